@@ -14,16 +14,16 @@ use crate::process::target_directory;
 pub struct Background {
     name: &'static str,
     child: Child,
-    said: PathBuf,
+    output_file: PathBuf,
 }
 
 impl Background {
-    pub fn begin(name: &'static str) -> Result<Self, String> {
+    pub fn spawn(name: &'static str) -> Result<Self, String> {
         let cannot = |e: std::io::Error| format!("cargo xtask {name}: {e}");
         let folder = target_directory().join("beside");
         fs::create_dir_all(&folder).map_err(cannot)?;
-        let said = folder.join(format!("{name}.txt"));
-        let file = File::create(&said).map_err(cannot)?;
+        let output_file = folder.join(format!("{name}.txt"));
+        let file = File::create(&output_file).map_err(cannot)?;
         let child = Command::new(env::current_exe().map_err(cannot)?)
             .arg(name)
             .stdin(Stdio::null())
@@ -31,14 +31,18 @@ impl Background {
             .stdout(file)
             .spawn()
             .map_err(cannot)?;
-        Ok(Self { name, child, said })
+        Ok(Self {
+            name,
+            child,
+            output_file,
+        })
     }
 
     /// Waits for the end of the task and prints its output.
     pub fn end(mut self) -> Result<(), String> {
         let name = self.name;
         let status = self.child.wait().map_err(|e| format!("cargo xtask {name}: {e}"))?;
-        print!("{}", fs::read_to_string(&self.said).unwrap_or_default());
+        print!("{}", fs::read_to_string(&self.output_file).unwrap_or_default());
         if status.success() {
             return Ok(());
         }

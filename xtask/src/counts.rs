@@ -71,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_add_up_over_crates() {
+    fn test_counts_add_up_over_crates() {
         let mut counts = Counts::default();
         for line in [
             "running 3 tests",
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_line_of_pytest_counts() {
+    fn pytest_counts_come_from_the_summary_line() {
         let mut counts = Counts::default();
         for line in [
             "tests/test_core.py .......",

@@ -48,7 +48,7 @@ const BANNED: [(&str, &str); 16] = [
     ("lazy_static", "use std::sync::OnceLock or LazyLock"),
 ];
 /// Crates of [`BANNED`] that are tolerated, with reasons.
-const TOLERATED: [(&str, &str); 5] = [
+const TOLERATED_CRATES: [(&str, &str); 5] = [
     ("core-foundation-sys", "the system of macOS"),
     ("js-sys", "the browser, which hoid is not built for"),
     ("linux-raw-sys", "numbers of Linux, nothing to link"),
@@ -78,7 +78,7 @@ const SEVERAL: [(&str, usize, &str); 9] = [
 
 /// Maximum number of crates in the dependency tree of `hoid-cli` on Linux, including the crates of hoid. A further
 /// crate needs a reason and a row in the table of dependencies of ARCHITECTURE.md.
-const MOST_CRATES: usize = 155;
+const MAX_CRATES: usize = 155;
 
 /// Checks all rules.
 pub fn check() -> Result<(), String> {
@@ -99,9 +99,9 @@ pub fn check() -> Result<(), String> {
         .args(["--target", "x86_64-unknown-linux-gnu", "--format", "{p}"]);
     let tree = output(&mut tree)?;
     let crates: BTreeSet<&str> = tree.lines().map(|line| line.trim_end_matches(" (*)")).collect();
-    if crates.len() > MOST_CRATES {
+    if crates.len() > MAX_CRATES {
         wrong.push(format!(
-            "hoid-cli is built from {} crates, expected at most {MOST_CRATES}: leave one out, or raise MOST_CRATES in \
+            "hoid-cli is built from {} crates, expected at most {MAX_CRATES}: leave one out, or raise MAX_CRATES in \
              xtask/src/crates.rs with the reason in ARCHITECTURE.md",
             crates.len()
         ));
@@ -220,7 +220,7 @@ fn take(rest: &mut &[&str], word: &str) -> bool {
 /// Returns the reason why a crate is unwanted; `None` if it is not.
 fn ban_of(package: &Package) -> Option<String> {
     let name = package.name.as_str();
-    if TOLERATED.iter().any(|(known, _)| *known == name) {
+    if TOLERATED_CRATES.iter().any(|(known, _)| *known == name) {
         return None;
     }
     let matches = |pattern: &str| match (pattern.strip_prefix('*'), pattern.strip_suffix('*')) {
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn expressions_of_licences() {
+    fn licence_expressions_are_evaluated() {
         for (expression, expected) in [
             ("MIT", Some(true)),
             ("MIT/Apache-2.0", Some(true)),
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn banned_crates_and_their_families() {
+    fn banned_crates_and_their_families_are_found() {
         for name in ["openssl-sys", "openssl", "arrow", "arrow-array", "lazy_static"] {
             assert!(ban_of(&package(name, "1.0.0", None)).is_some(), "{name}");
         }
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn a_second_version_needs_a_statement() {
+    fn second_version_must_be_declared() {
         let two = [package("a", "1.0.0", None), package("a", "2.0.0", None)];
         let said = several(&two);
         assert!(

@@ -85,7 +85,7 @@ fn test(arguments: &[String]) -> Result<(), String> {
     let shown = format!("{command:?}");
     let mut total = Counts::default();
     let status = if arguments.is_empty() {
-        let required = Background::begin(python::REQUIRE)?;
+        let required = Background::spawn(python::REQUIRE)?;
         cargo(&["test", "--workspace", "--no-run"], &[])?;
         let mut required = Some(required.end());
         let mut built = Ok(None);
@@ -93,7 +93,7 @@ fn test(arguments: &[String]) -> Result<(), String> {
             // The build must not start before the first test runs: until then the two cargo processes would block each
             // other.
             if let Some(required) = required.take() {
-                built = required.and_then(|()| Background::begin(python::BUILD).map(Some));
+                built = required.and_then(|()| Background::spawn(python::BUILD).map(Some));
             }
             total.add(line);
         })?;

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_passage_is_replaced_and_nothing_else() {
+    fn only_the_generated_section_is_replaced() {
         let page = "a\n<!-- generated: x -->\nold\n<!-- end: x -->\nb\n";
         let once = replaced(page, "x", "new\n").unwrap();
         assert_eq!(once, "a\n<!-- generated: x -->\n\nnew\n\n<!-- end: x -->\nb\n");

@@ -24,7 +24,7 @@ pub const REQUIRE: &str = "python-require";
 pub const BUILD: &str = "python-build";
 
 /// Oldest Python version that the package supports.
-const OLDEST: (u32, u32) = (3, 10);
+const OLDEST_PYTHON: (u32, u32) = (3, 10);
 
 /// Builds and installs the wheel, and runs pytest with these arguments.
 pub fn test(arguments: &[String]) -> Result<Counts, String> {
@@ -215,7 +215,7 @@ fn interpreter() -> Result<String, String> {
         let text = String::from_utf8_lossy(&output.stdout).trim().to_owned();
         let mut parts = text.split(' ').map(str::parse::<u32>);
         if let (Some(Ok(major)), Some(Ok(minor))) = (parts.next(), parts.next()) {
-            if (major, minor) >= OLDEST {
+            if (major, minor) >= OLDEST_PYTHON {
                 return Ok(name);
             }
             found.push(format!("{name} is {major}.{minor}"));
@@ -223,8 +223,8 @@ fn interpreter() -> Result<String, String> {
     }
     Err(format!(
         "the tests of the Python package need Python {}.{} or newer{}; install it, or name it in HOID_PYTHON",
-        OLDEST.0,
-        OLDEST.1,
+        OLDEST_PYTHON.0,
+        OLDEST_PYTHON.1,
         if found.is_empty() {
             ", and none was found".to_owned()
         } else {
@@ -244,7 +244,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_requirements_of_an_extra_are_found() {
+    fn requirements_of_an_extra_are_found() {
         let project = "[project]\ntest = [\"no\"]\n\n[project.optional-dependencies]\nlsl = [\"pylsl\"]\n\
                        test = [\n    \"pytest\",\n    \"matplotlib>=3.7\",\n    \"dask[distributed]\",\n    \"pyxdf\",\n]\n\
                        last = [\"other\"]\n";

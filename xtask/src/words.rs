@@ -242,7 +242,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_are_found_in_prose_alone() {
+    fn banned_words_are_found_only_in_prose() {
         let source = "/// Begins `begin` here.\nlet begins = \"it says so\"; // sought\n/// ```\n/// begin\n/// ```\nlet c = '\"';\n";
         let found: Vec<(usize, Vec<&str>)> = (of_rust(source).into_iter())
             .map(|(line, prose)| (line, banned_in(&prose).into_iter().map(|(word, _)| word).collect()))
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn pages_and_packages_have_prose_too() {
+    fn prose_of_markdown_and_python_is_extracted() {
         assert_eq!(of_markdown("a\n```\nbegin\n```\nb").len(), 2);
         let package = "begin = 1  # it begins\n\"\"\"Doc\nbegin\n\"\"\"\nx = 1\n";
         assert_eq!(of_python(package).len(), 4);

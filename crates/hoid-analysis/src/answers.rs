@@ -6,7 +6,7 @@
 //! the crossover is requested, and not determined if the delay is requested. By default the response is requested, and
 //! an undetermined crossover or margin gives a warning.
 
-use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_open, family::FamilyFit};
+use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_undetermined, family::FamilyFit};
 use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
 
 use crate::AnalysisError;
@@ -164,8 +164,8 @@ pub(crate) fn of_operator(fit: &Fit) -> Vec<Answered> {
     let mut all = vec![answered(RESPONSE, None)];
     if let Ok(operator) = fit.operator() {
         all.extend(operator.rows().iter().map(|(name, _, estimate)| {
-            let why =
-                is_open(estimate).then(|| format!("{name} ({estimate}) is not significantly different from zero"));
+            let why = is_undetermined(estimate)
+                .then(|| format!("{name} ({estimate}) is not significantly different from zero"));
             answered(name, why)
         }));
     }

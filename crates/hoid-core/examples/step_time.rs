@@ -6,7 +6,7 @@
 
 use std::time::Instant;
 
-use hoid_core::adaptive::{AdaptiveFilter, defaults::DefaultOperator, least_memory, memory_needed};
+use hoid_core::adaptive::{AdaptiveFilter, defaults::DefaultOperator, memory_needed, min_memory};
 
 const LENGTH_S: f64 = 120.0;
 
@@ -32,7 +32,7 @@ fn shortest_us(run: &[(f64, f64)], ts_s: f64, replay_s: f64, repetitions: u32) -
     let memory = if replay_s > 0.0 {
         memory_needed(ts_s, replay_s)
     } else {
-        least_memory(ts_s)
+        min_memory(ts_s)
     };
     let prior = DefaultOperator::with_delay(0.2).prior(ts_s);
     let mut shortest = vec![f64::INFINITY; run.len()];

@@ -12,7 +12,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_of_any_kind_do_no_harm() {
+    fn nan_and_reversed_bounds_are_handled() {
         assert_eq!([-1.0, 0.5, 3.0].map(|x| within(x, [0.0, 2.0])), [0.0, 0.5, 2.0]);
         assert_eq!(within(5.0, [f64::NAN, 2.0]), 2.0);
         assert_eq!(within(5.0, [0.0, f64::NAN]), 5.0);

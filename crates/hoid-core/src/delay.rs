@@ -45,7 +45,7 @@ mod tests {
     use std::vec::Vec;
 
     #[test]
-    fn delays_by_the_length_of_its_memory() {
+    fn delay_equals_the_length_of_the_memory() {
         for n in 0..4 {
             let mut memory = [7.0; 4];
             let mut line = DelayLine::new(&mut memory[..n]);

@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_sixty_digits() {
+    fn values_agree_with_60_digit_reference() {
         // From fixtures/hold/make.py.
         let lines = include_str!("../../../fixtures/hold/divided_differences.csv").lines();
         for line in lines.skip(1) {
@@ -311,7 +311,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ways_of_evaluation_agree_where_they_meet() {
+    fn evaluation_methods_agree_at_their_boundaries() {
         let meet = |size: f64, one: fn(f64, f64) -> DividedDifferences, other: fn(f64, f64) -> DividedDifferences| {
             for (s, q) in pairs_of_size(size) {
                 // Each value is within 16 eps of the exact value.
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn the_branches_of_the_exponentials_agree_where_they_meet() {
+    fn exponential_branches_agree_at_their_boundaries() {
         for h in [-6.0, -1.5, 1.5] {
             // x = h^2 - q at -1, 0, 1 and where sqrt x = 0.25.
             for x in [-1.0, 0.0, 0.0625, 1.0] {
@@ -391,13 +391,13 @@ mod tests {
     }
 
     #[test]
-    fn no_pole_at_all() {
+    fn values_at_the_origin_are_exact() {
         let d = DividedDifferences::at(0.0, 0.0);
         assert_eq!(values(&d), [1.0, 1.0, 0.5, 1.0 / 6.0, 1.0, 0.5, 1.0, 0.5]);
     }
 
     #[test]
-    fn what_is_not_finite_gives_nan() {
+    fn non_finite_arguments_give_nan() {
         for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             for (s, q) in [(bad, 0.01), (bad, 0.0), (-0.1, bad), (0.0, bad), (bad, bad)] {
                 let found = values(&DividedDifferences::at(s, q));

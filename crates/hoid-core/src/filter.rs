@@ -217,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn division_undoes_multiplication_for_every_order() {
+    fn division_inverts_multiplication_for_every_order() {
         let d = [-0.7, 0.31, -0.12, 0.05, -0.02, 0.01];
         let x = wave(200);
         for n in 0..=d.len() {
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_division_in_parts_is_the_division() {
+    fn division_in_parts_equals_one_division() {
         let d = [-0.7, 0.31, -0.12, 0.05, -0.02, 0.01];
         for n in 0..=d.len() {
             let mut whole = wave(200);
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn fir_delays_and_weighs() {
+    fn fir_applies_delay_and_coefficients() {
         let mut y = [0.0; 5];
         fir(&[2.0, 3.0], 1, &[1.0, 10.0, 0.0, 0.0, 0.0], &mut y);
         assert_eq!(y, [0.0, 2.0, 23.0, 30.0, 0.0]);
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn empty_and_short_slices_pass() {
+    fn empty_and_short_slices_are_accepted() {
         divide_in_place(&[0.5, 0.2, 0.1], &mut []);
         let mut one = [1.0];
         divide_in_place(&[0.5, 0.2, 0.1], &mut one);

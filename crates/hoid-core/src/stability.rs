@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_known_roots() {
+    fn stability_agrees_with_known_roots() {
         for &largest in &[0.6, 0.9, 0.999, 1.001, 1.2, 3.0] {
             for &angle in &[0.05, 1.0, 2.5] {
                 let p = polynomial(&[0.5, -0.2], &[(largest, angle), (0.4, 0.7)]);
@@ -92,14 +92,14 @@ mod tests {
     }
 
     #[test]
-    fn a_pole_on_the_circle_is_not_inside() {
+    fn pole_on_the_unit_circle_is_not_inside() {
         assert!(!roots_inside(&[-1.0], 1.0));
         assert!(!roots_inside(&[0.0, 1.0], 1.0));
         assert!(!roots_inside(&[-2.0, 1.0], 1.0));
     }
 
     #[test]
-    fn degenerate_input() {
+    fn degenerate_polynomials_are_handled() {
         assert!(roots_inside(&[], 1.0));
         assert!(roots_inside(&[0.0, 0.0, 0.0], 1.0));
         assert!(!roots_inside(&[f64::NAN], 1.0));

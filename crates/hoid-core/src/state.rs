@@ -32,11 +32,11 @@ impl State for bool {
     }
 }
 
-/// Upper limit of restored 64-bit counters; `MOST_OF_32` is the limit for 32-bit counters. No run reaches them, so
+/// Upper limit of restored 64-bit counters; `MAX_COUNT_32` is the limit for 32-bit counters. No run reaches them, so
 /// counting never overflows even after invalid numbers were restored.
-const MOST: f64 = 9_007_199_254_740_992.0;
-const MOST_OF_32: f64 = 2_147_483_648.0;
-const MOST_OF_USIZE: f64 = if usize::BITS > 32 { MOST } else { MOST_OF_32 };
+const MAX_COUNT: f64 = 9_007_199_254_740_992.0;
+const MAX_COUNT_32: f64 = 2_147_483_648.0;
+const MAX_COUNT_USIZE: f64 = if usize::BITS > 32 { MAX_COUNT } else { MAX_COUNT_32 };
 
 macro_rules! counters {
     ($($type:ty, $most:expr);+) => {$(
@@ -49,7 +49,7 @@ macro_rules! counters {
         }
     )+};
 }
-counters!(u32, MOST_OF_32; u64, MOST; usize, MOST_OF_USIZE);
+counters!(u32, MAX_COUNT_32; u64, MAX_COUNT; usize, MAX_COUNT_USIZE);
 
 impl<T: State> State for [T] {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {

@@ -8,7 +8,7 @@ use hoid_core::{
         defaults::{DefaultOperator, REPLAYED_S},
         detector::Detection,
         initial_estimate::InitialEstimate,
-        least_memory, memory_needed,
+        memory_needed, min_memory,
         mixture::ChangePrior,
         noise::Lags,
     },
@@ -110,7 +110,7 @@ impl Person {
     }
 }
 
-const GAINS_OF_A_PERSON: [f64; GAINS] = [1.2, 1.8, 0.9];
+const OPERATOR_GAINS: [f64; GAINS] = [1.2, 1.8, 0.9];
 
 fn response(basis: &Basis, gains: [f64; GAINS], omega: f64) -> [f64; 2] {
     let h = basis.response(omega, basis.point());
@@ -130,13 +130,13 @@ fn estimate(filter: &AdaptiveFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2
 }
 
 #[test]
-fn bands_cover_and_precision_grows() {
+fn bands_cover_the_truth_and_narrow_with_time() {
     let (mut inside, mut all) = (0.0, 0.0);
     let mut squares = [0.0; 2];
     for seed in 0..16 {
         let (mut person, mut filter) = (Person::new(seed), filter(1e9));
         for k in 0..5000 {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+            let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
             filter.step(e, u);
             let age = match k {
                 499 => 0,
@@ -144,7 +144,7 @@ fn bands_cover_and_precision_grows() {
                 _ => continue,
             };
             for omega in [1.0, 2.0, 4.0] {
-                let truth = response(&person.basis, GAINS_OF_A_PERSON, omega);
+                let truth = response(&person.basis, OPERATOR_GAINS, omega);
                 let (value, variance) = estimate(&filter, omega);
                 for part in 0..2 {
                     let error = value[part] - truth[part];
@@ -181,13 +181,13 @@ fn steep(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
 }
 
 #[test]
-fn a_steep_remnant_is_no_harder_than_a_flat_one() {
+fn steep_remnant_is_estimated_as_precisely_as_a_flat_one() {
     let mut precision = Vec::new();
     for poles in [1, 4] {
         let (v, variance) = steep(poles, 5000, 7);
         let (mut person, mut filter) = (Person::new(3), filter(1e9));
         for (k, v) in v.iter().enumerate() {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.0);
+            let [e, u] = person.sample(OPERATOR_GAINS, 0.0);
             filter.step(e, u + v);
             if k == 1000 {
                 // The innovations have .1 to 60 thousandths of the power of u; their scale is found immediately from
@@ -196,7 +196,7 @@ fn a_steep_remnant_is_no_harder_than_a_flat_one() {
                 assert!((0.7..1.5).contains(&ratio), "{poles} poles: {ratio}");
             }
         }
-        let truth = response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0);
+        let truth = response(&basis(default_operator()), OPERATOR_GAINS, 2.0);
         let (value, variance) = estimate(&filter, 2.0);
         for part in 0..2 {
             let z = (value[part] - truth[part]) / variance[part].sqrt();
@@ -220,7 +220,7 @@ fn neuromuscular_system_and_delay_are_found() {
     for seed in 0..3 {
         let (mut person, mut filter) = (Person::at(300 + seed, point), filter(1e9));
         for _ in 0..6000 {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.02);
+            let [e, u] = person.sample(OPERATOR_GAINS, 0.02);
             filter.step(e, u);
         }
         let found = filter.dynamics();
@@ -231,7 +231,7 @@ fn neuromuscular_system_and_delay_are_found() {
 }
 
 #[test]
-fn one_who_is_far_from_what_is_usual_is_found() {
+fn operators_far_from_the_prior_are_found() {
     // A delay 100 ms longer than the prior, and a system of 16 rad/s with a delay that is 60 ms shorter: from the
     // default person alone, the corrections converge to another minimum.
     for (point, seed) in [
@@ -254,7 +254,7 @@ fn one_who_is_far_from_what_is_usual_is_found() {
     ] {
         let (mut person, mut filter) = (Person::at(seed, point), filter(1e9));
         for _ in 0..4000 {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.02);
+            let [e, u] = person.sample(OPERATOR_GAINS, 0.02);
             filter.step(e, u);
         }
         let found = filter.dynamics();
@@ -264,7 +264,7 @@ fn one_who_is_far_from_what_is_usual_is_found() {
 }
 
 #[test]
-fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
+fn delay_change_is_distinguished_from_a_gain_change() {
     let later = Point {
         tau: 0.21,
         ..default_operator()
@@ -275,15 +275,15 @@ fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
         let mut other = basis(later);
         let mut past = vec![0.0; other.delay() + 3];
         for k in 0..3000 {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.08);
+            let [e, u] = person.sample(OPERATOR_GAINS, 0.08);
             past.rotate_right(1);
             past[0] = e;
             let l = other.delay();
             let z = other.step([past[l], past[l + 1], past[l + 2]]);
-            let answers = |x: [f64; GAINS]| -> f64 { GAINS_OF_A_PERSON.iter().zip(x).map(|(g, x)| g * x).sum() };
+            let response_of = |x: [f64; GAINS]| -> f64 { OPERATOR_GAINS.iter().zip(x).map(|(g, x)| g * x).sum() };
             // The change takes half a second.
             let part = ((f64::from(k) - 1500.0) / 25.0).clamp(0.0, 1.0);
-            let u = u + part * (answers(other.regressors(&z).x) - person.w);
+            let u = u + part * (response_of(other.regressors(&z).x) - person.w);
             filter.step(e, u);
             if filter.detector().declared() && (1500..2000).contains(&k) {
                 let told = filter.detector().difference();
@@ -296,13 +296,13 @@ fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
 }
 
 #[test]
-fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
+fn change_is_tracked_and_a_larger_remnant_is_no_change() {
     let (mut found, mut errors) = (0, 0.0);
     for seed in 0..4 {
         let (mut person, mut filter) = (Person::new(100 + seed), filter(12.5));
-        let after = GAINS_OF_A_PERSON.map(|g| 0.5 * g);
+        let after = OPERATOR_GAINS.map(|g| 0.5 * g);
         for k in 0..3000 {
-            let gains = if k < 1500 { GAINS_OF_A_PERSON } else { after };
+            let gains = if k < 1500 { OPERATOR_GAINS } else { after };
             let [e, u] = person.sample(gains, 0.03);
             filter.step(e, u);
             found += u32::from(filter.detector().declared() && (1500..2000).contains(&k));
@@ -324,7 +324,7 @@ fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
     for seed in 0..4 {
         let (mut person, mut filter) = (Person::new(200 + seed), filter(12.5));
         for k in 0..3000 {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, if k < 1500 { 0.03 } else { 0.06 });
+            let [e, u] = person.sample(OPERATOR_GAINS, if k < 1500 { 0.03 } else { 0.06 });
             filter.step(e, u);
             alarms += u32::from(filter.detector().declared());
         }
@@ -333,20 +333,20 @@ fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
 }
 
 #[test]
-fn what_stands_still_is_no_change_and_one_behind_it_is_found() {
+fn constant_span_is_no_change_and_a_later_change_is_found() {
     let (mut alarms, mut found) = (0, 0);
     for seed in 0..4 {
         let (mut person, mut filter) = (Person::new(300 + seed), filter(12.5));
         for k in 0..4500 {
             let gains = if k < 2500 {
-                GAINS_OF_A_PERSON
+                OPERATOR_GAINS
             } else {
-                GAINS_OF_A_PERSON.map(|g| 0.5 * g)
+                OPERATOR_GAINS.map(|g| 0.5 * g)
             };
             let [e, u] = person.sample(gains, 0.03);
             // The recording contains zeros for three seconds, and once more while the gains change.
-            let stands = (1500..1650).contains(&k) || (2400..2550).contains(&k);
-            let [e, u] = if stands { [0.0; 2] } else { [e, u] };
+            let is_constant = (1500..1650).contains(&k) || (2400..2550).contains(&k);
+            let [e, u] = if is_constant { [0.0; 2] } else { [e, u] };
             filter.step(e, u);
             let declared = u32::from(filter.detector().declared());
             alarms += if k < 2550 { declared } else { 0 };
@@ -358,10 +358,10 @@ fn what_stands_still_is_no_change_and_one_behind_it_is_found() {
 }
 
 #[test]
-fn a_copy_goes_on_with_the_same_digits() {
+fn restored_filter_continues_bit_identically() {
     let (mut person, mut first) = (Person::new(5), filter(12.5));
     for _ in 0..1234 {
-        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
         first.step(e, u);
     }
     let mut numbers = Vec::new();
@@ -371,7 +371,7 @@ fn a_copy_goes_on_with_the_same_digits() {
     second.visit(&mut |number| *number = *left.next().expect("as many numbers"));
     assert!(left.next().is_none());
     for k in 0..1000 {
-        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
         assert_eq!(first.step(e, u), second.step(e, u), "{k}");
         assert_eq!(
             first.detector().log_significance(),
@@ -382,7 +382,7 @@ fn a_copy_goes_on_with_the_same_digits() {
 }
 
 #[test]
-fn what_says_nothing_does_no_harm() {
+fn uninformative_data_keep_the_filter_finite() {
     let mut silent = filter(12.5);
     for _ in 0..500 {
         assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
@@ -396,10 +396,10 @@ fn what_says_nothing_does_no_harm() {
     assert!(!silent.has_started());
 
     let (mut person, mut filter) = (Person::new(9), filter(12.5));
-    let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+    let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
     assert!(filter.step(e, u).innovation.is_finite() && !filter.has_started());
     for k in 0..2000 {
-        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
         match k % 7 {
             0 => filter.bridge(e),
             1 => assert!(filter.step_without_update(e, u).innovation.is_finite()),
@@ -413,19 +413,19 @@ fn what_says_nothing_does_no_harm() {
     let (value, variance) = estimate(&filter, 2.0);
     assert!(value.iter().chain(&variance).all(|v| v.is_finite()));
     assert!(filter.step(1e200, 1.0).shortened || filter.step(1.0, 1e200).shortened);
-    let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+    let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
     assert!(filter.step(e, u).innovation.is_finite() && filter.restarts() > 0);
 }
 
 #[test]
-fn an_outlier_hardly_moves_the_estimate() {
+fn outlier_hardly_moves_the_estimate() {
     let (mut person, mut filter) = (Person::new(11), filter(12.5));
     for _ in 0..1500 {
-        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
         filter.step(e, u);
     }
     let (before, variance) = estimate(&filter, 2.0);
-    let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+    let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
     filter.step(e, u + 100.0);
     let (after, _) = estimate(&filter, 2.0);
     for part in 0..2 {
@@ -434,8 +434,8 @@ fn an_outlier_hardly_moves_the_estimate() {
 }
 
 #[test]
-fn what_makes_no_sense_is_refused() {
-    let memory = || vec![0.0; least_memory(TS)];
+fn invalid_priors_and_memory_are_refused() {
+    let memory = || vec![0.0; min_memory(TS)];
     assert!(AdaptiveFilter::new(prior(13.5), vec![0.0; 3]).is_none());
     let sound = prior(13.5);
     let changed = |mean_interval_s: f64, steady: f64| ChangePrior {
@@ -483,22 +483,22 @@ fn what_makes_no_sense_is_refused() {
 }
 
 #[test]
-fn without_memory_nothing_is_replayed_and_the_person_is_followed() {
+fn operator_is_tracked_without_replay_memory() {
     let (mut lean, mut replayed) = (0.0, 0.0);
     for seed in 0..4 {
         let mut person = Person::new(700 + seed);
-        let memory = vec![0.0; least_memory(TS)];
+        let memory = vec![0.0; min_memory(TS)];
         let mut filters = [
             filter(1e9),
             AdaptiveFilter::new(prior(1e9), memory).expect("a sound prior"),
         ];
         for _ in 0..3000 {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+            let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
             filters.iter_mut().for_each(|filter| {
                 filter.step(e, u);
             });
         }
-        let truth = response(&person.basis, GAINS_OF_A_PERSON, 2.0);
+        let truth = response(&person.basis, OPERATOR_GAINS, 2.0);
         let error = |filter: &AdaptiveFilter<Vec<f64>>| {
             let (value, _) = estimate(filter, 2.0);
             (value[0] - truth[0]).hypot(value[1] - truth[1]) / truth[0].hypot(truth[1])
@@ -510,9 +510,9 @@ fn without_memory_nothing_is_replayed_and_the_person_is_followed() {
 }
 
 #[test]
-fn what_is_known_stands_at_the_beginning() {
+fn initial_estimate_is_used() {
     let mut state = [0.0; STATES];
-    state[..GAINS].copy_from_slice(&GAINS_OF_A_PERSON);
+    state[..GAINS].copy_from_slice(&OPERATOR_GAINS);
     let mut covariance = [[0.0; STATES]; STATES];
     for (i, row) in covariance.iter_mut().enumerate() {
         row[i] = 1e-3;
@@ -540,17 +540,17 @@ fn what_is_known_stands_at_the_beginning() {
     }
     let (value, truth) = (
         told.response(2.0),
-        response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0),
+        response(&basis(default_operator()), OPERATOR_GAINS, 2.0),
     );
     assert!((value[0] - truth[0]).hypot(value[1] - truth[1]) < 1e-9);
     // Compared with a filter without an initial estimate, over ten seconds.
     let (mut person, mut other) = (Person::new(3), filter(1e9));
     let mut errors = [0.0; 2];
     for k in 0..500 {
-        let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+        let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
         told.step(e, u);
         other.step(e, u);
-        let truth = response(&person.basis, GAINS_OF_A_PERSON, 2.0);
+        let truth = response(&person.basis, OPERATOR_GAINS, 2.0);
         for (sum, filter) in errors.iter_mut().zip([&told, &other]).filter(|_| k >= 60) {
             let (value, _) = estimate(filter, 2.0);
             *sum += (value[0] - truth[0]).powi(2) + (value[1] - truth[1]).powi(2);
@@ -573,33 +573,33 @@ fn what_is_known_stands_at_the_beginning() {
 }
 
 #[test]
-fn a_stick_that_ends_does_not_make_the_person_answer_less() {
+fn stick_limit_does_not_bias_the_response() {
     let (mut told, mut taken) = (0.0, 0.0);
     for seed in 0..4 {
         let (mut person, mut free) = (Person::new(400 + seed), filter(12.5));
-        let (mut knows, mut does_not) = (filter(12.5), filter(13.5));
+        let (mut with_limit, mut without_limit) = (filter(12.5), filter(13.5));
         let mut power = 0.0;
         for _ in 0..3000 {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+            let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
             power += u * u;
             free.step(e, u);
         }
         let end = 1.2 * (power / 3000.0).sqrt();
         let mut person = Person::new(400 + seed);
         for k in 0..3000 {
-            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+            let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
             let stick = u.clamp(-end, end);
-            knows.step(e, stick);
+            with_limit.step(e, stick);
             // No two consecutive samples are equal, so the limit of the stick is not recognised.
-            does_not.step(e, stick * (1.0 + 1e-9 * f64::from(k % 2)));
+            without_limit.step(e, stick * (1.0 + 1e-9 * f64::from(k % 2)));
         }
         let (of, _) = estimate(&free, 2.0);
         let distance = |filter: &AdaptiveFilter<Vec<f64>>| {
             let (y, _) = estimate(filter, 2.0);
             (y[0] - of[0]).hypot(y[1] - of[1]) / of[0].hypot(of[1])
         };
-        told += distance(&knows) / 4.0;
-        taken += distance(&does_not) / 4.0;
+        told += distance(&with_limit) / 4.0;
+        taken += distance(&without_limit) / 4.0;
     }
     assert!(told < 0.5 * taken, "{told:.3} for {taken:.3}");
 }

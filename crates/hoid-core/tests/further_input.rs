@@ -34,7 +34,7 @@ fn two_inputs(samples: usize, seed: u64) -> Vec<[f64; 3]> {
 }
 
 #[test]
-fn a_further_input_alone_is_the_first_input() {
+fn single_further_input_equals_the_first_input() {
     // theta of the model with one input is [b0, b1, c1, d1, f1, f2, -]; with the input as a further one it is [c1, d1,
     // b0, b1, f1, f2, -].
     let order = [2, 3, 0, 1, 4, 5, 6];
@@ -140,7 +140,7 @@ fn psi_is_the_negative_derivative_of_the_innovation() {
 }
 
 #[test]
-fn without_forgetting_the_estimate_is_that_of_least_squares() {
+fn infinite_memory_gives_the_least_squares_estimate() {
     // ARX with two inputs: theta = [a1, b0, b1, b0 of r, b1 of r].
     let shape = AnyShape {
         na: 1,
@@ -182,7 +182,7 @@ fn without_forgetting_the_estimate_is_that_of_least_squares() {
 }
 
 #[test]
-fn an_unstable_or_too_large_further_input_is_refused() {
+fn unstable_or_too_large_further_input_is_refused() {
     let shape = AnyShape {
         nb: 1,
         nf: 1,
@@ -207,7 +207,7 @@ fn an_unstable_or_too_large_further_input_is_refused() {
 }
 
 #[test]
-fn after_an_overflow_the_filters_of_all_inputs_are_at_rest() {
+fn reset_clears_the_filters_of_all_inputs() {
     let shape = AnyShape {
         nb: 1,
         ..AnyShape::default()

@@ -42,7 +42,7 @@ fn ways<const N: usize>() -> Vec<Forgetting<N>> {
 }
 
 #[test]
-fn factors_are_the_plain_covariance_for_every_way_of_forgetting() {
+fn factored_covariance_matches_the_plain_form() {
     let data = box_jenkins(20_000, 1, 0.02);
     let shape = shapes()[4];
     for forgetting in ways::<5>() {
@@ -88,7 +88,7 @@ fn factors_are_the_plain_covariance_for_every_way_of_forgetting() {
 }
 
 #[test]
-fn without_c_d_and_f_the_prediction_error_method_is_least_squares_to_the_last_bit() {
+fn rpem_without_c_d_f_is_bit_identical_to_rls() {
     let data = box_jenkins(3000, 2, 0.02);
     let shape = shapes()[0];
     for forgetting in ways::<4>() {
@@ -130,7 +130,7 @@ fn without_c_d_and_f_the_prediction_error_method_is_least_squares_to_the_last_bi
 }
 
 #[test]
-fn without_error_bars_the_estimate_is_the_same_to_the_last_bit() {
+fn estimate_without_error_bars_is_bit_identical() {
     let data = box_jenkins(3000, 21, 0.02);
     let (arx, bj) = (shapes()[0], shapes()[4]);
     let unlimited = |p0: f64| {
@@ -172,7 +172,7 @@ fn without_error_bars_the_estimate_is_the_same_to_the_last_bit() {
 }
 
 #[test]
-fn orders_in_the_type_are_the_same_recursion_to_the_last_bit() {
+fn fixed_and_dynamic_orders_are_bit_identical() {
     let data = box_jenkins(3000, 13, 0.02);
     let shape = shapes()[4];
     let adaptation = covariance::<5>(0.1, Forgetting::Exponential { lambda: [LAMBDA; 5] });
@@ -203,7 +203,7 @@ fn orders_in_the_type_are_the_same_recursion_to_the_last_bit() {
 }
 
 #[test]
-fn a_forgetting_matrix_with_equal_entries_is_the_scalar_factor() {
+fn equal_forgetting_matrix_matches_the_scalar_factor() {
     let data = box_jenkins(8192, 3, 0.02);
     let shape = shapes()[4];
     let make = |lambda: [f64; 5]| {
@@ -233,7 +233,7 @@ fn a_forgetting_matrix_with_equal_entries_is_the_scalar_factor() {
 }
 
 #[test]
-fn a_window_is_least_squares_over_its_samples() {
+fn window_matches_least_squares_over_its_samples() {
     const W: usize = 300;
     // Large samples come first: their rounding errors must be gone after two windows.
     let mut data = box_jenkins(2000, 4, 0.02);
@@ -304,7 +304,7 @@ fn gram_schmidt(rows: &[([f64; 4], f64)]) -> [f64; 4] {
 }
 
 #[test]
-fn without_forgetting_the_error_bars_are_the_covariance_and_with_it_their_known_limit() {
+fn error_bars_match_the_covariance_and_its_forgetting_limit() {
     let data = box_jenkins(30_000, 9, 0.02);
     let shape = shapes()[0];
     let spread_of = |lambda: f64| {
@@ -327,7 +327,7 @@ fn without_forgetting_the_error_bars_are_the_covariance_and_with_it_their_known_
 }
 
 #[test]
-fn the_guard_holds_every_variance_within_its_bound() {
+fn guard_keeps_every_variance_within_its_bound() {
     const BOUND: f64 = 50.0;
     let mut noise = Noise(10);
     for forgetting in ways::<5>().into_iter().skip(1) {
@@ -414,7 +414,7 @@ fn pseudo_linear_regression_finds_a_model_with_coloured_noise() {
 }
 
 #[test]
-fn shapes_that_do_not_fit_and_unstable_starts_are_refused() {
+fn mismatched_shapes_and_unstable_starts_are_refused() {
     let make = |shape: AnyShape, theta: [f64; 4]| {
         let adaptation = covariance::<4>(1.0, Forgetting::Exponential { lambda: [1.0; 4] });
         Rpem::new(

@@ -100,7 +100,7 @@ fn differences(regressor: Regressor) -> Vec<(String, f64)> {
 }
 
 #[test]
-fn the_gradient_is_one_filter_in_direct_form_while_theta_moves() {
+fn gradient_is_one_direct_form_filter_for_varying_theta() {
     let found = differences(Regressor::Gradient);
     assert_eq!(found.len(), 6);
     for (name, difference) in found {
@@ -111,7 +111,7 @@ fn the_gradient_is_one_filter_in_direct_form_while_theta_moves() {
 /// Shows that the test can fail: a cascade of 1/F and D/C is a different recursion if the model has F together with C
 /// or D.
 #[test]
-fn a_cascade_is_another_recursion() {
+fn cascade_differs_from_the_direct_form() {
     for (name, difference) in differences(Regressor::Cascade) {
         let same = ["armax", "oe", "ararx"].contains(&name.as_str());
         assert_eq!(difference < 1e-9, same, "{name}: {difference:e}");
@@ -122,7 +122,7 @@ fn a_cascade_is_another_recursion() {
 /// and one zero the difference of the cascade and the direct form is
 /// `Delta(t) = -f(t) Delta(t-1) + [f(t) d(t-1) - d(t) f(t-1)] z(t-2)`, `z = x/F`.
 #[test]
-fn the_order_of_two_filters_differs_by_the_moves_of_theta() {
+fn filter_order_matters_only_while_theta_changes() {
     let shape = FixedShape::<0, 1, 0, 1, 1>;
     let [mut direct, mut cascade] =
         [Regressor::Gradient, Regressor::Cascade].map(|regressor| Predictor::<_, 3, 3>::new(shape, regressor).unwrap());

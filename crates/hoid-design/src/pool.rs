@@ -26,9 +26,9 @@ use serde_json::{Value, json};
 use crate::compare::{CompareError, Observation, Weights, meta_mean, variance_between_people};
 
 /// Parameters with the same meaning in every form.
-const OF_ANY_FORM: [&str; 3] = ["omega_nm", "zeta_nm", "tau_e"];
+const FORM_INDEPENDENT_NAMES: [&str; 3] = ["omega_nm", "zeta_nm", "tau_e"];
 /// Smallest number of people with information for which a parameter is pooled.
-const LEAST_PEOPLE: usize = 3;
+const MIN_PEOPLE: usize = 3;
 /// Share of the prior above which the data of a person are regarded as uninformative.
 const UNINFORMATIVE_PRIOR_SHARE: f64 = 0.9;
 
@@ -108,7 +108,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
         if !people.iter().any(|p| p.parameter(name).is_some()) {
             continue;
         }
-        if form.is_none() && !OF_ANY_FORM.contains(&name) {
+        if form.is_none() && !FORM_INDEPENDENT_NAMES.contains(&name) {
             let why = "the forms of people differ; name a form under [analysis] in group.toml".to_owned();
             found.left_out.push((name.to_owned(), why));
             continue;
@@ -150,10 +150,10 @@ fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
 fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
     let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
     // With only two people, the variance between them is practically unknown.
-    if known.len() < LEAST_PEOPLE {
+    if known.len() < MIN_PEOPLE {
         return Err(CompareError::TooFew {
             found: known.len(),
-            expected: LEAST_PEOPLE,
+            expected: MIN_PEOPLE,
         });
     }
     let mean = meta_mean(&known, Weights::default())?.coefficients[0];
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_known_badly_is_drawn_to_all() {
+    fn imprecise_estimates_are_shrunk_to_the_mean() {
         let found = of(&[(0.0, 0.01), (0.2, 0.01), (0.4, 0.01), (1.5, 1.0)]);
         let shrinkage: Vec<f64> = found.people.iter().map(|p| p.shrinkage).collect();
         assert!(shrinkage[3] > 0.9 && shrinkage[0] < 0.4, "{shrinkage:?}");
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn pooled_people_are_nearer_to_the_truth_and_their_errors_hold() {
+    fn pooling_reduces_errors_and_intervals_have_nominal_coverage() {
         let (mut own, mut all, mut held, mut count) = (0.0, 0.0, 0, 0);
         let mut rng = ChaCha8Rng::seed_from_u64(7);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -320,7 +320,7 @@ mod tests {
     }
 
     #[test]
-    fn the_prior_is_taken_out_before() {
+    fn prior_is_removed_before_pooling() {
         let parameter = |value: f64, share: f64| Parameter {
             name: "tau_e".to_owned(),
             unit: "s",
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn a_population_is_a_prior() {
+    fn population_can_be_used_as_a_prior() {
         let own: Vec<(&str, Option<Observation>)> = [("A", -1.6, 0.01), ("B", -1.4, 0.02), ("C", -1.5, 0.01)]
             .iter()
             .map(|(who, value, variance)| {
@@ -358,8 +358,12 @@ mod tests {
             .chain([("D", None)])
             .collect();
         let parameter = pooled(("tau_e", "s"), &own).unwrap();
-        let nobody = &parameter.people[3];
-        assert!(nobody.shrinkage == 1.0 && nobody.own.is_none() && (nobody.value - parameter.centre).abs() < 1e-12);
+        let unmeasured = &parameter.people[3];
+        assert!(
+            unmeasured.shrinkage == 1.0
+                && unmeasured.own.is_none()
+                && (unmeasured.value - parameter.centre).abs() < 1e-12
+        );
         let population = Population {
             condition: "fo".to_owned(),
             form: None,

@@ -51,7 +51,7 @@ fn crossover() -> Vec<Quantity> {
 }
 
 #[test]
-fn conditions_within_people() {
+fn conditions_are_compared_within_people() {
     let found = Comparing::default().run(&group(&THREE)).unwrap();
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
     let names: Vec<String> = found.differences.iter().map(|d| d.quantity.to_string()).collect();
@@ -85,7 +85,7 @@ fn conditions_within_people() {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn missing_results_are_reported() {
     let mut rows = THREE.to_vec();
     rows.push(("P11", "fo", 2.5, 0.1, 0.2, "lead"));
     rows[1].2 = f64::NAN; // null in JSON
@@ -127,7 +127,7 @@ fn what_is_missing_is_named() {
 }
 
 #[test]
-fn parameters_are_those_of_one_form() {
+fn parameters_are_compared_only_for_one_form() {
     let of = vec!["K".parse().unwrap(), "tau_e".parse().unwrap()];
     let comparing = Comparing {
         quantities: of,
@@ -148,7 +148,7 @@ fn parameters_are_those_of_one_form() {
 }
 
 #[test]
-fn groups_of_people_and_interactions() {
+fn groups_and_interactions_are_compared() {
     let rows: Vec<Row<'_>> = [("A", 2.0), ("B", 2.4), ("C", 2.2), ("D", 3.0), ("E", 3.5), ("F", 3.1)]
         .iter()
         .flat_map(|(who, w)| {
@@ -198,7 +198,7 @@ fn groups_of_people_and_interactions() {
 }
 
 #[test]
-fn a_result_is_written_and_read() {
+fn result_round_trips_through_json() {
     let found = Comparing::default().run(&group(&THREE)).unwrap();
     let text = found.to_json();
     assert_eq!(Comparison::from_json(&text).unwrap(), found);
@@ -218,7 +218,7 @@ fn a_result_is_written_and_read() {
 }
 
 #[test]
-fn errors_say_what_to_do() {
+fn error_messages_contain_advice() {
     let all = group(&THREE);
     let of = |names: &[&str]| names.iter().map(|n| n.parse().unwrap()).collect::<Vec<Quantity>>();
     let run = |comparing: Comparing| comparing.run(&all).unwrap_err().to_string();

@@ -25,14 +25,14 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 fn person(rng: &mut ChaCha8Rng, share: f64, mean: f64, tau: f64, estimated: bool) -> Observation {
     let error = 0.1 + 0.4 * share;
     let value = mean + tau * normal(rng) + error * normal(rng);
-    let told = if estimated {
+    let variance_factor = if estimated {
         ChiSquared::new(4.0).unwrap().sample(rng) / 4.0
     } else {
         1.0
     };
     Observation {
         value,
-        variance: error * error * told,
+        variance: error * error * variance_factor,
     }
 }
 
@@ -50,7 +50,7 @@ fn paired(n: usize, tau: f64, estimated: bool, weights: Weights) -> f64 {
 }
 
 #[test]
-fn differences_within_people() {
+fn within_person_intervals_have_nominal_coverage() {
     for n in [3, 6, 12] {
         for tau in [1.0, 0.4, 0.0] {
             for estimated in [false, true] {
@@ -65,14 +65,14 @@ fn differences_within_people() {
 
 /// Why the weights are not those of the restricted likelihood.
 #[test]
-fn the_restricted_likelihood_says_too_much_of_three_people() {
+fn restricted_likelihood_undercovers_for_three_people() {
     let held = paired(3, 0.4, false, Weights::Restricted);
     println!("restricted likelihood, 3 people: intervals {held:.4}");
     assert!((0.86..0.89).contains(&held), "{held}");
 }
 
 #[test]
-fn differences_between_groups_of_people() {
+fn between_group_intervals_have_nominal_coverage() {
     for n in [6, 12, 24] {
         for estimated in [false, true] {
             let mut rng = ChaCha8Rng::seed_from_u64(530 + n as u64);

@@ -11,7 +11,7 @@ use simulated::CASES;
 const EXPERIMENTS: u64 = 200;
 
 #[test]
-fn the_scatter_is_what_was_predicted() {
+fn scatter_matches_the_prediction() {
     // A target, a disturbance, and both.
     for case in [&CASES[1], &CASES[4], &CASES[10]] {
         for q in case.checked(EXPERIMENTS, 53) {

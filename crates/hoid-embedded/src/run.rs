@@ -23,7 +23,7 @@ const SAMPLE_TIME_S: f64 = 0.01;
 const NK: f64 = 29.0;
 /// Number of samples per output line.
 const EVERY: u32 = 100;
-/// Length of the memory in numbers: more than `least_memory(SAMPLE_TIME_S)`, but too short for replays.
+/// Length of the memory in numbers: more than `min_memory(SAMPLE_TIME_S)`, but too short for replays.
 const MEMORY: usize = 3 * 128;
 /// Longest input line in bytes.
 const LONGEST: usize = 80;

@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn standard_errors_are_the_derivatives() {
+    fn standard_errors_match_finite_differences() {
         let (h, range) = (1e-7, (1e-3, 300.0));
         for i in 0..7 {
             let shifted = |sign: f64| {
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn a_double_root_has_no_standard_error_and_a_loop_without_crossover_no_margins() {
+    fn double_roots_have_no_error_and_no_crossover_gives_no_margins() {
         let mut double = theta();
         (double[5], double[6]) = (-1.0, 0.25);
         let roots = fit(double, only(5)).roots();
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_root_tells_its_frequency_and_damping() {
+    fn root_gives_frequency_and_damping() {
         let s = Complex64::new(-0.35, (1.0_f64 - 0.35 * 0.35).sqrt()) * 11.25;
         let root = Root {
             polynomial: 'f',

@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_of_u_is_found_and_biases_nothing() {
+    fn offset_of_u_is_found_without_bias() {
         // Sum over the runs of the squared errors of c, in standard errors.
         let (mut squares, runs) = (0.0, 12);
         for k in 0..runs {
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_the_constant_of_the_regression() {
+    fn level_equals_the_regression_constant() {
         // Reference: ARX is linear, so a column of ones is added to the regressors.
         let record = moved(&simulated(40), 0.0, 0.03);
         let fit = fitted(Structure::Arx, &record);
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn over_a_step_it_is_an_unknown_and_exact() {
+    fn level_of_a_noise_free_step_response_is_exact() {
         let step: Vec<f64> = (0..200).map(|t| if t < 40 { 0.0 } else { 10.0 }).collect();
         let two: Vec<Record> = [13.5, -2.0].map(|level| after_a_rest(&step, level)).into();
         let without = without_level(&two);
@@ -210,14 +210,14 @@ mod tests {
                 assert!((found + taken - level).abs() < 1e-8, "{structure} {found} {taken}");
             }
             // If a lag responds to a step, removing the means alone biases the static gain.
-            let beside = Estimator::new(structure, orders).fit(&without).unwrap();
-            let missed = (beside.model().response(0.0).re - 2.0).abs();
+            let without_level_term = Estimator::new(structure, orders).fit(&without).unwrap();
+            let missed = (without_level_term.model().response(0.0).re - 2.0).abs();
             assert!(structure != Structure::Arx || missed > 1e-4, "{structure} {missed}");
         }
     }
 
     #[test]
-    fn it_moves_steady_tracking_by_little_and_zero_states_have_none() {
+    fn level_hardly_changes_other_estimates() {
         let record = moved(&simulated(43), 0.0, 0.03);
         let without = without_level(std::slice::from_ref(&record));
         let plain = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
@@ -225,9 +225,9 @@ mod tests {
             level: true,
             ..plain.clone()
         };
-        let (beside, unknown) = (plain.fit(&without).unwrap(), with.fit(&without).unwrap());
-        assert_eq!(unknown.state_count(), beside.state_count() + 1);
-        for ((name, a), (_, b)) in beside.parameters().iter().zip(unknown.parameters()) {
+        let (without_level_term, unknown) = (plain.fit(&without).unwrap(), with.fit(&without).unwrap());
+        assert_eq!(unknown.state_count(), without_level_term.state_count() + 1);
+        for ((name, a), (_, b)) in without_level_term.parameters().iter().zip(unknown.parameters()) {
             let off = (a.value - b.value).abs() / a.standard_error.unwrap();
             assert!(off < 0.2, "{name} {off}");
         }
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn an_integration_makes_nothing_of_a_constant() {
+    fn integrating_model_has_no_constant() {
         let e: Vec<f64> = (0..400)
             .map(|t| (0.31 * t as f64).sin() + (0.07 * t as f64).cos())
             .collect();
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn there_is_none_without_an_input() {
+    fn model_without_input_has_no_level() {
         let record = simulated(41);
         let orders = hoid_model::Orders {
             na: 2,

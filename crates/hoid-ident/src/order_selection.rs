@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use crate::{Estimator, Fit, IdentError, SearchOptions, criterion::first_residual};
 
 /// Maximum number of candidates in a search; the fit of each candidate takes some milliseconds.
-pub const MOST_CANDIDATES: usize = 100_000;
+pub const MAX_CANDIDATES: usize = 100_000;
 
 /// Ranges of the orders and of the delay.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -137,7 +137,7 @@ impl OrderRanges {
     /// Returns the number of combinations.
     ///
     /// # Errors
-    /// [`IdentError::EmptyRange`] if a range is empty, [`IdentError::BadOption`] for more than [`MOST_CANDIDATES`].
+    /// [`IdentError::EmptyRange`] if a range is empty, [`IdentError::BadOption`] for more than [`MAX_CANDIDATES`].
     pub fn candidates(&self) -> Result<usize, IdentError> {
         if let Some((name, range)) = self.named().into_iter().find(|(_, r)| r.is_empty()) {
             return Err(IdentError::EmptyRange {
@@ -148,11 +148,11 @@ impl OrderRanges {
             .named()
             .map(|(_, range)| *range.end() as f64 - *range.start() as f64 + 1.0);
         let all: f64 = numbers.iter().product();
-        if all > MOST_CANDIDATES as f64 {
+        if all > MAX_CANDIDATES as f64 {
             return Err(IdentError::BadOption {
                 option: "the search over orders and delay".to_owned(),
                 found: format!("{all} candidates ({self})"),
-                expected: format!("at most {MOST_CANDIDATES} candidates: narrow --nk and --orders"),
+                expected: format!("at most {MAX_CANDIDATES} candidates: narrow --nk and --orders"),
             });
         }
         Ok(all as usize)
@@ -514,7 +514,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn searches_have_an_end() {
+    fn number_of_order_combinations_is_limited() {
         let one = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
         for ranges in [
             OrderRanges {
@@ -538,7 +538,7 @@ mod tests {
     }
 
     #[test]
-    fn combinations_run_through_all_and_empty_ranges_are_refused() {
+    fn all_combinations_are_listed_and_empty_ranges_refused() {
         let mut ranges = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
         assert_eq!(
             ranges.combinations().unwrap(),
@@ -557,7 +557,7 @@ mod tests {
     }
 
     #[test]
-    fn default_delays_are_those_of_people() {
+    fn default_delay_range_covers_human_delays() {
         assert_eq!(default_delay_range(SampleTime::new(0.01).unwrap()), 6..=61);
         assert_eq!(default_delay_range(SampleTime::new(1.0 / 60.0).unwrap()), 4..=37);
     }

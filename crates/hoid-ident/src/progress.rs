@@ -70,9 +70,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_innermost_watcher_is_told_and_the_outer_one_comes_back() {
-        let told = Arc::new(Mutex::new(Vec::new()));
-        let (outer, inner) = (told.clone(), told.clone());
+    fn innermost_watcher_is_notified_and_outer_one_restored() {
+        let notified = Arc::new(Mutex::new(Vec::new()));
+        let (outer, inner) = (notified.clone(), notified.clone());
         step("nobody", 0, 1);
         watched(
             move |step| outer.lock().unwrap().push(("outer", step.done)),
@@ -88,13 +88,13 @@ mod tests {
             },
         );
         step("nobody", 1, 1);
-        assert_eq!(*told.lock().unwrap(), [("outer", 0), ("inner", 7), ("outer", 1)]);
+        assert_eq!(*notified.lock().unwrap(), [("outer", 0), ("inner", 7), ("outer", 1)]);
     }
 
     #[test]
-    fn what_other_threads_do_is_counted() {
-        let told = Arc::new(Mutex::new(Vec::new()));
-        let seen = told.clone();
+    fn progress_of_other_threads_is_counted() {
+        let notified = Arc::new(Mutex::new(Vec::new()));
+        let seen = notified.clone();
         watched(
             move |step| seen.lock().unwrap().push(step.done),
             || {
@@ -106,7 +106,7 @@ mod tests {
                 });
             },
         );
-        let mut all = told.lock().unwrap().clone();
+        let mut all = notified.lock().unwrap().clone();
         all.sort_unstable();
         assert_eq!(all, [1, 2, 3]);
     }

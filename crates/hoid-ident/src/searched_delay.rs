@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn theta_moves_with_the_delay_as_its_slope_says() {
+    fn slope_of_theta_matches_neighbouring_delays() {
         // Reference: the fits with one sample less and one sample more of delay, a chord of 20 ms.
         let record = run(0);
         let fit = searched(&record).fit;
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_hold_where_the_delay_is_searched() {
+    fn errors_are_valid_for_a_searched_delay() {
         let truth = Scenario::condition(Condition::C1).initial.operator;
         let omega = 12.0;
         let response = {
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_that_is_given_or_belongs_to_no_operator_adds_nothing() {
+    fn given_delays_and_fir_models_add_no_delay_variance() {
         let record = run(1);
         let given = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
         let fit = given.fit(std::slice::from_ref(&record)).unwrap();
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn no_delay_is_less_certain_than_its_range() {
+    fn delay_variance_is_limited_by_the_search_range() {
         // u does not depend on e: the delay carries no information.
         let record = run(2);
         let delays = 3;

@@ -58,7 +58,7 @@ const HIGH_ORDER: usize = 12;
 /// Relative increase of the diagonal of the normal matrix in the regression for the high-order ARX model.
 const RIDGE: f64 = 1e-8;
 /// Order of the autoregression that estimates the innovations for the start of C.
-const LONG: usize = 24;
+const LONG_AR_ORDER: usize = 24;
 
 /// Termination of a linear regression.
 const DIRECT: Termination = Termination {
@@ -476,7 +476,7 @@ impl SeveralInputs {
             let products = NoiseProducts::new(left, self.nd);
             return products.fit_up_to(self.nd).map_or_else(none, |found| found.d);
         }
-        hannan_rissanen(left, (self.nc, self.nd), LONG).unwrap_or_else(none)
+        hannan_rissanen(left, (self.nc, self.nd), LONG_AR_ORDER).unwrap_or_else(none)
     }
 
     fn theta_of(&self, a: &[f64], systems: &[(Vec<f64>, Vec<f64>)], noise: &[f64]) -> Vec<f64> {

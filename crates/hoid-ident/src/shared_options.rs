@@ -267,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_of_a_choice_are_those_that_the_library_reads() {
+    fn choice_names_match_the_library() {
         fn named<T: NamedChoice>() -> Vec<&'static str> {
             T::CHOICES.iter().map(|choice| choice.choice_name()).collect()
         }

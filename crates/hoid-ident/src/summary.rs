@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fit_and_its_validation_print_as_aligned_text() {
+    fn fit_and_validation_print_as_aligned_text() {
         let orders = Orders {
             na: 1,
             nb: 1,

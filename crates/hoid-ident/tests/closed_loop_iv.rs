@@ -124,7 +124,7 @@ fn covered(errors: &[[f64; 6]]) -> f64 {
 
 #[test]
 #[ignore = "the experiment on 200 runs of ten trials; minutes"]
-fn standard_errors_cover_the_truth() {
+fn standard_errors_have_nominal_coverage() {
     let runs = 200;
     let (converged, errors) = study(runs, 10);
     let covered = covered(&errors);
@@ -143,7 +143,7 @@ fn standard_errors_cover_the_truth() {
 }
 
 #[test]
-fn converges_near_the_truth_in_a_closed_loop_with_a_rich_remnant() {
+fn converges_near_the_truth_with_complex_remnant() {
     let (converged, errors) = study(4, 3);
     // 24 numbers, correlated within a run: fewer than 15 are beyond 1.96, except with probability 1e-6, and none is
     // beyond six.

@@ -26,7 +26,7 @@ const NOISE: f64 = 0.3;
 /// Time constant of the noise, s.
 const NOISE_S: f64 = 0.1;
 /// Difference of `n ln V` above which the search has ended in another minimum.
-const ANOTHER: f64 = 50.0;
+const OTHER_MINIMUM_DIFFERENCE: f64 = 50.0;
 
 fn operator(form: Form, random: &mut Uniform) -> FamilyOperator {
     let of = |coordinate: &Coordinate| match coordinate {
@@ -87,7 +87,7 @@ fn ended(record: &Record, form: Form, prior: OperatorPrior, delay_range_s: (f64,
 }
 
 #[test]
-fn the_searches_reach_the_minimum_of_the_operator() {
+fn searches_reach_the_global_minimum() {
     let forms = FamilyEstimator::default().forms;
     let missed = |number: u64| -> [u64; 2] {
         let mut random = Uniform(number.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 20_261_130);
@@ -100,7 +100,7 @@ fn the_searches_reach_the_minimum_of_the_operator() {
         let least = priors.map(|prior| ended(&record, form, prior(), near));
         let found = priors.map(|prior| ended(&record, form, prior(), (0.0, 0.8)));
         let least = least.into_iter().chain(found).fold(f64::INFINITY, f64::min);
-        found.map(|found| u64::from(found > least + ANOTHER))
+        found.map(|found| u64::from(found > least + OTHER_MINIMUM_DIFFERENCE))
     };
     let missed: Vec<[u64; 2]> = (0..OPERATORS).into_par_iter().map(missed).collect();
     let [without, with] = [0, 1].map(|i| missed.iter().map(|m| m[i]).sum::<u64>());

@@ -38,7 +38,7 @@ fn record() -> Record {
 }
 
 #[test]
-fn arx_with_two_inputs_is_that_of_numpy() {
+fn arx_with_two_inputs_matches_numpy() {
     let model = SeveralInputs {
         na: 2,
         inputs: vec![

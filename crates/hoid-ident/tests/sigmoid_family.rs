@@ -19,7 +19,7 @@ const G: f64 = 2.0;
 /// K/T_I and T_L of a lead-lag operator before and after the change.
 const ENDS: [[f64; 2]; 2] = [[4.0, 0.3], [2.0, 1.0]];
 /// T_I, omega_nm, zeta_nm and tau_e, which is nine samples of 1/60 s.
-const STILL: [f64; 4] = [5.0, 12.0, 0.4, 0.15];
+const CONSTANT_PARAMETERS: [f64; 4] = [5.0, 12.0, 0.4, 0.15];
 
 fn element(text: &str) -> ContinuousTransferFunction {
     text.parse().unwrap()
@@ -29,7 +29,7 @@ fn element(text: &str) -> ContinuousTransferFunction {
 /// lead controls a gain.
 fn scenario(form: Form, share: f64) -> FamilyScenario {
     let state = |[gain, lead]: [f64; 2]| {
-        let [t_i, omega, zeta, tau] = STILL;
+        let [t_i, omega, zeta, tau] = CONSTANT_PARAMETERS;
         let mut x = vec![gain];
         if form != Form::Lag {
             x.push(lead);
@@ -88,15 +88,15 @@ fn truth() -> Vec<(&'static str, f64)> {
         ("T_L2", ENDS[1][1]),
         ("t_M", T_M),
         ("G", G),
-        ("T_I", STILL[0]),
-        ("omega_nm", STILL[1]),
-        ("zeta_nm", STILL[2]),
-        ("tau_e", STILL[3]),
+        ("T_I", CONSTANT_PARAMETERS[0]),
+        ("omega_nm", CONSTANT_PARAMETERS[1]),
+        ("zeta_nm", CONSTANT_PARAMETERS[2]),
+        ("tau_e", CONSTANT_PARAMETERS[3]),
     ]
 }
 
 #[test]
-fn a_change_without_noise_is_recovered() {
+fn noise_free_change_is_recovered() {
     let record = run(&scenario(Form::LeadLag, 0.0), 0);
     let fit = estimator(Form::LeadLag).fit(std::slice::from_ref(&record)).unwrap();
     for (name, expected) in truth() {
@@ -120,11 +120,11 @@ fn a_change_without_noise_is_recovered() {
 }
 
 #[test]
-fn the_square_of_a_lead_is_recovered_over_its_kinks() {
+fn squared_lead_is_recovered() {
     // With a direct part: the squared lead has as many zeros as there are poles.
     let mut with = scenario(Form::Lag, 0.0);
     for (state, [gain, lead]) in [(&mut with.initial, [0.9, 0.1]), (&mut with.last, [0.5, 0.2])] {
-        let [_, omega, zeta, tau] = STILL;
+        let [_, omega, zeta, tau] = CONSTANT_PARAMETERS;
         let x = [gain, lead, omega.ln(), zeta.ln(), tau];
         state.operator = FamilyOperator::new(Form::Lead2, true, &x).unwrap();
         state.controlled_element = element("1/s");
@@ -145,7 +145,7 @@ fn the_square_of_a_lead_is_recovered_over_its_kinks() {
 }
 
 #[test]
-fn a_level_of_u_is_found_and_moves_nothing() {
+fn level_of_u_is_found_without_bias() {
     // Mean square of the level in standard errors, for records without a level and with a level in u.
     let (runs, level) = (6, 0.7);
     let with_level = SigmoidChange {
@@ -228,7 +228,7 @@ fn study(runs: u64) -> Vec<(String, Vec<f64>)> {
 }
 
 #[test]
-fn errors_hold_over_simulated_runs() {
+fn errors_have_nominal_coverage_over_simulated_runs() {
     let runs = 10;
     let (mut inside, mut count) = (0, 0);
     for (name, errors) in study(runs) {
@@ -246,7 +246,7 @@ fn errors_hold_over_simulated_runs() {
 }
 
 #[test]
-fn a_fit_with_noise_is_trustworthy_and_a_prior_alone_is_named() {
+fn parameter_determined_by_the_prior_alone_is_reported() {
     let record = run(&scenario(Form::LeadLag, 0.1), 3);
     let records = std::slice::from_ref(&record);
     let fit = estimator(Form::LeadLag).fit(records).unwrap();
@@ -272,7 +272,7 @@ fn a_fit_with_noise_is_trustworthy_and_a_prior_alone_is_named() {
 }
 
 #[test]
-fn a_start_and_bounds_are_those_of_the_form() {
+fn start_and_constraints_use_the_names_of_the_form() {
     let record = run(&scenario(Form::Lag, 0.1), 0);
     let records = std::slice::from_ref(&record);
     let names = estimator(Form::Lag).names();
@@ -307,7 +307,7 @@ fn a_start_and_bounds_are_those_of_the_form() {
 }
 
 #[test]
-fn nothing_to_see_is_said() {
+fn no_change_is_reported() {
     // The change comes after the record has ended.
     let mut late = scenario(Form::LeadLag, 0.1);
     late.schedule = Schedule::Sigmoid {

@@ -83,7 +83,7 @@ mod tests {
     const A: [[f64; 3]; 3] = [[4.0, 2.0, 0.5], [2.0, 5.0, 1.0], [0.5, 1.0, 3.0]];
 
     #[test]
-    fn solves_and_refuses() {
+    fn solves_definite_and_refuses_indefinite_systems() {
         let (mut l, mut x) = (A, [1.0, -2.0, 0.5]);
         assert!(factor(&mut l, 3));
         solve(&l, 3, &mut x);
@@ -96,14 +96,14 @@ mod tests {
     }
 
     #[test]
-    fn a_small_pivot_is_refused() {
+    fn small_pivot_is_refused() {
         // The second pivot is 1e-6.
         let a = [[1.0, 1.0], [1.0, 1.0 + 1e-6]];
         assert!(factor_above(&mut a.clone(), 2, 1e-7) && !factor_above(&mut a.clone(), 2, 1e-5));
     }
 
     #[test]
-    fn the_triangular_systems_are_the_solution() {
+    fn forward_and_backward_substitution_give_the_solution() {
         let (mut l, b) = (A, [1.0, -2.0, 0.5]);
         assert!(factor(&mut l, 3));
         let (mut x, mut expected) = (b, b);
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn the_inverse_is_that_of_the_part_that_counts() {
+    fn scaled_inverse_uses_only_the_leading_block() {
         let mut l = A;
         assert!(factor(&mut l, 2));
         let inverse = scaled_inverse(&l, 2, 32.0);

@@ -97,7 +97,7 @@ mod tests {
     use crate::cholesky;
 
     #[test]
-    fn it_is_the_solution_by_cholesky() {
+    fn solution_matches_cholesky() {
         // A Hilbert matrix plus a ridge, of any size up to N.
         for n in 1..=8 {
             let mut a: [[f64; 8]; 8] = std::array::from_fn(|i| std::array::from_fn(|j| 1.0 / (i + j + 1) as f64));
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_solution_is_refused() {
+    fn unsolvable_systems_are_refused() {
         let mut no = [[0.0; 4]; 4];
         (no[0], no[1]) = ([1.0, 2.0, 0.0, 0.0], [2.0, 1.0, 0.0, 0.0]);
         assert!(!solve(&mut no.clone(), 2, &mut [1.0; 4]));
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn any_matrix_is_solved_with_its_determinant() {
+    fn general_matrix_is_solved_with_its_determinant() {
         // The first pivot is zero; the determinant is 5.
         let a = [[0.0, 2.0, 1.0], [1.0, -1.0, 0.0], [3.0, 0.0, -1.0]];
         let b = [[1.0, 0.0, 2.0], [0.0, 1.0, -1.0], [4.0, 0.5, 0.0]];

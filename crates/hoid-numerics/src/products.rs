@@ -21,7 +21,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_the_sum_in_order_to_the_last_bit() {
+    fn dot_is_bit_identical_to_the_ordered_sum() {
         let a = [0.1, -7.3, 1e17, 3.3, -1e17];
         let b = [1.7, 0.3, 1.0, 0.9, 1.0];
         let sum: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();

@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moments_by_hand() {
+    fn moments_match_hand_calculation() {
         let x = [1.0, 2.0, 4.0, 5.0];
         assert_eq!((mean(&x), squared_deviations(&x)), (3.0, 10.0));
         assert_eq!((variance(&x), sample_variance(&x)), (2.5, 10.0 / 3.0));
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn three_quantiles() {
+    fn quantile_definitions_match_known_values() {
         // NumPy: quantile([1..9, 100], [.25, .5, .75]) = 3.25, 5.5, 7.75.
         let sorted = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 100.0];
         let mut mixed = [5.0, 1.0, 9.0, 100.0, 2.0, 8.0, 3.0, 7.0, 4.0, 6.0];
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn medians_are_the_same_of_any_number_of_values() {
+    fn median_definitions_agree_for_any_count() {
         for n in 1..30 {
             let of = || (0..n).map(|i| f64::from(i * 7 % n)).collect::<std::vec::Vec<_>>();
             let median = upper_median(&mut of());

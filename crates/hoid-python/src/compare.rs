@@ -58,10 +58,12 @@ pub fn compare(
     };
     interrupt::run(py, runs, progress.as_ref(), true, move |status| {
         let estimates = comparing.estimates_of(&manifest, &directory, |manifest, place| {
-            let told = |p: Progress| status.set(p.done, p.total);
-            run_group(manifest, &base, place, &options, &told, &|| status.should_continue())
-                .map(|_| ())
-                .map_err(CompareError::from)
+            let on_progress = |p: Progress| status.set(p.done, p.total);
+            run_group(manifest, &base, place, &options, &on_progress, &|| {
+                status.should_continue()
+            })
+            .map(|_| ())
+            .map_err(CompareError::from)
         })?;
         Ok::<_, CompareError>(comparing.run(&estimates)?.to_json())
     })

@@ -333,7 +333,7 @@ impl PyOperatorFit {
         all.set_item("coherent_share", found.coherent_share)?;
         all.set_item("sample_time", found.sample_time.s())?;
         all.set_item("intersample", found.intersample.name())?;
-        all.set_item("tau_e_if_straight", found.delay_if_straight_s(0))?;
+        all.set_item("tau_e_if_straight", found.delay_if_linear_s(0))?;
         all.set_item("clusters", found.clusters)?;
         all.set_item("kind", kind)?;
         all.set_item("inflation", found.inflation)?;

@@ -74,12 +74,12 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
             let _ = send.send(work(&shared));
         })
         .map_err(|error| bad_option(format!("the system cannot start a thread: {error}")))?;
-    let mut told = u64::MAX;
-    let mut tell = || -> PyResult<()> {
+    let mut reported = u64::MAX;
+    let mut report = || -> PyResult<()> {
         let done = status.done.load(Ordering::Relaxed);
-        if let Some(progress) = progress.filter(|_| done != told) {
+        if let Some(progress) = progress.filter(|_| done != reported) {
             progress.call1((done, status.total.load(Ordering::Relaxed)))?;
-            told = done;
+            reported = done;
         }
         py.check_signals()
     };
@@ -95,12 +95,12 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
                     return Err(error.into());
                 }
                 let result = result.map_err(Into::into)?;
-                tell()?;
+                report()?;
                 return Ok(result);
             }
             Err(RecvTimeoutError::Timeout) => {
                 if interrupted.is_none()
-                    && let Err(error) = tell()
+                    && let Err(error) = report()
                 {
                     status.stopped.store(true, Ordering::Relaxed);
                     if !patient {

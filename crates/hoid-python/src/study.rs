@@ -208,12 +208,12 @@ pub fn reproduce(
         recordings,
     };
     let found = interrupt::run(py, 0, progress.as_ref(), true, move |standing| {
-        let tell = |event: ReproductionEvent<'_>| {
+        let on_event = |event: ReproductionEvent<'_>| {
             if let ReproductionEvent::Progress(p) = event {
                 standing.set(p.done, p.total);
             }
         };
-        reproduce_into(&wanted, &directory, &tell, &|| standing.should_continue())
+        reproduce_into(&wanted, &directory, &on_event, &|| standing.should_continue())
     })?;
     Ok(found.map(|made| (made.index, made.items, made.tally)))
 }

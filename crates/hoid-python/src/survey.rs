@@ -50,12 +50,12 @@ pub fn info<'py>(
         each(&found.quality_issues, |issue| quality_issue(py, issue))?,
     )?;
     all.set_item("notes", &found.notes)?;
-    all.set_item("look", looked(py, &look)?)?;
+    all.set_item("look", look_to_dict(py, &look)?)?;
     Ok(all)
 }
 
 /// Returns the layout of the file, and the keywords with which to read it.
-fn looked<'py>(py: Python<'py>, look: &Look) -> PyResult<Bound<'py, PyDict>> {
+fn look_to_dict<'py>(py: Python<'py>, look: &Look) -> PyResult<Bound<'py, PyDict>> {
     let role = |role: &Role| -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         all.set_item("column", &role.column)?;

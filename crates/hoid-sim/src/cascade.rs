@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn impulse_response_is_that_of_the_exact_transfer_function() {
+    fn impulse_response_matches_the_exact_transfer_function() {
         for order in 1..=HIGHEST_ORDER {
             for (ts, t_n) in [(0.01, 0.06), (0.001, 0.06), (0.05, 0.02)] {
                 let h = RemnantFilter::new(1.0, t_n, order)
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn constant_input_ends_at_itself() {
+    fn static_gain_is_one() {
         for order in 1..=HIGHEST_ORDER {
             let cascade = Cascade::new(order, 0.5);
             let mut z = [0.0; HIGHEST_ORDER];

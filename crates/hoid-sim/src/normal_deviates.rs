@@ -85,12 +85,12 @@ impl TryRng for Middle {
 }
 
 /// Number of bytes that are drawn at a time.
-const DRAWN: usize = 2048;
+const DRAWN_BYTES: usize = 2048;
 
 /// Random numbers of a generator, drawn many at a time: the numbers are the same, but take half the time.
 struct Buffered {
     generator: ChaCha8Rng,
-    bytes: [u8; DRAWN],
+    bytes: [u8; DRAWN_BYTES],
     at: usize,
 }
 
@@ -98,8 +98,8 @@ impl Buffered {
     fn new(generator: ChaCha8Rng) -> Self {
         Self {
             generator,
-            bytes: [0; DRAWN],
-            at: DRAWN,
+            bytes: [0; DRAWN_BYTES],
+            at: DRAWN_BYTES,
         }
     }
 
@@ -132,7 +132,7 @@ impl Buffered {
     #[inline(never)]
     fn over_the_end(&mut self, next: &mut [u8]) {
         for byte in next {
-            if self.at == DRAWN {
+            if self.at == DRAWN_BYTES {
                 self.generator.fill_bytes(&mut self.bytes);
                 self.at = 0;
             }
@@ -168,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn drawn_many_at_a_time_the_numbers_are_the_same() {
+    fn buffered_generator_gives_the_same_numbers() {
         let mut alone = ChaCha8Rng::from_seed([7; 32]);
         let mut buffered = Buffered::new(ChaCha8Rng::from_seed([7; 32]));
         for round in 0..4000 {
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn deviates_are_those_of_the_library() {
+    fn deviates_match_the_library() {
         let edges = edges();
         assert!(edges.windows(2).all(|pair| pair[0] > pair[1]), "{edges:?}");
         // Many thousands of the deviates are not accepted directly, and some hundreds are in the tail.

@@ -9,11 +9,11 @@ use crate::{RunSeed, Simulator, cascade::HIGHEST_ORDER};
 
 /// Largest accepted index of a sample in a saved state: eight hours at 1 kHz. The random numbers up to this sample are
 /// drawn again, and an invalid larger index must not exhaust the memory.
-const MOST_SAMPLES: f64 = 3e7;
+const MAX_SAMPLES: f64 = 3e7;
 
 /// Returns the index of the next sample from a saved state; `None` if it is not valid.
 pub(crate) fn saved_sample(k: f64) -> Option<usize> {
-    ((0.0..=MOST_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
+    ((0.0..=MAX_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
 }
 
 /// Running operator of a scenario of the thesis.
@@ -146,7 +146,7 @@ mod tests {
     /// For the error of a run from its run-in on, the control of the operator is bit-identical to the control of the
     /// run, for every order of the remnant and through a change of the task.
     #[test]
-    fn the_operator_of_a_run_gives_its_control() {
+    fn operator_run_reproduces_the_control_of_the_simulator() {
         for (condition, order) in [
             (Condition::C1, 1),
             (Condition::C4, 2),
@@ -177,7 +177,7 @@ mod tests {
 
     /// A saved operator continues in another operator, also after the end of its scenario.
     #[test]
-    fn a_saved_operator_goes_on_with_the_same_digits() {
+    fn restored_operator_continues_bit_identically() {
         let mut scenario = Scenario::condition(Condition::C4);
         scenario.measurement_s = 1.0;
         let new = || OperatorRun::new(Simulator::new(&scenario).unwrap(), RunSeed::default(), 0.0);
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_its_end_a_scenario_goes_on() {
+    fn scenario_continues_after_its_end() {
         let mut scenario = Scenario::condition(Condition::C4);
         let long = Simulator::new(&scenario).unwrap();
         scenario.measurement_s = 1.0;

@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_of_a_run_is_repeatable_and_its_own() {
+    fn noise_is_repeatable_and_independent_between_runs() {
         assert_eq!(noise(1, 2, 3), noise(1, 2, 3));
         let all = [
             noise(1, 2, 3),
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_of_this_version_is_pinned() {
+    fn noise_matches_the_pinned_values() {
         // A change of generator or transform would change every published figure: it must be
         // noticed.
         let first: Vec<String> = RunSeed::default()

@@ -135,7 +135,7 @@ mod tests {
     /// The recursion of a constant operator and the operator advanced sample by sample give the same response, for
     /// every form and for delays of a whole number of samples and of a fraction of a sample.
     #[test]
-    fn both_computations_give_the_same_response() {
+    fn batch_and_recursion_give_the_same_response() {
         let ts = SampleTime::SIXTIETH;
         let f = shown(900);
         for form in Form::OF_TARGET {
@@ -160,7 +160,7 @@ mod tests {
     /// Long before and after a step of all parameters, the response equals that of the constant operators; in between
     /// it does not.
     #[test]
-    fn a_change_leads_from_one_response_to_the_other() {
+    fn changing_response_matches_both_constant_responses() {
         let ts = SampleTime::HUNDREDTH;
         let f = shown(4000);
         let seen = Feedforward::of_text("derivative:0.3..0.6,tau_f=0.1..0.2", Some((11.0, 0.3))).unwrap();

@@ -111,7 +111,7 @@ fn errors_against_continuous(condition: Condition, extra: f64) -> Vec<[f64; 2]> 
 }
 
 #[test]
-fn the_noise_free_loop_tends_to_the_continuous_one() {
+fn noise_free_loop_converges_to_the_continuous_loop() {
     // Bounds at Ts = 0.01 s; the measured errors are 0.036 and 0.088. The phase margin of s2 is 23 deg, so C2 is more
     // sensitive to the holds.
     for (condition, bound) in [(Condition::C1, 0.04), (Condition::C2, 0.1)] {
@@ -138,7 +138,7 @@ fn the_noise_free_loop_tends_to_the_continuous_one() {
 }
 
 #[test]
-fn the_noise_free_response_obeys_the_discrete_model() {
+fn noise_free_response_satisfies_the_discrete_model() {
     // Coefficients from the expected values.
     let f = [-1.9121130548, 0.9242709633];
     for (condition, b) in [
@@ -156,7 +156,7 @@ fn the_noise_free_response_obeys_the_discrete_model() {
 }
 
 #[test]
-fn realisations_agree_while_nothing_changes_and_differ_at_the_jump() {
+fn realisations_differ_only_when_the_element_changes() {
     let run = |condition, realisation| {
         let mut scenario = with_level(condition, 0.0);
         scenario.realisation = realisation;
@@ -186,7 +186,7 @@ fn realisations_agree_while_nothing_changes_and_differ_at_the_jump() {
 /// With a controlled element of zero the error equals the target, and the response at each sample has the delay of this
 /// sample.
 #[test]
-fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
+fn changing_delay_applies_when_the_response_arrives() {
     let with = |before: f64, after: f64| {
         let mut scenario = with_level(Condition::C3, 0.0);
         for (state, delay) in [(&mut scenario.initial, before), (&mut scenario.last, after)] {
@@ -230,7 +230,7 @@ fn a_delay_that_changes_is_that_of_the_sample_at_which_the_response_arrives() {
 }
 
 #[test]
-fn the_obtained_noise_level_is_the_demanded_one() {
+fn obtained_noise_level_equals_the_requested_level() {
     for condition in [Condition::C1, Condition::C2] {
         for order in 1..=4 {
             for definition in [NoiseDefinition::Response, NoiseDefinition::Remnant] {
@@ -282,7 +282,7 @@ fn the_obtained_noise_level_is_the_demanded_one() {
 }
 
 #[test]
-fn a_run_is_the_measurement_with_its_truth_and_is_repeatable() {
+fn run_is_repeatable_and_contains_the_true_parameters() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
     let run_seed = RunSeed {
         seed: 3,
@@ -330,7 +330,7 @@ fn with_unstable_operator(mut scenario: Scenario) -> Scenario {
 }
 
 #[test]
-fn the_remnant_has_its_theoretical_variance() {
+fn remnant_has_its_theoretical_variance() {
     for order in 1..=4 {
         let mut scenario = Scenario::condition(Condition::C1);
         scenario.remnant.order = order;
@@ -374,7 +374,7 @@ fn the_remnant_has_its_theoretical_variance() {
 }
 
 #[test]
-fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
+fn diverging_loop_is_an_error() {
     let mut scenario = with_unstable_operator(Scenario::condition(Condition::C2));
     scenario.remnant.strength = RemnantStrength::Gain {
         initial: 0.1,
@@ -402,7 +402,7 @@ fn a_diverging_loop_is_an_error_and_not_a_row_of_nan() {
 }
 
 #[test]
-fn runs_side_by_side_have_the_bits_of_each_alone() {
+fn batched_runs_are_bit_identical_to_single_runs() {
     for (condition, order, runs) in [
         (Condition::C1, 1, 19),
         (Condition::C1, 2, 3),
@@ -426,7 +426,7 @@ fn runs_side_by_side_have_the_bits_of_each_alone() {
 }
 
 #[test]
-fn a_run_that_is_wrong_is_refused_among_many() {
+fn invalid_noise_is_refused_in_a_batch() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let good = vec![0.0; simulator.samples()];
     let mut bad = good.clone();

@@ -89,7 +89,7 @@ fn of_family(scenario: &Scenario) -> FamilyScenario {
 }
 
 #[test]
-fn a_lead_on_the_element_of_the_text_is_the_known_simulator() {
+fn lead_form_matches_the_simulator_of_the_thesis() {
     for (condition, order, realisation) in [
         (Condition::C1, 1, Realisation::Input),
         (Condition::C2, 4, Realisation::Input),
@@ -204,7 +204,7 @@ fn by_integration(scenario: &FamilyScenario, d: &[f64]) -> Vec<[f64; 2]> {
 }
 
 #[test]
-fn is_what_integration_of_the_differential_equations_gives() {
+fn loop_matches_numerical_integration() {
     let ts = 1.0 / 60.0;
     let tail = [12.0_f64.ln(), 0.4_f64.ln()];
     for (form, head, num, den, tau_samples) in [
@@ -257,7 +257,7 @@ fn coefficient(values: &[f64], omega_rad_s: f64, ts: f64) -> Complex64 {
 }
 
 #[test]
-fn the_describing_function_is_the_operator_behind_a_hold() {
+fn describing_function_equals_the_operator_with_a_hold() {
     let mut operators = vec![lead_lag(0.1437)];
     // Without a neuromuscular part, e acts immediately, after half a sample of the hold.
     operators.push(FamilyOperator::new(Form::LeadLag, false, &[2.0, 0.3, 0.2, 0.15]).unwrap());
@@ -288,7 +288,7 @@ fn the_describing_function_is_the_operator_behind_a_hold() {
 }
 
 #[test]
-fn parameters_that_change_are_those_in_force() {
+fn changed_parameters_take_effect_at_once() {
     // All parameters change in a step: from then on the loop is that of the final state, starting from the states of
     // the initial loop. For comparison, both loops are simulated in one run, each with its own recursion.
     let mut scenario = typical();
@@ -378,7 +378,7 @@ fn parts() -> Vec<Vec<RemnantPart>> {
 }
 
 #[test]
-fn each_remnant_has_its_share_of_the_variance() {
+fn each_remnant_has_the_requested_share_of_the_variance() {
     // In the last scenario, most of u is the response of the person to a target.
     let mut seen = typical();
     let sum = |rms, interleaved| MultiSine {
@@ -430,7 +430,7 @@ fn each_remnant_has_its_share_of_the_variance() {
 }
 
 #[test]
-fn remnants_are_of_their_kind() {
+fn remnants_have_the_statistics_of_their_kind() {
     let kinds = parts();
     let remnant_of = |parts: &Vec<RemnantPart>| {
         let mut scenario = typical();
@@ -465,7 +465,7 @@ fn remnants_are_of_their_kind() {
 }
 
 #[test]
-fn the_stick_drifts_and_records_are_offset() {
+fn stick_bias_drift_and_recorder_offsets_are_applied() {
     let mut scenario = typical();
     let plain = FamilySimulator::new(&scenario).unwrap().signals(seed(4)).unwrap();
     scenario.stick = Stick {
@@ -501,7 +501,7 @@ fn the_stick_drifts_and_records_are_offset() {
 }
 
 #[test]
-fn runs_are_named_by_their_seed() {
+fn seed_determines_the_run() {
     let mut scenario = typical();
     scenario.remnant = parts().remove(3);
     let simulator = FamilySimulator::new(&scenario).unwrap();
@@ -522,7 +522,7 @@ fn runs_are_named_by_their_seed() {
 }
 
 #[test]
-fn what_has_no_run_is_refused() {
+fn invalid_scenarios_are_refused() {
     let refused = |change: &dyn Fn(&mut FamilyScenario)| {
         let mut scenario = typical();
         change(&mut scenario);
@@ -562,7 +562,7 @@ fn what_has_no_run_is_refused() {
 }
 
 #[test]
-fn a_target_that_is_seen_moves_the_control_before_there_is_an_error() {
+fn feedforward_with_preview_adds_to_the_control() {
     // e = f - y and y = P u, so at each line of f in the steady state U = Y E + F R e^{j omega preview}.
     let mut scenario = typical();
     scenario.disturbance = Excitation::default();

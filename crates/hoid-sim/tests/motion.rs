@@ -64,7 +64,7 @@ fn coefficient(record: &Record, name: &str, omega: f64) -> Complex64 {
 
 /// At each line of target and disturbance, U = Y E + M Y_out with the exact discrete models.
 #[test]
-fn the_response_to_motion_is_exact_at_every_line() {
+fn motion_response_is_exact_at_every_line() {
     for felt in responses() {
         let mut scenario = task(Some(felt.clone()));
         // The canals forget with a time constant of 5.9 s.
@@ -100,7 +100,7 @@ fn the_response_to_motion_is_exact_at_every_line() {
 
 /// The predicted variances of u and e include the response to motion, and the remnant has its share.
 #[test]
-fn the_share_of_the_remnant_counts_the_response_to_motion() {
+fn remnant_share_includes_the_motion_response() {
     let mut scenario = task(Some(operator(Form::Canals, &[-2.0], 0.18)));
     let shape = RemnantShape::Lag {
         time_constant_s: 0.1,
@@ -126,7 +126,7 @@ fn the_share_of_the_remnant_counts_the_response_to_motion() {
 
 /// Both responses share a changing neuromuscular system: after the change, the response is that of the final state.
 #[test]
-fn the_neuromuscular_system_is_shared_while_it_changes() {
+fn changing_neuromuscular_system_is_shared() {
     let mut scenario = task(Some(operator(Form::Canals, &[-0.9], 0.18)));
     scenario.target.random_phases = false;
     scenario.disturbance.random_phases = false;
@@ -150,7 +150,7 @@ fn the_neuromuscular_system_is_shared_while_it_changes() {
 }
 
 #[test]
-fn motion_that_cannot_be_simulated_is_refused() {
+fn invalid_motion_responses_are_refused() {
     let bare = FamilyOperator::new(Form::Gain, false, &[-0.2, 0.1]).unwrap();
     let refused = FamilySimulator::new(&task(Some(bare))).unwrap_err().to_string();
     assert!(refused.contains("share one neuromuscular system"), "{refused}");

@@ -13,7 +13,7 @@ fn person(plant: Plant, kind: RemnantKind, number: u64) -> Person {
 }
 
 #[test]
-fn everybody_lies_in_the_ranges() {
+fn drawn_people_lie_within_the_ranges() {
     let population = Population::default();
     let mut endless = 0;
     for (number, plant) in (0..20).flat_map(|n| Plant::ALL.map(|plant| (n, plant))) {
@@ -49,7 +49,7 @@ fn everybody_lies_in_the_ranges() {
 }
 
 #[test]
-fn runs_are_named_and_have_their_strength() {
+fn runs_are_repeatable_and_follow_the_controlled_element() {
     for plant in Plant::ALL {
         let found = person(plant, RemnantKind::SignalDependent, 3);
         let run = found.run(1).unwrap();
@@ -73,7 +73,7 @@ fn runs_are_named_and_have_their_strength() {
 }
 
 #[test]
-fn runs_spread_where_they_are_told_to() {
+fn run_to_run_spread_has_the_requested_size() {
     let task = Task {
         between_runs: 0.05,
         ..Task::default()
@@ -105,7 +105,7 @@ fn runs_spread_where_they_are_told_to() {
 }
 
 #[test]
-fn other_rates_and_forms_are_drawn_too() {
+fn other_rates_and_forms_can_be_drawn() {
     let task = Task {
         sample_time: hoid_model::SampleTime::HUNDREDTH,
         ..Task::default()

@@ -87,7 +87,7 @@ fn both_responses_are_exact_at_every_line() {
 /// The same task as a scenario of the family, simulated with matrices of any order, gives the same loop through a
 /// change of the operator, of its neuromuscular system and of the response to the target.
 #[test]
-fn the_loop_is_that_of_the_family() {
+fn loop_matches_the_family_simulator() {
     for condition in [Condition::C1, Condition::C3, Condition::C4, Condition::C6] {
         let mut scenario = seen(condition, 0.0);
         if scenario.schedule != Schedule::Constant {
@@ -136,7 +136,7 @@ fn the_loop_is_that_of_the_family() {
 }
 
 #[test]
-fn batched_runs_are_those_of_the_single_runs() {
+fn batched_runs_match_single_runs() {
     for condition in [Condition::C2, Condition::C4] {
         let simulator = Simulator::new(&seen(condition, 0.1)).unwrap();
         let noises: Vec<Vec<f64>> = (0..3).map(|r| seed(r).white_noise(simulator.samples())).collect();
@@ -152,7 +152,7 @@ fn batched_runs_are_those_of_the_single_runs() {
 /// The noise level is the share of the remnant in the variance of u, which now contains the responses to target and
 /// disturbance. The remnant gain is computed for the continuous loop.
 #[test]
-fn the_noise_level_counts_all_of_u() {
+fn noise_level_refers_to_the_variance_of_all_of_u() {
     for (condition, level) in [(Condition::C1, 0.1), (Condition::C2, 0.2)] {
         let scenario = seen(condition, level);
         let simulator = Simulator::new(&scenario).unwrap();
@@ -179,7 +179,7 @@ fn the_noise_level_counts_all_of_u() {
 }
 
 #[test]
-fn without_a_display_nothing_changes() {
+fn zero_feedforward_gives_the_same_signals() {
     let plain = Scenario::condition(Condition::C4);
     let record = Simulator::new(&plain).unwrap().run(seed(1), false).unwrap();
     assert!(record.channel("d").is_none() && record.channels().all(|c| c.role.is_empty()));
@@ -191,7 +191,7 @@ fn without_a_display_nothing_changes() {
 }
 
 #[test]
-fn what_cannot_be_seen_is_refused() {
+fn invalid_target_displays_are_refused() {
     let refused = |change: &dyn Fn(&mut Scenario)| {
         let mut scenario = seen(Condition::C4, 0.1);
         change(&mut scenario);

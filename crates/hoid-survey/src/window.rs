@@ -81,7 +81,7 @@ impl RecursiveMethod for WindowOptions {
         self.window.lambda(sample_time).map(|_| ())
     }
 
-    fn fits_anew(&self) -> bool {
+    fn refits_stored_samples(&self) -> bool {
         true
     }
 

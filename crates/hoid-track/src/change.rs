@@ -39,7 +39,7 @@ pub struct Change {
 }
 
 /// Change of a quantity, in standard errors, beyond which the quantity counts as changed.
-const CHANGED: f64 = 2.0;
+const SIGNIFICANT_CHANGE: f64 = 2.0;
 /// Names of the quantities of [`Change::z`].
 const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
 const REMNANT: &str = "remnant";
@@ -55,7 +55,12 @@ impl Change {
     /// `zeta_nm`, `remnant`, `tau_e`. If the operator was tested as a whole and none of its quantities changed by so
     /// much, its response is named: `response`.
     pub fn changed(&self) -> Vec<&'static str> {
-        let each = || QUANTITIES.into_iter().zip(self.z).filter(|(_, z)| z.abs() > CHANGED);
+        let each = || {
+            QUANTITIES
+                .into_iter()
+                .zip(self.z)
+                .filter(|(_, z)| z.abs() > SIGNIFICANT_CHANGE)
+        };
         let is_named = each().any(|(name, _)| name != REMNANT);
         let whole = (self.of_operator && !is_named).then_some("response");
         whole.into_iter().chain(each().map(|(name, _)| name)).collect()
@@ -107,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_baseline_is_the_distance_in_standard_deviations() {
+    fn threshold_statistic_is_the_distance_in_standard_deviations() {
         let ts = SampleTime::HUNDREDTH;
         // Mean of the error 0, variance 8/7; its rates are +-200.
         let error = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
@@ -125,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn where_the_operator_changed_and_no_single_quantity_the_response_is_named() {
+    fn response_is_named_if_no_single_parameter_changed() {
         let estimate = Estimate::with_variance(1.0, 0.01);
         let of = |of_operator, z| Change {
             seconds_ago: 1.0,

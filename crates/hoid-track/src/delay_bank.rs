@@ -17,8 +17,9 @@
 //!
 //! Before there is any evidence, the delay is distributed about the delay of the start,
 //! `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s = 0.03 s; this prior fades like all evidence. Innovations count with
-//! at most [`LARGEST`] standard deviations, so a single outlier does not decide. While the estimate is kept constant,
-//! the evidence is not updated, because all recursions except one then have coefficients that belong to another delay.
+//! at most [`INNOVATION_LIMIT`] standard deviations, so a single outlier does not decide. While the estimate is kept
+//! constant, the evidence is not updated, because all recursions except one then have coefficients that belong to
+//! another delay.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::{MAX_DELAY, Orders, SampleTime, uncertainty::Estimate};
@@ -34,15 +35,15 @@ use crate::{
 /// Memory length of the evidence, s.
 const MEMORY_S: f64 = 10.0;
 /// Lead in the logarithm of the evidence from which another delay is reported.
-const LEAD: f64 = 2.0;
+const MIN_EVIDENCE_LEAD: f64 = 2.0;
 /// Divisor of the evidence in the weights of the delays.
 const EVIDENCE_DIVISOR: f64 = 3.0;
 /// Limit on the magnitude of an innovation in the evidence, in standard deviations.
-const LARGEST: f64 = 5.0;
+const INNOVATION_LIMIT: f64 = 5.0;
 /// Prior standard deviation of the delay about the delay of the start, s.
 const BEFORE_S: f64 = 0.03;
 /// Largest number of tracked delays.
-const MOST: usize = 128;
+const MAX_DELAYS: usize = 128;
 
 /// A bank with one recursion for each delay.
 pub(crate) struct DelayBank {
@@ -82,11 +83,11 @@ impl DelayBank {
     ) -> Result<Self, IdentError> {
         let (first_nk, last_nk) = (sample_time.nk(low_s), sample_time.nk(high_s));
         let count = last_nk.saturating_sub(first_nk).saturating_add(1);
-        if count > MOST {
+        if count > MAX_DELAYS {
             return Err(bad(
                 "the range of the delay",
                 format!("{low_s} to {high_s} s, {count} samples"),
-                &format!("at most {MOST} samples; narrow the range, or sample more slowly"),
+                &format!("at most {MAX_DELAYS} samples; narrow the range, or sample more slowly"),
             ));
         }
         if last_nk > MAX_DELAY {
@@ -134,14 +135,22 @@ impl DelayBank {
         }
         let mut most = f64::NEG_INFINITY;
         for (evidence, innovation) in self.evidence.iter_mut().zip(&self.innovations) {
-            let square = (innovation * innovation / variance).min(LARGEST * LARGEST);
+            let square = (innovation * innovation / variance).min(INNOVATION_LIMIT * INNOVATION_LIMIT);
             // A NaN innovation counts as the largest possible one.
-            let square = if square.is_nan() { LARGEST * LARGEST } else { square };
+            let square = if square.is_nan() {
+                INNOVATION_LIMIT * INNOVATION_LIMIT
+            } else {
+                square
+            };
             *evidence = self.decay * *evidence - 0.5 * square;
             most = most.max(*evidence);
         }
         self.evidence.iter_mut().for_each(|evidence| *evidence -= most);
-        if self.evidence.get(self.best).is_some_and(|evidence| *evidence < -LEAD) {
+        if self
+            .evidence
+            .get(self.best)
+            .is_some_and(|evidence| *evidence < -MIN_EVIDENCE_LEAD)
+        {
             let leads = |(_, evidence): &(usize, &f64)| **evidence >= 0.0;
             self.best = self
                 .evidence

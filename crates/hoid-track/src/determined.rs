@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_supposition_is_not_what_the_data_say() {
+    fn prior_values_are_not_determined() {
         let e = |value: f64, error: f64| Estimate::with_variance(value, error * error);
         let operator = OperatorEstimate {
             k_e: e(1.0, 0.6),

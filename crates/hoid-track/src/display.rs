@@ -92,7 +92,7 @@ mod tests {
     use crate::Method;
 
     #[test]
-    fn every_method_says_what_it_remembers() {
+    fn every_method_describes_its_memory() {
         let ts = SampleTime::HUNDREDTH;
         for method in [Method::rls(), Method::rpem(), Method::adaptive()] {
             let (structure, orders) = (method.default_structure(), method.default_orders(29));

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_belongs_to_a_rule_is_refused_by_the_others() {
+    fn settings_of_one_rule_are_refused_by_the_others() {
         let mut rule = ForgettingRule::default();
         assert!(rule.set("drift", "K_e=.01").is_err() && rule.set("rate", ".2").is_err());
         assert!(rule.set("forgetting", "random_walk").unwrap());

@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_response_to_a_further_input_is_that_of_a_model_of_its_own() {
+    fn further_input_response_matches_a_separate_model() {
         let orders = Orders {
             na: 1,
             nb: 2,

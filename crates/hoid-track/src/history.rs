@@ -4,11 +4,15 @@ use hoid_core::state::{State, visit_all};
 
 /// Largest magnitude of a value in a recursion. The fourth power of such a value is finite, and therefore so are the
 /// covariances of filtered signals.
-const LARGEST: f64 = 1e60;
+const MAX_MAGNITUDE: f64 = 1e60;
 
 /// Limits the magnitude of a value to 1e60; NaN, which products of large numbers may give, becomes zero.
 pub fn bounded(x: f64) -> f64 {
-    if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
+    if x.is_nan() {
+        0.0
+    } else {
+        x.clamp(-MAX_MAGNITUDE, MAX_MAGNITUDE)
+    }
 }
 
 /// The last n values in one slice. Each value is stored twice, n elements apart, so no values have to be moved.
@@ -77,7 +81,7 @@ mod tests {
 
     /// The newest values remain within the buffer after invalid numbers were restored.
     #[test]
-    fn the_newest_ones_are_within() {
+    fn newest_values_stay_within_the_buffer() {
         let mut past = History::new(3);
         past.visit(&mut |number| *number = 1e18);
         assert_eq!(past.newest().len(), 3);
@@ -86,10 +90,10 @@ mod tests {
     }
 
     #[test]
-    fn values_stay_numbers() {
+    fn stored_values_are_finite_and_limited() {
         let mut past = History::new(3);
         [f64::NAN, f64::INFINITY, -1e300].into_iter().for_each(|x| past.push(x));
-        assert_eq!(past.newest(), [-LARGEST, LARGEST, 0.0]);
+        assert_eq!(past.newest(), [-MAX_MAGNITUDE, MAX_MAGNITUDE, 0.0]);
         assert_eq!(weighted(&[1.0, 1.0], past.newest()), 0.0);
     }
 }

@@ -2,24 +2,24 @@
 //!
 //! A person who waits for the run to start is not tracking. A fit of such samples gives meaningless delays and poles
 //! with small standard errors. The head is the longest stretch at the start of a record in which both e and u stay
-//! within [`SHARE`] of their later size from their median over the first second, or within one step of their
+//! within [`IDLE_SHARE`] of their later size from their median over the first second, or within one step of their
 //! resolution. The size is the 90 % quantile of the distance from the median in the second half of the record. A head
-//! shorter than [`LEAST_S`] does not count, because signals start near zero.
+//! shorter than [`MIN_HEAD_S`] does not count, because signals start near zero.
 
 use hoid_model::Record;
 use hoid_numerics::statistics::{upper_median, upper_quantile};
 
 /// Distance from the median of the first second, as a share of the later size of the signal, within which a signal is
 /// idle.
-const SHARE: f64 = 0.02;
+const IDLE_SHARE: f64 = 0.02;
 /// Shortest idle head, s.
-const LEAST_S: f64 = 1.0;
+const MIN_HEAD_S: f64 = 1.0;
 /// Quantile of the distance from the median that defines the size of a signal.
-const SIZE: f64 = 0.9;
+const SIZE_QUANTILE: f64 = 0.9;
 /// Largest distance, in steps of the resolution, of an idle value from the median of the first second.
-const STEPS: f64 = 1.01;
+const MAX_STEPS: f64 = 1.01;
 /// Largest step of a resolution, as a share of the size of the signal.
-const COARSE: f64 = 0.2;
+const MAX_STEP_SHARE: f64 = 0.2;
 
 /// Returns the number of samples at the start of a record in which neither e nor u moves; 0 if they last less than a
 /// second, and all samples if neither signal ever moves.
@@ -29,16 +29,16 @@ pub fn idle_head(record: &Record) -> usize {
         let later = &signal[signal.len() / 2..];
         let centre = upper_median(&mut later.to_vec()).unwrap_or(0.0);
         let mut off: Vec<f64> = later.iter().map(|x| (x - centre).abs()).collect();
-        let size = upper_quantile(&mut off, SIZE).unwrap_or(0.0);
+        let size = upper_quantile(&mut off, SIZE_QUANTILE).unwrap_or(0.0);
         let steps = || later.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0);
         let step = steps().fold(f64::INFINITY, f64::min);
         // Noise has no resolution: its differences are not multiples of the smallest difference.
         let multiple = |d: f64| (d / step - (d / step).round()).abs() < 1e-3;
-        let coarse = step <= COARSE * size && steps().all(multiple);
+        let coarse = step <= MAX_STEP_SHARE * size && steps().all(multiple);
         let room = if coarse {
-            (STEPS * step).max(SHARE * size)
+            (MAX_STEPS * step).max(IDLE_SHARE * size)
         } else {
-            SHARE * size
+            IDLE_SHARE * size
         };
         let first = upper_median(&mut signal[..second.min(signal.len())].to_vec()).unwrap_or(0.0);
         signal.iter().take_while(|x| (*x - first).abs() <= room).count()
@@ -50,7 +50,7 @@ pub fn idle_head(record: &Record) -> usize {
         [] => still(record.output()),
         input => still(input).min(still(record.output())),
     };
-    if head as f64 * record.sample_time().s() < LEAST_S {
+    if head as f64 * record.sample_time().s() < MIN_HEAD_S {
         0
     } else {
         head
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn the_head_ends_where_the_run_begins_and_runs_have_none() {
+    fn idle_head_ends_at_the_start_of_the_run() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         for seed in 0..20 {
             let seed = RunSeed {
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn what_never_moves_is_idle_throughout() {
+    fn constant_record_is_idle_throughout() {
         let still = |name: &str, x: f64| Channel::new(name, "", vec![x; 500]);
         let record = Record::new(hoid_model::SampleTime::HUNDREDTH, still("e", 0.0), still("u", 2.0)).unwrap();
         assert_eq!(idle_head(&record), 500);

@@ -2,7 +2,7 @@
 //! then the tracker runs.
 //!
 //! Rates above 200 Hz are decimated to about 100 Hz ([`Decimation::Auto`]), unless orders, delay or memory of the
-//! request are in samples. The estimate then lags the last sample of the stream by [`Live::behind_s`].
+//! request are in samples. The estimate then lags the last sample of the stream by [`Live::lag_s`].
 
 use hoid_model::{Decimated, Decimation, Decimator, Orders, Record, SampleTime};
 
@@ -188,7 +188,7 @@ impl Live {
     }
 
     /// Returns the time from the last sample that the tracker received to the last sample of the stream, s.
-    pub fn behind_s(&self) -> f64 {
+    pub fn lag_s(&self) -> f64 {
         let samples = self.decimator.as_ref().map_or(0, Decimator::lag_samples);
         samples as f64 * self.sample_time.s()
     }
@@ -274,13 +274,13 @@ mod tests {
     }
 
     #[test]
-    fn a_fast_stream_is_tracked_as_its_decimated_recording() {
+    fn fast_stream_is_tracked_like_its_decimated_recording() {
         let record = fast(12.0);
         let mut live = live(&TrackRequest::default());
         let advanced = (samples(&record))
             .filter(|sample| !live.update(*sample, true, &choose).between)
             .count();
-        assert!((live.behind_s() - 0.15).abs() < 0.02, "{}", live.behind_s());
+        assert!((live.lag_s() - 0.15).abs() < 0.02, "{}", live.lag_s());
         assert_eq!(live.decimated().map(|done| done.factor), Some(10));
 
         let (lower, _) = record.decimated(10).unwrap();
@@ -294,12 +294,12 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_is_kept_where_samples_are_counted() {
+    fn sample_based_settings_keep_the_rate() {
         assert!(live(&TrackRequest::of(Method::rpem())).decimated().is_none());
     }
 
     #[test]
-    fn a_restored_stream_continues_between_two_samples_of_the_lower_rate() {
+    fn restored_stream_continues_between_decimated_samples() {
         let record = fast(6.0);
         let all: Vec<Sample> = samples(&record).collect();
         let (before, after) = all.split_at(3005);
@@ -324,7 +324,7 @@ mod tests {
     /// Changes each number of the decimator in turn and seals the numbers again: no index or counter may end the
     /// process.
     #[test]
-    fn a_decimator_takes_any_numbers() {
+    fn decimator_restores_arbitrary_numbers_safely() {
         let record = fast(1.0);
         let all: Vec<Sample> = samples(&record).collect();
         for before in [100, 600] {
@@ -351,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn requests_that_cannot_be_live_are_refused() {
+    fn invalid_live_requests_are_refused() {
         let ts = SampleTime::new(0.01).unwrap();
         let asked = TrackRequest::default();
         for warm_up_s in [0.0, -1.0, f64::NAN, f64::INFINITY] {

@@ -191,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_factor_is_a_memory_and_only_one_of_them_is_taken() {
+    fn lambda_sets_the_memory_and_excludes_the_memory_option() {
         let mut options = MemoryOptions::default();
         assert!(options.set("lambda", "0.75").unwrap());
         assert_eq!(options.memory.0, Some(Memory::Samples(4.0)));
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn memories_as_written() {
+    fn memory_text_is_parsed() {
         assert_eq!("256".parse::<Memory>().unwrap(), Memory::Samples(256.0));
         assert_eq!("2.56s".parse::<Memory>().unwrap(), Memory::Seconds(2.56));
         assert_eq!("Inf".parse::<Memory>().unwrap(), Memory::Infinite);

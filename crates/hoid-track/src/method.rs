@@ -141,7 +141,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// True for a method that repeatedly fits its stored samples: it needs no start coefficients and no warm-up.
-    fn fits_anew(&self) -> bool {
+    fn refits_stored_samples(&self) -> bool {
         false
     }
 

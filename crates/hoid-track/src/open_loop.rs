@@ -13,7 +13,7 @@ use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty:
 use crate::response::Response;
 
 /// Largest standard error of the crossover, relative to the crossover.
-const MOST: f64 = 0.5;
+const MAX_CROSSOVER_ERROR: f64 = 0.5;
 
 /// Crossover frequency and phase margin.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,7 +79,7 @@ impl OpenLoop {
         };
         let crossover_rad_s = estimate(found.omega_rad_s, 0);
         match crossover_rad_s.standard_error {
-            Some(error) if error > MOST * found.omega_rad_s => Err(NoCrossover::NotDetermined),
+            Some(error) if error > MAX_CROSSOVER_ERROR * found.omega_rad_s => Err(NoCrossover::NotDetermined),
             _ => Ok(Self {
                 crossover_rad_s,
                 phase_margin_deg: estimate(found.margin_deg, 1),
@@ -124,7 +124,7 @@ mod tests {
 
     /// Crossover and margin are the same as for a batch fit of the family with the same operator and covariance.
     #[test]
-    fn measures_are_those_of_a_batch_fit() {
+    fn loop_measures_match_a_batch_fit() {
         let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
         let operator = FamilyOperator::new(Form::LeadLag, true, &[0.4, 0.5, 0.25, 2.4, -1.4, 0.15]).unwrap();
         let sizes = [0.02, 0.03, 0.02, 0.05, 0.1, 0.01];
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_there_has_a_reason() {
+    fn missing_crossover_has_a_reason() {
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
         let with = |gain: f64, variance: f64| {
             let whole = |_: f64| {

@@ -114,7 +114,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn priors_as_typed_come_back() {
+    fn prior_text_round_trips() {
         for text in ["population", "none", "omega_nm=9:0.2,T_I=5:0.5"] {
             assert_eq!(PersonPrior::read(text).unwrap().text().as_deref(), Some(text));
         }

@@ -234,7 +234,7 @@ mod tests {
     use crate::Method;
 
     #[test]
-    fn names_and_letters() {
+    fn known_names_and_letters_are_recognised() {
         let names: Vec<String> = ["K_e", "K_e_dot", "b0", "b1", "f2"].map(str::to_owned).to_vec();
         for known in ["K_e", "K_e_dot", "b", "b1", "f"] {
             assert!(is_known(&names, known), "{known}");
@@ -245,7 +245,7 @@ mod tests {
     }
 
     #[test]
-    fn a_start_settles_the_orders_and_the_delay_those_of_the_input() {
+    fn start_and_delay_range_narrow_the_orders() {
         let ts = SampleTime::HUNDREDTH;
         let default = default_operator_ranges(Structure::BoxJenkins, ts);
         let start: Vec<String> = ["b0", "b1", "d1", "d2", "f1", "f2"].map(str::to_owned).to_vec();
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn named_orders_stand_for_the_usual_ones() {
+    fn named_orders_replace_the_defaults() {
         let ts = SampleTime::HUNDREDTH;
         let of = |method: &Method, named: &[(&str, RangeInclusive<usize>)], start: &[&str]| {
             let named = named.iter().map(|(name, range)| ((*name).to_owned(), range.clone()));
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn a_method_that_starts_itself_searches_nothing() {
+    fn self_starting_method_needs_no_search() {
         let ts = SampleTime::HUNDREDTH;
         let ranges = OrderRanges {
             nd: 16..=16,
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_start_belongs_to_one_model() {
+    fn start_is_refused_for_several_models() {
         let ts = SampleTime::HUNDREDTH;
         let default = default_operator_ranges(Structure::BoxJenkins, ts);
         let options = TrackOptions {

@@ -97,7 +97,7 @@ mod tests {
     use hoid_core::filter::{divide_in_place, fir, multiply};
 
     #[test]
-    fn equals_the_filtered_residual_of_the_general_model() {
+    fn predictor_matches_the_filtered_residual() {
         let orders = Orders {
             na: 1,
             nb: 2,
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn an_output_alone_needs_no_input() {
+    fn output_only_model_ignores_the_input() {
         let orders = Orders {
             na: 1,
             nc: 1,

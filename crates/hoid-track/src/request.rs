@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_delay_in_seconds_becomes_samples_at_the_rate() {
+    fn delay_in_seconds_is_converted_to_samples() {
         let asked = TrackRequest {
             delay: Some(DelayRange::Seconds(0.28, 0.28)),
             ..TrackRequest::of(Method::rpem())
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn a_start_of_names_is_a_start_of_numbers() {
+    fn named_start_is_converted_to_theta() {
         let orders: NamedOrders = [("nk", 29), ("nd", 1)].map(|(name, n)| (name.to_owned(), n..=n)).into();
         let named: BTreeMap<String, f64> = [("b0", 0.1), ("b1", 0.0), ("d1", -0.5), ("f1", -1.5), ("f2", 0.6)]
             .map(|(name, value)| (name.to_owned(), value))

@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn covariance_is_that_of_finite_differences() {
+    fn covariance_agrees_with_finite_differences() {
         let p = THETA.len();
         let mut covariance = vec![0.0; p * p];
         for i in 0..p {
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn the_value_alone_is_the_same() {
+    fn value_without_covariance_is_the_same() {
         let whole = at(&THETA, None).value;
         let alone = Response::value_of_polynomials(&ORDERS, &THETA, 4.0, SampleTime::HUNDREDTH);
         assert!(
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn gain_and_phase_are_those_of_the_number() {
+    fn gain_and_phase_match_the_complex_value() {
         let response = Response {
             value: [0.0, -10.0],
             covariance: [[0.04, 0.0], [0.0, 0.01]],

@@ -134,7 +134,7 @@ mod tests {
 
     /// Changes each number in turn and seals the numbers again: no index, length or difference of counters may end the
     /// process.
-    fn each_number_may_be_anything(method: Method, with: &[(&str, &str)], saved_at: usize, to: usize) {
+    fn check_arbitrary_numbers(method: Method, with: &[(&str, &str)], saved_at: usize, to: usize) {
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let span = record.span(0.0, 20.0).unwrap();
@@ -164,18 +164,18 @@ mod tests {
     }
 
     #[test]
-    fn a_guard_takes_any_numbers() {
-        each_number_may_be_anything(Method::rpem(), &[("guard", "yes")], 2350, 2600);
+    fn guard_restores_arbitrary_numbers_safely() {
+        check_arbitrary_numbers(Method::rpem(), &[("guard", "yes")], 2350, 2600);
     }
 
     #[test]
-    fn a_bank_of_delays_takes_any_numbers() {
-        each_number_may_be_anything(Method::rpem(), &[("track_delay", "0.28..0.3")], 2050, 2060);
+    fn delay_bank_restores_arbitrary_numbers_safely() {
+        check_arbitrary_numbers(Method::rpem(), &[("track_delay", "0.28..0.3")], 2050, 2060);
     }
 
     #[test]
-    fn a_window_takes_any_numbers() {
+    fn window_restores_arbitrary_numbers_safely() {
         let with = [("forgetting", "window"), ("memory", "40")];
-        each_number_may_be_anything(Method::rpem(), &with, 2030, 2100);
+        check_arbitrary_numbers(Method::rpem(), &with, 2030, 2100);
     }
 }

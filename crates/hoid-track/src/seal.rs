@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_seal_is_fnv_1a() {
+    fn seal_is_fnv_1a() {
         // The published checksum of no bytes is the offset basis; the checksum of eight zero bytes follows by hand.
         assert_eq!(sealed(Vec::new()), [(BASIS >> 11) as f64]);
         let eight = (0..8).fold(BASIS, |sum, _| sum.wrapping_mul(PRIME));
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_sealed_opens_and_nothing_else() {
+    fn only_unchanged_sealed_numbers_open() {
         let numbers = vec![1.0, -0.0, f64::NAN, f64::INFINITY, 5e-324];
         let whole = sealed(numbers.clone());
         assert_eq!(opened(&whole).unwrap().len(), numbers.len());

@@ -82,9 +82,9 @@ impl GainOptions {
     /// Returns the guard against windup; `None` if it follows from the start. Unless it is given, it is off with the
     /// settings of the thesis: P at the start is given, P forgets exponentially, and innovations are not limited.
     pub fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
-        let of_the_text =
+        let thesis_settings =
             self.covariance.is_some() && self.forgetting == ForgettingRule::Exponential && limit == f64::INFINITY;
-        self.windup_guard.or(of_the_text.then_some(WindupGuard::Off))
+        self.windup_guard.or(thesis_settings.then_some(WindupGuard::Off))
     }
 
     /// Removes the memories and drifts of parameters that are not known.

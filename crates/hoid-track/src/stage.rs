@@ -283,7 +283,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_warm_up_has_no_more_samples_than_its_numbers() {
+    fn restored_warm_up_samples_are_limited() {
         let sample_time = SampleTime::new(0.01).unwrap();
         let mut warm_up = WarmUp::new(100, sample_time);
         let sample = Sample {

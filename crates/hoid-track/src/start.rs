@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Variance in P for a start without knowledge, in units of the innovation variance.
-const UNKNOWN: f64 = 1e6;
+const UNKNOWN_VARIANCE: f64 = 1e6;
 /// Operator of a start without knowledge: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), of the same order of
 /// magnitude as in the thesis.
 const TYPICAL_OPERATOR: [f64; 5] = [0.1, 0.05, 10.0, 0.4, 0.25];
@@ -142,7 +142,7 @@ impl StartState {
     }
 
     fn without_fit(setup: &Setup, values: Vec<f64>) -> Self {
-        let size = setup.covariance.unwrap_or(UNKNOWN);
+        let size = setup.covariance.unwrap_or(UNKNOWN_VARIANCE);
         let covariance = multiple(size, values.len());
         Self {
             spread: covariance.clone(),
@@ -177,7 +177,7 @@ impl StartState {
         let p = values.len();
         let spread = match &covariance {
             Some(c) if variance > 0.0 => c.iter().map(|c| c / variance).collect(),
-            _ => multiple(UNKNOWN, p),
+            _ => multiple(UNKNOWN_VARIANCE, p),
         };
         let covariance = match setup.covariance {
             None => spread.clone(),
@@ -510,7 +510,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_in_memory_is_refused() {
+    fn requests_that_exceed_the_memory_are_refused() {
         for ts_s in [1e-7, 1e-12, f64::MIN_POSITIVE] {
             for guard in ["yes", "no"] {
                 let error = refused(Method::rpem(), &[("guard", guard)], ts_s);

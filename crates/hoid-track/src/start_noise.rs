@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn d_is_that_of_the_autoregression() {
+    fn d_satisfies_the_normal_equations() {
         let span = span();
         let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))
             .fit(std::slice::from_ref(&span))
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_fit_gives_nothing() {
+    fn short_span_gives_no_noise_model() {
         let span = span();
         let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))
             .fit(std::slice::from_ref(&span))

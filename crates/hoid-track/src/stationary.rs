@@ -9,12 +9,12 @@
 //! Wittenmark, *Adaptive Control*, 2nd ed. 1995, section 11.5, conditional updating). They therefore enter only the
 //! filters:
 //!
-//! - A signal is **stationary** while it stays within [`SHARE`] of its typical size from its value at the start of the
-//!   stationary span. The typical size is the geometric mean, over blocks of one second, of the largest distance from
-//!   the value at the start of the block. Before ten blocks are known, a span is stationary only if all its values are
-//!   equal.
-//! - There is **no information** if both e and u are stationary for [`BOTH_S`], or one of the two for [`ONE_S`]: a
-//!   frozen channel, or a resting hand, whose response cannot be distinguished from no response.
+//! - A signal is **stationary** while it stays within [`STATIONARY_SHARE`] of its typical size from its value at the
+//!   start of the stationary span. The typical size is the geometric mean, over blocks of one second, of the largest
+//!   distance from the value at the start of the block. Before ten blocks are known, a span is stationary only if all
+//!   its values are equal.
+//! - There is **no information** if both e and u are stationary for [`MIN_BOTH_S`], or one of the two for
+//!   [`MIN_ONE_S`]: a frozen channel, or a resting hand, whose response cannot be distinguished from no response.
 //! - The recursion is then restored exactly to its state before the first sample of the span (or before a jump to the
 //!   value of the span): a stored state is restored, and the recursion takes the samples from then on again. Estimate,
 //!   covariance and innovation variance keep their values of that time for the whole span.
@@ -32,18 +32,18 @@ use crate::{
 };
 
 /// Share of its typical size within which a signal is stationary.
-const SHARE: f64 = 0.02;
+const STATIONARY_SHARE: f64 = 0.02;
 /// Shortest stationary span of both signals, and of one signal, that carries no information, s, and the smallest number
 /// of samples of a stationary span.
-pub(crate) const BOTH_S: f64 = 1.0;
-const ONE_S: f64 = 5.0;
-const LEAST: u64 = 20;
+pub(crate) const MIN_BOTH_S: f64 = 1.0;
+const MIN_ONE_S: f64 = 5.0;
+const MIN_SAMPLES: u64 = 20;
 /// Number of blocks after which the typical size of a signal is known, and largest number of blocks over which the size
 /// is averaged.
-const KNOWN_AFTER: u32 = 10;
-const AVERAGED: u32 = 60;
+const KNOWN_AFTER_BLOCKS: u32 = 10;
+const AVERAGED_BLOCKS: u32 = 60;
 /// Largest number of samples between two stored states.
-const MOST: u64 = 1 << 17;
+const MAX_SAMPLES: u64 = 1 << 17;
 /// e and u.
 const CHANNELS: usize = 2;
 
@@ -175,9 +175,9 @@ impl Channel {
             return;
         }
         self.blocks = self.blocks.saturating_add(1);
-        self.size += (distance.ln() - self.size) / f64::from(self.blocks.min(AVERAGED));
-        if self.blocks >= KNOWN_AFTER {
-            self.tolerance = SHARE * self.size.exp();
+        self.size += (distance.ln() - self.size) / f64::from(self.blocks.min(AVERAGED_BLOCKS));
+        if self.blocks >= KNOWN_AFTER_BLOCKS {
+            self.tolerance = STATIONARY_SHARE * self.size.exp();
         }
     }
 }
@@ -237,10 +237,10 @@ impl State for StationaryWatch {
 impl StationaryWatch {
     /// Builds the watch for a recursion with a delay of nk samples; `None` if the sample time is too short.
     pub fn new(nk: usize, sample_time: SampleTime) -> Option<Self> {
-        let samples = |seconds: f64| ((seconds / sample_time.s()).round() as u64).max(LEAST);
-        let one = samples(ONE_S);
-        (one <= MOST).then(|| Self {
-            both: samples(BOTH_S),
+        let samples = |seconds: f64| ((seconds / sample_time.s()).round() as u64).max(MIN_SAMPLES);
+        let one = samples(MIN_ONE_S);
+        (one <= MAX_SAMPLES).then(|| Self {
+            both: samples(MIN_BOTH_S),
             one,
             block: ((1.0 / sample_time.s()).round() as u64).max(4),
             settle: (nk as u64).saturating_add((SETTLE_S / sample_time.s()).round() as u64),
@@ -284,7 +284,7 @@ impl StationaryWatch {
         if act == Act::Step
             && let Some((channel, stood)) = self.stationary_channel()
         {
-            return self.begin_pause(recursion, channel, stood, sample);
+            return self.start_pause(recursion, channel, stood, sample);
         }
         Guarded {
             outcome: act.on(recursion, sample),
@@ -325,7 +325,7 @@ impl StationaryWatch {
 
     /// Restores the recursion to its state before the last `stood` samples; these samples then update only the filters.
     #[cold]
-    fn begin_pause(
+    fn start_pause(
         &mut self,
         recursion: &mut dyn Recursion,
         channel: GuardChannel,
@@ -357,7 +357,7 @@ impl StationaryWatch {
         self.paused = stood.max(1);
         self.moving = 0;
         self.channel = GuardChannel::ALL.iter().position(|c| *c == channel).unwrap_or(0);
-        self.tell(GuardAction::Paused);
+        self.report(GuardAction::Paused);
         Guarded { outcome, held: true }
     }
 
@@ -371,7 +371,7 @@ impl StationaryWatch {
             false => self.moving.saturating_add(1),
         };
         if self.moving >= self.settle {
-            self.tell(GuardAction::Resumed);
+            self.report(GuardAction::Resumed);
             self.paused = 0;
         }
         Guarded { outcome, held: true }
@@ -385,7 +385,7 @@ impl StationaryWatch {
         e.min(u) >= self.both || e >= self.one || u >= self.one
     }
 
-    fn tell(&mut self, action: GuardAction) {
+    fn report(&mut self, action: GuardAction) {
         let channel = GuardChannel::ALL
             .get(self.channel)
             .copied()

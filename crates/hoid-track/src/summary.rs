@@ -49,7 +49,7 @@ mod tests {
     use crate::{Method, TrackOptions, track};
 
     #[test]
-    fn a_trace_prints_what_it_is_and_where_it_ends() {
+    fn trace_summary_contains_method_and_final_estimate() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let trace = track(&record, &TrackOptions::default_for(Method::rpem(), 29), 64).unwrap();

@@ -563,7 +563,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_rows_reach_as_far_as_the_mean() {
+    fn nan_rows_spread_only_over_the_averaging_length() {
         let mut values = vec![1.0; 12];
         values[4] = f64::NAN;
         let means = causal_mean(&values, 1, 3);
@@ -573,7 +573,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_come_back_whole() {
+    fn packed_triangles_round_trip() {
         let whole = [1.0, 2.0, 3.0, 2.0, 4.0, 5.0, 3.0, 5.0, 6.0];
         let mut packed = Vec::new();
         pack(&whole, 3, &mut packed);

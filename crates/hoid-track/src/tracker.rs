@@ -318,7 +318,7 @@ impl Tracker {
     }
 
     /// Returns the finding that the current response is implausible for a person. With a controlled element, the loop
-    /// that it forms with the response is examined ([`LoopShape::doubt`]); without a controlled element, the sign of
+    /// that it forms with the response is examined ([`LoopShape::finding`]); without a controlled element, the sign of
     /// the response at low frequencies.
     pub(crate) fn response_finding(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
@@ -327,7 +327,7 @@ impl Tracker {
                 Err(NoCrossover::NeverFalls) => 0.0,
                 Err(_) => return None,
             };
-            return self.loop_shape(element).doubt(reach);
+            return self.loop_shape(element).finding(reach);
         }
         let phase = self.response(LOW_RAD_S)?.phase_deg();
         let reach = IMPLAUSIBLE_DISTANCE * phase.standard_error?;

@@ -22,7 +22,7 @@ struct Count {
 }
 
 #[test]
-fn bands_hold_from_the_second_second_on() {
+fn bands_have_nominal_coverage_in_the_first_seconds() {
     let mut counts = AT_S.map(|_| Count { inside: 0.0, all: 0.0 });
     let mut loops = AT_S.map(|_| Count { inside: 0.0, all: 0.0 });
     for number in 0..45 {

@@ -10,7 +10,7 @@ const PEOPLE: u64 = 45;
 const AT_S: [f64; 3] = [2.0, 15.0, 30.0];
 
 #[test]
-fn poles_and_delay_of_people_are_within_their_errors() {
+fn poles_and_delay_are_within_their_errors() {
     let mut beyond = AT_S.map(|_| [0.0; 3]);
     let mut inside = AT_S.map(|_| [0.0; 3]);
     let mut people = 0.0;

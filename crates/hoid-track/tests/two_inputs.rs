@@ -107,7 +107,7 @@ fn value(trace: &Trace, row: usize, name: &str) -> (f64, f64) {
 }
 
 #[test]
-fn without_forgetting_rls_ends_at_the_batch_fit() {
+fn rls_with_infinite_memory_matches_the_batch_fit() {
     let record = record(1, 0.01, false);
     let method = Method::rls();
     let options = TrackOptions {
@@ -144,7 +144,7 @@ fn without_forgetting_rls_ends_at_the_batch_fit() {
 }
 
 #[test]
-fn a_change_of_one_response_is_followed_in_that_response_alone() {
+fn change_of_one_response_leaves_the_other_unchanged() {
     let (mut before, mut after) = (Vec::new(), Vec::new());
     let (mut changed, mut false_alarms) = (0, 0);
     let note = |trace: &Trace, record: &Record| {
@@ -214,7 +214,7 @@ fn own_db() -> f64 {
 }
 
 #[test]
-fn with_one_input_the_response_to_the_error_is_wrong() {
+fn omitting_the_further_input_biases_the_response_to_e() {
     // A target that e follows: without the target as an input, the estimated response to e includes the response to r.
     let plain = record(3, 0.01, false);
     let r = plain.channel("r").unwrap().to_vec();
@@ -240,7 +240,7 @@ fn with_one_input_the_response_to_the_error_is_wrong() {
 }
 
 #[test]
-fn samples_without_the_further_input_change_nothing() {
+fn samples_without_the_further_input_do_not_update() {
     let record = record(5, 0.01, false);
     let span = record.span(0.0, 26.0).unwrap();
     let mut tracker = Tracker::new(&box_jenkins(), Some(&span), record.sample_time()).unwrap();

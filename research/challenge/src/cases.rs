@@ -9,14 +9,14 @@ use super::{
     operator::{Parameter, Plant},
 };
 
-/// Default start of a change, s; `TAKES_S` is its default duration.
+/// Default start of a change, s; `CHANGE_DURATION_S` is its default duration.
 const AT_S: f64 = 45.0;
-const TAKES_S: f64 = 0.5;
+const CHANGE_DURATION_S: f64 = 0.5;
 
 fn shift(parameter: Parameter, factor: f64) -> OperatorChange {
     OperatorChange {
         at_s: AT_S,
-        takes_s: TAKES_S,
+        takes_s: CHANGE_DURATION_S,
         parameter,
         factor,
     }
@@ -404,7 +404,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_their_own_and_changes_lie_within() {
+    fn case_names_are_unique_and_changes_lie_within_the_run() {
         let all = cases();
         for (i, case) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|other| other.name != case.name), "{}", case.name);

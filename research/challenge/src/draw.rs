@@ -96,7 +96,7 @@ impl fmt::Display for Portion {
 }
 
 /// Maximum number of draws for a run; if they do not suffice, no person can stabilise the case.
-const MOST_DRAWS: usize = 2000;
+const MAX_DRAWS: usize = 2000;
 const NUMBERS: usize = 10;
 /// Largest permitted value of `|1/(1 + Y P)|`.
 const LARGEST_SENSITIVITY: f64 = 3.5;
@@ -104,7 +104,7 @@ const PERSON: u64 = 1;
 
 /// Returns the person of a run; `attempt` is the number of earlier people who lost control in the simulation.
 pub(super) fn person(case: &Case, run: RunOf, ts: SampleTime, attempt: usize) -> Result<Operator, SimError> {
-    let numbers = run.stream(case, PERSON).uniform(NUMBERS * MOST_DRAWS);
+    let numbers = run.stream(case, PERSON).uniform(NUMBERS * MAX_DRAWS);
     let mut left = attempt;
     for draw in numbers.chunks_exact(NUMBERS) {
         let Some(operator) = drawn(case, ts, draw)? else {
@@ -118,7 +118,7 @@ pub(super) fn person(case: &Case, run: RunOf, ts: SampleTime, attempt: usize) ->
     Err(SimError::NoAcceptablePerson {
         form: format!("{:?} of the case {}", case.form, case.name),
         plant: format!("{:?}", case.plant),
-        draws: MOST_DRAWS,
+        draws: MAX_DRAWS,
     })
 }
 
@@ -205,7 +205,7 @@ mod tests {
     use crate::cases;
 
     #[test]
-    fn somebody_bears_every_case_and_nobody_twice() {
+    fn every_case_has_a_person_and_seeds_differ() {
         for case in cases() {
             let ts = SampleTime::new(1.0 / case.rate_hz).unwrap();
             let of = |seeds, number| {
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_share_the_work() {
+    fn portions_divide_the_work() {
         let parts: Vec<Portion> = ["1/3", "2/3", "3/3"].map(|t| t.parse().unwrap()).into();
         for i in 0..20 {
             assert_eq!(parts.iter().filter(|part| part.holds(i)).count(), 1);

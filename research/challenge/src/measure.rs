@@ -30,11 +30,11 @@ const BEFORE_S: f64 = 0.5;
 const STEADY_S: f64 = 10.0;
 const LONG_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
 /// Largest error, to which larger errors are limited.
-const LARGEST: f64 = 10.0;
-const STUDENT: f64 = 1.96;
+const MAX_ERROR: f64 = 10.0;
+const CRITICAL_VALUE: f64 = 1.96;
 /// Time after a change within which an alarm is not counted as false, s. An alarm within [`FOUND_S`] has found the
 /// change.
-const OF_CHANGE_S: f64 = 12.0;
+const ALARM_WINDOW_S: f64 = 12.0;
 /// Times after a change within which it should be found, s.
 pub const FOUND_S: [f64; 2] = [5.0, 8.0];
 
@@ -100,7 +100,7 @@ pub(super) fn lines_rad_s() -> Vec<f64> {
 }
 
 /// Times at which the response is requested, with their labels.
-pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: bool) -> Vec<(String, f64)> {
+pub(super) fn requested_times(changes_s: &[f64], start_s: f64, length_s: f64, is_long: bool) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     let steady = |from: f64| {
         let count = ((length_s - from) / STEADY_S + 1e-9) as usize;
@@ -144,7 +144,7 @@ impl EvaluationRun {
             Vec::new()
         };
         let start_s = case.start_s();
-        let asked = asked(&changes_s, start_s.1, case.length_s, case.length_s > 200.0);
+        let asked = requested_times(&changes_s, start_s.1, case.length_s, case.length_s > 200.0);
         let (labels, asked_s) = asked.into_iter().unzip();
         let changes = (changes_s.iter().enumerate())
             .map(|(i, at_s)| ChangeOutcome {
@@ -220,10 +220,10 @@ fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Tr
         let Some((found, _)) = said.get(name) else { continue };
         let covered = said
             .get(&format!("{name} se"))
-            .map(|(error, _)| (found - value).abs() <= STUDENT * error);
+            .map(|(error, _)| (found - value).abs() <= CRITICAL_VALUE * error);
         let error = ((found - value) / value).abs();
         if error.is_finite() {
-            parameters.insert(name.to_owned(), (error.min(LARGEST), covered));
+            parameters.insert(name.to_owned(), (error.min(MAX_ERROR), covered));
         }
     }
 }
@@ -265,7 +265,7 @@ pub(super) fn scored(
         .collect();
     let length_s = task.time_s(task.e.len());
     let from = task.start_s.1;
-    let of_change = |t: f64| changes.iter().any(|c| t >= c.at_s && t < c.at_s + OF_CHANGE_S);
+    let of_change = |t: f64| changes.iter().any(|c| t >= c.at_s && t < c.at_s + ALARM_WINDOW_S);
     let step = 0.01;
     let exposed = (0..((length_s - from) / step) as usize).filter(|i| !of_change(from + step * *i as f64));
     let exposed_s = exposed.count() as f64 * step;
@@ -302,12 +302,16 @@ fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2
     }
     let each = said.response.iter().zip(truths);
     let error = each.map(|(h, truth)| (h - truth).norm() / truth.norm()).sum::<f64>() / truths.len() as f64;
-    let error = if error.is_finite() { error.min(LARGEST) } else { LARGEST };
+    let error = if error.is_finite() {
+        error.min(MAX_ERROR)
+    } else {
+        MAX_ERROR
+    };
     let mut covered = [0, 0];
     for ((h, truth), c) in said.response.iter().zip(truths).zip(said.covariance.iter().flatten()) {
         let d = h - truth;
         for (distance, variance) in [(d.re, c[0]), (d.im, c[1])] {
-            covered[0] += usize::from(distance.abs() <= STUDENT * variance.sqrt());
+            covered[0] += usize::from(distance.abs() <= CRITICAL_VALUE * variance.sqrt());
             covered[1] += 1;
         }
     }
@@ -326,20 +330,24 @@ mod tests {
     use crate::entrant::Alarm;
 
     #[test]
-    fn what_is_asked_lies_between_changes() {
-        let all = asked(&[45.0], 30.0, 90.0, false);
+    fn requested_times_lie_between_changes() {
+        let all = requested_times(&[45.0], 30.0, 90.0, false);
         let labels: Vec<&str> = all.iter().map(|(l, _)| l.as_str()).collect();
         assert_eq!(labels, ["before", "+2", "+4", "+8", "+13", "+18", "+28"]);
-        let six = asked(&[40.0, 52.0], 30.0, 120.0, false);
+        let six = requested_times(&[40.0, 52.0], 30.0, 120.0, false);
         assert_eq!(six.iter().filter(|(l, _)| l == "+8").count(), 2);
         assert_eq!(six.iter().filter(|(l, _)| l == "+13").count(), 1);
-        assert_eq!(asked(&[], 30.0, 90.0, false).len(), 6);
-        assert!(asked(&[15.0], 30.0, 90.0, false).iter().all(|(_, t)| *t >= 30.0));
+        assert_eq!(requested_times(&[], 30.0, 90.0, false).len(), 6);
+        assert!(
+            requested_times(&[15.0], 30.0, 90.0, false)
+                .iter()
+                .all(|(_, t)| *t >= 30.0)
+        );
     }
 
-    struct Says(EntrantResult);
+    struct FixedResult(EntrantResult);
 
-    impl Entrant for Says {
+    impl Entrant for FixedResult {
         fn name(&self) -> String {
             "says".to_owned()
         }
@@ -351,7 +359,7 @@ mod tests {
 
     /// The true response has no error, and an alarm at the true time finds the change.
     #[test]
-    fn the_truth_has_no_error_and_silence_has_the_error_one() {
+    fn true_response_has_error_zero_and_no_response_error_one() {
         let case = super::super::cases()
             .into_iter()
             .find(|c| c.name == "change-K_e_dot-100")
@@ -381,13 +389,13 @@ mod tests {
             alarms: Some(vec![alarm(33.0), alarm(48.5), alarm(56.0), alarm(80.0)]),
             findings: Vec::new(),
         };
-        let line = posed.line(&Says(answer));
+        let line = posed.line(&FixedResult(answer));
         assert!(line.moments.iter().all(|m| m.error < 1e-12 && m.covered == [14, 14]));
         assert!(line.moments.iter().all(|m| m.parameters["K_e"].1 == Some(true)));
         assert_eq!(line.changes[0].after_s, Some(3.5));
         assert_eq!(line.false_alarms, Some(2));
         assert!((line.exposed_s - 48.0).abs() < 0.05, "{}", line.exposed_s);
-        let silent = posed.line(&Says(EntrantResult::default()));
+        let silent = posed.line(&FixedResult(EntrantResult::default()));
         assert!(silent.moments.iter().all(|m| m.error == 1.0) && silent.false_alarms.is_none());
     }
 }

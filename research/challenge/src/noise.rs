@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn whitening_makes_it_white() {
+    fn whitening_filter_whitens_the_noise() {
         let streams = |tag| RunSeed {
             seed: 6,
             cell: tag,

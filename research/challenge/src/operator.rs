@@ -174,33 +174,33 @@ pub fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
 }
 
 /// Largest order of a system.
-pub(super) const MOST_STATES: usize = 6;
+pub(super) const MAX_STATES: usize = 6;
 
 /// A system without zeros, `x = v/(a_0 + a_1 s + ... + a_n s^n)`, whose states are x and its derivatives. Outputs are
 /// weighted sums of the states, so a change of the gain acts at once.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Canonical {
     /// The state: x, its first derivative, and so on.
-    pub x: [f64; MOST_STATES],
+    pub x: [f64; MAX_STATES],
 }
 
 impl Canonical {
     pub fn at_rest() -> Self {
-        Self { x: [0.0; MOST_STATES] }
+        Self { x: [0.0; MAX_STATES] }
     }
 
     /// Advances the state by a fourth-order Runge-Kutta step of length h; `v` is the input at the start, the middle and
     /// the end of the step.
     pub fn advance(&mut self, denominator: &[f64], v: [f64; 3], h: f64) {
         let n = denominator.len() - 1;
-        let slope = |x: &[f64; MOST_STATES], v: f64| {
-            let mut d = [0.0; MOST_STATES];
+        let slope = |x: &[f64; MAX_STATES], v: f64| {
+            let mut d = [0.0; MAX_STATES];
             d[..n - 1].copy_from_slice(&x[1..n]);
             let known: f64 = denominator[..n].iter().zip(x).map(|(a, x)| a * x).sum();
             d[n - 1] = (v - known) / denominator[n];
             d
         };
-        let moved = |x: &[f64; MOST_STATES], d: &[f64; MOST_STATES], by: f64| {
+        let moved = |x: &[f64; MAX_STATES], d: &[f64; MAX_STATES], by: f64| {
             let mut to = *x;
             to.iter_mut().zip(d).for_each(|(x, d)| *x += by * d);
             to
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn the_response_is_that_of_the_transfer_function() {
+    fn response_matches_the_transfer_function() {
         let operator = typical();
         let open_loop = operator.open_loop(Plant::Lagged).unwrap();
         for omega in [0.1, 1.0, 5.0, 20.0] {
@@ -249,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stepped_system_answers_a_sine_with_its_response() {
+    fn integrated_sine_response_matches_the_frequency_response() {
         let operator = Operator {
             tau_e_s: 0.0,
             ..typical()
@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_of_one_parameter_leaves_the_others() {
+    fn change_of_one_parameter_keeps_the_others() {
         let lead = Operator {
             lag_s: 0.0,
             third_s: 0.0,

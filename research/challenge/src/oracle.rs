@@ -24,10 +24,10 @@ use super::{
 /// Logarithm of the likelihood ratio above which a change is certain.
 pub const CERTAIN: f64 = 12.0;
 /// Lower limit of the strength; without it the remnant would vanish where the error is zero and reveal the response.
-const LEAST_LEVEL: f64 = 0.05;
-/// Order of the noise model of the batch fit; `LEAST_S` is the shortest span of the fit, s.
+const MIN_LEVEL: f64 = 0.05;
+/// Order of the noise model of the batch fit; `MIN_SPAN_S` is the shortest span of the fit, s.
 const ND: usize = 4;
-const LEAST_S: f64 = 7.5;
+const MIN_SPAN_S: f64 = 7.5;
 
 /// Returns the logarithm of the likelihood ratio over the first `seconds` after the change with this index.
 pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
@@ -52,7 +52,7 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
     };
     (*first..end)
         .map(|k| {
-            let scale = hidden.innovation * hidden.level[k].max(LEAST_LEVEL);
+            let scale = hidden.innovation * hidden.level[k].max(MIN_LEVEL);
             let (mut now, mut old) = (0.0, 0.0);
             for (lag, a) in hidden.whitening.iter().enumerate().take(k + 1) {
                 now += a * hidden.n[k - lag];
@@ -76,7 +76,7 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedRespon
     let at = |t_s: &f64| -> Option<ReportedResponse> {
         // A change takes half a second.
         let from = (changes_s.iter().rev().find(|c| *c < t_s)).map_or(task.start_s.0, |c| c + 0.5);
-        if t_s - from < LEAST_S {
+        if t_s - from < MIN_SPAN_S {
             return None;
         }
         let fit = estimator
@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_change_is_certain_a_small_one_is_not() {
+    fn only_a_large_change_is_certain() {
         let (large, small) = (found("change-K_e_dot-100", 8.0), found("change-zeta-10", 8.0));
         assert!(large > CERTAIN && small < CERTAIN && large > small, "{large} {small}");
     }
@@ -133,7 +133,7 @@ mod tests {
     /// The mean of the log ratio is the divergence: half the power of the whitened difference divided by the variance.
     /// Its standard deviation over runs is the square root of twice the divergence.
     #[test]
-    fn the_evidence_of_a_normal_remnant_is_half_the_power_of_the_difference() {
+    fn evidence_for_a_gaussian_remnant_matches_the_divergence() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();
         let (mut sum, mut expected) = (0.0, 0.0);
         for number in 0..6 {

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_case_has_its_row() {
+    fn every_case_has_a_row() {
         let page = page(&[], "never measured");
         assert!(cases().iter().all(|case| page.contains(&format!("| {} |", case.name))));
         assert!(page.contains("never measured"));

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use super::{
     draw::Portion,
     entrant::{Entrant, Seam, Task},
-    measure::{ChangeOutcome, Line, asked, scored},
+    measure::{ChangeOutcome, Line, requested_times, scored},
     run::{chosen_entrants, kept, refused},
 };
 use crate::ChallengeError;
@@ -242,7 +242,8 @@ impl Joined {
         let length_s = e.len() as f64 / RATE_HZ;
         // At a seam the response is requested at the same times as at a change.
         let at_s: &[f64] = if self.second.is_some() { &[TRIAL_S] } else { &[] };
-        let (labels, asked_s): (Vec<String>, Vec<f64>) = asked(at_s, start_s.1, length_s, false).into_iter().unzip();
+        let (labels, asked_s): (Vec<String>, Vec<f64>) =
+            requested_times(at_s, start_s.1, length_s, false).into_iter().unzip();
         let found = ChangeOutcome {
             at_s: TRIAL_S,
             evidence: [KNOWN_CHANGE_EVIDENCE; 2],
@@ -309,7 +310,7 @@ mod tests {
     /// The control of the trial is the error, delayed by one sample and multiplied by a gain: the describing function
     /// is this gain, and the sample is the shift of the recorder.
     #[test]
-    fn the_describing_function_of_a_gain_is_the_gain() {
+    fn describing_function_of_a_gain_is_the_gain() {
         let n = 2702;
         let sines = |k: usize, shift: f64| -> f64 {
             let t = (k as f64 - shift) / RATE_HZ;

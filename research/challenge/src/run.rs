@@ -189,7 +189,7 @@ mod tests {
     /// An existing run is read and not computed again; the lines are the same in any order and with any number of
     /// threads.
     #[test]
-    fn what_is_there_is_not_computed_again() {
+    fn existing_runs_are_not_computed_again() {
         let directory = tempfile::tempdir().unwrap();
         let default = options(directory.path());
         let all = challenge(&default, &|_| ()).unwrap();
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_checked() {
+    fn case_and_entrant_names_are_checked() {
         assert!(chosen_cases(&["none-".to_owned()]).unwrap().len() > 20);
         assert_eq!(chosen_cases(&["rates".to_owned()]).unwrap().len(), 5);
         let refused = chosen_cases(&["nothing".to_owned()]).unwrap_err().to_string();

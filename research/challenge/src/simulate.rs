@@ -118,7 +118,7 @@ pub struct OracleData {
 
 const RUN_IN_S: f64 = 15.0;
 /// Maximum number of people who may lose control in the simulation before it fails.
-const MOST_ATTEMPTS: usize = 20;
+const MAX_ATTEMPTS: usize = 20;
 /// Limit of u beyond which control is lost, standard deviations of u.
 const LOSS_LIMIT: f64 = 30.0;
 
@@ -137,7 +137,7 @@ pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
         time_s: 0.0,
         scenario: case.name.clone(),
     });
-    for attempt in 0..MOST_ATTEMPTS {
+    for attempt in 0..MAX_ATTEMPTS {
         let operator = person(case, run, sample_time, attempt)?;
         outcome = of_person(case, run, operator, sample_time);
         if !matches!(outcome, Err(SimError::Diverged { .. })) {
@@ -348,7 +348,7 @@ mod tests {
     /// Without a remnant, U/E at the lines of the excitation over whole periods of 20 s equals the true response, for
     /// held and continuous errors and for whole and fractional delays.
     #[test]
-    fn the_loop_has_the_response_that_is_called_true() {
+    fn simulated_loop_has_the_true_response() {
         for (name, within) in [("none-lag-1", 1e-3), ("delay-half-60", 1e-3), ("continuous-60", 4e-3)] {
             let quiet = Case {
                 ratio: 0.0,
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn the_shadow_is_the_person_of_before_and_the_sum_is_what_was_recorded() {
+    fn recorded_output_is_the_response_plus_remnant() {
         let run = simulate(&case("change-K_e_dot-100"), RUN).unwrap();
         let OracleData {
             n, response, before, ..
@@ -393,7 +393,7 @@ mod tests {
     }
 
     #[test]
-    fn blemishes_are_where_they_should_be() {
+    fn imperfections_occur_where_specified() {
         let run = simulate(&case("none-missing"), RUN).unwrap();
         assert!(run.e[6000..6300].iter().all(|e| e.is_nan()) && run.record().is_none());
         assert!(run.e[..6000].iter().chain(&run.e[6300..]).all(|e| e.is_finite()));
@@ -408,7 +408,7 @@ mod tests {
 
     /// Each selected person keeps control.
     #[test]
-    fn every_loop_runs() {
+    fn every_closed_loop_stays_under_control() {
         let are_loops = |case: &Case| {
             let again = matches!(case.theme, Theme::Changes | Theme::ChangesInRemnants);
             !again && !matches!(case.imperfection, Imperfection::IdleStart(_))

@@ -350,7 +350,7 @@ mod tests {
     use crate::measure::{ChangeOutcome, Moment};
 
     #[test]
-    fn numbers_are_where_they_belong() {
+    fn tables_contain_the_expected_rows() {
         let moment = |label: &str, error| Moment {
             label: label.to_owned(),
             t_s: 0.0,

@@ -8,8 +8,8 @@
 //! causal: the ratios use the rows from 30.72 s on, and ratios from 10 s on are given as well.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+use hoid_evidence::given_delay::{options, thesis_settings};
 use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};
-use hoid_evidence::told::{of_the_text, options};
 use hoid_model::{
     Record,
     scenario::{Condition, Realisation},
@@ -36,7 +36,7 @@ impl Cell {
     }
 
     /// Returns the start of the change: 1.8 % of a sigmoid are completed 4/G before its middle.
-    fn begins_s(&self) -> f64 {
+    fn change_start_s(&self) -> f64 {
         match self.condition {
             Condition::C3 | Condition::C5 => CHANGE_S - 8.0,
             _ => CHANGE_S - 0.04,
@@ -61,7 +61,7 @@ fn tracker(name: &str, record: &Record) -> Tracker {
         return Tracker::new(&options, None, record.sample_time()).unwrap();
     }
     let options = match name {
-        "rls" | "rpem" => of_the_text(method),
+        "rls" | "rpem" => thesis_settings(method),
         _ => options(method),
     };
     Tracker::new(
@@ -88,7 +88,7 @@ fn follow(name: &str, cell: &Cell, record: &Record) -> RunResult {
         };
         tracker.update(sample, t >= moves_from);
         if tracker.change().is_some() && t > START_S {
-            let after = cell.changes() && (cell.begins_s()..CHANGE_S + 10.0).contains(&t);
+            let after = cell.changes() && (cell.change_start_s()..CHANGE_S + 10.0).contains(&t);
             if after && delay_s.is_nan() {
                 delay_s = t - CHANGE_S;
             }

@@ -47,7 +47,7 @@ fn bare(record: &Record) -> Record {
 /// Model, modification of the record, and whether the record was reported as not constant.
 type Row = (String, String, Option<bool>);
 
-fn told(verdict: &Verdict) -> bool {
+fn reports_change(verdict: &Verdict) -> bool {
     verdict.findings().iter().any(|f| f.kind == "not-constant")
 }
 
@@ -56,7 +56,7 @@ fn rows(what: &str, runs: &[Record], other: &Record, fit: &dyn Fn(&[Record]) -> 
     let with = |change: &dyn Fn(&Record) -> Record| {
         let mut all = runs.to_vec();
         all[middle] = change(&all[middle]);
-        fit(&all).map(|verdict| told(&verdict))
+        fit(&all).map(|verdict| reports_change(&verdict))
     };
     let mut all = vec![(what.to_owned(), "clean".to_owned(), with(&Record::clone))];
     if env::args().any(|a| a == "--clean") {

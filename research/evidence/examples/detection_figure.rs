@@ -7,7 +7,7 @@
 use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};
 
 /// Position of a rate of zero, 1/h: less than one alarm in all hours of the table.
-const NONE: f64 = 0.02;
+const ZERO_RATE_POSITION: f64 = 0.02;
 
 fn main() {
     let path = std::env::args().nth(1).unwrap_or_else(|| "detection.txt".to_owned());
@@ -23,11 +23,11 @@ fn main() {
             let mut points: Vec<(f64, f64)> = rows
                 .iter()
                 .filter(|cells| cells[1].starts_with(statistic))
-                .map(|cells| (number(cells[3]).max(NONE), number(cells[column])))
+                .map(|cells| (number(cells[3]).max(ZERO_RATE_POSITION), number(cells[column])))
                 .collect();
             // Of the thresholds without a false alarm, the lowest is the best.
             points.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-            let silent = points.iter().rposition(|p| p.0 <= NONE).unwrap_or(0);
+            let silent = points.iter().rposition(|p| p.0 <= ZERO_RATE_POSITION).unwrap_or(0);
             let points = &points[silent..];
             Curve {
                 name: name.to_owned(),

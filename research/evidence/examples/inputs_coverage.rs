@@ -56,7 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let plants = [Plant::Integrator, Plant::LaggedIntegrator, Plant::DoubleIntegrator];
     let mut held = BTreeMap::new();
     let (mut found, mut seeing, mut invented, mut blind) = (0, 0, 0, 0);
-    let (mut told, mut told_off, mut right_form) = (0, 0, 0);
+    let (mut trustworthy, mut trustworthy_with_one_input, mut right_form) = (0, 0, 0);
     for k in 0..people {
         let plant = plants[(k / 2) as usize % plants.len()];
         let Ok(person) = Person::draw(&population, &task, plant, None, RemnantKind::BroadBand, seed, k) else {
@@ -124,14 +124,14 @@ fn main() -> Result<(), Box<dyn Error>> {
                 .ok()
                 .filter(|one| one.verdict.level == VerdictLevel::Trustworthy)
             {
-                told_off += 1;
+                trustworthy_with_one_input += 1;
                 println!("{k}: one input is {}", one.verdict.level);
             }
         } else {
             blind += 1;
             invented += usize::from(response.is_some());
         }
-        told += usize::from(two.verdict.level == VerdictLevel::Trustworthy);
+        trustworthy += usize::from(two.verdict.level == VerdictLevel::Trustworthy);
         let of = |all: &[Parameter], name: &str| all.iter().find(|p| p.name == name).cloned();
         let own = &two.fit.operators[0].parameters;
         for truth in person.state.operator.named() {
@@ -171,7 +171,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "response to the target found: {found} of {seeing} (its form: {right_form}); invented: {invented} of {blind}"
     );
     println!(
-        "trustworthy with two inputs: {told} of {}; with one input: {told_off} of {seeing}",
+        "trustworthy with two inputs: {trustworthy} of {}; with one input: {trustworthy_with_one_input} of {seeing}",
         seeing + blind
     );
     println!("quantity, determined of all, held of those (%)");

@@ -105,7 +105,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 fit.lead_s = lead_s;
                 let of = fit.operator(0);
                 let tau = of.parameters.iter().find(|p| p.name == "tau_e").ok_or("no delay")?;
-                let later = fit.delay_if_straight_s(0).map_or(0.0, |straight| straight - tau.value);
+                let later = fit.delay_if_linear_s(0).map_or(0.0, |straight| straight - tau.value);
                 let Some((low, high)) = tau.interval else {
                     none += 1;
                     continue;
@@ -120,16 +120,16 @@ fn main() -> Result<(), Box<dyn Error>> {
                 off += of_error;
                 errors += error;
             }
-            let told = (people - none) as f64;
-            let share = |n: u64| 100.0 * n as f64 / told;
+            let determined = (people - none) as f64;
+            let share = |n: u64| 100.0 * n as f64 / determined;
             let kind = if is_held { "held" } else { "logged" };
             println!(
                 "{rate_hz:5} {kind:6} {:5.1} % {:5.1} % {:5.1} % {:+.2} {:.4}, {none} without",
                 share(right),
                 share(other),
                 share(near),
-                off / told,
-                errors / told
+                off / determined,
+                errors / determined
             );
         }
     }

@@ -5,8 +5,8 @@
 //! are joined in the middle
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+use hoid_evidence::given_delay::{options, thesis_settings};
 use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};
-use hoid_evidence::told::{of_the_text, options};
 use hoid_model::{
     Channel, Record, SampleTime,
     scenario::{Condition, Scenario},
@@ -244,8 +244,8 @@ fn detection(runs: usize) {
 /// seed 9000.
 fn tune(runs: usize) {
     let methods = [
-        of_the_text(Method::rls()),
-        of_the_text(Method::rpem()),
+        thesis_settings(Method::rls()),
+        thesis_settings(Method::rpem()),
         options(hoid_survey::fused()),
         options(hoid_survey::ekf()),
         options(hoid_survey::ukf()),

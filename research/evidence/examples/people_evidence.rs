@@ -22,7 +22,7 @@ const ELEMENTS: [&str; 2] = ["fo", "so"];
 /// Harmonics of 1/20 Hz in the disturbance of both elements.
 const LINES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
 /// Analysed rows of a trial: whole periods.
-const FROM: usize = 300;
+const FIRST_ROW: usize = 300;
 const ROWS: usize = 2400;
 const RATE_HZ: f64 = 60.0;
 const AT_S: [usize; 6] = [2, 4, 8, 13, 18, 28];
@@ -63,8 +63,8 @@ fn read(folder: &PathBuf, person: &str, element: &str) -> Vec<Trial> {
         let later = [0, 1, 0];
         let of = |c: usize, from: usize, rows: usize| all[c][from + later[c]..from + later[c] + rows].to_vec();
         Trial {
-            signals: [0, 1, 2].map(|c| of(c, FROM, ROWS)),
-            ramp: [0, 1].map(|c| of(c, 0, FROM)),
+            signals: [0, 1, 2].map(|c| of(c, FIRST_ROW, ROWS)),
+            ramp: [0, 1].map(|c| of(c, 0, FIRST_ROW)),
         }
     };
     files.iter().map(of).collect()
@@ -124,7 +124,7 @@ struct Run {
 fn is_certain(before: &[Trial], joined: usize, after: &[Trial], second: usize) -> bool {
     let rows = |trial: &Trial| {
         let of = |c: usize| [trial.ramp[c].as_slice(), &trial.signals[c]].concat();
-        Rows::new(&of(0), &of(1), FROM, 1.0 / RATE_HZ)
+        Rows::new(&of(0), &of(1), FIRST_ROW, 1.0 / RATE_HZ)
     };
     let [before, after] = [before, after].map(|trials| trials.iter().map(rows).collect::<Vec<Rows>>());
     let others: Vec<&Rows> = (0..after.len()).filter(|i| *i != second).map(|i| &after[i]).collect();

@@ -129,8 +129,8 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
     }
     let nk = record.sample_time().nk(0.2);
     let mut options = TrackOptions::default_for(method.clone(), nk);
-    let of_the_text = matches!(name, "rls" | "rpem");
-    if of_the_text {
+    let thesis_settings = matches!(name, "rls" | "rpem");
+    if thesis_settings {
         let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
         settings.extend((name == "rpem").then_some(("stable", "noise")));
         options = options.with(&settings).unwrap();
@@ -226,7 +226,7 @@ fn alarms(run: &Run, from: f64, to: f64) -> usize {
 }
 
 /// Formats the events of the guard, by kind, and the number of recordings with events.
-fn told(all: &[Run]) -> String {
+fn guard_events(all: &[Run]) -> String {
     let mut kinds = BTreeMap::<&str, usize>::new();
     for (kind, count) in all.iter().flat_map(|r| &r.faults) {
         *kinds.entry(kind).or_default() += count;
@@ -321,7 +321,7 @@ fn main() {
             operator(1),
             all.iter().map(|r| r.restarts).sum::<u64>(),
             all.iter().flat_map(|r| r.faults.values()).sum::<usize>(),
-            told(&all),
+            guard_events(&all),
         );
     }
 }

@@ -21,10 +21,10 @@ use hoid_track::{GuardEvent, Sample, TrackOptions, Tracker};
 use rayon::prelude::*;
 
 /// Places of the inserted faults, s after the start, and the largest length of a fault.
-const PLACES_S: [f64; 2] = [33.3, 47.77];
+const FAULT_TIMES_S: [f64; 2] = [33.3, 47.77];
 const LONGEST_S: f64 = 20.0;
 /// Time after a fault in which it may be reported, s.
-const BEHIND_S: f64 = 3.0;
+const REPORT_WINDOW_S: f64 = 3.0;
 
 struct Recording {
     e: Vec<f64>,
@@ -32,7 +32,7 @@ struct Recording {
     sample_time: SampleTime,
 }
 
-fn told(recording: &Recording, e: &[f64], u: &[f64], method: &str) -> Vec<(usize, GuardEvent)> {
+fn guard_events(recording: &Recording, e: &[f64], u: &[f64], method: &str) -> Vec<(usize, GuardEvent)> {
     let method = hoid_survey::method(method).unwrap();
     let options = TrackOptions::without_prior(method, recording.sample_time);
     let mut tracker = Tracker::new(&options, None, recording.sample_time).unwrap();
@@ -122,7 +122,10 @@ fn main() {
             }
         })
         .collect();
-    let clean: Vec<Vec<(usize, GuardEvent)>> = recordings.par_iter().map(|r| told(r, &r.e, &r.u, &method)).collect();
+    let clean: Vec<Vec<(usize, GuardEvent)>> = recordings
+        .par_iter()
+        .map(|r| guard_events(r, &r.e, &r.u, &method))
+        .collect();
     let mut kinds = BTreeMap::<&str, usize>::new();
     for (name, (_, event)) in names
         .iter()
@@ -146,15 +149,15 @@ fn main() {
             .zip(&clean)
             .flat_map_iter(|(r, clean)| {
                 let (fault, method) = (&fault, &method);
-                PLACES_S.map(move |at_s| {
+                FAULT_TIMES_S.map(move |at_s| {
                     let per_second = 1.0 / r.sample_time.s();
                     let at = (at_s * per_second) as usize;
                     let (mut e, mut u) = (r.e.clone(), r.u.clone());
                     let end = fault.put(&mut e, &mut u, at, per_second, 0.0);
-                    let until = end.min(e.len()) + (BEHIND_S * per_second) as usize;
+                    let until = end.min(e.len()) + (REPORT_WINDOW_S * per_second) as usize;
                     let within = |k: usize| k >= at && k < until;
                     let without: Vec<_> = clean.iter().filter(|(k, _)| within(*k)).collect();
-                    let with = told(r, &e, &u, method);
+                    let with = guard_events(r, &e, &u, method);
                     let mut with = with.iter().filter(|(k, _)| within(*k));
                     with.any(|event| !without.contains(&event))
                 })

@@ -66,7 +66,7 @@ fn options(method: Method) -> TrackOptions {
 }
 
 /// Returns RLS or RPEM with the settings of the thesis.
-fn of_the_text(method: Method) -> TrackOptions {
+fn thesis_settings(method: Method) -> TrackOptions {
     let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
     settings.extend((method != Method::rls()).then_some(("stable", "noise")));
     options(method.clone()).with(&settings).unwrap()
@@ -135,10 +135,12 @@ fn table(runs: usize) {
         (4, 0.2),
     ];
     // Effect of the order of the filters of the gradient.
-    let cascade = of_the_text(Method::rpem()).with(&[("regressor", "cascade")]).unwrap();
+    let cascade = thesis_settings(Method::rpem())
+        .with(&[("regressor", "cascade")])
+        .unwrap();
     let methods: [(&str, TrackOptions); 5] = [
-        ("RLS, text", of_the_text(Method::rls())),
-        ("RPEM, text", of_the_text(Method::rpem())),
+        ("RLS, text", thesis_settings(Method::rls())),
+        ("RPEM, text", thesis_settings(Method::rpem())),
         ("cascade", cascade),
         ("RPEM", options(Method::rpem())),
         ("physical", options(hoid_survey::physical())),

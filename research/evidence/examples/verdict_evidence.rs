@@ -88,14 +88,14 @@ enum Kind {
 
 /// An operator with its remnant.
 #[derive(Debug, Clone, Copy)]
-struct Somebody {
+struct SimulatedPerson {
     operator: Operator,
     element: Element,
     share: f64,
     remnant: usize,
 }
 
-fn somebody(kind: Kind, numbers: &[f64]) -> Somebody {
+fn simulated_person(kind: Kind, numbers: &[f64]) -> SimulatedPerson {
     let at = |i: usize, low: f64, high: f64| low + numbers[i] * (high - low);
     let element = match kind {
         Kind::Lead if numbers[0] < 0.5 => Element::DoubleIntegrator,
@@ -113,7 +113,7 @@ fn somebody(kind: Kind, numbers: &[f64]) -> Somebody {
     };
     let crossover = at(5, 1.5, 3.0);
     operator.k = 1.0 / (operator.response(crossover) * element.transfer_function().response(crossover)).norm();
-    Somebody {
+    SimulatedPerson {
         operator,
         element,
         share: 0.05 * 6.0_f64.powf(numbers[6]),
@@ -141,7 +141,7 @@ impl Forcing {
 
 /// Simulates a loop and returns e and u; `None` if the loop is unbounded.
 fn simulate(
-    who: &Somebody,
+    person: &SimulatedPerson,
     forcing: &Forcing,
     normals: &[f64],
     level: f64,
@@ -160,7 +160,7 @@ fn simulate(
     let (mut e_all, mut u_all) = (Vec::with_capacity(count), Vec::with_capacity(count));
     for k in 0..count {
         let w = normals[k];
-        n = match who.remnant {
+        n = match person.remnant {
             // Running rms of u over a second.
             1 => pole * n + drive * w * (0.45 + 0.89 * running.sqrt().min(3.0)),
             // Two pulses per second.
@@ -174,11 +174,11 @@ fn simulate(
         for j in 0..INNER {
             let step = k * INNER + j;
             let t = step as f64 * h - RUN_IN_S;
-            let who_now = at(t);
+            let operator_now = at(t);
             let f = forcing.at(t);
-            u = who_now.k * (z + who_now.lead * dz) + level * n;
-            let position = if who.element == Element::Gain { u } else { y };
-            let e = if who.element == Element::Gain {
+            u = operator_now.k * (z + operator_now.lead * dz) + level * n;
+            let position = if person.element == Element::Gain { u } else { y };
+            let e = if person.element == Element::Gain {
                 f - position
             } else {
                 -position
@@ -188,18 +188,18 @@ fn simulate(
                 e_all.push(e);
                 u_all.push(u);
             }
-            let ago = (who_now.tau / h).round() as usize;
+            let ago = (operator_now.tau / h).round() as usize;
             let seen = step.checked_sub(ago).map_or(0.0, |s| past[s]);
-            let seen = if who_now.lag > 0.0 {
-                lagged += h * (seen - lagged) / who_now.lag;
+            let seen = if operator_now.lag > 0.0 {
+                lagged += h * (seen - lagged) / operator_now.lag;
                 lagged
             } else {
                 seen
             };
-            let (omega, zeta) = (who_now.omega, who_now.zeta);
+            let (omega, zeta) = (operator_now.omega, operator_now.zeta);
             dz += h * (omega * omega * (seen - z) - 2.0 * zeta * omega * dz);
             z += h * dz;
-            match who.element {
+            match person.element {
                 Element::Gain => {}
                 Element::Integrator => y += h * (u + f),
                 Element::LaggedIntegrator => {
@@ -212,7 +212,7 @@ fn simulate(
                 }
             }
         }
-        running += (u * u / (level / who.share.sqrt().max(1e-9)).powi(2).max(1e-9) - running) / RATE as f64;
+        running += (u * u / (level / person.share.sqrt().max(1e-9)).powi(2).max(1e-9) - running) / RATE as f64;
         if !(y.abs() < 1e3 && u.abs() < 1e4) {
             return None;
         }
@@ -241,11 +241,11 @@ fn rms(values: &[f64]) -> f64 {
 
 /// Modification of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Attack {
+enum Modification {
     Clean,
     Sign,
     TwoPeople,
-    Swaying,
+    Oscillating,
     Halved,
     Drifting,
     Late,
@@ -253,12 +253,12 @@ enum Attack {
     OtherTask,
 }
 
-impl Attack {
+impl Modification {
     const ALL: [Self; 9] = [
         Self::Clean,
         Self::Sign,
         Self::TwoPeople,
-        Self::Swaying,
+        Self::Oscillating,
         Self::Halved,
         Self::Drifting,
         Self::Late,
@@ -271,7 +271,7 @@ impl Attack {
             Self::Clean => "clean",
             Self::Sign => "sign of e turned over",
             Self::TwoPeople => "two people, 15 s each in turn",
-            Self::Swaying => "gain sways +-25 %, period 10 to 30 s",
+            Self::Oscillating => "gain sways +-25 %, period 10 to 30 s",
             Self::Halved => "K halved and +.1 s at 45 s",
             Self::Drifting => "gain drifts to 55 % in 60 s",
             Self::Late => "delay +.1 s at 45 s",
@@ -286,7 +286,7 @@ impl Attack {
 }
 
 /// Simulates a run of a kind of operator with a modification.
-fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, Element)> {
+fn run(kind: Kind, modification: Modification, seed: u64, number: u64) -> Option<(Record, Element)> {
     let stream = |of: u64, n: usize| uniform([seed, kind as u64, number, of], n);
     let numbers = stream(0, 4000);
     let samples = ((RUN_IN_S + LENGTH_S) * RATE as f64) as usize;
@@ -296,62 +296,62 @@ fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, El
         pairs.chunks_exact(2).map(normal).collect::<Vec<f64>>()
     };
     for draw in numbers.chunks_exact(80) {
-        let who = somebody(kind, draw);
-        let mut second = somebody(kind, &[&draw[..1], &draw[21..40]].concat());
-        second.element = who.element;
-        let (one, two) = (who.operator, second.operator);
+        let person = simulated_person(kind, draw);
+        let mut second = simulated_person(kind, &[&draw[..1], &draw[21..40]].concat());
+        second.element = person.element;
+        let (one, two) = (person.operator, second.operator);
         // Two similar operators count as one.
-        if attack == Attack::TwoPeople && (one.response(2.0) / two.response(2.0) - 1.0).norm() < 0.25 {
+        if modification == Modification::TwoPeople && (one.response(2.0) / two.response(2.0) - 1.0).norm() < 0.25 {
             continue;
         }
         let period = 10.0 + 20.0 * draw[60];
-        let at = move |t: f64| match attack {
-            Attack::TwoPeople if (t / 15.0).floor().rem_euclid(2.0) == 1.0 => two,
-            Attack::Swaying => Operator {
+        let at = move |t: f64| match modification {
+            Modification::TwoPeople if (t / 15.0).floor().rem_euclid(2.0) == 1.0 => two,
+            Modification::Oscillating => Operator {
                 k: one.k * (1.0 + 0.25 * (TAU * t / period).sin()),
                 ..one
             },
-            Attack::Halved if t >= 45.0 => Operator {
+            Modification::Halved if t >= 45.0 => Operator {
                 k: 0.5 * one.k,
                 tau: one.tau + 0.1,
                 ..one
             },
-            Attack::Late if t >= 45.0 => Operator {
+            Modification::Late if t >= 45.0 => Operator {
                 tau: one.tau + 0.1,
                 ..one
             },
-            Attack::Drifting => Operator {
+            Modification::Drifting => Operator {
                 k: one.k * (1.0 - 0.45 * ((t - 11.0) / 60.0).clamp(0.0, 1.0)),
                 ..one
             },
             _ => one,
         };
-        let of_target = who.element != Element::Integrator;
+        let of_target = person.element != Element::Integrator;
         let forcing = Forcing::new(&draw[40..60], of_target);
         let silent = vec![0.0; 2 * samples];
-        let Some([_, u]) = simulate(&who, &forcing, &silent, 0.0, &at) else {
+        let Some([_, u]) = simulate(&person, &forcing, &silent, 0.0, &at) else {
             continue;
         };
-        let level = rms(&u) * who.share.sqrt();
-        let Some([e, mut u]) = simulate(&who, &forcing, &normals(1), level, &at) else {
+        let level = rms(&u) * person.share.sqrt();
+        let Some([e, mut u]) = simulate(&person, &forcing, &normals(1), level, &at) else {
             continue;
         };
         // A loop at its stability limit is not realistic.
-        if rms(&u) * who.share.sqrt() > 1.8 * level {
+        if rms(&u) * person.share.sqrt() > 1.8 * level {
             continue;
         }
-        if matches!(attack, Attack::OtherRun | Attack::OtherTask) {
-            let forcing = match attack {
-                Attack::OtherTask => Forcing::new(&draw[20..40], of_target),
+        if matches!(modification, Modification::OtherRun | Modification::OtherTask) {
+            let forcing = match modification {
+                Modification::OtherTask => Forcing::new(&draw[20..40], of_target),
                 _ => forcing,
             };
-            u = simulate(&who, &forcing, &normals(2), level, &at)?[1].clone();
+            u = simulate(&person, &forcing, &normals(2), level, &at)?[1].clone();
         }
-        let sign = if attack == Attack::Sign { -1.0 } else { 1.0 };
+        let sign = if modification == Modification::Sign { -1.0 } else { 1.0 };
         let e = e.into_iter().map(|e| sign * e).collect();
         let channel = |name: &str, values: Vec<f64>| Channel::new(name, "", values);
         let record = Record::new(SampleTime::HUNDREDTH, channel("e", e), channel("u", u)).unwrap();
-        return Some((record, who.element));
+        return Some((record, person.element));
     }
     None
 }
@@ -365,7 +365,7 @@ struct RunVerdict {
     seconds: f64,
 }
 
-fn said(
+fn run_verdict(
     what: String,
     record: &Record,
     element: Option<ContinuousTransferFunction>,
@@ -436,15 +436,15 @@ fn main() {
     let method = text("--method").map_or(Method::adaptive(), |name| hoid_survey::method(&name).unwrap());
     let (named, kinds) = (is("--element"), is("--kinds"));
     let only = text("--only");
-    let mut asked: Vec<(Kind, Attack, u64)> = Vec::new();
-    for attack in Attack::ALL {
+    let mut asked: Vec<(Kind, Modification, u64)> = Vec::new();
+    for modification in Modification::ALL {
         for kind in [Kind::Lead, Kind::GainLike, Kind::Lag] {
-            asked.extend((0..runs).map(|run| (kind, attack, run)));
+            asked.extend((0..runs).map(|run| (kind, modification, run)));
         }
     }
-    asked.retain(|(_, attack, _)| {
+    asked.retain(|(_, modification, _)| {
         only.as_ref()
-            .is_none_or(|only| attack.words().starts_with(only.as_str()))
+            .is_none_or(|only| modification.words().starts_with(only.as_str()))
     });
     let folder = env::var("HOID_HUMAN_DATA").ok();
     if folder.is_some() {
@@ -452,11 +452,17 @@ fn main() {
     }
     let mut all: Vec<RunVerdict> = asked
         .into_par_iter()
-        .filter_map(|(kind, attack, number)| {
-            let (record, element) = run(kind, attack, seed, number)?;
-            let what = format!("{}|{kind:?}", attack.words());
+        .filter_map(|(kind, modification, number)| {
+            let (record, element) = run(kind, modification, seed, number)?;
+            let what = format!("{}|{kind:?}", modification.words());
             let element = named.then(|| element.transfer_function());
-            Some(said(what, &record, element, &method, attack.changes_once()))
+            Some(run_verdict(
+                what,
+                &record,
+                element,
+                &method,
+                modification.changes_once(),
+            ))
         })
         .collect();
     if let Some(folder) = &folder {
@@ -469,7 +475,7 @@ fn main() {
                 .take(2)
                 .filter(|part| part.parse::<u32>().is_err())
                 .collect();
-            said(
+            run_verdict(
                 format!("recorded people|{}", group.join(" ")),
                 record,
                 None,
@@ -504,7 +510,7 @@ fn main() {
             )
             .unwrap();
             let element = named.then(|| plant.transfer_function().unwrap());
-            Some(said(
+            Some(run_verdict(
                 format!("clean, virtual people|{kind}"),
                 &record,
                 element,
@@ -530,7 +536,7 @@ fn main() {
                 .run(streams, false)
                 .unwrap();
             let what = format!("clean, the text's conditions|{condition}");
-            said(what, &record, None, &method, false)
+            run_verdict(what, &record, None, &method, false)
         });
         all.extend(of_text.collect::<Vec<RunVerdict>>());
     }

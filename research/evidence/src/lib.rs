@@ -4,13 +4,13 @@
 //! | module | contents |
 //! |---|---|
 //! | [`task`] | the conditions of the thesis, and execution of runs on all cores |
-//! | [`told`] | methods with a given delay |
+//! | [`given_delay`] | methods with a given delay |
 //! | [`oracle`] | upper bound of the information about a change, if the operators before and after it are known |
 //! | [`pilots`] | the folder of recorded pilots |
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+pub mod given_delay;
 pub mod oracle;
 pub mod pilots;
 pub mod task;
-pub mod told;

@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 const ORDER: usize = 16;
 const DELAY_S: f64 = 0.2;
-const LIMIT: f64 = 3.5;
+const RESIDUAL_LIMIT: f64 = 3.5;
 
 /// Regressors and output of a trial, with the first row that is analysed.
 pub struct Rows {
@@ -103,7 +103,7 @@ pub fn log_ratio(before: &[&Rows], joined: usize, after: &[&Rows], second: &Rows
     };
     let own = of(first, &gains(&[first], &d));
     let variance = own.iter().map(|v| v * v).sum::<f64>() / own.len() as f64;
-    let limit = LIMIT * variance.sqrt();
+    let limit = RESIDUAL_LIMIT * variance.sqrt();
     let loss = |gains: &Vector3<f64>| {
         let left = &of(second, gains)[..samples];
         let mean = left.iter().sum::<f64>() / samples as f64;

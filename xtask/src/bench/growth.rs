@@ -29,7 +29,7 @@ struct Point {
 }
 
 /// Interval between measurements of a child's memory.
-const LOOK: Duration = Duration::from_millis(2);
+const MEMORY_POLL_INTERVAL: Duration = Duration::from_millis(2);
 
 const PLAN: &str = "name = \"growth\"
 title = \"One cell: ARX and Box-Jenkins in condition C1\"
@@ -210,7 +210,7 @@ fn watched(command: &mut Command) -> Result<(f64, Option<u64>), String> {
         match child.try_wait().map_err(|e| format!("{shown}: {e}"))? {
             Some(ended) if ended.success() => return Ok((begun.elapsed().as_secs_f64(), peak)),
             Some(ended) => return Err(format!("failed ({ended}): {shown}")),
-            None => thread::sleep(LOOK),
+            None => thread::sleep(MEMORY_POLL_INTERVAL),
         }
     }
 }
@@ -278,7 +278,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slopes_of_powers_are_their_exponents() {
+    fn slope_of_a_power_law_is_its_exponent() {
         for exponent in [1.0, 2.0] {
             let points: Vec<Point> = [10_usize, 100, 1000]
                 .map(|n| Point {
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn high_water_is_read_and_shown() {
+    fn peak_memory_is_parsed_and_formatted() {
         assert_eq!(high_water("VmPeak:\t 9 kB\nVmHWM:\t  2048 kB\n"), Some(2 << 20));
         assert_eq!(high_water(""), None);
         assert_eq!(bytes(2 << 20), "2.00 MiB");
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn a_section_has_a_row_a_point() {
+    fn section_has_one_row_per_point() {
         let mut text = String::new();
         let at = |n: usize| Point {
             n,

@@ -3,8 +3,8 @@
 //! Times measured on a shared machine carry little information. The number of instructions of a program is reproducible
 //! to a few parts in a thousand, regardless of what else runs. Callgrind (Valgrind) counts the instructions for one run
 //! and for three runs of a task in the example `tasks`; half of the difference is the number for one run. The stored
-//! numbers are in [`KEPT`] with the version of the compiler. The check fails if a number exceeds its stored value by
-//! more than [`ALLOWED`]; with a different compiler version the excess is only reported.
+//! numbers are in [`STORED_COUNTS`] with the version of the compiler. The check fails if a number exceeds its stored
+//! value by more than [`ALLOWED_INCREASE`]; with a different compiler version the excess is only reported.
 
 use std::{
     collections::BTreeMap,
@@ -15,9 +15,9 @@ use std::{
 
 use serde_json::{Value, json};
 
-const KEPT: &str = "crates/hoid/benches/instructions.json";
+const STORED_COUNTS: &str = "crates/hoid/benches/instructions.json";
 /// Permitted increase relative to the stored number.
-const ALLOWED: f64 = 0.05;
+const ALLOWED_INCREASE: f64 = 0.05;
 /// Tasks with one thread and one record. Valgrind uses AVX2 if the processor has it, but not AVX-512. The sums of `arx`
 /// and `bj` therefore use the same registers on all processors except old ones, which need more instructions.
 const TASKS: [&str; 6] = ["arx", "bj", "rls", "rpem", "loop", "loop with noise"];
@@ -49,17 +49,17 @@ pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     println!("{text}");
     if keep {
         let text = format!("{:#}\n", json!({"compiler": compiler, "tasks": found}));
-        return fs::write(KEPT, text).map_err(|error| format!("{KEPT}: {error}"));
+        return fs::write(STORED_COUNTS, text).map_err(|error| format!("{STORED_COUNTS}: {error}"));
     }
     match (over, same_compiler) {
         (false, _) => Ok(()),
         (true, true) => Err(format!(
-            "a task takes more than {:.0} % more instructions than {KEPT} states; repair it, or keep the new numbers with \
-             `cargo xtask bench --instructions --keep` and give the reason",
-            100.0 * ALLOWED
+            "a task takes more than {:.0} % more instructions than {STORED_COUNTS} states; repair it, or keep the \
+             new numbers with `cargo xtask bench --instructions --keep` and give the reason",
+            100.0 * ALLOWED_INCREASE
         )),
         (true, false) => {
-            println!("{KEPT} was made with a compiler other than {compiler}: the numbers cannot be compared");
+            println!("{STORED_COUNTS} was made with a compiler other than {compiler}: the numbers cannot be compared");
             Ok(())
         }
     }
@@ -71,7 +71,7 @@ struct Kept {
 }
 
 fn read() -> Option<Kept> {
-    let value: Value = serde_json::from_str(&fs::read_to_string(KEPT).ok()?).ok()?;
+    let value: Value = serde_json::from_str(&fs::read_to_string(STORED_COUNTS).ok()?).ok()?;
     let tasks = value.get("tasks")?.as_object()?;
     Some(Kept {
         compiler: value.get("compiler")?.as_str()?.to_owned(),
@@ -93,7 +93,7 @@ fn compare(found: &BTreeMap<String, u64>, kept: &BTreeMap<String, u64>) -> (Stri
         lines.push(match kept.get(task) {
             Some(kept) => {
                 let ratio = *n as f64 / *kept as f64;
-                over |= ratio > 1.0 + ALLOWED;
+                over |= ratio > 1.0 + ALLOWED_INCREASE;
                 format!("{task:<16} {n:>12} {kept:>12} {ratio:>7.3}")
             }
             None => format!("{task:<16} {n:>12}"),
@@ -132,7 +132,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_are_read_and_compared() {
+    fn instruction_counts_are_parsed_and_compared() {
         assert_eq!(
             collected("==7== Events    : Ir\n==7== Collected : 4711\n==7=="),
             Some(4711)

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_found_among_noise_and_the_fastest_kept() {
+    fn result_lines_are_parsed_and_the_fastest_kept() {
         let printed = "Starting...\n\
             {\"task\": \"arx\", \"peer\": \"numba 1\", \"seconds\": 2e-5, \"answer\": [1.0, -2.0]}\n\
             {\"task\": \"arx\", \"peer\": \"numba 1\", \"seconds\": 1e-5, \"answer\": [1.0, -2.0]}\n\
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn answers_are_compared_relative_to_their_size() {
+    fn answers_are_compared_relative_to_their_magnitude() {
         assert_eq!(difference(&[1.0, 0.0], &[1.0, 0.0]), Some(0.0));
         assert!((difference(&[100.0, 1.0], &[100.0, 1.001]).unwrap() - 0.001 / 1.001).abs() < 1e-15);
         assert_eq!(difference(&[1.0], &[1.0, 2.0]), None);

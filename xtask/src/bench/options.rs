@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn options_are_read_and_nonsense_is_refused() {
+    fn options_are_parsed_and_invalid_ones_refused() {
         let options = read("--only arx,bj --peers none --rounds 3 --dry").unwrap();
         assert_eq!((options.peers, options.rounds, options.dry), (Peers::None, 3, true));
         assert!(options.chooses("arx") && !options.chooses("rls"));

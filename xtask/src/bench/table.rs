@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::lines::{Line, Outcome, difference};
 
 /// Relative difference up to which results count as equal.
-const SAME: f64 = 1e-6;
+const EQUAL_TOLERANCE: f64 = 1e-6;
 
 /// Limits on the speed of hoid: task, words in the name of the peer, and smallest permitted ratio.
 const LIMITS: [(&str, &str, f64); 16] = [
@@ -89,7 +89,7 @@ pub fn ratios(lines: &[Line], machine: &str) -> String {
 
 fn answers(ours: &[f64], theirs: &[f64], differs: Option<&str>) -> String {
     match (difference(ours, theirs), differs) {
-        (Some(d), None) if d <= SAME => format!("same to {d:.0e}"),
+        (Some(d), None) if d <= EQUAL_TOLERANCE => format!("same to {d:.0e}"),
         (Some(d), None) => format!("**differ by {d:.0e}**"),
         (Some(d), Some(why)) => format!("{why} ({d:.0e})"),
         (None, Some(why)) => why.to_owned(),
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn ratios_limits_and_answers_stand_in_the_table() {
+    fn table_contains_ratios_limits_and_answers() {
         let skipped = Line {
             task: "bj".to_owned(),
             peer: "z".to_owned(),

@@ -55,7 +55,7 @@ impl BatchAnswer for FamilyFit {
         set("termination", termination(&fit.termination));
         set(
             "intersample",
-            json!({"used": fit.intersample.name(), "tau_e_if_straight": optional(fit.delay_if_straight_s(0))}),
+            json!({"used": fit.intersample.name(), "tau_e_if_straight": optional(fit.delay_if_linear_s(0))}),
         );
         let mut quality = goodness(&found.quality()?);
         quality.insert("coherent_share".to_owned(), optional(fit.coherent_share));

@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn those_that_predict_as_well_count_and_those_that_do_not_do_not() {
+    fn alternatives_are_weighted_by_prediction_and_age() {
         let about = [0.1, 0.04, 11.0, 0.3, 0.28];
         let mut all = Alternatives::NONE;
         assert_eq!(all.scatter(&about, 100, 150), [[0.0; PARAMETERS]; PARAMETERS]);

@@ -28,10 +28,10 @@ use super::{
 use crate::state::{State, visit_all};
 
 /// Magnitude of a signal beyond which the filters are reset.
-pub(super) const LARGEST: f64 = 1e100;
-/// `RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `LARGEST_STEP` limits the change of the basis
-/// point in one step (relative for omega and zeta, in s for tau).
-const RANGE: [[f64; 2]; DYNAMICS] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
+pub(super) const MAX_SIGNAL: f64 = 1e100;
+/// `BASIS_POINT_RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `LARGEST_STEP` limits the change of
+/// the basis point in one step (relative for omega and zeta, in s for tau).
+const BASIS_POINT_RANGE: [[f64; 2]; DYNAMICS] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
 const LARGEST_STEP: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
 /// Longest delay in s.
 pub(super) const LONGEST_DELAY_S: f64 = 0.9;
@@ -50,7 +50,7 @@ const NOISE_UPDATE_S: f64 = 1.28;
 /// Squared innovation, in innovation variances, above which the weight of a sample in the noise model is reduced.
 const CLIP_VARIANCES: f64 = 100.0;
 /// Lower limit of the innovation variance relative to the power of u.
-const LEAST: f64 = 1e-24;
+const MIN_RELATIVE_VARIANCE: f64 = 1e-24;
 
 /// Sample after the whitening filter.
 #[derive(Debug, Clone, Copy)]
@@ -226,7 +226,7 @@ impl Candidate {
     /// full. Returns false if a number has overflowed.
     #[inline(always)]
     pub fn update(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
-        let sound = |x: &f64| x.abs() < LARGEST;
+        let sound = |x: &f64| x.abs() < MAX_SIGNAL;
         if !(sound(&white.y) && white.signals.iter().all(sound)) {
             return false;
         }
@@ -330,7 +330,7 @@ impl Candidate {
         let [early, late] = [&mut self.early, &mut self.late].map(|part| core::mem::replace(part, Moments::NONE));
         let moments = early.with(&late);
         let (n, ts) = (moments.samples, self.scales.sample_time);
-        let least = LEAST * self.scales.size * self.scales.size;
+        let least = MIN_RELATIVE_VARIANCE * self.scales.size * self.scales.size;
         let energy = moments.energy(&self.basis, self.mixture.mean()).max(n * least);
         let settled = self.samples as f64 * ts > UNSETTLED_S;
         let [predictive_variance, rests_on] = &mut self.predictive_variance;
@@ -390,7 +390,7 @@ impl Candidate {
         let of = [at.omega, at.zeta, 1.0];
         let [omega, zeta, tau] = core::array::from_fn(|j| {
             let [down, up] = LARGEST_STEP[j].map(|far| far * of[j]);
-            let [low, high] = RANGE[j];
+            let [low, high] = BASIS_POINT_RANGE[j];
             let from = [at.omega, at.zeta, at.tau][j];
             (from + state[LINEAR + j].max(down).min(up)).max(low).min(high)
         });

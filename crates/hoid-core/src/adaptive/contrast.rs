@@ -32,7 +32,7 @@ const BLOCKS_PER_SCORE: usize = 2;
 pub(super) const EMPIRICAL_SHARE: f64 = 2.0 / 3.0;
 pub(super) const MODEL_ONLY: f64 = 0.0;
 /// Lower limit of the divisor of S.
-const LEAST_FREE: f64 = 0.3;
+const MIN_DIVISOR: f64 = 0.3;
 
 /// Difference between present and past in gains, level, natural frequency, damping and delay.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -76,7 +76,7 @@ impl Contrast {
                 stretches += 1.0;
             }
         }
-        let free = (1.0 - (STATES + 3) as f64 / stretches).max(LEAST_FREE);
+        let free = (1.0 - (STATES + 3) as f64 / stretches).max(MIN_DIVISOR);
         let samples = sums.map(|s| s.samples);
         let all = samples[0] + samples[1];
         let residual_squares = before.residual_squares + now.residual_squares;
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn where_the_noise_is_white_the_distance_is_a_chi_square() {
+    fn distance_is_chi_square_for_white_noise() {
         let [mean, error, by_model] = mean_distance(0.0, 400, 1);
         // The mean of 400 values with variance 12 has a standard error of .17; the margin is larger because S is
         // estimated from 35 stretches.
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn where_it_is_not_the_scores_know() {
+    fn empirical_covariance_corrects_for_coloured_noise() {
         let [mean, error, by_model] = mean_distance(0.9, 400, 2);
         // With the covariance given by the noise model, T is several times too large.
         assert!(by_model > 20.0, "{by_model}");
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn the_dispersion_is_how_far_the_model_is_off() {
+    fn dispersion_measures_the_error_of_the_noise_model() {
         for (pole, [low, high]) in [(0.0, [0.9, 1.6]), (0.9, [3.0, 12.0])] {
             let mut random = 5;
             let all = blocks(70, &STATE, pole, &mut random);
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_found_where_it_is_and_what_was_before_is_told() {
+    fn change_and_values_before_it_are_estimated() {
         let mut random = 3;
         let mut all = blocks(60, &STATE, 0.0, &mut random);
         let changed = core::array::from_fn(|i| STATE[i] + if i == 1 { 1.0 } else { 0.0 });
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_that_say_nothing_have_no_contrast() {
+    fn empty_blocks_give_no_contrast() {
         let mut random = 4;
         let all = blocks(20, &STATE, 0.0, &mut random);
         assert!(Contrast::between([&[], &all], EMPIRICAL_SHARE, |sum| sum).is_none());

@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn fewer_false_alarms_need_a_higher_threshold_and_any_number_has_one() {
+    fn fewer_false_alarms_give_a_higher_threshold() {
         let of = |false_alarms: f64| {
             let default = DefaultOperator {
                 false_alarms,
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn starts_of_a_short_delay_stay_where_a_basis_can_be_made() {
+    fn starts_respect_the_shortest_delay() {
         let prior = DefaultOperator::with_delay(0.05).prior(0.01);
         assert!(prior.is_valid());
         assert!(prior.starts.iter().all(|start| start.tau >= SHORTEST_DELAY_S));

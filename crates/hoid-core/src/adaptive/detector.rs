@@ -47,7 +47,7 @@ const PAIRS: u32 = OPERATOR as u32 / 2;
 /// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
 /// Minimum number of blocks in a present that starts after a gap.
-const LEAST_AFTER_GAP: usize = 4;
+const MIN_BLOCKS_AFTER_GAP: usize = 4;
 /// Weight, in blocks, of the prior for the level of a statistic; the prior is the level of a chi-square.
 const PRIOR_BLOCKS: f64 = 60.0;
 /// Maximum number of blocks, in addition to the prior, in the mean that estimates the level of a statistic.
@@ -191,7 +191,7 @@ impl Detector {
         let recent_blocks = recent[present].min(fresh);
         let now = blocks.len().saturating_sub(recent_blocks);
         let before = now.saturating_sub(GUARD_BLOCKS);
-        if before < least || recent_blocks < LEAST_AFTER_GAP.min(recent[0]) {
+        if before < least || recent_blocks < MIN_BLOCKS_AFTER_GAP.min(recent[0]) {
             return None;
         }
         let sides = [&blocks[before.saturating_sub(most)..before], &blocks[now..]];
@@ -279,7 +279,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chance_is_that_of_the_tables() {
+    fn significance_matches_chi_square_tables() {
         // Abramowitz and Stegun, table 26.8: percentage points of the chi-square for Q = .05 and .001.
         for (pairs, [five, one]) in [
             (1, [5.99147, 13.8155]),

@@ -122,26 +122,26 @@ mod tests {
     }
 
     #[test]
-    fn the_simplest_set_that_explains_is_told() {
+    fn smallest_explaining_set_of_changes_is_reported() {
         // Only the delay changed; compared with their own errors, neither the gains nor the delay differ by much.
-        let told = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
-        assert_eq!(told.changed, [false, false, true]);
-        assert!((told.value[6] - 1.5).abs() < 1e-9 && told.value[0] == 0.0);
+        let reported = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
+        assert_eq!(reported.changed, [false, false, true]);
+        assert!((reported.value[6] - 1.5).abs() < 1e-9 && reported.value[0] == 0.0);
         // The variance of the delay for known gains is far less than its marginal variance, 1.82.
-        assert!(told.covariance[6][6] < 0.1, "{}", told.covariance[6][6]);
-        let told = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
-        assert_eq!(told.changed, [true, true, false]);
+        assert!(reported.covariance[6][6] < 0.1, "{}", reported.covariance[6][6]);
+        let reported = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
+        assert_eq!(reported.changed, [true, true, false]);
         // If all groups changed, the difference itself is reported.
         let difference = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, -12.0];
-        let told = Difference::of(&contrast(difference)).unwrap();
-        assert_eq!(told.changed, [true; 3]);
-        for (i, value) in told.value.iter().enumerate() {
+        let reported = Difference::of(&contrast(difference)).unwrap();
+        assert_eq!(reported.changed, [true; 3]);
+        for (i, value) in reported.value.iter().enumerate() {
             assert!((value - difference[i]).abs() < 1e-9);
         }
     }
 
     #[test]
-    fn a_contrast_that_says_nothing_has_no_difference() {
+    fn empty_contrast_has_no_difference() {
         assert!(Difference::of(&Contrast::default()).is_none());
     }
 }

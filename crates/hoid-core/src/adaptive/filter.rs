@@ -11,7 +11,7 @@ pub use replay::REPLAYED;
 use super::{
     alternatives::Alternatives,
     basis::{Basis, Complex, Point},
-    candidate::{Candidate, LARGEST, LONGEST_DELAY_S},
+    candidate::{Candidate, LONGEST_DELAY_S, MAX_SIGNAL},
     detector::Detector,
     history::{History, Use},
     initial_estimate::InitialEstimate,
@@ -97,11 +97,11 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Builds the recursion at rest. If `memory` has [`memory_needed`] numbers, the replays have their full length.
-    /// With fewer numbers the replays are shorter, and with [`least_memory`], the minimum, there are none. Returns
+    /// With fewer numbers the replays are shorter, and with [`min_memory`], the minimum, there are none. Returns
     /// `None` for invalid numbers or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         let ts = prior.sample_time;
-        if !prior.is_valid() || prior.person.tau > LONGEST_DELAY_S || memory.as_ref().len() < least_memory(ts) {
+        if !prior.is_valid() || prior.person.tau > LONGEST_DELAY_S || memory.as_ref().len() < min_memory(ts) {
             return None;
         }
         let basis = Basis::new(prior.person, ts)?;
@@ -255,7 +255,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 self.powers[2] += y * y;
             }
             self.keep(u);
-            self.begin();
+            self.try_to_start();
             return Step {
                 innovation: 0.0,
                 shortened: false,
@@ -311,7 +311,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     fn pass(&mut self, u: f64, sample_use: Use) -> Step {
         let innovation = self.live.innovation(&self.live.whitened(u));
         let through = through_filters(&self.saturation, sample_use, u, u - innovation);
-        if innovation.abs() < LARGEST && through.abs() < LARGEST {
+        if innovation.abs() < MAX_SIGNAL && through.abs() < MAX_SIGNAL {
             self.history.complete(u, sample_use);
             self.passed += 1;
             store(&mut self.live, sample_use, through);
@@ -502,15 +502,15 @@ pub fn errors_needed(sample_time: f64) -> usize {
 }
 
 /// Returns the minimum length of the memory in numbers. The sample time is in s.
-pub fn least_memory(sample_time: f64) -> usize {
+pub fn min_memory(sample_time: f64) -> usize {
     3 * errors_needed(sample_time)
 }
 
 /// Maximum number of samples in a replay.
-const MOST_REPLAYED: f64 = 12_000.0;
+const MAX_REPLAYED: f64 = 12_000.0;
 
 /// Returns the length of the memory, in numbers, for replays over `seconds`. The sample time is in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
-    let samples = (seconds / sample_time).clamp(0.0, MOST_REPLAYED);
+    let samples = (seconds / sample_time).clamp(0.0, MAX_REPLAYED);
     3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)
 }

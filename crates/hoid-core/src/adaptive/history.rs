@@ -140,7 +140,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_same_output_is_revised() {
+    fn only_equal_outputs_are_revised() {
         let mut history = History::new([0.0; 30]);
         for u in [1.0, 2.0, 2.0, 1.0] {
             history.push(0.5);
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_samples_are_there_and_nothing_before_the_record() {
+    fn last_samples_are_kept_and_earlier_ones_are_zero() {
         let mut history = History::new([9.0; 30]);
         for k in 0..25_u32 {
             history.push(f64::from(k));

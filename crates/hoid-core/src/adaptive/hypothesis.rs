@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn the_update_is_the_twin_of_the_kalman_gain() {
+    fn update_satisfies_the_kalman_equations() {
         // A singular covariance: the gains are on a line.
         let mut p = covariance(0.0);
         for i in 0..GAINS {
@@ -260,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn a_block_that_says_nothing_changes_nothing() {
+    fn empty_and_overflowing_blocks_change_nothing() {
         let mut h = Hypothesis::new([0.1; STATES], covariance(1.0), 0.01, 0, 0.0);
         let before = h;
         let left = h.update(&Moments::NONE, &basis(), 1.0);
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn a_child_remembers_what_was_before() {
+    fn child_keeps_earlier_segments() {
         let mut h = Hypothesis::new([0.1; STATES], covariance(1.0), 0.01, 0, 0.0);
         for block in 1..=SEGMENTS as u64 + 2 {
             h.state[0] = block as f64;

@@ -127,7 +127,7 @@ mod tests {
     };
 
     #[test]
-    fn blocks_end_after_half_a_second_and_the_oldest_goes() {
+    fn blocks_last_half_a_second_and_the_oldest_is_dropped() {
         let mut last = LastBlocks::new(0.1);
         let mut closed = 0;
         for _ in 0..5 * (BLOCKS + 3) {
@@ -139,7 +139,7 @@ mod tests {
 
     /// The number of blocks remains within the list after invalid numbers were restored.
     #[test]
-    fn restored_blocks_are_within() {
+    fn restored_block_count_is_limited() {
         let mut last = LastBlocks::new(0.1);
         last.visit(&mut |number| *number = 1e18);
         (0..20).for_each(|_| last.take(&ROW));
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_beside_a_gap_is_not_kept() {
+    fn blocks_next_to_a_gap_are_dropped() {
         let mut last = LastBlocks::new(0.05);
         (0..25).for_each(|_| last.take(&ROW));
         assert_eq!(last.all().len(), 2);

@@ -87,7 +87,7 @@ const FIRST_BIRTH_S: f64 = 3.0;
 /// free numerator.
 const FORM_SWITCH: f64 = 0.3;
 /// Lower limit of a log probability.
-const LEAST_LOG_WEIGHT: f64 = -60.0;
+const MIN_LOG_WEIGHT: f64 = -60.0;
 /// Prior standard deviation of the gains relative to the ratio of the magnitudes of u and e.
 const INITIAL_GAIN_DEVIATION: f64 = 2.0;
 
@@ -144,7 +144,7 @@ impl Mixture {
                 * [1.0 - prior.free_numerator, prior.free_numerator][class / 2]
         };
         let mut mixture = Self {
-            hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, LEAST_LOG_WEIGHT); HYPOTHESES],
+            hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, MIN_LOG_WEIGHT); HYPOTHESES],
             count: 0,
             blocks: 0,
             mean: [0.0; STATES],
@@ -250,7 +250,7 @@ impl Mixture {
             .sum();
         let all = best + libm::log(sum);
         for h in self.all_mut() {
-            h.log_weight = (finite(h.log_weight) - all).max(LEAST_LOG_WEIGHT);
+            h.log_weight = (finite(h.log_weight) - all).max(MIN_LOG_WEIGHT);
         }
     }
 
@@ -527,7 +527,7 @@ mod tests {
 
     /// Returns the distance of the gains from those of the changed operator after a given number of blocks, relative to
     /// the change. The remnant has four poles; `first` is the number of early samples of each block.
-    fn off(first: usize, blocks: usize) -> f64 {
+    fn gain_distance(first: usize, blocks: usize) -> f64 {
         let point = Point {
             tau: 0.2,
             omega: 11.0,
@@ -590,15 +590,15 @@ mod tests {
     }
 
     #[test]
-    fn a_child_does_not_take_the_step_of_a_change_for_its_response() {
-        let (with, without) = (off(4, 60), off(0, 60));
+    fn child_ignores_the_transient_of_a_change() {
+        let (with, without) = (gain_distance(4, 60), gain_distance(0, 60));
         assert!(with < 0.05 && with < 0.5 * without, "{with} {without}");
     }
 
     #[test]
-    fn blocks_shorter_than_the_whitening_filter_do_no_harm() {
+    fn blocks_shorter_than_the_whitening_filter_are_allowed() {
         // A child then skips its whole first block, and its variance is that of the next blocks.
-        let all = off(32, 63);
+        let all = gain_distance(32, 63);
         assert!(all < 0.2, "{all}");
     }
 }

@@ -57,12 +57,12 @@
 //! fit ([`initial_estimate`]). [`AdaptiveFilter`] needs no operating system; its memory is an array that the caller
 //! owns.
 //! ```
-//! use hoid_core::adaptive::{AdaptiveFilter, least_memory, defaults::DefaultOperator};
+//! use hoid_core::adaptive::{AdaptiveFilter, min_memory, defaults::DefaultOperator};
 //!
 //! const SAMPLE_TIME_S: f64 = 0.02;
 //! // Without memory for replays, as on a microcontroller; memory_needed() gives the numbers that replays take.
 //! const MEMORY: usize = 192;
-//! assert!(MEMORY >= least_memory(SAMPLE_TIME_S));
+//! assert!(MEMORY >= min_memory(SAMPLE_TIME_S));
 //! let person = DefaultOperator::with_delay(0.2);
 //! let mut tracker = AdaptiveFilter::new(person.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("no filter")?;
 //!
@@ -110,7 +110,7 @@ mod signal_history;
 mod sizes;
 mod volatility;
 
-pub use filter::{AdaptiveFilter, REPLAYED, errors_needed, least_memory, memory_needed};
+pub use filter::{AdaptiveFilter, REPLAYED, errors_needed, memory_needed, min_memory};
 pub use operator::through;
 pub use prior::AdaptivePrior;
 pub use sizes::{DYNAMICS, GAINS, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};

@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn score_and_information_are_those_of_the_residuals() {
+    fn score_and_information_match_difference_quotients() {
         let state = [0.3, -0.2, 0.1, 0.4, 0.2, -0.03, 0.01];
         let moments = block(|_, k| libm::sin(k as f64));
         let about = moments.about(&basis(), &state);
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn the_state_that_made_the_output_leaves_nothing() {
+    fn true_state_leaves_no_residual() {
         let state = [0.3, -0.2, 0.1, 0.4, 0.2, -0.03, 0.01];
         let w = weights(&basis(), &state);
         let moments = block(|z, _| (0..SIGNALS).map(|k| w[k] * z[k]).sum::<f64>() + w[SIGNALS] * 0.2);

@@ -28,7 +28,7 @@ const DEFAULT_TIME_CONSTANTS_S: [f64; 2] = [0.3, 0.06];
 const PRIOR_DEVIATION: f64 = 10.0;
 
 /// Lower limit of the ridge, for residuals that vanish.
-const LEAST: f64 = 1e-300;
+const MIN_RIDGE: f64 = 1e-300;
 
 /// Fading factor below which the sums are rescaled.
 const RESCALE_BELOW: f64 = 0.5;
@@ -172,7 +172,7 @@ impl NoiseModel {
 
     /// Weight of the prior in the units of the sums.
     fn ridge(&self) -> f64 {
-        self.variance() / (PRIOR_DEVIATION * PRIOR_DEVIATION) + LEAST
+        self.variance() / (PRIOR_DEVIATION * PRIOR_DEVIATION) + MIN_RIDGE
     }
 
     /// Upper triangle of the sums over the lags 1 to p, plus the ridge.
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn an_autoregression_is_found() {
+    fn autoregression_is_found() {
         // The poles .95 and .6 give D = 1 - 1.55 q^-1 + .57 q^-2.
         let (mut model, mut seed) = (NoiseModel::new(6, 100.0, 0.01).unwrap(), 7);
         let mut v = [0.0; WIDTH];
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_steep_remnant_is_whitened_to_the_end() {
+    fn steep_remnant_spectrum_is_whitened() {
         // Four poles at .85: v has 1.6e4 times the power of eps, and its spectrum falls by 5e8 up to half the sampling
         // frequency. With a prior that scales with the power of v, D would not follow the remnant there.
         let (mut model, mut seed) = (NoiseModel::new(8, 100.0, 0.01).unwrap(), 3);
@@ -292,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn the_covariance_of_d_holds() {
+    fn covariance_of_d_matches_the_scatter() {
         // Squared errors of four coefficients in 100 runs, in standard errors: their mean has a standard error of .07,
         // or .14 if the four were fully correlated. This is tested while the memory grows and when it has its full
         // length.
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn a_remnant_that_is_known_is_there_at_once_and_left_as_data_come() {
+    fn prior_remnant_is_used_first_and_forgotten_with_data() {
         // An autoregression of order 1 with the pole .9 has the autocovariances .9^k/(1 - .81).
         let (mut model, mut seed) = (NoiseModel::new(6, 40.0, 0.01).unwrap(), 5);
         let lags: Lags = core::array::from_fn(|k| 0.9_f64.powi(k as i32) / 0.19);
@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_leaves_what_was_supposed() {
+    fn zero_signals_keep_the_prior_model() {
         let mut model = NoiseModel::new(4, 40.0, 0.01).unwrap();
         let before = model.d().to_vec();
         for _ in 0..1000 {

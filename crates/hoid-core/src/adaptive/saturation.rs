@@ -83,7 +83,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stick_that_stands_farther_out_than_ever_is_at_its_end() {
+    fn held_extreme_value_is_a_limit() {
         let ends = after(&[0.1, -0.4, 1.0]);
         // Predictions beyond the limit, inside the limit, and more than one range beyond it.
         let beyond = |u: f64, predicted: f64| ends.end(u).map(|end| ends.beyond(end, u, predicted));
@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn one_that_moves_or_has_been_farther_is_not() {
+    fn moving_or_inner_value_is_not_a_limit() {
         let ends = after(&[0.1, 1.0, 0.5]);
         assert_eq!(ends.end(0.5), None);
         assert_eq!(ends.end(1.0), None);
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_at_which_the_stick_has_stayed_is_known_at_once() {
+    fn known_limit_is_recognised_at_once() {
         let ends = after(&[0.1, 1.0, 1.0, -0.3]);
         assert_eq!(ends.end(1.0), Some(Use::AtUpperLimit));
         assert_eq!(ends.end(-0.3), Some(Use::AtLowerLimit));
@@ -114,13 +114,13 @@ mod tests {
     }
 
     #[test]
-    fn a_stick_that_never_moved_has_no_end() {
+    fn constant_output_has_no_limit() {
         assert_eq!(after(&[]).end(0.0), None);
         assert_eq!(after(&[0.0; 4]).end(0.0), None);
     }
 
     #[test]
-    fn a_pedal_ends_where_it_is_let_go() {
+    fn released_pedal_is_at_its_lower_limit() {
         let ends = after(&[0.0, 0.3, 0.0]);
         assert_eq!(ends.end(0.0), Some(Use::AtLowerLimit));
     }

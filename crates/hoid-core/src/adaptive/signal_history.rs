@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_ones_stand_in_their_order_and_can_be_saved_anywhere() {
+    fn history_keeps_the_order_and_can_be_saved_at_any_time() {
         let mut past = SignalHistory::ZERO;
         for t in 0..100 {
             past.push(&[f64::from(t); SIGNALS]);

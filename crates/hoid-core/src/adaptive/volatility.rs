@@ -4,9 +4,9 @@
 //! variance 2/n. People who act in pulses have innovations in bursts, and the variance of the log energies is tens of
 //! times larger. A likelihood that treats their samples as independent is too sharp and splits the data of a constant
 //! operator into many segments. Each sample therefore counts as `1/c` of a sample, the quasi-likelihood of
-//! overdispersed data (R. W. M. Wedderburn, *Biometrika* 61 (1974) 439-447), with `c = v^POWER`, where v is the
-//! variance of the log energies divided by its value for constant power. Differences between successive blocks remove
-//! slow drifts of the power:
+//! overdispersed data (R. W. M. Wedderburn, *Biometrika* 61 (1974) 439-447), with `c = v^DISPERSION_EXPONENT`, where v
+//! is the variance of the log energies divided by its value for constant power. Differences between successive blocks
+//! remove slow drifts of the power:
 //!
 //! `v = (pi/2) (mean |ln E_k - ln E_{k-1}|)^2/(4/n)`,
 //!
@@ -16,12 +16,12 @@
 //! empirical. Pilots with a dead zone have a typical v of 75 and c of at most 4.5, people with a mouse a typical v of 6
 //! and c of at most 1.9, and simulated remnants have c = 1.
 
-/// Exponent of the dispersion `c = v^POWER`.
-const POWER: f64 = 0.3;
+/// Exponent of the dispersion `c = v^DISPERSION_EXPONENT`.
+const DISPERSION_EXPONENT: f64 = 0.3;
 /// Weight of the prior v = 1, as a number of differences of log energies.
 const PRIOR_DIFFERENCES: f64 = 4.0;
 /// Largest value of v.
-const LARGEST: f64 = 1000.0;
+const MAX_VOLATILITY: f64 = 1000.0;
 
 /// Running mean of the absolute differences of the log energies, scaled to 1 for a constant power.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,7 +77,7 @@ impl Volatility {
     /// Returns the number of samples that count as one independent sample.
     pub fn dispersion(&self) -> f64 {
         let root = (self.steps + PRIOR_DIFFERENCES) / (self.differences + PRIOR_DIFFERENCES);
-        libm::pow((root * root).clamp(1.0, LARGEST), POWER)
+        libm::pow((root * root).clamp(1.0, MAX_VOLATILITY), DISPERSION_EXPONENT)
     }
 }
 
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn constant_power_has_none_and_bursts_have_some() {
+    fn dispersion_is_one_for_constant_power_and_larger_for_bursts() {
         let mut seed = 3_u64;
         let mut uniform = || {
             seed = seed
@@ -109,12 +109,12 @@ mod tests {
         // 1000 differences: v = 1 with a standard error of .05.
         assert!((even.dispersion() - 1.0).abs() < 0.06, "{}", even.dispersion());
         // (pi/2) (ln 10)^2 128/4 = 267.
-        assert!((bursts.dispersion() - libm::pow(267.0, POWER)).abs() < 0.2);
+        assert!((bursts.dispersion() - libm::pow(267.0, DISPERSION_EXPONENT)).abs() < 0.2);
         assert!((Volatility::new(4).dispersion() - 1.0).abs() < 1e-12);
     }
 
     #[test]
-    fn silence_is_no_burst() {
+    fn zero_power_is_not_a_burst() {
         let mut v = Volatility::new(1);
         for energy in [0.0, 1.0, 0.0, 0.0, 1.0] {
             v.take(energy, 32.0);

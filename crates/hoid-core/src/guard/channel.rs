@@ -43,13 +43,13 @@ const GAIN: f64 = 0.05;
 const INNER_TAIL_PROBABILITY: f64 = 0.1;
 const INNER_GAIN: f64 = 0.02;
 /// Smallest limit of an error, relative to the quantile; `LARGEST_TAIL_RATIO` is the largest.
-const LIMIT: f64 = 2.5;
+const MIN_TAIL_RATIO: f64 = 2.5;
 const LARGEST_TAIL_RATIO: f64 = 12.0;
 /// Largest mean magnitude of differences, relative to their inner quantile, at which they are typical of the signal.
 /// Gaussian errors have .49 and Laplacian errors .43; errors five times as large have 2.4 and 2.2.
-const TYPICAL: f64 = 1.3;
+const MAX_TYPICAL_RATIO: f64 = 1.3;
 /// Number of blocks over which the tails are averaged.
-const AVERAGED: u32 = 20;
+const AVERAGED_BLOCKS: u32 = 20;
 /// Ratio of the inner (90 %) quantile to the 99 % quantile for Gaussian errors.
 const GAUSSIAN_INNER: f64 = 1.6449 / 2.5758;
 /// Time constant in s with which the slope of a held-back signal is damped.
@@ -136,13 +136,13 @@ impl ChannelGuard {
         (self.quantiles, self.inner) = (quantiles, inner);
         self.averaged = 0;
         self.average_tails();
-        self.averaged = AVERAGED;
+        self.averaged = AVERAGED_BLOCKS;
         self.start_detection();
     }
 
     /// Sets the initial values of unknown quantiles from the mean magnitudes of the differences. The quantiles are then
     /// learnt; until [`ChannelGuard::start_detection`], no sample counts as an outlier.
-    pub fn start_learning(&mut self, means: [f64; ORDERS]) {
+    pub fn start_estimation(&mut self, means: [f64; ORDERS]) {
         for (j, mean) in means.into_iter().enumerate() {
             if self.quantiles[j] <= 0.0 {
                 self.quantiles[j] = QUANTILE_OVER_MEAN * mean;
@@ -182,7 +182,7 @@ impl ChannelGuard {
             }
         }
         let counted = count as f64 - self.order as f64 - 1.0;
-        counted > 0.0 && sum <= TYPICAL * self.inner[self.order] * counted
+        counted > 0.0 && sum <= MAX_TYPICAL_RATIO * self.inner[self.order] * counted
     }
 
     /// Returns the first difference above which a sample counts as a jump.
@@ -237,7 +237,7 @@ impl ChannelGuard {
 
     #[inline(always)]
     fn limit(&self, order: usize) -> f64 {
-        let limit = self.tail_ratio[order].max(LIMIT) * self.quantiles[order];
+        let limit = self.tail_ratio[order].max(MIN_TAIL_RATIO) * self.quantiles[order];
         if limit > self.floor { limit } else { self.floor }
     }
 
@@ -282,16 +282,16 @@ impl ChannelGuard {
     }
 
     fn average_tails(&mut self) {
-        self.averaged = self.averaged.saturating_add(1).min(AVERAGED);
+        self.averaged = self.averaged.saturating_add(1).min(AVERAGED_BLOCKS);
         let weight = 1.0 / f64::from(self.averaged);
         for ((tail_ratio, q), p) in self.tail_ratio.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
-            // Unknown quantiles give 0/0; the limit of a signal with such quantiles is the lower bound `LIMIT`, which
-            // is about the limit for a Gaussian tail. `clamp` would return NaN, which would stay in the average for
-            // ever.
+            // Unknown quantiles give 0/0; the limit of a signal with such quantiles is the lower bound
+            // `MIN_TAIL_RATIO`, which is about the limit for a Gaussian tail. `clamp` would return NaN, which would
+            // stay in the average for ever.
             let square = match quotient.is_nan() {
-                true => LIMIT,
-                false => (quotient * quotient).clamp(LIMIT, LARGEST_TAIL_RATIO),
+                true => MIN_TAIL_RATIO,
+                false => (quotient * quotient).clamp(MIN_TAIL_RATIO, LARGEST_TAIL_RATIO),
             };
             *tail_ratio += weight * (square - *tail_ratio);
         }
@@ -384,7 +384,7 @@ mod tests {
 
     /// Reference: a polynomial of degree j-1 through the last j samples, by Lagrange's formula.
     #[test]
-    fn errors_are_those_of_the_extrapolated_polynomials() {
+    fn errors_match_polynomial_extrapolation() {
         let signal = |t: f64| libm::sin(0.31 * t) + 0.2 * libm::cos(1.7 * t);
         let mut channel = ChannelGuard::new(0.01);
         for t in 0..40 {
@@ -418,7 +418,7 @@ mod tests {
     /// The 99 % quantile of a Gaussian first difference of a random walk is 2.576; this approximation has a standard
     /// error of about 8 %.
     #[test]
-    fn quantiles_are_found_from_far_off_and_one_outlier_hardly_moves_them() {
+    fn quantiles_converge_and_resist_outliers() {
         let (mut state, mut x) = (1, 0.0);
         let mut channel = ChannelGuard::new(0.01);
         channel.set_quantiles([0.01, 1.0, 1.0, 1.0]);
@@ -443,7 +443,7 @@ mod tests {
     }
 
     #[test]
-    fn an_outlier_is_held_back_until_the_signal_comes_back() {
+    fn outlier_is_replaced_until_the_signal_returns() {
         let signal = |t: i32| libm::sin(0.03 * f64::from(t));
         let mut channel = ChannelGuard::new(0.01);
         channel.set_quantiles([0.04, 0.002, 2e-4, 2e-5]);
@@ -456,8 +456,8 @@ mod tests {
             let x = signal(t) + 5.0;
             assert!(channel.is_outlier(&channel.errors(x)) || channel.held() > 0);
             assert!(channel.held() == 0 || !channel.is_back(x), "{t}");
-            let stands = channel.hold(x);
-            assert!((stands - signal(t)).abs() < 0.1, "{t}: {stands}");
+            let replacement = channel.hold(x);
+            assert!((replacement - signal(t)).abs() < 0.1, "{t}: {replacement}");
         }
         assert!(channel.is_back(signal(308)) && (channel.largest_error() - 5.0).abs() < 0.1);
         channel.resume(signal(308));
@@ -471,7 +471,7 @@ mod tests {
     /// Weibull's distribution gives m = 4^(1/k): twice the quantile for k = 2, seven times for k = .7; the largest of
     /// 1e5 samples is within the limit, a spike is not. Rests have no effect.
     #[test]
-    fn who_moves_in_bursts_has_a_higher_limit_and_a_spike_is_still_one() {
+    fn bursts_raise_the_limit_and_spikes_are_still_detected() {
         for (shape, least, most) in [(2.0, 2.4, 2.6), (1.0, 3.0, 5.5), (0.7, 5.0, 10.5)] {
             let mut state = 7_u64;
             let mut uniform = || {
@@ -506,7 +506,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_a_step_a_signal_moves_as_before_and_one_of_another_scale_does_not() {
+    fn offset_after_a_step_is_accepted_and_rescaling_is_not() {
         for order in 0..ORDERS {
             let mut channel = ChannelGuard::new(0.01);
             let mut state = 3;
@@ -531,30 +531,30 @@ mod tests {
     }
 
     #[test]
-    fn while_quantiles_are_learnt_nothing_is_held_back() {
+    fn no_outliers_are_detected_while_quantiles_are_estimated() {
         let mut channel = ChannelGuard::new(0.01);
         channel.follow(0.0, &[0.0; ORDERS]);
-        channel.start_learning([0.0; ORDERS]);
+        channel.start_estimation([0.0; ORDERS]);
         channel.start_detection();
         assert!(!channel.is_known());
-        channel.start_learning([0.1; ORDERS]);
+        channel.start_estimation([0.1; ORDERS]);
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         channel.start_detection();
         assert!(channel.is_known() && channel.is_outlier(&channel.errors(1e9)));
     }
 
     #[test]
-    fn a_heavy_tail_is_learnt_after_blocks_without_knowledge() {
+    fn tail_ratio_is_set_after_empty_blocks() {
         let mut channel = ChannelGuard::new(0.01);
         channel.end_block();
-        assert_eq!(channel.tail_ratio, [LIMIT; ORDERS]);
+        assert_eq!(channel.tail_ratio, [MIN_TAIL_RATIO; ORDERS]);
         channel.set_tails([3.0; ORDERS], [1.0; ORDERS]);
-        let expected = 9.0_f64.clamp(LIMIT, LARGEST_TAIL_RATIO);
+        let expected = 9.0_f64.clamp(MIN_TAIL_RATIO, LARGEST_TAIL_RATIO);
         assert!(channel.tail_ratio.iter().all(|heavy| (heavy - expected).abs() < 1e-12));
     }
 
     #[test]
-    fn nothing_known_lets_numbers_pass_and_nothing_else() {
+    fn unknown_channel_accepts_only_finite_values() {
         let mut channel = ChannelGuard::new(0.01);
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         assert!(channel.is_outlier(&channel.errors(f64::NAN)));

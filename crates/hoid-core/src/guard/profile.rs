@@ -26,29 +26,29 @@ use crate::bounds::within;
 /// Number of channels: e and u.
 pub const CHANNELS: usize = 2;
 /// Number of blocks from which the long-run values are learnt.
-const LEARNING_BLOCKS: u32 = 10;
+const ESTIMATION_BLOCKS: u32 = 10;
 /// Weight of a block once the long-run values are known.
-const WEIGHT: f64 = 1.0 / 60.0;
+const BLOCK_WEIGHT: f64 = 1.0 / 60.0;
 /// Fraction of the long-run mean difference up to which a signal counts as constant. The constants below are the limits
 /// of the other rules.
 pub const CONSTANT_FRACTION: f64 = 1e-3;
 const FROZEN_U_BLOCKS: u32 = 3;
-const IDLE: f64 = 0.05;
+const IDLE_RATIO: f64 = 0.05;
 const IDLE_BLOCKS: u32 = 2;
-const LARGER: f64 = 5.0;
-const RESCALED: f64 = 3.5;
+const LARGER_RATIO: f64 = 5.0;
+const RESCALED_RATIO: f64 = 3.5;
 const LARGEST_ORDER_RATIO: f64 = 1.5;
 const OTHER_CHANNEL_RATIO: f64 = 2.0;
 const LARGER_BLOCKS: u32 = 2;
 const SWAPPED_DRIFT: f64 = 1.0;
-const SWAPPED: f64 = 6.0;
+const SWAPPED_EVIDENCE: f64 = 6.0;
 /// Largest contribution of one block to the sum for swapped channels.
-const MOST_EVIDENCE: f64 = 4.0;
-const MISFIT: f64 = 4.0;
+const MAX_EVIDENCE: f64 = 4.0;
+const MISFIT_EVIDENCE: f64 = 4.0;
 /// Ratio R up to which there is never a misfit.
-const LEAST_RATIO: f64 = 1.5;
+const MIN_MISFIT_RATIO: f64 = 1.5;
 /// Ratio of the innovations to their long-run value below which there is no misfit.
-const LEAST_GROWTH: f64 = 2.0;
+const MIN_INNOVATION_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
 /// Distance of a block from the long-run values below which it resembles them: four times the logarithm of four.
 const SIMILAR_DISTANCE: f64 = 4.0 * 1.386;
@@ -135,13 +135,13 @@ impl Block {
     /// Ratio R of the mean magnitude of the innovations to the smallest mean difference of u; `None` if either is
     /// missing.
     fn ratio(&self) -> Option<f64> {
-        let least = self.least_of_u();
+        let least = self.smallest_prediction_error_of_u();
         (self.innovations > 0 && least > 0.0).then(|| self.innovation / least)
     }
 
     /// Smallest mean magnitude of the differences of u of order 1 to 4, which is the error of predicting u from its own
     /// past.
-    fn least_of_u(&self) -> f64 {
+    fn smallest_prediction_error_of_u(&self) -> f64 {
         self.differences[1]
             .iter()
             .fold(f64::INFINITY, |least, a| if *a < least { *a } else { least })
@@ -237,7 +237,7 @@ impl Profile {
     pub fn of(typical: &Block) -> Self {
         Self {
             typical: *typical,
-            blocks: LEARNING_BLOCKS,
+            blocks: ESTIMATION_BLOCKS,
             ..Self::new()
         }
     }
@@ -267,7 +267,7 @@ impl Profile {
 
     /// True once the long-run values are known.
     pub fn is_known(&self) -> bool {
-        self.blocks >= LEARNING_BLOCKS
+        self.blocks >= ESTIMATION_BLOCKS
     }
 
     /// Returns the long-run values.
@@ -279,7 +279,11 @@ impl Profile {
     pub fn update(&mut self, block: &Block) {
         let known = self.is_known();
         self.blocks = self.blocks.saturating_add(1);
-        let weight = if known { WEIGHT } else { 1.0 / f64::from(self.blocks) };
+        let weight = if known {
+            BLOCK_WEIGHT
+        } else {
+            1.0 / f64::from(self.blocks)
+        };
         let toward = |typical: &mut f64, found: f64, least: f64, most: f64| {
             let bounded = if known { within(found, [least, most]) } else { found };
             *typical += weight * (bounded - *typical);
@@ -287,9 +291,13 @@ impl Profile {
         // If the squares of a signal underflow, the ratio R is not defined.
         let sound = |ratio: &f64| ratio.is_finite() && block.innovation.is_finite();
         if let Some(ratio) = block.ratio().filter(sound) {
-            let known = self.ratios >= LEARNING_BLOCKS;
+            let known = self.ratios >= ESTIMATION_BLOCKS;
             self.ratios = self.ratios.saturating_add(1);
-            let weight = if known { WEIGHT } else { 1.0 / f64::from(self.ratios) };
+            let weight = if known {
+                BLOCK_WEIGHT
+            } else {
+                1.0 / f64::from(self.ratios)
+            };
             let bounded = if known {
                 within(ratio, [0.5 * self.ratio, 2.0 * self.ratio])
             } else {
@@ -322,10 +330,10 @@ impl Profile {
     }
 
     /// Returns the minimum time, in blocks, for which a fault that was just reported has lasted.
-    pub fn duration_blocks(&self, trouble: Fault) -> u32 {
-        match trouble {
-            Fault::FrozenOutput => self.frozen_u.max(trouble.blocks()),
-            _ => trouble.blocks(),
+    pub fn duration_blocks(&self, fault: Fault) -> u32 {
+        match fault {
+            Fault::FrozenOutput => self.frozen_u.max(fault.blocks()),
+            _ => fault.blocks(),
         }
     }
 
@@ -344,14 +352,20 @@ impl Profile {
                 self.typical.differences[c][0],
             )
         };
-        let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.typical.magnitude[c]);
+        let silent = |c: usize| {
+            below(
+                block.range[c][1] - block.range[c][0],
+                IDLE_RATIO,
+                self.typical.magnitude[c],
+            )
+        };
         let count = |run: u32, is: bool| if is { run.saturating_add(1) } else { 0 };
         let frozen_e = still(0);
         self.frozen_u = count(self.frozen_u, still(1));
         self.idle = count(self.idle, silent(0) && silent(1));
         let grown = |c: usize, j: usize| {
             let typical = self.typical.differences[c][j];
-            typical > 0.0 && block.differences[c][j] > LARGER * typical
+            typical > 0.0 && block.differences[c][j] > LARGER_RATIO * typical
         };
         self.larger = count(self.larger, [0, 2].iter().all(|j| grown(0, *j) && grown(1, *j)));
         let ratios = [0, 1].map(|c| self.ratios_of(block, c));
@@ -360,16 +374,17 @@ impl Profile {
             let other = ratios[1 - c][1];
             *run = count(
                 *run,
-                least > RESCALED && most < LARGEST_ORDER_RATIO * least && other < OTHER_CHANNEL_RATIO,
+                least > RESCALED_RATIO && most < LARGEST_ORDER_RATIO * least && other < OTHER_CHANNEL_RATIO,
             );
         }
         let evidence = self.distance(block, [0, 1]) - self.distance(block, [1, 0]) - SWAPPED_DRIFT;
-        let evidence = evidence.clamp(-MOST_EVIDENCE, MOST_EVIDENCE);
-        self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
-        let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
-        let misfit = self.ratios >= LEARNING_BLOCKS && block.ratio().is_some_and(|ratio| ratio > limit);
+        let evidence = evidence.clamp(-MAX_EVIDENCE, MAX_EVIDENCE);
+        self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED_EVIDENCE);
+        let limit = (MISFIT_EVIDENCE * self.ratio).max(MIN_MISFIT_RATIO);
+        let misfit = self.ratios >= ESTIMATION_BLOCKS && block.ratio().is_some_and(|ratio| ratio > limit);
         // During a rest the past of u predicts u exactly, which does not imply that the model is wrong.
-        let innovations_normal = self.ratios < LEARNING_BLOCKS || block.innovation <= LEAST_GROWTH * self.innovation;
+        let innovations_normal =
+            self.ratios < ESTIMATION_BLOCKS || block.innovation <= MIN_INNOVATION_GROWTH * self.innovation;
         let misfit = misfit && !innovations_normal;
         self.misfits = count(self.misfits, misfit);
         if frozen_e {
@@ -384,7 +399,7 @@ impl Profile {
             Some(Fault::RescaledInput)
         } else if self.rescaled[1] >= LARGER_BLOCKS {
             Some(Fault::RescaledOutput)
-        } else if self.swapped >= SWAPPED {
+        } else if self.swapped >= SWAPPED_EVIDENCE {
             Some(Fault::Swapped)
         } else if self.misfits >= MISFIT_BLOCKS {
             Some(Fault::Misfit)
@@ -452,7 +467,7 @@ mod tests {
 
     /// Squares that underflow: infinite innovations do not become a long-run value, and nothing panics afterwards.
     #[test]
-    fn numbers_without_a_size_are_not_learnt() {
+    fn non_finite_innovations_do_not_enter_the_profile() {
         let mut profile = known();
         for innovation in [f64::INFINITY, f64::NAN, 0.1] {
             let found = Block {
@@ -465,7 +480,7 @@ mod tests {
     }
 
     #[test]
-    fn each_trouble_has_its_name_and_ends() {
+    fn each_fault_is_identified_and_ends() {
         let typical = block([0.02, 0.1], [0.1, 1.1]);
         let cases = [
             (block([0.0, 0.1], [0.1, 1.1]), Fault::FrozenInput, 1),
@@ -484,21 +499,21 @@ mod tests {
                 2,
             ),
         ];
-        for (bad, trouble, after) in cases {
+        for (bad, fault, after) in cases {
             let mut profile = known();
             for n in 1..=5 {
                 let found = profile.find_fault(&bad, false);
-                assert_eq!(found, (n >= after).then_some(trouble), "{n} {trouble:?}");
+                assert_eq!(found, (n >= after).then_some(fault), "{n} {fault:?}");
             }
             let left = (0..30).find(|_| profile.find_fault(&typical, false).is_none());
-            assert!(left.is_some_and(|n| n <= 12), "{trouble:?}: {left:?}");
+            assert!(left.is_some_and(|n| n <= 12), "{fault:?}: {left:?}");
         }
     }
 
     /// A constant u at its rest position is a fault only if e is constant too, or if the innovations during the rest
     /// are too large.
     #[test]
-    fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
+    fn rest_is_a_fault_only_with_constant_e_or_large_innovations() {
         let still = block([0.02, 0.0], [0.1, 1.1]);
         let quiet = |innovation: f64, e: f64| Block {
             innovation,
@@ -506,7 +521,7 @@ mod tests {
         };
         let after = |rests: bool, found: &Block| {
             let mut profile = known();
-            (1..=20).find_map(|n| profile.find_fault(found, rests).map(|trouble| (n, trouble)))
+            (1..=20).find_map(|n| profile.find_fault(found, rests).map(|fault| (n, fault)))
         };
         assert_eq!(after(false, &still), Some((3, Fault::FrozenOutput)));
         assert_eq!(after(true, &quiet(0.0, 0.02)), None);
@@ -516,12 +531,12 @@ mod tests {
         // The duration of a fault includes the blocks in which it was accepted as a rest.
         let mut profile = known();
         (0..9).for_each(|_| assert_eq!(profile.find_fault(&quiet(0.0, 0.02), true), None));
-        let told = profile.find_fault(&quiet(0.0, 0.02), false);
-        assert_eq!(told.map(|trouble| profile.duration_blocks(trouble)), Some(10));
+        let reported = profile.find_fault(&quiet(0.0, 0.02), false);
+        assert_eq!(reported.map(|fault| profile.duration_blocks(fault)), Some(10));
     }
 
     #[test]
-    fn a_block_moves_the_long_run_values_by_a_sixtieth() {
+    fn one_block_changes_long_run_values_by_at_most_two_percent() {
         let mut profile = known();
         let before = *profile.typical();
         profile.update(&block([20.0, 100.0], [0.1, 1.1]));
@@ -532,7 +547,7 @@ mod tests {
     }
 
     #[test]
-    fn channels_that_are_alike_are_never_swapped() {
+    fn similar_channels_are_never_reported_as_swapped() {
         let mut profile = Profile::new();
         let mut size = 0.1;
         for n in 0..200 {

@@ -127,7 +127,7 @@ mod tests {
 
     /// Comparison with the predictor of the recursions.
     #[test]
-    fn innovations_are_those_of_the_predictor() {
+    fn innovations_match_the_predictor() {
         let orders = [1, 2, 1, 2, 2];
         let theta = [-0.3, 1.0, -0.4, 0.2, -0.8, 0.1, -1.5, 0.6];
         let shape = AnyShape {
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn an_estimate_that_is_as_good_is_never_astray_and_a_worse_one_soon() {
+    fn only_a_worse_estimate_is_reported_as_diverged() {
         let mut model = ReferenceModel::new([0, 1, 0, 0, 0], &[0.0]).unwrap();
         let mut blocks = |worse: f64, n: usize| {
             model.reset();

@@ -3,8 +3,8 @@
 //!
 //! A stick with a dead zone rests at its centre, and a stick that is pushed to its end rests there. Such values are
 //! atoms of the distribution of u: u often returns to them and stays there. The last [`ATOMS`] values at which u stayed
-//! for `LEAST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration l
-//! of the longest rest. A constant span of length T is a **rest**, and no fault, if
+//! for `MIN_REST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration
+//! l of the longest rest. A constant span of length T is a **rest**, and no fault, if
 //!
 //! `n >= 3`, `S >= .05 t`, `T < max(8 s, 2 l)`,
 //!
@@ -22,11 +22,11 @@
 /// Number of stored values.
 pub const ATOMS: usize = 4;
 /// Minimum duration of a rest in s.
-const LEAST_S: f64 = 0.1;
-/// Minimum number of rests at a value for it to count as an atom; `SHARE` is the minimum fraction of the time spent
-/// there.
-const RESTS: u32 = 3;
-const SHARE: f64 = 0.05;
+const MIN_REST_S: f64 = 0.1;
+/// Minimum number of rests at a value for it to count as an atom; `MIN_TIME_SHARE` is the minimum fraction of the time
+/// spent there.
+const MIN_RESTS: u32 = 3;
+const MIN_TIME_SHARE: f64 = 0.05;
 /// A rest at an atom is accepted if it is shorter than `ACCEPTED_REST_S` seconds or than `LONGEST_REST_FACTOR` times
 /// the longest rest so far.
 const ACCEPTED_REST_S: f64 = 8.0;
@@ -87,8 +87,8 @@ impl Resting {
         if self.constant_samples > 0 && (u - self.value).abs() <= self.tolerance {
             self.constant_samples += 1;
         } else {
-            if self.constant_samples as f64 * self.sample_time >= LEAST_S && !self.rejected {
-                self.learn();
+            if self.constant_samples as f64 * self.sample_time >= MIN_REST_S && !self.rejected {
+                self.record_rest();
             }
             (self.value, self.constant_samples) = if u.is_finite() { (u, 1) } else { (0.0, 0) };
             self.rejected = false;
@@ -102,7 +102,7 @@ impl Resting {
 
     /// Learns the constant span that has just ended. If the list of atoms is full and does not contain the value of the
     /// span, this value replaces the atom with the shortest total duration.
-    fn learn(&mut self) {
+    fn record_rest(&mut self) {
         let place = self.place().unwrap_or_else(|| {
             let least = (0..ATOMS).min_by_key(|i| self.atoms[*i].samples).unwrap_or(0);
             self.atoms[least] = Atom {
@@ -139,8 +139,8 @@ impl Resting {
         // Number of samples before this constant span.
         let time = self.samples.saturating_sub(self.constant_samples) as f64;
         self.constant_samples > 0
-            && rests >= RESTS
-            && samples as f64 >= SHARE * time
+            && rests >= MIN_RESTS
+            && samples as f64 >= MIN_TIME_SHARE * time
             && duration_s < believed
             && !self.rejected
     }
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stick_rests_where_it_often_did_and_not_for_ever() {
+    fn rest_is_accepted_at_known_values_for_a_limited_time() {
         let resting = person(&[60, 150, 80, 120]);
         assert!((rest_ends_after(resting, 0.0) - 8.0).abs() < 0.02);
         assert!((rest_ends_after(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
@@ -183,7 +183,7 @@ mod tests {
 
     /// A signal that takes each of many values for a moment, as from a coarse converter.
     #[test]
-    fn values_of_a_coarse_signal_are_no_atoms() {
+    fn quantised_values_are_not_rest_values() {
         let mut resting = Resting::new(0.01);
         for k in 0_u32..400 {
             let value = f64::from(k.wrapping_mul(2_654_435_761) >> 26);
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn a_doubted_stand_is_not_learnt_and_no_number_is_no_rest() {
+    fn rejected_rests_and_nan_are_ignored() {
         let mut resting = person(&[60, 150, 80]);
         (0..3000).for_each(|_| resting.take(0.0));
         resting.reject();

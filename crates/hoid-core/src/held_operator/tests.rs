@@ -70,7 +70,7 @@ fn assert_within(found: f64, expected: f64, bound: f64, what: std::fmt::Argument
 }
 
 #[test]
-fn coefficients_agree_with_sixty_digits() {
+fn coefficients_agree_with_60_digit_reference() {
     for case in cases() {
         let p = case.parameters;
         let (found, _) = held_operator_delayed(p, case.delta, case.ts);
@@ -85,7 +85,7 @@ fn coefficients_agree_with_sixty_digits() {
 }
 
 #[test]
-fn the_sum_keeps_its_relative_precision() {
+fn sum_of_coefficients_keeps_its_relative_precision() {
     for case in cases() {
         let [_, _, omega, zeta] = case.parameters;
         let ts = case.ts;
@@ -103,7 +103,7 @@ fn the_sum_keeps_its_relative_precision() {
 }
 
 #[test]
-fn jacobian_agrees_with_sixty_digits() {
+fn jacobian_agrees_with_60_digit_reference() {
     for case in cases() {
         let p = case.parameters;
         let (_, found) = held_operator_delayed(p, case.delta, case.ts);
@@ -122,7 +122,7 @@ fn jacobian_agrees_with_sixty_digits() {
 }
 
 #[test]
-fn no_fraction_is_the_hold_of_whole_samples() {
+fn zero_fraction_equals_the_whole_sample_hold() {
     let mut count = 0;
     for case in cases().into_iter().filter(|c| c.delta == 0.0) {
         let (whole, by_whole) = held_operator(case.parameters, case.ts);
@@ -139,7 +139,7 @@ fn no_fraction_is_the_hold_of_whole_samples() {
 }
 
 #[test]
-fn a_fraction_of_one_sample_is_a_whole_sample() {
+fn fraction_of_one_sample_equals_a_whole_sample() {
     for case in cases() {
         let p = case.parameters;
         let (whole, by_whole) = held_operator(p, case.ts);
@@ -201,7 +201,7 @@ fn jacobian_agrees_with_finite_differences() {
 }
 
 #[test]
-fn continuous_in_the_fraction() {
+fn coefficients_are_continuous_in_the_fraction() {
     const STEPS: usize = 2000;
     // For all operators except the first, the way of evaluating the divided differences changes within the sample.
     for (omega, zeta) in [
@@ -241,7 +241,7 @@ fn continuous_in_the_fraction() {
 }
 
 #[test]
-fn poles_at_the_origin_and_no_time() {
+fn poles_at_the_origin_and_zero_sample_time() {
     let (double_integrator, _) = held_operator_delayed([0.09, 0.036, 0.0, 0.35], 0.003, TS);
     assert_eq!(double_integrator, [0.0, 0.0, 0.0, -2.0, 1.0]);
     let (at_once, _) = held_operator_delayed([0.09, 0.036, 11.25, 0.35], 0.0, 0.0);
@@ -249,7 +249,7 @@ fn poles_at_the_origin_and_no_time() {
 }
 
 #[test]
-fn what_is_not_finite_gives_coefficients_that_are_not() {
+fn non_finite_arguments_give_non_finite_coefficients() {
     let good = [0.09, 0.036, 11.25, 0.35, 0.0037, TS];
     let finite = |v: [f64; 6]| {
         let p = [v[0], v[1], v[2], v[3]];

@@ -23,7 +23,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_by_hand() {
+    fn holm_adjustment_matches_r() {
         // R: p.adjust(c(.01, .04, .03, .005), "holm") = .03 .06 .06 .02.
         let adjusted = holm(&[0.01, 0.04, 0.03, 0.005]);
         for (found, expected) in adjusted.iter().zip([0.03, 0.06, 0.06, 0.02]) {

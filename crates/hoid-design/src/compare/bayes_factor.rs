@@ -57,7 +57,7 @@ mod tests {
 
     /// Those of pingouin (scipy's adaptive quadrature).
     #[test]
-    fn the_numbers_of_another_program() {
+    fn bayes_factors_match_pingouin() {
         let mut seen = 0;
         for line in include_str!("../../../../fixtures/compare/bayes.csv").lines().skip(1) {
             let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
@@ -69,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_none() {
+    fn invalid_statistics_give_no_bayes_factor() {
         for (t, first, second) in [
             (f64::NAN, 5, 0),
             (f64::INFINITY, 5, 0),

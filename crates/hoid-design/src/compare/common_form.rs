@@ -6,7 +6,7 @@
 //! Multimodel Inference*, 2002, section 2.6). The common form is the simplest form within 2 of the smallest sum. A form
 //! that the data of most people leave open is not considered, because its parameters would not be determined.
 
-use hoid_ident::family::{LEAST_WEIGHT, NO_EVIDENCE};
+use hoid_ident::family::{MIN_WEIGHT, NO_EVIDENCE};
 use hoid_model::{Finding, Form};
 use hoid_study::group::FormEvidence;
 
@@ -23,7 +23,7 @@ pub struct CommonForm {
 
 /// True if the data leave the form open: its weight is zero, although its criterion is close to the smallest one.
 fn is_undetermined(of: &FormEvidence) -> bool {
-    of.weight == 0.0 && of.criterion < -2.0 * LEAST_WEIGHT.ln()
+    of.weight == 0.0 && of.criterion < -2.0 * MIN_WEIGHT.ln()
 }
 
 /// Returns the simplest form within 2 of the smallest sum of criteria; `None` if no form has a criterion for all people
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn the_form_is_that_of_the_least_sum_and_the_simplest_near_it() {
+    fn common_form_is_the_simplest_near_the_smallest_sum() {
         use Form::{Gain, Lead, LeadLag};
         let one = person(&[(Gain, 0.0, 0.8), (Lead, 2.0, 0.2), (LeadLag, 2.5, 0.1)]);
         let two = person(&[(Gain, 30.0, 0.0), (Lead, 0.0, 0.6), (LeadLag, 1.0, 0.4)]);
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn a_form_that_most_leave_open_is_not_common() {
+    fn form_undetermined_for_most_people_is_not_common() {
         use Form::{Lead, LeadLag};
         let open = person(&[(Lead, 5.0, 1.0), (LeadLag, 0.0, 0.0)]);
         let closed = person(&[(Lead, 5.0, 0.1), (LeadLag, 0.0, 0.9)]);

@@ -62,7 +62,7 @@ pub struct Comparing {
 }
 
 /// Share of the prior in an estimate above which a finding is reported.
-const PRIOR_WEIGHS: f64 = 0.5;
+const MAX_PRIOR_SHARE: f64 = 0.5;
 
 impl Comparing {
     /// Computes the comparison.
@@ -284,7 +284,7 @@ impl Work<'_> {
         for (subject, condition, found) in cells {
             match found {
                 Ok((known, _)) => {
-                    if known.prior_share > PRIOR_WEIGHS {
+                    if known.prior_share > MAX_PRIOR_SHARE {
                         prior.push(format!("{subject} in {condition} {:.0} %", 100.0 * known.prior_share));
                     }
                     self.result.estimates.push(PersonEstimate {

@@ -164,7 +164,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
     }
     let within: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Within).collect();
     let mut all = Vec::new();
-    let everybody = |weights: &BTreeMap<String, f64>| -> Vec<_> {
+    let people_with = |weights: &BTreeMap<String, f64>| -> Vec<_> {
         let of = |subject: &String| weights.keys().any(|c| group.cell(subject, c).is_some());
         let subjects = group.subjects().into_iter().filter(of);
         subjects.map(|subject| (subject, weights.clone(), 0)).collect()
@@ -178,7 +178,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
                 from: a.name.clone(),
                 to: b.name.clone(),
                 effect: None,
-                people: everybody(&weights),
+                people: people_with(&weights),
             });
         }
     }
@@ -203,7 +203,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
                         from: c.name.clone(),
                         to: d.name.clone(),
                         effect: Some([first.name.clone(), a.name.clone(), b.name.clone()]),
-                        people: everybody(&weights),
+                        people: people_with(&weights),
                     });
                 }
             }
@@ -304,7 +304,7 @@ mod tests {
     ];
 
     #[test]
-    fn two_factors_within_people_and_their_interaction() {
+    fn contrasts_of_two_within_factors_and_their_interaction() {
         let all = of(&TWO_BY_TWO, &["plant:H1=1r,1p;H2=2r,2p", "axis:roll=1r,2r;pitch=1p,2p"]).unwrap();
         assert_eq!(all.len(), 3);
         assert_eq!(weights(&all[0]), [("1p", -0.5), ("1r", -0.5), ("2p", 0.5), ("2r", 0.5)]);
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn conditions_in_pairs_and_groups_of_people() {
+    fn contrasts_of_condition_pairs_and_groups() {
         let three = [("P", "a"), ("P", "b"), ("P", "c"), ("Q", "a"), ("Q", "b")];
         let all = of(&three, &["condition"]).unwrap();
         let pairs: Vec<(&str, &str, usize)> = all
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn factors_without_meaning_are_refused() {
+    fn invalid_factors_are_refused() {
         let people = [("P", "a"), ("P", "b"), ("Q", "a"), ("Q", "b")];
         for (factors, word) in [
             (&["display"][..], "levels are not known"),

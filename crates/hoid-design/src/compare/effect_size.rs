@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn the_numbers_of_r() {
+    fn effect_sizes_match_r() {
         let mut seen = 0;
         for line in include_str!("../../../../fixtures/compare/effects.csv").lines().skip(1) {
             let cells: Vec<&str> = line.split(',').collect();
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn few_people_and_no_scatter_have_none() {
+    fn few_people_or_no_scatter_give_no_effect_size() {
         assert!(d_z(&[1.0]).is_none() && d_z(&[]).is_none() && d_z(&[1.0, 1.0]).is_none());
         assert!(hedges_g(&[1.0], &[2.0]).is_none() && hedges_g(&[], &[2.0, 3.0, 4.0]).is_none());
         let two = d_z(&[1.0, 2.0]).unwrap();

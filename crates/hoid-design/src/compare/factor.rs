@@ -113,7 +113,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_factor_is_read() {
+    fn factor_text_is_parsed() {
         let axis: Factor = "axis:roll=C1r, C2r;pitch=C1p,C2p".parse().unwrap();
         assert_eq!((axis.name.as_str(), axis.levels.len()), ("axis", 2));
         assert_eq!(axis.levels[0].members, ["C1r", "C2r"]);

@@ -503,7 +503,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_person_without_a_result_has_a_reason() {
+    fn missing_estimates_have_a_reason() {
         let object = json!({"group": "g", "people": [
             {"subject": "P", "condition": "c", "run": "all", "runs": 0, "status": "failed", "reason": "no run could be read"},
             {"subject": "Q", "condition": "c", "run": "all", "runs": 2, "form": "lead",
@@ -600,7 +600,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn runs_of_their_own_are_averaged() {
+    fn separate_runs_are_averaged() {
         let row = |run: &str, k: f64| {
             json!({"subject": "P", "condition": "c", "run": run, "runs": 2, "form": "gain",
                    "parameters": {"K": {"value": k, "standard_error": 0.01}},

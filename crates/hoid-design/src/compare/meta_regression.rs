@@ -343,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn the_numbers_of_metafor() {
+    fn results_match_metafor() {
         let cases = cases();
         let mut seen = 0;
         for line in include_str!("../../../../fixtures/compare/expected.csv")
@@ -384,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_errors_are_the_t_test() {
+    fn equal_errors_give_the_t_test() {
         // R: t.test(c(.9, 1.4, .2, .7)): t = 3.2215, df = 3.
         let values = [0.9, 1.4, 0.2, 0.7];
         for variance in [0.0, 0.01, 4.0] {
@@ -403,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn the_slope_is_that_of_the_likelihood() {
+    fn slope_agrees_with_finite_differences() {
         let cases = cases();
         let case = &cases["six"];
         let model = Model {
@@ -420,7 +420,7 @@ mod tests {
     }
 
     #[test]
-    fn the_weights_are_kept_away_from_those_of_one_person() {
+    fn penalised_weights_are_not_dominated_by_one_person() {
         // l has its maximum at zero, where the second person has 25 times the weight of the others.
         let all = [(0.3, 0.25), (-0.2, 0.01), (-0.4, 0.25), (0.1, 0.2)];
         let all = all.map(|(value, variance)| Observation { value, variance });
@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_compared_is_refused() {
+    fn invalid_observations_are_refused() {
         let of = |values: &[f64], variance| -> Vec<Observation> {
             values
                 .iter()

@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_read_as_they_are_written() {
+    fn quantity_names_round_trip() {
         for name in [
             "crossover",
             "phase_margin",

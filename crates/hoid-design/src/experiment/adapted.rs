@@ -29,7 +29,7 @@ const SMALL_SLOPE: f64 = 0.3;
 const LONGEST_LAG_S: f64 = 3.0;
 /// Desired and smallest phase margin, in deg.
 const MARGIN_DEG: f64 = 40.0;
-const LEAST_MARGIN_DEG: f64 = 15.0;
+const MIN_MARGIN_DEG: f64 = 15.0;
 /// Range of the crossover frequencies to try, in rad/s, and their number.
 const CROSSOVERS_RAD_S: (f64, f64) = (0.3, 5.0);
 const TRIALS: usize = 300;
@@ -109,7 +109,7 @@ fn adapted(
     let mut falling: Vec<(f64, f64)> = all
         .iter()
         .copied()
-        .filter(|(_, m)| *m < MARGIN_DEG && *m >= LEAST_MARGIN_DEG)
+        .filter(|(_, m)| *m < MARGIN_DEG && *m >= MIN_MARGIN_DEG)
         .collect();
     falling.sort_by(|a, b| b.1.total_cmp(&a.1));
     let wide = all.into_iter().filter(|(_, m)| *m >= MARGIN_DEG);
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loop_falls_by_twenty_decibels_a_decade() {
+    fn typical_loop_falls_by_20_db_per_decade() {
         for (element, form) in [
             ("4", Form::Lag),
             ("4/s", Form::Gain),
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn people_differ_by_one_spread() {
+    fn people_differ_from_the_typical_one_by_one_spread() {
         let (typical, others) = population(&"4/s".parse().unwrap(), None).unwrap();
         assert_eq!(others.len(), 6);
         let slow = others.iter().find(|p| p.name == "tau_e = 0.40").unwrap();

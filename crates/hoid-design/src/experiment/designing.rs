@@ -187,7 +187,7 @@ mod tests {
     };
 
     #[test]
-    fn a_design_tells_more_than_the_lines_of_the_text() {
+    fn design_is_more_informative_than_the_thesis_lines() {
         let task = task(0.2);
         let designed = Designing::default().run(&task, &[Enters::Target]).unwrap();
         let text = super::super::expected(&task, &reference(), 81.92).unwrap();
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wanted_is_told_better() {
+    fn requested_quantities_are_estimated_more_precisely() {
         let task = task(0.2);
         let of = |name: &str| {
             let wanted = vec![RequestedQuantity {
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_are_kept() {
+    fn rms_limits_are_respected() {
         let task = task(0.2);
         let of = |most_rms| {
             Designing {

@@ -24,7 +24,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     DesignError, Expected, People, SpreadSource,
-    power::{MOST_PEOPLE, people_needed, power},
+    power::{MAX_PEOPLE, people_needed, power},
     wanted::named_number,
 };
 
@@ -172,7 +172,7 @@ impl DifferenceRequest {
         all.extend(runs.filter(|runs| !RUNS.contains(runs)));
         all.sort_unstable();
         plan.rows = all.into_iter().map(|runs| self.row(&plan, runs)).collect();
-        plan.answer = answer(&plan.rows, runs);
+        plan.answer = chosen_row(&plan.rows, runs);
         Ok(plan)
     }
 
@@ -231,11 +231,11 @@ pub(super) fn check_spread(quantity: &'static str, found: f64) -> Result<(), Des
 }
 
 /// Returns the index of the row with the given number of runs or, if there is none, of the row with the lowest cost.
-fn answer(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
+fn chosen_row(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
     if let Some(place) = rows.iter().position(|row| Some(row.runs) == runs) {
         return place;
     }
-    let cost = |row: &RunsAndPeople| row.people.unwrap_or(MOST_PEOPLE) * (2 * row.runs + COST_OF_PERSON);
+    let cost = |row: &RunsAndPeople| row.people.unwrap_or(MAX_PEOPLE) * (2 * row.runs + COST_OF_PERSON);
     let least = rows.iter().enumerate().min_by_key(|(_, row)| cost(row));
     least.map_or(0, |(place, _)| place)
 }
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn more_runs_take_fewer_people_down_to_those_between() {
+    fn more_runs_need_fewer_people() {
         let plan = plan("crossover=0.3", None).unwrap();
         let people: Vec<usize> = plan.rows.iter().map(|row| row.people.unwrap()).collect();
         assert!(people.windows(2).all(|two| two[1] <= two[0]), "{people:?}");
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn simulated_experiments_find_it_as_often() {
+    fn simulated_experiments_confirm_the_power() {
         let plan = plan("crossover=8%", Some(2)).unwrap();
         let row = plan.answer().unwrap();
         let people = row.people.unwrap();

@@ -102,7 +102,7 @@ mod tests {
     };
 
     #[test]
-    fn variation_adds_to_the_error_for_the_person() {
+    fn run_to_run_variation_adds_to_the_error_for_the_person() {
         let of_one = expected(&task(0.2), &reference(), 81.92).unwrap();
         let of_four = expected(&task(0.2), &reference(), 4.0 * 81.92).unwrap();
         let (one, four) = (of_one.with_run_to_run(0.1, 1), of_four.with_run_to_run(0.1, 4));

@@ -74,7 +74,7 @@ impl ExperimentDesign {
 /// exceeds four times its rms in 1 of 16000 samples.
 const RMS_MULTIPLE: f64 = 4.0;
 /// Largest number of runs of a condition in `hoid lab`.
-const MOST_RUNS: usize = 100;
+const MAX_RUNS: usize = 100;
 
 impl ExperimentDesign {
     /// Returns an experiment for `hoid lab --config`. Its condition is the scenario file named by `scenario`, in the
@@ -93,7 +93,7 @@ impl ExperimentDesign {
             self.preview(),
             room(self.expected.rms_e),
             room(self.expected.rms_u),
-            self.runs.clamp(1, MOST_RUNS),
+            self.runs.clamp(1, MAX_RUNS),
         ))
     }
 }

@@ -362,7 +362,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn errors_fall_with_time_and_do_not_depend_on_size() {
+    fn errors_decrease_with_time_and_not_with_amplitude() {
         let forcing = reference();
         let of = |task: &Task, length| expected(task, &forcing, length).unwrap();
         let (one, four) = (of(&task(0.2), 81.92), of(&task(0.2), 4.0 * 81.92));
@@ -389,7 +389,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn crossover_and_margin_move_with_the_parameters() {
+    fn crossover_and_margin_gradients_match_finite_differences() {
         // Finite differences of the margins of an operator with another gain: d omega/d ln K.
         let task = task(0.2);
         let all = Loop::of(&task).unwrap();
@@ -413,7 +413,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_says_nothing_is_refused() {
+    fn uninformative_experiments_are_refused() {
         let one = Sinusoid {
             amplitude_deg: 1.0,
             omega_rad_s: 1.0,

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_are_those_of_finite_differences() {
+    fn derivatives_agree_with_finite_differences() {
         let task = task();
         let joint = Joint::of(&task);
         // K, omega_nm, zeta_nm, tau_e of B; K_d, T_L and the delay of F; one arm.
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_move_with_their_coordinates() {
+    fn parameter_gradients_agree_with_finite_differences() {
         let task = task();
         let joint = Joint::of(&task);
         let all = joint.parameters(&task);

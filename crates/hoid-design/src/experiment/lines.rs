@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn phases_make_the_signal_flat() {
+    fn optimised_phases_reduce_the_crest_factor() {
         let all = multiples((2, 200), 10, 1);
         let mut lines = equal(&all, 80.0);
         let before = crest_factor(&lines, 80.0);

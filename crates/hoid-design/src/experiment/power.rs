@@ -61,16 +61,16 @@ pub fn power(effect: f64, people: usize, alpha: f64) -> Option<f64> {
 }
 
 /// Largest number of people considered.
-pub const MOST_PEOPLE: usize = 1000;
+pub const MAX_PEOPLE: usize = 1000;
 
 /// Returns the smallest number of people with at least this power; `None` if it exceeds a thousand.
 pub fn people_needed(effect: f64, wanted: f64, alpha: f64) -> Option<usize> {
     let suffices = |people: usize| power(effect, people, alpha).is_some_and(|found| found >= wanted);
-    if !suffices(MOST_PEOPLE) {
+    if !suffices(MAX_PEOPLE) {
         return None;
     }
     // The power increases with the number of people, so the number is found by bisection.
-    let (mut few, mut enough) = (1, MOST_PEOPLE);
+    let (mut few, mut enough) = (1, MAX_PEOPLE);
     while enough - few > 1 {
         let middle = few.midpoint(enough);
         match suffices(middle) {
@@ -90,7 +90,7 @@ mod tests {
     const REFERENCE_TABLE: &str = include_str!("../../../../fixtures/power/power.csv");
 
     #[test]
-    fn twin_of_scipy_and_statsmodels() {
+    fn power_matches_scipy_and_statsmodels() {
         let mut worst = [0.0_f64; 2];
         for row in REFERENCE_TABLE.lines().skip(1) {
             let (kind, numbers) = row.split_once(',').unwrap();
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn people_are_the_least_that_suffice() {
+    fn smallest_sufficient_number_of_people_is_found() {
         for (effect, wanted) in [(0.5, 0.8), (1.0, 0.8), (0.2, 0.9), (3.0, 0.8)] {
             let people = people_needed(effect, wanted, 0.05).unwrap();
             assert!(power(effect, people, 0.05).unwrap() >= wanted);

@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_design_comes_back_from_its_json() {
+    fn design_round_trips_through_json() {
         let design = DesignRequest {
             against: Some(Against::Reference),
             difference: Some(DifferenceRequest::new("crossover=0.4".parse().unwrap())),
@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn the_worst_person_needs_most_runs() {
+    fn worst_person_needs_the_most_runs() {
         let design = request().run().unwrap();
         let worst = design.worst.unwrap();
         assert!(design.people.iter().all(|p| p.runs_needed <= worst.runs_needed));
@@ -333,7 +333,7 @@ mod tests {
 
     /// The delay relative to the present target may be zero.
     #[test]
-    fn the_accepted_error_of_the_delay_to_a_target_is_absolute() {
+    fn accepted_error_of_the_target_delay_is_absolute() {
         let design = DesignRequest {
             display: Display::Pursuit,
             designing: Designing {
@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn a_seen_target_comes_with_a_disturbance() {
+    fn displayed_target_is_combined_with_a_disturbance() {
         let pursuit = DesignRequest {
             display: Display::Pursuit,
             ..request()

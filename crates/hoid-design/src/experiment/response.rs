@@ -195,7 +195,7 @@ mod tests {
     use crate::experiment::{Designing, information::tests::task};
 
     #[test]
-    fn a_line_knows_less_than_all_of_them() {
+    fn all_lines_together_reduce_the_error_of_one_line() {
         let task = task(0.2);
         let all = Loop::of(&task).unwrap();
         let designing = Designing::default();

@@ -31,9 +31,9 @@ use super::{
 
 /// Largest ratio of an amplitude below the crossover frequency to the geometric mean of these amplitudes; the inverse
 /// is the smallest ratio.
-const WITHIN: f64 = 2.0;
+const MAX_AMPLITUDE_RATIO: f64 = 2.0;
 /// Smallest fraction of an equal share that each line keeps.
-const LEAST_SHARE: f64 = 0.1;
+const MIN_SHARE: f64 = 0.1;
 /// Number of iterations for the shares: in general, and when a line is moved on trial.
 const STEPS: usize = 400;
 const STEPS_OF_TRIAL: usize = 60;
@@ -41,7 +41,7 @@ const STEPS_OF_TRIAL: usize = 60;
 const MOVES: [i32; 10] = [-16, -8, -4, -2, -1, 1, 2, 4, 8, 16];
 const ROUNDS: usize = 3;
 /// Smallest relative improvement of J for which a line is moved.
-const WORTH: f64 = 1e-3;
+const MIN_IMPROVEMENT: f64 = 1e-3;
 
 /// A line, given by its multiple of the fundamental and its point of entry.
 pub(super) type Place = (u32, Enters);
@@ -83,7 +83,7 @@ impl Search<'_> {
                     let mut trial = places.clone();
                     trial[k].0 = moved;
                     if let Ok((found, criterion)) = self.shares(&trial, STEPS_OF_TRIAL)
-                        && criterion < best * (1.0 - WORTH)
+                        && criterion < best * (1.0 - MIN_IMPROVEMENT)
                     {
                         (places, shares, best) = (trial, found, criterion);
                     }
@@ -128,7 +128,7 @@ impl Search<'_> {
                 .map(|(m, q)| q * (slope(m) / criterion).sqrt())
                 .collect();
             let whole: f64 = moved.iter().sum();
-            let least = LEAST_SHARE / n as f64;
+            let least = MIN_SHARE / n as f64;
             shares = moved.iter().map(|q| (q / whole).max(least)).collect();
             self.limit(places, &mut shares);
         }
@@ -156,7 +156,10 @@ impl Search<'_> {
                 **q = *control
                     * match beyond {
                         true => power.min(self.shelf * self.shelf * level),
-                        false => power.clamp(level / (WITHIN * WITHIN), level * WITHIN * WITHIN),
+                        false => power.clamp(
+                            level / (MAX_AMPLITUDE_RATIO * MAX_AMPLITUDE_RATIO),
+                            level * MAX_AMPLITUDE_RATIO * MAX_AMPLITUDE_RATIO,
+                        ),
                     };
             }
         }

@@ -52,10 +52,10 @@ impl Criterion<'_> {
             .zip(&mut ws.further)
         {
             let FurtherSignals { s, w, .. } = signals;
-            let begin = pad + input.orders.nk.min(n);
+            let start = pad + input.orders.nk.min(n);
             s.resize(pad + n, 0.0);
-            s[..begin].fill(0.0);
-            divide(f, &input.values[record][..pad + n - begin], &mut s[begin..]);
+            s[..start].fill(0.0);
+            divide(f, &input.values[record][..pad + n - start], &mut s[start..]);
             w.resize(pad + n, 0.0);
             w.fill(0.0);
             for (j, &bj) in b.iter().enumerate() {
@@ -77,8 +77,8 @@ impl Criterion<'_> {
         {
             let FurtherSignals { s, w, of_b, of_f } = signals;
             of_b.resize(s.len(), 0.0);
-            let begin = ws.pad + input.orders.nk.min(s.len() - ws.pad);
-            whiten(parts.c, parts.d, s, of_b, begin);
+            let start = ws.pad + input.orders.nk.min(s.len() - ws.pad);
+            whiten(parts.c, parts.d, s, of_b, start);
             if input.orders.nf > 0 {
                 let mut filtered = vec![0.0; w.len()];
                 divide(f, &w[from..], &mut filtered[from..]);

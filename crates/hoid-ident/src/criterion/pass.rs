@@ -72,26 +72,26 @@ impl Criterion<'_> {
         if !plain || u.len() < 2 * head || head < least {
             return None;
         }
-        let begin = Data {
+        let head_data = Data {
             e: &e[..head.min(e.len())],
             u: &u[..head],
             ..self.data[record]
         };
-        let states = self.residual_pass(theta, record, begin, ws);
+        let states = self.residual_pass(theta, record, head_data, ws);
         if !states.responses.have_decayed(head - self.first) {
             return None;
         }
-        self.gradient_pass(theta, blocks, begin, ws);
+        self.gradient_pass(theta, blocks, head_data, ws);
         visit(&states, ws.pad + self.first..ws.pad + head, ws);
         let parts = Polynomials::split(&self.orders, theta);
         let nothing = EliminatedStates::default();
-        let mut behind = head;
+        let mut carried = head;
         for from in (head..u.len()).step_by(SPAN) {
             let to = (from + SPAN).min(u.len());
-            ws.carry_over_tail(behind);
-            behind = to - from;
+            ws.carry_over_tail(carried);
+            carried = to - from;
             self.next_span(&parts, blocks, self.data[record], from..to, ws);
-            visit(&nothing, ws.pad..ws.pad + behind, ws);
+            visit(&nothing, ws.pad..ws.pad + carried, ws);
         }
         Some(states)
     }

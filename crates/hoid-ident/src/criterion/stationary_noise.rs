@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn covariance_of_first_order_noise_is_known() {
+    fn covariance_of_first_order_noise_matches_the_formula() {
         // AR(1): x = -d v, var v = 1/(1 - d^2).
         let ar = StationaryNoise::of(&[], &[-0.8]).unwrap();
         assert!((ar.covariance[(0, 0)] - 0.64 / 0.36).abs() < 1e-14);
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn covariance_solves_its_equation_and_the_factor_gives_it_back() {
+    fn covariance_solves_its_equation_and_equals_its_factor_squared() {
         let past = StationaryNoise::of(&[0.4, 0.1], &[-1.6, 0.8, -0.1]).unwrap();
         let (phi, k) = (&past.transition, &past.gain);
         let again = phi * &past.covariance * phi.transpose() + k * k.transpose();
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_that_is_not_stationary_has_no_past() {
+    fn nonstationary_noise_is_rejected() {
         assert!(StationaryNoise::of(&[], &[-1.0]).is_none());
         assert!(StationaryNoise::of(&[], &[-2.0, 1.1]).is_none());
         assert!(StationaryNoise::of(&[f64::NAN], &[0.1]).is_none());

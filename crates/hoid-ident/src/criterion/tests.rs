@@ -110,7 +110,7 @@ fn criterion<'a>(orders: Orders, data: Vec<Data<'a>>, initial: InitialState) -> 
 }
 
 #[test]
-fn gradient_agrees_with_finite_differences_in_both_modes() {
+fn gradient_matches_finite_differences() {
     let (e, u) = record(300);
     for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
         for ((orders, theta), level) in cases()
@@ -145,7 +145,7 @@ fn gradient_agrees_with_finite_differences_in_both_modes() {
 }
 
 #[test]
-fn residuals_obey_the_model_equation() {
+fn residuals_satisfy_the_model_equation() {
     let (e, u) = record(120);
     let theta = vec![0.2, -0.1, 0.3, -0.5, -1.5, 0.62];
     let orders = Orders {
@@ -171,7 +171,7 @@ fn residuals_obey_the_model_equation() {
 }
 
 #[test]
-fn estimated_states_leave_nothing_to_gain() {
+fn residuals_are_orthogonal_to_the_free_responses() {
     // Shifting w by any free response must not lower the loss: the residual is orthogonal to the
     // basis.
     let (e, u) = record(300);
@@ -255,7 +255,7 @@ fn estimated_states_of_a_noise_free_record_are_exact() {
 }
 
 #[test]
-fn the_unconditional_sum_of_squares_is_that_of_the_covariance_matrix() {
+fn backcast_sum_of_squares_matches_the_covariance_matrix() {
     let (_, u) = record(60);
     let orders = Orders {
         na: 2,
@@ -278,7 +278,7 @@ fn the_unconditional_sum_of_squares_is_that_of_the_covariance_matrix() {
 }
 
 #[test]
-fn weights_act_as_a_diagonal_matrix_and_keep_the_gradient_exact() {
+fn gradient_of_the_weighted_criterion_is_exact() {
     let (e, u) = record(200);
     for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
         for (orders, theta) in cases().into_iter().take(4) {
@@ -318,7 +318,7 @@ fn weights_act_as_a_diagonal_matrix_and_keep_the_gradient_exact() {
 }
 
 #[test]
-fn a_later_first_residual_leaves_the_gradient_exact() {
+fn gradient_is_exact_with_a_later_first_residual() {
     let (e, u) = record(300);
     let (orders, theta) = cases().remove(1);
     let data = vec![Data::new(&e, &u)];
@@ -356,7 +356,7 @@ fn add_in_spans(
 }
 
 #[test]
-fn long_records_pass_span_by_span_to_the_same_sums() {
+fn sums_over_spans_equal_sums_over_the_record() {
     // After each of these heads the rest consists of whole spans and a part of a span.
     let (e, u) = record(9001);
     let long = Data::new(&e, &u);
@@ -411,7 +411,7 @@ fn long_records_pass_span_by_span_to_the_same_sums() {
 }
 
 #[test]
-fn what_does_not_die_away_passes_whole() {
+fn spans_are_not_used_with_slow_poles_long_delays_or_weights() {
     let (e, u) = record(9001);
     let data = vec![Data::new(&e, &u)];
     let orders = Orders {
@@ -486,7 +486,7 @@ fn with_further<'a>(
 }
 
 #[test]
-fn a_further_input_alone_is_the_first_one() {
+fn single_further_input_equals_the_first_input() {
     let (e, u) = record(300);
     let alone = Orders {
         nb: 2,
@@ -527,7 +527,7 @@ fn a_further_input_alone_is_the_first_one() {
 }
 
 #[test]
-fn gradient_of_two_inputs_agrees_with_finite_differences() {
+fn gradient_with_two_inputs_matches_finite_differences() {
     let (e, x, u) = inputs(300);
     let base = Orders {
         nb: 2,
@@ -580,7 +580,7 @@ fn gradient_of_two_inputs_agrees_with_finite_differences() {
 }
 
 #[test]
-fn two_inputs_without_noise_leave_nothing() {
+fn residuals_of_noise_free_two_input_data_are_zero() {
     let (e, x, _) = inputs(400);
     let (mut one, mut two) = (vec![0.5, -0.3, 0.1, 0.2, 0.1, 0.3], vec![0.2; 6]);
     for t in 6..400 {

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lags_in_fours_are_lags_one_by_one() {
+    fn adding_four_lags_at_once_equals_adding_each_lag() {
         let signal = |n: usize, k: f64| (0..n).map(|t| (k * t as f64).sin()).collect::<Vec<f64>>();
         for n in [1, 3, 5, 6, 40] {
             let x = signal(n, 0.7);

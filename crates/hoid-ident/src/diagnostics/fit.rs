@@ -17,7 +17,7 @@ use crate::{Choice, Fit, IdentError};
 /// Residuals are only rounding errors of the data if their power is below this share of the power of u.
 const ROUNDING: f64 = 1e-22;
 /// Minimum number of residuals per unknown; with fewer residuals a fit carries no information.
-const FEWEST_RESIDUALS: usize = 5;
+const MIN_RESIDUALS: usize = 5;
 /// Significance level of the test of b against zero.
 const LEVEL: f64 = 0.05;
 
@@ -59,11 +59,11 @@ impl Fit {
     /// Returns a finding if there are too few residuals for the number of unknowns.
     fn too_few(&self) -> Option<Finding> {
         let unknowns = self.model.theta().len() + self.states;
-        (self.covariance.is_some() && self.residuals < FEWEST_RESIDUALS * unknowns).then(|| {
+        (self.covariance.is_some() && self.residuals < MIN_RESIDUALS * unknowns).then(|| {
             Finding::undetermined(
                 "too-few",
                 format!(
-                    "{} residuals for {unknowns} unknowns with nk = {}, fewer than {FEWEST_RESIDUALS} for each; use a \
+                    "{} residuals for {unknowns} unknowns with nk = {}, fewer than {MIN_RESIDUALS} for each; use a \
                      longer record or lower orders",
                     self.residuals,
                     self.orders().nk
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn clean_runs_of_the_reference_text_are_trustworthy() {
+    fn clean_runs_of_the_thesis_are_trustworthy() {
         for condition in [Condition::C1, Condition::C2] {
             let record = simulated(condition);
             let verdict = fitted(&box_jenkins(29), &record);
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_at_the_end_of_its_range_and_a_wrong_one() {
+    fn delay_at_the_end_of_its_range_is_reported() {
         let record = simulated(Condition::C1);
         let records = std::slice::from_ref(&record);
         let mut ranges = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn an_output_that_does_not_follow_the_input_is_not_determined() {
+    fn unrelated_output_is_not_determined() {
         let record = simulated(Condition::C1);
         let other = with_output(&record, noise(record.len()));
         let records = std::slice::from_ref(&other);
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn a_noise_model_that_is_too_poor_and_a_sample_that_carries_the_fit() {
+    fn poor_noise_model_and_outlier_are_reported() {
         let record = simulated(Condition::C1);
         let oe = Estimator::new(Structure::OutputError, Structure::OutputError.operator_orders(29));
         assert!(kinds(&fitted(&oe, &record)).contains(&"residuals-not-white"));
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn instruments_do_not_ask_for_white_residuals() {
+    fn coloured_residuals_of_instruments_are_only_a_note() {
         let record = simulated(Condition::C1);
         let records = std::slice::from_ref(&record);
         let orders = Structure::OutputError.operator_orders(29);
@@ -313,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn coefficients_of_no_operator_and_unstable_ones() {
+    fn unconvertible_and_unstable_coefficients_are_reported() {
         let of = |f1: f64, f2: f64| {
             let mut fit = box_jenkins(29).fit(&[simulated(Condition::C1)]).unwrap();
             let mut theta = fit.model.theta().to_vec();
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_without_an_input_is_judged_by_its_residuals() {
+    fn model_without_input_is_judged_by_its_residuals() {
         let record = simulated(Condition::C1);
         let output = Channel::new("u", "", noise(3000));
         let white = Record::of_output(record.sample_time(), output).unwrap();

@@ -147,7 +147,7 @@ mod tests {
     use crate::GreyBox;
 
     #[test]
-    fn a_clean_run_is_trustworthy_and_a_delay_at_its_bound_is_not() {
+    fn clean_run_is_trustworthy_and_delay_at_its_bound_is_doubtful() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let records = std::slice::from_ref(&record);
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn records_of_their_own_are_named() {
+    fn findings_name_the_record_of_an_individual_parameter() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let run = |k| {
             simulator

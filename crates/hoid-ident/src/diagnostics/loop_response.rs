@@ -24,7 +24,7 @@ pub struct LoopResponse {
 
 /// Tests whether e responds to u in the samples from `from` on. `None` if there are too few data, a value is not a
 /// number or a signal is constant.
-pub fn answer(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
+pub fn loop_response(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
     let thin = thinning(sample_time_s);
     let latest = (LATEST_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;
     let longest = latest + NOISE;
@@ -41,15 +41,15 @@ pub fn answer(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<L
         j if j <= NOISE => past(e, t, j),
         j => past(u, t, latest + j - NOISE),
     });
-    let asked = DMatrix::from_fn(n, latest, |t, j| past(u, t, j + 1));
-    if !before.iter().chain(&asked).chain(&y).all(|v| v.is_finite()) {
+    let latest_columns = DMatrix::from_fn(n, latest, |t, j| past(u, t, j + 1));
+    if !before.iter().chain(&latest_columns).chain(&y).all(|v| v.is_finite()) {
         return None;
     }
     let q = orthogonal(&before)?;
     let left = &y - &q * (q.transpose() * &y);
-    let asked = &asked - &q * (q.transpose() * &asked);
-    let of_asked = orthogonal(&asked)?;
-    let explained = (of_asked.transpose() * &left).norm_squared();
+    let latest_columns = &latest_columns - &q * (q.transpose() * &latest_columns);
+    let of_latest = orthogonal(&latest_columns)?;
+    let explained = (of_latest.transpose() * &left).norm_squared();
     let (whole, rest) = (left.norm_squared(), left.norm_squared() - explained);
     if whole <= 0.0 {
         return None;
@@ -89,19 +89,22 @@ mod tests {
     }
 
     #[test]
-    fn e_answers_to_its_own_u_alone() {
+    fn e_responds_only_to_u_of_its_own_loop() {
         for seed in 0..10 {
             let ([e, u], [_, other]) = (loop_of(seed), loop_of(100 + seed));
-            let (own, other) = (answer(&e, &u, 0, 0.02).unwrap(), answer(&e, &other, 0, 0.02).unwrap());
+            let (own, other) = (
+                loop_response(&e, &u, 0, 0.02).unwrap(),
+                loop_response(&e, &other, 0, 0.02).unwrap(),
+            );
             assert!(own.share > 0.2 && own.p_value < 1e-6, "{own:?}");
             assert!(other.share < 0.05, "{other:?}");
         }
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn short_records_and_zero_output_give_no_result() {
         let [e, u] = loop_of(1);
-        assert_eq!(answer(&e[..300], &u[..300], 0, 0.02), None);
-        assert_eq!(answer(&e, &vec![0.0; u.len()], 0, 0.02), None);
+        assert_eq!(loop_response(&e[..300], &u[..300], 0, 0.02), None);
+        assert_eq!(loop_response(&e, &vec![0.0; u.len()], 0, 0.02), None);
     }
 }

@@ -48,10 +48,10 @@ pub mod second_opinion;
 mod sigmoid;
 mod whitened;
 
-pub use constancy::{Course, RUN_TO_RUN, ResponseBasis, Unsteady, unsteady};
-pub use loop_response::{LoopResponse, answer};
+pub use constancy::{Course, RUN_TO_RUN, ResponseBasis, ResponseChange, response_changes};
+pub use loop_response::{LoopResponse, loop_response};
 pub use no_response::{Response, response};
-pub use operator::{gain_findings, is_open, leads_backwards, neuromuscular_finding, pole_findings};
+pub use operator::{gain_findings, has_negative_lead, is_undetermined, neuromuscular_finding, pole_findings};
 pub use operator_step::{OperatorStep, operator_step};
 pub use recorded_element::{RecordedElement, recorded_element};
 pub use residual_response::{ResidualResponse, residual_response};

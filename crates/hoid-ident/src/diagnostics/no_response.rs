@@ -38,7 +38,7 @@ const NEUROMUSCULAR: (f64, f64) = (11.0, 0.4);
 /// Number of surrogate records without a relation between e and u.
 const SURROGATES: usize = 1999;
 /// Minimum number of frequencies for the test.
-const FEWEST: usize = 12;
+const MIN_FREQUENCIES: usize = 12;
 const SEED: u64 = 0x686f_6964;
 const COLUMNS: usize = 3;
 
@@ -48,7 +48,7 @@ pub struct Response {
     /// T: share of the power of the whitened output that the response explains.
     pub share: f64,
     /// Number of surrogates whose share is at least as large as the share of the records.
-    pub reached_by: usize,
+    pub surrogates_above: usize,
     /// Number of surrogates.
     pub surrogates: usize,
 }
@@ -56,20 +56,20 @@ pub struct Response {
 impl Response {
     /// Returns the probability of a share at least this large if u does not respond to e.
     pub fn p_value(&self) -> f64 {
-        (self.reached_by + 1) as f64 / (self.surrogates + 1) as f64
+        (self.surrogates_above + 1) as f64 / (self.surrogates + 1) as f64
     }
 
     /// Returns the finding that no response can be distinguished from chance; `None` if no surrogate has as large a
     /// share as the records.
     pub fn finding(&self) -> Option<Finding> {
-        (self.reached_by > 0).then(|| {
+        (self.surrogates_above > 0).then(|| {
             Finding::undetermined(
                 "no-response",
                 format!(
                     "the response of u to e cannot be distinguished from chance: {} of {} pairs of unrelated records \
                      with the same spectra respond at least as strongly (p = {:.2}); check that both channels are \
                      from the same run and are not exchanged",
-                    self.reached_by,
+                    self.surrogates_above,
                     self.surrogates,
                     self.p_value()
                 ),
@@ -94,7 +94,7 @@ struct Spectra {
 pub fn response(records: &[Record]) -> Option<Response> {
     let all: Option<Vec<Spectra>> = records.iter().map(Spectra::of).collect();
     let all = all?;
-    if all.iter().map(|s| s.u.len()).sum::<usize>() < FEWEST {
+    if all.iter().map(|s| s.u.len()).sum::<usize>() < MIN_FREQUENCIES {
         return None;
     }
     let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
@@ -120,17 +120,17 @@ pub fn response(records: &[Record]) -> Option<Response> {
         return None;
     }
     let mut generator = ChaCha8Rng::seed_from_u64(SEED);
-    let mut reached_by = 0;
+    let mut surrogates_above = 0;
     for _ in 0..SURROGATES {
         for turn in &mut turns {
             // A resolution of 32 bits is more than sufficient for a phase.
             *turn = Complex64::from_polar(1.0, TAU * f64::from(generator.next_u32()) / 4_294_967_296.0);
         }
-        reached_by += usize::from(share(&turns) >= own);
+        surrogates_above += usize::from(share(&turns) >= own);
     }
     Some(Response {
         share: own,
-        reached_by,
+        surrogates_above,
         surrogates: SURROGATES,
     })
 }
@@ -287,18 +287,18 @@ mod tests {
     }
 
     #[test]
-    fn a_person_responds() {
+    fn simulated_operators_respond_to_the_error() {
         for condition in [Condition::C1, Condition::C2, Condition::C3] {
             let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
             let run = simulator.run(RunSeed::default(), false).unwrap();
             let found = response(&[run]).unwrap();
-            assert_eq!(found.reached_by, 0, "{found:?}");
+            assert_eq!(found.surrogates_above, 0, "{found:?}");
             assert!(found.p_value() < 1e-3 && found.finding().is_none());
         }
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn too_little_data_gives_no_result() {
         assert_eq!(response(&[record(vec![0.0; 4000], noise(1, [0.9, 0.9], 4000))]), None);
         assert_eq!(
             response(&[record(noise(1, [0.9, 0.9], 60), noise(2, [0.9, 0.9], 60))]),

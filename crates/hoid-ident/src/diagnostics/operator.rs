@@ -11,20 +11,20 @@ use hoid_model::{
 use crate::{Reason, Termination};
 
 /// A value within this number of its standard errors of zero counts as undetermined.
-const LEAST_ERRORS: f64 = 2.0;
+const MIN_STANDARD_ERRORS: f64 = 2.0;
 /// Damping ratio above which the poles count as a lag: the faster of the two real poles is then 34 times the slower.
 const LARGEST_DAMPING: f64 = 3.0;
 
 /// True if a value is less than two standard errors from zero; false for a value without a standard error, which was
 /// given and not estimated.
-pub fn is_open(e: &Estimate) -> bool {
+pub fn is_undetermined(e: &Estimate) -> bool {
     e.standard_error
-        .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
+        .is_some_and(|error| e.value.abs() < MIN_STANDARD_ERRORS * error)
 }
 
 /// True if K_e and K_e_dot have opposite signs and are each at least two standard errors from zero: a negative lead.
-pub fn leads_backwards(o: &OperatorEstimate) -> bool {
-    let sign = |e: &Estimate| if is_open(e) { 0.0 } else { e.value.signum() };
+pub fn has_negative_lead(o: &OperatorEstimate) -> bool {
+    let sign = |e: &Estimate| if is_undetermined(e) { 0.0 } else { e.value.signum() };
     sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
 }
 
@@ -36,9 +36,9 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let mut all_open = !operators.is_empty();
     for (label, o) in operators {
         let named = [("K_e", o.k_e), ("T_L", o.t_l_s), ("K_e_dot", o.k_e_dot)];
-        let of_label = named.iter().filter(|(_, e)| is_open(e));
+        let of_label = named.iter().filter(|(_, e)| is_undetermined(e));
         open.extend(of_label.map(|(name, e)| format!("{name}{label} ({e})")));
-        all_open &= is_open(&o.k_e) && is_open(&o.k_e_dot);
+        all_open &= is_undetermined(&o.k_e) && is_undetermined(&o.k_e_dot);
     }
     if all_open {
         return vec![Finding::undetermined(
@@ -46,7 +46,7 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
             "no gain differs from zero by two standard errors: u responds too little to e",
         )];
     }
-    let backwards = operators.iter().filter(|(_, o)| leads_backwards(o));
+    let backwards = operators.iter().filter(|(_, o)| has_negative_lead(o));
     let negative: Vec<String> = backwards
         .map(|(label, o)| format!("T_L{label} ({})", o.t_l_s))
         .collect();
@@ -78,7 +78,7 @@ pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
     let named = [("omega_nm", operator.omega_nm_rad_s), ("zeta_nm", operator.zeta_nm)];
     let open: Vec<String> = named
         .iter()
-        .filter(|(_, e)| is_open(e))
+        .filter(|(_, e)| is_undetermined(e))
         .map(|(name, e)| format!("{name} ({e})"))
         .collect();
     let lag = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
@@ -183,15 +183,15 @@ mod tests {
     }
 
     #[test]
-    fn a_determined_operator_gives_no_finding_and_a_fixed_value_is_not_open() {
+    fn determined_operators_and_fixed_values_give_no_finding() {
         let o = operator();
         assert!(gain_findings(&[("", o)]).is_empty() && pole_findings(&o, ts()).is_empty());
-        assert!(!is_open(&Estimate::fixed(0.0)));
+        assert!(!is_undetermined(&Estimate::fixed(0.0)));
         assert!(gain_findings(&[]).is_empty());
     }
 
     #[test]
-    fn a_lead_that_nobody_has_is_named() {
+    fn negative_lead_is_reported() {
         let e = |value: f64, error: f64| Estimate::with_variance(value, error * error);
         let lag = OperatorEstimate {
             t_l_s: e(-0.2, 0.05),
@@ -211,16 +211,16 @@ mod tests {
             k_e_dot: e(-0.036, 0.004),
             ..operator()
         };
-        assert!(!leads_backwards(&flipped));
+        assert!(!has_negative_lead(&flipped));
         let open = OperatorEstimate {
             k_e_dot: e(-0.004, 0.004),
             ..lag
         };
-        assert!(!leads_backwards(&open));
+        assert!(!has_negative_lead(&open));
     }
 
     #[test]
-    fn errors_as_large_as_values_are_named() {
+    fn undetermined_parameters_are_reported() {
         let lead = OperatorEstimate {
             k_e: wide(0.09),
             t_l_s: wide(0.4),
@@ -252,8 +252,8 @@ mod tests {
     }
 
     #[test]
-    fn poles_of_no_person_are_a_lag() {
-        for (omega, zeta, senseless) in [
+    fn implausible_neuromuscular_poles_are_reported() {
+        for (omega, zeta, implausible) in [
             (11.25, 0.35, false),
             (11.25, 2.9, false),
             (11.25, 3.1, true),
@@ -261,13 +261,13 @@ mod tests {
             (315.0, 1.0, true),
         ] {
             let found = neuromuscular_finding(omega, zeta, ts());
-            assert_eq!(found.is_some(), senseless, "{omega}, {zeta}");
+            assert_eq!(found.is_some(), implausible, "{omega}, {zeta}");
             assert!(found.is_none_or(|f| f.kind == "neuromuscular-lag"));
         }
     }
 
     #[test]
-    fn ends_of_the_search_and_of_the_delay() {
+    fn search_termination_and_delay_bounds_are_reported() {
         let of = |reason| {
             search_finding(Termination { reason, iterations: 3 }).map(|finding| (finding.kind, finding.severity.name()))
         };

@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn one_step_leads_to_the_fit() {
+    fn one_step_reaches_the_grey_box_fit() {
         // Reference: a grey-box fit of the same stretch, whose noise model has order one instead of four.
         let record = run(1);
         let start = OperatorParameters {
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_needs_no_step_and_a_wrong_delay_one() {
+    fn step_is_significant_only_for_a_wrong_delay() {
         let mut squares = 0.0;
         for k in 10..22 {
             let steps = operator_step(&truth(), &run(k)).unwrap();
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_that_says_nothing_gives_no_step() {
+    fn uninformative_records_give_no_step() {
         let record = run(31);
         let n = record.len();
         let still = Record::new(

@@ -23,7 +23,7 @@ pub(super) const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
 /// p-value below which a response to the target is reported. The first value applies if target and disturbance have
 /// separate lines, the second if only the target excites the loop: in that case an error in the form of the fit looks
 /// like a response to the target.
-const BY_CHANCE: [f64; 2] = [1e-2, 1e-7];
+const P_VALUE_LIMITS: [f64; 2] = [1e-2, 1e-7];
 
 /// Returns a finding for each recorded target to which u responds.
 pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
@@ -41,7 +41,7 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
             SeenChannel::new(name, ChannelRole::Feedforward),
         )?;
         let chance = found.p_value;
-        (chance < BY_CHANCE[usize::from(!apart)]).then(|| finding(name, chance, !apart && rests(records)))
+        (chance < P_VALUE_LIMITS[usize::from(!apart)]).then(|| finding(name, chance, !apart && rests(records)))
     };
     TARGETS.into_iter().filter(is_recorded).filter_map(found).collect()
 }

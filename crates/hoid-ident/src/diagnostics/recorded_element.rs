@@ -19,8 +19,8 @@
 //! | `equations` | the least-squares fit of an element |
 //!
 //! If a disturbance was not recorded, the person responds to it, so u is not independent of it. The element is
-//! therefore judged only if the recorded signals explain all but [`UNEXPLAINED`] of the power, as they do if all
-//! signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
+//! therefore judged only if the recorded signals explain all but [`MAX_UNEXPLAINED_SHARE`] of the power, as they do if
+//! all signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
 
 mod equations;
 mod spectra;
@@ -28,13 +28,13 @@ mod spectra;
 use hoid_model::{Complex64, ContinuousTransferFunction, Finding, Record};
 
 use equations::Fitted;
-use spectra::{Exogenous, MOST_FREQUENCIES, Spectra};
+use spectra::{Exogenous, MAX_FREQUENCIES, Spectra};
 
 /// Largest unexplained share of the power, expressed as a disturbance at u, for which the element is judged.
-const UNEXPLAINED: f64 = 0.02;
+const MAX_UNEXPLAINED_SHARE: f64 = 0.02;
 /// Share of the power that remains unexplained for exact data because the delay is scanned in steps; smaller
 /// differences between elements do not count.
-const EXACT: f64 = 1e-4;
+const EXACT_DATA_SHARE: f64 = 1e-4;
 /// Frequencies at which two elements are compared, rad/s: the range in which people close their loops.
 const COMPARED_RAD_S: [f64; 7] = [0.5, 0.75, 1.1, 1.6, 2.4, 3.6, 5.4];
 /// Largest difference between the logarithms of two responses that count as equal: 10 % of the gain or 6 deg.
@@ -43,7 +43,7 @@ const EQUAL_RESPONSES: f64 = 0.1;
 /// after the other.
 const ALIGNED_SAMPLES: f64 = 1.5;
 /// Largest number of poles of a given element that can be tested.
-const MOST_POLES: usize = 4;
+const MAX_POLES: usize = 4;
 
 /// The controlled element identified from a recorded loop.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,14 +102,14 @@ pub fn recorded_element(
 ) -> Option<RecordedElement> {
     let (m, n) = (given.num().len() - 1, given.den().len() - 1);
     let sample_time_s = records.first()?.sample_time().s();
-    if n > MOST_POLES || records.iter().any(|record| record.input_channel().is_none()) {
+    if n > MAX_POLES || records.iter().any(|record| record.input_channel().is_none()) {
         return None;
     }
     let exogenous = Exogenous::of(records, excitation);
     let mut spectra = Vec::new();
     let mut frequencies = 0;
     for record in records {
-        if frequencies < MOST_FREQUENCIES {
+        if frequencies < MAX_FREQUENCIES {
             let found = Spectra::of(record, &exogenous)?;
             frequencies += found.omega.len();
             spectra.push(found);
@@ -127,8 +127,8 @@ pub fn recorded_element(
     let least = fits.iter().map(|fit| fit.unexplained).fold(f64::INFINITY, f64::min);
     let chosen = fits
         .into_iter()
-        .find(|fit| fit.unexplained <= 2.0 * least + EXACT)
-        .filter(|fit| fit.unexplained <= UNEXPLAINED)?;
+        .find(|fit| fit.unexplained <= 2.0 * least + EXACT_DATA_SHARE)
+        .filter(|fit| fit.unexplained <= MAX_UNEXPLAINED_SHARE)?;
     let element = transfer_function(&chosen, given.delay_s())?;
     let ratio = |omega: f64| (omega, element.response(omega) / given.response(omega));
     let difference = COMPARED_RAD_S

@@ -29,7 +29,7 @@ pub(crate) const TAPS: usize = 6;
 pub(crate) const TAP_S: f64 = 0.15;
 /// Length of a block in s, and minimum number of blocks for the test.
 const BLOCK_S: f64 = 2.0;
-const FEWEST: usize = 10;
+const MIN_BLOCKS: usize = 10;
 
 /// Result of the test for a missing response.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,7 +58,7 @@ pub fn residual_response(
     let rows: Vec<usize> = (first..u.len()).step_by(thin).collect();
     let block = (BLOCK_S / every_s).round() as usize;
     let blocks = rows.len().saturating_sub(NOISE) / block.max(1);
-    if blocks < FEWEST || columns.iter().any(|c| c.len() != u.len()) || e.len() != u.len() {
+    if blocks < MIN_BLOCKS || columns.iter().any(|c| c.len() != u.len()) || e.len() != u.len() {
         return None;
     }
     let n = rows.len();
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn the_level_holds_also_where_the_remnant_is_not_steady() {
+    fn test_level_holds_for_unsteady_remnant() {
         // Share of 100 loops with p < 0.1: 0.1 with a standard error of 0.03; the larger of the two p-values is below
         // 0.1 less often.
         for loud in [
@@ -162,13 +162,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_is_found() {
+    fn unmodelled_response_is_found() {
         let missed = (0..20).filter(|seed| found(*seed, 0.2, |_| 1.0).p_value > 1e-3).count();
         assert!(missed <= 1, "{missed} of 20");
     }
 
     #[test]
-    fn too_little_or_no_number_says_nothing() {
+    fn insufficient_and_invalid_data_give_no_result() {
         let (e, known, mut u) = loop_of(3, 0.0, |_| 1.0);
         let short = |n: usize| residual_response(&[known[..n].to_vec()], &e[..n], &u[..n], 100, TS);
         assert!(short(900).is_none() && short(1400).is_some());

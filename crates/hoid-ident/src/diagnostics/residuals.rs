@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn each_size_has_its_finding() {
+    fn each_residual_measure_has_its_finding() {
         let (eps, e) = (white(3000, 1), white(3000, 2));
         let coloured: Vec<f64> = (1..3000).map(|t| eps[t] + 0.3 * eps[t - 1]).collect();
         let measures = ResidualMeasures::of(&[(&coloured, &e[1..])], 0.01);
@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn residuals_of_zero_and_models_without_input() {
+    fn zero_residuals_and_missing_inputs_are_handled() {
         let measures = ResidualMeasures::of(&[(&[0.0; 9], &[1.0; 9])], 0.01);
         assert!(kinds(&measures).is_empty());
         assert!(kinds(&ResidualMeasures::of(&[], 0.01)).is_empty());

@@ -172,7 +172,7 @@ pub fn of_family(
         None if again.channels.is_empty() => &Without::ALL[..],
         _ => &Without::ALL[..1],
     };
-    let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
+    let measures = |of: &FamilyFit| of.loop_measures_of_best_form(0, element?);
     opinions(asked, records, |others| {
         let other = again.fit_with_response(others, None).ok()?;
         // Only the best form is compared, because the second fit has no other forms.
@@ -308,7 +308,7 @@ mod tests {
     }
 
     /// Returns the record with one faulty sample of e.
-    fn spoilt(record: &Record) -> [Record; 1] {
+    fn with_outlier(record: &Record) -> [Record; 1] {
         let mut e = record.input().to_vec();
         e[4000] = 30.0;
         let u = Channel::new("u", "", record.output().to_vec());
@@ -316,9 +316,9 @@ mod tests {
     }
 
     #[test]
-    fn a_sample_that_carries_a_fit_is_told_by_all_kinds_of_fits() {
+    fn influential_sample_is_reported_for_all_kinds_of_fits() {
         let record = simulated(Condition::C1);
-        let (clean, bad) = ([record.clone()], spoilt(&record));
+        let (clean, bad) = ([record.clone()], with_outlier(&record));
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
         let element = Some(&element);
         let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_that_one_sample_makes_is_told() {
+    fn change_caused_by_one_sample_is_reported() {
         let record = simulated(Condition::C4);
         let estimator = SigmoidChange {
             likelihood_intervals: false,
@@ -341,6 +341,6 @@ mod tests {
         };
         let of = |records: &[Record]| of_sigmoid(&estimator, &estimator.fit(records).unwrap(), records);
         assert_eq!(of(std::slice::from_ref(&record)), None);
-        assert!(of(&spoilt(&record)).is_some());
+        assert!(of(&with_outlier(&record)).is_some());
     }
 }

@@ -3,7 +3,7 @@
 use hoid_model::{Finding, Record, SampleTime, Verdict};
 
 use super::{
-    operator::{gain_findings, is_open, neuromuscular_finding, pole_findings, search_finding},
+    operator::{gain_findings, is_undetermined, neuromuscular_finding, pole_findings, search_finding},
     residuals::ResidualMeasures,
 };
 use crate::{
@@ -118,8 +118,8 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
             let varies = !matches!(p.name, "T_I" | "K" | "omega_nm" | "zeta_nm" | "tau_e");
             // Without a lag, K is the gain itself.
             if varies || (p.name == "K" && of.get("T_I").is_none()) {
-                known |= !is_open(&p.estimate);
-                if is_open(&p.estimate) {
+                known |= !is_undetermined(&p.estimate);
+                if is_undetermined(&p.estimate) {
                     open.push(format!("{}{label} ({})", p.name, p.estimate));
                 }
             }
@@ -129,7 +129,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
         return all;
     };
     let still = ["omega_nm", "zeta_nm", "tau_e"].into_iter().filter_map(|name| {
-        let estimate = first.get(name).filter(is_open)?;
+        let estimate = first.get(name).filter(is_undetermined)?;
         Some(format!("{name} ({estimate})"))
     });
     open.extend(still);
@@ -149,7 +149,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
         ));
     }
     // The error of T_I is at least half of T_I, so 1/T_I does not differ significantly from zero.
-    if first.get("T_I").as_ref().is_some_and(is_open) {
+    if first.get("T_I").as_ref().is_some_and(is_undetermined) {
         all.push(Finding::note(
             "lag",
             "only K/T_I is determined, not T_I or K: 1/T_I is less than two standard errors from zero",
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_with_a_change_is_trustworthy_and_a_delay_at_its_bound_is_not() {
+    fn changing_run_is_trustworthy_and_delay_at_bound_is_doubtful() {
         let record = simulated(Condition::C4);
         let records = std::slice::from_ref(&record);
         let estimator = SigmoidChange {
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_without_a_change_says_so() {
+    fn missing_change_is_reported() {
         let record = simulated(Condition::C1);
         let records = std::slice::from_ref(&record);
         let estimator = SigmoidChange {

@@ -10,9 +10,9 @@ pub(super) const NOISE: usize = 16;
 /// Lowest rate after decimation, Hz.
 const RATE_HZ: f64 = 50.0;
 /// Number of standard deviations above which a residual is an outlier.
-pub(super) const LIMIT: f64 = 3.5;
+pub(super) const OUTLIER_LIMIT: f64 = 3.5;
 /// The unexplained part v is only rounding errors if its power is below this share of the power of u.
-const EXACT: f64 = 1e-18;
+const ROUNDING_SHARE: f64 = 1e-18;
 /// Number of alternations between the estimates of the coefficients and of the noise model.
 const ROUNDS: usize = 3;
 
@@ -59,7 +59,7 @@ impl Whitened {
                 .map(|d| -d)
                 .collect();
         }
-        if v.norm_squared() <= EXACT * y.norm_squared() {
+        if v.norm_squared() <= ROUNDING_SHARE * y.norm_squared() {
             return None;
         }
         let eps = clipped(&whitened_vector(&v, &d), limit);
@@ -125,11 +125,11 @@ fn factored(x: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>, Vec<f64>)> 
     let scaled = DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / scales[j]);
     let (q, r) = scaled.qr().unpack();
     let least = r.diagonal().iter().fold(f64::MAX, |least, d| least.min(d.abs()));
-    (least > DEPENDENT).then_some((q, r, scales))
+    (least > MIN_DIAGONAL).then_some((q, r, scales))
 }
 
 /// Diagonal element of the triangular factor R below which columns are linearly dependent.
-const DEPENDENT: f64 = 1e-10;
+const MIN_DIAGONAL: f64 = 1e-10;
 
 /// Pseudorandom numbers of a fixed stream, uniform with variance 1/12.
 #[cfg(test)]

@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn the_covariance_of_a_side_is_that_of_small_steps() {
+    fn covariance_of_a_side_matches_finite_differences() {
         let operator = |x: &[f64]| FamilyOperator::new(Form::LeadLag, true, x).unwrap();
         // Three directions, including the gain.
         let directions = [
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bias_is_that_of_the_prediction_error_fit() {
+    fn bias_applies_only_to_the_prediction_error_fit() {
         let all = Form::LeadLag.coordinates(true);
         let mut there = HERE;
         there[0] += 1.0;
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_test_at_one_percent_has_one_percent() {
+    fn one_percent_test_rejects_one_percent() {
         // Independent normal differences of three coordinates: a linear congruential generator (D. E. Knuth, MMIX) and
         // sums of twelve deviates (central limit theorem).
         let mut state = 11_u64;

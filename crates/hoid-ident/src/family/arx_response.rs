@@ -12,15 +12,15 @@
 
 use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, Structure, resampling::PASS};
 
-use super::{prediction::NONE, response_fit::MeasuredResponse};
+use super::{prediction::ROUNDING_POWER, response_fit::MeasuredResponse};
 use crate::{Estimator, Fit, IdentError, ResponsePoint};
 
 /// Highest order of A.
 const POLES: usize = 16;
 /// The orders are not reduced further if neither A nor B has more coefficients than this.
-const FEWEST: usize = 4;
+const MIN_COEFFICIENTS: usize = 4;
 /// Maximum number of coefficients of B.
-pub(super) const MOST_GAINS: usize = 60;
+pub(super) const MAX_GAINS: usize = 60;
 /// Innovation variance relative to the power of u below which the record may be free of noise.
 const NEARLY_NOISE_FREE: f64 = 1e-3;
 /// Ratio of the innovation variances of two models that is too large to result only from different degrees of freedom
@@ -51,7 +51,7 @@ pub(super) struct ArxResponse {
 impl ArxResponse {
     /// Estimates the response from all records together. The orders are halved until the records determine the
     /// coefficients; a smooth record determines fewer of them. The sampling frequency is halved while B would still
-    /// have [`MOST_GAINS`] coefficients, and if B became shorter than [`SHORTEST_RESPONSE_S`], down to the lowest
+    /// have [`MAX_GAINS`] coefficients, and if B became shorter than [`SHORTEST_RESPONSE_S`], down to the lowest
     /// frequency that leaves the band of the response.
     ///
     /// # Errors
@@ -61,8 +61,8 @@ impl ArxResponse {
         let mut lead_s = 0.0;
         loop {
             let records = slower.as_deref().unwrap_or(records);
-            let is_too_fast = gains(records) >= 2 * MOST_GAINS;
-            let found = regressed(records, false, MOST_GAINS);
+            let is_too_fast = gains(records) >= 2 * MAX_GAINS;
+            let found = regressed(records, false, MAX_GAINS);
             let covers = |orders: &Orders| orders.nb as f64 * records[0].sample_time().s() >= SHORTEST_RESPONSE_S;
             let is_short = found.as_ref().is_ok_and(|(_, orders)| !covers(orders));
             if (is_too_fast || is_short)
@@ -91,13 +91,13 @@ impl ArxResponse {
     /// the order of the operator, with its delay in whole samples. The high-order model and all models of this kind are
     /// fitted, and the one with the smallest innovation variance is used.
     pub fn without_noise(records: &[Record], longest_delay_s: f64) -> Option<Self> {
-        let (high, of_high) = regressed(records, true, MOST_GAINS).ok()?;
+        let (high, of_high) = regressed(records, true, MAX_GAINS).ok()?;
         if high.innovations > NEARLY_NOISE_FREE {
             return None;
         }
         // If there is noise, models that use only a subset of the regressors of the high-order model are skipped, since
         // their innovation variance cannot be smaller.
-        let is_noise = high.innovations > SAFETY_FACTOR * NONE;
+        let is_noise = high.innovations > SAFETY_FACTOR * ROUNDING_POWER;
         let contained = |orders: &Orders| {
             let last = |orders: &Orders| orders.nk + orders.nb;
             orders.na <= of_high.na && orders.nk >= of_high.nk && last(orders) <= last(&of_high)
@@ -120,7 +120,7 @@ impl ArxResponse {
                 least
             }
         });
-        (least.innovations < NONE).then_some(least)
+        (least.innovations < ROUNDING_POWER).then_some(least)
     }
 
     fn of_fit(records: &[Record], fit: &Fit) -> Self {
@@ -143,15 +143,17 @@ pub(super) fn frequencies(ts: SampleTime) -> Vec<f64> {
 }
 
 /// Returns (na, nb) of the first regression; nb applies to each of the inputs.
-pub(super) fn first_orders(records: &[Record], inputs: usize, most_gains: usize) -> (usize, usize) {
+pub(super) fn first_orders(records: &[Record], inputs: usize, max_gains: usize) -> (usize, usize) {
     let shortest = records.iter().map(Record::len).min().unwrap_or(0);
-    let nb = gains(records).clamp(FEWEST, most_gains).min(shortest / (8 * inputs));
+    let nb = gains(records)
+        .clamp(MIN_COEFFICIENTS, max_gains)
+        .min(shortest / (8 * inputs));
     (POLES.min(shortest / 12).max(2), nb.max(2))
 }
 
-/// Returns both orders halved; `None` if neither order exceeds [`FEWEST`].
+/// Returns both orders halved; `None` if neither order exceeds [`MIN_COEFFICIENTS`].
 pub(super) fn halved((na, nb): (usize, usize)) -> Option<(usize, usize)> {
-    (na.max(nb) > FEWEST).then(|| (na.div_ceil(2).max(2), nb.div_ceil(2).max(2)))
+    (na.max(nb) > MIN_COEFFICIENTS).then(|| (na.div_ceil(2).max(2), nb.div_ceil(2).max(2)))
 }
 
 /// Returns an ARX estimator that also estimates a level: without noise, an error of the removed means would be visible.
@@ -191,9 +193,9 @@ fn gains(records: &[Record]) -> usize {
 
 /// Repeats the regression until the records determine the coefficients, each time with half the order of A or with half
 /// of both orders. Returns the response and the orders.
-fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<(ArxResponse, Orders), IdentError> {
+fn regressed(records: &[Record], of_a_alone: bool, max_gains: usize) -> Result<(ArxResponse, Orders), IdentError> {
     let mut orders = Structure::Arx.operator_orders(1);
-    (orders.na, orders.nb) = first_orders(records, 1, most_gains);
+    (orders.na, orders.nb) = first_orders(records, 1, max_gains);
     loop {
         let estimator = if of_a_alone {
             with_level(orders)
@@ -260,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn the_response_to_a_few_sinusoids_contains_the_delay_at_every_rate() {
+    fn arx_response_includes_the_delay_at_every_sampling_rate() {
         let truth = FamilyOperator::new(Form::Lead, true, &[2.0, 0.5, 2.3, -1.2, 0.35]).unwrap();
         for rate_hz in [20.0, 50.0, 100.0, 200.0] {
             let ts = SampleTime::new(1.0 / rate_hz).unwrap();

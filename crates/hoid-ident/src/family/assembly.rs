@@ -24,7 +24,7 @@ use super::{
     prediction::Prediction,
     prediction_fit::PredictionFit,
     result::{FamilyFit, FreeModel, OperatorInForm, WeighedForm},
-    sensitivity::{LARGEST_SHARE_AT_LINES, MORE_WITHOUT_LINES, UNSEEN_WITHOUT_LINES, rivals},
+    sensitivity::{EXTRA_DEVIATIONS_WITHOUT_LINES, EXTRA_WEIGHT_WITHOUT_LINES, LARGEST_SHARE_AT_LINES, rivals},
 };
 use crate::{
     IdentError, SearchOptions,
@@ -47,7 +47,7 @@ pub(super) struct AtLines<'d> {
     pub in_form: Vec<InForm>,
     pub fit: Option<LineFit>,
     /// Reason why there is no fit, if one was requested.
-    pub why_none: Option<String>,
+    pub missing_reason: Option<String>,
 }
 
 /// The search of a form other than the best one, with its weight in the averages.
@@ -125,7 +125,7 @@ impl<'a> Chosen<'_, 'a> {
         let mut weighed = vec![in_form(found, &errors, self.weight, separate)?];
         for other in &self.others {
             let form = self.weighed(other, separate, workspace)?;
-            if form.operators.first().is_some_and(knows_the_response) {
+            if form.operators.first().is_some_and(response_is_determined) {
                 weighed.push(form);
             }
         }
@@ -151,7 +151,7 @@ impl<'a> Chosen<'_, 'a> {
             noise_free,
             not_constant: constancy(fit, self.run_to_run, workspace),
             lines: self.lines.fit.as_ref(),
-            no_lines: self.lines.why_none.as_deref(),
+            no_lines: self.lines.missing_reason.as_deref(),
             agreement: agreement.as_ref(),
             instrumental: instrumental.as_ref(),
             no_instrumental: no_instrumental.as_deref(),
@@ -166,7 +166,7 @@ impl<'a> Chosen<'_, 'a> {
                 .and_then(|errors| errors.into_iter().min_by(f64::total_cmp)),
             weighed: &weighed,
         }));
-        let noise = &found.eta()[layout.noise_begins()..];
+        let noise = &found.eta()[layout.noise_offset()..];
         Ok(FamilyFit {
             form: layout.form,
             neuromuscular: layout.neuromuscular,
@@ -180,7 +180,7 @@ impl<'a> Chosen<'_, 'a> {
             run_to_run: errors.run_to_run,
             coherent_share: self.lines.describing.and_then(coherent_share),
             lines: self.lines.fit,
-            no_lines: self.lines.why_none,
+            no_lines: self.lines.missing_reason,
             instrumental,
             no_instrumental,
             agreement,
@@ -306,24 +306,24 @@ fn add_bias(
     };
     match lines {
         Some(lines) if separate == 1 => {
-            let owes: Vec<bool> = (lines.prior_shares.iter())
+            let is_from_prior: Vec<bool> = (lines.prior_shares.iter())
                 .map(|share| *share > LARGEST_SHARE_AT_LINES)
                 .collect();
             covariances.add_bias(fit, &lines.elements());
-            if owes.contains(&true) {
+            if is_from_prior.contains(&true) {
                 for other in others {
-                    covariances.add_extra_variance(fit, other, 1.0, |place| owes.get(place) == Some(&true));
+                    covariances.add_extra_variance(fit, other, 1.0, |place| is_from_prior.get(place) == Some(&true));
                 }
             }
         }
         _ => {
             for other in others {
                 covariances.add_bias(fit, other);
-                covariances.add_extra_variance(fit, other, MORE_WITHOUT_LINES, |_| true);
+                covariances.add_extra_variance(fit, other, EXTRA_WEIGHT_WITHOUT_LINES, |_| true);
             }
             let elements = fit.layout().elements.iter().enumerate().filter(|_| unseen);
             for (place, (coordinate, _)) in elements {
-                let unseen = UNSEEN_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
+                let unseen = EXTRA_DEVIATIONS_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
                 covariances.extra_variance[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
             }
         }
@@ -484,7 +484,7 @@ fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
 
 /// True if the frequency response in a form other than the best one has small errors. If the parameters of a form
 /// compensate each other, its response may be undetermined, and its errors are then meaningless.
-fn knows_the_response(of: &OperatorInForm) -> bool {
+fn response_is_determined(of: &OperatorInForm) -> bool {
     let errors = response_errors(&of.operator, of.covariance.as_deref());
     errors.is_some_and(|all| all.iter().sum::<f64>() < LARGEST_RESPONSE_ERROR * all.len() as f64)
 }

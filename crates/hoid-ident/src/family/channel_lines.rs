@@ -28,7 +28,7 @@ use super::{
     coordinates::{self, Grid},
     intersample::Intersample,
     layout::{ChannelInLayout, FamilyLayout},
-    lines::{FEWEST_RUNS, moderated},
+    lines::{MIN_RUNS, moderated},
     prior::OperatorPrior,
 };
 use crate::{
@@ -56,7 +56,7 @@ struct Coefficients {
 
 impl Coefficients {
     /// Returns the part of u that the responses do not explain.
-    fn left(&self, responses: &[Complex64]) -> Complex64 {
+    fn residual(&self, responses: &[Complex64]) -> Complex64 {
         self.inputs
             .iter()
             .zip(responses)
@@ -160,7 +160,7 @@ impl ChannelLines {
             samples: n,
             periods,
         };
-        let windows = if records < FEWEST_RUNS {
+        let windows = if records < MIN_RUNS {
             whole.single_periods()
         } else {
             vec![whole]
@@ -225,12 +225,12 @@ impl ChannelLines {
         let of = |line: &Line| {
             let h = responses(line.omega_rad_s);
             let n = line.runs.len() as f64;
-            let left: Vec<Complex64> = line.runs.iter().map(|run| run.left(&h)).collect();
+            let left: Vec<Complex64> = line.runs.iter().map(|run| run.residual(&h)).collect();
             let mean = left.iter().sum::<Complex64>() / n;
             let squares: f64 = left.iter().map(|x| (x - mean).norm_sqr()).sum();
             let of_runs = (n > 1.0).then(|| squares / (n * (n - 1.0)));
             let power = |bins: &Vec<Coefficients>| {
-                bins.iter().map(|bin| bin.left(&h).norm_sqr()).sum::<f64>() / bins.len().max(1) as f64
+                bins.iter().map(|bin| bin.residual(&h).norm_sqr()).sum::<f64>() / bins.len().max(1) as f64
             };
             let neighbours = line.neighbours.iter().map(power).sum::<f64>() / (n * n);
             (of_runs, neighbours)
@@ -241,7 +241,7 @@ impl ChannelLines {
             .filter(|r| r.is_finite())
             .collect();
         let excess = match upper_median(&mut ratios) {
-            Some(median) if self.runs >= FEWEST_RUNS => median.max(1.0),
+            Some(median) if self.runs >= MIN_RUNS => median.max(1.0),
             _ => 1.0,
         };
         for (line, (of_runs, neighbours)) in self.lines.iter_mut().zip(all) {
@@ -440,7 +440,7 @@ impl ChannelCriterion {
     }
 
     /// Returns the criterion without a prior, with the variances multiplied by `excess`.
-    pub fn of_lines_alone(mut self, excess: f64) -> Self {
+    pub fn without_prior(mut self, excess: f64) -> Self {
         self.penalty.clear();
         self.excess = excess;
         self
@@ -533,7 +533,7 @@ impl ChannelCriterion {
             }
             Some(covariance)
         };
-        let alone = self.clone().of_lines_alone(1.0);
+        let alone = self.clone().without_prior(1.0);
         let chi_squared = alone.linearise(&x, &mut Workspace::default()).sum_of_squares;
         chi_squared.is_finite().then(|| ChannelMinimum {
             chi_squared,

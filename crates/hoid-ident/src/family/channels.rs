@@ -24,7 +24,7 @@ use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{Complex64, Detrend, Form, Record, SampleTime, Structure, operator_family::Coordinate};
 
 use super::{
-    arx_response::{MOST_GAINS, first_orders, frequencies, halved, measured},
+    arx_response::{MAX_GAINS, first_orders, frequencies, halved, measured},
     channel::{Channel, ChannelFit, ChannelResponse, SeenChannel, lead},
     channel_lines::{AtChannelLines, ChannelLines, InForm, own_places},
     coordinates,
@@ -50,7 +50,7 @@ use crate::{
 };
 
 /// Fraction of the power of an input that the previous inputs must leave unexplained.
-const LEAST_OWN_PART: f64 = 1e-9;
+const MIN_OWN_PART: f64 = 1e-9;
 /// Relative increase of the diagonal of the normal matrix in the regression for the ARX model.
 const RIDGE: f64 = 1e-7;
 /// Longest delay of a channel relative to the end of the preview, s.
@@ -186,7 +186,7 @@ impl<'s> FurtherInputs<'s> {
                     }
                 }
             }
-            if dot(&left, &left) <= LEAST_OWN_PART * power {
+            if dot(&left, &left) <= MIN_OWN_PART * power {
                 return refuse(
                     format!("{} is a linear combination of {}", channel.name, names.join(" and ")),
                     format!(
@@ -270,7 +270,7 @@ impl<'s> FurtherInputs<'s> {
     /// # Errors
     /// [`IdentError::SingularRegressors`] if the records do not distinguish the inputs.
     pub fn responses(&self, records: &[Record]) -> Result<Vec<Vec<MeasuredResponse>>, IdentError> {
-        let mut orders = first_orders(records, self.all.len() + 1, MOST_GAINS);
+        let mut orders = first_orders(records, self.all.len() + 1, MAX_GAINS);
         loop {
             if let Some(found) = self.regressed(records, orders) {
                 return Ok(found);
@@ -291,7 +291,7 @@ impl<'s> FurtherInputs<'s> {
         };
         // Relative to the end of the preview, the delay is longer by the preview.
         let own = |lead: &usize| InputOrders {
-            nb: (nb + lead).min(2 * MOST_GAINS),
+            nb: (nb + lead).min(2 * MAX_GAINS),
             nf: 0,
             nk: 0,
         };

@@ -35,9 +35,9 @@ pub struct FormFigures {
 pub const NO_EVIDENCE: f64 = 2.0;
 /// Weight below which a form is omitted from averages, because its contribution would be smaller than the error of the
 /// mean.
-pub const LEAST_WEIGHT: f64 = 0.02;
+pub const MIN_WEIGHT: f64 = 0.02;
 /// Maximum number of forms that are averaged.
-const MOST_FORMS: usize = 4;
+const MAX_FORMS: usize = 4;
 
 /// Returns the index of the best form, given the criteria of all forms with the simplest form first. A criterion of
 /// `None` excludes a form. `None` if all forms are excluded.
@@ -48,8 +48,8 @@ pub(super) fn best_form(criteria: &[Option<f64>]) -> Option<usize> {
         .position(|c| c.is_some_and(|c| c - least <= NO_EVIDENCE))
 }
 
-/// Returns the weight of each form; a criterion of `None` excludes a form, and `front` is the best form.
-pub(super) fn weights(criteria: &[Option<f64>], front: usize) -> Vec<f64> {
+/// Returns the weight of each form; a criterion of `None` excludes a form, and `best` is the best form.
+pub(super) fn weights(criteria: &[Option<f64>], best: usize) -> Vec<f64> {
     let least = criteria.iter().flatten().copied().fold(f64::INFINITY, f64::min);
     // Akaike weights, exp(-Delta/2) (Burnham and Anderson 2002, section 2.9).
     let mut weights: Vec<f64> = (criteria.iter())
@@ -59,7 +59,7 @@ pub(super) fn weights(criteria: &[Option<f64>], front: usize) -> Vec<f64> {
     order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]));
     let total: f64 = weights.iter().sum();
     for (rank, &i) in order.iter().enumerate() {
-        if i != front && (rank >= MOST_FORMS || weights[i] < LEAST_WEIGHT * total) {
+        if i != best && (rank >= MAX_FORMS || weights[i] < MIN_WEIGHT * total) {
             weights[i] = 0.0;
         }
     }
@@ -72,14 +72,14 @@ mod tests {
     use super::*;
 
     fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
-        let front = best_form(criteria)?;
-        Some((front, weights(criteria, front)))
+        let best = best_form(criteria)?;
+        Some((best, weights(criteria, best)))
     }
 
     #[test]
-    fn weights_are_akaikes_and_the_simplest_near_form_is_in_front() {
-        let (front, weights) = weigh(&[Some(13.0), Some(2.5), Some(1.0), None]).unwrap();
-        assert_eq!(front, 1);
+    fn akaike_weights_and_preference_for_the_simplest_form() {
+        let (best, weights) = weigh(&[Some(13.0), Some(2.5), Some(1.0), None]).unwrap();
+        assert_eq!(best, 1);
         let of_second = 1.0 / (1.0 + (-0.75_f64).exp());
         let expected = [0.0, 1.0 - of_second, of_second, 0.0];
         assert!(
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_forms_than_are_worth_their_time() {
+    fn number_of_weighed_forms_is_limited() {
         let (_, weights) = weigh(&[Some(1.0); 8]).unwrap();
         assert_eq!(weights.iter().filter(|w| **w > 0.0).count(), 4);
         assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-12);

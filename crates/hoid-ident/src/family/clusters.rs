@@ -19,21 +19,21 @@ use crate::{
 };
 
 /// Minimum number of records for which each record is a cluster.
-const FEWEST_RECORDS: usize = 5;
+const MIN_RECORDS: usize = 5;
 /// Approximate total number of blocks into which fewer records are divided.
 const BLOCKS: usize = 8;
 /// Duration of the shortest block, s.
 const SHORTEST_BLOCK_S: f64 = 4.0;
 
 /// Returns the degrees of freedom of standard errors that are based on the scatter of n clusters.
-pub(super) fn freedom(clusters: usize) -> f64 {
+pub(super) fn degrees_of_freedom(clusters: usize) -> f64 {
     clusters.saturating_sub(1).max(1) as f64
 }
 
 /// Returns the 97.5 % quantile of Student's distribution for n clusters, which is half the width of a 95 % interval in
 /// standard errors.
 pub(super) fn quantile(clusters: usize) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom(clusters)).map_or(1.96, |t| t.inverse_cdf(0.975))
+    StudentsT::new(0.0, 1.0, degrees_of_freedom(clusters)).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 
 /// Type of the clusters.
@@ -60,7 +60,7 @@ impl Clusters {
         workspace: &mut Workspace,
     ) -> Result<Self, IdentError> {
         let (p, records) = (eta.len(), criterion.data.len());
-        let kind = if records >= FEWEST_RECORDS {
+        let kind = if records >= MIN_RECORDS {
             ClusterKind::Runs
         } else {
             ClusterKind::Blocks

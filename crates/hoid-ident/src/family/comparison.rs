@@ -13,7 +13,7 @@ use hoid_numerics::statistics::upper_median;
 use super::{
     choice::{FormFigures, best_form, weights},
     covariances::{self, Covariances},
-    diagnostics::MOST_DAMPED,
+    diagnostics::MAX_DAMPING_RATIO,
     line_fit::LineFit,
     prediction::Prediction,
     prediction_fit::PredictionFit,
@@ -26,7 +26,7 @@ const EQUAL_CRITERIA: f64 = 0.05;
 /// Ratio of sums of squares up to which forms without noise count as equally good.
 const EQUAL_FIT_RATIO: f64 = 1.1;
 /// Number of standard errors by which a gain must differ from zero to count as determined.
-const LEAST_ERRORS: f64 = 2.0;
+const MIN_STANDARD_ERRORS: f64 = 2.0;
 
 /// A form with its fits.
 pub(super) struct Tried<'a> {
@@ -38,7 +38,7 @@ pub(super) struct Tried<'a> {
 /// Criteria of all forms, and the best form.
 pub(super) struct Comparison {
     /// Index of the best form; `None` if no form could be fitted.
-    pub front: Option<usize>,
+    pub best: Option<usize>,
     /// Criteria of each form, in the order in which the forms were given.
     pub figures: Vec<FormFigures>,
 }
@@ -69,17 +69,17 @@ impl Comparison {
             counting
         };
         let mut criteria = self::criteria(tried, prediction, 1.0);
-        let front = best_form(&counted(&criteria));
-        if let Some(front) = front.filter(|_| compares_biased(tried, prediction)) {
-            let bias = bias_of_evidence(&tried[front], prediction, highest_order, workspace);
+        let best = best_form(&counted(&criteria));
+        if let Some(best) = best.filter(|_| compares_biased(tried, prediction)) {
+            let bias = bias_of_evidence(&tried[best], prediction, highest_order, workspace);
             criteria = self::criteria(tried, prediction, bias);
         }
-        let weights = front.map_or(Vec::new(), |front| weights(&counted(&criteria), front));
+        let weights = best.map_or(Vec::new(), |best| weights(&counted(&criteria), best));
         let figures = tried.iter().zip(criteria).enumerate();
         let figures =
             figures.map(|(i, (t, criterion))| figures_of(t, criterion, weights.get(i).copied().unwrap_or(0.0)));
         Self {
-            front,
+            best,
             figures: figures.collect(),
         }
     }
@@ -142,7 +142,7 @@ fn is_undetermined(fit: &PredictionFit<'_>) -> bool {
             .iter()
             .enumerate()
             .filter(|(_, (c, _))| *c == Coordinate::Gain);
-        gains.all(|(at, _)| LEAST_ERRORS * covariances.clustered[at * p + at].sqrt() < fit.eta()[at].abs())
+        gains.all(|(at, _)| MIN_STANDARD_ERRORS * covariances.clustered[at * p + at].sqrt() < fit.eta()[at].abs())
     };
     fit.ridge > 0.0 || !covariances::covariances(fit).is_some_and(known)
 }
@@ -150,7 +150,11 @@ fn is_undetermined(fit: &PredictionFit<'_>) -> bool {
 /// True if the neuromuscular poles have become two separate lags, in the prediction error fit or in the fit at the
 /// lines.
 fn neuromuscular_poles_are_lags(tried: &Tried<'_>) -> bool {
-    let lags = |operator: &FamilyOperator| operator.neuromuscular().is_some_and(|(_, zeta)| zeta > MOST_DAMPED);
+    let lags = |operator: &FamilyOperator| {
+        operator
+            .neuromuscular()
+            .is_some_and(|(_, zeta)| zeta > MAX_DAMPING_RATIO)
+    };
     let of_fit = tried
         .fit
         .as_ref()
@@ -179,12 +183,12 @@ fn compares_biased(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> bool {
 /// forms is a squared distance in units of the errors; if the bias enlarges the errors, this ratio decreases
 /// accordingly.
 fn bias_of_evidence(
-    front: &Tried<'_>,
+    best: &Tried<'_>,
     prediction: &Prediction<'_>,
     highest_order: usize,
     workspace: &mut Workspace,
 ) -> f64 {
-    let ratio = front.fit.as_ref().ok().and_then(|fit| {
+    let ratio = best.fit.as_ref().ok().and_then(|fit| {
         let mut covariances = covariances::covariances(fit)?;
         let operator = fit.layout().operator(fit.eta(), 0).ok()?;
         let errors = |covariances: &Covariances| {

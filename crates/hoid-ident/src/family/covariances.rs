@@ -62,15 +62,15 @@ impl Covariances {
     ///
     /// The errors are linearised, but the other estimate may be far along a ridge of the criterion, for example if gain
     /// and lag increase together. The linearised change `J d`, where J is the gradient of the response, is then not the
-    /// difference of the responses. In this case d is replaced by the [least squares difference](responding) that
-    /// explains the difference of the responses.
+    /// difference of the responses. In this case d is replaced by the [least squares
+    /// difference](differences_from_response) that explains the difference of the responses.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
         let elements = fit.layout().operator_elements();
         let (found, of_channels): (Vec<_>, Vec<_>) =
             (differences(fit, other).into_iter()).partition(|(place, _)| *place < elements);
-        let found = responding(fit, other, &found).unwrap_or(found);
+        let found = differences_from_response(fit, other, &found).unwrap_or(found);
         for (place, d) in found.into_iter().chain(of_channels) {
             difference[place] = d;
         }
@@ -129,7 +129,7 @@ pub(super) fn response_errors(
 /// Returns the index and the difference from another estimate for each element of the operator and of its channels that
 /// is not at a bound and that the other estimate contains.
 fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
-    let elements = fit.layout().noise_begins();
+    let elements = fit.layout().noise_offset();
     let free = fit.free().into_iter().filter(|place| *place < elements);
     free.filter_map(|place| Some((place, fit.eta()[place] - other.get(place)?)))
         .collect()
@@ -143,7 +143,11 @@ const RIDGE: f64 = 1e-9;
 /// Returns the least squares solution of `J d = H - H_other`, relative to |H|, over the band of manual control and an
 /// octave on each side. `None` if the given differences already explain the difference of the responses, or if some
 /// elements belong to single records.
-fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64)]) -> Option<Vec<(usize, f64)>> {
+fn differences_from_response(
+    fit: &PredictionFit<'_>,
+    other: &[f64],
+    differences: &[(usize, f64)],
+) -> Option<Vec<(usize, f64)>> {
     let layout = fit.layout();
     let places = &layout.positions(0)[..layout.coordinates()];
     if layout.operator_elements() != places.len() {
@@ -153,7 +157,7 @@ fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64
     let at = |place: &usize| places.iter().position(|p| p == place);
     let coordinates: Vec<usize> = differences.iter().filter_map(|(place, _)| at(place)).collect();
     let d: Vec<f64> = differences.iter().map(|(_, d)| *d).collect();
-    let found = explaining(&here, &there, &coordinates, &d)?;
+    let found = solve_differences(&here, &there, &coordinates, &d)?;
     Some(
         differences
             .iter()
@@ -163,8 +167,13 @@ fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64
     )
 }
 
-/// Like [`responding`], for two operators and the differences `d` of these coordinates.
-fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usize], d: &[f64]) -> Option<Vec<f64>> {
+/// Like [`differences_from_response`], for two operators and the differences `d` of these coordinates.
+fn solve_differences(
+    here: &FamilyOperator,
+    there: &FamilyOperator,
+    coordinates: &[usize],
+    d: &[f64],
+) -> Option<Vec<f64>> {
     let q = coordinates.len();
     let (mut total, mut linear) = (Linearisation::empty(q), 0.0);
     let (low, high) = (0.5 * BAND_RAD_S[0], 2.0 * BAND_RAD_S[4]);
@@ -310,7 +319,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_bias_along_a_ridge_is_that_of_the_responses() {
+    fn bias_along_a_ridge_matches_the_response_difference() {
         // Two leads and a lag, for which only K T_L^2/T_I is well known in the band: a pilot who controls an
         // integrator.
         let coordinates = Form::Lead2Lag.coordinates(true);
@@ -335,7 +344,7 @@ mod tests {
                 .collect()
         };
         let there = of(0.0094, 2.72, 0.001);
-        let found = explaining(&here, &there, &all, &d(&there)).unwrap();
+        let found = solve_differences(&here, &there, &all, &d(&there)).unwrap();
         // Sums of squares over the band, relative to the response: explained, linear and actual.
         let (mut explained, mut linear, mut actual) = (0.0, 0.0, 0.0);
         for k in 0..200 {
@@ -354,6 +363,6 @@ mod tests {
         assert!(linear > 25.0 * actual, "{linear} {actual}");
         // A small difference is not changed.
         let near = of(0.045, 1.27, 0.8);
-        assert_eq!(explaining(&here, &near, &all, &d(&near)), None);
+        assert_eq!(solve_differences(&here, &near, &all, &d(&near)), None);
     }
 }

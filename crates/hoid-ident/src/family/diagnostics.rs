@@ -10,7 +10,7 @@ use super::{
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
     line_fit::LineFit,
-    parameter::{Parameter, least_weight},
+    parameter::{Parameter, min_weight},
     prior::OperatorPrior,
     result::{FreeModel, WeighedForm},
 };
@@ -26,7 +26,7 @@ const LARGEST_EXCESS_LOSS: f64 = 0.01;
 /// unknown.
 pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
 /// Damping ratio above which the two neuromuscular poles count as separate lags: no muscle is so strongly damped.
-pub(super) const MOST_DAMPED: f64 = 1.5;
+pub(super) const MAX_DAMPING_RATIO: f64 = 1.5;
 /// Smallest weight of the best form with which the form counts as determined.
 const SETTLED_WEIGHT: f64 = 0.95;
 /// Ratio of standard errors from clusters to model-based standard errors above which a note is added.
@@ -96,7 +96,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
         ));
     }
     determined(judged, &mut all);
-    all.extend(unsettled(judged.weighed));
+    all.extend(undetermined_form(judged.weighed));
     if let Some(share) = judged.noise_free {
         // The residuals are rounding errors of the data; residual tests and other methods do not apply to them.
         all.push(Finding::note(
@@ -129,8 +129,8 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
 }
 
 /// Returns a finding about forms that the data do not distinguish; `None` if the form is determined.
-fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
-    let front = weighed.first().filter(|front| front.weight < SETTLED_WEIGHT)?;
+fn undetermined_form(weighed: &[WeighedForm]) -> Option<Finding> {
+    let best = weighed.first().filter(|best| best.weight < SETTLED_WEIGHT)?;
     let mut all: Vec<&WeighedForm> = weighed.iter().filter(|w| w.weight >= 1.0 - SETTLED_WEIGHT).collect();
     all.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     let named: Vec<String> = all.iter().map(|w| format!("{} {:.2}", w.form, w.weight)).collect();
@@ -140,7 +140,7 @@ fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
             "the form is not determined: the weights are {}; parameters are named as in {}, and all errors include \
              the differences between the forms",
             named.join(", "),
-            front.form
+            best.form
         ),
     ))
 }
@@ -152,7 +152,7 @@ fn at_bound(parameter: &Parameter) -> bool {
 
 /// Formats how the prior changes a parameter, from the value without the prior to the value with it. `None` unless the
 /// data determine the parameter and the prior shifts it noticeably.
-fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
+fn describe_pull(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
     let pull = prior.pull(parameter)?;
     let errors = pull.abs() * parameter.value / parameter.standard_error?;
     (parameter.determined && errors > NOTED_PULL).then(|| {
@@ -171,27 +171,27 @@ fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
 }
 
 /// Parameters that would be determined if the forms that have them were more likely than the others.
-struct OfSomeForms<'a> {
+struct FormParameters<'a> {
     names: Vec<&'a str>,
     forms: Vec<Form>,
     /// Total weight of these forms.
     weight: f64,
 }
 
-impl<'a> OfSomeForms<'a> {
+impl<'a> FormParameters<'a> {
     /// Returns these parameters, grouped by the forms that have them.
     fn all(parameters: &'a [Parameter], weighed: &[WeighedForm]) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
-        let is_open = |p: &&Parameter| !p.determined && p.interval.is_some_and(|(low, high)| low * high > 0.0);
-        for parameter in parameters.iter().filter(is_open).filter(|p| !at_bound(p)) {
+        let is_undetermined = |p: &&Parameter| !p.determined && p.interval.is_some_and(|(low, high)| low * high > 0.0);
+        for parameter in parameters.iter().filter(is_undetermined).filter(|p| !at_bound(p)) {
             let forms = match parameter.averaged_over.as_slice() {
-                [] => weighed.first().map(|front| front.form).into_iter().collect(),
+                [] => weighed.first().map(|best| best.form).into_iter().collect(),
                 several => several.to_vec(),
             };
             let weight = (weighed.iter().filter(|of| forms.contains(&of.form)))
                 .map(|of| of.weight)
                 .sum();
-            if forms.is_empty() || weight > least_weight(&parameter.name) {
+            if forms.is_empty() || weight > min_weight(&parameter.name) {
                 continue;
             }
             match all.iter_mut().find(|of| of.forms == forms) {
@@ -223,13 +223,13 @@ impl<'a> OfSomeForms<'a> {
 }
 
 fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
-    let of_some_forms = OfSomeForms::all(judged.parameters, judged.weighed);
+    let form_parameters = FormParameters::all(judged.parameters, judged.weighed);
     let is_explained = |parameter: &Parameter| {
-        of_some_forms
+        form_parameters
             .iter()
             .any(|of| of.names.contains(&parameter.name.as_str()))
     };
-    all.extend(of_some_forms.iter().map(OfSomeForms::finding));
+    all.extend(form_parameters.iter().map(FormParameters::finding));
     let find = |name: &str| {
         judged
             .parameters
@@ -276,7 +276,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         };
         all.push(Finding::note("lag", words));
     }
-    if let Some(zeta) = find("zeta_nm").filter(|z| z.value > MOST_DAMPED) {
+    if let Some(zeta) = find("zeta_nm").filter(|z| z.value > MAX_DAMPING_RATIO) {
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
@@ -306,7 +306,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         ));
     }
     let pulled: Vec<String> = (judged.parameters.iter())
-        .filter_map(|parameter| pulled(parameter, judged.prior))
+        .filter_map(|parameter| describe_pull(parameter, judged.prior))
         .collect();
     if !pulled.is_empty() {
         all.push(Finding::note(
@@ -387,7 +387,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parameters_of_forms_that_are_not_settled_are_named_with_their_own_forms() {
+    fn findings_name_the_forms_that_have_a_parameter() {
         let weighed =
             [(Form::Lead, 0.45), (Form::LeadLag, 0.04), (Form::Lag, 0.51)].map(|(form, weight)| WeighedForm {
                 form,
@@ -412,7 +412,7 @@ mod tests {
             // This parameter is undetermined for another reason; the forms that have it are more likely than not.
             parameter("tau_e", &[Form::Lead, Form::Lag]),
         ];
-        let messages: Vec<String> = OfSomeForms::all(&all, &weighed)
+        let messages: Vec<String> = FormParameters::all(&all, &weighed)
             .iter()
             .map(|of| of.finding().message)
             .collect();

@@ -5,7 +5,7 @@ use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, ope
 use super::{
     clusters::{ClusterKind, quantile},
     covariances::{self, Covariances},
-    parameter::{CoordinateEstimate, DC_GAIN, Parameter, least_weight},
+    parameter::{CoordinateEstimate, DC_GAIN, Parameter, min_weight},
     prediction_fit::PredictionFit,
     profile::profile_interval,
     result::{OperatorInForm, OperatorOfRecord, WeighedForm, title},
@@ -235,7 +235,7 @@ fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: u
     });
     let found = Parameter::averaged(&each.collect::<Vec<_>>(), clusters)?;
     Some(Parameter {
-        determined: found.determined && other <= 1.0 - least_weight(DC_GAIN),
+        determined: found.determined && other <= 1.0 - min_weight(DC_GAIN),
         ..found
     })
 }

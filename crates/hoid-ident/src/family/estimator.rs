@@ -32,7 +32,7 @@ use crate::{
 };
 
 /// Maximum number of pairs (nc, nd) that are compared if nc is searched.
-const MOST_NOISE_PAIRS: usize = 60;
+const MAX_NOISE_PAIRS: usize = 60;
 
 /// Reason why the lines are not used if there is little noise.
 const TOO_LITTLE_NOISE: &str = "the noise is weaker than the leakage";
@@ -96,7 +96,7 @@ impl FamilyEstimator {
             channel_lines,
             in_form,
             no_lines: why,
-        } = self.begin(&records, &seen, describing.as_ref(), &mut workspace)?;
+        } = self.prepare(&records, &seen, describing.as_ref(), &mut workspace)?;
         let no_lines = no_lines.or(why);
         let at_lines = (channel_lines.as_ref()).map(|lines| self.at_lines(lines, &prediction));
         let count = starts.len();
@@ -111,16 +111,16 @@ impl FamilyEstimator {
             });
         }
         progress::step("forms", count, count);
-        let Comparison { front, figures } = Comparison::of(&tried, &prediction, *self.nd.end(), &mut workspace);
-        let Some(front) = front else {
+        let Comparison { best, figures } = Comparison::of(&tried, &prediction, *self.nd.end(), &mut workspace);
+        let Some(best) = best else {
             return Err(tried
                 .into_iter()
                 .find_map(|t| t.fit.err())
                 .unwrap_or(IdentError::NoFiniteLoss));
         };
-        let weight = figures[front].weight;
-        let Tried { lines, fit, .. } = tried.remove(front);
-        let weights = figures.iter().enumerate().filter(|(i, _)| *i != front);
+        let weight = figures[best].weight;
+        let Tried { lines, fit, .. } = tried.remove(best);
+        let weights = figures.iter().enumerate().filter(|(i, _)| *i != best);
         let others = tried.into_iter().zip(weights).filter(|(_, (_, f))| f.weight > 0.0);
         let others = others.map(|(tried, (_, figures))| {
             Ok(OtherForm {
@@ -137,7 +137,7 @@ impl FamilyEstimator {
                 channels: at_lines,
                 in_form,
                 fit: lines,
-                why_none: no_lines,
+                missing_reason: no_lines,
             },
             others: others.collect::<Result<_, IdentError>>()?,
             forms: figures,
@@ -167,7 +167,7 @@ impl FamilyEstimator {
         };
         let (records, seen) = with_channel.prepared(records)?;
         let mut workspace = Workspace::of_thread();
-        let mut begun = with_channel.begin(&records, &seen, None, &mut workspace)?;
+        let mut begun = with_channel.prepare(&records, &seen, None, &mut workspace)?;
         let apart = have_separate_lines(begun.channel_lines.as_deref(), &asked);
         let found = begun.channels.pop().ok_or(IdentError::NoFiniteLoss)?;
         Ok((found, apart))
@@ -196,7 +196,7 @@ impl FamilyEstimator {
 
     /// Prepares the searches of all forms: determines the starts, the orders of the noise model, and the further inputs
     /// with a response.
-    fn begin<'a>(
+    fn prepare<'a>(
         &self,
         records: &'a [Record],
         seen: &'a FurtherInputs<'_>,
@@ -270,7 +270,7 @@ impl FamilyEstimator {
         };
         let noise = noise.map_or_else(|| self.noise_orders(&prediction, &starts, workspace), Ok)?;
         if !seen.is_empty() && channel_lines.is_none() {
-            let least = self.least_left(&prediction, &starts, noise.1, workspace)?;
+            let least = self.smallest_residual(&prediction, &starts, noise.1, workspace)?;
             let form = (starts[least].form, self.neuromuscular);
             let from = starts[least].coordinates.as_slice();
             channels = seen.choose(&mut prediction, begun, (form, from), noise, workspace)?;
@@ -344,7 +344,7 @@ impl FamilyEstimator {
             sample_time,
             intersample,
             course_is_known: intersample != Intersample::Auto,
-            other_course: Vec::new(),
+            other_intersample: Vec::new(),
             little_noise: None,
             initial: self.initial_state,
             first,
@@ -392,7 +392,7 @@ impl FamilyEstimator {
         if self.intersample == Intersample::Auto {
             let held = with_level(Intersample::Zoh)?;
             if let Some(mut other) = search(&held, &from) {
-                let (course, is_known) = LittleNoise::course(&found, &other);
+                let (course, is_known) = LittleNoise::intersample_of(&found, &other);
                 match course {
                     Intersample::Auto => {}
                     Intersample::Zoh => {
@@ -407,7 +407,7 @@ impl FamilyEstimator {
                 }
                 prediction.course_is_known = is_known;
                 if !is_known {
-                    prediction.other_course = other.coordinates(&forms);
+                    prediction.other_intersample = other.coordinates(&forms);
                 }
             }
         }
@@ -450,7 +450,7 @@ impl FamilyEstimator {
             }
         }
         let pairs = self.nc.clone().count() * self.nd.clone().count();
-        if *self.nc.end() > 0 && pairs > MOST_NOISE_PAIRS {
+        if *self.nc.end() > 0 && pairs > MAX_NOISE_PAIRS {
             return refuse(
                 "the noise orders",
                 format!("{pairs} pairs of nc and nd"),

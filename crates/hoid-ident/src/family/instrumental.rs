@@ -49,7 +49,7 @@ use crate::{
 };
 
 /// Maximum number of steps for given instruments.
-const STEPS: usize = 25;
+const MAX_STEPS: usize = 25;
 /// Length of a step, in standard errors, below which the iteration ends.
 const CONVERGED: f64 = 0.01;
 /// Maximum number of halvings of a step.
@@ -284,7 +284,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             let covariance = self.covariance(&x, &a, &held.products, variance);
             let (free, step) = self.step(&x, &a, &g).ok_or(IdentError::NoFiniteLoss)?;
             let moved = length(&step, &metric, variance);
-            if moved <= CONVERGED || steps == STEPS {
+            if moved <= CONVERGED || steps == MAX_STEPS {
                 let found = moved <= CONVERGED;
                 return Ok(Zero {
                     x,
@@ -438,7 +438,7 @@ mod tests {
     const MEDIAN_OF_CHI2: f64 = 0.455;
 
     #[test]
-    fn the_truth_lies_within_its_errors() {
+    fn true_parameters_lie_within_their_errors() {
         // Medians are used because the first of these people has weak instruments (see above). The median of twelve
         // values of chi^2 has a standard error of 0.32: 1/(2 f sqrt(12)), with the density f = 0.45 at the median.
         let mut squares = [Vec::new(), Vec::new()];
@@ -461,7 +461,7 @@ mod tests {
     }
 
     #[test]
-    fn with_psi_for_instruments_its_zero_is_the_minimum_of_the_prediction_error() {
+    fn psi_as_instruments_gives_the_prediction_error_minimum() {
         // Z' eps + P (m - x) is then the descent of the loss, for the D of that fit.
         let (_, records) = person(3);
         let estimator = estimator();
@@ -480,7 +480,7 @@ mod tests {
             sample_time: SampleTime::SIXTIETH,
             intersample: Intersample::Auto,
             course_is_known: false,
-            other_course: Vec::new(),
+            other_intersample: Vec::new(),
             little_noise: None,
             initial: estimator.initial_state,
             first: first.unwrap(),
@@ -503,7 +503,7 @@ mod tests {
             order: NOISE_ORDER,
         };
         let minimum = fit.layout().coordinates_of(fit.eta(), 0);
-        let d = fit.eta()[fit.layout().noise_begins()..].to_vec();
+        let d = fit.eta()[fit.layout().noise_offset()..].to_vec();
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
         let of_held = method.instruments_of(&minimum, &mut workspace).unwrap();
@@ -534,7 +534,7 @@ mod tests {
     }
 
     #[test]
-    fn a_channel_that_cannot_be_an_instrument_is_told() {
+    fn unusable_instrument_channel_is_reported() {
         let (_, records) = person(4);
         let without = FamilyEstimator {
             excitation: Some("x".to_owned()),

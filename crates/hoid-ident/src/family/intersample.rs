@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_model_has_the_response_of_its_course() {
+    fn discrete_model_has_the_expected_frequency_response() {
         let ts = SampleTime::new(0.02).unwrap();
         let forms: [(Form, bool, &[f64]); 3] = [
             (Form::Lead, true, &[1.5, 0.5, 2.4, -1.2, 0.193]),
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_straight_line_needs_the_sample_after_it() {
+    fn linear_interpolation_needs_a_minimum_delay() {
         let ts = SampleTime::new(0.02).unwrap();
         let operator = |tau: f64| FamilyOperator::new(Form::Gain, true, &[1.5, 2.4, -1.2, tau]).unwrap();
         assert!(Intersample::Foh.discrete(&operator(0.009), None, ts).is_err());

@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_jackknife_of_a_mean_is_the_variance_over_n() {
+    fn jackknife_of_a_mean_is_the_variance_over_n() {
         let x = [3.0, -1.0, 4.0, 1.5, 9.0];
         let (n, sum) = (x.len() as f64, x.iter().sum::<f64>());
         let others: Vec<Vec<f64>> = x.iter().map(|one| vec![(sum - one) / (n - 1.0), -2.0]).collect();
@@ -60,7 +60,7 @@ mod tests {
     }
 
     #[test]
-    fn data_and_prior_together_leave_the_inverse_open() {
+    fn data_and_prior_parts_add_up_to_the_inverse() {
         // H = G + P: H^-1 G H^-1 + H^-1 P H^-1 = H^-1.
         let penalty = |place, logarithmic, precision| Penalty {
             place,

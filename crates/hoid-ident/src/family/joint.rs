@@ -38,9 +38,9 @@ use super::{
 use crate::{criterion::Workspace, grey_box::objective::AdditionalTerm, optimize::Objective};
 
 /// Lower bound of `V_L - V_P` relative to V_L, needed because V_L and V_P are estimates.
-const LEAST_DIFFERENCE: f64 = 0.25;
+const MIN_DIFFERENCE: f64 = 0.25;
 /// Minimum number of runs for a joint fit: the scatter of fewer runs does not determine the variances of the lines.
-const FEWEST_RUNS: usize = 3;
+const MIN_RUNS: usize = 3;
 /// Upper bound of the fraction s.
 const LARGEST_SHARE: f64 = 0.9;
 
@@ -69,7 +69,7 @@ impl Lines<'_> {
         delay_range_s: (f64, f64),
     ) -> Arc<dyn Objective + Send + Sync> {
         let data = match self {
-            Self::Channels(criterion) => return Arc::new(criterion.as_ref().clone().of_lines_alone(excess)),
+            Self::Channels(criterion) => return Arc::new(criterion.as_ref().clone().without_prior(excess)),
             Self::Response(data) => data,
         };
         let points: Vec<MeasuredResponse> = (data.points.iter())
@@ -100,7 +100,7 @@ pub(super) fn with_lines<'a>(
     (lines, measured): (&LineFit, &Lines<'_>),
     workspace: &mut Workspace,
 ) -> Option<PredictionFit<'a>> {
-    if measured.runs() < FEWEST_RUNS {
+    if measured.runs() < MIN_RUNS {
         return None;
     }
     let layout = fit.layout();
@@ -110,7 +110,7 @@ pub(super) fn with_lines<'a>(
     let mut criterion = fit.criterion.clone();
     criterion.additional = Some(AdditionalTerm {
         criterion: measured.criterion(layout, excess, prediction.delay_range_s),
-        elements: layout.noise_begins(),
+        elements: layout.noise_offset(),
         weight: weight * fit.innovation_variance * fit.inflation,
     });
     let minimum = criterion.search(fit.eta().to_vec(), &prediction.search, None, workspace)?;
@@ -128,7 +128,7 @@ fn weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> 
     let q: Vec<f64> = (0..BAND_RAD_S.len())
         .map(|i| {
             let [here, there] = [&operator, &lines.operator].map(|of| of.response(BAND_RAD_S[i]));
-            let expected = (of_lines[i] - of_prediction[i]).max(LEAST_DIFFERENCE * of_lines[i]);
+            let expected = (of_lines[i] - of_prediction[i]).max(MIN_DIFFERENCE * of_lines[i]);
             ((there - here) / here).norm_sqr() / expected
         })
         .collect();
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lines_take_away_what_a_wrong_noise_model_adds() {
+    fn lines_reduce_the_bias_of_a_wrong_noise_model() {
         let truth = FamilyOperator::new(Form::Lead, true, &TRUTH).unwrap();
         // If the remnant is modelled as white, the fit in the loop is biased.
         let fitted = |excitation: Option<&str>, nd: usize| {
@@ -225,9 +225,9 @@ mod tests {
         let eta = [&TRUTH[..4], &[0.2837, -0.9, 0.1]].concat();
         let mut workspace = Workspace::default();
         let at = criterion.linearise(&eta, &mut workspace);
-        let beside = criterion.additional_at(&eta, &mut workspace);
-        assert!(beside.sum_of_squares > 0.0 && beside.sum_of_squares < at.sum_of_squares);
-        assert_eq!((beside.descent[5], beside.descent[6]), (0.0, 0.0));
+        let additional = criterion.additional_at(&eta, &mut workspace);
+        assert!(additional.sum_of_squares > 0.0 && additional.sum_of_squares < at.sum_of_squares);
+        assert_eq!((additional.descent[5], additional.descent[6]), (0.0, 0.0));
         for i in 0..eta.len() {
             let mut value = |by: f64| {
                 let mut moved = eta.clone();

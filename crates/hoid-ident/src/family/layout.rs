@@ -139,7 +139,7 @@ impl FamilyLayout {
     }
 
     /// Returns the index in eta of the first coefficient of the noise model.
-    pub fn noise_begins(&self) -> usize {
+    pub fn noise_offset(&self) -> usize {
         self.elements.len() + self.channels.iter().map(|channel| channel.limits.len()).sum::<usize>()
     }
 
@@ -214,7 +214,7 @@ impl Parametrisation for FamilyLayout {
         self.sample_time
     }
 
-    fn first_sample_begins(&self) -> f64 {
+    fn first_interval_start(&self) -> f64 {
         if self.intersample == Intersample::Auto {
             -0.5
         } else {
@@ -234,7 +234,7 @@ impl Parametrisation for FamilyLayout {
     }
 
     fn stable_blocks(&self) -> Vec<Range<usize>> {
-        let first = self.noise_begins();
+        let first = self.noise_offset();
         Vec::from_iter((self.nc > 0).then_some(first..first + self.nc))
     }
 
@@ -256,20 +256,20 @@ impl Parametrisation for FamilyLayout {
         let found = self
             .intersample
             .discrete(&operator, held.of(self.delay_of(record)), self.sample_time)?;
-        let noise = &eta[self.noise_begins()..];
+        let noise = &eta[self.noise_offset()..];
         let orders = self.orders(found.nk);
         let mut theta = found.b.clone();
         theta.extend_from_slice(noise);
         theta.extend_from_slice(&found.f);
         // For each parameter: the derivatives of theta with respect to it, each with its index in theta.
         let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
-        let (nb, behind) = (found.b.len(), found.b.len() + noise.len());
+        let (nb, noise_end) = (found.b.len(), found.b.len() + noise.len());
         for i in 0..self.coordinates() {
             let rows = found.jacobian.iter().enumerate();
-            let at = |row: usize| if row < nb { row } else { behind + row - nb };
+            let at = |row: usize| if row < nb { row } else { noise_end + row - nb };
             slopes.push(rows.map(|(row, slope)| (at(row), slope[i])).collect());
         }
-        slopes.extend((nb..behind).map(|place| vec![(place, 1.0)]));
+        slopes.extend((nb..noise_end).map(|place| vec![(place, 1.0)]));
         let mut further = Vec::with_capacity(self.channels.len());
         for channel in &self.channels {
             let operator = self.channel(eta, channel, record)?;

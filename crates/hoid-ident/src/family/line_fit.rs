@@ -11,7 +11,7 @@ use super::{
 use crate::{IdentError, SearchOptions, Termination, grey_box::objective::Penalty};
 
 /// Minimum number of runs for a covariance from the jackknife over runs.
-const FEWEST_RUNS: usize = 5;
+const MIN_RUNS: usize = 5;
 
 /// Fit of one form at the lines of the excitation.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -121,7 +121,7 @@ pub(super) fn line_fit(
         }
     }
     let prior_shares = criterion.prior_shares(&found);
-    let by_runs = (runs >= FEWEST_RUNS && others.len() == runs)
+    let by_runs = (runs >= MIN_RUNS && others.len() == runs)
         .then(|| jackknife(&others))
         .flatten();
     let by_lines = criterion.covariance(&found);

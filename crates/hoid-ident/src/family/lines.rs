@@ -16,14 +16,14 @@ use crate::frequency::DescribingFunction;
 /// Degrees of freedom nu_0 of the variance from neighbouring bins.
 const PRIOR_FREEDOM: f64 = 8.0;
 /// Minimum number of runs whose scatter is used.
-pub(super) const FEWEST_RUNS: usize = 3;
+pub(super) const MIN_RUNS: usize = 3;
 
 /// Returns the variance of a line: the variance from the scatter of the runs, shrunk towards the variance of the
 /// remnant in neighbouring bins times `excess`. For fewer than three runs this is the variance of the remnant alone.
 pub(super) fn moderated(runs: usize, of_runs: Option<f64>, neighbour_variance: f64, excess: f64) -> f64 {
     let nu = 2.0 * (runs as f64 - 1.0);
     match of_runs {
-        Some(v) if runs >= FEWEST_RUNS => (nu * v + PRIOR_FREEDOM * excess * neighbour_variance) / (nu + PRIOR_FREEDOM),
+        Some(v) if runs >= MIN_RUNS => (nu * v + PRIOR_FREEDOM * excess * neighbour_variance) / (nu + PRIOR_FREEDOM),
         _ => neighbour_variance,
     }
 }
@@ -47,7 +47,7 @@ impl<'d> LineData<'d> {
         // The factor is at least one: a scatter between runs that is smaller than the remnant explains is due to
         // chance.
         let excess = match upper_median(&mut ratios) {
-            Some(median) if runs >= FEWEST_RUNS => median.max(1.0),
+            Some(median) if runs >= MIN_RUNS => median.max(1.0),
             _ => 1.0,
         };
         let of_runs = |i: usize| lines[i].standard_error.map(|s| s * s);

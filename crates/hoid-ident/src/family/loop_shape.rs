@@ -124,7 +124,7 @@ impl LoopShape {
     /// Returns evidence against the operator; `None` if there is no such evidence. A record that remains bounded must
     /// come from a stable loop, which has a crossover and a positive phase margin, and a person's phase margin is at
     /// most 120 deg. `reach_deg` is half the width of the 95 % interval of the margin at the lowest crossover.
-    pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
+    pub fn finding(&self, reach_deg: f64) -> Option<Finding> {
         let remedy = "check the controlled element, the signs and units of e and u, and the time shift between e and u";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {
             return Some(Finding::doubt(
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_loop_that_rises_above_one_again_is_not_stable() {
+    fn loop_with_three_crossovers_is_unstable() {
         let found = shape(resonant, Some(1e-4));
         assert_eq!((found.crossovers.len(), found.unstable_poles), (3, Some(2)));
         let [low, middle, high] = [0, 1, 2].map(|k| found.crossovers[k]);
@@ -225,7 +225,7 @@ mod tests {
             "{found:?}"
         );
         assert!(found.gain_margin.unwrap().1.value < 0.0);
-        let doubt = found.doubt(1.0).unwrap();
+        let doubt = found.finding(1.0).unwrap();
         assert_eq!(
             (doubt.kind, doubt.severity),
             ("unstable-loop", hoid_model::Severity::Doubt)
@@ -236,17 +236,17 @@ mod tests {
             doubt.message
         );
         // With large errors the loop may be stable.
-        let note = shape(resonant, Some(0.3)).doubt(1.0).unwrap();
+        let note = shape(resonant, Some(0.3)).finding(1.0).unwrap();
         assert_eq!(note.severity, hoid_model::Severity::Note);
         // Without errors the values are used.
         assert_eq!(
-            shape(resonant, None).doubt(1.0).unwrap().severity,
+            shape(resonant, None).finding(1.0).unwrap().severity,
             hoid_model::Severity::Doubt
         );
     }
 
     #[test]
-    fn errors_are_those_of_finite_differences() {
+    fn errors_match_finite_differences() {
         let l = |gain: f64, turn: f64| move |w: f64| Complex64::from_polar(gain, turn - 0.15 * w);
         let found = shape(l(1.0, 0.0), Some(1e-6));
         let moved = |gain: f64, turn: f64| shape(l(gain, turn), None);
@@ -269,19 +269,19 @@ mod tests {
             let error = estimate.standard_error.unwrap();
             assert!((error / expected - 1.0).abs() < 1e-5, "{error} {expected}");
         }
-        assert_eq!((found.is_stable(), found.doubt(0.1)), (Some(true), None));
+        assert_eq!((found.is_stable(), found.finding(0.1)), (Some(true), None));
         assert_eq!(found.smallest_margin(), Some((omega, margin)));
     }
 
     #[test]
-    fn a_loop_without_a_crossover_or_a_number_has_a_doubt() {
+    fn missing_crossover_and_reversed_sign_are_reported() {
         for of in [1e-6, f64::NAN] {
             let found = shape(|_| Complex64::new(of, 0.0), Some(1e-6));
-            assert_eq!(found.doubt(0.0).unwrap().kind, "no-crossover");
+            assert_eq!(found.finding(0.0).unwrap().kind, "no-crossover");
             assert_eq!(found.gain_margin, None);
         }
         // Reversed sign.
         let found = shape(|w| Complex64::from_polar(-1.0, -0.15 * w), Some(1e-6));
-        assert_eq!(found.doubt(1.0).unwrap().kind, "unstable-loop");
+        assert_eq!(found.finding(1.0).unwrap().kind, "unstable-loop");
     }
 }

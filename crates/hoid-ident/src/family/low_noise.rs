@@ -18,7 +18,7 @@ use hoid_model::Form;
 use super::{
     coordinates::{self, Grid},
     intersample::Intersample,
-    prediction::{EQUAL, NONE, Prediction},
+    prediction::{EQUAL_POWER, Prediction, ROUNDING_POWER},
 };
 use crate::{SearchOptions, criterion::Workspace, optimize::Objective};
 
@@ -31,7 +31,7 @@ const LOW_NOISE_SHARE: f64 = 5e-3;
 const ROUNDING: f64 = 1e-25;
 /// Number of grid points for further searches of a form whose residual is not yet small, and number of rounds of these
 /// searches. The second round uses the best form of the first round.
-const MORE_STARTS: usize = 4;
+const ADDITIONAL_STARTS: usize = 4;
 const ROUNDS: usize = 2;
 /// Ratio of the residual powers for two intersample behaviours below which the difference is decisive. For a continuous
 /// error neither model is right: the hold has the relative error `x^2/6` and linear interpolation `x^2/3` with
@@ -41,7 +41,7 @@ const DECISIVE_RATIO: f64 = 0.02;
 /// another minimum.
 const OTHER_MINIMUM_RATIO: f64 = 1.1;
 /// Maximum number of steps of a search.
-const MOST_STEPS: usize = 200;
+const MAX_STEPS: usize = 200;
 
 /// A form with the starting coordinates of its searches.
 pub(super) type Starts = (Form, Vec<Vec<f64>>);
@@ -86,7 +86,7 @@ impl LittleNoise {
                 .flat_map(|(form, all)| all.iter().map(move |x| (*form, x)));
             all.any(|(form, x)| {
                 search
-                    .left(form, x, workspace)
+                    .residual_power(form, x, workspace)
                     .is_some_and(|share| share < LARGEST_AT_START)
             })
         };
@@ -98,31 +98,32 @@ impl LittleNoise {
             .map(|(form, starts)| search.least(*form, starts, workspace));
         let mut ends: Vec<Option<End>> = ends.collect();
         for round in 0..ROUNDS {
-            let Some((best, share)) = least_of(&ends).filter(|(_, share)| clean || *share < LOW_NOISE_SHARE) else {
+            let Some((best, share)) = smallest_share(&ends).filter(|(_, share)| clean || *share < LOW_NOISE_SHARE)
+            else {
                 break;
             };
             // A response without noise belongs exactly to some form. If no form fits exactly, the minimum of the best
             // form is also wrong, and this form is searched again.
-            let none_is_found = clean && round > 0 && share >= NONE;
+            let none_is_found = clean && round > 0 && share >= ROUNDING_POWER;
             // A form whose residual is close to the smallest one is not searched again.
-            let beside = (starts[best].0, ends[best].clone()?.coordinates);
+            let best_known = (starts[best].0, ends[best].clone()?.coordinates);
             for ((form, _), end) in starts.iter().zip(&mut ends) {
                 let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);
-                if known < NONE || (known < OTHER_MINIMUM_RATIO * share && !none_is_found) {
+                if known < ROUNDING_POWER || (known < OTHER_MINIMUM_RATIO * share && !none_is_found) {
                     continue;
                 }
-                let more = search.more_starts(*form, &beside, workspace);
+                let more = search.more_starts(*form, &best_known, workspace);
                 *end = search
                     .least(*form, &more, workspace)
                     .filter(|end| end.share < known)
                     .or(end.take());
             }
         }
-        let (_, share) = least_of(&ends).filter(|(_, share)| *share < LOW_NOISE_SHARE)?;
+        let (_, share) = smallest_share(&ends).filter(|(_, share)| *share < LOW_NOISE_SHARE)?;
         let n = prediction.samples() as f64;
         let criterion = (ends.iter().zip(starts)).filter_map(|(end, (form, _))| {
             let size = form.coordinates(neuromuscular).len() as f64;
-            Some(n * end.as_ref()?.share.max(EQUAL).ln() + n.ln() * size)
+            Some(n * end.as_ref()?.share.max(EQUAL_POWER).ln() + n.ln() * size)
         });
         let criterion = criterion.fold(f64::INFINITY, f64::min);
         Some(Self { ends, share, criterion })
@@ -150,7 +151,7 @@ impl LittleNoise {
 
     /// Returns the intersample behaviour that fits better, given the searches with a smooth and with a held error, and
     /// whether the difference is decisive.
-    pub fn course(smooth: &Self, held: &Self) -> (Intersample, bool) {
+    pub fn intersample_of(smooth: &Self, held: &Self) -> (Intersample, bool) {
         match held.share.max(ROUNDING) / smooth.share.max(ROUNDING) {
             ratio if ratio < DECISIVE_RATIO => (Intersample::Zoh, true),
             ratio if ratio > 1.0 / DECISIVE_RATIO => (Intersample::Foh, true),
@@ -161,7 +162,7 @@ impl LittleNoise {
 }
 
 /// Returns the index and the relative residual power of the form with the smallest residual.
-fn least_of(ends: &[Option<End>]) -> Option<(usize, f64)> {
+fn smallest_share(ends: &[Option<End>]) -> Option<(usize, f64)> {
     let shares = ends
         .iter()
         .enumerate()
@@ -181,7 +182,7 @@ impl Search<'_, '_> {
     fn least(&self, form: Form, starts: &[Vec<f64>], workspace: &mut Workspace) -> Option<End> {
         let criterion = self.prediction.criterion((form, self.neuromuscular), (0, 0));
         let search = SearchOptions {
-            max_iterations: MOST_STEPS,
+            max_iterations: MAX_STEPS,
             ..self.prediction.search
         };
         let mut best: Option<End> = None;
@@ -205,14 +206,14 @@ impl Search<'_, '_> {
     /// Returns those grid points of a form that leave the smallest residuals, each with its best gain. The grid is used
     /// as it is, and also with the neuromuscular system and the delay of another operator. Since u is linear in the
     /// gain, one step from a gain of zero gives the best gain.
-    fn more_starts(&self, form: Form, beside: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
+    fn more_starts(&self, form: Form, best_known: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
         let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Default);
         // The neuromuscular system and the delay are the last coordinates of every form.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
-        let of_other = &beside.1[beside.1.len() - tail..];
+        let of_other = &best_known.1[best_known.1.len() - tail..];
         let mut moved: Vec<Vec<f64>> = (grid.iter())
             .map(|point| [&point[..point.len() - tail], of_other].concat())
             .collect();
@@ -230,11 +231,14 @@ impl Search<'_, '_> {
             }
         }
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        all.into_iter().take(MORE_STARTS).map(|(_, point)| point).collect()
+        all.into_iter()
+            .take(ADDITIONAL_STARTS)
+            .map(|(_, point)| point)
+            .collect()
     }
 
     /// Returns the power of the part of u that an operator does not explain, relative to the power of u.
-    fn left(&self, form: Form, coordinates: &[f64], workspace: &mut Workspace) -> Option<f64> {
+    fn residual_power(&self, form: Form, coordinates: &[f64], workspace: &mut Workspace) -> Option<f64> {
         let left = self
             .prediction
             .unexplained((form, self.neuromuscular), coordinates, workspace);
@@ -302,19 +306,16 @@ mod tests {
     }
 
     #[test]
-    fn an_operator_without_noise_is_found_with_its_level_and_its_course() {
+    fn noise_free_operator_is_found_with_its_intersample_model() {
         let ts = SampleTime::new(0.025).unwrap();
         let held = fitted(record(&truth().zoh(ts).unwrap(), 0.0));
         assert!(worst(&held, 0.243) < 1e-10);
-        assert_eq!(
-            (held.intersample, held.delay_if_straight_s(0)),
-            (Intersample::Zoh, None)
-        );
+        assert_eq!((held.intersample, held.delay_if_linear_s(0)), (Intersample::Zoh, None));
         // A piecewise linear error; the delay is half a sample longer than this model shows.
         let straight = fitted(record(&truth().interpolate(ts).unwrap(), 0.0));
         assert!(worst(&straight, 0.243 + 0.0125) < 1e-10);
         assert_eq!(
-            (straight.intersample, straight.delay_if_straight_s(0)),
+            (straight.intersample, straight.delay_if_linear_s(0)),
             (Intersample::Foh, None)
         );
         for fit in [held, straight] {
@@ -326,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_little_noise_is_modelled_and_says_no_more_than_it_can() {
+    fn small_noise_is_modelled_and_errors_cover_the_truth() {
         let ts = SampleTime::new(0.025).unwrap();
         let fit = fitted(record(&truth().zoh(ts).unwrap(), 1e-3));
         let c = fit.operator(0).covariance.clone().unwrap();
@@ -340,7 +341,7 @@ mod tests {
     /// A lead compensates for the hold: its values for the two intersample behaviours differ by more than the errors
     /// due to noise.
     #[test]
-    fn both_courses_of_the_error_are_within_the_errors_if_both_fit() {
+    fn errors_cover_both_intersample_models_if_both_fit() {
         let ts = SampleTime::new(0.025).unwrap();
         let record = record(&truth().zoh(ts).unwrap(), 3e-3);
         let of = |intersample| {
@@ -365,17 +366,17 @@ mod tests {
     }
 
     #[test]
-    fn the_noise_of_a_person_is_not_little() {
+    fn operator_remnant_is_not_treated_as_small_noise() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let fit = fitted(record.detrended(Detrend::Mean));
         assert_eq!((fit.intersample, fit.noise_free), (Intersample::Auto, None));
         let tau = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e").unwrap();
-        assert!((fit.delay_if_straight_s(0).unwrap() - tau.value - 0.005).abs() < 1e-12);
+        assert!((fit.delay_if_linear_s(0).unwrap() - tau.value - 0.005).abs() < 1e-12);
     }
 
     #[test]
-    fn a_quarter_of_the_squares_settles_nothing() {
+    fn quarter_of_the_sum_of_squares_decides_nothing() {
         let of = |share: f64, criterion: f64| LittleNoise {
             ends: Vec::new(),
             share,
@@ -383,23 +384,26 @@ mod tests {
         };
         let smooth = of(1e-6, 0.0);
         assert_eq!(
-            LittleNoise::course(&smooth, &of(2.5e-7, -9.0)),
+            LittleNoise::intersample_of(&smooth, &of(2.5e-7, -9.0)),
             (Intersample::Zoh, false)
         );
         assert_eq!(
-            LittleNoise::course(&smooth, &of(2.5e-7, 9.0)),
+            LittleNoise::intersample_of(&smooth, &of(2.5e-7, 9.0)),
             (Intersample::Auto, false)
         );
-        assert_eq!(LittleNoise::course(&smooth, &of(0.0, -9.0)), (Intersample::Zoh, true));
         assert_eq!(
-            LittleNoise::course(&of(0.0, 0.0), &of(1e-9, 9.0)),
+            LittleNoise::intersample_of(&smooth, &of(0.0, -9.0)),
+            (Intersample::Zoh, true)
+        );
+        assert_eq!(
+            LittleNoise::intersample_of(&of(0.0, 0.0), &of(1e-9, 9.0)),
             (Intersample::Foh, true)
         );
     }
 
     /// Removing the mean of e causes a ramp in u that is as large as u itself.
     #[test]
-    fn an_integration_of_an_error_with_a_mean_is_found() {
+    fn integration_of_a_nonzero_mean_error_is_found() {
         let ts = SampleTime::new(0.005).unwrap();
         let x = [3.4, 0.72, 0.333, 2.13, -0.775, 0.398];
         let truth = FamilyOperator::new(Form::QuadraticIntegral, true, &x).unwrap();

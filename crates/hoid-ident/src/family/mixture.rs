@@ -15,13 +15,13 @@
 use hoid_model::uncertainty::Estimate;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-use super::clusters::{freedom, quantile};
+use super::clusters::{degrees_of_freedom, quantile};
 
 /// Number of bisection steps for each end of an interval.
 const HALVINGS: usize = 80;
 /// Distance from the intervals, in widths of their union, beyond which Student's distribution leaves less than a
 /// hundredth of [`TAIL`].
-const FAR: f64 = 50.0;
+const TAIL_DISTANCE: f64 = 50.0;
 /// Probability in each tail outside the interval.
 const TAIL: f64 = 0.025;
 
@@ -80,7 +80,7 @@ type Part = (f64, f64, (f64, f64));
 
 /// Returns the 95 % interval of the mixture; `None` if a form has no interval.
 fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
-    let student = StudentsT::new(0.0, 1.0, freedom(clusters)).ok()?;
+    let student = StudentsT::new(0.0, 1.0, degrees_of_freedom(clusters)).ok()?;
     let quantile = quantile(clusters);
     let parts: Option<Vec<Part>> = (components.iter())
         .map(|c| Some((c.weight / total, c.estimate.value, c.interval?)))
@@ -103,7 +103,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
     };
     let (least, most) = (finite(f64::min, f64::INFINITY), finite(f64::max, f64::NEG_INFINITY));
     // Far beyond the finite ends, only forms with an infinite end have any remaining probability.
-    let reach = FAR * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
+    let reach = TAIL_DISTANCE * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
     let place = |wanted: f64| {
         let (mut low, mut high) = (least - reach, most + reach);
         for _ in 0..HALVINGS {
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn one_form_is_itself_and_two_alike_are_one() {
+    fn mixture_of_equal_forms_equals_one_form() {
         let one = component(0.3, 2.0, 0.1, 8);
         let alone = Mixture::of(&[one], 8).unwrap();
         assert_eq!((alone.estimate, alone.interval), (one.estimate, one.interval));
@@ -183,7 +183,7 @@ mod tests {
 
     /// Two forms that are three standard errors apart: mean and variance by hand, the interval from its probability.
     #[test]
-    fn forms_that_differ_widen_the_error() {
+    fn differing_forms_increase_the_error() {
         let many = 1_000_000;
         let all = [component(0.75, 1.0, 0.1, many), component(0.25, 1.4, 0.2, many)];
         let found = Mixture::of(&all, many).unwrap();
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_that_is_open_in_a_form_with_weight_is_open() {
+    fn infinite_limit_of_a_weighted_form_is_kept() {
         let closed = component(0.9, 5.0, 0.5, 8);
         let open = |weight| Component {
             weight,

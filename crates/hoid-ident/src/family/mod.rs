@@ -103,7 +103,7 @@ mod starts;
 
 pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
 pub use channel::{ChannelFit, ChannelForm, ChannelResponse, ChannelRole, SeenChannel};
-pub use choice::{FormFigures, LEAST_WEIGHT, NO_EVIDENCE};
+pub use choice::{FormFigures, MIN_WEIGHT, NO_EVIDENCE};
 pub use clusters::ClusterKind;
 pub use instrumental::InstrumentalFit;
 pub use intersample::Intersample;

@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn an_autoregression_is_found_with_its_order() {
+    fn autoregression_and_its_order_are_found() {
         let all = [series(4000), series(3000)];
         let products = NoiseProducts::new(&all, 8);
         let fit = products.fit(2).unwrap();
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mixed_model_is_found_by_two_regressions() {
+    fn arma_model_is_found_by_two_regressions() {
         // A moving average of the series above: v = w + 0.6 w(t-1), where w is the autoregression.
         let w = series(8000);
         let v: Vec<f64> = (1..w.len()).map(|t| w[t] + 0.6 * w[t - 1]).collect();
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_smooth_series_has_as_many_coefficients_as_it_needs() {
+    fn smooth_series_is_fitted_with_full_order() {
         let v: Vec<f64> = (0..400).map(|t| (0.1 * f64::from(t)).sin()).collect();
         let products = NoiseProducts::new(&[v], 24);
         let found = products.fit_up_to(24).unwrap();
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_model_is_no_model() {
+    fn zero_and_short_series_give_no_model() {
         let none = NoiseProducts::new(&[vec![0.0; 50]], 4);
         assert_eq!(
             (none.best_order(0..=4, Penalty::Akaike), none.fit_up_to(4)),

@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn the_exact_model_gives_its_operator_back() {
+    fn exact_model_returns_its_operator() {
         for operator in operators() {
             let found = family_of_polynomials(&exact(&operator), None, None).unwrap();
             assert_eq!(found.operator.form(), operator.form());
@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn the_real_pole_is_the_lag_and_of_three_the_one_that_fits() {
+    fn lag_is_assigned_to_the_real_pole_that_fits() {
         let found = family_of_polynomials(&exact(&operators()[3]), None, None).unwrap();
         assert_eq!(found.real_poles.len(), 1);
         assert_eq!(found.real_poles[0].role, PoleRole::Lag);
@@ -467,7 +467,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_those_of_the_coefficients() {
+    fn covariance_matches_finite_differences_of_the_coefficients() {
         // Each coefficient is changed by a small step; the coordinates change as dx/dtheta predicts.
         let operator = FamilyOperator::new(Form::LeadLag, true, &LEAD_LAG).unwrap();
         let model = exact(&operator);
@@ -499,7 +499,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_operator_is_refused() {
+    fn polynomials_without_an_operator_are_refused() {
         let refused = |m: &PolynomialModel, form| family_of_polynomials(m, None, form).unwrap_err().to_string();
         // Four poles, an unstable pole, a negative pole, and no delay.
         let four = polynomials(9, &[0.1, 0.1], &[-0.5, 0.2, 0.0, 0.01]);

@@ -50,9 +50,9 @@ impl LoopMeasures {
         let [crossover_rad_s, phase_margin_deg] = both;
         Self {
             crossover_rad_s,
-            crossover_interval: reaching(crossover_rad_s, NORMAL),
+            crossover_interval: symmetric_interval(crossover_rad_s, NORMAL),
             phase_margin_deg,
-            phase_margin_interval: reaching(phase_margin_deg, NORMAL),
+            phase_margin_interval: symmetric_interval(phase_margin_deg, NORMAL),
             by_gain,
             of_person: both.map(|e| e.standard_error),
         }
@@ -62,8 +62,8 @@ impl LoopMeasures {
     /// number of clusters.
     pub(super) fn with_student_intervals(self, clusters: usize) -> Self {
         Self {
-            crossover_interval: reaching(self.crossover_rad_s, quantile(clusters)),
-            phase_margin_interval: reaching(self.phase_margin_deg, quantile(clusters)),
+            crossover_interval: symmetric_interval(self.crossover_rad_s, quantile(clusters)),
+            phase_margin_interval: symmetric_interval(self.phase_margin_deg, quantile(clusters)),
             ..self
         }
     }
@@ -132,7 +132,7 @@ impl LoopMeasures {
 }
 
 /// Returns the interval that extends `quantile` standard errors to each side of an estimate.
-fn reaching(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
+fn symmetric_interval(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
     let reach = quantile * of.standard_error?;
     Some((of.value - reach, of.value + reach))
 }
@@ -279,7 +279,7 @@ mod tests {
     const X: [f64; 6] = [5.6, 0.6, 0.1, 2.7, -1.7, 0.14];
 
     #[test]
-    fn a_gain_over_an_integrator_crosses_at_the_gain() {
+    fn gain_and_integrator_cross_over_at_the_gain() {
         let gain = FamilyOperator::new(Form::Gain, true, &[2.0, 100.0_f64.ln(), 0.7_f64.ln(), 0.1]).unwrap();
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
         let found = loop_measures(&gain, None, &element, (SampleTime::new(1e-4).unwrap(), AUTO)).unwrap();
@@ -293,7 +293,7 @@ mod tests {
     /// of .6 s crosses over at 10 rad/s with 90 - 344 = -254 deg. The principal values of both margins are within 180
     /// deg.
     #[test]
-    fn a_margin_below_zero_is_followed_round() {
+    fn margin_below_minus_180_degrees_is_unwrapped() {
         for (gain, delay) in [(20.0, 0.2), (10.0, 0.6), (2.0, 0.1)] {
             let open_loop = |w: f64| Complex64::new(0.0, -gain / w) * Complex64::from_polar(1.0, -delay * w);
             let expected = 90.0 - (gain * delay).to_degrees();
@@ -330,7 +330,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gain_is_one_at_the_crossover() {
+    fn open_loop_gain_is_one_at_the_crossover() {
         let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
         for scale in [0.02, 0.1, 0.5] {
             let of = FamilyOperator::new(Form::LeadLag, true, &[scale * X[0], X[1], X[2], X[3], X[4], X[5]]).unwrap();
@@ -347,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn no_crossover_is_none() {
+    fn missing_crossover_gives_none() {
         let small = FamilyOperator::new(Form::Gain, true, &[1e-6, 2.4, -1.0, 0.1]).unwrap();
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 1.0]).unwrap();
         assert_eq!(

@@ -15,7 +15,7 @@ use crate::{
 /// Highest order of the noise model.
 pub const HIGHEST_NOISE_ORDER: usize = 24;
 /// Highest nd that is searched by default if nc is above zero: an ARMA model needs few coefficients.
-const HIGHEST_BESIDE_NC: usize = 8;
+const HIGHEST_ND_WITH_NC: usize = 8;
 
 /// Estimator of the operator of a person, with its options.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +105,7 @@ impl FamilyEstimator {
         let nc = named.get("nc").cloned().unwrap_or(0..=0);
         let highest = match *nc.end() {
             0 => HIGHEST_NOISE_ORDER,
-            _ => HIGHEST_BESIDE_NC,
+            _ => HIGHEST_ND_WITH_NC,
         };
         let nd = named.get("nd").cloned().unwrap_or(0..=highest);
         Ok(Self { nc, nd, ..self })

@@ -18,22 +18,22 @@ use hoid_model::{
 use super::mixture::{Component, Mixture, widened};
 
 /// Total weight of the forms with a parameter up to which the parameter counts as undetermined.
-const LEAST_WEIGHT: f64 = 0.5;
+const MIN_WEIGHT: f64 = 0.5;
 /// Name of the gain (at zero frequency in forms with a lag, in the band in other forms), and the total weight of the
 /// forms with the same meaning up to which it counts as undetermined.
 pub(super) const DC_GAIN: &str = "K";
-const LEAST_WEIGHT_OF_DC_GAIN: f64 = 0.95;
+const MIN_WEIGHT_OF_DC_GAIN: f64 = 0.95;
 /// Largest ratio of the posterior to the prior variance of a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of the logarithm of a determined parameter.
 const LARGEST_LOG_ERROR: f64 = 0.35;
 
 /// Returns the total weight of the forms with a parameter up to which the parameter counts as undetermined.
-pub(super) fn least_weight(name: &str) -> f64 {
+pub(super) fn min_weight(name: &str) -> f64 {
     if name == DC_GAIN {
-        LEAST_WEIGHT_OF_DC_GAIN
+        MIN_WEIGHT_OF_DC_GAIN
     } else {
-        LEAST_WEIGHT
+        MIN_WEIGHT
     }
 }
 
@@ -95,7 +95,7 @@ impl Parameter {
         if all.len() == 1 {
             let (_, weight, only) = all[0];
             return Some(Self {
-                determined: only.determined && weight > LEAST_WEIGHT,
+                determined: only.determined && weight > MIN_WEIGHT,
                 ..only.clone()
             });
         }
@@ -142,7 +142,7 @@ impl Parameter {
             interval,
             prior_share: share(&|p| p.prior_share),
             // The parameter is not determined if the forms without it are more likely than the forms with it.
-            determined: total > LEAST_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
+            determined: total > MIN_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
             averaged_over: each.iter().map(|(form, ..)| *form).collect(),
             ..front.clone()
         })
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_that_is_known_has_a_time_constant() {
+    fn determined_lag_has_a_finite_interval() {
         let all = known(0.2, 0.02);
         let t_i = of(&all, "T_I");
         assert_eq!((t_i.value, t_i.determined), (5.0, true));
@@ -405,7 +405,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gain_of_the_person_is_known_less_well_than_that_of_the_run() {
+    fn gain_error_for_the_person_includes_run_to_run_variation() {
         let all = known(0.2, 0.02);
         let (gain, tau) = (of(&all, "K_over_T_I"), of(&all, "tau_e"));
         assert!((gain.standard_error_person.unwrap() - 0.2_f64.hypot(0.25)).abs() < 1e-12);
@@ -419,7 +419,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_is_averaged_over_the_forms_that_have_it() {
+    fn parameter_is_averaged_over_the_forms_that_have_it() {
         let near = known(0.2, 0.02);
         let mut far = of(&near, "tau_e").clone();
         far.value += 0.04;
@@ -445,7 +445,7 @@ mod tests {
 
     /// T_I of a pure integration has no error. It is not part of the mean, but the interval has no upper limit.
     #[test]
-    fn a_parameter_at_a_bound_in_a_form_with_weight_is_in_the_interval() {
+    fn interval_includes_a_weighted_form_at_a_bound() {
         let known = known(0.2, 0.02);
         let lag = of(&known, "T_I");
         let infinite = Parameter {
@@ -468,7 +468,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_that_is_not_known_is_open_above() {
+    fn undetermined_lag_has_no_upper_limit() {
         let all = known(0.02, 0.03);
         for name in ["T_I", "K"] {
             let open = of(&all, name);

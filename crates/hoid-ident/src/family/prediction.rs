@@ -35,9 +35,9 @@ use crate::{
 };
 
 /// Residual power relative to the power of u below which the residual is not noise but rounding errors of the file.
-pub(super) const NONE: f64 = 1e-8;
+pub(super) const ROUNDING_POWER: f64 = 1e-8;
 /// Relative residual power below which forms count as equal, because chance determines where a noise-free search ends.
-pub(super) const EQUAL: f64 = 1e-18;
+pub(super) const EQUAL_POWER: f64 = 1e-18;
 /// Maximum number of rounds in which the weight kappa sigma^2 of the prior is updated.
 const ROUNDS: usize = 3;
 /// Relative change of the weight of the prior below which no further round is needed.
@@ -55,7 +55,7 @@ pub(super) struct Prediction<'a> {
     /// True if the intersample behaviour was given by the user or determined from the data.
     pub course_is_known: bool,
     /// Coordinates of the forms for the other intersample behaviour, if there is little noise and both behaviours fit.
-    pub other_course: Vec<(Form, Vec<f64>)>,
+    pub other_intersample: Vec<(Form, Vec<f64>)>,
     /// Residual power of an output error fit relative to the power of u, if there is little noise.
     pub little_noise: Option<f64>,
     pub initial: InitialState,
@@ -195,7 +195,7 @@ impl<'a> Prediction<'a> {
         let layout = fit.layout();
         let mut criterion = self.criterion((layout.form, layout.neuromuscular), noise);
         criterion.penalty.clone_from(&fit.criterion.penalty);
-        let operators = &fit.eta()[..layout.noise_begins()];
+        let operators = &fit.eta()[..layout.noise_offset()];
         let search = SearchOptions {
             max_iterations,
             tolerance,
@@ -235,12 +235,12 @@ impl<'a> Prediction<'a> {
 
     /// Returns the residual power relative to the power of u if the residual is not noise; `None` if there is noise.
     pub fn noise_free(&self) -> Option<f64> {
-        self.little_noise.filter(|share| *share < NONE)
+        self.little_noise.filter(|share| *share < ROUNDING_POWER)
     }
 
     /// Returns the sum of squares below which forms count as equal; zero if there is noise.
     pub fn equal(&self) -> f64 {
-        self.noise_free().map_or(0.0, |_| EQUAL * self.power())
+        self.noise_free().map_or(0.0, |_| EQUAL_POWER * self.power())
     }
 
     /// Returns a mean square far below rounding errors, used in place of zero, whose logarithm does not exist.
@@ -257,9 +257,9 @@ impl<'a> Prediction<'a> {
     ) -> Result<PredictionFit<'a>, IdentError> {
         let (n, states) = (criterion.residuals(), criterion.states());
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
-        let beside = criterion.additional_at(&minimum.theta, workspace).sum_of_squares;
+        let additional = criterion.additional_at(&minimum.theta, workspace).sum_of_squares;
         // The noise variance is computed from the residuals alone, without the prior and the lines.
-        let mut squares = minimum.at.sum_of_squares - penalty - beside;
+        let mut squares = minimum.at.sum_of_squares - penalty - additional;
         if self.noise_free().is_some() {
             squares = squares.max(self.rounding() * n as f64);
         }

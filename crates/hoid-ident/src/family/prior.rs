@@ -44,7 +44,7 @@ pub struct OperatorPrior {
 }
 
 /// Coordinates whose parameters can have a prior.
-const KNOWN: [Coordinate; 5] = [
+const COORDINATES_WITH_PRIOR: [Coordinate; 5] = [
     Coordinate::LogOmega,
     Coordinate::LogZeta,
     Coordinate::Delay,
@@ -54,7 +54,7 @@ const KNOWN: [Coordinate; 5] = [
 
 /// Returns the coordinate of a parameter; `None` if the parameter cannot have a prior.
 fn coordinate_of(parameter: &str) -> Option<Coordinate> {
-    KNOWN.into_iter().find(|c| c.parameter() == parameter)
+    COORDINATES_WITH_PRIOR.into_iter().find(|c| c.parameter() == parameter)
 }
 
 /// Source of the population prior.
@@ -100,7 +100,7 @@ impl OperatorPrior {
                 })
             };
             if coordinate_of(&entry.parameter).is_none() {
-                let names = KNOWN.map(Coordinate::parameter).join(", ");
+                let names = COORDINATES_WITH_PRIOR.map(Coordinate::parameter).join(", ");
                 return refuse(entry.parameter.clone(), &format!("one of {names}"));
             }
             if entries[..i].iter().any(|other| other.parameter == entry.parameter) {
@@ -243,7 +243,7 @@ mod tests {
     use crate::family::FamilyEstimator;
 
     #[test]
-    fn priors_as_typed() {
+    fn prior_text_round_trips() {
         let typed: OperatorPrior = "omega_nm=10.5:0.3, zeta_nm=0.3:0.5".parse().unwrap();
         assert_eq!(typed.to_string(), "omega_nm=10.5:0.3,zeta_nm=0.3:0.5");
         assert_eq!("none".parse::<OperatorPrior>().unwrap(), OperatorPrior::none());
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn what_another_fit_determined_is_a_prior() {
+    fn prior_uses_only_parameters_determined_by_a_fit() {
         let estimate = |value, standard_error| Estimate { value, standard_error };
         let found = [
             ("K", estimate(4.0, Some(0.2)), true),
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_coordinates_of_the_form_are_penalised() {
+    fn only_coordinates_of_the_form_are_penalised() {
         let prior = OperatorPrior::population();
         assert_eq!(prior.penalties(Form::LeadLag, true).len(), 3);
         assert_eq!(prior.penalties(Form::LeadLag, false).len(), 1);
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn the_pull_of_a_prior_leads_back_to_the_fit_without_it() {
+    fn removing_the_pull_of_a_prior_gives_the_fit_without_it() {
         // By hand: the data at ln 8 with three quarters of the information, the prior at ln 10.5.
         let (data, prior, share): (f64, f64, f64) = (8.0, 10.5, 0.25);
         let both = ((1.0 - share) * data.ln() + share * prior.ln()).exp();

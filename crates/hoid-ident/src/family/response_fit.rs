@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn an_exact_response_gives_its_operator_back() {
+    fn exact_response_returns_its_operator() {
         let ts = SampleTime::new(1.0 / 60.0).unwrap();
         for form in Form::ALL {
             let truth = truth(form);
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn the_errors_are_those_of_repeated_measurements() {
+    fn errors_match_the_scatter_of_repeated_measurements() {
         // 400 measurements with a fixed seed: the standard deviations are accurate to 3.5 %.
         let mut state = 5_u64;
         let mut uniform = move || {

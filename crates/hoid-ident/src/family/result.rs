@@ -133,7 +133,7 @@ pub struct FamilyFit {
     #[serde(default)]
     pub intersample: Intersample,
     /// True if the intersample behaviour was given or determined from the data. Otherwise the delay may be half a
-    /// sample longer ([`FamilyFit::delay_if_straight_s`]).
+    /// sample longer ([`FamilyFit::delay_if_linear_s`]).
     #[serde(default)]
     pub course_is_known: bool,
     /// Time in s by which e was advanced when the sampling frequency was lowered, because the new hold is longer than
@@ -200,7 +200,11 @@ impl FamilyFit {
     }
 
     /// Like [`Self::loop_measures`], for the best form only.
-    pub fn loop_measures_in_front(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
+    pub fn loop_measures_of_best_form(
+        &self,
+        record: usize,
+        element: &ContinuousTransferFunction,
+    ) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)
     }
@@ -208,7 +212,7 @@ impl FamilyFit {
     /// Returns the delay tau_e in s of a record for an error that is linear between samples, logged from a continuous
     /// signal or one with a higher sampling frequency; this delay is half a sample longer. `None` if the intersample
     /// behaviour is known.
-    pub fn delay_if_straight_s(&self, record: usize) -> Option<f64> {
+    pub fn delay_if_linear_s(&self, record: usize) -> Option<f64> {
         let of = self.operator(record);
         let averaged = of.parameters.iter().find(|p| p.name == Coordinate::Delay.parameter());
         let tau = averaged.map_or_else(|| of.operator.tau_e_s(), |tau| tau.value);
@@ -262,10 +266,10 @@ impl FamilyFit {
     /// such evidence. A record that remains bounded must come from a stable loop, which has a crossover and a positive
     /// phase margin, and a person's phase margin is at most 120 deg.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
-        let reach = (self.loop_measures_in_front(record, element))
+        let reach = (self.loop_measures_of_best_form(record, element))
             .and_then(|found| found.phase_margin_interval)
             .map_or(0.0, |(low, high)| 0.5 * (high - low));
-        self.loop_shape(record, element).doubt(reach)
+        self.loop_shape(record, element).finding(reach)
     }
 
     /// Returns all crossings and the stability of the loop of a record with a controlled element, for the best form.
@@ -341,7 +345,7 @@ mod tests {
     use crate::family::FamilyEstimator;
 
     #[test]
-    fn the_polynomials_have_the_title_of_the_operator() {
+    fn polynomial_fit_has_the_title_of_the_operator_fit() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let estimator = FamilyEstimator {

@@ -35,10 +35,10 @@ const ARMA_ORDERS: NoiseOrders = (4, 5);
 /// Prior share in the fit at the lines above which other noise models are also used.
 pub(super) const LARGEST_SHARE_AT_LINES: f64 = 0.25;
 /// Weight of the squared differences that is added to one if there are no lines.
-pub(super) const MORE_WITHOUT_LINES: f64 = 0.5;
+pub(super) const EXTRA_WEIGHT_WITHOUT_LINES: f64 = 0.5;
 /// Additional standard deviations of parameters if there are no lines, for the bias that fits with other noise models
 /// do not show.
-pub(super) const UNSEEN_WITHOUT_LINES: [(Coordinate, f64); 2] =
+pub(super) const EXTRA_DEVIATIONS_WITHOUT_LINES: [(Coordinate, f64); 2] =
     [(Coordinate::LogOmega, 0.12), (Coordinate::LogZeta, 0.2)];
 /// Maximum number of steps and tolerance of the search with another noise model. The search need not converge, since
 /// only the size of the difference is used.
@@ -60,7 +60,7 @@ pub(super) fn rivals(
     let mut orders: Vec<NoiseOrders> = vec![(0, highest / 4), (0, highest / 2), (0, highest), ARMA_ORDERS];
     orders.retain(|&(nc, nd)| (nc, nd) != own && nd > 0 && nd <= highest && nc <= highest);
     orders.dedup();
-    let elements = layout.noise_begins();
+    let elements = layout.noise_offset();
     let start = layout.coordinates_of(fit.eta(), 0);
     let Ok(series) = prediction.unexplained((layout.form, layout.neuromuscular), &start, workspace) else {
         return Vec::new();
@@ -77,7 +77,10 @@ pub(super) fn rivals(
             others.push(found[..elements].to_vec());
         }
     }
-    let of_course = prediction.other_course.iter().find(|(form, _)| *form == layout.form);
+    let of_course = prediction
+        .other_intersample
+        .iter()
+        .find(|(form, _)| *form == layout.form);
     others.extend(of_course.map(|(_, coordinates)| layout.spread(coordinates, &[])));
     others
 }

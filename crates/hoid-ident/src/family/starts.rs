@@ -134,7 +134,7 @@ impl FamilyEstimator {
 
     /// Returns the index of the form with a start whose residual is smallest after whitening by an autoregression of
     /// this order.
-    pub(super) fn least_left(
+    pub(super) fn smallest_residual(
         &self,
         prediction: &Prediction<'_>,
         starts: &[Start],

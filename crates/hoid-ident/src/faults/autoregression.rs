@@ -1,11 +1,11 @@
 //! Prediction of a channel from its own past, by a fit that is robust to faults.
 //!
 //! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` is fitted by least squares with bounded influence: a row counts
-//! only if neither x(t) nor any of its p past values exceeds [`FAR`] robust deviations (Mallows' weights on the
-//! regressors) and, in later rounds, if eps does not exceed [`LARGEST_RESIDUAL`] times its robust scale (R. A. Maronna,
-//! R. D. Martin, V. J. Yohai, *Robust Statistics*, 2006, sections 5.11 and 8.4). White noise of [`FLOOR`] deviations of
-//! x is assumed in addition: it keeps the normal equations of a smooth channel regular, and smaller deviations are not
-//! faults.
+//! only if neither x(t) nor any of its p past values exceeds [`OUTLIER_LIMIT`] robust deviations (Mallows' weights on
+//! the regressors) and, in later rounds, if eps does not exceed [`LARGEST_RESIDUAL`] times its robust scale (R. A.
+//! Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*, 2006, sections 5.11 and 8.4). White noise of
+//! [`NOISE_FLOOR`] deviations of x is assumed in addition: it keeps the normal equations of a smooth channel regular,
+//! and smaller deviations are not faults.
 
 use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
@@ -13,14 +13,14 @@ use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 /// Largest order of the autoregression; a short channel has a lower order.
 pub(super) const ORDER: usize = 16;
 /// A row does not count if one of its values exceeds this number of deviations of the channel.
-const FAR: f64 = 6.0;
+const OUTLIER_LIMIT: f64 = 6.0;
 /// A row does not count if its residual exceeds this number of standard deviations of the residuals.
 const LARGEST_RESIDUAL: f64 = 4.0;
 /// Standard deviation of the additional white noise, relative to the deviation of the channel.
-pub(super) const FLOOR: f64 = 1e-3;
+pub(super) const NOISE_FLOOR: f64 = 1e-3;
 const ROUNDS: usize = 3;
 /// Number of rows that is sufficient for estimating the coefficients; of a longer channel only every k-th row is used.
-const MOST_ROWS: usize = 40_000;
+const MAX_ROWS: usize = 40_000;
 
 /// Coefficients `1, a_1 .. a_p` of the autoregression.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,11 +35,15 @@ impl Autoregression {
         if p == 0 || deviation <= 0.0 {
             return None;
         }
-        let stride = (x.len() / MOST_ROWS).max(1);
+        let stride = (x.len() / MAX_ROWS).max(1);
         let mut near = 0;
         let mut rows: Vec<usize> = Vec::with_capacity(x.len() / stride);
         for (t, v) in x.iter().enumerate() {
-            near = if v.abs() > FAR * deviation { 0 } else { near + 1 };
+            near = if v.abs() > OUTLIER_LIMIT * deviation {
+                0
+            } else {
+                near + 1
+            };
             if near > p && t % stride == 0 {
                 rows.push(t);
             }
@@ -48,12 +52,12 @@ impl Autoregression {
             rows = (p..x.len()).step_by(stride).collect();
         }
         let mut found = Self {
-            a: least_squares(x, &rows, p, FLOOR * deviation)?,
+            a: least_squares(x, &rows, p, NOISE_FLOOR * deviation)?,
         };
         for _ in 1..ROUNDS {
             let all: Vec<f64> = rows.iter().map(|t| found.residual(x, *t)).collect();
             let scale = quantile(&mut all.iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.5) / 0.674_489_75;
-            let scale = scale.max(FLOOR * deviation);
+            let scale = scale.max(NOISE_FLOOR * deviation);
             let kept = rows
                 .iter()
                 .zip(&all)
@@ -62,7 +66,7 @@ impl Autoregression {
             if kept.len() < 5 * p {
                 break;
             }
-            found.a = least_squares(x, &kept, p, FLOOR * deviation)?;
+            found.a = least_squares(x, &kept, p, NOISE_FLOOR * deviation)?;
         }
         Some(found)
     }
@@ -109,7 +113,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn outliers_do_not_carry_the_fit() {
+    fn outliers_do_not_affect_the_fit() {
         let clean = autoregressive(4000, 3);
         let fit = |x: &[f64]| Autoregression::of(x, 3.0).unwrap().a;
         let good = fit(&clean);
@@ -125,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_short_or_constant_channel_has_none() {
+    fn short_and_constant_channels_give_no_autoregression() {
         assert!(Autoregression::of(&[1.0; 10], 1.0).is_none());
         assert!(Autoregression::of(&[0.0; 400], 0.0).is_none());
     }

@@ -11,8 +11,8 @@
 //! **Exchanged.** A person responds only after a delay of a tenth of a second or more; a controlled element responds
 //! immediately. The significance of lag j is the relative increase of the loss without it: for b_1,
 //! `R = (V_without - V)/V`. If e responds to u with a delay and u responds to e immediately, i.e. if `R` of u exceeds
-//! both [`IMMEDIATE_INCREASE`] and [`TIMES`] times `R` of e, input and output are exchanged. If neither responds
-//! immediately, nothing is reported.
+//! both [`IMMEDIATE_INCREASE`] and [`MIN_INCREASE_RATIO`] times `R` of e, input and output are exchanged. If neither
+//! responds immediately, nothing is reported.
 //!
 //! **Sign.** A person's response to an error initially has the sign of the error: `sum_j b_j` is positive. The sign is
 //! wrong if the sum is more than [`SIGNIFICANTLY_NEGATIVE`] standard errors below zero.
@@ -30,11 +30,11 @@ const OTHER_LAGS: usize = 12;
 /// Relative increase of the loss without the first lag above which a response is immediate.
 const IMMEDIATE_INCREASE: f64 = 0.1;
 /// For exchanged channels, minimum ratio of the increase of the loss for u to the increase for e.
-const TIMES: f64 = 20.0;
+const MIN_INCREASE_RATIO: f64 = 20.0;
 /// The sum of the coefficients `b_j` counts as negative if it is more than this number of standard errors below zero.
 const SIGNIFICANTLY_NEGATIVE: f64 = 4.0;
 /// Minimum number of blocks for a test.
-const FEWEST: usize = 200;
+const MIN_BLOCKS: usize = 200;
 
 /// Returns a wrong direction and its statistic: for exchanged channels the ratio of the increases of the loss, for a
 /// wrong sign the number of standard errors. `None` if no fault is found, or if the record is too short or its sample
@@ -46,12 +46,12 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     }
     let average = |x: &[f64]| -> Vec<f64> { x.chunks_exact(block).map(mean).collect() };
     let (e, u) = (average(record.input()), average(record.output()));
-    if e.len() < FEWEST {
+    if e.len() < MIN_BLOCKS {
         return None;
     }
     let of_output = CrossResponse::of(&u, &e)?;
     let of_input = CrossResponse::of(&e, &u)?;
-    if of_output.at_once > IMMEDIATE_INCREASE && of_output.at_once > TIMES * of_input.at_once {
+    if of_output.at_once > IMMEDIATE_INCREASE && of_output.at_once > MIN_INCREASE_RATIO * of_input.at_once {
         return Some((FaultKind::Exchanged, of_output.at_once / of_input.at_once));
     }
     (of_output.sum < -SIGNIFICANTLY_NEGATIVE).then_some((FaultKind::Sign, -of_output.sum))

@@ -1,12 +1,12 @@
 //! Stretches in which a channel is constant: frozen channels, dropouts and idle stretches.
 //!
 //! A *hold* is a run of equal values. A channel in full precision has no holds except at its largest or smallest value
-//! (a rail, which is treated separately), so [`FROZEN`] equal samples already count as frozen. A quantised channel or a
-//! resting hand has holds in normal operation. Such a hold is frozen if it lasts at least [`RESTING_S`] and [`LONGER`]
-//! times the length that nine of ten holds do not exceed, and if the other channel moves by more than half of its
-//! deviation in the meantime. Holds at the [rest](super::rest) of a stick are compared only with each other. A hold is
-//! a dropout if the channel jumps to its value and back, each time by more than twice the change that 999 of 1000
-//! changes do not exceed.
+//! (a rail, which is treated separately), so [`MIN_EQUAL_SAMPLES`] equal samples already count as frozen. A quantised
+//! channel or a resting hand has holds in normal operation. Such a hold is frozen if it lasts at least [`RESTING_S`]
+//! and [`MIN_RELATIVE_LENGTH`] times the length that nine of ten holds do not exceed, and if the other channel moves by
+//! more than half of its deviation in the meantime. Holds at the [rest](super::rest) of a stick are compared only with
+//! each other. A hold is a dropout if the channel jumps to its value and back, each time by more than twice the change
+//! that 999 of 1000 changes do not exceed.
 //!
 //! *Idle* is a stretch of [`IDLE_S`] or more in which both e and u stay within [`IDLE_RANGE`] of their deviations in
 //! each half second, such as before the start or after the end of a run. This does not happen while a person tracks,
@@ -20,9 +20,9 @@ use super::{
 };
 
 /// Number of successive equal samples from which a channel of full precision counts as frozen.
-const FROZEN: usize = 6;
+const MIN_EQUAL_SAMPLES: usize = 6;
 /// Minimum length of a frozen hold of a quantised channel, relative to the length that nine of ten holds do not exceed.
-const LONGER: f64 = 20.0;
+const MIN_RELATIVE_LENGTH: f64 = 20.0;
 /// Minimum duration of a frozen hold of a quantised channel, s.
 const RESTING_S: f64 = 3.0;
 /// Shortest idle stretch, s.
@@ -60,11 +60,11 @@ pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) 
     let mut changes: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let large = 2.0 * quantile(&mut changes, 0.999);
     let deviation_of_other = other.map(|o| level_and_deviation(o).1);
-    let longest = |typical: f64| ((RESTING_S / sample_time_s) as usize).max((LONGER * typical) as usize);
-    let in_use = if in_steps { longest(typical) } else { FROZEN };
+    let longest = |typical: f64| ((RESTING_S / sample_time_s) as usize).max((MIN_RELATIVE_LENGTH * typical) as usize);
+    let in_use = if in_steps { longest(typical) } else { MIN_EQUAL_SAMPLES };
     let at_rest = rest.map_or(in_use, |rest| longest(rest.typical_samples));
     let is_fault = |run: &Range<usize>| -> Option<Hold> {
-        if run.len() < FROZEN {
+        if run.len() < MIN_EQUAL_SAMPLES {
             return None;
         }
         let held = values[run.start];
@@ -146,7 +146,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn a_frozen_channel_in_full_precision_and_in_steps() {
+    fn frozen_channels_are_found_with_and_without_quantisation() {
         let (e, u) = (autoregressive(4000, 1), autoregressive(4000, 2));
         assert!(frozen(&u, Some(&e), 0.01).is_empty());
         let mut held = u.clone();
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stick_in_its_dead_zone_is_not_frozen() {
+    fn stick_in_its_dead_zone_is_not_frozen() {
         let e = autoregressive(9000, 1);
         let zone = |v: &f64| v - v.clamp(-4.0, 4.0);
         // Slow, like a hand.
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn a_dropout_is_a_hold_with_jumps() {
+    fn dropout_is_a_hold_with_jumps() {
         let mut u: Vec<f64> = autoregressive(4000, 2).iter().map(|v| v + 40.0).collect();
         u[700..740].fill(0.0);
         let found = frozen(&u, None, 0.01);
@@ -198,13 +198,13 @@ mod tests {
     }
 
     #[test]
-    fn a_rail_is_another_matter() {
+    fn saturation_is_not_reported_as_frozen() {
         let u: Vec<f64> = autoregressive(4000, 2).iter().map(|v| v.clamp(-3.0, 3.0)).collect();
         assert!(frozen(&u, None, 0.01).is_empty());
     }
 
     #[test]
-    fn what_comes_before_a_run() {
+    fn idle_span_before_a_run_is_found() {
         let mut state = 5_u64;
         let mut small = || {
             state = state

@@ -103,7 +103,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn no_other_values_leave_a_smaller_sum_of_squares() {
+    fn interpolated_values_minimise_the_sum_of_squares() {
         let x = autoregressive(600, 5);
         let ar = Autoregression::of(&x, 3.0).unwrap();
         for (start, m) in [(300, 1), (300, 4), (3, 3), (596, 4)] {

@@ -8,14 +8,14 @@
 //! apart are a spike; for a known modulus they are a turn there and back, and unwrapping repairs the channel in either
 //! case.
 //!
-//! **Step.** At a large change, the medians of [`SPAN_S`] before and after differ by more than [`STEPPED`] times the
+//! **Step.** At a large change, the medians of [`SPAN_S`] before and after differ by more than [`MIN_STEP`] times the
 //! larger deviation within the two spans, and by more than four fifths of the change: the person has not compensated
 //! for the change, as they would for a step of the target.
 //!
 //! **Scale.** In one second the deviation from the level exceeds the median of this deviation over all seconds by the
-//! factor [`UNITS`]. For a stick with a [rest](super::rest) only the samples away from the rest count. No person
+//! factor [`UNIT_FACTOR`]. For a stick with a [rest](super::rest) only the samples away from the rest count. No person
 //! increases a signal by this factor from one second to the next. The edges of the stretch are its outermost samples
-//! beyond [`OUTSIDE`] deviations of the remaining samples.
+//! beyond [`OUTLIER_LIMIT`] deviations of the remaining samples.
 
 use std::{f64::consts::PI, ops::Range};
 
@@ -28,11 +28,11 @@ const LARGE: f64 = 6.0;
 /// Length of the spans before and after a step, s.
 const SPAN_S: f64 = 5.0;
 /// Minimum size of a step, relative to the larger deviation in the two spans.
-const STEPPED: f64 = 6.0;
+const MIN_STEP: f64 = 6.0;
 /// A second is in another unit if its deviation exceeds the typical deviation by more than this factor.
-const UNITS: f64 = 100.0;
+const UNIT_FACTOR: f64 = 100.0;
 /// A sample belongs to a stretch in another unit if it exceeds this number of deviations of the remaining samples.
-const OUTSIDE: f64 = 15.0;
+const OUTLIER_LIMIT: f64 = 15.0;
 const MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
 /// Number of large changes of the same size from which this size is taken as an unknown modulus.
 const MIN_AGREEING_CHANGES: usize = 4;
@@ -115,7 +115,7 @@ pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)
         let (before, one) = level_and_deviation(&values[t - span..t]);
         let (after, other) = level_and_deviation(&values[t..t + span]);
         let (shift, noise) = (after - before, one.max(other));
-        if shift * change > 0.0 && shift.abs() > STEPPED * noise && shift.abs() > 0.8 * change.abs() {
+        if shift * change > 0.0 && shift.abs() > MIN_STEP * noise && shift.abs() > 0.8 * change.abs() {
             found.push((t, shift, shift.abs() / noise.max(f64::MIN_POSITIVE)));
         }
     }
@@ -148,7 +148,7 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
     }
     let mut all: Vec<(Range<usize>, f64)> = Vec::new();
     for (k, size) in sizes.iter().enumerate() {
-        if *size <= UNITS * typical {
+        if *size <= UNIT_FACTOR * typical {
             continue;
         }
         let rows = k * block..((k + 1) * block).min(n);
@@ -162,7 +162,7 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
     }
     let inside = |t: usize| all.iter().any(|(rows, _)| rows.contains(&t));
     let rest: Vec<f64> = (0..n).filter(|t| !inside(*t)).map(|t| values[t]).collect();
-    let limit = OUTSIDE * level_and_deviation(&rest).1;
+    let limit = OUTLIER_LIMIT * level_and_deviation(&rest).1;
     let outside = |t: usize| (values[t] - level).abs() > limit;
     // A single sample of a stretch in another unit may be small, but not ten in a row.
     let last_outside = |mut rows: Box<dyn Iterator<Item = usize>>| {
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn seconds_in_a_dead_zone_and_out_of_it_are_in_one_unit() {
+    fn dead_zone_is_not_reported_as_a_change_of_scale() {
         let zone = |v: &f64| v - v.clamp(-4.0, 4.0);
         let u: Vec<f64> = channel(4).iter().map(zone).collect();
         let at_rest = u.iter().filter(|v| **v == 0.0).count();
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn a_good_channel_has_none_of_them() {
+    fn clean_channel_has_no_wraps_steps_or_scale_changes() {
         for seed in 1..8 {
             let x = channel(seed);
             assert!(wrap(&x, 0.01).is_none() && steps(&x, 0.01).is_empty() && scales(&x, 0.01).is_empty());
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn an_angle_is_unwrapped() {
+    fn wrapped_angle_is_unwrapped() {
         let x: Vec<f64> = channel(4).iter().map(|v| 5.0 * v + 132.0).collect();
         let wrapped: Vec<f64> = x.iter().map(|v| (v + 180.0).rem_euclid(360.0) - 180.0).collect();
         let found = wrap(&wrapped, 0.01).unwrap();
@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_that_stays_and_a_pulse() {
+    fn permanent_step_is_found_and_pulse_is_not() {
         let mut x = channel(3);
         x[3000..].iter_mut().for_each(|v| *v += 80.0);
         let found = steps(&x, 0.01);
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn another_unit_for_a_while() {
+    fn temporary_scale_change_is_found() {
         let mut x = channel(6);
         x[2030..4777].iter_mut().for_each(|v| *v *= 1e6);
         let found = scales(&x, 0.01);

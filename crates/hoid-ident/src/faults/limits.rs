@@ -5,4 +5,4 @@ pub const BRIDGED_S: f64 = 0.1;
 /// Shortest segment between two cuts that is used, s.
 pub const SHORTEST_S: f64 = 2.0;
 /// Share of spikes in a channel above which no spike is bridged.
-pub const MOST_SPIKES: f64 = 0.05;
+pub const MAX_SPIKE_SHARE: f64 = 0.05;

@@ -24,7 +24,7 @@
 //!
 //! [`repair`] inspects a record and follows [`FaultHandling`](hoid_model::FaultHandling). By default it bridges faults
 //! of up to [`BRIDGED_S`], cuts the record at longer faults, and returns each segment of [`SHORTEST_S`] or more as a
-//! record. If more than [`MOST_SPIKES`] of the samples of a channel are spikes, they are reported and not bridged,
+//! record. If more than [`MAX_SPIKE_SHARE`] of the samples of a channel are spikes, they are reported and not bridged,
 //! because so many spikes contradict the assumptions about the channel.
 
 mod autoregression;
@@ -45,7 +45,7 @@ mod test_signals;
 #[cfg(test)]
 mod tests;
 
-pub use limits::{BRIDGED_S, MOST_SPIKES, SHORTEST_S};
+pub use limits::{BRIDGED_S, MAX_SPIKE_SHARE, SHORTEST_S};
 pub use repairing::{RepairedRecord, SLOWEST_S, repair};
 pub use resistant::{held, resistant};
 pub use rest::Rest;

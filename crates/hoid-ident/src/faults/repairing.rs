@@ -6,7 +6,7 @@ use hoid_model::{Channel, Fault, FaultAction, FaultHandling, FaultKind, Finding,
 
 use super::{
     direction::wrong_direction,
-    limits::{MOST_SPIKES, SHORTEST_S},
+    limits::{MAX_SPIKE_SHARE, SHORTEST_S},
     search::{FaultSpan, search},
     spikes,
 };
@@ -137,7 +137,7 @@ fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
         let mut values = channel.values.clone();
         let found = spikes::find(&mut values, ts);
         let samples: usize = found.iter().map(|spike| spike.samples.len()).sum();
-        let few = samples as f64 <= (MOST_SPIKES * values.len() as f64).max(3.0);
+        let few = samples as f64 <= (MAX_SPIKE_SHARE * values.len() as f64).max(3.0);
         if few {
             channel.values = values;
         }

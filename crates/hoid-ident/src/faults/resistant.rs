@@ -14,7 +14,7 @@ use std::{cmp::Ordering, collections::BinaryHeap};
 use hoid_model::Record;
 
 use super::{
-    autoregression::{Autoregression, FLOOR},
+    autoregression::{Autoregression, NOISE_FLOOR},
     robust::{level_and_deviation, quantum},
     spikes::scales,
 };
@@ -39,7 +39,7 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     let mut eps = ar.residuals(&x);
     let norm = ar.norm();
     let window = ((1.0 / sample_time_s) as usize).clamp(64, 4096);
-    let sigma = scales(&eps, window, (FLOOR * deviation).max(quantum(values)) * norm);
+    let sigma = scales(&eps, window, (NOISE_FLOOR * deviation).max(quantum(values)) * norm);
     let (p, n) = (ar.order(), x.len());
     let error =
         |eps: &[f64], t: usize| -> f64 { ar.a.iter().zip(&eps[t..]).map(|(a, e)| a * e).sum::<f64>() / (norm * norm) };
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_sample_brings_is_bounded() {
+    fn influence_of_one_sample_is_bounded() {
         let clean = autoregressive(3000, 21);
         let mut held = Vec::new();
         for size in [10.0, 1e3, 1e5] {

@@ -77,7 +77,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn a_dead_zone_and_pulses_rest_and_other_channels_do_not() {
+    fn rest_is_found_only_in_dead_zones_and_pulses() {
         let u = autoregressive(6000, 3);
         assert_eq!(Rest::of(&u), None);
         let zone = |width: f64| -> Vec<f64> { u.iter().map(|v| v - v.clamp(-width, width)).collect() };

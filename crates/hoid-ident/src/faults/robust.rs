@@ -52,7 +52,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn scales_of_a_normal_a_resting_and_a_constant_channel() {
+    fn robust_scale_of_normal_resting_and_constant_channels() {
         let normal: Vec<f64> = autoregressive(4000, 9)
             .windows(3)
             .map(|w| w[2] - 1.6 * w[1] + 0.8 * w[0] + 3.0)

@@ -10,12 +10,12 @@ use hoid_model::{FaultAction, FaultKind};
 
 use super::{
     holds, levels,
-    limits::{BRIDGED_S, MOST_SPIKES},
+    limits::{BRIDGED_S, MAX_SPIKE_SHARE},
     spikes,
 };
 
 /// Minimum length of a stretch between long faults for it to be searched for spikes and steps, samples.
-const FEWEST: usize = 100;
+const MIN_LENGTH: usize = 100;
 
 /// A fault and the affected samples.
 #[derive(Debug, Clone, PartialEq)]
@@ -87,7 +87,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultS
             }));
         }
         let total: usize = of_channel.iter().map(|place| place.samples.len()).sum();
-        let too_many = total as f64 > (MOST_SPIKES * n as f64).max(3.0);
+        let too_many = total as f64 > (MAX_SPIKE_SHARE * n as f64).max(3.0);
         if cut || too_many {
             *values = before;
         }
@@ -158,7 +158,7 @@ fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     all
 }
 
-/// Returns the stretches of at least [`FEWEST`] samples outside long faults (`out`).
+/// Returns the stretches of at least [`MIN_LENGTH`] samples outside long faults (`out`).
 fn stretches(out: &[bool]) -> Vec<Range<usize>> {
     let mut all: Vec<Range<usize>> = Vec::new();
     for t in (0..out.len()).filter(|t| !out[*t]) {
@@ -167,6 +167,6 @@ fn stretches(out: &[bool]) -> Vec<Range<usize>> {
             _ => all.push(t..t + 1),
         }
     }
-    all.retain(|stretch| stretch.len() >= FEWEST);
+    all.retain(|stretch| stretch.len() >= MIN_LENGTH);
     all
 }

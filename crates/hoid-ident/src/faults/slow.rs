@@ -15,12 +15,12 @@ use hoid_model::{Detrend, Record};
 /// Period above which a component is slow for a person, s.
 pub const PERIOD_S: f64 = 20.0;
 /// Largest number of cosines that are removed; it limits the computing time for long records.
-const MOST: usize = 64;
+const MAX_COSINES: usize = 64;
 
 /// Returns the records without components slower than `period_s`; `None` if all records are too short for such
 /// components.
 pub fn without_slow(records: &[Record], period_s: f64) -> Option<Vec<Record>> {
-    let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MOST);
+    let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MAX_COSINES);
     records.iter().any(|r| count(r) > 0).then(|| {
         let each = records.iter().map(|record| {
             let flat = record.clone().detrended(Detrend::Linear);
@@ -59,8 +59,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_slow_goes_and_what_is_fast_stays() {
-        let gone = |e: &dyn Fn(f64) -> f64| {
+    fn slow_components_are_removed_and_fast_ones_kept() {
+        let remaining = |e: &dyn Fn(f64) -> f64| {
             let before = record(8000, e);
             let after = &without_slow(std::slice::from_ref(&before), PERIOD_S).unwrap()[0];
             // u is .3 e before and after.
@@ -68,18 +68,18 @@ mod tests {
             assert!(same.clone().all(|(e, u)| (0.3 * e - u).abs() < 1e-9));
             root_mean_square(after.input()) / root_mean_square(before.input())
         };
-        assert!(gone(&|t| 3.0 + 0.2 * t) < 1e-9);
-        assert!(gone(&|t| (2.0 * PI * t / 60.0).sin()) < 0.1);
+        assert!(remaining(&|t| 3.0 + 0.2 * t) < 1e-9);
+        assert!(remaining(&|t| (2.0 * PI * t / 60.0).sin()) < 0.1);
         // A step keeps its edge.
-        assert!(gone(&|t| f64::from(u8::from(t > 31.0))) < 0.25);
+        assert!(remaining(&|t| f64::from(u8::from(t > 31.0))) < 0.25);
         for period in [10.0, 2.0, 0.5] {
-            let left = gone(&|t| (2.0 * PI * t / period + 0.3).sin());
+            let left = remaining(&|t| (2.0 * PI * t / period + 0.3).sin());
             assert!((left - 1.0).abs() < 0.05, "{period} s: {left}");
         }
     }
 
     #[test]
-    fn a_short_record_has_nothing_slow() {
+    fn short_records_give_no_result() {
         assert!(without_slow(&[record(900, f64::sin)], PERIOD_S).is_none());
         assert!(without_slow(&[], PERIOD_S).is_none());
     }

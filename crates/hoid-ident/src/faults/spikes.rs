@@ -13,13 +13,14 @@
 //!
 //! Each explanation has m unknowns. The faulty samples are the smallest set whose interpolation
 //!
-//! 1. reduces the sum by more than [`LARGE`]^2, which happens once in 1e15 samples for normal innovations;
+//! 1. reduces the sum by more than [`ROOT_OF_MIN_REDUCTION`]^2, which happens once in 1e15 samples for normal
+//!    innovations;
 //! 2. leaves less of the sum than m pushes leave, by more than [`ROOT_OF_MIN_ADVANTAGE`]^2; the advantage is also more
-//!    than [`PART`] of the reduction, or the pushes leave more than [`MIN_SUM_RATIO`] times as much (several faulty
-//!    samples of a smooth channel give a few more large innovations than there are pushes, and their squares make up
-//!    nearly all of S);
+//!    than [`MIN_ADVANTAGE_SHARE`] of the reduction, or the pushes leave more than [`MIN_SUM_RATIO`] times as much
+//!    (several faulty samples of a smooth channel give a few more large innovations than there are pushes, and their
+//!    squares make up nearly all of S);
 //! 3. leaves no innovation beyond [`LARGEST_INNOVATION`] sigma (or at most a twentieth of S);
-//! 4. moves a sample by more than [`SMALLEST`] deviations of the channel, and by more than two of its quantisation
+//! 4. moves a sample by more than [`MIN_CHANGE`] deviations of the channel, and by more than two of its quantisation
 //!    steps.
 //!
 //! The first samples of a record are searched in reversed time, where they are the last samples: a Gaussian
@@ -34,26 +35,26 @@
 use std::ops::Range;
 
 use super::{
-    autoregression::{Autoregression, FLOOR},
+    autoregression::{Autoregression, NOISE_FLOOR},
     interpolation::{Interpolation, apply},
     robust::{level_and_deviation, median, quantum},
 };
 
 /// Square root of the minimum reduction of S.
-const LARGE: f64 = 8.0;
+const ROOT_OF_MIN_REDUCTION: f64 = 8.0;
 /// Square root of the minimum advantage of faults over pushes in S.
 const ROOT_OF_MIN_ADVANTAGE: f64 = 5.0;
 /// Minimum advantage of faults over pushes, as a share of the reduction of S by interpolation.
-const PART: f64 = 0.2;
+const MIN_ADVANTAGE_SHARE: f64 = 0.2;
 /// Minimum ratio of the sum that pushes leave to the sum that faults (or noise alone) leave. It applies if the
-/// advantage of faults is less than the share [`PART`].
+/// advantage of faults is less than the share [`MIN_ADVANTAGE_SHARE`].
 const MIN_SUM_RATIO: f64 = 20.0;
 /// Largest innovation that may remain after interpolation, as a multiple of sigma.
 const LARGEST_INNOVATION: f64 = 5.0;
 /// Innovation at which a search for a fault starts, as a multiple of sigma.
 const SEED: f64 = 4.0;
 /// Minimum change of a faulty sample by interpolation, relative to the deviation of the channel.
-const SMALLEST: f64 = 1.5;
+const MIN_CHANGE: f64 = 1.5;
 /// Deviation that no person reaches within a few samples, in robust deviations of the channel.
 const IMPOSSIBLE_DEVIATION: f64 = 20.0;
 const ROUNDS: usize = 4;
@@ -82,11 +83,11 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
             break;
         };
         let mut eps = ar.residuals(&x);
-        let sigma = scales(&eps, window, (FLOOR * deviation).max(step) * ar.norm());
+        let sigma = scales(&eps, window, (NOISE_FLOOR * deviation).max(step) * ar.norm());
         let search = Search {
             ar: &ar,
             sigma: &sigma,
-            smallest: (SMALLEST * deviation).max(2.0 * step),
+            smallest: (MIN_CHANGE * deviation).max(2.0 * step),
             deviation,
             longest,
             reach: reach(&ar),
@@ -217,7 +218,7 @@ impl Search<'_> {
         let all = Interpolation::new(self.ar, eps, start, self.longest);
         for m in 1..=all.most() {
             let fall = all.fall(m) / (sigma * sigma);
-            if fall < LARGE * LARGE {
+            if fall < ROOT_OF_MIN_REDUCTION * ROOT_OF_MIN_REDUCTION {
                 continue;
             }
             let rows = start..(start + m + self.reach).min(eps.len());
@@ -241,8 +242,9 @@ impl Search<'_> {
             let largest = left.iter().copied().fold(0.0, f64::max);
             let clean = largest <= LARGEST_INNOVATION * LARGEST_INNOVATION || left_by_faults <= 0.05 * total;
             let decisive = left_by_pushes > MIN_SUM_RATIO * left_by_faults.max(left.len() as f64);
-            let is_fault =
-                clean && better > ROOT_OF_MIN_ADVANTAGE * ROOT_OF_MIN_ADVANTAGE && (better > PART * fall || decisive);
+            let is_fault = clean
+                && better > ROOT_OF_MIN_ADVANTAGE * ROOT_OF_MIN_ADVANTAGE
+                && (better > MIN_ADVANTAGE_SHARE * fall || decisive);
             let worst = |k: usize| x[start + k].abs();
             let is_wild = m <= 3
                 && (0..m).all(|k| worst(k) > IMPOSSIBLE_DEVIATION * self.deviation)
@@ -297,7 +299,7 @@ mod tests {
     use super::{super::test_signals::autoregressive, *};
 
     #[test]
-    fn a_fault_is_found_and_a_push_is_not() {
+    fn spike_is_found_and_response_to_a_push_is_not() {
         let clean = autoregressive(4000, 11);
         assert!(find(&mut clean.clone(), 0.01).is_empty());
         let mut faulty = clean.clone();
@@ -319,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn patches_ends_and_neighbours() {
+    fn adjacent_and_boundary_spikes_are_found() {
         let clean = autoregressive(3000, 2);
         for places in [&[5_usize, 6, 7][..], &[2999], &[0], &[1000, 1004], &[1500, 1514, 1530]] {
             let mut faulty = clean.clone();
@@ -334,14 +336,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_to_look_at_is_no_fault() {
+    fn empty_constant_and_short_channels_have_no_spikes() {
         assert!(find(&mut [], 0.01).is_empty());
         assert!(find(&mut [1.0; 500], 0.01).is_empty());
         assert!(find(&mut [1.0, 2.0, 3.0], 0.01).is_empty());
     }
 
     #[test]
-    fn a_bridge_is_what_the_others_say() {
+    fn bridge_is_the_conditional_expectation() {
         let clean = autoregressive(2000, 8);
         let mut broken = clean.clone();
         broken[700..705].fill(1e3);

@@ -36,7 +36,7 @@ fn kinds(found: &[Fault]) -> Vec<FaultKind> {
 }
 
 #[test]
-fn clean_runs_have_no_faults_and_stay_as_they_are() {
+fn clean_runs_have_no_faults_and_are_unchanged() {
     for condition in Condition::ALL {
         let record = run(condition, 17);
         let found = repaired(&record);
@@ -63,7 +63,7 @@ fn clean_runs_have_no_faults_and_stay_as_they_are() {
 }
 
 #[test]
-fn bursts_of_few_samples_are_found_whatever_their_signs() {
+fn short_bursts_of_any_sign_are_found() {
     for signs in [&[-1.0, 1.0][..], &[1.0, 1.0], &[1.0, -1.0, 1.0, 1.0, -1.0], &[1.0; 8]] {
         for place in [490, 4000] {
             let clean = run(Condition::C1, 5);
@@ -82,7 +82,7 @@ fn bursts_of_few_samples_are_found_whatever_their_signs() {
 }
 
 #[test]
-fn one_sample_of_the_error_is_found_and_bridged() {
+fn spike_of_the_error_is_found_and_bridged() {
     for (condition, place) in [(Condition::C1, 4000), (Condition::C3, 700), (Condition::C6, 7000)] {
         let clean = run(condition, 5);
         let record = with(&clean, |e, _| e[place] = 30.0);
@@ -95,9 +95,9 @@ fn one_sample_of_the_error_is_found_and_bridged() {
         assert!((found.segments[0].input()[place] - clean.input()[place]).abs() < 0.05);
         assert_eq!(found.findings[0].severity, Severity::Note);
         // The faults are reported and not repaired.
-        let told = repair(&record, FaultHandling::Report).unwrap();
-        assert_eq!(told.segments[0].input(), record.input());
-        assert_eq!(told.findings[0].severity, Severity::Doubt);
+        let reported = repair(&record, FaultHandling::Report).unwrap();
+        assert_eq!(reported.segments[0].input(), record.input());
+        assert_eq!(reported.findings[0].severity, Severity::Doubt);
         assert!(repair(&record, FaultHandling::Keep).unwrap().faults.is_empty());
         let cut = repair(&record, FaultHandling::Cut).unwrap();
         assert_eq!((cut.segments.len(), cut.faults[0].action), (2, FaultAction::Cut));
@@ -106,7 +106,7 @@ fn one_sample_of_the_error_is_found_and_bridged() {
 }
 
 #[test]
-fn a_spike_of_the_output_too() {
+fn spike_of_the_output_is_found() {
     let clean = run(Condition::C1, 9);
     let deviation = (clean.output().iter().map(|u| u * u).sum::<f64>() / clean.len() as f64).sqrt();
     let found = repaired(&with(&clean, |_, u| u[3000] += 10.0 * deviation));
@@ -115,7 +115,7 @@ fn a_spike_of_the_output_too() {
 }
 
 #[test]
-fn rest_before_a_run_is_cut() {
+fn idle_span_before_a_run_is_cut() {
     let clean = run(Condition::C1, 3);
     let record = with(&clean, |e, u| {
         e.splice(0..0, vec![0.0; 1500]);
@@ -129,7 +129,7 @@ fn rest_before_a_run_is_cut() {
 }
 
 #[test]
-fn a_frozen_output_other_units_and_a_step_cut_the_record() {
+fn frozen_output_scale_change_and_step_cut_the_record() {
     let clean = run(Condition::C1, 4);
     let frozen = repaired(&with(&clean, |_, u| {
         let held = u[2000];
@@ -174,7 +174,7 @@ fn time_in_milliseconds_is_not_determined() {
 }
 
 #[test]
-fn nothing_usable_is_said() {
+fn unusable_record_is_undetermined() {
     let ts = SampleTime::new(0.01).unwrap();
     let active = |t: usize| t % 300 < 100;
     let bursts = |seed| -> Vec<f64> {
@@ -197,7 +197,7 @@ fn nothing_usable_is_said() {
 }
 
 #[test]
-fn an_output_alone_and_a_record_too_short() {
+fn output_only_and_short_records_are_accepted() {
     let ts = SampleTime::new(0.01).unwrap();
     let mut u = super::test_signals::autoregressive(3000, 3);
     u[1000] += 50.0;
@@ -208,7 +208,7 @@ fn an_output_alone_and_a_record_too_short() {
 }
 
 #[test]
-fn exchanged_channels_and_a_wrong_sign() {
+fn exchanged_channels_and_wrong_sign_are_found() {
     let exchanged = |r: &Record| with(r, std::mem::swap);
     let turned = |r: &Record| with(r, |_, u| u.iter_mut().for_each(|v| *v = -*v));
     let (population, task) = (Population::default(), Task::default());
@@ -226,7 +226,7 @@ fn exchanged_channels_and_a_wrong_sign() {
 }
 
 #[test]
-fn a_spike_of_the_excitation_is_bridged_and_a_clean_one_is_left_alone() {
+fn only_a_faulty_excitation_is_bridged() {
     for condition in [Condition::C1, Condition::C2, Condition::C4] {
         let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();

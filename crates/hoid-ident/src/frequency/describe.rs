@@ -14,7 +14,7 @@ use crate::{IdentError, informative_data::common_sample_time};
 
 /// Amplitude of a line, relative to the root sum of squares of all coefficients of its channel, up to which it is only
 /// rounding.
-const LEAST_LINE: f64 = 1e-12;
+const MIN_LINE_AMPLITUDE: f64 = 1e-12;
 
 /// Number of bins at non-excited frequencies from which the remnant at a line is estimated.
 const NEIGHBOURS: usize = 8;
@@ -298,7 +298,7 @@ impl Run {
             let whole: f64 = x.iter().map(|c| c.norm_sqr()).sum();
             for (n, omega_rad_s) in excitation.harmonics().iter().zip(excitation.omega_rad_s()) {
                 let size = x[n * self.window.periods].norm();
-                if size.is_nan() || size <= LEAST_LINE * whole.sqrt() {
+                if size.is_nan() || size <= MIN_LINE_AMPLITUDE * whole.sqrt() {
                     return Err(IdentError::NoLinePower {
                         channel: name.to_owned(),
                         label: self.label.clone(),
@@ -376,11 +376,11 @@ fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
         let periods = run.window.periods;
         let is_line = |k: usize| k.is_multiple_of(periods) && harmonics.binary_search(&(k / periods)).is_ok();
         let at = line.harmonic * periods;
-        let mut beside: Vec<usize> = (1..run.e.len()).filter(|&k| !is_line(k)).collect();
-        beside.sort_by_key(|k| k.abs_diff(at));
-        beside.truncate(NEIGHBOURS);
+        let mut nearby_bins: Vec<usize> = (1..run.e.len()).filter(|&k| !is_line(k)).collect();
+        nearby_bins.sort_by_key(|k| k.abs_diff(at));
+        nearby_bins.truncate(NEIGHBOURS);
         let power = |k: &usize| (run.u[*k] - line.response * run.e[*k]).norm_sqr();
-        let mean = beside.iter().map(power).sum::<f64>() / beside.len() as f64;
+        let mean = nearby_bins.iter().map(power).sum::<f64>() / nearby_bins.len() as f64;
         // Squared modulus of the weight of the run in the average, such as |D_i|^2.
         let d = b.norm_sqr() / run.e[at].norm_sqr();
         squares += d * mean;

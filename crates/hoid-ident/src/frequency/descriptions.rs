@@ -68,7 +68,7 @@ fn record(samples: usize, e: impl Fn(usize) -> f64, u: impl Fn(usize) -> f64) ->
 }
 
 #[test]
-fn several_runs_are_described_by_default() {
+fn defaults_describe_several_runs() {
     let (records, element) = (runs(5), element());
     let options = DescriptionOptions {
         controlled_element: Some(element.clone()),
@@ -112,7 +112,7 @@ fn several_runs_are_described_by_default() {
 }
 
 #[test]
-fn one_run_is_doubtful_and_says_why() {
+fn single_run_is_doubtful_with_a_reason() {
     let records = runs(1);
     let found = describe_runs(&records, &DescriptionOptions::default()).unwrap();
     assert_eq!((found.realisation, found.function.runs.len()), (Realisation::Record, 1));
@@ -142,7 +142,7 @@ fn one_run_is_doubtful_and_says_why() {
 }
 
 #[test]
-fn a_person_who_does_not_follow_is_not_described() {
+fn unrelated_runs_are_not_determined() {
     let options = DescriptionOptions::default();
     // By chance 1 in 20 sets of unrelated runs is not reported as unrelated; for 400 sets of two periods the standard
     // error is 0.011.
@@ -173,7 +173,7 @@ fn a_person_who_does_not_follow_is_not_described() {
 }
 
 #[test]
-fn the_loop_is_doubted_where_it_says_nothing() {
+fn crossover_outside_the_measured_lines_is_doubtful() {
     let rough: Vec<Vec<f64>> = (0..4).map(|i| noise(50 + i, PERIOD)).collect();
     let runs: Vec<Record> = rough
         .iter()
@@ -203,7 +203,7 @@ fn the_loop_is_doubted_where_it_says_nothing() {
 }
 
 #[test]
-fn what_is_wrong_with_the_signals_is_found() {
+fn faults_of_the_excitation_are_reported() {
     let rough = noise(7, 4 * PERIOD);
     let of = |samples| record(samples, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
     // A measured disturbance with noise: its share of the power is 0.0025 of 2.5025.
@@ -249,7 +249,7 @@ fn what_is_wrong_with_the_signals_is_found() {
 }
 
 #[test]
-fn what_cannot_be_described_is_refused() {
+fn invalid_requests_are_refused() {
     let options = DescriptionOptions::default();
     assert!(matches!(describe_runs(&[], &options), Err(IdentError::NoRecords)));
     let message =

@@ -162,17 +162,19 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
         at.join(", ")
     );
     let crossover = found.in_loop.and_then(|(_, m)| m.crossover_rad_s);
-    let beside = |k: &usize| {
+    let is_next_to_crossover = |k: &usize| {
         crossover.is_some_and(|c| {
             let above = lines.partition_point(|line| line.omega_rad_s <= c.value);
             *k == above || *k + 1 == above
         })
     };
-    Some(if 2 * low.len() >= lines.len() || low.iter().any(beside) {
-        Finding::doubt("low-coherence", words)
-    } else {
-        Finding::note("low-coherence", words)
-    })
+    Some(
+        if 2 * low.len() >= lines.len() || low.iter().any(is_next_to_crossover) {
+            Finding::doubt("low-coherence", words)
+        } else {
+            Finding::note("low-coherence", words)
+        },
+    )
 }
 
 fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
@@ -260,7 +262,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coherence_by_chance_is_what_the_distribution_says() {
+    fn chance_coherence_matches_its_distribution() {
         assert_eq!(chance_coherence(1), None);
         assert!((chance_coherence(2).unwrap() - 0.95).abs() < 1e-15);
         let ten = chance_coherence(10).unwrap();

@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_found_where_the_forcing_function_has_them() {
+    fn lines_of_the_forcing_function_are_found() {
         let given = Excitation::of_forcing_function(&ForcingFunction::reference(), 81.92).unwrap();
         assert_eq!(given.harmonics(), [3, 5, 8, 13, 22, 34, 53, 86, 139, 229]);
         for (samples, noise) in [(8192, 0.0), (16384, 0.0), (8192, 0.02)] {
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_span_that_leaks_is_refused() {
+    fn span_with_leakage_is_refused() {
         for samples in [4096, 8000, 8150] {
             let refused = Excitation::found_in(&reference(samples, 0.0), "e", &LineSearch::default());
             assert!(
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_lines_is_refused() {
+    fn signals_and_lists_without_lines_are_refused() {
         let search = LineSearch::default();
         assert!(matches!(
             Excitation::found_in(&record(vec![2.5; 100]), "e", &search),

@@ -76,7 +76,7 @@ const STEPS_PER_TURN: f64 = 40.0;
 /// Number of golden section steps, each of which multiplies the bracket by 0.618: from a fortieth of a turn down to the
 /// rounding errors of the criterion.
 const REFINEMENTS: usize = 60;
-const MOST_STEPS: f64 = 1e5;
+const MAX_STEPS: f64 = 1e5;
 
 /// The best K and K T_L for one delay, and the criterion for them.
 #[derive(Clone, Copy)]
@@ -98,13 +98,13 @@ impl DescribingFunction {
         let omega: Vec<f64> = self.lines.iter().map(|l| l.omega_rad_s).collect();
         let highest = omega.iter().copied().fold(0.0, f64::max);
         let steps = (longest - shortest) * highest / TAU * STEPS_PER_TURN;
-        if !(shortest < longest && steps < MOST_STEPS && shortest.is_finite()) {
+        if !(shortest < longest && steps < MAX_STEPS && shortest.is_finite()) {
             return refuse(
                 "the range of delays in s",
                 format!("{shortest} to {longest}"),
                 format!(
                     "two finite numbers in ascending order, at most {:.0} s apart",
-                    MOST_STEPS * TAU / (STEPS_PER_TURN * highest)
+                    MAX_STEPS * TAU / (STEPS_PER_TURN * highest)
                 ),
             );
         }
@@ -240,7 +240,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_model_is_returned() {
+    fn exact_gain_lead_and_delay_are_recovered() {
         let omega: Vec<f64> = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0].map(|n| n * TAU / 20.0).to_vec();
         let weights = [1.0, 0.9, 0.8, 0.7, 0.4, 0.3, 0.2];
         for (gain, lead, delay) in [(6.9, 0.31, 0.28), (-2.0, 0.0, 0.05), (1.5, -0.4, 0.6)] {

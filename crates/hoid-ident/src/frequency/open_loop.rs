@@ -233,7 +233,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_straight_line_is_crossed_where_it_is() {
+    fn crossover_of_a_log_linear_response_is_exact() {
         // k/s with a phase that is linear over log omega, for which the interpolation is exact.
         let omega: [f64; 4] = [0.3, 1.0, 4.0, 11.0];
         let phase = |w: f64| -100.0 - 30.0 * w.ln();
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_that_is_known_bends_nothing() {
+    fn known_delay_makes_the_interpolation_exact() {
         let omega = [0.7, 3.0, 9.0];
         let response: Vec<Complex64> = omega
             .iter()
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn the_gain_margin_is_where_the_phase_falls_through_the_negative_axis() {
+    fn gain_margin_is_taken_where_the_phase_falls_below_minus_180() {
         // 4/s with a delay of 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
         let omega = [0.7, 3.0, 9.0, 14.0];
         let response: Vec<Complex64> = omega
@@ -289,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn no_crossover_is_none() {
+    fn missing_crossover_gives_none() {
         let omega = [1.0, 2.0];
         let small = [Complex64::new(0.5, 0.0), Complex64::new(0.1, 0.0)];
         assert_eq!(Crossover::of(&omega, &small, 0.0), None);

@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn with_equal_denominators_it_is_the_mean_and_its_error() {
+    fn ratio_with_equal_denominators_is_the_mean() {
         let values = [1.0, 2.0, 4.0, 4.5];
         let terms = |b: f64| {
             values

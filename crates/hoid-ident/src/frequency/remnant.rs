@@ -131,7 +131,7 @@ mod tests {
     use super::{super::spectrum::coefficients, *};
 
     #[test]
-    fn bands_hold_the_power_off_the_lines() {
+    fn bands_contain_the_power_between_the_lines() {
         let n = 512;
         let x: Vec<f64> = (0..n).map(|k| (k as f64 * k as f64 * 0.37).sin()).collect();
         let c = coefficients(&x);

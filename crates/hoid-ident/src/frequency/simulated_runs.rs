@@ -59,7 +59,7 @@ fn element(scenario: &Scenario) -> DiscreteTransferFunction {
 }
 
 #[test]
-fn without_remnant_the_lines_are_those_of_the_held_operator() {
+fn noise_free_lines_match_the_operator_with_hold() {
     for condition in [Condition::C1, Condition::C2] {
         let scenario = scenario(condition, false);
         let (records, truth, plant) = (runs(&scenario, 0, 1), operator(&scenario), element(&scenario));
@@ -95,7 +95,7 @@ fn without_remnant_the_lines_are_those_of_the_held_operator() {
 }
 
 #[test]
-fn margins_between_the_lines_are_near_those_of_the_loop() {
+fn interpolated_margins_are_close_to_the_true_margins() {
     // The lines next to the crossover are 1.00 and 1.69 rad/s for C1, and 2.61 and 4.07 rad/s for C2. They are so far
     // apart that a straight line between them does not describe the loop.
     for (condition, crossover, margin) in [(Condition::C1, 1.5635, 76.67), (Condition::C2, 2.7480, 22.90)] {
@@ -120,7 +120,7 @@ fn margins_between_the_lines_are_near_those_of_the_loop() {
 }
 
 #[test]
-fn error_bars_hold_what_they_say() {
+fn confidence_circles_have_nominal_coverage() {
     let scenario = scenario(Condition::C2, true);
     let (truth, lines) = (operator(&scenario), lines());
     let (experiments, runs_each) = (80_u64, 5_u64);
@@ -180,7 +180,7 @@ fn error_bars_hold_what_they_say() {
 }
 
 #[test]
-fn the_remnant_is_found_off_the_lines() {
+fn remnant_spectrum_matches_the_simulated_remnant() {
     for (condition, k_n) in [(Condition::C1, 0.07636), (Condition::C2, 0.13971)] {
         let scenario = scenario(condition, true);
         let records = runs(&scenario, 500, 40);
@@ -222,7 +222,7 @@ fn the_remnant_is_found_off_the_lines() {
 }
 
 #[test]
-fn each_period_can_be_a_run() {
+fn each_period_can_be_treated_as_a_run() {
     let mut scenario = scenario(Condition::C1, true);
     scenario.measurement_s = 4.0 * PERIOD_S;
     let records = runs(&scenario, 900, 2);

@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sinusoid_has_its_amplitude_in_its_bin_alone() {
+    fn sinusoid_appears_only_in_its_bin() {
         for n in [96, 97, 2400] {
             let x: Vec<f64> = (0..n)
                 .map(|i| 0.3 + 1.7 * (TAU * 7.0 * f64::from(i) / f64::from(n) + 0.4).sin())

@@ -11,7 +11,7 @@ fn record(e: Vec<f64>, u: Vec<f64>) -> Result<Record, hoid_model::ModelError> {
 }
 
 #[test]
-fn the_controlled_element_is_found_behind_a_disturbance_and_an_offset() {
+fn element_is_found_despite_disturbance_and_offset() {
     // y[k + 1] = 0.8 y[k] + 0.5 (u[k] + d[k]), with u and d recorded one sample late, over two periods after a long
     // run-in.
     let at = |k: i32, n: f64, phase: f64| (std::f64::consts::TAU * n * f64::from(k) / 100.0 + phase).sin();

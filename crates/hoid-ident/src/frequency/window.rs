@@ -80,10 +80,10 @@ impl Window {
     /// offset that remains after the shift.
     pub fn samples_of(self, values: &[f64], offset: f64) -> (&[f64], f64) {
         let whole = offset.floor();
-        let begin = self.first as f64 + whole;
-        if begin >= 0.0 && begin + self.samples as f64 <= values.len() as f64 {
-            let begin = begin as usize;
-            return (&values[begin..begin + self.samples], offset - whole);
+        let start = self.first as f64 + whole;
+        if start >= 0.0 && start + self.samples as f64 <= values.len() as f64 {
+            let start = start as usize;
+            return (&values[start..start + self.samples], offset - whole);
         }
         (&values[self.first..self.first + self.samples], offset)
     }
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_of_whole_periods_are_found_and_others_named() {
+    fn only_spans_of_whole_periods_are_accepted() {
         let r = record(1000, 0.01);
         let w = Window::of_span(&r, Some(0.0), Some(6.0), 2.0).unwrap();
         assert_eq!((w.first, w.samples, w.periods), (100, 600, 3));
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn an_offset_is_taken_back() {
+    fn sampling_offset_is_compensated() {
         let (n, period) = (400_usize, 200.0);
         let wave = |t: f64| (TAU * 3.0 * t / period + 0.3).sin() + 0.2 * (TAU * 11.0 * t / period).cos();
         let at = |shift: f64| -> Vec<f64> { (0..n).map(|k| wave(k as f64 - shift)).collect() };

@@ -346,7 +346,7 @@ mod tests {
     }
 
     #[test]
-    fn common_and_individual_parameters_have_their_places() {
+    fn common_and_individual_parameters_have_distinct_positions() {
         let common = layout(2, 3, &[], &[]).unwrap();
         assert_eq!(common.names, ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e", "T_n"]);
         assert!(common.positions.iter().all(|p| *p == [0, 1, 2, 3, 4, 5]));
@@ -398,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_asked_is_named() {
+    fn invalid_constraints_are_refused_by_name() {
         let name = |r: Result<Layout, IdentError>| match r {
             Err(IdentError::BadOption { option, .. }) => option.replace("the constraint on ", ""),
             Err(IdentError::UnknownParameter { name, .. }) => name,

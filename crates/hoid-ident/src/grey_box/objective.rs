@@ -260,9 +260,9 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
     /// loss decreases.
     fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
         let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
-        let begin = self.layout.first_sample_begins();
-        let place = |delay_s: f64| delay_s / ts - begin;
-        let border = |n: usize| (n as f64 + begin) * ts;
+        let interval_start = self.layout.first_interval_start();
+        let place = |delay_s: f64| delay_s / ts - interval_start;
+        let border = |n: usize| (n as f64 + interval_start) * ts;
         let mut samples: Vec<usize> = delays
             .iter()
             .map(|&i| place(minimum.theta[i]).floor().max(0.0) as usize)
@@ -465,7 +465,7 @@ mod tests {
     }
 
     #[test]
-    fn the_loss_is_continuous_in_the_delay() {
+    fn loss_is_continuous_in_the_delay() {
         let signals = signals(600);
         let layout = Layout::new(2, 2, (0.05, 0.6), &BTreeMap::new(), &[], SampleTime::HUNDREDTH).unwrap();
         let first = first_residual(&super::super::layout::orders(2, 61), InitialState::Estimate);

@@ -69,7 +69,7 @@ pub(crate) trait Parametrisation: Clone {
     fn sample_time(&self) -> SampleTime;
     /// Returns the delay in samples at which the sampling interval 0 starts: -0.5 if e is interpolated (the response is
     /// then half a sample later), 0 by default.
-    fn first_sample_begins(&self) -> f64 {
+    fn first_interval_start(&self) -> f64 {
         0.0
     }
     /// Returns the orders of the polynomials if the first coefficient of B has the delay nk.
@@ -94,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_covariance_of_a_linear_map_is_that_of_its_sums() {
+    fn covariance_of_a_linear_map_matches_hand_calculation() {
         // theta = [x + 2 y, x - y] of eta = [y, other, x].
         let mapped = Mapped {
             orders: Orders::default(),

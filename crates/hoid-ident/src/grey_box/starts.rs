@@ -35,7 +35,7 @@ const GRID_ZETA: [f64; 3] = [0.25, 0.7, 1.3];
 /// another minimum below half a sample.
 pub(crate) const GRID_TIME_CONSTANT_S: [f64; 6] = [0.1, 0.004, 0.012, 0.03, 0.06, 0.3];
 /// Minimum number of delays if the range of delays is not a single value.
-const FEWEST_DELAYS: usize = 3;
+const MIN_DELAYS: usize = 3;
 
 /// A start with a name, which is the same for all records: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`.
 #[derive(Debug, Clone)]
@@ -86,7 +86,7 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     let bounded = |slot: usize, value: f64| value.clamp(scout.limits[slot].0, scout.limits[slot].1);
     let (low, high) = scout.limits[DELAY];
     let intervals = match high - low {
-        width if width > 0.0 => ((width / GRID_DELAY_S).ceil() as usize).max(FEWEST_DELAYS - 1),
+        width if width > 0.0 => ((width / GRID_DELAY_S).ceil() as usize).max(MIN_DELAYS - 1),
         _ => 0,
     };
     let t_n = if scout.layout.order == 0 {

@@ -124,7 +124,7 @@ fn with_noise_models(criterion: &Criterion<'_>, system: &System, workspace: &mut
         } else {
             vec![Block::B]
         };
-        let mut start = Start::to_be_found(system.label, theta, left);
+        let mut start = Start::with_unknown(system.label, theta, left);
         while let Some(block) = start.next_block().filter(|_| criterion.is_feasible(&start.theta)) {
             let there = criterion.linearise_block(&start.theta, block, workspace);
             start.update(&o, &there);

@@ -25,7 +25,7 @@ const LARGEST_FACTOR: usize = 8;
 /// Largest number of coefficients of D for the averaged records.
 const LARGEST_ND: usize = 2;
 /// Number of points of the pole grid from which searches on the averaged records are made.
-const SEARCHED: usize = 2;
+const SEARCHED_POINTS: usize = 2;
 /// Limits of the searches on the averaged records.
 const SEARCH: SearchOptions = SearchOptions {
     method: SearchMethod::LevenbergMarquardt,
@@ -35,7 +35,7 @@ const SEARCH: SearchOptions = SearchOptions {
 
 /// A pole z of the averaged records is well inside the remaining band if `|ln z|` is below this limit (the Nyquist
 /// frequency is pi).
-const SLOW: f64 = 1.3;
+const SLOW_POLE_LIMIT: f64 = 1.3;
 
 /// Poles estimated from the averaged records.
 #[derive(Debug, Default)]
@@ -150,7 +150,7 @@ impl<'c> Continuation<'c> {
     fn next_trial(&mut self) {
         let o = &self.averaged_criterion.orders;
         let start = |noise: &[f64], f: &[f64], left| {
-            Start::to_be_found("pole grid", [&vec![0.0; o.nb], noise, f].concat(), left)
+            Start::with_unknown("pole grid", [&vec![0.0; o.nb], noise, f].concat(), left)
         };
         self.trial = match (&self.noise, self.grid.get(self.tried)) {
             (None, Some(f)) => Some(start(&vec![0.0; o.nd], f, vec![Block::D, Block::B])),
@@ -160,9 +160,15 @@ impl<'c> Continuation<'c> {
         if self.trial.is_none() {
             let mut ranked = std::mem::take(&mut self.ranked);
             ranked.sort_by(|a, b| a.value.total_cmp(&b.value));
-            ranked.truncate(SEARCHED);
+            ranked.truncate(SEARCHED_POINTS);
             let starts = ranked.into_iter().map(|start| start.with_own_noise(o)).collect();
-            self.searches = Some(MultiStart::new(self.averaged_criterion, *o, &SEARCH, SEARCHED, starts));
+            self.searches = Some(MultiStart::new(
+                self.averaged_criterion,
+                *o,
+                &SEARCH,
+                SEARCHED_POINTS,
+                starts,
+            ));
         }
     }
 
@@ -177,7 +183,8 @@ impl<'c> Continuation<'c> {
             .filter(|f| hoid_core::stability::roots_inside(f, 1.0))
             .collect();
         let slow = |f: &Vec<f64>| {
-            polynomial::roots(&monic(f)).is_some_and(|z| z.iter().all(|z| z.ln().norm() * (self.factor as f64) < SLOW))
+            polynomial::roots(&monic(f))
+                .is_some_and(|z| z.iter().all(|z| z.ln().norm() * (self.factor as f64) < SLOW_POLE_LIMIT))
         };
         SlowPoles {
             complete: f.first().is_some_and(slow),
@@ -261,7 +268,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_root_of_the_poles_undoes_their_power() {
+    fn root_of_poles_inverts_their_power() {
         let poles = [
             Complex64::new(0.95, 0.06),
             Complex64::new(0.95, -0.06),
@@ -279,7 +286,7 @@ mod tests {
     }
 
     #[test]
-    fn averages_leave_the_remainder_out() {
+    fn averages_omit_the_remainder() {
         assert_eq!(averaged(&[1.0, 3.0, 5.0, 7.0, 9.0], 2), [2.0, 6.0]);
         assert!(averaged(&[1.0], 2).is_empty());
     }

@@ -39,7 +39,7 @@ use crate::{
 };
 
 /// Number of candidates that are completed with their own noise model.
-const COMPLETED: usize = 4;
+const COMPLETED_CANDIDATES: usize = 4;
 
 /// Returns the starts, each with the polynomials that are still unknown.
 pub(crate) fn initial_guesses(
@@ -59,7 +59,7 @@ pub(crate) fn initial_guesses_with_poles(
     workspace: &mut Workspace,
 ) -> Vec<Start> {
     let starts = from_poles(slow, criterion, sample_time, workspace);
-    if shared_poles::concerns(&criterion.orders) {
+    if shared_poles::may_share_poles(&criterion.orders) {
         return shared_poles::initial_guesses(criterion, starts, workspace);
     }
     starts
@@ -84,7 +84,7 @@ fn from_poles(
         .map(|f| ("low-pass continuation".to_owned(), f))
         .collect();
     if proposals.is_empty() {
-        proposals = ranked_grid(criterion, sample_time, COMPLETED, workspace);
+        proposals = ranked_grid(criterion, sample_time, COMPLETED_CANDIDATES, workspace);
     }
     if !slow.complete
         && let Some(f) = arx_poles(criterion, &criterion.data, workspace)
@@ -238,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn every_proposal_for_the_poles_comes_near_them() {
+    fn reduced_high_order_model_finds_the_poles() {
         let (e, u) = record(4000, 0.5);
         let orders = Orders {
             nb: 2,
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_record_that_is_too_short_has_no_high_order_start() {
+    fn short_record_has_no_high_order_start() {
         let (e, u) = record(25, 0.1);
         let orders = Orders {
             nb: 1,

@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn comes_near_the_truth_of_a_box_jenkins_model_and_of_an_armax_model() {
+    fn chain_approximates_box_jenkins_and_armax_models() {
         let n = 20_000;
         let (e, eps) = (white(n, 1), white(n, 2));
         let (b, f, c, d) = ([1.0, 0.5], [-1.5, 0.7], [0.5], [-0.8]);
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn says_nothing_where_it_cannot() {
+    fn unsuitable_orders_and_signals_give_no_start() {
         let (e, u) = (white(50, 1), white(50, 2));
         let base = Orders {
             nb: 1,

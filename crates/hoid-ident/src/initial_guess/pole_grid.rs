@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn grids_over_the_disc_have_the_order_and_are_stable() {
+    fn pole_grids_are_stable_and_have_the_requested_order() {
         for (order, places) in [(0, 1), (1, 7), (2, 44), (3, 88), (4, 88)] {
             let grid = anywhere(order);
             assert_eq!(grid.len(), places);

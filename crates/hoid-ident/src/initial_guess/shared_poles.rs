@@ -32,7 +32,7 @@ const STEPS: usize = 8;
 const MAX_GROUPS: usize = 6;
 
 /// True if the model has A together with other polynomials that could contain its poles.
-pub(crate) fn concerns(o: &Orders) -> bool {
+pub(crate) fn may_share_poles(o: &Orders) -> bool {
     o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
 }
 
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn poles_are_dealt_out_in_every_way_with_conjugates_together() {
+    fn all_pole_assignments_keep_conjugate_pairs_together() {
         let pair = [Complex64::new(0.5, 0.3), Complex64::new(0.5, -0.3)];
         let poles = [pair[0], pair[1], Complex64::new(0.9, 0.0), Complex64::new(-0.2, 0.0)];
         let chosen: Vec<Vec<Complex64>> = pole_assignments(&poles, 2)

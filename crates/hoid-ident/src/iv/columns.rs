@@ -9,12 +9,12 @@ pub(crate) type Columns = Vec<Vec<f64>>;
 /// amplitude. Columns that are orthogonalised twice are accurate to 1e-15.
 const OWN_PART: f64 = 1e-10;
 /// Largest length of an artificial past, in samples.
-const PAST: usize = 256;
+const MAX_PAST: usize = 256;
 
 /// Returns the signal with an artificial past, and the length of this past. The past is the signal reflected at its
 /// first sample and faded in, so simulations start without a jump.
 pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
-    let length = PAST.min(x.len().saturating_sub(1));
+    let length = MAX_PAST.min(x.len().saturating_sub(1));
     let fade = |k: usize| 0.5 + 0.5 * (std::f64::consts::PI * k as f64 / (length + 1) as f64).cos();
     let mut extended: Vec<f64> = (1..=length).rev().map(|k| fade(k) * (2.0 * x[0] - x[k])).collect();
     extended.extend_from_slice(x);
@@ -47,7 +47,7 @@ pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
 }
 
 /// Splits a residual over all records into the parts of the single records, which have these numbers of rows.
-pub(super) fn cut(residual: &[f64], rows: &[usize]) -> Columns {
+pub(super) fn split_by_record(residual: &[f64], rows: &[usize]) -> Columns {
     let mut at = 0;
     rows.iter()
         .map(|n| {
@@ -68,10 +68,10 @@ mod tests {
     }
 
     #[test]
-    fn an_invented_past_ends_where_the_record_begins() {
+    fn artificial_past_joins_the_record_smoothly() {
         let x = wave(2000, 0.01);
         let (extended, past) = with_past(&x);
-        assert_eq!(past, PAST);
+        assert_eq!(past, MAX_PAST);
         assert_eq!(extended[past..], x);
         let steepest = extended.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
         assert!(steepest < 0.03, "{steepest}");
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn dependent_columns_are_left_out_of_the_basis() {
+    fn dependent_columns_are_excluded_from_the_basis() {
         let (a, b) = (wave(100, 0.2), wave(100, 0.9));
         let sum: Vec<f64> = a.iter().zip(&b).map(|(x, y)| x - 3.0 * y).collect();
         let (basis, kept) = orthonormal(&[a, vec![0.0; 100], b, sum, vec![f64::NAN; 100]]);

@@ -10,17 +10,17 @@ use hoid_core::filter::{divide_in_place, multiply};
 use hoid_model::polynomial::reflected_inside;
 use nalgebra::DMatrix;
 
-use super::columns::{Columns, cut};
+use super::columns::{Columns, split_by_record};
 use crate::{linalg::least_squares::dot, noise_model::noise_model};
 
 /// Largest order of the autoregression that describes the spectrum of a residual.
-const LONGEST: usize = 30;
+const MAX_ORDER: usize = 30;
 
 /// Fits a long autoregression `D r = eps` to a residual and returns D and the variance of eps.
 fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
     let n: usize = residual.iter().map(Vec::len).sum();
     let shortest = residual.iter().map(Vec::len).min().unwrap_or(0);
-    let order = LONGEST.min(shortest / 10);
+    let order = MAX_ORDER.min(shortest / 10);
     let (_, d) = noise_model(residual, 0, order);
     let d = reflected_inside(&d).unwrap_or_default();
     let mut total = 0.0;
@@ -58,7 +58,7 @@ pub(super) fn covariance(
                 return column.clone();
             }
             let rows: Vec<usize> = residual.iter().map(Vec::len).collect();
-            let mut backwards = cut(column, &rows);
+            let mut backwards = split_by_record(column, &rows);
             for part in &mut backwards {
                 part.reverse();
                 divide_in_place(&d, part);
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn covariance_is_that_of_least_squares_for_white_residuals() {
+    fn white_residuals_give_the_least_squares_covariance() {
         let residual = white(5000);
         let z = vec![wave(5000, 0.1), wave(5000, 0.7)];
         let found = covariance(&z, &z, |_| true, &[residual]).unwrap();
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn covariance_knows_the_colour_at_the_frequency_of_the_instrument() {
+    fn covariance_uses_the_spectrum_at_the_instrument_frequency() {
         let mut residual = white(20_000);
         divide_in_place(&[-0.9], &mut residual);
         for w in [0.05_f64, 0.5, 2.5] {

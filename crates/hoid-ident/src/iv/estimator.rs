@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Residuals are only rounding errors if their amplitude is below this share of the output.
-const EXACT: f64 = 1e-11;
+const ROUNDING_SHARE: f64 = 1e-11;
 
 /// Instrumental variable estimator with its options.
 #[derive(Debug, Clone, PartialEq)]
@@ -104,7 +104,7 @@ impl InstrumentalVariable {
             return Err(IdentError::NoFiniteLoss);
         }
         let power: f64 = criterion.data.iter().map(|d| dot(d.u, d.u)).sum();
-        let exact = sum_of_squares <= EXACT * EXACT * power;
+        let exact = sum_of_squares <= ROUNDING_SHARE * ROUNDING_SHARE * power;
         let mut termination = solution.termination;
         if exact {
             termination.reason = Reason::ExactFit;

@@ -31,7 +31,7 @@ use crate::{
 };
 
 use super::{
-    columns::{cut, orthonormal, with_past},
+    columns::{orthonormal, split_by_record, with_past},
     equation::Source,
 };
 
@@ -103,7 +103,7 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
             let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
             let sum = combination(&basis, &weights, samples);
             Source {
-                inputs: cut(&sum, &lengths).into_iter().map(Cow::Owned).collect(),
+                inputs: split_by_record(&sum, &lengths).into_iter().map(Cow::Owned).collect(),
                 samples: block,
             }
         })
@@ -134,7 +134,7 @@ pub(super) fn following(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>>
     let target = targets.concat();
     let basis = best_basis(driving, targets);
     let weights: Vec<f64> = basis.iter().map(|q| dot(q, &target)).collect();
-    cut(&combination(&basis, &weights, target.len()), &lengths)
+    split_by_record(&combination(&basis, &weights, target.len()), &lengths)
 }
 
 fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> {
@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn filters_are_orthonormal() {
+    fn laguerre_filters_are_orthonormal() {
         let mut impulse = vec![0.0; 4000];
         // The impulse comes after the samples from which the artificial past is computed.
         impulse[300] = 1.0;
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn the_part_of_a_delayed_response_is_found() {
+    fn delayed_response_to_the_signal_is_found() {
         let n = 4000;
         let x: Vec<f64> = (0..n)
             .map(|t| (0.05 * f64::from(t)).sin() + (0.31 * f64::from(t)).sin())

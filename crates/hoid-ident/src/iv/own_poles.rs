@@ -60,7 +60,7 @@ const NEGLIGIBLE_STEP: f64 = 0.5;
 const MAX_STEPS_WITHOUT_GAIN: usize = 12;
 const GAIN: f64 = 0.9;
 /// If a step is longer than this multiple of the shortest step, the extrapolation has diverged.
-const DIVERGED: f64 = 10.0;
+const DIVERGENCE_RATIO: f64 = 10.0;
 
 /// The objective `|Q' eps(theta)|^2` for given instruments and a given noise model.
 struct GivenInstruments<'p, 'a> {
@@ -168,7 +168,7 @@ pub(super) fn solve_nonlinear_form(
         }
         system = match &nearest {
             // The extrapolation has diverged: return to the best system.
-            Some((least, near)) if moved > DIVERGED * least => {
+            Some((least, near)) if moved > DIVERGENCE_RATIO * least => {
                 extrapolation = Extrapolation::default();
                 near.system.clone()
             }

@@ -29,7 +29,7 @@ const START_ROUNDS: usize = 5;
 const FULL_STEPS: usize = 20;
 /// A zero of the equation does not belong to the operator if its residual variance exceeds the smallest residual
 /// variance by this factor.
-const FAR: f64 = 1.15;
+const MAX_VARIANCE_RATIO: f64 = 1.15;
 /// Steps smaller than this share of the output are only rounding errors.
 const ROUNDING: f64 = 1e-12;
 
@@ -60,7 +60,7 @@ pub(super) fn settle(
         let variance = found.variance();
         // The estimating equation has several zeros; the zero that belongs to the operator has about the smallest
         // residual.
-        let far = variance > FAR * whitest.variance;
+        let far = variance > MAX_VARIANCE_RATIO * whitest.variance;
         let class = match found.termination.reason {
             Reason::Settled | Reason::InstrumentsHeld if !far => 0.0,
             _ if far => 2.0,

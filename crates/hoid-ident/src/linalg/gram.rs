@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn systems_by_hand() {
+    fn gram_products_match_hand_calculation() {
         let mut gram = Gram::new(3);
         for row in [[1.0, 2.0, -1.0], [0.5, 0.0, 4.0]] {
             gram.add(|i| row[i]);

@@ -10,7 +10,7 @@ use crate::IdentError;
 
 /// A combination of parameters counts as undetermined by the data if its eigenvalue of the information matrix (scaled
 /// to a unit diagonal) is below this limit. Rounding leaves about 1e-15 times the number of parameters.
-const SINGULAR: f64 = 1e-13;
+const MIN_EIGENVALUE: f64 = 1e-13;
 
 /// Returns the inverse of the information matrix by rows; `names` are the names of the parameters.
 ///
@@ -30,7 +30,7 @@ pub(crate) fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<
     let scale: Vec<f64> = (0..p).map(|i| gram[i * p + i].sqrt()).collect();
     let scaled = DMatrix::from_fn(p, p, |i, j| gram[i * p + j] / (scale[i] * scale[j]));
     let eigen = SymmetricEigen::new(scaled);
-    if let Some(k) = (0..p).find(|&k| eigen.eigenvalues[k] < SINGULAR) {
+    if let Some(k) = (0..p).find(|&k| eigen.eigenvalues[k] < MIN_EIGENVALUE) {
         let direction = eigen.eigenvectors.column(k);
         let largest = direction.amax();
         let involved: Vec<&str> = (0..p)
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn inverse_information_is_the_inverse_whatever_the_units() {
+    fn inverse_information_is_the_inverse_in_any_units() {
         let g = gram(&columns());
         let inverse = inverse_information(&g, &names()).unwrap();
         for i in 0..3 {
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn an_undetermined_combination_is_named() {
+    fn undetermined_combination_is_reported() {
         let mut dependent = columns();
         dependent[2] = dependent[0].iter().map(|v| -1e-6 * v).collect();
         match inverse_information(&gram(&dependent), &names()) {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn held_parameters_have_no_variance() {
+    fn fixed_parameters_have_no_variance() {
         let g = gram(&columns());
         let part = inverse_of_free(&g, &[0, 2], &names()).unwrap();
         let two = inverse_information(&[g[0], g[2], g[6], g[8]], &["b0", "f1"].map(String::from)).unwrap();

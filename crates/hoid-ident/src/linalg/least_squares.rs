@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn residual_is_orthogonal_and_inverse_gram_inverts() {
+    fn residual_is_orthogonal_and_inverse_gram_is_the_inverse() {
         let (x, mut y) = example();
         y.iter_mut().enumerate().for_each(|(t, v)| *v += (1.7 * t as f64).sin());
         let (mut qx, mut qy) = (x.clone(), y.clone());
@@ -282,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn dependent_columns_are_named() {
+    fn dependent_columns_are_reported() {
         let (mut x, mut y) = example();
         let rows = y.len();
         let double: Vec<f64> = x[..rows].iter().map(|v| -2.0 * v).collect();
@@ -300,7 +300,7 @@ mod tests {
     }
 
     #[test]
-    fn fewer_rows_than_columns() {
+    fn fewer_rows_than_columns_are_rank_deficient() {
         let ls = LeastSquares::factor(&mut [1.0, 2.0, 3.0], &mut [1.0]);
         assert!(!ls.has_full_rank());
         let none = LeastSquares::factor(&mut [], &mut []);

@@ -76,16 +76,16 @@ impl<'s> MultiStart<'s> {
     /// Continues with the linearisation at [`MultiStart::evaluation_point`].
     pub fn update(&mut self, there: Linearisation, workspace: &mut Workspace) {
         if let Some((label, mut descent)) = self.searching.take() {
-            let known = self.best().filter(|_| descent.is_at_its_start());
+            let known = self.best().filter(|_| descent.awaits_first_linearisation());
             if known.is_some_and(|known| lies_in_basin(known, descent.evaluation_point(), there.sum_of_squares)) {
-                return self.begin();
+                return self.start_next_search();
             }
             match descent.update(there) {
                 Progress::Continues => self.searching = Some((label, descent)),
                 Progress::Ended(reason) => {
                     let minimum = reason.and_then(|reason| descent.finish(reason, workspace));
                     self.minima.extend(minimum.map(|minimum| (label, minimum)));
-                    self.begin();
+                    self.start_next_search();
                 }
             }
         } else if let Some(at) = self.incomplete() {
@@ -107,11 +107,11 @@ impl<'s> MultiStart<'s> {
         self.starts.sort_by(|a, b| a.value.total_cmp(&b.value));
         self.starts.truncate(self.most);
         self.starts.reverse();
-        self.begin();
+        self.start_next_search();
     }
 
     /// Starts the search from the best start that has not been used.
-    fn begin(&mut self) {
+    fn start_next_search(&mut self) {
         while let (None, Some(Start { label, theta, .. })) = (&self.searching, self.starts.pop()) {
             let known = self.best().map(|minimum| minimum.at.sum_of_squares);
             self.searching =

@@ -38,11 +38,11 @@ impl Start {
         } else {
             vec![Block::B]
         };
-        Self::to_be_found(label, [&vec![0.0; o.nb + o.nd], f].concat(), left)
+        Self::with_unknown(label, [&vec![0.0; o.nb + o.nd], f].concat(), left)
     }
 
     /// Creates a start with some unknown polynomials `left`; the last of these is computed next.
-    pub fn to_be_found(label: &str, theta: Vec<f64>, left: Vec<Block>) -> Self {
+    pub fn with_unknown(label: &str, theta: Vec<f64>, left: Vec<Block>) -> Self {
         Self {
             label: label.to_owned(),
             theta,

@@ -12,8 +12,8 @@ pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f6
         .map(|i| delta[i] * dot(&minimum.at.gram[i * p..(i + 1) * p], &delta))
         .sum();
     let found = sum_of_squares - minimum.at.sum_of_squares;
-    rise <= BASIN * minimum.at.sum_of_squares && (found - rise).abs() <= 0.1 * rise
+    rise <= MAX_LOSS_INCREASE * minimum.at.sum_of_squares && (found - rise).abs() <= 0.1 * rise
 }
 
 /// Largest relative increase of the loss at which a start is compared with the quadratic model.
-const BASIN: f64 = 0.05;
+const MAX_LOSS_INCREASE: f64 = 0.05;

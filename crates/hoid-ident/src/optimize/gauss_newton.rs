@@ -10,7 +10,7 @@ use crate::criterion::Workspace;
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
 /// Predicted relative decrease of the loss below which the second derivative is estimated from the gradients.
-const NEAR: f64 = 1e-2;
+const SMALL_DECREASE: f64 = 1e-2;
 
 /// Relative decrease of the loss that may be hidden by rounding: filters with poles near the unit circle lose five of
 /// the sixteen digits.
@@ -95,7 +95,7 @@ impl<'s> GaussNewton<'s> {
     }
 
     /// True until the search has received its first linearisation.
-    pub fn is_at_its_start(&self) -> bool {
+    pub fn awaits_first_linearisation(&self) -> bool {
         matches!(self.trial, Trial::Start)
     }
 
@@ -152,8 +152,10 @@ impl<'s> GaussNewton<'s> {
     }
 
     fn move_to(&mut self, there: Linearisation) {
-        if self.options.method == SearchMethod::Automatic && self.predicted_decrease <= NEAR * self.at.sum_of_squares {
-            self.learn(&there);
+        if self.options.method == SearchMethod::Automatic
+            && self.predicted_decrease <= SMALL_DECREASE * self.at.sum_of_squares
+        {
+            self.update_secant(&there);
         } else {
             self.secant.clear();
         }
@@ -162,7 +164,7 @@ impl<'s> GaussNewton<'s> {
     }
 
     /// Corrects the secant by a symmetric matrix of rank one, so `(H + S) s = g - g'` for the last step s.
-    fn learn(&mut self, there: &Linearisation) {
+    fn update_secant(&mut self, there: &Linearisation) {
         let p = self.theta.len();
         self.secant.resize(p * p, 0.0);
         let step: Vec<f64> = self
@@ -211,7 +213,7 @@ impl<'s> GaussNewton<'s> {
         if let Some(step) = &undamped
             && step.predicted <= self.options.tolerance * self.at.sum_of_squares
         {
-            return if self.ask(&step.delta, 1.0) {
+            return if self.try_step(&step.delta, 1.0) {
                 self.trial = Trial::Last;
                 Progress::Continues
             } else {
@@ -245,7 +247,7 @@ impl<'s> GaussNewton<'s> {
                 self.secant.clear();
             }
             if let Some(step) = step.or_else(|| self.damped_step(self.mu, &[]))
-                && self.ask(&step.delta, 1.0)
+                && self.try_step(&step.delta, 1.0)
             {
                 // Most trials are accepted: computing the derivatives immediately costs less than a second pass.
                 self.trial = Trial::Damped {
@@ -266,7 +268,7 @@ impl<'s> GaussNewton<'s> {
     /// Halves the fraction of a step until its end has a predictor, and requests the derivatives there.
     fn try_share(&mut self, delta: Vec<f64>, mut factor: f64) -> Progress {
         while factor > 1e-12 {
-            if self.ask(&delta, factor) {
+            if self.try_step(&delta, factor) {
                 self.trial = Trial::Share { delta, factor };
                 return Progress::Continues;
             }
@@ -282,7 +284,7 @@ impl<'s> GaussNewton<'s> {
     }
 
     /// Makes the end of a step the next evaluation point; returns false if there is no predictor at this point.
-    fn ask(&mut self, delta: &[f64], factor: f64) -> bool {
+    fn try_step(&mut self, delta: &[f64], factor: f64) -> bool {
         self.evaluation_point.clear();
         self.evaluation_point
             .extend(self.theta.iter().zip(delta).map(|(t, s)| t + factor * s));
@@ -325,7 +327,7 @@ impl<'s> GaussNewton<'s> {
                 if free.len() < before {
                     continue;
                 }
-                let room = cut(&self.theta, &delta, limits);
+                let room = fraction_within_limits(&self.theta, &delta, limits);
                 delta.iter_mut().for_each(|d| *d *= room);
             }
             return self.step(delta, secant);
@@ -349,7 +351,7 @@ impl<'s> GaussNewton<'s> {
         }
         delta.iter_mut().for_each(|d| *d *= alpha);
         if let Some(limits) = self.objective.limits() {
-            alpha = cut(&self.theta, &delta, limits);
+            alpha = fraction_within_limits(&self.theta, &delta, limits);
             delta.iter_mut().for_each(|d| *d *= alpha);
         }
         Some(delta)
@@ -390,7 +392,7 @@ pub(crate) fn free_parameters(objective: &dyn Objective, theta: &[f64], descent:
 }
 
 /// Returns the largest fraction of a step that stays within the limits.
-fn cut(theta: &[f64], delta: &[f64], limits: &[(f64, f64)]) -> f64 {
+fn fraction_within_limits(theta: &[f64], delta: &[f64], limits: &[(f64, f64)]) -> f64 {
     let room = |((t, d), (low, high)): ((&f64, &f64), &(f64, f64))| match *d {
         d if d > 0.0 => (high - t) / d,
         d if d < 0.0 => (low - t) / d,

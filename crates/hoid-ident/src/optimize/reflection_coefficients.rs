@@ -182,7 +182,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reflection_coefficients_and_polynomials_are_inverses() {
+    fn reflection_coefficients_and_polynomials_convert_both_ways() {
         for p in [
             vec![],
             vec![-0.9],
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn the_box_is_the_region_of_stability() {
+    fn unit_box_is_the_region_of_stability() {
         let mut state = 7_u64;
         let mut draw = || {
             state = state
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_jacobian_agrees_with_finite_differences() {
+    fn jacobian_matches_finite_differences() {
         let k = [0.3, -0.7, 0.5, 0.9];
         let jacobian = polynomial_jacobian(&k);
         for j in 0..4 {

@@ -60,7 +60,7 @@ fn noise_free_parameters_are_found_exactly() {
 }
 
 #[test]
-fn the_gradient_vanishes_at_the_end() {
+fn gradient_is_zero_at_convergence() {
     let (e, u) = signals(2000, 0.1);
     // At convergence with this tolerance, the cosines are at most sqrt(tolerance), 1e-6 by default.
     for (tolerance, left) in [(1e-12, 1e-6), (1e-15, 3.2e-8)] {
@@ -120,7 +120,7 @@ fn descend(valley: &Valley, method: SearchMethod, max_iterations: usize) -> Mini
 }
 
 #[test]
-fn every_method_goes_down_the_valley() {
+fn every_method_descends_the_valley() {
     let open = Valley { limits: None };
     for method in [
         SearchMethod::Automatic,
@@ -138,7 +138,7 @@ fn every_method_goes_down_the_valley() {
 }
 
 #[test]
-fn limits_are_kept_and_fixed_parameters_stay() {
+fn limits_and_fixed_parameters_are_respected() {
     let bounded = Valley {
         limits: Some(vec![(-2.0, 0.5), (f64::NEG_INFINITY, f64::INFINITY)]),
     };
@@ -164,7 +164,7 @@ fn limits_are_kept_and_fixed_parameters_stay() {
 }
 
 #[test]
-fn unstable_starts_are_refused_and_limits_are_told() {
+fn unstable_starts_and_the_iteration_limit_are_reported() {
     let (e, u) = signals(500, 0.1);
     assert!(run(&e, &u, &[0.1, 0.1, 0.0, -2.1, 1.2]).is_none());
     assert!(run(&e, &u, &[f64::NAN, 0.1, 0.0, -1.0, 0.3]).is_none());
@@ -199,7 +199,7 @@ fn unstable_starts_are_refused_and_limits_are_told() {
 }
 
 #[test]
-fn the_secant_saves_steps_where_the_model_is_wrong_and_ends_in_the_same_place() {
+fn secant_saves_steps_for_a_wrong_model() {
     let (e, u) = signals(3000, 0.4);
     // One pole instead of the two that are needed, and white noise instead of coloured noise.
     let orders = Orders {

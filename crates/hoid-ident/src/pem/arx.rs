@@ -27,7 +27,7 @@ use crate::{
 const WELL_CONDITIONED: f64 = 1e7;
 
 /// A fit is exact if the power of the residuals is below this share of the power of the output.
-const EXACT: f64 = 1e-12;
+const EXACT_FIT_SHARE: f64 = 1e-12;
 
 /// Solution of the regression, with the matrix from which its covariance is computed.
 #[derive(Debug)]
@@ -171,7 +171,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
         squares -= correction[i] * sign(i) * residuals.products[i];
     }
     // In an exact fit only rounding errors remain in the residuals; QR computes them more accurately.
-    if !squares.is_finite() || squares < EXACT * power {
+    if !squares.is_finite() || squares < EXACT_FIT_SHARE * power {
         return None;
     }
     let inverse_gram = (0..p * p)

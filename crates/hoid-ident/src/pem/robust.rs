@@ -3,7 +3,7 @@
 //! Huber's loss ([`Loss`](crate::Loss)) with the threshold k is minimised by iteratively reweighted least squares (P.
 //! J. Huber, *Robust Statistics*, 1981, section 7.8): the weights `w = min(1, k/|r|)` of a search are computed from the
 //! residuals r of the previous search, in units of the scale s. Each round lowers the loss. The scale is the median
-//! absolute residual of the previous round divided by 0.6745; it is kept constant after [`SCALES`] rounds, so the
+//! absolute residual of the previous round divided by 0.6745; it is kept constant after [`SCALE_ROUNDS`] rounds, so the
 //! rounds converge.
 //!
 //! A bounded loss bounds the weight of a residual but not the effect of a sample on the regressors. A single wrong
@@ -30,7 +30,7 @@ use crate::{
 };
 
 /// Number of rounds in which the scale is estimated; in later rounds it is constant.
-const SCALES: usize = 10;
+const SCALE_ROUNDS: usize = 10;
 
 /// Largest number of rounds of reweighting.
 const ROUNDS: usize = 50;
@@ -61,7 +61,7 @@ impl Reweighting {
     pub fn next(&mut self, residuals: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         // If the scale is estimated in every round, it can alternate with the weights; with a fixed scale each round
         // decreases Huber's loss.
-        if self.round < SCALES {
+        if self.round < SCALE_ROUNDS {
             self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;
         }
         self.round += 1;
@@ -179,7 +179,7 @@ mod tests {
     use crate::{Estimator, Loss};
 
     #[test]
-    fn weights_fall_beyond_the_threshold_only() {
+    fn weights_decrease_only_beyond_the_threshold() {
         let mut rounds = Reweighting::new(1.345);
         let residuals = vec![vec![0.5, -1.0, 1.5], vec![100.0, -0.2]];
         let weights = rounds.next(&residuals).unwrap();
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn one_sample_moves_nothing_by_half_a_standard_error() {
+    fn one_outlier_moves_estimates_less_than_half_an_error() {
         let clean = simulated(1);
         let fit = |record: Record| box_jenkins(HUBER).fit(&[record]).unwrap().operator().unwrap();
         let before = fit(clean.clone());
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_held_is_fitted_as_it_is() {
+    fn data_that_cannot_be_limited_are_fitted_unchanged() {
         // The neighbours of a sample carry no information about a constant error, and there is no response to find.
         let clean = simulated(2);
         let e = Channel::new("e", "", vec![1.0; clean.len()]);

@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn a_declaration_lists_sets_and_gets() {
+    fn declared_settings_can_be_listed_set_and_read() {
         let mut own = Own::default();
         let list = own.list();
         assert_eq!(list.iter().map(|s| s.name).collect::<Vec<_>>(), ["delay", "limit"]);

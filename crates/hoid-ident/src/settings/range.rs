@@ -153,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ranges_as_written() {
+    fn range_text_is_parsed() {
         type Counts = RangeInclusive<usize>;
         assert_eq!(Counts::read("29"), Ok(29..=29));
         assert_eq!(Counts::read("20..40"), Ok(20..=40));
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn delays_as_written() {
+    fn delay_range_text_is_parsed() {
         let ts = SampleTime::new(0.01).unwrap();
         let nk = |text: &str| DelayRange::read(text).unwrap().samples(ts);
         assert_eq!((nk("29"), nk("0.28s"), nk(" 0.28 s")), (29..=29, 29..=29, 29..=29));

@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn values_come_back_as_they_were_written() {
+    fn value_text_round_trips() {
         returns("true", true);
         returns("17", 17_usize);
         returns("0.1", 0.1);
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_value_says_what_was_expected() {
+    fn invalid_values_are_refused_with_the_expected_format() {
         assert!(bool::read("yes").is_err() && usize::read("-1").is_err() && f64::read("nan").is_err());
         assert!(<(f64, f64)>::read("3..1").is_err() && <(f64, f64)>::read("1").is_err());
         assert!(Constraint::read("5").is_err() && Constraint::read("5..1").is_err());

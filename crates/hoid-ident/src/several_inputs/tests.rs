@@ -47,7 +47,7 @@ fn box_jenkins() -> SeveralInputs {
 }
 
 #[test]
-fn two_systems_and_their_noise_are_found() {
+fn two_systems_and_their_noise_model_are_found() {
     // 40 records: the mean square of the errors, in standard errors, is one to within 4 of its standard errors.
     let truth = [0.5, 0.2, 0.4, -0.8, -0.7, 0.3, -0.9];
     let (mut squares, mut count) = (0.0, 0.0);
@@ -66,7 +66,7 @@ fn two_systems_and_their_noise_are_found() {
 }
 
 #[test]
-fn without_noise_the_coefficients_are_exact() {
+fn noise_free_coefficients_are_exact() {
     let fit = SeveralInputs {
         nc: 0,
         nd: 0,
@@ -84,7 +84,7 @@ fn without_noise_the_coefficients_are_exact() {
 }
 
 #[test]
-fn with_one_input_it_is_the_estimator_of_one() {
+fn one_input_matches_the_single_input_estimator() {
     let record = record(600, 0.1, 9);
     for (structure, na, nc, nd, nf) in [
         (Structure::Arx, 2, 0, 0, 0),
@@ -144,24 +144,24 @@ fn with_one_input_it_is_the_estimator_of_one() {
 }
 
 #[test]
-fn what_has_no_meaning_is_refused() {
+fn invalid_inputs_and_orders_are_refused() {
     let data = [record(200, 0.1, 1)];
-    let said = |how: SeveralInputs| how.fit(&data).unwrap_err().to_string();
+    let refusal = |how: SeveralInputs| how.fit(&data).unwrap_err().to_string();
     let twice = SeveralInputs {
         inputs: vec![box_jenkins().inputs[0].clone(); 2],
         ..box_jenkins()
     };
-    assert!(said(twice).contains("e twice"));
+    assert!(refusal(twice).contains("e twice"));
     let none = SeveralInputs {
         inputs: Vec::new(),
         ..box_jenkins()
     };
-    assert!(said(none).contains("at least one"));
+    assert!(refusal(none).contains("at least one"));
     let mut unknown = box_jenkins();
     unknown.inputs[1].0 = "q".to_owned();
-    assert!(said(unknown).contains("no channel q"));
+    assert!(refusal(unknown).contains("no channel q"));
     assert!(
-        said(SeveralInputs {
+        refusal(SeveralInputs {
             structure: Structure::Ar,
             ..box_jenkins()
         })
@@ -169,7 +169,7 @@ fn what_has_no_meaning_is_refused() {
     );
     let mut late = box_jenkins();
     late.inputs[1].1.nk = 400;
-    let needs = said(late);
+    let needs = refusal(late);
     assert!(needs.contains("needs more than 401"), "{needs}");
     // Enough samples for the coefficients of one input, but too few for those of two inputs.
     let few = [record(14, 0.1, 1)];

@@ -15,17 +15,17 @@ const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
 const HIGHEST_FREQUENCY: f64 = 0.999;
 /// Share of the time span at each end in which t_M is not searched by default: so short a part of a record does not
 /// determine two gains.
-const ENDS: f64 = 0.05;
+const END_SHARE: f64 = 0.05;
 /// Largest default rate times the sample time: 10 to 90 % of the change take two samples (2 ln 9 = 4.4). A faster
 /// change cannot be distinguished from this one, and its likelihood would be a staircase in t_M with a step for each
 /// sample (at this rate the slope varies by 2 % with the position of t_M between two samples, at twice the rate by 50
 /// %).
-pub(crate) const FASTEST: f64 = 2.0;
+pub(crate) const FASTEST_DEFAULT_RATE: f64 = 2.0;
 /// Largest admissible rate times the sample time.
-const FASTEST_GIVEN: f64 = 10.0;
+const FASTEST_RATE: f64 = 10.0;
 /// Smallest rate times the time span: 8 to 92 % of the change fill the span (2 ln 12 = 5.0), so the change can hardly
 /// be distinguished from a line.
-const SLOWEST: f64 = 5.0;
+const SLOWEST_RATE: f64 = 5.0;
 
 /// Quantities that determine the bounds.
 #[derive(Debug, Clone, Copy)]
@@ -89,10 +89,13 @@ fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Ra
     let known = layout.form == Form::Lead;
     let all = (f64::NEG_INFINITY, f64::INFINITY);
     Ok(match element {
-        Element::Midpoint => ((from, to), (from + ENDS * span, to - ENDS * span)),
+        Element::Midpoint => ((from, to), (from + END_SHARE * span, to - END_SHARE * span)),
         Element::LogRate => {
-            let slowest = (SLOWEST / span).min(FASTEST / frame.ts_s);
-            ((slowest, FASTEST_GIVEN / frame.ts_s), (slowest, FASTEST / frame.ts_s))
+            let slowest = (SLOWEST_RATE / span).min(FASTEST_DEFAULT_RATE / frame.ts_s);
+            (
+                (slowest, FASTEST_RATE / frame.ts_s),
+                (slowest, FASTEST_DEFAULT_RATE / frame.ts_s),
+            )
         }
         Element::Constant(Coordinate::LagRate) => {
             let (low, high) = of_family(Coordinate::LagRate).unwrap_or(all);
@@ -125,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn limits_hold_what_has_a_meaning() {
+    fn limits_are_checked_and_invalid_constraints_refused() {
         let none = BTreeMap::new();
         let layout = Layout::new(Form::Lead, true, 1);
         let default = limits(&layout, &frame(), &none).unwrap();
@@ -159,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_is_bounded_by_its_time_constant() {
+    fn lag_limits_follow_from_its_time_constant() {
         let layout = Layout::new(Form::LeadLag, true, 0);
         let with = |c: Constraint| limits(&layout, &frame(), &BTreeMap::from([("T_I".to_owned(), c)]));
         let place = layout.lag.unwrap();

@@ -8,7 +8,7 @@ use hoid_model::{
 
 use super::{
     instant::Instant,
-    layout::{Layout, MOST_VARYING},
+    layout::{Layout, MAX_VARYING},
 };
 
 /// A parameter with its name, unit and estimate.
@@ -72,7 +72,7 @@ pub(super) struct ThetaEstimate<'a> {
 impl ThetaEstimate<'_> {
     /// Returns the operator before (0) or after (1) the change.
     pub fn end(&self, end: usize) -> Result<ChangedOperator, ModelError> {
-        let mut values = [0.0; MOST_VARYING];
+        let mut values = [0.0; MAX_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(self.layout.varying) {
             *value = self.theta[Layout::ends(i)[end]];
         }
@@ -144,7 +144,7 @@ impl ThetaEstimate<'_> {
         let all = operator.named_gradients().into_iter();
         all.filter(|(_, gradient)| wanted(gradient))
             .map(|(parameter, gradient)| {
-                let (mut whole, beside) = of(&gradient);
+                let (mut whole, extra_variance) = of(&gradient);
                 let mut value = parameter.value;
                 // omega_nm and zeta_nm are elements of theta, so no logarithm is involved.
                 let own = match (parameter.coordinate, self.layout.neuromuscular_indices) {
@@ -159,7 +159,7 @@ impl ThetaEstimate<'_> {
                     name: parameter.name,
                     unit: parameter.unit,
                     estimate: match self.covariance {
-                        Some(covariance) => estimate(value, variance_along(&whole, covariance) + beside),
+                        Some(covariance) => estimate(value, variance_along(&whole, covariance) + extra_variance),
                         None => Estimate::fixed(value),
                     },
                 }

@@ -20,10 +20,10 @@ use crate::{
     optimize::Reason,
 };
 
-/// Largest order of the noise model in an automatic choice (`MOST_NOISE`), and the order without a choice, i.e. for
-/// exact data or a given start (`DEFAULT_NOISE`).
-const MOST_NOISE: usize = 12;
-const DEFAULT_NOISE: usize = 1;
+/// Largest order of the noise model in an automatic choice (`MAX_NOISE_ORDER`), and the order without a choice, i.e.
+/// for exact data or a given start (`DEFAULT_NOISE_ORDER`).
+const MAX_NOISE_ORDER: usize = 12;
+const DEFAULT_NOISE_ORDER: usize = 1;
 /// Number of lower minima along t_M or G that the fit accepts before it stays at the last one.
 const MAX_LOWER_MINIMA: usize = 10;
 
@@ -41,7 +41,7 @@ impl SigmoidChange {
         let off_level = off_level.as_deref().unwrap_or(records);
         let guess = match self.start {
             Some(_) => None,
-            None => self.of_one_operator().first_guess(off_level, MOST_NOISE),
+            None => self.of_one_operator().first_guess(off_level, MAX_NOISE_ORDER),
         };
         let order = guess.as_ref().map(|(_, noise)| noise.d.len());
         let guess = guess.map(|(coordinates, _)| coordinates);
@@ -55,10 +55,10 @@ impl SigmoidChange {
         // Exact data do not determine a noise model, so the first order is sufficient.
         let is_exact = |fit: &SigmoidFit| fit.termination().reason == Reason::ExactFit;
         let chosen = order
-            .filter(|nd| self.nd.is_none() && *nd > DEFAULT_NOISE)
+            .filter(|nd| self.nd.is_none() && *nd > DEFAULT_NOISE_ORDER)
             .and_then(|nd| with_noise(nd).ok())
             .filter(|fit| !is_exact(fit));
-        chosen.map_or_else(|| with_noise(self.nd.unwrap_or(DEFAULT_NOISE)), Ok)
+        chosen.map_or_else(|| with_noise(self.nd.unwrap_or(DEFAULT_NOISE_ORDER)), Ok)
     }
 
     /// Returns the estimator for an operator without a change, whose result gives a start.
@@ -134,12 +134,12 @@ impl SigmoidChange {
 
     /// Returns the names of all parameters that a fit may have: the names of [`Self::names`], with every `d` that can
     /// be chosen.
-    pub fn most_names(&self) -> Vec<String> {
-        Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(MOST_NOISE)).names()
+    pub fn possible_names(&self) -> Vec<String> {
+        Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(MAX_NOISE_ORDER)).names()
     }
 
     fn layout(&self) -> Layout {
-        Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(DEFAULT_NOISE))
+        Layout::new(self.form, self.neuromuscular, self.nd.unwrap_or(DEFAULT_NOISE_ORDER))
     }
 
     /// Returns the starts, each with its name and its theta.

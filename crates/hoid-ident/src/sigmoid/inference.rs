@@ -6,7 +6,7 @@
 use std::fmt;
 
 use super::{
-    bounds::FASTEST,
+    bounds::FASTEST_DEFAULT_RATE,
     ends::{ChangedOperator, ThetaEstimate},
     layout::Layout,
     objective::ChangeCriterion,
@@ -174,7 +174,7 @@ pub(super) fn inference(
 
 /// Returns the smallest ln G at which the change counts as abrupt: the upper bound less a margin for rounding.
 fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
-    (FASTEST / criterion.sample_time.s()).ln() - 1e-9
+    (FASTEST_DEFAULT_RATE / criterion.sample_time.s()).ln() - 1e-9
 }
 
 /// Inverts the information matrix of the free parameters. If the matrix is singular, t_M and G are removed first, since

@@ -2,7 +2,7 @@
 
 use hoid_model::operator_family::POWERS;
 
-use super::layout::{Layout, MOST_VARYING};
+use super::layout::{Layout, MAX_VARYING};
 
 /// Argument above which `e^-x` is zero in double precision.
 const UNDERFLOW_ARGUMENT: f64 = 746.0;
@@ -17,7 +17,7 @@ pub(crate) struct Instant {
     /// Derivative of the share with respect to ln G.
     pub by_log_rate: f64,
     /// Parameters of the numerator, starting with the gain.
-    pub values: [f64; MOST_VARYING],
+    pub values: [f64; MAX_VARYING],
     /// The numerator divided by its gain, in ascending powers of s.
     pub shape: [f64; POWERS],
     /// Derivatives of the shape with respect to all parameters except the gain.
@@ -38,7 +38,7 @@ impl Instant {
         let rest = far / (1.0 + far);
         let share = if x < 0.0 { rest } else { 1.0 - rest };
         let slope = rest / (1.0 + far);
-        let mut values = [0.0; MOST_VARYING];
+        let mut values = [0.0; MAX_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(layout.varying) {
             let [first, last] = Layout::ends(i);
             let part = (theta[last] - theta[first]) * rest;
@@ -54,14 +54,14 @@ impl Instant {
 
     /// Returns the parameters before the change, for a model without a change.
     pub fn constant(layout: &Layout, theta: &[f64]) -> Self {
-        let mut values = [0.0; MOST_VARYING];
+        let mut values = [0.0; MAX_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(layout.varying) {
             *value = theta[Layout::ends(i)[0]];
         }
         Self::of(layout, values, 0.0, [0.0; 2])
     }
 
-    fn of(layout: &Layout, values: [f64; MOST_VARYING], share: f64, [by_midpoint, by_log_rate]: [f64; 2]) -> Self {
+    fn of(layout: &Layout, values: [f64; MAX_VARYING], share: f64, [by_midpoint, by_log_rate]: [f64; 2]) -> Self {
         let (shape, slopes) = layout.form.shape(&values[1..]);
         Self {
             share,
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sigmoid_is_that_of_the_schedule_to_the_last_bit() {
+    fn sigmoid_is_bit_identical_to_the_schedule() {
         let layout = lead(0);
         for rate in [0.5, 100.0] {
             let theta = [0.09, 0.07, 0.4, 1.2, 40.96, f64::ln(rate), 11.25, 0.35, 0.28];

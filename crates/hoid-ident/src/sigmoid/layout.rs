@@ -31,7 +31,7 @@ pub const SIGMOID_NAMES: [(&str, &str); 9] = [
 ];
 
 /// Largest number of parameters of a numerator.
-pub(crate) const MOST_VARYING: usize = 3;
+pub(crate) const MAX_VARYING: usize = 3;
 
 /// Indices of the parameters in theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gain_and_a_lead_have_their_known_places() {
+    fn gain_and_lead_layout_has_the_documented_order() {
         let known = SIGMOID_NAMES.map(|(name, unit)| (name.to_owned(), unit));
         let d1 = ("d1".to_owned(), "");
         assert_eq!(lead(1).names_and_units(), [&known[..], &[d1]].concat());
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn every_form_has_a_place_for_each_of_its_coordinates() {
+    fn every_coordinate_of_every_form_has_a_position() {
         for form in Form::ALL {
             for neuromuscular in [true, false].into_iter().filter(|nm| form.is_proper(*nm)) {
                 let layout = Layout::new(form, neuromuscular, 2);

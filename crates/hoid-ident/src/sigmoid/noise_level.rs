@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_of_residuals_that_have_them_exactly() {
+    fn exact_noise_levels_are_recovered() {
         for sigma in [[0.01, 0.02], [3.0, 1.0], [1.0, 1.0]] {
             let (eps, shares) = record(sigma);
             let found = levels(&eps, &shares).unwrap();
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_have_the_geometric_mean_one() {
+    fn geometric_mean_of_the_weights_is_one() {
         let (eps, shares) = record([0.01, 0.02]);
         let weights = weights(levels(&eps, &shares).unwrap(), &shares);
         let sum: f64 = weights[0].iter().map(|w| w.ln()).sum();
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn no_levels_without_noise_or_without_a_side() {
+    fn zero_noise_or_a_missing_side_gives_no_levels() {
         let (eps, shares) = record([0.01, 0.02]);
         assert_eq!(levels(&[vec![0.0; 400]], &shares), None);
         assert_eq!(levels(&eps, &[vec![0.0; 400]]), None);

@@ -180,10 +180,10 @@ impl ChangeCriterion<'_> {
         let powers = unit.b.len();
         let mut y: Vec<Vec<f64>> = (0..powers).map(|i| unit.response(i, &input)).collect();
         // Sample t has the index t - nk + past_errors.
-        let begin = from + past_errors - unit.nk;
+        let input_start = from + past_errors - unit.nk;
         let gains = self.gains(theta, record);
         let respond = |y: &[&[f64]]| combined(&gains, y, Instant::numerator);
-        let w = respond(&y.iter().map(|y| &y[begin..]).collect::<Vec<_>>());
+        let w = respond(&y.iter().map(|y| &y[input_start..]).collect::<Vec<_>>());
         let mut v: Vec<f64> = data.u[from..].iter().zip(&w).map(|(u, w)| u - w).collect();
         let mut eps = self.whitened(theta, record, &v);
 
@@ -191,7 +191,10 @@ impl ChangeCriterion<'_> {
         let h: Vec<Vec<f64>> = (0..powers).map(|i| unit.impulse_response(i, input.len())).collect();
         let mut free: Vec<Vec<f64>> = (0..past_errors)
             .map(|age| {
-                let tails: Vec<&[f64]> = h.iter().map(|h| h.get(begin - oldest - age..).unwrap_or(&[])).collect();
+                let tails: Vec<&[f64]> = h
+                    .iter()
+                    .map(|h| h.get(input_start - oldest - age..).unwrap_or(&[]))
+                    .collect();
                 let mut column = respond(&tails);
                 // The filter D makes the response longer.
                 column.resize((column.len().max(past_errors) + nd).min(n - from), 0.0);
@@ -242,8 +245,8 @@ impl ChangeCriterion<'_> {
     /// Returns the weighted columns of psi in one record, before projection.
     fn columns(&self, theta: &[f64], record: usize, pass: &Pass) -> Vec<Vec<f64>> {
         let (layout, gains) = (&self.layout, &pass.gains);
-        let begin = self.first - layout.nd + layout.order() - pass.unit.nk;
-        let y: Vec<&[f64]> = pass.y.iter().map(|y| &y[begin..]).collect();
+        let input_start = self.first - layout.nd + layout.order() - pass.unit.nk;
+        let y: Vec<&[f64]> = pass.y.iter().map(|y| &y[input_start..]).collect();
         // Derivatives with respect to the gain; derivatives with respect to each other parameter, divided by the gain.
         let along: Vec<Vec<f64>> = (0..layout.varying)
             .map(|j| match j.checked_sub(1) {
@@ -279,7 +282,7 @@ impl ChangeCriterion<'_> {
             let slopes: Vec<Vec<f64>> = (0..y.len())
                 .map(|i| pass.unit.slope(i, p, &pass.input, &pass.y[i]))
                 .collect();
-            let slopes: Vec<&[f64]> = slopes.iter().map(|slope| &slope[begin..]).collect();
+            let slopes: Vec<&[f64]> = slopes.iter().map(|slope| &slope[input_start..]).collect();
             columns[place] = self.whitened(theta, record, &combined(gains, &slopes, Instant::numerator));
         }
         // A longer delay also delays the change.

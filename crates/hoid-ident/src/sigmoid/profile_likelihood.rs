@@ -11,7 +11,7 @@ use super::{layout::Layout, objective::ChangeCriterion, search::search};
 use crate::optimize::{Minimum, SearchMethod, SearchOptions};
 
 /// 95 % quantile of chi-square with one degree of freedom.
-const REGULAR: f64 = 3.841;
+const CHI_SQUARE_95: f64 = 3.841;
 /// 95 % quantile of the larger of two exponential variables with mean 2.
 const CHANGE_POINT: f64 = 7.352;
 /// The walk continues up to this multiple of the quantile, since the loss need not increase monotonically.
@@ -21,7 +21,7 @@ const GROWTH: f64 = 1.5;
 /// First step along the profile, in standard errors.
 const FIRST_STEP: f64 = 0.5;
 /// Largest number of points on each side of the minimum; the largest step can be hundreds of times the first.
-const MOST_POINTS: usize = 40;
+const MAX_POINTS: usize = 40;
 /// Number of halvings of the last step, which determine the end of the interval to a sixteenth of this step.
 const HALVINGS: usize = 4;
 
@@ -62,7 +62,7 @@ pub(crate) fn profile_likelihood_interval(
     let quantile = if change_point && place == criterion.layout.midpoint {
         CHANGE_POINT
     } else {
-        REGULAR
+        CHI_SQUARE_95
     };
     let n = criterion.residuals() as f64;
     let options = SearchOptions {
@@ -94,7 +94,7 @@ pub(crate) fn profile_likelihood_interval(
         let (mut inside, mut outside) = (minimum.theta.clone(), None);
         let mut from = minimum.theta.clone();
         let mut step = first_step;
-        for _ in 0..MOST_POINTS {
+        for _ in 0..MAX_POINTS {
             let value = (from[place] + sign * step).clamp(low, high);
             step *= GROWTH;
             let Some((loss, theta)) = at(value, &from) else { break };

@@ -9,16 +9,16 @@ use hoid_model::Form;
 
 use super::{
     instant::Instant,
-    layout::{Layout, MOST_VARYING},
+    layout::{Layout, MAX_VARYING},
     objective::ChangeCriterion,
     unit_operator::UnitOperator,
 };
 use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
 
 /// Time before the first residual of the ranking, in time constants of the poles.
-const SETTLING: f64 = 4.0;
+const SETTLING_TIME_CONSTANTS: f64 = 4.0;
 /// Rate of decay that is assumed if there is no neuromuscular part, 1/s.
-const FAST: f64 = 10.0;
+const FAST_RATE: f64 = 10.0;
 /// Lead time constants tried for a squared lead, s: first value, factor, number.
 const LEADS_S: (f64, f64, usize) = (0.02, 1.12, 60);
 
@@ -36,12 +36,12 @@ impl<'c, 'a> Ranking<'c, 'a> {
         let unit = UnitOperator::of(layout, theta, None, criterion.sample_time)?;
         let decay = layout
             .neuromuscular_indices
-            .map_or(FAST, |[omega, zeta]| theta[omega] * theta[zeta]);
+            .map_or(FAST_RATE, |[omega, zeta]| theta[omega] * theta[zeta]);
         let ts = criterion.sample_time.s();
         let mut signals = Vec::with_capacity(criterion.data.len());
         for data in &criterion.data {
             let n = data.u.len();
-            let settled = ((SETTLING / (decay * ts)) as usize).min(n / 8);
+            let settled = ((SETTLING_TIME_CONSTANTS / (decay * ts)) as usize).min(n / 8);
             let first = criterion.first + settled;
             if first >= n || unit.nk > first - layout.nd {
                 return None;
@@ -182,7 +182,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
 }
 
 /// Returns the parameters of the numerator `n_0 + n_1 s + n_2 s^2`.
-fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MOST_VARYING] {
+fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MAX_VARYING] {
     // If the gain is zero, the lead time constant is set to zero.
     let over = |x: f64, gain: f64| if gain == 0.0 { 0.0 } else { x / gain };
     match form {
@@ -208,7 +208,7 @@ fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f
 }
 
 /// Returns the gain k and the lead time constant T for which `k (1, 2 T, T^2)` is nearest to n.
-fn square_of_a_lead(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MOST_VARYING] {
+fn square_of_a_lead(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MAX_VARYING] {
     let product = |a: &[f64], b: &[f64]| {
         let pairs = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
         pairs.map(|(i, j)| a[i] * metric(i, j) * b[j]).sum::<f64>()
@@ -232,7 +232,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parameters_are_those_that_made_the_numerator() {
+    fn parameters_are_recovered_from_the_numerator() {
         for form in Form::ALL {
             let x = [3.0, 0.02 * 1.12_f64.powi(20), 0.4];
             let (shape, _) = form.shape(&x[1..]);

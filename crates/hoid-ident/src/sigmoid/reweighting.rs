@@ -20,7 +20,7 @@ const ROUNDS: usize = 20;
 /// ratio is about `1/sqrt n`, i.e. 1 % for 10000 residuals.
 const CONVERGED: f64 = 1e-6;
 /// Negligible relative change of the loss: it changes the log-likelihood of 10000 residuals by 0.005.
-const NEGLIGIBLE: f64 = 1e-6;
+const NEGLIGIBLE_CHANGE: f64 = 1e-6;
 
 /// Estimates fit and noise levels alternately and returns the minimum and the levels. The levels are `None` if they
 /// cannot be determined, such as for residuals that are only rounding errors.
@@ -48,14 +48,14 @@ pub(super) fn with_levels(
         let next = search(criterion, minimum.theta.clone(), options, None).ok_or(IdentError::NoFiniteLoss)?;
         iterations += next.termination.iterations;
         let change = next.at.sum_of_squares / minimum.at.sum_of_squares - 1.0;
-        if round > 0 && change > NEGLIGIBLE {
+        if round > 0 && change > NEGLIGIBLE_CHANGE {
             // Each of the last two fits has the higher loss with the noise levels of the other; the more likely fit is
             // kept.
             (criterion.weights, levels) = (kept, before);
             break;
         }
         minimum = next;
-        if round + 1 == ROUNDS && change < -NEGLIGIBLE && minimum.termination.converged() {
+        if round + 1 == ROUNDS && change < -NEGLIGIBLE_CHANGE && minimum.termination.converged() {
             minimum.termination.reason = Reason::IterationLimit;
         }
     }

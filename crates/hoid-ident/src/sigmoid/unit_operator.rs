@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_gain_and_a_lead_of_the_family_are_those_of_the_delayed_operator() {
+    fn family_lead_form_matches_the_delayed_operator() {
         let layout = Layout::new(Form::Lead, true, 0);
         let ts = SampleTime::HUNDREDTH;
         for (omega, zeta, delay) in [(11.25, 0.35, 0.1234), (6.0, 1.4, 0.2), (30.0, 0.1, 0.305)] {
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_meaning_is_none() {
+    fn invalid_parameters_give_none() {
         let layout = Layout::new(Form::LeadLag, true, 0);
         let theta = [0.09, 0.07, 0.4, 1.2, 5.0, 0.0, 0.2, 11.0, 0.3, 0.2];
         let of = |place: usize, value: f64| {

@@ -12,7 +12,7 @@ use super::{
 use crate::{Fit, IdentError, Series};
 
 /// Results of the residual tests. By chance one in a hundred lags is outside the 99 % bound; a share above
-/// [`OUTSIDE_ALLOWED`] is significant.
+/// [`MAX_OUTSIDE_SHARE`] is significant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResidualDiagnostics {
     /// The residuals are not white at the 1 % level: the order of the noise model is too low.
@@ -26,7 +26,7 @@ pub struct ResidualDiagnostics {
 }
 
 /// Share of lags outside the 99 % bound above which a correlation is significant.
-pub const OUTSIDE_ALLOWED: f64 = 0.06;
+pub const MAX_OUTSIDE_SHARE: f64 = 0.06;
 
 /// Simulated and predicted output of a model for a record, with the measures and tests derived from them.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +54,7 @@ impl Validation {
             let c = &self.cross_correlation;
             let lags = || c.lags.iter().zip(&c.values).filter(|(k, _)| keep(**k));
             let beyond = lags().filter(|(_, r)| r.abs() > c.bound_99).count();
-            beyond as f64 > OUTSIDE_ALLOWED * lags().count() as f64
+            beyond as f64 > MAX_OUTSIDE_SHARE * lags().count() as f64
         };
         ResidualDiagnostics {
             coloured_residuals: self.ljung_box.is_some_and(|t| t.p_value < 0.01),

@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn covariances_over_several_blocks_are_plain_sums() {
+    fn blockwise_covariances_equal_plain_sums() {
         let n = 2 * BLOCK + 77;
         let x: Vec<f64> = (0..n).map(|t| (0.37 * t as f64).sin()).collect();
         let y: Vec<f64> = (0..n).map(|t| (0.11 * t as f64).cos()).collect();
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn correlation_of_white_noise_keeps_its_bounds_and_a_delay_shows() {
+    fn white_noise_stays_within_bounds_and_a_delay_gives_a_peak() {
         let mut state = 5_u64;
         let mut draw = || {
             state = state

@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn vaf_and_nrmse_of_known_signals() {
+    fn vaf_and_nrmse_match_hand_calculation() {
         let u = [1.0, 3.0, 1.0, 3.0];
         assert_eq!(vaf(&u, &u), 100.0);
         assert_eq!(nrmse_fit(&u, &u), 100.0);

@@ -23,7 +23,7 @@ mod correlation;
 mod goodness_of_fit;
 mod whiteness;
 
-pub use comparison::{OUTSIDE_ALLOWED, ResidualDiagnostics, Validation};
+pub use comparison::{MAX_OUTSIDE_SHARE, ResidualDiagnostics, Validation};
 pub use correlation::Correlation;
 pub use goodness_of_fit::{GoodnessOfFit, nrmse_fit, vaf};
 pub use whiteness::{LARGEST_LAG, LjungBox, whiteness};

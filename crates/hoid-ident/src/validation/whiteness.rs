@@ -45,7 +45,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ljung_and_box_as_published() {
+    fn ljung_box_statistic_matches_the_formula() {
         // r = 0.1, -0.2, n = 100: Q = 100 * 102 * (0.01/99 + 0.04/98) = 5.1936; chi-square with 2
         // degrees: exp(-Q/2).
         let correlation = Correlation {

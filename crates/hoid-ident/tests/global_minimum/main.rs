@@ -21,11 +21,11 @@ use rayon::prelude::*;
 use systems::System;
 
 /// Largest relative loss above the reference at which the reference counts as reached.
-const REACHED: f64 = 1e-6;
+const MAX_EXCESS_LOSS: f64 = 1e-6;
 /// Modulus above which a root counts as being on the unit circle.
 const ON_CIRCLE: f64 = 1.0 - 1e-4;
 /// Distance below which two roots cancel each other.
-const CANCELS: f64 = 0.01;
+const CANCELLATION_DISTANCE: f64 = 0.01;
 
 /// Results of the starts of one system.
 struct Outcome {
@@ -41,9 +41,9 @@ impl Outcome {
         let mut system = System::numbered(number);
         let record = std::slice::from_ref(&system.record);
         let estimator = Estimator::new(Structure::BoxJenkins, system.orders);
-        let began = Instant::now();
+        let started = Instant::now();
         let own = estimator.fit(record).ok();
-        let own_s = began.elapsed().as_secs_f64();
+        let own_s = started.elapsed().as_secs_f64();
         let starts: Vec<Vec<f64>> = std::iter::once(system.theta.clone())
             .chain((0..restarts).map(|_| system.random_start()))
             .collect();
@@ -71,18 +71,22 @@ impl Outcome {
 
     /// Returns the relative loss of the automatic starts above the reference; not positive if their loss is the
     /// smallest.
-    fn above(&self) -> f64 {
+    fn excess_loss(&self) -> f64 {
         let loss = |fit: &Option<Fit>| fit.as_ref().map_or(f64::INFINITY, Fit::loss);
         loss(&self.own) / loss(&self.lowest) - 1.0
     }
 
-    fn reached(&self) -> bool {
-        self.above() <= REACHED
+    fn is_reached(&self) -> bool {
+        self.excess_loss() <= MAX_EXCESS_LOSS
     }
 
     /// True if the reference is not an excluded case.
-    fn counts(&self) -> bool {
-        let reference = if self.above() <= 0.0 { &self.own } else { &self.lowest };
+    fn is_counted(&self) -> bool {
+        let reference = if self.excess_loss() <= 0.0 {
+            &self.own
+        } else {
+            &self.lowest
+        };
         reference.as_ref().is_some_and(is_regular)
     }
 }
@@ -98,23 +102,26 @@ fn is_regular(fit: &Fit) -> bool {
         roots(&monic(m.f())),
     );
     let inside = c.iter().chain(&f).all(|z| z.norm() < ON_CIRCLE);
-    let apart = |p: &[Complex64], q: &[Complex64]| p.iter().all(|z| q.iter().all(|w| (z - w).norm() > CANCELS));
+    let apart = |p: &[Complex64], q: &[Complex64]| {
+        p.iter()
+            .all(|z| q.iter().all(|w| (z - w).norm() > CANCELLATION_DISTANCE))
+    };
     fit.termination().reason != Reason::Border && inside && apart(&b, &f) && apart(&c, &d)
 }
 
 /// Returns the number of systems that are not excluded and the number of these whose reference is reached, followed by
 /// the same numbers for the excluded systems.
 fn study(numbers: std::ops::Range<u64>, restarts: usize) -> [usize; 4] {
-    let began = Instant::now();
+    let started = Instant::now();
     let outcomes: Vec<Outcome> = numbers
         .into_par_iter()
         .map(|number| Outcome::of(number, restarts))
         .collect();
     let count = |counts: bool| {
-        let these = outcomes.iter().filter(|o| o.counts() == counts);
-        [these.clone().count(), these.filter(|o| o.reached()).count()]
+        let these = outcomes.iter().filter(|o| o.is_counted() == counts);
+        [these.clone().count(), these.filter(|o| o.is_reached()).count()]
     };
-    for o in outcomes.iter().filter(|o| !o.reached()) {
+    for o in outcomes.iter().filter(|o| !o.is_reached()) {
         let reason = |fit: &Option<Fit>| {
             fit.as_ref().map(|fit| {
                 (
@@ -124,11 +131,11 @@ fn study(numbers: std::ops::Range<u64>, restarts: usize) -> [usize; 4] {
                 )
             })
         };
-        let kind = if o.counts() { "missed" } else { "missed (apart)" };
+        let kind = if o.is_counted() { "missed" } else { "missed (apart)" };
         println!(
             "{kind} {} by {:.2e}: {:?} {:?}",
             o.number,
-            o.above(),
+            o.excess_loss(),
             reason(&o.own),
             reason(&o.lowest)
         );
@@ -142,14 +149,14 @@ fn study(numbers: std::ops::Range<u64>, restarts: usize) -> [usize; 4] {
         100.0 * reached as f64 / counted as f64,
         times[times.len() / 2],
         times.iter().sum::<f64>() / times.len() as f64,
-        began.elapsed().as_secs_f64(),
+        started.elapsed().as_secs_f64(),
     );
     [counted, reached, apart, apart_reached]
 }
 
 #[test]
 #[ignore = "the experiment on 1000 systems (or HOID_SYSTEMS=FROM..TO); minutes"]
-fn own_starts_reach_the_global_minimum_of_a_thousand_systems() {
+fn default_starts_reach_the_global_minimum_of_1000_systems() {
     let numbers = std::env::var("HOID_SYSTEMS").ok().and_then(|text| {
         let (from, to) = text.split_once("..")?;
         Some(from.parse().ok()?..to.parse().ok()?)
@@ -159,7 +166,7 @@ fn own_starts_reach_the_global_minimum_of_a_thousand_systems() {
 }
 
 #[test]
-fn own_starts_reach_the_global_minimum() {
+fn default_starts_reach_the_global_minimum() {
     // The default starts alone miss one system in twelve.
     let [counted, reached, ..] = study(0..60, 6);
     assert!(counted > 50 && reached == counted, "{reached} of {counted}");

@@ -54,7 +54,7 @@ fn trial(text: &str) -> Record {
 /// border of stability its loss was once larger by half.
 #[test]
 #[ignore = "minutes; prints the table of all cells"]
-fn what_has_converged_predicts_well() {
+fn converged_fits_predict_about_as_well_as_pem() {
     for cell in ["P03_fo", "P05_fo", "P09_fo", "P03_so", "P05_so", "P09_so"] {
         let Some(records) = trials(cell) else {
             eprintln!("skipped: HOID_HUMAN_DATA names no directory of recordings");

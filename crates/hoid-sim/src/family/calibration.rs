@@ -23,9 +23,9 @@ use super::{
 };
 
 /// Initial horizon in samples.
-const FIRST: usize = 512;
+const INITIAL_HORIZON: usize = 512;
 /// Horizon in samples within which the response of a stable loop must decay.
-const LONGEST: usize = 1 << 20;
+const MAX_HORIZON: usize = 1 << 20;
 /// Fraction of the energy that may remain in the second half of the horizon for a response to count as decayed. The
 /// fraction beyond the horizon is then about the square of this value.
 const DECAYED_ENERGY: f64 = 1e-7;
@@ -109,7 +109,7 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
     let mut state = LoopState::at_rest(held, held.longest_delay());
     let mut shaped = Shaped::at_rest(shaping);
     let (mut total, mut before, mut w) = ([0.0; 3], 0.0, 1.0);
-    let mut horizon = FIRST;
+    let mut horizon = INITIAL_HORIZON;
     let mut done = 0;
     loop {
         let mut block = [0.0; 3];
@@ -132,10 +132,10 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
         if !total[0].is_finite() {
             return Err(unstable("the response of u to a unit of remnant grows without bound"));
         }
-        if horizon > FIRST && block[0] <= DECAYED_ENERGY * total[0] {
+        if horizon > INITIAL_HORIZON && block[0] <= DECAYED_ENERGY * total[0] {
             return Ok(total);
         }
-        if horizon >= LONGEST {
+        if horizon >= MAX_HORIZON {
             return Err(unstable("the response of u to a unit of remnant does not decay"));
         }
         horizon *= 2;

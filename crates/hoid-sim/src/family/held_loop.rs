@@ -18,7 +18,7 @@ use hoid_model::{
 use crate::held_operator::{HeldOperator, OperatorOutput, OperatorState};
 
 /// Smallest accepted magnitude of `1 + D Y` within a sample.
-const SMALLEST: f64 = 1e-9;
+const MIN_RETURN_DIFFERENCE: f64 = 1e-9;
 
 /// Closed loop with its parameters at one instant.
 #[derive(Debug, Clone)]
@@ -85,7 +85,7 @@ impl HeldLoop {
             element_input,
             element_output,
         };
-        if held.return_difference().abs() < SMALLEST {
+        if held.return_difference().abs() < MIN_RETURN_DIFFERENCE {
             return Err(ModelError::UnstableLoop {
                 reason: "the direct parts of operator and controlled element cancel within a sample".to_owned(),
             });

@@ -80,8 +80,11 @@ impl FamilyOperatorRun {
 
     /// Returns the state as numbers.
     pub fn saved(&mut self) -> Vec<f64> {
-        let beside = [self.k as f64, self.n];
-        beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
+        let own_state = [self.k as f64, self.n];
+        own_state
+            .into_iter()
+            .chain(self.numbers().map(|number| *number))
+            .collect()
     }
 
     /// Restores the state that [`FamilyOperatorRun::saved`] returned for an operator with the same scenario and run, so
@@ -208,7 +211,7 @@ mod tests {
     /// For the error of a run from its run-in on, the control of the operator is bit-identical to the control of the
     /// run.
     #[test]
-    fn the_operator_of_a_run_gives_its_control() {
+    fn operator_run_reproduces_the_control_of_the_simulator() {
         let integrating = state(Form::Lag, false, &[1.5, 0.0, 0.1437], [&[1.0], &[1.0]]);
         for scenario in [busy(), quick(0.7), quick(1.0), quick(5.3), task(integrating)] {
             let simulator = FamilySimulator::new(&scenario).unwrap();
@@ -225,7 +228,7 @@ mod tests {
 
     /// A saved operator continues in another operator, also after the end of its scenario.
     #[test]
-    fn a_saved_operator_goes_on_with_the_same_digits() {
+    fn restored_operator_continues_bit_identically() {
         let new = || FamilyOperatorRun::new(FamilySimulator::new(&busy()).unwrap(), SEED, 0.0).unwrap();
         let mut first = new();
         let e = |k: usize| (0.1 * k as f64).sin();
@@ -251,7 +254,7 @@ mod tests {
     }
 
     #[test]
-    fn behind_its_end_a_scenario_goes_on() {
+    fn scenario_continues_after_its_end() {
         let mut scenario = quick(5.3);
         let long = FamilySimulator::new(&scenario).unwrap();
         scenario.measurement_s = 1.0;
@@ -265,7 +268,7 @@ mod tests {
     }
 
     #[test]
-    fn an_operator_that_answers_within_a_sample_is_refused() {
+    fn operator_with_delay_below_the_minimum_is_refused() {
         let of = |samples: f64| FamilyOperatorRun::new(FamilySimulator::new(&quick(samples)).unwrap(), SEED, 0.0);
         let refused = of(0.3).unwrap_err();
         assert!(matches!(refused, SimError::DirectResponse { .. }), "{refused}");

@@ -87,9 +87,9 @@ pub struct PersonRun {
 }
 
 /// Number of rejected draws after which the ranges of a population count as empty.
-const MOST_DRAWS: usize = 2000;
+const MAX_DRAWS: usize = 2000;
 /// Maximum number of draws for a run.
-const MOST_RUN_DRAWS: usize = 50;
+const MAX_RUN_DRAWS: usize = 50;
 /// Number of random values per draw.
 const NUMBERS: usize = 16;
 const PERSON: u64 = u64::from_le_bytes(*b"person\0\0");
@@ -126,7 +126,7 @@ impl Person {
             cell: person,
             replication: 0,
         };
-        let numbers = streams.uniform_of(PERSON, NUMBERS * MOST_DRAWS);
+        let numbers = streams.uniform_of(PERSON, NUMBERS * MAX_DRAWS);
         for draw in numbers.chunks_exact(NUMBERS) {
             let form = form.unwrap_or_else(|| {
                 let forms = plant.forms();
@@ -187,7 +187,7 @@ impl Person {
         Err(SimError::NoAcceptablePerson {
             form: form.map_or_else(|| "any".to_owned(), |form| form.to_string()),
             plant: plant.to_string(),
-            draws: MOST_DRAWS,
+            draws: MAX_DRAWS,
         })
     }
 
@@ -218,10 +218,10 @@ impl Person {
             });
         }
         let number = |operator: &FamilyOperator| operator.coordinates().len();
-        let deviates = seed.white_noise_of(SPREAD, number(&self.state.operator) * MOST_RUN_DRAWS);
+        let deviates = seed.white_noise_of(SPREAD, number(&self.state.operator) * MAX_RUN_DRAWS);
         let of_target = self.feedforward.as_ref().map_or(0, |seen| number(&seen.operator));
         // Without a displayed target, there are no deviates for its response in any draw.
-        let of_target = seed.white_noise_of(TARGET_SPREAD, of_target * MOST_RUN_DRAWS);
+        let of_target = seed.white_noise_of(TARGET_SPREAD, of_target * MAX_RUN_DRAWS);
         for (draw, z) in deviates.chunks_exact(number(&self.state.operator)).enumerate() {
             let state = FamilyState {
                 operator: self.task.spread(&self.state.operator, z)?,
@@ -250,7 +250,7 @@ impl Person {
         Err(SimError::NoAcceptablePerson {
             form: self.state.operator.form().to_string(),
             plant: self.plant.to_string(),
-            draws: MOST_RUN_DRAWS,
+            draws: MAX_RUN_DRAWS,
         })
     }
 }

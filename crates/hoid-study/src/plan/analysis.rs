@@ -120,7 +120,7 @@ pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
             how.estimator.forms.iter().flat_map(of).map(str::to_owned).collect()
         }
         ResolvedRequest::Change(how) => {
-            let mut names = how.estimator.most_names();
+            let mut names = how.estimator.possible_names();
             // K and K_e_dot are not parameters of the fit, but products of parameters that change.
             let all = how.estimator.form.parameters(how.estimator.neuromuscular).into_iter();
             let products = all.filter(|name| matches!(*name, "K" | "K_e_dot"));

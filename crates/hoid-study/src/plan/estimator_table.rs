@@ -198,7 +198,7 @@ impl EstimatorTable {
         let operator = asked.is_some_and(|asked| asked.structure().is_none());
         let tracks = method.is_some();
         // A method that repeats a batch fit has no start coefficients and no time of the first update.
-        let moves = method.is_some_and(|method| !method.fits_anew());
+        let moves = method.is_some_and(|method| !method.refits_stored_samples());
         let both = "fit and grey-box";
         let recursive = "the recursive methods";
         let given = [

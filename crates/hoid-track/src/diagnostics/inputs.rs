@@ -19,7 +19,7 @@ const APART_S: f64 = 10.0;
 /// Largest number of rows that are compared.
 const ROWS: usize = 16;
 /// Probability, over all comparisons of an input, below which a change is named.
-const UNLIKELY: f64 = 0.01;
+const SIGNIFICANCE_LEVEL: f64 = 0.01;
 
 /// The largest change of a response.
 #[derive(Debug, Clone, Copy)]
@@ -40,7 +40,8 @@ impl Trace {
         let own = self.largest_change(rows, |row, omega| Some(self.response_at(row, omega)));
         let of_further = self.largest_change(rows, |row, omega| self.further_response(row, omega));
         let channel = further.channel.as_str();
-        let named = |found: Option<ChangeOfResponse>| found.filter(|f| f.p_value < UNLIKELY).map(|f| f.in_words());
+        let named =
+            |found: Option<ChangeOfResponse>| found.filter(|f| f.p_value < SIGNIFICANCE_LEVEL).map(|f| f.in_words());
         let message = match (named(own), named(of_further)) {
             (Some(own), Some(further)) => {
                 format!("both responses changed: that to e {own}; that to {channel} {further}")
@@ -133,7 +134,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_statistic_is_the_distance_in_errors() {
+    fn wald_statistic_is_the_squared_distance_in_errors() {
         let response = |re: f64, c: [[f64; 2]; 2]| Response {
             value: [re, 1.0],
             covariance: c,

@@ -60,10 +60,10 @@ use crate::trace::Trace;
 /// Largest number of rows that are examined.
 const ROWS: usize = 400;
 /// VAF in % below which the simulated start fit explains little.
-const LEAST_START_VAF: f64 = 20.0;
+const MIN_START_VAF: f64 = 20.0;
 /// Share of shortened steps, and share of faulty samples, beyond which a finding is reported.
-const SHORTENED: f64 = 0.05;
-const FAULTS: f64 = 0.1;
+const MAX_SHORTENED_SHARE: f64 = 0.05;
+const MAX_FAULT_SHARE: f64 = 0.1;
 /// Ratio of a standard error to its median beyond which the covariance has blown up.
 const EXCESSIVE_ERROR_RATIO: f64 = 30.0;
 
@@ -88,9 +88,9 @@ impl Trace {
         all.extend(self.covariance_finding(&rows));
         all.extend(self.count_findings());
         all.extend(self.guard_findings());
-        all.extend(self.learnt_at_rest(record));
+        all.extend(self.updated_at_rest(record));
         all.extend(self.idle_finding(record));
-        all.extend(self.supposed_finding());
+        all.extend(self.prior_value_finding());
         all.extend(self.not_followed(record));
         all.extend(self.changed_input(&rows));
         if !all.iter().any(|finding| finding.kind == "gain") {
@@ -99,8 +99,8 @@ impl Trace {
         all.extend(self.many_changes_finding());
         all.extend(self.missed_structure(record));
         all.extend(self.response_finding.clone());
-        all.extend(self.unsteady_finding(record));
-        all.extend(self.answer_finding(record));
+        all.extend(self.response_change_finding(record));
+        all.extend(self.loop_response_finding(record));
         Ok(Verdict::of(all))
     }
 
@@ -123,11 +123,11 @@ impl Trace {
         let mut all: Vec<Finding> = fit.verdict(&span, choice)?.findings().iter().map(of_start).collect();
         if fit.model().structure().has_input() {
             let vaf = fit.quality(&span)?.vaf_simulation;
-            if vaf < LEAST_START_VAF {
+            if vaf < MIN_START_VAF {
                 all.push(Finding::doubt(
                     "start-explains-little",
                     format!(
-                        "the start fit explains {vaf:.0} % of u (VAF of the simulation, expected {LEAST_START_VAF:.0} \
+                        "the start fit explains {vaf:.0} % of u (VAF of the simulation, expected {MIN_START_VAF:.0} \
                          % or more); use a longer span, or another span"
                     ),
                 ));
@@ -137,7 +137,7 @@ impl Trace {
     }
 
     /// Returns the finding that the record does not determine omega_nm, zeta_nm or tau_e of the last row.
-    fn supposed_finding(&self) -> Option<Finding> {
+    fn prior_value_finding(&self) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self
             .operator(row)
@@ -208,7 +208,7 @@ impl Trace {
         let counts = self.counts();
         let mut all = Vec::new();
         let samples = counts.samples.max(1) as f64;
-        if counts.skipped as f64 > FAULTS * samples {
+        if counts.skipped as f64 > MAX_FAULT_SHARE * samples {
             let share = 100.0 * counts.skipped as f64 / samples;
             all.push(Finding::doubt(
                 "faults",
@@ -222,7 +222,7 @@ impl Trace {
         } else {
             samples
         };
-        if counts.shortened as f64 > SHORTENED * moved {
+        if counts.shortened as f64 > MAX_SHORTENED_SHARE * moved {
             all.push(Finding::doubt(
                 "steps-shortened",
                 format!(

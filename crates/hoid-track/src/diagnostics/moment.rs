@@ -1,6 +1,6 @@
 //! Reliability of the estimate of one sample.
 
-use hoid_ident::diagnostics::{gain_findings, is_open, neuromuscular_finding};
+use hoid_ident::diagnostics::{gain_findings, is_undetermined, neuromuscular_finding};
 use hoid_model::{
     NotConvertible, SampleTime, Severity, VerdictLevel,
     uncertainty::{Estimate, OperatorEstimate},
@@ -58,21 +58,21 @@ impl Tracker {
             .zip(&estimates)
             .filter(|(name, _)| name.starts_with('b'))
             .peekable();
-        of_b.peek().is_some() && of_b.all(|(_, e)| is_open(e))
+        of_b.peek().is_some() && of_b.all(|(_, e)| is_undetermined(e))
     }
 }
 
 fn level_of_operator(operator: &OperatorEstimate, sample_time: SampleTime) -> VerdictLevel {
     let mut gains = gain_findings(&[("", *operator)]);
     // A person who responds like a pure gain has no lead to determine.
-    if !is_open(&operator.k_e) && is_open(&operator.k_e_dot) {
+    if !is_undetermined(&operator.k_e) && is_undetermined(&operator.k_e_dot) {
         gains.retain(|finding| finding.kind != "undetermined-parameter");
     }
-    let senseless = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
+    let implausible = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
     let open = gains.iter().any(|finding| finding.severity == Severity::Undetermined);
     if open {
         VerdictLevel::NotDetermined
-    } else if !gains.is_empty() || senseless.is_some() || !operator.parameters().is_stable() {
+    } else if !gains.is_empty() || implausible.is_some() || !operator.parameters().is_stable() {
         VerdictLevel::Doubtful
     } else {
         VerdictLevel::Trustworthy

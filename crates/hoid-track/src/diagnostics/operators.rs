@@ -1,7 +1,7 @@
 //! Findings about the operators of the rows of a trace: the share of rows that have an operator, the significance and
 //! sign of the gains, the lead, and the plausibility of poles and delay.
 
-use hoid_ident::diagnostics::{is_open, leads_backwards, neuromuscular_finding};
+use hoid_ident::diagnostics::{has_negative_lead, is_undetermined, neuromuscular_finding};
 use hoid_model::{
     Finding, NotConvertible, Severity,
     uncertainty::{Estimate, OperatorEstimate},
@@ -22,12 +22,12 @@ pub(super) fn is_other(operator: &Operator) -> bool {
 
 /// Shares of the rows beyond which a finding is reported.
 const NOT_CONVERTIBLE: f64 = 0.05;
-const MOST: f64 = 0.5;
-const QUARTER: f64 = 0.25;
-const SIGN: f64 = 0.02;
+const UNDETERMINED_SHARE: f64 = 0.5;
+const IMPLAUSIBLE_SHARE: f64 = 0.25;
+const SIGN_SHARE: f64 = 0.02;
 const NEGATIVE_LEAD: f64 = 0.1;
 /// Upper bound of omega_nm in the physical recursions as a share of the Nyquist frequency, less rounding.
-const AT_FASTEST: f64 = 0.4999;
+const OMEGA_BOUND_SHARE: f64 = 0.4999;
 
 /// Returns the findings about the operators of the rows of a trace.
 pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Finding> {
@@ -67,25 +67,25 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     all.extend(lead_finding(&rows_with).map(of_response));
     let nyquist = trace.sample_time().nyquist_rad_s();
     let bounded = trace.options().method.is_physical();
-    let senseless = rows_with(&|o| {
+    let implausible = rows_with(&|o| {
         let omega = o.omega_nm_rad_s.value;
         neuromuscular_finding(omega, o.zeta_nm.value, trace.sample_time()).is_some()
-            || (bounded && omega >= AT_FASTEST * nyquist)
+            || (bounded && omega >= OMEGA_BOUND_SHARE * nyquist)
     });
-    if senseless > QUARTER {
+    if implausible > IMPLAUSIBLE_SHARE {
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
                 "in {:.0} % of the rows the two poles are a lag and carry no information about the neuromuscular system (omega_nm near \
                  or above the Nyquist frequency, or zeta_nm above 3)",
-                100.0 * senseless
+                100.0 * implausible
             ),
         ));
     }
     if let Some((low, high)) = trace.options().method.track_delay_s().filter(|(low, high)| high > low) {
         let near = 1e-6 * (high - low);
         let at_end = rows_with(&|o| o.tau_e_s.value <= low + near || o.tau_e_s.value >= high - near);
-        if at_end > QUARTER {
+        if at_end > IMPLAUSIBLE_SHARE {
             all.push(Finding::doubt(
                 "delay-at-bound",
                 format!(
@@ -104,7 +104,7 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let beyond = |e: &Estimate, sign: f64| e.standard_error.is_some_and(|s| sign * e.value > 3.0 * s);
     let positive = rows_with(&|o| beyond(&o.k_e, 1.0));
     let negative = rows_with(&|o| beyond(&o.k_e, -1.0));
-    (positive > SIGN && negative > SIGN).then(|| {
+    (positive > SIGN_SHARE && negative > SIGN_SHARE).then(|| {
         Finding::doubt(
             "gain-sign",
             format!(
@@ -119,7 +119,7 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
 /// Finding about a negative lead: people have no negative lead, but gain and lead that approximate a lag can include
 /// one.
 fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
-    let negative = rows_with(&leads_backwards);
+    let negative = rows_with(&has_negative_lead);
     (negative > NEGATIVE_LEAD).then(|| {
         Finding::doubt(
             "negative-lead",
@@ -140,8 +140,8 @@ type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 /// one.
 fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
-    let both = rows_with(&|o| is_open(&o.k_e) && is_open(&o.k_e_dot));
-    if both > MOST {
+    let both = rows_with(&|o| is_undetermined(&o.k_e) && is_undetermined(&o.k_e_dot));
+    if both > UNDETERMINED_SHARE {
         let why = if remembers { " for the memory in use" } else { "" };
         return Some(Finding::undetermined(
             "gain",
@@ -151,9 +151,9 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
             ),
         ));
     }
-    let no_gain = rows_with(&|o| is_open(&o.k_e) && !is_open(&o.k_e_dot));
-    let no_lead = rows_with(&|o| is_open(&o.k_e_dot) && !is_open(&o.k_e));
-    if no_gain > MOST {
+    let no_gain = rows_with(&|o| is_undetermined(&o.k_e) && !is_undetermined(&o.k_e_dot));
+    let no_lead = rows_with(&|o| is_undetermined(&o.k_e_dot) && !is_undetermined(&o.k_e));
+    if no_gain > UNDETERMINED_SHARE {
         let remedy = if remembers { "; use a longer memory" } else { "" };
         return Some(Finding::doubt(
             "undetermined-parameter",
@@ -163,7 +163,7 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
             ),
         ));
     }
-    (no_lead > MOST).then(|| {
+    (no_lead > UNDETERMINED_SHARE).then(|| {
         Finding::note(
             "undetermined-parameter",
             format!(
@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_negative_lead_is_no_lead() {
+    fn negative_lead_is_reported() {
         let operator = |k_e: f64, k_e_dot: f64| OperatorEstimate {
             k_e: Estimate::with_variance(k_e, 0.01),
             t_l_s: Estimate::fixed(k_e_dot / k_e),
@@ -199,7 +199,7 @@ mod tests {
             (0.1, -0.3, false),
             (-1.0, -0.3, false),
         ] {
-            assert_eq!(leads_backwards(&operator(k_e, k_e_dot)), expected, "{k_e}, {k_e_dot}");
+            assert_eq!(has_negative_lead(&operator(k_e, k_e_dot)), expected, "{k_e}, {k_e_dot}");
         }
         let share = |negative: f64| move |_: &dyn Fn(&OperatorEstimate) -> bool| negative;
         assert!(lead_finding(&share(0.05)).is_none());

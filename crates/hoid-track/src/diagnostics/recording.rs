@@ -1,27 +1,27 @@
 //! Findings about a trace that follow from the recording: the actions of the guard, an idle head, and agreement of the
 //! last row with the last few seconds.
 
-use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
+use hoid_ident::diagnostics::{has_negative_lead, is_undetermined, operator_step};
 use hoid_model::{Finding, Record};
 
 use crate::{
     guard::{GuardAction, GuardChoice, GuardKind, TrackFault},
-    stationary::BOTH_S,
+    stationary::MIN_BOTH_S,
     trace::Trace,
 };
 
 /// Share of held-back samples beyond which the finding about them is a warning.
 const MANY_HELD_BACK: f64 = 0.01;
 /// Largest number of faulty spans that are listed individually.
-const NAMED: usize = 3;
+const MAX_NAMED_FAULTS: usize = 3;
 /// Lengths of the spans at the end of the record with which the last row is compared, s.
 const LAST_S: [f64; 2] = [16.0, 30.0];
 /// Smallest number of declared changes that counts as many, and length of record per change, s, above which the number
 /// does not count as many.
 const MANY_CHANGES: usize = 3;
-const FOR_EACH_S: f64 = 30.0;
+const RECORD_PER_CHANGE_S: f64 = 30.0;
 /// p-value of one of ten comparisons below which the end of the record differs from the last row.
-const UNLIKELY: f64 = 1e-4;
+const P_VALUE_LIMIT: f64 = 1e-4;
 
 impl Trace {
     /// Findings about the actions of the guard.
@@ -74,7 +74,7 @@ impl Trace {
 
     /// Finding about spans in which e and u stay constant while the estimate is updated, because the guard was turned
     /// off: the spans carry no information, and the error bars go to zero with the innovations ([`crate::stationary`]).
-    pub(super) fn learnt_at_rest(&self, record: &Record) -> Option<Finding> {
+    pub(super) fn updated_at_rest(&self, record: &Record) -> Option<Finding> {
         if self.options().method.guard() != Some(GuardChoice::No) {
             return None;
         }
@@ -83,7 +83,7 @@ impl Trace {
         let begun: Vec<usize> = (0..u.len()).filter(|k| begins(*k)).chain([u.len()]).collect();
         let longest = begun.windows(2).max_by_key(|of| of[1] - of[0])?;
         let [from, to] = [longest[0], longest[1]].map(|k| record.time_s(k));
-        (to - from >= BOTH_S).then(|| {
+        (to - from >= MIN_BOTH_S).then(|| {
             Finding::doubt(
                 "learnt-at-rest",
                 format!(
@@ -96,8 +96,8 @@ impl Trace {
 
     /// Compares the last few seconds of the record with the last row: the delay may have changed, or the estimate may
     /// not have recovered. A step of a parameter ([`operator_step`]) gives a finding if its p-value, given the errors
-    /// of the step and of the row, is below [`UNLIKELY`]. For a delay in whole samples, the step must also exceed one
-    /// and a half samples.
+    /// of the step and of the row, is below [`P_VALUE_LIMIT`]. For a delay in whole samples, the step must also exceed
+    /// one and a half samples.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
@@ -106,7 +106,7 @@ impl Trace {
         if self.options().further.is_some() {
             return None;
         }
-        if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
+        if self.response_is_known && (is_undetermined(&operator.k_e) || has_negative_lead(&operator)) {
             return None;
         }
         let end = self.times_s()[row] + self.sample_time().s();
@@ -135,7 +135,7 @@ impl Trace {
                     0.0
                 };
                 let p_value = step.p_value(own.unwrap_or(0.0), grid);
-                if p_value < UNLIKELY && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
+                if p_value < P_VALUE_LIMIT && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
                     let words = format!(
                         "the last {length:.0} s require a {name} that differs from the last row by {}: the person \
                          changed in a way that the estimate does not follow, or the estimate has not recovered; \
@@ -152,7 +152,7 @@ impl Trace {
     /// Finding that neither gain is determined in the last row, regardless of earlier rows.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
-        let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;
+        let nothing = is_undetermined(&operator.k_e) && is_undetermined(&operator.k_e_dot) && !self.response_is_known;
         nothing.then(|| {
             Finding::doubt(
                 "last-row",
@@ -165,7 +165,7 @@ impl Trace {
     pub(super) fn many_changes_finding(&self) -> Option<Finding> {
         let changes = self.changes().len();
         let length = self.times_s().last()? - self.times_s().first()?;
-        (changes >= MANY_CHANGES && changes as f64 * FOR_EACH_S >= length).then(|| {
+        (changes >= MANY_CHANGES && changes as f64 * RECORD_PER_CHANGE_S >= length).then(|| {
             Finding::doubt(
                 "many-changes",
                 format!(
@@ -199,8 +199,13 @@ impl Trace {
 /// Lists the first faulty spans as text.
 fn named(faults: &[TrackFault]) -> String {
     let one = |f: &TrackFault| format!("{} in {} at {:.2} to {:.2} s", f.kind, f.channel, f.from_s, f.to_s);
-    let mut text = faults.iter().take(NAMED).map(one).collect::<Vec<_>>().join("; ");
-    if faults.len() > NAMED {
+    let mut text = faults
+        .iter()
+        .take(MAX_NAMED_FAULTS)
+        .map(one)
+        .collect::<Vec<_>>()
+        .join("; ");
+    if faults.len() > MAX_NAMED_FAULTS {
         text.push_str("; ...");
     }
     text

@@ -2,12 +2,12 @@
 //!
 //! The gains of the basis and the delay are fitted to each stretch between two declared changes and are tested for
 //! steps, drifts and slow oscillations, and all stretches together for a drift that they share: the method may declare
-//! a change somewhere within a long drift ([`hoid_ident::diagnostics::unsteady`]).
+//! a change somewhere within a long drift ([`hoid_ident::diagnostics::response_changes`]).
 
 use std::ops::Range;
 
 use hoid_core::adaptive::{GAINS, STATES};
-use hoid_ident::diagnostics::{Course, LoopResponse, ResponseBasis, Unsteady, answer, unsteady};
+use hoid_ident::diagnostics::{Course, LoopResponse, ResponseBasis, ResponseChange, loop_response, response_changes};
 use hoid_model::{Finding, Record};
 
 use super::structure::columns;
@@ -18,7 +18,7 @@ use crate::trace::Trace;
 /// a step: of simulated people who do not change, about 1 % are below each of these limits.
 const UNLIKELY_STEP: f64 = 0.03;
 const UNLIKELY_DRIFT: f64 = 0.01;
-const UNLIKELY_SWAY: f64 = 0.05;
+const UNLIKELY_OSCILLATION: f64 = 0.05;
 /// Lag of a second basis, s, for people with a long lag, who respond like an integrator. The basis that explains u
 /// better is used.
 const LONG_LAG_S: f64 = 10.0;
@@ -28,7 +28,7 @@ const SETTLING_S: f64 = 3.0;
 /// Smallest share of the innovations of e (the part of e that older e and u do not explain) that the latest u explains
 /// if e responds to u. The share is above one half in closed loops, and below 0.03 if e and u are from two runs with
 /// the same forcing function.
-const NO_ANSWER: f64 = 0.05;
+const MIN_RESPONSE_SHARE: f64 = 0.05;
 /// Time before and after a declared change that is excluded from the stretches, s.
 const EXCLUDED_S: f64 = 5.0;
 
@@ -73,13 +73,13 @@ impl Trace {
 
     /// Returns the test results of all stretches, the most significant first; the p-values account for the number of
     /// stretches.
-    pub(super) fn unsteady(&self, record: &Record) -> Vec<Unsteady> {
+    pub(super) fn response_changes(&self, record: &Record) -> Vec<ResponseChange> {
         let spanned: Vec<Spanned> = [self.lag_s(), LONG_LAG_S]
             .into_iter()
             .filter_map(|lag_s| self.spanned(record, lag_s))
             .collect();
         let bases: Vec<ResponseBasis<'_>> = spanned.iter().map(Spanned::basis).collect();
-        let mut all = unsteady(&bases, record.output(), &self.stretches(record), self.sample_time().s());
+        let mut all = response_changes(&bases, record.output(), &self.stretches(record), self.sample_time().s());
         all.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
         all
     }
@@ -101,14 +101,17 @@ impl Trace {
     /// Finding that the response varies in a way that the trace does not report. The test is limited to methods with a
     /// basis; other methods forget, or model how people drift, and do not assume that a person is constant between
     /// changes.
-    pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
+    pub(super) fn response_change_finding(&self, record: &Record) -> Option<Finding> {
         self.options().method.lag_of_basis_s()?;
-        let unlikely = |found: &Unsteady| match found.course {
-            Course::Sway(_) => found.p_value / UNLIKELY_SWAY,
+        let unlikely = |found: &ResponseChange| match found.course {
+            Course::Oscillation(_) => found.p_value / UNLIKELY_OSCILLATION,
             Course::Step => found.p_value / UNLIKELY_STEP,
             Course::Drift => found.p_value / UNLIKELY_DRIFT,
         };
-        let found = self.unsteady(record).into_iter().filter(|found| unlikely(found) < 1.0);
+        let found = self
+            .response_changes(record)
+            .into_iter()
+            .filter(|found| unlikely(found) < 1.0);
         let found = found.min_by(|a, b| unlikely(a).total_cmp(&unlikely(b)))?;
         let [by, error] = found.by;
         let size = match found.name {
@@ -129,7 +132,7 @@ impl Trace {
                 "drifting",
                 format!("the {name} of the person drifts by {size} where the trace declares no change (p = {p:.0e})"),
             ),
-            Course::Sway(period) => (
+            Course::Oscillation(period) => (
                 "swaying",
                 format!(
                     "the {name} of the person oscillates by {size} with a period of about {period:.0} s (p = \
@@ -144,13 +147,15 @@ impl Trace {
     }
 
     /// Estimates how e responds to u.
-    pub(super) fn answer(&self, record: &Record) -> Option<LoopResponse> {
-        answer(record.input(), record.output(), 0, self.sample_time().s())
+    pub(super) fn loop_response(&self, record: &Record) -> Option<LoopResponse> {
+        loop_response(record.input(), record.output(), 0, self.sample_time().s())
     }
 
     /// Finding that e does not respond to u.
-    pub(super) fn answer_finding(&self, record: &Record) -> Option<Finding> {
-        let found = self.answer(record).filter(|found| found.share < NO_ANSWER)?;
+    pub(super) fn loop_response_finding(&self, record: &Record) -> Option<Finding> {
+        let found = self
+            .loop_response(record)
+            .filter(|found| found.share < MIN_RESPONSE_SHARE)?;
         Some(Finding::doubt(
             "no-answer",
             format!(

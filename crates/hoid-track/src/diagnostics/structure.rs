@@ -12,9 +12,9 @@ use hoid_model::{Finding, Record};
 use crate::{guard::GuardKind, trace::Trace};
 
 /// p-value of the test below which the operator is considered to lack part of the person's structure.
-const UNLIKELY: f64 = 1e-3;
+const P_VALUE_LIMIT: f64 = 1e-3;
 /// p-value above which a corrected lag is considered to explain the residual.
-const LAG_EXPLAINS: f64 = 0.02;
+const LAG_P_VALUE: f64 = 0.02;
 /// Longest span that is examined, s, and the time excluded at its start, s, because the filters start at rest.
 const LONGEST_S: f64 = 120.0;
 const SETTLING_S: f64 = 10.0;
@@ -25,7 +25,7 @@ impl Trace {
     /// Finding that the record contradicts the structure of the operator.
     pub(super) fn missed_structure(&self, record: &Record) -> Option<Finding> {
         let found = self.residual_response(record)?;
-        (found.p_value < UNLIKELY).then(|| {
+        (found.p_value < P_VALUE_LIMIT).then(|| {
             Finding::doubt(
                 "structure",
                 format!(
@@ -55,7 +55,7 @@ impl Trace {
         columns.push(slower(&columns[0], basis.point().lag, ts));
         let of = |columns: &[Vec<f64>]| residual_response(columns, record.input(), record.output(), first, ts);
         let corrected = of(&columns)?;
-        if corrected.p_value > LAG_EXPLAINS {
+        if corrected.p_value > LAG_P_VALUE {
             return Some(corrected);
         }
         columns.pop();
@@ -150,20 +150,20 @@ mod tests {
     }
 
     #[test]
-    fn chance_is_chance_and_another_response_is_seen() {
+    fn missed_response_is_found_without_false_alarms() {
         // Of 30 people of the right form, 1.5 are expected to have a p-value below .05 by chance, with a standard
         // deviation of 1.2.
         let clean: Vec<f64> = (0..30).map(|i| found(&run(i)).p_value).collect();
         assert!(clean.iter().filter(|p| **p < 0.05).count() <= 6, "{clean:?}");
-        assert!(clean.iter().all(|p| *p > UNLIKELY), "{clean:?}");
+        assert!(clean.iter().all(|p| *p > P_VALUE_LIMIT), "{clean:?}");
         // An additional third of the gain .85 s after the error: far beyond the delay and its corrections.
         let echoes: Vec<ResidualResponse> = (0..6).map(|i| found(&with_echo(&run(i), 0.33, 85))).collect();
-        let seen = echoes.iter().filter(|f| f.p_value < UNLIKELY);
+        let seen = echoes.iter().filter(|f| f.p_value < P_VALUE_LIMIT);
         assert!(seen.count() >= 5, "{echoes:?}");
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn short_records_and_other_methods_give_no_result() {
         let record = run(0).span(0.0, 25.0).unwrap();
         let trace = track(&record, &TrackOptions::default_for(Method::adaptive(), 29), 50).unwrap();
         assert_eq!(trace.residual_response(&record), None);

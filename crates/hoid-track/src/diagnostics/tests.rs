@@ -24,7 +24,7 @@ fn judged(record: &Record, options: &TrackOptions) -> Verdict {
 
 /// The recursion of the thesis, without a guard, reported 11.3293 ± .0096 rad/s for a person who had left.
 #[test]
-fn a_rest_from_which_is_learnt_is_a_doubt() {
+fn update_at_rest_is_a_warning() {
     let record = simulated(Condition::C1);
     let stopped = |name: &str, values: &[f64]| {
         let values = (0..values.len()).map(|k| values[k.min(4100)]).collect();
@@ -42,7 +42,7 @@ fn a_rest_from_which_is_learnt_is_a_doubt() {
 }
 
 #[test]
-fn a_method_that_starts_itself_says_what_it_supposes() {
+fn prior_values_of_a_short_run_are_reported() {
     let record = simulated(Condition::C1);
     let options = TrackOptions::default_for(Method::adaptive(), 29);
     let short = judged(&record.span(0.0, 3.0).unwrap(), &options);
@@ -76,7 +76,7 @@ fn change() -> crate::Change {
 
 /// An output of zero has no gain: there is no operator, which differs from a doubtful operator.
 #[test]
-fn an_output_that_is_zero_is_not_determined() {
+fn zero_output_is_not_determined() {
     let record = simulated(Condition::C1);
     let input = Channel::new("e", "", record.input().to_vec());
     let silent = Channel::new("u", "", vec![0.0; record.len()]);
@@ -87,7 +87,7 @@ fn an_output_that_is_zero_is_not_determined() {
 }
 
 /// Returns a trace with an operator in each row, as from a recursion in physical parameters.
-fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
+fn tracked_in_physical_parameters(record: &Record, every: usize) -> Trace {
     let options = TrackOptions::default_for(Method::rpem(), 29)
         .with(&[("memory", "20s")])
         .unwrap();
@@ -99,13 +99,13 @@ fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
 /// Returns the kinds of the findings about a trace of C1 with changed rows.
 fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
     let record = simulated(Condition::C1);
-    let mut trace = in_the_operators_parameters(&record, 100);
+    let mut trace = tracked_in_physical_parameters(&record, 100);
     change(&mut trace);
     kinds(&trace.verdict(&record, None).unwrap())
 }
 
 #[test]
-fn each_size_of_the_trace_has_its_finding() {
+fn each_defect_of_a_trace_has_its_finding() {
     assert!(changed(|_| ()).is_empty());
     let counted = changed(|trace| (trace.counts.shortened, trace.counts.skipped) = (1000, 1000));
     assert_eq!(counted, ["faults", "steps-shortened"]);
@@ -144,7 +144,7 @@ fn each_size_of_the_trace_has_its_finding() {
 }
 
 #[test]
-fn orders_of_no_operator_are_judged_by_their_coefficients() {
+fn unconvertible_orders_are_judged_by_their_coefficients() {
     let record = simulated(Condition::C1);
     let orders = Orders {
         na: 3,
@@ -169,7 +169,7 @@ fn typical() -> TrackOptions {
 }
 
 #[test]
-fn a_sign_that_is_wrong_is_told_with_and_without_a_controlled_element() {
+fn wrong_sign_is_reported_with_and_without_element() {
     let scenario = Scenario::condition(Condition::C1);
     let record = simulated(Condition::C1);
     let turned = record.input().iter().map(|e| -e).collect();
@@ -191,7 +191,7 @@ fn a_sign_that_is_wrong_is_told_with_and_without_a_controlled_element() {
 }
 
 #[test]
-fn the_output_of_another_run_is_told() {
+fn output_of_another_run_is_reported() {
     let record = simulated(Condition::C1);
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let seed = RunSeed {
@@ -207,7 +207,7 @@ fn the_output_of_another_run_is_told() {
 
 /// u is scaled after the simulation, so the loop does not respond to the change of the gain.
 #[test]
-fn a_gain_that_drifts_and_one_that_sways_are_told() {
+fn drifting_and_oscillating_gains_are_reported() {
     let record = simulated(Condition::C1);
     let scaled = |gain: &dyn Fn(f64) -> f64| {
         let u = (0..record.len())
@@ -222,7 +222,7 @@ fn a_gain_that_drifts_and_one_that_sways_are_told() {
 }
 
 #[test]
-fn who_answers_like_a_gain_is_trustworthy_and_no_remedy_is_refused() {
+fn pure_gain_is_trustworthy_and_remedies_are_valid_options() {
     let record = simulated(Condition::C1);
     let lead_is_open = |mut trace: Trace| {
         for o in &mut trace.operator {
@@ -230,7 +230,7 @@ fn who_answers_like_a_gain_is_trustworthy_and_no_remedy_is_refused() {
         }
         trace.verdict(&record, None).unwrap()
     };
-    let verdict = lead_is_open(in_the_operators_parameters(&record, 10));
+    let verdict = lead_is_open(tracked_in_physical_parameters(&record, 10));
     let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
     assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
     // For a method without a memory length, a longer one is not recommended.

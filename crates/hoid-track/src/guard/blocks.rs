@@ -5,7 +5,7 @@ use hoid_core::guard::{
     profile::{Block, CHANNELS, CONSTANT_FRACTION, Fault},
 };
 
-use super::{FLOOR, Guard, LARGEST, LEAST_AGE, SOUND_EVERY, event::GuardKind};
+use super::{Guard, MAX_LEVEL_RATIO, MIN_OUTLIER_SIZE, MIN_SNAPSHOT_AGE, SNAPSHOT_INTERVAL, event::GuardKind};
 use crate::recursion::Recursion;
 
 impl Guard {
@@ -21,41 +21,41 @@ impl Guard {
             self.sound_blocks = 0;
             return;
         }
-        let trouble = self.profile.find_fault(&block, self.resting.is_rest());
+        let fault = self.profile.find_fault(&block, self.resting.is_rest());
         if let Some(reference) = &mut self.reference {
             if self.pause.kind > 0 {
-                reference.begin();
+                reference.start();
             } else if self.profile.is_unusual(&block) {
                 reference.suspect();
-            } else if trouble.is_none() && reference.end_block(&block, self.block_length) {
+            } else if fault.is_none() && reference.end_block(&block, self.block_length) {
                 self.start.restore(recursion);
                 self.sound_at = [0; 2];
-                self.begin_pause(GuardKind::Diverged, 2, 0, 0.0);
+                self.start_pause(GuardKind::Diverged, 2, 0, 0.0);
                 return;
             }
         }
         if self.pause.kind > 0 {
-            self.judge_pause(recursion, trouble, &block);
+            self.judge_pause(recursion, fault, &block);
             return;
         }
-        match trouble {
-            Some(trouble) => {
-                let (kind, channel) = named(trouble);
-                let blocks = self.profile.duration_blocks(trouble);
+        match fault {
+            Some(fault) => {
+                let (kind, channel) = named(fault);
+                let blocks = self.profile.duration_blocks(fault);
                 let seen = u64::from(blocks) * u64::from(self.block_length);
                 self.restore_older_state(recursion, seen);
-                self.begin_pause(kind, channel, seen.min(self.samples), 0.0);
+                self.start_pause(kind, channel, seen.min(self.samples), 0.0);
             }
             None if self.in_ring == 0 => {
                 self.profile.update(&block);
-                self.learn_tails(&block);
+                self.start_quantile_estimation(&block);
                 self.set_limits();
                 self.sound_blocks = if self.profile.is_calm() {
                     self.sound_blocks + 1
                 } else {
                     0
                 };
-                if self.sound_blocks >= SOUND_EVERY {
+                if self.sound_blocks >= SNAPSHOT_INTERVAL {
                     self.sound_blocks = 0;
                     let older = usize::from(self.sound_at[1] < self.sound_at[0]);
                     self.sound[older].take(recursion);
@@ -67,32 +67,32 @@ impl Guard {
     }
 
     /// Starts to learn the quantiles of the differences of both signals if their typical values are not known yet.
-    fn learn_tails(&mut self, block: &Block) {
+    fn start_quantile_estimation(&mut self, block: &Block) {
         if !self.profile.is_known() {
             for (channel, means) in self.channels.iter_mut().zip(block.differences) {
-                channel.start_learning(means);
+                channel.start_estimation(means);
             }
         }
     }
 
-    fn judge_pause(&mut self, recursion: &mut dyn Recursion, trouble: Option<Fault>, block: &Block) {
-        self.pause.bad_block = trouble.is_some();
-        if trouble.is_some() {
+    fn judge_pause(&mut self, recursion: &mut dyn Recursion, fault: Option<Fault>, block: &Block) {
+        self.pause.bad_block = fault.is_some();
+        if fault.is_some() {
             self.pause.good = 0;
         }
-        if trouble.is_some() && self.former.resembles(block) {
+        if fault.is_some() && self.former.resembles(block) {
             let former = self.former;
             self.restart_and_forget(recursion);
             self.profile = former;
             self.set_limits();
-        } else if trouble.is_some_and(Fault::may_be_the_new_level) {
+        } else if fault.is_some_and(Fault::may_be_the_new_level) {
             self.pause.suspect_samples += u64::from(self.block_length);
         }
     }
 
     /// Restores a state of the recursion that is older than the last `samples` samples.
     fn restore_older_state(&self, recursion: &mut dyn Recursion, samples: u64) {
-        let least = samples.max(LEAST_AGE * u64::from(self.block_length));
+        let least = samples.max(MIN_SNAPSHOT_AGE * u64::from(self.block_length));
         let sound = (0..2)
             .filter(|i| self.sound_at[*i] > 0 && self.samples - self.sound_at[*i] >= least)
             .max_by_key(|i| self.sound_at[*i]);
@@ -111,12 +111,16 @@ impl Guard {
         self.centre = typical.mean;
         for c in 0..CHANNELS {
             let size = typical.magnitude[c];
-            self.largest[c] = if size > 0.0 { LARGEST * size } else { f64::INFINITY };
-            self.channels[c].set_floor(FLOOR[c] * size);
+            self.largest[c] = if size > 0.0 {
+                MAX_LEVEL_RATIO * size
+            } else {
+                f64::INFINITY
+            };
+            self.channels[c].set_floor(MIN_OUTLIER_SIZE[c] * size);
             let still = CONSTANT_FRACTION * typical.differences[c][0];
             self.channels[c].set_resting(still);
             if !self.channels[c].is_known() {
-                self.channels[c].start_learning(typical.differences[c]);
+                self.channels[c].start_estimation(typical.differences[c]);
                 self.channels[c].start_detection();
             }
         }
@@ -126,8 +130,8 @@ impl Guard {
 }
 
 /// Returns the kind and the channel of a fault.
-fn named(trouble: Fault) -> (GuardKind, usize) {
-    match trouble {
+fn named(fault: Fault) -> (GuardKind, usize) {
+    match fault {
         Fault::FrozenInput => (GuardKind::Frozen, 0),
         Fault::FrozenOutput => (GuardKind::Frozen, 1),
         Fault::Idle => (GuardKind::Idle, 2),

@@ -1,7 +1,7 @@
-//! Schedule of the comparison between the estimate and the start model. In every round of [`EVERY`] blocks only the
-//! first [`COMPARED`] are compared, which keeps the cost low; after something unusual, all of the next
-//! [`SUSPECT_BLOCKS`] blocks are compared. In a round, the first [`SETTLING`] blocks do not count, because the filters
-//! of the start model start at rest.
+//! Schedule of the comparison between the estimate and the start model. In every round of [`ROUND_BLOCKS`] blocks only
+//! the first [`COMPARED_BLOCKS`] are compared, which keeps the cost low; after something unusual, all of the next
+//! [`SUSPECT_BLOCKS`] blocks are compared. In a round, the first [`SETTLING_BLOCKS`] blocks do not count, because the
+//! filters of the start model start at rest.
 
 use hoid_core::{
     delay::DelayLine,
@@ -14,9 +14,9 @@ use hoid_core::{
 
 /// Number of blocks in a round, number of blocks at its start that are compared, and number of the first of these, in
 /// which the filters settle.
-const EVERY: u32 = 44;
-const COMPARED: u32 = 11;
-const SETTLING: u32 = 3;
+const ROUND_BLOCKS: u32 = 44;
+const COMPARED_BLOCKS: u32 = 11;
+const SETTLING_BLOCKS: u32 = 3;
 /// Number of blocks that are compared after something unusual.
 const SUSPECT_BLOCKS: u32 = 30;
 
@@ -45,12 +45,12 @@ impl Reference {
             model,
             delay: DelayLine::new(vec![0.0; nk]),
             over: 0,
-            compared: COMPARED,
+            compared: COMPARED_BLOCKS,
         }
     }
 
     /// Starts a round in which many blocks are compared, with all filters at rest.
-    pub fn begin(&mut self) {
+    pub fn start(&mut self) {
         self.model.reset();
         (self.over, self.compared) = (0, SUSPECT_BLOCKS);
     }
@@ -58,7 +58,7 @@ impl Reference {
     /// Takes note of something unusual: the current block does not count, and the next blocks are compared.
     pub fn suspect(&mut self) {
         if self.over >= self.compared {
-            self.begin();
+            self.start();
         } else {
             self.model.skip_block();
             self.compared = self.over.saturating_add(SUSPECT_BLOCKS);
@@ -78,17 +78,17 @@ impl Reference {
     pub fn end_block(&mut self, block: &Block, length: u32) -> bool {
         self.over = self.over.saturating_add(1);
         // Blocks with held-back samples carry no information.
-        let counts = self.over > SETTLING && self.over <= self.compared && block.innovations == length;
-        let astray = if counts {
+        let counts = self.over > SETTLING_BLOCKS && self.over <= self.compared && block.innovations == length;
+        let diverged = if counts {
             self.model.end_block(block.innovation)
         } else {
             self.model.skip_block();
             false
         };
-        if self.over >= EVERY.max(self.compared) {
+        if self.over >= ROUND_BLOCKS.max(self.compared) {
             self.model.reset();
-            (self.over, self.compared) = (0, COMPARED);
+            (self.over, self.compared) = (0, COMPARED_BLOCKS);
         }
-        astray
+        diverged
     }
 }

@@ -3,7 +3,7 @@
 use hoid_core::guard::profile::CHANNELS;
 
 use super::{
-    Guard, Guarded, PULSE, Raw,
+    Guard, Guarded, MAX_PULSE_SIZE, Raw,
     event::{GuardAction, GuardKind},
 };
 use crate::recursion::{Recursion, Sample};
@@ -41,7 +41,7 @@ impl Guard {
                     self.ring[first..place].iter_mut().for_each(|raw| raw.held[c] = false);
                     continue;
                 }
-                self.tell(GuardKind::Outlier, c, u64::from(held), size, GuardAction::Held, 1);
+                self.report(GuardKind::Outlier, c, u64::from(held), size, GuardAction::Held, 1);
             } else {
                 clean[c] = channel.hold(x[c]);
                 holds[c] = true;
@@ -60,7 +60,7 @@ impl Guard {
             return self.lasting(recursion, c, sample);
         }
         if holds == [false; CHANNELS] {
-            return self.take_again(recursion, sample);
+            return self.reprocess(recursion, sample);
         }
         let sample = Sample {
             e: clean[0],
@@ -85,7 +85,7 @@ impl Guard {
             return false;
         };
         held >= self.shortest_pulse
-            && size <= PULSE * self.profile.typical().magnitude[1]
+            && size <= MAX_PULSE_SIZE * self.profile.typical().magnitude[1]
             && (x - last).abs() <= largest_move
             && (x - last).abs() <= 0.5 * size
     }
@@ -93,7 +93,7 @@ impl Guard {
     /// Handles the return of both signals. The recursion takes the samples again from the start of the excursion.
     /// Held-back samples are replaced by values on a parabola through the last good sample, with its slope, and the
     /// next good sample.
-    fn take_again(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
+    fn reprocess(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
         for c in 0..CHANNELS {
             let mut last = self.channels_before[c].last();
             let mut slope = self.channels_before[c].slope();
@@ -149,11 +149,11 @@ impl Guard {
         let x = [sample.e, sample.u];
         let (held, size) = (u64::from(self.channels[c].held()), self.channels[c].largest_error());
         if !x[c].is_finite() {
-            self.begin_pause(GuardKind::Missing, c, held, 0.0);
+            self.start_pause(GuardKind::Missing, c, held, 0.0);
             return self.paused(recursion, sample);
         }
         if self.is_too_large(c, x[c]) {
-            self.begin_pause(GuardKind::Level, c, held, x[c].abs());
+            self.start_pause(GuardKind::Level, c, held, x[c].abs());
             return self.paused(recursion, sample);
         }
         self.before.restore(recursion);
@@ -195,7 +195,7 @@ impl Guard {
             c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_typically(behind);
         self.in_ring = 0;
         if !is_target {
-            self.tell(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);
+            self.report(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);
         }
         Guarded { outcome, held: false }
     }

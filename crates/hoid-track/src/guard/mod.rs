@@ -14,15 +14,15 @@
 //! continue smoothly, since the person responds only after the delay. A lasting jump of e, after which e moves as
 //! before while u continues as predicted, is therefore tracking and is not reported. A disturbed sensor recovers as
 //! fast as it failed: an excursion that ends with a jump is an outlier. A fast hand leaves a dead zone at once but
-//! returns over several samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude,
-//! whose last step is within the normal moves of u, is a pulse and is used as recorded.
+//! returns over several samples: an excursion of u of [`PULSE_S`] or more within [`MAX_PULSE_SIZE`] times its mean
+//! magnitude, whose last step is within the normal moves of u, is a pulse and is used as recorded.
 //!
 //! **Restoring.** The state of a recursion consists of few numbers ([`hoid_core::state`]). It is stored at the start,
-//! when a sample is first held back, and every [`SOUND_EVERY`] blocks without a fault. Of the snapshots after such
-//! blocks, the last two are kept, and the newest one that is older than the time in which the rules detect a fault is
-//! restored. The ring of samples that may have to be taken again is twice [`LONGEST_S`] long, because both signals may
-//! be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached their
-//! size.
+//! when a sample is first held back, and every [`SNAPSHOT_INTERVAL`] blocks without a fault. Of the snapshots after
+//! such blocks, the last two are kept, and the newest one that is older than the time in which the rules detect a fault
+//! is restored. The ring of samples that may have to be taken again is twice [`LONGEST_S`] long, because both signals
+//! may be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached
+//! their size.
 //!
 //! **Filters have settled** when the delay and [`SETTLE_S`] have passed: after that time the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 %.
@@ -77,16 +77,16 @@ pub(crate) const SETTLE_S: f64 = 2.0;
 /// Length of a block, s.
 const BLOCK_S: f64 = 1.0;
 /// Number of blocks without a fault between two snapshots, and smallest age, in blocks, of a snapshot that is restored.
-const SOUND_EVERY: u32 = 5;
-const LEAST_AGE: u64 = 4;
+const SNAPSHOT_INTERVAL: u32 = 5;
+const MIN_SNAPSHOT_AGE: u64 = 4;
 /// Multiple of the typical mean magnitude beyond which the level of a signal has changed.
-const LARGEST: f64 = 30.0;
+const MAX_LEVEL_RATIO: f64 = 30.0;
 /// Smallest size of an outlier as a multiple of the mean magnitude: e passes a low-pass filter before it reaches an
 /// innovation, while u enters the innovation directly.
-const FLOOR: [f64; CHANNELS] = [0.3, 1e-3];
+const MIN_OUTLIER_SIZE: [f64; CHANNELS] = [0.3, 1e-3];
 /// Shortest pulse of the hand, s, and its largest size as a multiple of the mean magnitude.
 const PULSE_S: f64 = 0.03;
-const PULSE: f64 = 6.0;
+const MAX_PULSE_SIZE: f64 = 6.0;
 /// Time after which a misfit or swapped channels are accepted as normal, s.
 const ACCEPTED_AFTER_S: f64 = 120.0;
 
@@ -302,7 +302,7 @@ impl Guard {
         self.reference = Some(Reference::new(model, nk));
     }
 
-    fn tell(&mut self, kind: GuardKind, channel: usize, samples: u64, size: f64, action: GuardAction, after: u64) {
+    fn report(&mut self, kind: GuardKind, channel: usize, samples: u64, size: f64, action: GuardAction, after: u64) {
         self.event = Some(GuardEvent {
             kind,
             channel: GuardChannel::ALL[channel],

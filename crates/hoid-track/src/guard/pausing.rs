@@ -14,7 +14,7 @@ impl Guard {
     }
 
     /// Starts a pause.
-    pub(super) fn begin_pause(&mut self, kind: GuardKind, channel: usize, samples: u64, size: f64) {
+    pub(super) fn start_pause(&mut self, kind: GuardKind, channel: usize, samples: u64, size: f64) {
         self.in_ring = 0;
         let place = GuardKind::ALL.iter().position(|k| *k == kind).unwrap_or(0);
         self.pause = Pause {
@@ -28,7 +28,7 @@ impl Guard {
         };
         self.block = Block::default();
         self.in_block = 0;
-        self.tell(kind, channel, samples, size, GuardAction::Paused, 0);
+        self.report(kind, channel, samples, size, GuardAction::Paused, 0);
     }
 
     /// Handles a sample during a pause: it enters the filters of the recursion if possible.
@@ -102,7 +102,7 @@ impl Guard {
             self.restarts += 1;
             self.restarted_at = self.samples;
         }
-        self.tell(kind, channel, self.samples - first, size, action, 0);
+        self.report(kind, channel, self.samples - first, size, action, 0);
     }
 
     /// Restarts the recursion from its start and forgets the typical values of the signals.

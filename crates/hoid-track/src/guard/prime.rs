@@ -18,9 +18,9 @@ use super::Guard;
 /// Quantiles of the magnitude of a Gaussian variable, in standard deviations.
 const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
 /// Probability of the inner quantile of the differences, which is estimated directly.
-const INNER: f64 = 0.9;
+const INNER_PROBABILITY: f64 = 0.9;
 /// Smallest number of blocks of a record from which typical values are learnt.
-const LEAST: usize = 5;
+const MIN_BLOCKS: usize = 5;
 
 impl Guard {
     /// Learns the typical values from a record.
@@ -47,12 +47,12 @@ impl Guard {
                     .filter_map(|(d, moves)| moves.then_some(d.abs()))
                     .collect();
                 outer[c][j] = tail(&of_moves);
-                inner[c][j] = quantile(of_moves, INNER);
+                inner[c][j] = quantile(of_moves, INNER_PROBABILITY);
             }
         }
         output.iter().for_each(|u| self.resting.take(*u));
         let length = self.block_length as usize;
-        if output.len() < LEAST * length {
+        if output.len() < MIN_BLOCKS * length {
             return;
         }
         let centre = signals.map(|signal| middle(signal.to_vec()));

@@ -223,7 +223,7 @@ impl AdaptiveRecursion {
     }
 
     /// True if an estimate exists and its response is not zero; a response of zero has no gain in dB and no phase.
-    fn answers(&self, [re, im]: [f64; 2]) -> bool {
+    fn has_response(&self, [re, im]: [f64; 2]) -> bool {
         self.model.has_started() && (re != 0.0 || im != 0.0)
     }
 
@@ -377,7 +377,7 @@ impl Recursion for AdaptiveRecursion {
 
     fn response(&self, omega_rad_s: f64) -> Option<Response> {
         let (value, by) = self.model.response_with_derivatives(omega_rad_s);
-        self.answers(value).then(|| Response {
+        self.has_response(value).then(|| Response {
             value,
             covariance: through(&by, &self.model.state_covariance()),
         })
@@ -385,7 +385,7 @@ impl Recursion for AdaptiveRecursion {
 
     fn response_value(&self, omega_rad_s: f64) -> Option<[f64; 2]> {
         let value = self.model.response(omega_rad_s);
-        self.answers(value).then_some(value)
+        self.has_response(value).then_some(value)
     }
 }
 

@@ -29,7 +29,7 @@ const RATE_HZ: f64 = 50.0;
 /// Time omitted at the start, because the filters start at rest, s.
 const SETTLING_S: f64 = 5.0;
 /// Limit of the residuals in the start span, standard deviations.
-const LIMIT: f64 = 3.5;
+const RESIDUAL_LIMIT: f64 = 3.5;
 
 const NOMINAL: Operator = Operator {
     gain: 1.0,
@@ -189,7 +189,7 @@ fn least_squares(white: &[White]) -> Result<Whitened, String> {
     let mut sums = Sums::default();
     white.iter().for_each(|w| sums.add(&w.x, w.y));
     let first = sums.solve()?;
-    let bound = LIMIT * first.variance.sqrt();
+    let bound = RESIDUAL_LIMIT * first.variance.sqrt();
     let mut limited = Sums::default();
     for w in white {
         let expected = product(&w.x, &first.theta);
@@ -330,7 +330,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_inverse_is_one() {
+    fn inverse_times_matrix_is_the_identity() {
         let a: Square = std::array::from_fn(|i| {
             std::array::from_fn(|j| 10f64.powi((i + j) as i32) * if i == j { 2.0 } else { 0.5 })
         });

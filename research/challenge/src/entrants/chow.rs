@@ -26,7 +26,7 @@ const MIN_PAST_BLOCKS: usize = 24;
 /// Number of blocks before an alarm that are kept.
 const KEPT_BLOCKS: usize = 12;
 const AT_RAD_S: f64 = 2.5;
-const LIMIT: f64 = 3.5;
+const RESIDUAL_LIMIT: f64 = 3.5;
 /// Ratio of T to its level above which a change is declared, if it is exceeded in `PERSISTENCE` consecutive blocks. In
 /// runs 2 to 5 of the cases without a change (open seeds; 1.8 h), which are not in any table, ratios of 6, 8, 12 and 25
 /// are exceeded 32, 15, 9 and 5 times; without the cases with a missing and a silent span, 21, 5, 0 and 0 times.
@@ -38,8 +38,8 @@ const PERSISTENCE: usize = 4;
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 const DEFAULT_LEVEL: f64 = 0.5;
 const PRIOR_WEIGHT: f64 = 10.0;
-const LONGEST: f64 = 480.0;
-const MOST: f64 = 3.0;
+const MAX_MEMORY_BLOCKS: f64 = 480.0;
+const MAX_LOG_EXCESS: f64 = 3.0;
 
 pub(super) struct Chow;
 
@@ -66,7 +66,7 @@ impl Entrant for Chow {
                 answer.estimates.push(reported(task, &whole.theta, &whole.covariance));
             }
             if !sample.is_void {
-                let bound = LIMIT * before.variance.sqrt();
+                let bound = RESIDUAL_LIMIT * before.variance.sqrt();
                 let expected = product(&sample.x, &before.theta);
                 open.add(&sample.x, expected + (sample.y - expected).clamp(-bound, bound));
             }
@@ -95,8 +95,8 @@ impl Entrant for Chow {
             before = past;
             let t = distance(&gradient, &past, &now);
             let relative = t / (level - MEAN_LOG).exp().max(1.0);
-            levels = (levels + 1.0).min(LONGEST);
-            level += (t.max(0.05).ln().min(level + MOST) - level) / levels;
+            levels = (levels + 1.0).min(MAX_MEMORY_BLOCKS);
+            level += (t.max(0.05).ln().min(level + MAX_LOG_EXCESS) - level) / levels;
             above = if relative > THRESHOLD { above + 1 } else { 0 };
             if above >= PERSISTENCE && sample.t_s >= task.start_s.1 {
                 above = 0;

@@ -12,7 +12,7 @@ use super::{
 
 const DRIFT: f64 = 0.1;
 const DRIFT_AT_RAD_S: f64 = 2.0;
-const LIMIT: f64 = 3.5;
+const RESIDUAL_LIMIT: f64 = 3.5;
 /// Memory length of the innovation variance, s.
 const MEMORY_S: f64 = 20.0;
 
@@ -48,7 +48,7 @@ impl Entrant for Kalman {
             (0..GAINS).for_each(|i| p[i][i] += drift[i]);
             let px: [f64; GAINS] = std::array::from_fn(|i| product(&p[i], &sample.x));
             let expected = product(&px, &sample.x) + variance;
-            let bound = LIMIT * expected.sqrt();
+            let bound = RESIDUAL_LIMIT * expected.sqrt();
             let innovation = (sample.y - product(&theta, &sample.x)).clamp(-bound, bound);
             for i in 0..GAINS {
                 theta[i] += px[i] * innovation / expected;

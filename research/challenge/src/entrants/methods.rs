@@ -13,9 +13,9 @@ use hoid_track::{Change, Method, Response, Sample, StartAt, TrackOptions, TrackP
 use super::super::entrant::{Alarm, Entrant, EntrantResult, ReportedResponse, Task};
 
 /// A method of `hoid_track` as an entrant.
-pub(super) struct OfMethod(pub Method);
+pub(super) struct MethodEntrant(pub Method);
 
-impl Entrant for OfMethod {
+impl Entrant for MethodEntrant {
     fn name(&self) -> String {
         self.0.name().to_owned()
     }
@@ -45,7 +45,7 @@ impl Entrant for OfMethod {
     }
 }
 
-impl OfMethod {
+impl MethodEntrant {
     fn options(&self, task: &Task) -> Result<TrackOptions, String> {
         let with = |nk| TrackOptions {
             start: StartAt::Span(Some(task.start_s)),
@@ -160,7 +160,7 @@ mod tests {
 
     /// Processing sample by sample gives the same result as processing a record.
     #[test]
-    fn both_ways_say_the_same() {
+    fn samplewise_and_batch_processing_agree() {
         let task = task("change-K_e_dot-100");
         for method in [
             Method::rls(),
@@ -168,7 +168,7 @@ mod tests {
             hoid_survey::multiple_model(),
             Method::adaptive(),
         ] {
-            let own = OfMethod(method);
+            let own = MethodEntrant(method);
             let (over_record, options) = (own.follow(&task).unwrap(), own.options(&task).unwrap());
             let by_sample = over_samples(&task, &options).unwrap();
             assert_eq!(over_record.alarms, by_sample.alarms, "{}", own.name());
@@ -182,7 +182,7 @@ mod tests {
     /// In a loop with a small margin the error is nearly a sine, and drifting gains fit its phase as well as any delay
     /// does: a method whose gains drift from the start converges far from the operator.
     #[test]
-    fn a_loop_of_small_margin_leads_nobody_astray() {
+    fn adaptive_converges_in_a_loop_with_a_small_margin() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();
         let of = RunOf {
             seeds: Seeds::Open,
@@ -190,15 +190,15 @@ mod tests {
         };
         let line = EvaluationRun::new(&case, of)
             .unwrap()
-            .line(&OfMethod(Method::adaptive()));
+            .line(&MethodEntrant(Method::adaptive()));
         let errors: Vec<f64> = line.moments.iter().map(|m| m.error).collect();
         assert!(errors.iter().all(|e| *e < 0.3), "{errors:?}");
     }
 
     #[test]
-    fn missing_samples_are_no_end() {
+    fn estimates_continue_after_missing_samples() {
         let task = task("none-missing");
-        let answer = OfMethod(hoid_survey::physical()).follow(&task).unwrap();
+        let answer = MethodEntrant(hoid_survey::physical()).follow(&task).unwrap();
         assert_eq!(answer.estimates.len(), task.asked_s.len());
         assert!(
             answer

@@ -20,7 +20,7 @@ use super::entrant::Entrant;
 pub fn entrants() -> Vec<Box<dyn Entrant>> {
     let mut all: Vec<Box<dyn Entrant>> = Vec::new();
     for method in hoid_survey::methods() {
-        all.push(Box::new(methods::OfMethod(method)));
+        all.push(Box::new(methods::MethodEntrant(method)));
     }
     all.push(Box::new(kalman::Kalman));
     all.push(Box::new(chow::Chow));

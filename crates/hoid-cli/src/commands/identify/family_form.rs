@@ -173,7 +173,7 @@ impl FamilyReport<'_> {
     fn between_samples(&self) -> String {
         let fit = self.fit;
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
-        let Some((tau, straight)) = named.zip(fit.delay_if_straight_s(0)) else {
+        let Some((tau, straight)) = named.zip(fit.delay_if_linear_s(0)) else {
             return match fit.intersample {
                 Intersample::Zoh => "tau_e applies to an error that is held between its samples.\n".to_owned(),
                 _ => "tau_e applies to an error that is linear between its samples.\n".to_owned(),

@@ -262,8 +262,8 @@ impl Session {
         self.innovation = taken.outcome.and_then(|outcome| outcome.innovation);
         self.counts.shortened += u64::from(taken.outcome.is_some_and(|outcome| outcome.shortened));
         if let Some(tracker) = self.live.tracker() {
-            // This is the time of the last sample that the recursion has processed.
-            let t = self.t.map(|t| t - self.live.behind_s());
+            // Time of the last sample that the recursion has processed.
+            let t = self.t.map(|t| t - self.live.lag_s());
             (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
             if let Some(event) = tracker.event() {
                 self.event = Some(event.at(t.unwrap_or(f64::NAN), self.live.plan().sample_time()));

@@ -26,7 +26,7 @@ fn responses_of_signals(basis: &mut Basis, omega: f64, ts: f64, of: &mut dyn FnM
 }
 
 #[test]
-fn filter_and_response_agree() {
+fn filter_output_matches_the_frequency_response() {
     let ts = 0.01;
     let mut basis = Basis::new(point(), ts).unwrap();
     let omega = 3.0;
@@ -45,7 +45,7 @@ fn filter_and_response_agree() {
 }
 
 #[test]
-fn derivatives_are_finite_differences() {
+fn derivatives_agree_with_finite_differences() {
     let (ts, omega, step) = (0.01, 4.0, 1e-5);
     let mut basis = Basis::new(point(), ts).unwrap();
     let twin = basis.clone();
@@ -71,7 +71,7 @@ fn derivatives_are_finite_differences() {
 }
 
 #[test]
-fn weights_are_those_of_the_regressors() {
+fn weights_match_the_regressors() {
     let basis = Basis::new(point(), 0.01).unwrap();
     let state: [f64; STATES] = [1.2, -0.7, 0.4, 0.3, 1.5, -0.04, 0.02];
     let z: Signals = [0.3, -1.1, 0.7, 2.0, -5.0, 11.0];
@@ -87,7 +87,7 @@ fn weights_are_those_of_the_regressors() {
 }
 
 #[test]
-fn one_that_has_moved_becomes_one_that_was_always_there() {
+fn moved_basis_converges_to_a_basis_at_the_new_point() {
     let ts = 0.01;
     let there = Point {
         tau: 0.231,
@@ -127,7 +127,7 @@ fn one_that_has_moved_becomes_one_that_was_always_there() {
 }
 
 #[test]
-fn a_gain_with_a_lead_is_in_the_span() {
+fn gain_with_lead_is_in_the_span() {
     let basis = Basis::new(point(), 0.01).unwrap();
     // (K_e + K_e_dot s)(s + a).
     let (k_e, k_e_dot) = (0.09, 0.07);
@@ -140,7 +140,7 @@ fn a_gain_with_a_lead_is_in_the_span() {
 }
 
 #[test]
-fn delay_is_continuous_and_what_makes_no_sense_is_refused() {
+fn basis_is_continuous_in_the_delay_and_refuses_invalid_points() {
     let run = |tau: f64| {
         let mut basis = Basis::new(Point { tau, ..point() }, 0.01).unwrap();
         let e = |k: i64| libm::sin(0.07 * k as f64);

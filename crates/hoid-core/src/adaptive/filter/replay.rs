@@ -41,7 +41,7 @@ const MIN_ORDERS: u64 = 3;
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Makes the first estimate once there are enough samples: the best of the candidates from all starting points over
     /// the samples so far or, without replays, the candidate at the point of the person.
-    pub(super) fn begin(&mut self) {
+    pub(super) fn try_to_start(&mut self) {
         let (ts, n) = (self.prior.sample_time, self.history.samples());
         let enough = n as f64 * ts >= self.prior.hold && n >= MIN_ORDERS * self.prior.order as u64;
         if !enough || !self.powers.iter().all(|p| *p > 0.0) {

@@ -1,8 +1,8 @@
 //! Scores `g_c = sum psi eps` and information `G_c = sum psi psi'` of blocks of records.
 //!
-//! Blocks have the length [`BLOCK_S`], or a greater length if this would give more than [`MOST`] blocks in all records.
-//! A long record is processed in pieces of whole blocks, each with its own initial states, so the memory for the
-//! columns of psi does not grow with the length of the record.
+//! Blocks have the length [`BLOCK_S`], or a greater length if this would give more than [`MAX_BLOCKS`] blocks in all
+//! records. A long record is processed in pieces of whole blocks, each with its own initial states, so the memory for
+//! the columns of psi does not grow with the length of the record.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use crate::{
 /// Length of a block, s: longer than the correlation time of the residuals.
 pub(super) const BLOCK_S: f64 = 2.0;
 /// Largest total number of blocks in all records.
-const MOST: usize = 96;
+const MAX_BLOCKS: usize = 96;
 /// Number of residuals in a piece of a long record.
 const PIECE: usize = 1 << 15;
 
@@ -45,7 +45,7 @@ pub(crate) fn score_blocks(
     let count = |d: &Data<'_>| d.u.len().saturating_sub(first);
     let total: usize = data.iter().map(count).sum();
     let length = ((BLOCK_S / sample_time_s).ceil() as usize)
-        .max(total.div_ceil(MOST))
+        .max(total.div_ceil(MAX_BLOCKS))
         .max(1);
     let mut blocks = Vec::new();
     for (record, whole) in data.iter().enumerate() {
@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_add_up_whatever_the_pieces() {
+    fn block_scores_add_up_for_any_record_length() {
         // One column, psi = 1: g is the sum of the residuals, G their number.
         for n in [1000_usize, 100_000] {
             let u: Vec<f64> = (0..n).map(|t| (0.1 * t as f64).sin()).collect();
@@ -150,7 +150,7 @@ mod tests {
             let sum: f64 = blocks.iter().map(|b| b.score[0]).sum();
             assert_eq!(count, (n - 30) as f64);
             assert!((sum - u[30..].iter().sum::<f64>()).abs() < 1e-9);
-            assert!(blocks.len() <= MOST && blocks.len() >= 4, "{}", blocks.len());
+            assert!(blocks.len() <= MAX_BLOCKS && blocks.len() >= 4, "{}", blocks.len());
         }
         let nothing = &mut |_: usize, _: Data<'_>| None;
         let u = [0.0; 50];

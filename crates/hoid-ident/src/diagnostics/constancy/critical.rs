@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_tail_agrees_with_andrews_table() {
+    fn tail_probability_matches_andrews_table() {
         // D. W. K. Andrews, Econometrica 71 (2003) 395-397, p = 1, pi_0 = 0.15: the 10, 5 and 1 % points.
         for (level, c) in [(0.1, 7.12), (0.05, 8.68), (0.01, 12.16)] {
             let found = de_long(c, 0.15);
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn few_instants_are_bonferronis() {
+    fn few_instants_use_the_bonferroni_bound() {
         assert!((of_supremum(1e-6, 3, 0.05) - 3e-6).abs() < 1e-12);
         assert!(of_supremum(1e-6, 100_000, 0.05) < 1e-3);
         assert_eq!(of_supremum(1.0, 3, 0.05), 1.0);

@@ -51,7 +51,7 @@ pub(crate) use blocks::{physical_blocks, score_blocks};
 pub use search::Course;
 use search::{Change, strongest};
 pub(crate) use search::{Constancy, Direction};
-pub use steadiness::{ResponseBasis, Unsteady, unsteady};
+pub use steadiness::{ResponseBasis, ResponseChange, response_changes};
 use stretch::most_influential_block;
 
 /// Largest p-value at which a parameter counts as changed, both in the test of the delay and in the test of the other

@@ -20,7 +20,7 @@ use crate::{
 };
 
 /// Residuals of a robust fit are limited to this multiple of their scale, as in the robust loss.
-const CLIPPED: f64 = 1.345;
+const CLIPPING_LIMIT: f64 = 1.345;
 /// If the sum of the scores of a parameter exceeds this number of standard deviations, the fit is not a least-squares
 /// minimum, for example because it was made for simulation or a prior has more weight than the data.
 const LARGEST_SCORE_SUM: f64 = 3.0;
@@ -42,7 +42,7 @@ impl Fit {
         let first = first_residual(&orders, self.initial_state);
         let mut workspace = Workspace::of_thread();
         let bound = if self.robust {
-            CLIPPED * self.innovation_variance.sqrt()
+            CLIPPING_LIMIT * self.innovation_variance.sqrt()
         } else {
             f64::INFINITY
         };

@@ -11,14 +11,14 @@ use super::{
 };
 
 /// Minimum number of blocks on each side of a change.
-const FEWEST: usize = 2;
+const MIN_BLOCKS_PER_SIDE: usize = 2;
 /// Shortest period of a periodic change, in blocks.
-const SHORTEST: f64 = 5.0;
+const MIN_PERIOD_BLOCKS: f64 = 5.0;
 /// A change is tested only if at least this share of its information remains after estimating the constant parameters.
 const MIN_INFORMATION_LEFT: f64 = 1e-3;
 /// Smallest eigenvalue of the information, scaled to a unit diagonal, for which a combination of parameters is
 /// determined.
-const SINGULAR: f64 = 1e-9;
+const MIN_EIGENVALUE: f64 = 1e-9;
 
 /// Input data of the test.
 pub(crate) struct Constancy<'a> {
@@ -52,7 +52,7 @@ pub enum Course {
     /// A linear drift over the whole record.
     Drift,
     /// A periodic change with this period in s.
-    Sway(f64),
+    Oscillation(f64),
 }
 
 /// A significant change of a parameter.
@@ -112,7 +112,7 @@ pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
 pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], sets: &[Candidate]) -> Option<Change> {
     let (blocks, n) = (of.blocks, of.blocks.len());
     let p = blocks.first()?.score.len();
-    if n < 2 * FEWEST || of.variance <= 0.0 || sets.is_empty() {
+    if n < 2 * MIN_BLOCKS_PER_SIDE || of.variance <= 0.0 || sets.is_empty() {
         return None;
     }
     let matrices: Vec<DMatrix<f64>> = blocks
@@ -146,7 +146,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
             // candidates.
             let (scatter, freedom) = match sets[t.set].course {
                 Course::Step | Course::Drift => (t.by_blocks, n - 2),
-                Course::Sway(_) => (0.0, 4 * (n - 2)),
+                Course::Oscillation(_) => (0.0, 4 * (n - 2)),
             };
             let variance = scatter.max(t.by_model * typical.max(1.0)) + t.between_runs;
             let p_one = of_student(t.u / variance.sqrt(), freedom as f64);
@@ -180,10 +180,10 @@ pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     for record in 0..records {
         let from = blocks.partition_point(|b| b.record < record);
         let to = blocks.partition_point(|b| b.record <= record);
-        if records > 1 && to - from >= FEWEST {
+        if records > 1 && to - from >= MIN_BLOCKS_PER_SIDE {
             all.push(Candidate::of_blocks(record, 0, from..to, blocks.len()));
         }
-        for k in from + FEWEST..(to + 1).saturating_sub(FEWEST) {
+        for k in from + MIN_BLOCKS_PER_SIDE..(to + 1).saturating_sub(MIN_BLOCKS_PER_SIDE) {
             all.push(Candidate::of_blocks(record, blocks[k].from, k..to, blocks.len()));
         }
     }
@@ -205,17 +205,17 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Candidate> {
 }
 
 /// Returns sinusoidal changes over the blocks of one record, where `block_s` is the duration of a block: periods from
-/// [`SHORTEST`] blocks to two thirds of the record, with frequencies spaced by half the frequency resolution, each in
-/// four phases.
+/// [`MIN_PERIOD_BLOCKS`] blocks to two thirds of the record, with frequencies spaced by half the frequency resolution,
+/// each in four phases.
 pub(super) fn periodic_changes(blocks: &[ScoreBlock], block_s: f64) -> Vec<Candidate> {
     let n = blocks.len();
     let frequencies = (3..)
         .map(|k| f64::from(k) / (2.0 * n as f64))
-        .take_while(|f| *f <= 1.0 / SHORTEST);
+        .take_while(|f| *f <= 1.0 / MIN_PERIOD_BLOCKS);
     let of = |frequency: f64, phase: u32| Candidate {
         record: 0,
         at: 0,
-        course: Course::Sway(block_s / frequency),
+        course: Course::Oscillation(block_s / frequency),
         weights: (0..n)
             .map(|c| (TAU * (c as f64 + 0.5) * frequency + FRAC_PI_4 * f64::from(phase)).sin())
             .collect(),
@@ -293,7 +293,7 @@ pub(super) fn pseudo_inverse(whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         .eigenvalues
         .iter()
         .enumerate()
-        .filter(|(_, value)| **value > SINGULAR)
+        .filter(|(_, value)| **value > MIN_EIGENVALUE)
     {
         let column = eigen.eigenvectors.column(k).component_mul(&scale);
         inverse += &column * column.transpose() / *value;

@@ -18,14 +18,14 @@ use super::{
     critical::of_student,
     search::{Change, Constancy, Course, Direction, drifts, periodic_changes, sets, strongest_among},
 };
-use crate::diagnostics::whitened::{LIMIT, NOISE, Whitened, solution, thinning};
+use crate::diagnostics::whitened::{NOISE, OUTLIER_LIMIT, Whitened, solution, thinning};
 
 /// Minimum number of 2 s blocks for the test.
-const FEWEST: usize = 8;
+const MIN_BLOCKS: usize = 8;
 
 /// A change of a response.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unsteady {
+pub struct ResponseChange {
     /// Time course of the change.
     pub course: Course,
     /// Name of the property that changes: `gain` or `delay`. A change of a lead is reported as `delay`.
@@ -55,12 +55,12 @@ pub struct ResponseBasis<'a> {
 /// Returns the most significant jump, drift and periodic change of a response in each of these stretches, and the most
 /// significant drift that all stretches have in common. Among several bases, the one that explains u best is used in
 /// each stretch. Stretches with too few data, or in which a value is not a number, are left out.
-pub fn unsteady(
+pub fn response_changes(
     bases: &[ResponseBasis<'_>],
     u: &[f64],
     stretches: &[Range<usize>],
     sample_time_s: f64,
-) -> Vec<Unsteady> {
+) -> Vec<ResponseChange> {
     let all: Vec<TestedStretch> = stretches
         .iter()
         .filter_map(|stretch| {
@@ -73,7 +73,7 @@ pub fn unsteady(
         .collect();
     let common = if all.len() > 1 { common_drift(&all) } else { None };
     let each = all.iter().flat_map(|stretch| &stretch.strongest);
-    each.map(|found| Unsteady {
+    each.map(|found| ResponseChange {
         p_value: (found.p_value * all.len() as f64).min(1.0),
         ..*found
     })
@@ -92,7 +92,7 @@ struct ScoredStretch {
 
 /// Results of the tests of a stretch.
 struct TestedStretch {
-    strongest: Vec<Unsteady>,
+    strongest: Vec<ResponseChange>,
     /// Drift of the gain and of the delay over the stretch, and the length of the stretch in blocks.
     drifts: [Option<Change>; 2],
     blocks: usize,
@@ -104,7 +104,7 @@ impl ScoredStretch {
         let rows: Vec<usize> = stretch.clone().step_by(thin).collect();
         let block = (BLOCK_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;
         let count = rows.len().saturating_sub(NOISE) / block;
-        if count < FEWEST || rows.last()? >= &u.len() || basis.columns.iter().any(|c| c.len() != u.len()) {
+        if count < MIN_BLOCKS || rows.last()? >= &u.len() || basis.columns.iter().any(|c| c.len() != u.len()) {
             return None;
         }
         let start = *rows.first()?;
@@ -112,7 +112,7 @@ impl ScoredStretch {
         let transient: Vec<f64> = (0..u.len()).map(|k| (-ago(k) / basis.lag_s).exp()).collect();
         let mut columns = basis.columns.to_vec();
         columns.push(transient);
-        let fit = Whitened::of(&columns, u, &rows, LIMIT)?;
+        let fit = Whitened::of(&columns, u, &rows, OUTLIER_LIMIT)?;
         let p = columns.len() + 1;
         // The directions use the gains of the numerator terms, because the coefficients of the individual signals are
         // too uncertain.
@@ -183,7 +183,7 @@ impl ScoredStretch {
                 .iter()
                 .filter_map(|sets| strongest_among(&of, &all, sets))
                 .filter_map(|change| {
-                    Some(Unsteady {
+                    Some(ResponseChange {
                         course: change.course,
                         name: NAMES.into_iter().find(|name| *name == change.name)?,
                         at: change.at,
@@ -201,7 +201,7 @@ impl ScoredStretch {
 /// Returns the more significant of the two drifts (of gain and delay) that several stretches have in common: the mean
 /// rate of the stretches, weighted by their precision, as a change over all of them. Each stretch has its own response,
 /// so changes between stretches are not part of the drift.
-fn common_drift(all: &[TestedStretch]) -> Option<Unsteady> {
+fn common_drift(all: &[TestedStretch]) -> Option<ResponseChange> {
     let blocks: usize = all.iter().map(|stretch| stretch.blocks).sum();
     let of = |i: usize| {
         let (mut information, mut weighted) = (0.0, 0.0);
@@ -212,7 +212,7 @@ fn common_drift(all: &[TestedStretch]) -> Option<Unsteady> {
             weighted += rate * error.powi(-2);
         }
         let z = weighted / information.sqrt();
-        (information > 0.0).then(|| Unsteady {
+        (information > 0.0).then(|| ResponseChange {
             course: Course::Drift,
             name: NAMES[i],
             at: 0,
@@ -264,21 +264,21 @@ mod tests {
     }
 
     /// Returns the changes found for this time course of the gain.
-    fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<Unsteady> {
+    fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<ResponseChange> {
         let (z, u) = run(seed, gain);
-        unsteady(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS)
+        response_changes(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS)
     }
 
-    fn p_value(found: &[Unsteady], is: impl Fn(Course) -> bool) -> f64 {
+    fn p_value(found: &[ResponseChange], is: impl Fn(Course) -> bool) -> f64 {
         let of_course = found.iter().filter(|found| is(found.course));
         of_course.map(|found| found.p_value).fold(1.0, f64::min)
     }
 
     #[test]
-    fn jumps_drifts_and_sways_are_told_apart() {
+    fn jumps_drifts_and_oscillations_are_distinguished() {
         let step = |c| c == Course::Step;
         let drift = |c| c == Course::Drift;
-        let sway = |c| matches!(c, Course::Sway(_));
+        let sway = |c| matches!(c, Course::Oscillation(_));
         for seed in 1..6 {
             let jumps = of(seed, |t| if t < 40.0 { 1.0 } else { 0.6 });
             assert!(p_value(&jumps, step) < 1e-4 && p_value(&jumps, sway) > 1e-3);
@@ -288,7 +288,7 @@ mod tests {
             let periodic_changes = of(seed, |t| 1.0 + 0.3 * (TAU * t / 16.0).sin());
             assert!(p_value(&periodic_changes, sway) < 1e-4);
             let found = periodic_changes.iter().find(|found| sway(found.course)).unwrap();
-            let Course::Sway(period) = found.course else {
+            let Course::Oscillation(period) = found.course else {
                 unreachable!()
             };
             assert!((period - 16.0).abs() < 2.5, "{period}");
@@ -296,21 +296,21 @@ mod tests {
     }
 
     #[test]
-    fn who_is_steady_is_called_so() {
+    fn constant_response_is_not_reported() {
         // With three time courses and 100 people, each p-value is below its limit in fewer than one in a hundred.
-        let told = (0..100)
+        let reported = (0..100)
             .map(|seed| of(1000 + seed, |_| 1.0))
             .filter(|found| found.iter().any(|found| found.p_value < 0.01))
             .count();
-        assert!(told <= 5, "{told} of 100");
+        assert!(reported <= 5, "{reported} of 100");
     }
 
     #[test]
-    fn a_drift_that_stretches_share_is_found_and_a_jump_between_them_is_not() {
+    fn common_drift_is_found_and_jumps_between_stretches_are_not() {
         let halves = [0..N / 2, N / 2..N];
         let drift = |gain: &dyn Fn(f64) -> f64, seed| {
             let (z, u) = run(seed, gain);
-            p_value(&unsteady(&[basis(&z)], &u, &halves, TS), |course| {
+            p_value(&response_changes(&[basis(&z)], &u, &halves, TS), |course| {
                 course == Course::Drift
             })
         };
@@ -320,7 +320,7 @@ mod tests {
             let falls = |t: f64| 1.0 - 0.15 * (t / 40.0).fract();
             shared += usize::from(drift(&falls, seed) < 1e-3);
             let (z, u) = run(seed, falls);
-            let first = unsteady(&[basis(&z)], &u, &halves[..1], TS);
+            let first = response_changes(&[basis(&z)], &u, &halves[..1], TS);
             one += usize::from(p_value(&first, |course| course == Course::Drift) < 1e-3);
             assert!(drift(&|t| if t < 40.0 { 1.0 } else { 0.6 }, seed) > 1e-3);
         }
@@ -328,18 +328,18 @@ mod tests {
     }
 
     #[test]
-    fn the_basis_that_explains_u_better_is_used() {
+    fn best_fitting_basis_is_used() {
         let (z, u) = run(7, |t| 1.0 - 0.3 * t / 80.0);
         let (other, _) = run(8, |_| 1.0);
-        let alone = unsteady(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS);
+        let alone = response_changes(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS);
         assert_eq!(
-            unsteady(&[basis(&other), basis(&z)], &u, slice::from_ref(&WHOLE), TS),
+            response_changes(&[basis(&other), basis(&z)], &u, slice::from_ref(&WHOLE), TS),
             alone
         );
         // A transient of the lag that started before the stretch does not affect the result.
         let early = |t: usize| 5.0 * (-(t as f64) * TS).exp();
         let decaying: Vec<f64> = u.iter().enumerate().map(|(t, u)| u + early(t)).collect();
-        let with = unsteady(&[basis(&z)], &decaying, slice::from_ref(&WHOLE), TS);
+        let with = response_changes(&[basis(&z)], &decaying, slice::from_ref(&WHOLE), TS);
         for (with, alone) in with.iter().zip(&alone) {
             assert!(
                 (with.by[0] - alone.by[0]).abs() < 1e-3 * alone.by[1],
@@ -349,9 +349,9 @@ mod tests {
     }
 
     #[test]
-    fn too_little_says_nothing() {
+    fn zero_columns_and_short_records_give_no_result() {
         let columns = [vec![0.0; N], vec![0.0; N]];
-        assert!(unsteady(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&WHOLE), TS).is_empty());
-        assert!(unsteady(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&(0..500)), TS).is_empty());
+        assert!(response_changes(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&WHOLE), TS).is_empty());
+        assert!(response_changes(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&(0..500)), TS).is_empty());
     }
 }

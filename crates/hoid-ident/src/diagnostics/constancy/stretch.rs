@@ -21,7 +21,7 @@ const REPORTED_CHANGE: f64 = 2.0;
 /// Minimum change for records with few blocks, as a multiple of the change that a single block causes by chance.
 const MIN_RATIO_TO_CHANCE: f64 = 4.5;
 /// Minimum number of blocks for the test.
-const FEWEST: usize = 5;
+const MIN_BLOCKS: usize = 5;
 
 /// A block with large influence, and the parameters that change without it.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,7 +37,7 @@ pub(super) struct Stretch {
 /// Returns the block with the most influence; `None` if its influence is below the threshold.
 pub(super) fn most_influential_block(of: &Constancy<'_>) -> Option<Stretch> {
     let (n, m) = (of.blocks.len(), of.directions.len());
-    if n < FEWEST || m == 0 || of.variance <= 0.0 {
+    if n < MIN_BLOCKS || m == 0 || of.variance <= 0.0 {
         return None;
     }
     let p = of.blocks[0].score.len();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn the_move_is_that_of_the_fit_without_the_block() {
+    fn reported_change_equals_a_fit_without_the_block() {
         let mut means = vec![0.1, -0.1, 0.05, -0.05, 0.1, -0.1, 0.0, 0.0];
         assert_eq!(constancy(&means, 1.0), None);
         means[3] = 8.0;
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_that_all_scatter_are_no_stretch() {
+    fn scatter_of_all_blocks_is_not_a_stretch() {
         let means = [3.0, -2.0, 2.5, -3.0, 3.0, -2.5, 2.0, -3.0];
         assert_eq!(constancy(&means, 1.0), None);
         assert_eq!(constancy(&[5.0, 0.0, 0.0], 1.0), None);

@@ -47,7 +47,7 @@ fn not_constant(fit: &Fit, records: &[Record]) -> Option<Finding> {
 }
 
 #[test]
-fn people_who_change_are_told_from_those_who_do_not() {
+fn changes_are_detected_without_false_alarms() {
     for (condition, changes) in [
         (Condition::C1, false),
         (Condition::C2, false),
@@ -66,7 +66,7 @@ fn people_who_change_are_told_from_those_who_do_not() {
 }
 
 #[test]
-fn a_delay_that_jumps_is_named_with_its_place() {
+fn jump_of_the_delay_is_reported_with_its_time() {
     let record = late(&simulated(Condition::C1, 2), 4100, 8);
     let records = std::slice::from_ref(&record);
     let verdicts = [
@@ -86,7 +86,7 @@ fn a_delay_that_jumps_is_named_with_its_place() {
 }
 
 #[test]
-fn a_run_unlike_the_others_is_named_and_equal_runs_are_not() {
+fn only_a_differing_run_is_reported() {
     let mut records = vec![simulated(Condition::C1, 3), simulated(Condition::C1, 4)];
     assert_eq!(not_constant(&box_jenkins(&records), &records), None);
     records.push(simulated(Condition::C2, 5));
@@ -167,20 +167,20 @@ impl Regression {
 }
 
 #[test]
-fn the_change_is_the_coefficient_of_its_regressor() {
+fn change_equals_the_coefficient_of_its_regressor() {
     let regression = Regression::new(5, 4000, 0.9, 0.8);
     let found = regression.strongest();
     assert!(found.at.abs_diff(2000) <= 200 && found.p_value < 1e-4, "{found:?}");
     // Reference: least squares with the regressor of the change as an additional column.
-    let behind: Vec<f64> = (0..4000)
+    let changed_input: Vec<f64> = (0..4000)
         .map(|t| if t >= found.at { regression.x[0][t] } else { 0.0 })
         .collect();
-    let theta = regression.solved(&[&regression.x[0], &regression.x[1], &behind]);
+    let theta = regression.solved(&[&regression.x[0], &regression.x[1], &changed_input]);
     assert!((found.by - theta[2]).abs() < 1e-9, "{} and {}", found.by, theta[2]);
 }
 
 #[test]
-fn constant_regressions_are_alarmed_no_more_often_than_the_level() {
+fn false_alarm_rate_does_not_exceed_the_level() {
     // With correlated noise and regressors, the scores are correlated over about ten samples.
     for memory in [0.0, 0.9] {
         let runs = 400_u32;
@@ -199,7 +199,7 @@ fn constant_regressions_are_alarmed_no_more_often_than_the_level() {
 }
 
 #[test]
-fn nothing_is_said_of_what_is_too_short_or_has_no_noise() {
+fn short_and_noise_free_records_give_no_finding() {
     let record = simulated(Condition::C1, 7);
     let short = [record.span(0.0, 5.0).unwrap()];
     let found = not_constant(&box_jenkins(&short), &short);

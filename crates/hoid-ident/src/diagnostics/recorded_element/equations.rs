@@ -8,7 +8,7 @@ use crate::linalg::least_squares::{LeastSquares, add_scaled, dot};
 /// Scan of the delay of the element, s: smallest delay, largest delay, step.
 const DELAYS_S: (f64, f64, f64) = (-0.05, 0.3, 0.01);
 /// Half width of the smoothing window of the residual spectrum, in natural logarithms of the frequency.
-const SMOOTHED: f64 = 0.35;
+const SMOOTHING_HALF_WIDTH: f64 = 0.35;
 /// Number of iterations in which the weights are computed.
 const ROUNDS: usize = 3;
 
@@ -225,7 +225,7 @@ fn smooth(weights: &mut [f64], residuals: &[f64], omega: &[f64], power: f64) {
         .collect();
     let floor = 1e-9 * power / n as f64;
     for (weight, at) in weights.iter_mut().zip(omega) {
-        let near = (0..n).filter(|&k| (omega[k] / at).ln().abs() < SMOOTHED);
+        let near = (0..n).filter(|&k| (omega[k] / at).ln().abs() < SMOOTHING_HALF_WIDTH);
         let (sum, count) = near.fold((0.0, 0.0), |(sum, count), k| (sum + own[k], count + 1.0));
         *weight = 1.0 / (sum / count + floor).sqrt();
     }

@@ -14,7 +14,7 @@ const DISTURBANCES: [&str; 3] = ["d", "f_d", "disturbance"];
 /// Range of the tested frequencies, rad/s: the frequencies at which people move u.
 const BAND_RAD_S: (f64, f64) = (0.3, 12.0);
 /// Number of frequencies that is sufficient; further samples of a record and further records are not used.
-pub(super) const MOST_FREQUENCIES: usize = 1000;
+pub(super) const MAX_FREQUENCIES: usize = 1000;
 
 /// Names of the exogenous channels of the loop.
 pub(super) struct Exogenous {
@@ -63,7 +63,7 @@ pub(super) struct Spectra {
 impl Spectra {
     pub(super) fn of(record: &Record, exogenous: &Exogenous) -> Option<Self> {
         let ts = record.sample_time().s();
-        let most = (2.0 * PI * MOST_FREQUENCIES as f64 / (BAND_RAD_S.1 * ts)) as usize;
+        let most = (2.0 * PI * MAX_FREQUENCIES as f64 / (BAND_RAD_S.1 * ts)) as usize;
         let samples = record.len().min(most);
         let step = 2.0 * PI / (samples as f64 * ts);
         let highest = BAND_RAD_S.1.min(0.4 * PI / ts);

@@ -53,7 +53,7 @@ fn element(gain: f64, lag: f64) -> ContinuousTransferFunction {
 }
 
 #[test]
-fn the_element_of_the_loop_is_found_and_another_one_refuted() {
+fn element_of_the_loop_is_found_and_a_wrong_one_rejected() {
     for seed in 0..3 {
         let record = [loop_of(90.0, 6.0, 0, true, seed)];
         for given in [
@@ -79,7 +79,7 @@ fn the_element_of_the_loop_is_found_and_another_one_refuted() {
 }
 
 #[test]
-fn several_records_have_one_element() {
+fn records_with_different_elements_give_no_element() {
     let records = [loop_of(30.0, 0.2, 0, true, 1), loop_of(30.0, 0.2, 0, true, 2)];
     let found = recorded_element(&records, &element(30.0, 0.2), Some("r")).unwrap();
     assert!(found.is_given() && found.element == element(30.0, 0.2), "{found:?}");
@@ -89,7 +89,7 @@ fn several_records_have_one_element() {
 }
 
 #[test]
-fn a_delay_of_the_machine_is_part_of_its_element() {
+fn delay_of_the_machine_is_found_with_its_element() {
     let record = [loop_of(60.0, 6.0, 5, true, 4)];
     let found = recorded_element(&record, &element(60.0, 6.0), None).unwrap();
     assert!((found.delay_s - 0.1).abs() < 0.003 && found.is_given(), "{found:?}");
@@ -111,7 +111,7 @@ fn a_delay_of_the_machine_is_part_of_its_element() {
 }
 
 #[test]
-fn signals_that_were_not_recorded_leave_the_element_open() {
+fn missing_or_short_signals_give_no_element() {
     // The person responds to the disturbance, so u is not independent of it.
     let record = loop_of(90.0, 6.0, 0, false, 1);
     assert_eq!(recorded_element(&[record], &element(45.0, 6.0), None), None);

@@ -20,13 +20,13 @@ use crate::{
 };
 
 /// Significance level of the test: the probability of reporting a response that does not exist.
-pub(in crate::family) const BY_CHANCE: f64 = 0.01;
+pub(in crate::family) const SIGNIFICANCE_LEVEL: f64 = 0.01;
 /// Cost of each parameter of a form, in units of chi^2.
 const COST_PER_PARAMETER: f64 = 4.0;
 
 /// Returns the probability that the best of `forms` forms reaches at least this likelihood ratio by chance, with `more`
 /// additional parameters.
-fn by_chance(ratio: f64, more: usize, forms: usize) -> f64 {
+fn chance_probability(ratio: f64, more: usize, forms: usize) -> f64 {
     let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
     (chance * forms as f64).min(1.0)
 }
@@ -87,7 +87,7 @@ impl FurtherInputs<'_> {
             let p_value = without.as_ref().map_or(0.0, |(_, without)| {
                 let ratio = (without.chi_squared - fit.1.chi_squared) / fit.1.excess();
                 let more = fit.1.coordinates.len().saturating_sub(without.coordinates.len()).max(1);
-                by_chance(ratio, more, fits.len())
+                chance_probability(ratio, more, fits.len())
             });
             let least = (without.iter().chain([fit]))
                 .map(|(_, fit)| fit.criterion())
@@ -100,7 +100,7 @@ impl FurtherInputs<'_> {
             let mut rows = vec![row(None, without.as_ref())];
             rows.extend(fits.iter().map(|(form, fit)| row(Some(*form), fit.as_ref())));
             compared.push(ChannelFit::compared(asked, rows, p_value));
-            if p_value < BY_CHANCE || asked.forms.len() == 1 {
+            if p_value < SIGNIFICANCE_LEVEL || asked.forms.len() == 1 {
                 in_use = with(form);
                 best = Some(fit.1.clone());
             } else {
@@ -176,7 +176,7 @@ impl FurtherInputs<'_> {
             let p_value = without.as_ref().map_or(0.0, |without| {
                 let ratio = fit.residuals as f64 * (without.loss / fit.loss).ln() / inflation;
                 let more = fit.parameters().saturating_sub(without.parameters()).max(1);
-                by_chance(ratio, more, fits.len())
+                chance_probability(ratio, more, fits.len())
             });
             let least = std::iter::once(value(fit))
                 .chain(without.as_ref().map(value))
@@ -189,7 +189,7 @@ impl FurtherInputs<'_> {
             let mut rows = vec![row(None, without.as_ref())];
             rows.extend(fits.iter().map(|(channel, fit)| row(Some(channel.form), fit.as_ref())));
             compared.push(ChannelFit::compared(asked, rows, p_value));
-            let has_response = p_value < BY_CHANCE || asked.forms.len() == 1;
+            let has_response = p_value < SIGNIFICANCE_LEVEL || asked.forms.len() == 1;
             let chosen = has_response.then(|| {
                 let own = &fit.layout().channels[others.len()];
                 Channel {

@@ -74,7 +74,7 @@ fn named<'p>(parameters: &'p [Parameter], name: &str) -> &'p Parameter {
 /// For these seeds the selected form is the canals, and the parameters agree with the simulated person: within their
 /// errors or, where the search ends at a kink of the direct part and gives no errors, within 15 %.
 #[test]
-fn the_response_of_the_canals_is_found() {
+fn response_of_the_semicircular_canals_is_found() {
     let scenario = task(Some(operator(Form::Canals, &[GAIN], 0.18)), 0.1);
     for seed in 1..=4 {
         let records: Vec<Record> = (0..3).map(|k| run(&scenario, 10 * seed + k)).collect();
@@ -101,7 +101,7 @@ fn the_response_of_the_canals_is_found() {
 }
 
 #[test]
-fn other_responses_to_motion_are_found_in_their_form() {
+fn gain_and_derivative_responses_to_motion_are_found() {
     for (form, head) in [(Form::Gain, vec![-0.3]), (Form::Derivative, vec![-0.25])] {
         let scenario = task(Some(operator(form, &head, 0.18)), 0.1);
         let records: Vec<Record> = (0..3).map(|k| run(&scenario, 50 + k)).collect();
@@ -115,7 +115,7 @@ fn other_responses_to_motion_are_found_in_their_form() {
 }
 
 #[test]
-fn without_motion_there_is_no_response_to_it() {
+fn no_motion_response_is_found_where_there_is_none() {
     let scenario = task(None, 0.1);
     for seed in 1..=4 {
         let records: Vec<Record> = (0..3).map(|k| run(&scenario, 100 + 10 * seed + k)).collect();
@@ -128,7 +128,7 @@ fn without_motion_there_is_no_response_to_it() {
 /// Without a remnant and from rest, the parameters equal the simulated ones. If the record starts later, the state of
 /// the canals at its start is unknown, and the error of their gain is 1 %.
 #[test]
-fn without_noise_the_response_to_motion_is_exact() {
+fn noise_free_motion_response_is_recovered_exactly() {
     let mut scenario = task(Some(operator(Form::Canals, &[GAIN], 0.18)), 0.0);
     let late = fit(&[run(&scenario, 1)], &[Form::Canals], Intersample::Zoh);
     let late = named(&late.channels[0].response.as_ref().unwrap().parameters, "K_m").value;

@@ -6,7 +6,7 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-use super::{choice::BY_CHANCE, *};
+use super::{choice::SIGNIFICANCE_LEVEL, *};
 use crate::{
     diagnostics::other_inputs,
     family::{ChannelRole, FamilyEstimator},
@@ -131,7 +131,7 @@ fn within(parameters: &[Parameter], name: &str, truth: f64) -> f64 {
 }
 
 #[test]
-fn both_responses_of_a_person_are_found() {
+fn responses_to_error_and_target_are_found() {
     let (operator, target) = operators();
     let record = run(&operator, Some(&target), 0, 3);
     let fit = estimator().fit(std::slice::from_ref(&record)).unwrap();
@@ -177,11 +177,12 @@ fn both_responses_of_a_person_are_found() {
         ..estimator()
     };
     let one_input = one.fit(std::slice::from_ref(&record)).unwrap();
-    let said = other_inputs::of_family(&one, &one_input, std::slice::from_ref(&record));
+    let findings = other_inputs::of_family(&one, &one_input, std::slice::from_ref(&record));
     assert!(
-        said.iter()
+        findings
+            .iter()
             .any(|f| f.kind == "other-input" && f.message.contains("to r")),
-        "{said:?}"
+        "{findings:?}"
     );
     let gain = one_input.operators[0]
         .parameters
@@ -192,7 +193,7 @@ fn both_responses_of_a_person_are_found() {
 }
 
 #[test]
-fn channels_as_typed() {
+fn channel_text_round_trips() {
     for text in [
         "r=feedforward",
         "r=feedforward:0.5",
@@ -219,25 +220,25 @@ fn channels_as_typed() {
 }
 
 #[test]
-fn what_is_not_there_is_not_found() {
+fn absent_target_response_is_not_found() {
     let (operator, _) = operators();
     for seed in 0..4 {
         let record = run(&operator, None, 0, seed);
         let fit = estimator().fit(std::slice::from_ref(&record)).unwrap();
         assert!(fit.channels[0].response.is_none(), "{:?}", fit.channels[0]);
-        assert!(fit.channels[0].p_value >= BY_CHANCE);
+        assert!(fit.channels[0].p_value >= SIGNIFICANCE_LEVEL);
         let one = FamilyEstimator {
             channels: Vec::new(),
             ..estimator()
         };
         let records = [record];
-        let said = other_inputs::of_family(&one, &one.fit(&records).unwrap(), &records);
-        assert!(said.is_empty(), "{said:?}");
+        let findings = other_inputs::of_family(&one, &one.fit(&records).unwrap(), &records);
+        assert!(findings.is_empty(), "{findings:?}");
     }
 }
 
 #[test]
-fn a_future_that_is_shown_makes_a_negative_delay() {
+fn preview_gives_a_negative_delay() {
     let (operator, target) = operators();
     let record = run(&operator, Some(&target), 20, 5);
     let shown = SeenChannel {
@@ -255,7 +256,7 @@ fn a_future_that_is_shown_makes_a_negative_delay() {
 }
 
 #[test]
-fn inputs_that_say_nothing_are_refused() {
+fn uninformative_inputs_are_refused() {
     let (operator, target) = operators();
     let record = run(&operator, Some(&target), 0, 3);
     let of = |names: &[&str]| {
@@ -285,7 +286,7 @@ fn inputs_that_say_nothing_are_refused() {
 }
 
 #[test]
-fn an_input_may_rest_in_one_of_the_records() {
+fn input_may_be_constant_in_one_of_several_records() {
     let (operator, target) = operators();
     let moving = run(&operator, Some(&target), 0, 3);
     let still = run(&operator, None, 0, 4);
@@ -307,7 +308,7 @@ fn an_input_may_rest_in_one_of_the_records() {
 }
 
 #[test]
-fn a_dead_zone_is_not_taken_for_a_response_to_the_target() {
+fn dead_zone_is_not_mistaken_for_a_target_response() {
     let (operator, _) = operators();
     let task = Task {
         disturbance: 0.0,

@@ -33,7 +33,7 @@ fn record() -> (Vec<f64>, Vec<f64>) {
 }
 
 #[test]
-fn without_noise_any_filter_and_any_instruments_give_the_system() {
+fn noise_free_system_is_found_with_any_filter_and_instruments() {
     let (e, u) = record();
     let data = vec![Data::new(&e, &u), Data::new(&e[40..], &u[40..])];
     let problem = IvProblem::new(&ORDERS, data.clone(), Source::measured(&data));
@@ -58,7 +58,7 @@ fn without_noise_any_filter_and_any_instruments_give_the_system() {
 }
 
 #[test]
-fn instruments_change_with_the_source_at_its_rows_alone() {
+fn each_source_affects_only_its_own_rows() {
     let (e, u) = record();
     let data = vec![Data::new(&e, &u), Data::new(&e[40..], &u[40..])];
     let doubled = |x: &[f64]| Cow::Owned(x.iter().map(|v| 2.0 * v).collect::<Vec<f64>>());

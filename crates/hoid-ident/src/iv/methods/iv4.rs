@@ -15,7 +15,7 @@ use hoid_model::Structure;
 
 use crate::iv::{
     algorithm::{Algorithm, IterationLimits, IvSolution},
-    columns::cut,
+    columns::split_by_record,
     covariance::covariance,
     equation::{IvProblem, Prefilter},
 };
@@ -45,7 +45,7 @@ fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Resu
     let rows = problem.rows(0);
     let shortest = rows.iter().min().copied().unwrap_or(0);
     let order = (ORDERS * (problem.poles + problem.nb)).min(shortest / ROWS_EACH);
-    let (_, whitening) = noise_model(&cut(&second.residual(&system), &rows), 0, order);
+    let (_, whitening) = noise_model(&split_by_record(&second.residual(&system), &rows), 0, order);
     let filter = Prefilter {
         d: &whitening,
         ..Prefilter::default()
@@ -54,7 +54,7 @@ fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Resu
     let (stable, _) = problem.stabilised(&system)?;
     let last = problem.equation(filter, &stable);
     let theta = problem.solve(&last)?;
-    let residual = cut(&last.residual(&theta), &problem.rows(order));
+    let residual = split_by_record(&last.residual(&theta), &problem.rows(order));
     Ok(IvSolution {
         covariance: covariance(&last.z, &last.phi, |_| true, &residual),
         theta,

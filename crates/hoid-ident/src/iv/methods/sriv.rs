@@ -10,7 +10,7 @@ use hoid_model::Structure;
 
 use crate::iv::{
     algorithm::{Algorithm, IterationLimits, IvSolution},
-    columns::cut,
+    columns::split_by_record,
     covariance::covariance,
     equation::IvProblem,
     last_iterate::NoiseModel,
@@ -32,7 +32,7 @@ fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, limits: IterationLimits) ->
     let theta: Vec<f64> = b.iter().chain(poles).copied().collect();
     let covariance = (last.termination.reason != Reason::UnstableEstimate)
         .then(|| {
-            let residual = cut(&last.equation.residual(&last.system), &problem.rows(0));
+            let residual = split_by_record(&last.equation.residual(&last.system), &problem.rows(0));
             let in_order = |columns: &[Vec<f64>]| {
                 let (poles, b) = columns.split_at(problem.poles);
                 [b, poles].concat()

@@ -44,7 +44,7 @@ fn partial_sums(k: usize, n: usize) -> usize {
 const LENGTHS: [usize; 9] = [0, 1, 5, 127, 510, 512, 518, 1024, 1100];
 
 #[test]
-fn products_of_any_number_and_length_have_the_same_bits_on_each_path() {
+fn products_are_bit_identical_on_each_path() {
     for n in LENGTHS {
         for count in 1..=8 {
             let columns = waves(n, count);
@@ -68,7 +68,7 @@ fn products_of_any_number_and_length_have_the_same_bits_on_each_path() {
 }
 
 #[test]
-fn two_lags_of_each_signal_in_one_pass_have_the_bits_of_the_tiles() {
+fn two_lags_in_one_pass_are_bit_identical_to_the_tiles() {
     for n in LENGTHS.map(|n| n + 1) {
         let (u, e) = (wave(n + 2, 0.05), wave(n + 2, 0.11));
         let of = |x: &'static [f64], lag: usize| Lagged {
@@ -97,7 +97,7 @@ fn two_lags_of_each_signal_in_one_pass_have_the_bits_of_the_tiles() {
 }
 
 #[test]
-fn residuals_of_any_number_of_inputs_have_the_same_bits_on_each_path() {
+fn residuals_are_bit_identical_on_each_path() {
     let factors = [0.3, -1.2, 0.7, 2.0, -0.1, 0.9, 0.4];
     for n in LENGTHS {
         for p in 1..=7 {
@@ -134,7 +134,7 @@ fn residuals_of_any_number_of_inputs_have_the_same_bits_on_each_path() {
 }
 
 #[test]
-fn variance_has_the_same_bits_on_each_path() {
+fn variance_is_bit_identical_on_each_path() {
     for n in LENGTHS {
         let x = wave(n + 1, 0.3);
         let spans = x.split_at(n / 3);
@@ -146,7 +146,7 @@ fn variance_has_the_same_bits_on_each_path() {
 }
 
 #[test]
-fn variance_is_that_around_the_mean_of_all_spans() {
+fn variance_uses_the_mean_of_all_spans() {
     let x = wave(103, 0.3);
     let mean = x.iter().sum::<f64>() / 103.0;
     let plain = x.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / 103.0;
@@ -159,7 +159,7 @@ fn variance_is_that_around_the_mean_of_all_spans() {
 }
 
 #[test]
-fn columns_that_follow_give_the_same_matrix() {
+fn shifted_columns_give_the_same_matrix() {
     let (u, e) = (wave(200, 0.05), wave(200, 0.11));
     let lagged = |x: &'static [f64], lag: usize| &x[10 - lag..200 - lag];
     let (u, e): (&'static [f64], &'static [f64]) = (u.leak(), e.leak());

@@ -39,7 +39,7 @@ fn by_qr(orders: &Orders, data: &[Data<'_>], first: usize) -> (Vec<f64>, f64, Ve
 }
 
 #[test]
-fn normal_equations_give_what_qr_gives() {
+fn normal_equations_match_qr() {
     let cases = [
         (Condition::C1, orders(2, 2, 29), true),
         (Condition::C4, orders(2, 2, 40), true),
@@ -76,7 +76,7 @@ fn normal_equations_give_what_qr_gives() {
 }
 
 #[test]
-fn what_normal_equations_cannot_decide_is_left_to_qr() {
+fn ill_conditioned_problems_are_solved_by_qr() {
     let n = 400;
     let e: Vec<f64> = (0..n)
         .map(|t| (0.11 * f64::from(t)).sin() + (1.9 * f64::from(t)).cos())

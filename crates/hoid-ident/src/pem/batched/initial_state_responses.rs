@@ -22,7 +22,7 @@ const TEST_INTERVAL: usize = 128;
 /// A response has decayed if its last values are below this limit; its first value is 1.
 const DECAYED: f64 = 1e-17;
 /// Minimum share of the sum of squares of a column that must be outside the space of the previous columns.
-const INDEPENDENT: f64 = 1e-12;
+const MIN_INDEPENDENT_SHARE: f64 = 1e-12;
 
 /// The responses h and g are stored in [`SignalBuffers::h`] and [`SignalBuffers::g`], preceded and followed by nf
 /// zeros; the orthogonal columns q are stored in [`SignalBuffers::q`].
@@ -240,7 +240,7 @@ fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
             let square = s[k * nf + k];
             for lane in 0..zero.lanes() {
                 let own = rest.lane(lane);
-                let independent = own > INDEPENDENT * square.lane(lane);
+                let independent = own > MIN_INDEPENDENT_SHARE * square.lane(lane);
                 dependent[lane] |= !independent;
                 rest.set_lane(lane, own.sqrt());
             }

@@ -72,15 +72,15 @@ impl LaneTask for Pass<'_> {
             nf: o.nf,
         };
         let states = InitialStateResponses::of(zero, [d, f], n - first, signals, &mut sums.dependent);
-        let begin = o.nk;
+        let first_row = o.nk;
         let mut to = first + states.rows;
-        signals.begin(history, (to - begin).max(SPAN), width);
+        signals.prepare(history, (to - first_row).max(SPAN), width);
         sums.products.clear();
         sums.products.resize(columns.count() * columns.count() * width, 0.0);
         let products = &mut sums.products;
         let mut inside = Vec::new();
 
-        let mut from = begin;
+        let mut from = first_row;
         loop {
             let count = to - from;
             let at = history * width;
@@ -90,22 +90,22 @@ impl LaneTask for Pass<'_> {
                 &u[from * width..to * width],
             );
             let mut counted = history;
-            if from == begin || !all_at_once(zero, [b, d, f], [inputs, outputs], signals, at) {
+            if from == first_row || !all_at_once(zero, [b, d, f], [inputs, outputs], signals, at) {
                 respond(zero, [b, f], [inputs, outputs], signals, at);
-                if from == begin {
+                if from == first_row {
                     // w is unknown until all of its regressors are inside the record.
-                    signals.r[at..at + (regressed - begin) * width].fill(0.0);
-                    signals.v[at..at + (regressed - begin) * width].fill(0.0);
+                    signals.r[at..at + (regressed - first_row) * width].fill(0.0);
+                    signals.v[at..at + (regressed - first_row) * width].fill(0.0);
                 }
                 whiten(zero, d, &signals.v, &mut signals.eps[at..end], at);
                 whiten(zero, d, &signals.s, &mut signals.x_b[at..end], at);
-                if from == begin {
-                    counted += first - begin;
-                    states.eliminate(zero, signals, history + regressed - begin, counted);
+                if from == first_row {
+                    counted += first - first_row;
+                    states.eliminate(zero, signals, history + regressed - first_row, counted);
                 }
                 filter_response(zero, [d, f], &mut signals.r[..end], &mut signals.x_f[at..end], at);
             }
-            if from == begin {
+            if from == first_row {
                 inside = states.components(zero, &columns, signals, counted);
                 columns.add_row(zero, signals, counted, 1.0, products);
             }
@@ -113,7 +113,7 @@ impl LaneTask for Pass<'_> {
             // slowest lane.
             let mut done = counted;
             while done < history + count {
-                let next = if done == counted && from == begin {
+                let next = if done == counted && from == first_row {
                     done + o.nf - 1 + SPAN
                 } else {
                     done + SPAN

@@ -21,7 +21,7 @@ pub(super) struct SignalBuffers {
 
 impl SignalBuffers {
     /// Allocates memory for spans of up to `longest` samples, with zeros before the first span.
-    pub fn begin(&mut self, history: usize, longest: usize, width: usize) {
+    pub fn prepare(&mut self, history: usize, longest: usize, width: usize) {
         for signal in [
             &mut self.s,
             &mut self.v,

@@ -89,7 +89,7 @@ fn theta(o: &Orders, lane: usize) -> Vec<f64> {
 }
 
 #[test]
-fn a_lane_has_the_criterion_of_its_record_alone() {
+fn lane_criterion_matches_a_single_record() {
     let records = runs(8, 1500);
     for o in [
         orders(2, 1, 2, 29),
@@ -132,7 +132,7 @@ fn a_lane_has_the_criterion_of_its_record_alone() {
 }
 
 #[test]
-fn a_lane_has_the_same_bits_on_every_path_and_beside_anything() {
+fn lane_is_bit_identical_on_every_path_and_alone() {
     let (records, o) = (runs(8, 1200), orders(2, 2, 2, 29));
     let thetas: Vec<Vec<f64>> = (0..8).map(|lane| theta(&o, lane)).collect();
     let bits = |there: &Linearisation| -> Vec<u64> { all(there).into_iter().map(f64::to_bits).collect() };
@@ -146,7 +146,7 @@ fn a_lane_has_the_same_bits_on_every_path_and_beside_anything() {
 }
 
 #[test]
-fn fits_side_by_side_are_those_alone() {
+fn batched_fits_match_single_fits() {
     let records = runs(11, 3072);
     for (nd, start) in [
         (1, None),
@@ -173,7 +173,7 @@ fn fits_side_by_side_are_those_alone() {
 }
 
 #[test]
-fn fits_from_no_start_have_the_same_bits_on_every_path_and_beside_anything() {
+fn batched_fits_are_bit_identical_on_every_path_and_alone() {
     let records = runs(5, 2048);
     let estimator = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
     let bits = |records: &[Record], path: InstructionSet| -> Vec<Vec<u64>> {
@@ -195,7 +195,7 @@ fn fits_from_no_start_have_the_same_bits_on_every_path_and_beside_anything() {
 }
 
 #[test]
-fn bad_records_fail_alone() {
+fn bad_record_does_not_affect_other_fits() {
     let mut records = runs(3, 1024);
     let silent = Record::new(
         records[0].sample_time(),
@@ -216,7 +216,7 @@ fn bad_records_fail_alone() {
 }
 
 #[test]
-fn other_models_and_records_of_different_lengths_are_fitted_one_after_the_other() {
+fn unsupported_batches_are_fitted_one_by_one() {
     let mut records = runs(2, 1024);
     let bj = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
     let arx = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29));

@@ -94,7 +94,7 @@ fn gradient_agrees_with_finite_differences() {
 }
 
 #[test]
-fn the_initial_state_costs_nothing_without_noise() {
+fn initial_state_of_noise_free_data_is_fitted_exactly() {
     let (e, _) = record(1500);
     for layout in all() {
         let layout = Layout { nd: 0, ..layout };
@@ -120,7 +120,7 @@ fn the_initial_state_costs_nothing_without_noise() {
 }
 
 #[test]
-fn without_a_change_only_the_first_state_counts() {
+fn only_the_first_state_is_used_without_a_change() {
     let (e, u) = record(600);
     for layout in all() {
         let mut c = ChangeCriterion {

@@ -84,7 +84,7 @@ fn gradient_agrees_with_finite_differences() {
 }
 
 #[test]
-fn columns_are_the_derivatives_of_the_residuals_up_to_the_initial_states() {
+fn columns_match_residual_derivatives_except_initial_states() {
     let (e, u) = record(1000);
     let c = criterion(&e, &u, 1);
     let theta = theta(1);
@@ -121,7 +121,7 @@ fn columns_are_the_derivatives_of_the_residuals_up_to_the_initial_states() {
 }
 
 #[test]
-fn the_initial_state_costs_nothing_without_noise() {
+fn initial_state_of_noise_free_data_is_fitted_exactly() {
     // A record cut out of a longer one has an unknown past, but is still fitted to rounding accuracy.
     let (e, _) = record(2000);
     let silence = vec![0.0; 2000];
@@ -152,7 +152,7 @@ fn the_initial_state_costs_nothing_without_noise() {
 }
 
 #[test]
-fn without_a_change_only_the_first_state_counts() {
+fn only_the_first_state_is_used_without_a_change() {
     let (e, u) = record(600);
     let c = ChangeCriterion {
         changes: false,
@@ -167,7 +167,7 @@ fn without_a_change_only_the_first_state_counts() {
 }
 
 #[test]
-fn no_meaning_is_not_feasible() {
+fn invalid_parameters_are_infeasible() {
     let (e, u) = record(600);
     let c = criterion(&e, &u, 1);
     assert!(c.is_feasible(&theta(1)));

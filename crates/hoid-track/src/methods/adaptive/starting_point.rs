@@ -26,21 +26,21 @@ use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordin
 use crate::person_prior::PersonPrior;
 
 /// Standard deviations of the dynamics without prior knowledge: relative for omega and zeta, in s for tau.
-const WIDE: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
+const UNINFORMATIVE_SPREAD: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
 /// Frequencies at which the gains are fitted to the response of an earlier fit: range in rad/s, and number.
 const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
 /// Range of the lag of a basis, s. A lag beyond its upper end cannot be distinguished from an integration.
 const LAGS_S: [f64; 2] = [0.05, 10.0];
 /// Root mean square of the relative misfit beyond which the basis cannot approximate a form.
-const MISFIT: f64 = 0.1;
+const MAX_MISFIT: f64 = 0.1;
 /// Length of data, in s, that has the same weight as the remnant of a fit.
 const REMNANT_S: f64 = 20.0;
 /// Longest impulse response of the remnant that is summed, s, and the largest share of the power of an impulse response
 /// in its second half.
 const LONGEST_S: f64 = 60.0;
-const LEFT: f64 = 1e-6;
+const MAX_SECOND_HALF_SHARE: f64 = 1e-6;
 /// Prior standard deviation of the level of u, in standard deviations of the remnant.
-const LEVEL: f64 = 3.0;
+const LEVEL_DEVIATION: f64 = 3.0;
 
 /// The point at which the basis is computed at the start, and the prior standard deviations of a person's dynamics
 /// about it.
@@ -63,7 +63,13 @@ impl StartingPoint {
         spread[2] = of_delay(spread[2]);
         match prior {
             PersonPrior::Population => {}
-            PersonPrior::Nothing => spread = [WIDE[0], WIDE[1], of_delay(WIDE[2])],
+            PersonPrior::Nothing => {
+                spread = [
+                    UNINFORMATIVE_SPREAD[0],
+                    UNINFORMATIVE_SPREAD[1],
+                    of_delay(UNINFORMATIVE_SPREAD[2]),
+                ]
+            }
             PersonPrior::Named(_) => {
                 let places = [&mut point.omega, &mut point.zeta];
                 for ((name, place), spread) in ["omega_nm", "zeta_nm"].into_iter().zip(places).zip(&mut spread) {
@@ -80,7 +86,7 @@ impl StartingPoint {
             }
             PersonPrior::Fit(fit) => {
                 let Some((omega, zeta)) = fit.operator.neuromuscular() else {
-                    return Err(no_place(
+                    return Err(unsupported_fit(
                         fit,
                         "it has no neuromuscular system, which the basis of this method requires; identify the person \
                          with --neuromuscular yes",
@@ -107,7 +113,7 @@ impl StartingPoint {
     }
 }
 
-fn no_place(fit: &FittedOperator, why: &str) -> IdentError {
+fn unsupported_fit(fit: &FittedOperator, why: &str) -> IdentError {
     IdentError::BadStart {
         reason: format!("{}: {why}, or start with --prior population", fit.source),
     }
@@ -124,8 +130,8 @@ pub(super) fn initial_estimate(
 ) -> Result<InitialEstimate, IdentError> {
     let nearest = Nearest::new(fit, basis, sample_time);
     let (value, misfit) = nearest.gains(|k| nearest.responses[k].value);
-    if misfit > MISFIT {
-        return Err(no_place(
+    if misfit > MAX_MISFIT {
+        return Err(unsupported_fit(
             fit,
             &format!(
                 "the response of the form {} is {:.0} % off the nearest operator of the basis; identify with a form \
@@ -163,11 +169,11 @@ pub(super) fn initial_estimate(
             }
         }
     }
-    let widened = nearest.lost(fit, &coordinates, &columns);
+    let widened = nearest.covariance_factor(fit, &coordinates, &columns);
     covariance.iter_mut().flatten().for_each(|c| *c *= widened);
     let lags = remnant(fit, sample_time);
     let power = lags.map_or(1.0, |lags| lags[0]) * fit.innovation_variance;
-    covariance[GAINS][GAINS] = LEVEL * LEVEL * power;
+    covariance[GAINS][GAINS] = LEVEL_DEVIATION * LEVEL_DEVIATION * power;
     Ok(InitialEstimate {
         state,
         covariance: symmetric(&covariance),
@@ -198,7 +204,7 @@ fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
     }
     let power = |g: &[f64]| g.iter().map(|x| x * x).sum::<f64>();
     let all = power(&g);
-    if !all.is_finite() || power(&g[longest / 2..]) > LEFT * all {
+    if !all.is_finite() || power(&g[longest / 2..]) > MAX_SECOND_HALF_SHARE * all {
         return None;
     }
     let of = |k: usize| g.iter().zip(&g[k.min(longest)..]).map(|(a, b)| a * b).sum();
@@ -219,7 +225,7 @@ impl Nearest {
     /// Returns the factor by which the covariance of the state must be increased so that the response is at no
     /// frequency better known than from the fit. The factor exceeds one because gains with a fixed lag cannot represent
     /// the uncertainty of the response that an unknown lag causes.
-    fn lost(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
+    fn covariance_factor(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
         let p = coordinates.len();
         let sizes = |g: &[Complex64]| -> [f64; 2] {
             let of = |part: fn(&Complex64) -> f64| {
@@ -345,7 +351,7 @@ mod tests {
 
     /// Before the first sample, gain and phase and their errors equal those of the fit.
     #[test]
-    fn the_estimate_begins_at_the_fit_with_its_errors() {
+    fn initial_estimate_matches_the_fit_and_its_errors() {
         for (form, x, near) in [
             (Form::Lead, vec![2.0, 0.4, 2.3, -1.2, 0.18], 0.001),
             (Form::LeadLag, vec![1.4, 0.5, 0.25, 2.4, -1.4, 0.153], 0.01),
@@ -385,7 +391,7 @@ mod tests {
     }
 
     #[test]
-    fn a_form_that_has_no_place_is_refused() {
+    fn unsupported_starting_fits_are_refused() {
         let none = fitted(Form::LeadDroop, &[1.4, 0.9, 6.0, 2.4, -1.4, 0.2]);
         let refused = tracker(none).err().map(|e| e.to_string());
         assert!(refused.is_none_or(|words| words.contains("--form")));
@@ -407,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn the_remnant_of_a_fit_is_summed() {
+    fn remnant_autocovariances_of_a_fit_are_summed() {
         // For an autoregression of order 1 with the pole .8, `r_k = .8^k/(1 - .64)`.
         let fit = FittedOperator {
             noise: (Vec::new(), vec![-0.8]),
@@ -425,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_named_moves_the_basis_and_the_rest_stays_usual() {
+    fn named_prior_values_replace_the_defaults() {
         let named = Method::adaptive()
             .with("prior", "omega_nm=9:0.2,tau_e=0.25:0.1")
             .unwrap();

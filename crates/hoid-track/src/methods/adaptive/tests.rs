@@ -20,7 +20,7 @@ fn options() -> TrackOptions {
 }
 
 #[test]
-fn it_starts_without_a_fit_and_finds_a_steady_person() {
+fn constant_operator_is_found_without_a_starting_fit() {
     let record = record(Condition::C1);
     let trace = track(&record, &options(), 100).unwrap();
     assert!(trace.start().is_none());
@@ -35,7 +35,7 @@ fn it_starts_without_a_fit_and_finds_a_steady_person() {
 }
 
 #[test]
-fn a_change_of_the_person_is_followed() {
+fn change_of_the_operator_is_tracked() {
     let trace = track(&record(Condition::C4), &options(), 100).unwrap();
     let last = trace.operator(trace.len() - 1).unwrap();
     assert!((last.k_e_dot.value - 0.084).abs() < 0.02, "{last:?}");
@@ -44,7 +44,7 @@ fn a_change_of_the_person_is_followed() {
 /// Ratio of the estimated to the true T_L, from 9 s after a change on, averaged over four runs. A single quotient with
 /// the covariance of all hypotheses gave .76.
 #[test]
-fn the_lead_after_a_change_is_not_too_short() {
+fn lead_after_a_change_is_unbiased() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
     let (mut sum, mut rows) = (0.0, 0.0);
     for replication in 0..4 {
@@ -69,7 +69,7 @@ fn the_lead_after_a_change_is_not_too_short() {
 }
 
 #[test]
-fn of_no_response_at_all_no_lead_is_told_that_is_not_a_number() {
+fn lead_is_finite_for_zero_output() {
     let mut tracker = Tracker::new(&options(), None, SampleTime::HUNDREDTH).unwrap();
     for k in 0..400 {
         tracker.step((0.07 * f64::from(k)).sin(), 0.0);
@@ -84,7 +84,7 @@ fn of_no_response_at_all_no_lead_is_told_that_is_not_a_number() {
 }
 
 #[test]
-fn responses_have_bands_from_the_first_second_on() {
+fn response_has_bands_after_the_first_second() {
     let record = record(Condition::C1);
     let mut tracker = Tracker::new(&options(), None, record.sample_time()).unwrap();
     let mut widths = Vec::new();
@@ -103,7 +103,7 @@ fn responses_have_bands_from_the_first_second_on() {
 }
 
 #[test]
-fn options_that_make_no_sense_are_refused() {
+fn invalid_options_are_refused() {
     assert!(Method::adaptive().with("false_alarms", "0").is_err());
     let mut refused = options();
     refused.orders.nd = 25;
@@ -114,7 +114,7 @@ fn options_that_make_no_sense_are_refused() {
 }
 
 #[test]
-fn a_trace_tells_gain_and_phase_with_bands() {
+fn trace_contains_gain_and_phase_with_bands() {
     let record = record(Condition::C1);
     let at_rad_s = vec![1.0, 2.5];
     for method in [Method::adaptive(), Method::rls()] {

@@ -16,7 +16,7 @@ pub fn options(method: Method) -> TrackOptions {
 }
 
 /// Options of RLS or RPEM with the settings of the thesis.
-pub fn of_the_text(method: Method) -> TrackOptions {
+pub fn thesis_settings(method: Method) -> TrackOptions {
     let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
     settings.extend((method != Method::rls()).then_some(("stable", "noise")));
     options(method.clone()).with(&settings).unwrap()

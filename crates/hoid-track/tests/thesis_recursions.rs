@@ -41,7 +41,7 @@ fn run(condition: Condition, order: usize, noise_level: f64, replication: u64) -
 }
 
 /// Returns options with the settings of the thesis and additional settings.
-fn of_the_text(method: Method, besides: &[(&str, &str)]) -> TrackOptions {
+fn thesis_options(method: Method, additional: &[(&str, &str)]) -> TrackOptions {
     let rpem = method == Method::rpem();
     let options = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
@@ -53,7 +53,7 @@ fn of_the_text(method: Method, besides: &[(&str, &str)]) -> TrackOptions {
     } else {
         &[]
     };
-    options.with(own).unwrap().with(besides).unwrap()
+    options.with(own).unwrap().with(additional).unwrap()
 }
 
 /// P as a plain matrix, with its update.
@@ -139,8 +139,8 @@ fn difference(trace: &Trace, twin: &[Vec<f64>]) -> f64 {
 }
 
 /// Returns the largest difference between the recursion of the program and the equations of the thesis.
-fn from_equations(method: &Method, record: &Record, besides: &[(&str, &str)]) -> f64 {
-    let trace = track(record, &of_the_text(method.clone(), besides), 1).unwrap();
+fn from_equations(method: &Method, record: &Record, additional: &[(&str, &str)]) -> f64 {
+    let trace = track(record, &thesis_options(method.clone(), additional), 1).unwrap();
     let start = trace.start().unwrap().model().theta();
     let twin = match *method == Method::rls() {
         true => rls(record, start),
@@ -150,7 +150,7 @@ fn from_equations(method: &Method, record: &Record, besides: &[(&str, &str)]) ->
 }
 
 #[test]
-fn by_the_settings_of_the_text_they_are_its_equations() {
+fn thesis_settings_reproduce_the_thesis_equations() {
     let mut with_a_guard = [0.0_f64; 2];
     for (condition, order, level) in [
         (Condition::C1, 1, 0.01),
@@ -180,7 +180,7 @@ fn by_the_settings_of_the_text_they_are_its_equations() {
 /// need not recover: after P has grown for minutes, the first samples change the estimate arbitrarily, which the windup
 /// guard prevents.
 #[test]
-fn an_hour_of_silence_leaves_every_number_finite() {
+fn estimates_stay_finite_during_an_hour_of_silence() {
     let run = run(Condition::C1, 1, 0.1, 1);
     let loud = run.len();
     let at = |signal: &[f64]| -> Vec<f64> {
@@ -199,7 +199,7 @@ fn an_hour_of_silence_leaves_every_number_finite() {
     )
     .unwrap();
     for method in [Method::rls(), Method::rpem()] {
-        let trace = track(&record, &of_the_text(method.clone(), &[]), 64).unwrap();
+        let trace = track(&record, &thesis_options(method.clone(), &[]), 64).unwrap();
         for k in 0..trace.len() {
             assert!(trace.theta(k).iter().all(|value| value.is_finite()), "{method} {k}");
         }
@@ -207,7 +207,7 @@ fn an_hour_of_silence_leaves_every_number_finite() {
             continue;
         }
         // Afterwards the estimate equals that of a run that starts at this time.
-        let alone = track(&run, &of_the_text(method.clone(), &[]), loud).unwrap();
+        let alone = track(&run, &thesis_options(method.clone(), &[]), loud).unwrap();
         let (last, first) = (trace.theta(trace.len() - 1), alone.theta(alone.len() - 1));
         for (a, b) in last.iter().zip(first) {
             assert!((a - b).abs() < 0.02 * (1.0 + b.abs()), "{method}: {last:?} {first:?}");
@@ -216,7 +216,7 @@ fn an_hour_of_silence_leaves_every_number_finite() {
 }
 
 #[test]
-fn a_guard_that_is_none_is_refused_with_what_to_do() {
+fn invalid_windup_guard_is_refused_with_advice() {
     let refused = |method: Method, name: &str, text: &str| method.with(name, text).unwrap_err().to_string();
     for (text, says) in [
         ("0.5", "1 or more"),
@@ -230,32 +230,36 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
             "{text}: {found}"
         );
     }
-    let without_p = of_the_text(Method::rls(), &[("forgetting", "window"), ("windup_guard", "100")]);
+    let without_p = thesis_options(Method::rls(), &[("forgetting", "window"), ("windup_guard", "100")]);
     let found = without_p.check().unwrap_err().to_string();
     assert!(
         found.contains("windup_guard") && found.contains("exponential"),
         "{found}"
     );
     // If no windup guard is requested, the window is accepted.
-    assert!(of_the_text(Method::rls(), &[("forgetting", "window")]).check().is_ok());
+    assert!(
+        thesis_options(Method::rls(), &[("forgetting", "window")])
+            .check()
+            .is_ok()
+    );
 }
 
 /// Settings other than those of the thesis keep the windup guard: a start with the covariance of the fit, limited
 /// innovations, and structures that the thesis does not have.
 #[test]
-fn other_settings_keep_their_guard() {
+fn settings_other_than_the_thesis_keep_the_guard() {
     let words = |options: TrackOptions| options.memory_as_text(hoid_model::SampleTime::HUNDREDTH);
     let is_off = |options: TrackOptions| words(options).ends_with("without a windup guard");
-    assert!(is_off(of_the_text(Method::rls(), &[])));
-    assert!(is_off(of_the_text(Method::rpem(), &[])));
+    assert!(is_off(thesis_options(Method::rls(), &[])));
+    assert!(is_off(thesis_options(Method::rpem(), &[])));
     assert!(!is_off(TrackOptions::default_for(Method::rpem(), NK)));
-    assert!(!is_off(of_the_text(Method::rpem(), &[("limit", "5")])));
-    assert!(!is_off(of_the_text(Method::rls(), &[("windup_guard", "1e4")])));
+    assert!(!is_off(thesis_options(Method::rpem(), &[("limit", "5")])));
+    assert!(!is_off(thesis_options(Method::rls(), &[("windup_guard", "1e4")])));
     let fir = hoid_model::Structure::Fir;
     let options = TrackOptions {
         structure: fir,
         orders: fir.operator_orders(NK),
-        ..of_the_text(Method::rls(), &[])
+        ..thesis_options(Method::rls(), &[])
     };
     assert!(!is_off(options));
 }
