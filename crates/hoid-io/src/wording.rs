@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_names_are_offered_and_far_ones_are_not() {
+    fn only_similar_names_are_suggested() {
         let names = ["t", "error", "stick", "", "E"];
         assert_eq!(did_you_mean(&["eror"], &names), "; did you mean \"error\"?");
         assert_eq!(did_you_mean(&["e"], &names), "; did you mean \"E\"?");
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn long_and_strange_cells_are_shown_short() {
+    fn long_cells_are_shortened_and_escaped() {
         let shown = shown(&"\u{1b}[31mé".repeat(1000));
         assert!(shown.chars().count() < 200 && !shown.contains('\u{1b}'), "{shown}");
     }

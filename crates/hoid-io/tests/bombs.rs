@@ -30,7 +30,7 @@ const MOST_KB: u64 = 300_000;
 const SAMPLE: u64 = 5;
 
 #[test]
-fn small_files_do_not_unpack_without_a_bound() {
+fn decompression_bombs_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| -> PathBuf { directory.path().join(name) };
     let zipped = |values: usize, unpacked: usize, megabytes: usize| {

@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn not_finite_is_refused() {
+    fn non_finite_parameters_are_refused() {
         for (k_c, omega_b_rad_s) in [(f64::NAN, 1.0), (1.0, f64::INFINITY)] {
             assert!(ControlledElement { k_c, omega_b_rad_s }.transfer_function().is_err());
         }

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_is_kept_once_and_a_text_is_none() {
+    fn name_is_interned_once_and_long_text_is_refused() {
         let typed: String = ["delay", "at", "bound"].join("-");
         let (one, two) = (interned("delay-at-bound"), interned(&typed));
         assert_eq!(one, Some("delay-at-bound"));

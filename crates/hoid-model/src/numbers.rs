@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_decides_the_digits() {
+    fn error_sets_the_number_of_digits() {
         assert_eq!(both(0.090_123_4, 0.001_234), pair("0.0901", "0.0012"));
         assert_eq!(both(11.2499, 0.0996), pair("11.25", "0.10"));
         assert_eq!(both(-1.912_113_05, 0.000_52), pair("-1.91211", "0.00052"));
@@ -155,14 +155,14 @@ mod tests {
     }
 
     #[test]
-    fn an_error_in_the_last_digits_is_none() {
+    fn rounding_sized_error_is_a_dash() {
         assert_eq!(both(0.35 - 1e-16, 1e-17), pair("0.35", DASH));
         assert_eq!(both(-0.499_999_999_999_999_9, 1.2e-16), pair("-0.5", DASH));
         assert_eq!(both(0.5, 1e-13), pair("0.50000000000000", "0.00000000000010"));
     }
 
     #[test]
-    fn what_is_no_number_is_a_dash() {
+    fn non_finite_numbers_are_a_dash() {
         assert_eq!(both(f64::NAN, 1.0), pair(DASH, DASH));
         assert_eq!(with_uncertainty(f64::INFINITY, None), pair(DASH, DASH));
         assert_eq!(both(0.25, f64::NAN), pair("0.25", DASH));
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_alone_have_five_digits() {
+    fn numbers_without_error_have_five_digits() {
         assert_eq!(plain(0.28), "0.28");
         assert_eq!(plain(0.0), "0");
         assert_eq!(plain(13.714_285), "13.714");
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_keep_the_decimals() {
+    fn intervals_use_the_decimals_of_the_error() {
         assert_eq!(interval(0.0901, Some(0.0012), 1.96), "0.0877 to 0.0925");
     }
 }

@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn unreachable_level_names_the_largest() {
+    fn unreachable_level_reports_the_largest() {
         for m in 1..=4 {
             for s in 0..2 {
                 let Err(ModelError::UnreachableNoiseLevel { largest, order, .. }) =
@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_gain_is_refused() {
+    fn invalid_arguments_are_refused() {
         let [(operator, element), _] = states();
         let call = |level, definition, order, time, lines: &[SpectralLine]| {
             remnant_gain(level, definition, order, time, &operator, &element, lines, ts())

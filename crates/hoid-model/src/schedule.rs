@@ -161,7 +161,7 @@ mod tests {
     };
 
     #[test]
-    fn is_the_sigmoid_as_printed() {
+    fn sigmoid_matches_the_printed_formula() {
         for t in [0.0, 30.0, 40.0, 40.96, 41.5, 60.0, 81.91] {
             let printed = 0.09 + (0.07 - 0.09) / (1.0 + (-0.5 * (t - 40.96f64)).exp());
             assert!((SLOW.value(0.09, 0.07, t) - printed).abs() < 1e-16);
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn there_and_back_again() {
+    fn alternating_schedule_switches_at_each_interval() {
         let often = Schedule::Alternating {
             rate_per_s: 5.0,
             midpoint_s: 20.0,

@@ -286,7 +286,7 @@ mod tests {
     /// An outlier of another order of magnitude after the first rows: relative to it, the lowest levels count as a
     /// single level.
     #[test]
-    fn an_outlier_in_a_long_channel() {
+    fn outlier_in_a_long_channel_is_no_saturation() {
         for outlier in [1e30, -1e30, 1e308] {
             let mut values: Vec<f64> = (0..200).map(|k| (0.37 * f64::from(k)).sin()).collect();
             (values[150], values[151]) = (outlier, -0.5 * outlier);
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_channel_in_full_precision_is_known_by_its_first_rows() {
+    fn first_rows_decide_whether_a_channel_is_quantised() {
         let wave = |k: usize| (0.37 * k as f64).sin() + 0.3 * (1.01 * k as f64).cos();
         let mut values: Vec<f64> = (0..4000).map(wave).collect();
         values[3000..3005].fill(2.0);

@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn each_library_lies_where_its_platform_looks() {
+    fn libraries_are_stored_in_their_platform_folder() {
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<_> = (heads().into_iter().enumerate())
             .map(|(i, (bytes, ..))| {
@@ -269,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_library_is_refused() {
+    fn other_files_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         for (bytes, ..) in heads() {

@@ -248,7 +248,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_ending_stands_for_one_format() {
+    fn each_extension_belongs_to_one_format() {
         let mut endings: Vec<&str> = ALL.iter().flat_map(|format| format.extensions).copied().collect();
         let count = endings.len();
         endings.sort_unstable();
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn each_other_ending_has_one_remedy() {
+    fn each_unsupported_extension_has_one_remedy() {
         let mut endings: Vec<&str> = ELSEWHERE.iter().flat_map(|(endings, _)| *endings).copied().collect();
         assert!(
             endings
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn endings_as_text() {
+    fn extensions_are_listed_as_text() {
         assert_eq!(extensions(&[&csv::CSV]), ".csv (also as .txt)");
         assert_eq!(
             extensions(&[&csv::CSV, &csv::TSV, &csv::TSV]),

@@ -123,7 +123,7 @@ mod tests {
     const GONE: f64 = f64::NAN;
 
     #[test]
-    fn bridges_inside_only() {
+    fn only_interior_gaps_are_filled() {
         let mut values = [1.0, GONE, 3.0, 4.0, GONE, GONE, GONE, 0.0];
         let bridged = fill(&mut values, None).unwrap();
         assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0]);
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn bridges_along_time() {
+    fn gaps_are_filled_linearly_in_time() {
         let mut values = [0.0, GONE, 10.0];
         fill(&mut values, Some(&[0.0, 0.3, 1.0])).unwrap();
         assert!((values[1] - 3.0).abs() < 1e-15);

@@ -242,7 +242,7 @@ mod tests {
     const GONE: f64 = f64::NAN;
 
     #[test]
-    fn values_are_held_or_lie_on_lines_along_time() {
+    fn sparse_values_are_held_or_interpolated_in_time() {
         let x = [0.0, 0.1, 0.4, 0.5, 1.0, 1.1];
         for (how, expected) in [
             (Sparse::Hold, [1.0, 1.0, 1.0, 6.0, 6.0]),

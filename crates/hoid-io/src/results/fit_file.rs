@@ -235,7 +235,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_response_to_a_target_has_its_delay_behind_the_preview() {
+    fn feedforward_delay_includes_the_preview() {
         let of = |channels: &str| {
             let text = FIT.trim_end().strip_suffix('}').unwrap();
             parse_fit(&format!("{text}, \"channels\": [{channels}]}}"), "fit.json")
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_fit_of_a_person_says_why() {
+    fn unusable_fits_give_the_reason() {
         assert!(why("{}").contains("parameters") && why("[1").contains("hoid identify --json"));
         for (from, to, expected) in [
             (r#""form": "gain", "#, "", "structure grey-box"),

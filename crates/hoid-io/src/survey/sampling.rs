@@ -79,7 +79,7 @@ mod tests {
     use crate::table::Precision;
 
     #[test]
-    fn time_and_its_faults() {
+    fn time_column_faults_are_reported() {
         let read = |name: &str, values: Vec<f64>| RawColumn {
             path: name.into(),
             parent: String::new(),

@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_and_their_faults() {
+    fn value_column_faults_are_reported() {
         let sine: Vec<f64> = (0..400).map(|k| (0.05 * f64::from(k)).sin()).collect();
         let found = values(&sine).unwrap();
         assert_eq!(

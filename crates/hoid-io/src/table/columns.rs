@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_of_another_rate_is_sparse_and_a_dropout_is_not() {
+    fn slower_topic_is_sparse_but_a_dropout_is_not() {
         let every = |m: usize| {
             column(
                 &(0..100)

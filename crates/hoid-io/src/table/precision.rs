@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn unit_of_the_last_digit() {
+    fn last_digit_unit_follows_the_printed_format() {
         let fixed = precision(&["0.0000", "0.0167", "45.0167"]);
         for t in [0.0, 0.0167, 45.0] {
             assert!((fixed.unit(t) - 1e-4).abs() < 1e-18, "{t}");
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn times_that_were_rounded_are_known_as_such() {
+    fn rounded_times_are_detected() {
         let times = |rate_hz: f64| (0..5000).map(move |k| f64::from(k) / rate_hz);
         let rounded: Vec<f64> = times(60.0).map(|t| (t * 1e4).round() / 1e4).collect();
         assert!((Precision::of_times(&rounded, false).unit(45.0) - 1e-4).abs() < 1e-18);

@@ -405,7 +405,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_times_and_their_units() {
+    fn time_columns_and_units_are_recognised_by_name() {
         use ColumnRole::{Other, Stamp, Time};
         let power = |power| Time(Some(Unit::Power(power)));
         for (name, meant) in [
@@ -440,7 +440,7 @@ mod tests {
     }
 
     #[test]
-    fn units_by_stamps_and_steps() {
+    fn time_units_are_inferred_from_values() {
         let unit = |first: f64, step: f64| unit_of(&(0..9).map(|k| first + step * f64::from(k)).collect::<Vec<_>>());
         for (first, step, power) in [
             (1.7e9, 1.0, 0),
@@ -477,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn choices() {
+    fn time_choices_are_parsed() {
         for text in [
             "clock",
             "clock:ms",

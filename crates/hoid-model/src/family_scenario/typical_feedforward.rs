@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_machine_moves_along_with_the_target() {
+    fn controlled_element_follows_the_target() {
         for (element, form) in [
             ("2", Form::Gain),
             ("4/s", Form::Derivative),
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn elements_without_a_typical_response() {
+    fn some_elements_have_no_typical_response() {
         let of = |state: &FamilyState| typical_feedforward(state, Display::Pursuit, 0.7, 0.0).unwrap();
         // An element whose gain rises with frequency, and an element whose inverse is improper without a neuromuscular
         // system.

@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn the_canals_are_those_of_the_literature() {
+    fn canal_models_match_the_literature() {
         use crate::FamilyOperator;
         let (nm, zeta): (f64, f64) = (11.0, 0.3);
         let x = [-0.4, nm.ln(), zeta.ln(), 0.18];

@@ -107,7 +107,7 @@ mod tests {
     use crate::formats::arrays::contents::{Entry, Indexing, Value};
 
     #[test]
-    fn other_times() {
+    fn signals_are_interpolated_to_another_clock() {
         let entry = |parent: &str, name: &str, values: &[f64]| {
             Entry::field(parent, name, Value::Array(Array::vector(Numbers::from_f64(values))))
         };

@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_matrices() {
+    fn matrices_are_split_into_columns() {
         let found = matrix(&[3, 2], true, Indexing::Python);
         assert_eq!(
             found,
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn parents() {
+    fn parent_of_a_path() {
         assert_eq!(parent("e"), "");
         assert_eq!(parent("data.run(3).e"), "data.run(3)");
         assert_eq!(parent("run(3).x(:,2)"), "run(3)");

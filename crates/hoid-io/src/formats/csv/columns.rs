@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_of_columns() {
+    fn column_kinds_are_inferred() {
         use ColumnKind::{Real, Text, Whole};
         let text = "a,b,c,d,e,f\n1,1,1,,01,x\n18446744073709551615,1.0,,,2,1\n";
         assert_eq!(kinds(text), [Whole, Real, Real, Real, Real, Text]);
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_says_so() {
+    fn invalid_tables_are_errors() {
         let message = |text: &str| read(text.as_bytes(), "run.csv").unwrap_err().to_string();
         assert!(message("# only\n").contains("is empty"));
         assert!(message("1,2\n3,4\n").contains("line 1: the first line holds numbers"));

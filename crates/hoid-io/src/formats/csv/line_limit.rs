@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_whole_text_without_line_ends_is_refused() {
+    fn text_without_line_ends_is_refused() {
         let file = tempfile::Builder::new().suffix(".csv").tempfile().unwrap();
         std::fs::write(file.path(), "t,\"e\"\n0,1\n").unwrap();
         assert_eq!(whole_text(file.path(), "run.csv").unwrap(), b"t,\"e\"\n0,1\n");

@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_and_places_are_those_of_the_whole_text() {
+    fn long_reader_matches_the_whole_text_reader() {
         let text = text(60_000, 60_000);
         let file = file(&text);
         let options = wanting(&["n"], None);
@@ -397,7 +397,7 @@ mod tests {
 
     /// A recorder that was stopped by a full disk or a power cut may leave any number of zero bytes.
     #[test]
-    fn a_line_without_end_is_an_error() {
+    fn endless_line_is_an_error() {
         let rows = "1,2\n".repeat(100_000);
         let file = file(&format!("t,e\n{rows}"));
         let mut whole = File::options().write(true).open(file.path()).unwrap();
@@ -414,7 +414,7 @@ mod tests {
     /// The size of a sparse file may require more memory for its rows than any computer has.
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_file_of_holes_is_left_to_the_reader_of_whole_texts() {
+    fn sparse_file_is_left_to_the_whole_text_reader() {
         let rows = "1,2\n".repeat(100_000);
         let file = file(&format!("t,e\n{rows}x,\"y\"\n"));
         let mut whole = File::options().write(true).open(file.path()).unwrap();
@@ -427,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn reading_ends_after_the_span_unless_the_time_starts_again() {
+    fn reading_stops_after_the_span_unless_time_restarts() {
         let rows = |text: &str, options: &ReadOptions| {
             let table = of_length(file(text).path(), "run.csv", options, 0).unwrap().unwrap();
             (

@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn separators_comments_blank_lines_mark_and_line_ends() {
+    fn equivalent_notations_give_the_same_table() {
         for text in [
             "t,e,u\n0,1,2\n1,3,4\n",
             "t;e;u\n0;1;2\n1;3;4",
@@ -447,7 +447,7 @@ mod tests {
     /// The full CSV reader reads quoted cells; without quotes, the fast reader reads rows of numbers in several parts.
     /// Both readers give the same bits, texts, precision and positions.
     #[test]
-    fn plain_rows_are_those_of_whole_csv() {
+    fn fast_reader_matches_the_full_csv_reader() {
         let mut state = 7_u64;
         let mut draw = |below: u64| {
             state = state
@@ -496,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_counted_as_an_editor_counts_them() {
+    fn line_numbers_match_a_text_editor() {
         let text = "# one\r\n\r\nt,e,u\r\n0,1,2\r\n# five\r\n\r\n1,x,4\r\n";
         let table = parse(text.as_bytes(), "run.csv").unwrap();
         assert_eq!(table.source.place(0), "line 4");
@@ -508,7 +508,7 @@ mod tests {
     }
 
     #[test]
-    fn units_and_sample_time() {
+    fn units_and_sample_time_are_read_from_comments() {
         let text = "# units: t s, e deg, K_e deg/deg, stick x mV per deg, q -\n# sample_time: 0.0125 s\nt,e,K_e,stick,stick x\n0,1,2,3,4\n";
         let table = parse(text.as_bytes(), "run.csv").unwrap();
         let units: Vec<&str> = table.columns.iter().map(|c| c.unit.as_str()).collect();
@@ -520,7 +520,7 @@ mod tests {
     }
 
     #[test]
-    fn units_in_names() {
+    fn units_are_read_from_column_names() {
         let header = "t,Fehler [deg],Knüppel (V),x(1),x[2],[deg],y (left hand),z (°/s)";
         let text = format!("{header}\n0,1,2,3,4,5,6,7\n");
         let table = parse(text.as_bytes(), "run.csv").unwrap();
@@ -529,7 +529,7 @@ mod tests {
     }
 
     #[test]
-    fn moments_are_s_from_the_first() {
+    fn moments_become_seconds_from_the_first() {
         let values = |cells: &str| {
             let text = format!("t,e\n{cells}");
             let table = parse(text.as_bytes(), "run.csv").unwrap();
@@ -550,7 +550,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_file_is_named_as_cut() {
+    fn cut_file_is_reported() {
         let rows: String = (0..20).map(|k| format!("{k}.00,0.12{k:02},-0.5{k:02}1\n")).collect();
         let text = format!("t,e,u\n{rows}");
         let notes = |text: &str| parse(text.as_bytes(), "run.csv").unwrap().notes;
@@ -578,7 +578,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_says_so() {
+    fn invalid_tables_are_errors() {
         assert!(message(b"").contains("run.csv is empty"));
         assert!(message(b"\n# only\n  \n").contains("is empty"));
         assert!(message(b"t,e,u\n").contains("no samples"));

@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_spreadsheet_would_run_is_text_and_comes_back() {
+    fn formula_cells_are_escaped_and_round_trip() {
         for (cell, written) in [
             ("=1+1", "'=1+1"),
             ("+cmd|' /C calc'!A0", "'+cmd|' /C calc'!A0"),
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_lack_their_end() {
+    fn unterminated_last_line_is_located() {
         for (text, at) in [
             ("", Some(0)),
             ("a", Some(0)),

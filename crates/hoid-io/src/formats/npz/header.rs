@@ -169,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headers_of_numpy() {
+    fn numpy_headers_are_parsed() {
         let plain = parse("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }  \n").unwrap();
         assert_eq!(
             plain,
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_seen() {
+    fn damaged_headers_are_refused() {
         for text in [
             "",
             "{",
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_come_back() {
+    fn quoted_text_round_trip() {
         for text in ["e", "a'b", "a\\b", "\u{e9}"] {
             assert_eq!(Reader { rest: &quoted(text) }.text().as_deref(), Some(text));
         }

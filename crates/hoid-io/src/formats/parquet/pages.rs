@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
+    fn page_sizes_are_read_and_checked_for_gzip() {
         let honest = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(decompressed_size(&honest, GZIP(), 100), Some(800));
         // The second page follows the last value and is not examined.
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_that_are_cut_or_make_no_sense_are_none() {
+    fn invalid_page_headers_are_none() {
         let whole = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(decompressed_size(&[], GZIP(), 100), Some(0));
         for cut in 1..whole.len() {

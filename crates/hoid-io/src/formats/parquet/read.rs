@@ -370,7 +370,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn integers_in_bytes() {
+    fn big_endian_integers_are_decoded() {
         assert_eq!(signed(&[]), 0);
         assert_eq!(signed(&[0xff, 0xfe]), -2);
         assert_eq!(signed(&[0x01, 0x00]), 256);

@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headers() {
+    fn stream_headers_are_parsed() {
         let text = "<?xml version='1.0'?><info><name>A &lt; B</name><channel_count>2</channel_count><nominal_srate>100.5</nominal_srate>\
             <channel_format>float32</channel_format><desc><channels><channel><label>x</label><unit>N</unit></channel><channel/></channels></desc></info>";
         let header = parse(text.as_bytes()).unwrap();

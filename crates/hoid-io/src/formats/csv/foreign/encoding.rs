@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn encodings() {
+    fn encodings_are_detected() {
         let text = "t\te\n0\t1\n";
         for order in [u16::to_le_bytes as fn(u16) -> [u8; 2], u16::to_be_bytes] {
             let bytes: Vec<u8> = text.encode_utf16().flat_map(order).collect();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_of_texts() {
+    fn trailing_zero_and_control_bytes_are_removed() {
         let text = String::from("t,e\n0,1\n");
         assert_eq!(decoded(b"t,e\n0,1\n\0\0\0"), (text.clone(), true));
         assert_eq!(decoded(b"t,e\n0,1\n\x1a"), (text, false));
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn line_ends() {
+    fn line_endings_are_normalised() {
         for (text, found) in [
             ("t,e\r0,1\r", "t,e\n0,1\n"),
             ("t,e\r\n0,1\r\n", "t,e\r\n0,1\r\n"),

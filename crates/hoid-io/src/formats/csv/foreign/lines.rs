@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_and_rows() {
+    fn lines_are_split_into_cells() {
         assert_eq!(Mark::Char(',').cells("a,\"b,c\",,"), ["a", "\"b,c\"", "", ""]);
         assert_eq!(Mark::Blanks.cells("  a \"b c\"\td "), ["a", "\"b c\"", "d"]);
         assert_eq!(Mark::Blanks.cells(""), [""; 0]);

@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn words_between_blanks() {
+    fn blank_separated_headers_are_split() {
         let rows = ["0.0 1 2", "0.1 3 4"];
         for (header, names) in [
             ("t e u", ["t", "e", "u"]),
@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_without_names() {
+    fn extra_cells_are_matched_to_the_header() {
         let comma = Mark::Char(',');
         let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let rows = ["0,5,", "1,6,"];

@@ -65,7 +65,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tables_with_bars() {
+    fn tables_with_bars_are_converted() {
         let found = "t\te, deg\tu\n0\t1\t2\n1\t\t4\n";
         for text in [
             "t|e, deg|u\n0|1|2\n1||4\n",
@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn other_text_with_bars() {
+    fn other_text_with_bars_is_no_table() {
         for text in [
             "",
             "|",

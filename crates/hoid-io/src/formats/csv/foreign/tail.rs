@@ -50,7 +50,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_below_a_table() {
+    fn words_below_a_table_are_found() {
         let rows = "t,e\n0,1\n1,2\n2,3\n";
         for words in [
             "Mean,2\n",
@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_kept() {
+    fn table_rows_are_never_taken_as_words() {
         for text in [
             "",
             "t,e\n",
