@@ -179,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_level_is_that_of_what_was_asked() {
+    fn level_covers_only_the_requested_answers() {
         let answers = [
             answered(RESPONSE, None),
             answered("tau_e", Some("tau_e is not determined by the data".to_owned())),
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crossover_whose_interval_holds_zero_is_open() {
+    fn crossover_with_zero_in_its_interval_is_undetermined() {
         let of = |value: f64, s: f64| {
             let one = Estimate::with_variance(value, s * s);
             let interval = Some((value - 2.0 * s, value + 2.0 * s));
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_asked_for() {
+    fn requested_names_are_parsed() {
         let names = |text: &str| asked_for(&text.split(',').map(str::to_owned).collect::<Vec<_>>());
         assert_eq!(
             names("crossover, delay,margin").unwrap(),

@@ -185,7 +185,7 @@ mod tests {
     use crate::config::Signal;
 
     #[test]
-    fn a_displayed_target_is_a_further_input_of_the_group() {
+    fn displayed_target_is_a_further_input_of_the_group() {
         let of = |display, disturbance| {
             let condition = Condition {
                 target: Some(Signal::default()),

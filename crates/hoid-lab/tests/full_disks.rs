@@ -136,7 +136,7 @@ fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Op
 }
 
 #[test]
-fn a_disk_that_fills_loses_nothing_that_was_told() {
+fn full_disk_loses_no_confirmed_data() {
     let at = tempfile::tempdir().unwrap();
     let mut state = 54_u64;
     let mut random = move || {
@@ -207,7 +207,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
 /// If the disk becomes full while a person tracks, the page is notified at once, the run does not count, and the
 /// session continues.
 #[test]
-fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
+fn full_disk_ends_the_run_and_notifies_the_page() {
     let at = tempfile::tempdir().unwrap();
     let Some(_disk) = Disk::mount(at.path(), 2048) else {
         eprintln!("skipped: no disk of its own can be mounted here");

@@ -25,7 +25,7 @@ const CASES: u64 = 1500;
 const FOUND: [u64; 2] = [6025, 66_758];
 
 #[test]
-fn what_nobody_says_or_saved_ends_nothing() {
+fn hostile_messages_and_files_do_not_stop_the_server() {
     let mut hostile = Hostile::new();
     (0..CASES).for_each(|number| hostile.case(5, number));
     FOUND.into_iter().for_each(|number| hostile.case(2026, number));
@@ -33,7 +33,7 @@ fn what_nobody_says_or_saved_ends_nothing() {
 
 /// A page requests a run, continues with a session whose plan is shorter, and tries to start the run there.
 #[test]
-fn a_run_of_one_session_does_not_start_in_another() {
+fn run_requested_in_another_session_does_not_start() {
     let dir = tempfile::tempdir().unwrap();
     let config = |runs: usize| Config {
         condition: vec![Condition {

@@ -97,7 +97,7 @@ fn status(reply: &str) -> &str {
 }
 
 #[test]
-fn strangers_are_refused() {
+fn requests_without_the_token_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let own = format!("/{}/", at.token);
@@ -201,7 +201,7 @@ fn batch(number: u64, first: usize, target: &[f64]) -> Value {
 }
 
 #[test]
-fn a_run_goes_through_and_its_live_estimate_is_told() {
+fn complete_run_sends_a_live_estimate() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let (mut person, mut other) = (at.page(), at.page());
@@ -231,7 +231,7 @@ fn a_run_goes_through_and_its_live_estimate_is_told() {
 }
 
 #[test]
-fn a_window_that_is_closed_breaks_its_run_off() {
+fn closing_the_window_interrupts_the_run() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let mut person = at.page();
@@ -272,7 +272,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
 }
 
 #[test]
-fn messages_that_are_none_end_the_connection() {
+fn invalid_messages_end_the_connection() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let closed = |message: Message| {
@@ -316,7 +316,7 @@ fn messages_that_are_none_end_the_connection() {
 }
 
 #[test]
-fn one_experiment_has_one_server() {
+fn second_server_of_an_experiment_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let _at = served(dir.path(), Mode::Sessions);
     let second = Lab::open(dir.path(), config(), Mode::Sessions, None);
@@ -327,7 +327,7 @@ fn one_experiment_has_one_server() {
 /// the client retries after a second.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_burst_of_connections_is_kept_until_it_is_accepted() {
+fn burst_of_connections_is_queued() {
     const BURST: usize = 500;
     let most = std::fs::read_to_string("/proc/sys/net/core/somaxconn").unwrap();
     if most.trim().parse::<usize>().unwrap() < BURST {
@@ -346,7 +346,7 @@ fn a_burst_of_connections_is_kept_until_it_is_accepted() {
 
 /// As many connections as the system allows, each of which sends one byte at intervals, are closed to admit the page.
 #[test]
-fn slow_strangers_do_not_shut_the_page_out() {
+fn slow_connections_do_not_block_the_page() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let mut slow = Vec::new();
@@ -372,7 +372,7 @@ fn slow_strangers_do_not_shut_the_page_out() {
 /// heads without the token or without an end, requests for sockets, or arbitrary bytes. The page receives a reply each
 /// time, and the longest time is printed (less than a second if the machine is otherwise idle).
 #[test]
-fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
+fn hostile_connections_do_not_block_the_page() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let over = Arc::new(AtomicBool::new(false));
@@ -441,7 +441,7 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
 
 /// The address for starting a browser is visible in the list of processes, so it works only once.
 #[test]
-fn the_address_of_the_browser_leads_to_the_page_once() {
+fn browser_address_works_only_once() {
     let dir = tempfile::tempdir().unwrap();
     let server = Server::new(Lab::open(dir.path(), config(), Mode::Sessions, None).unwrap(), None).unwrap();
     let once = server.address_once().unwrap();

@@ -99,7 +99,7 @@ fn finished(out: &Path) -> (Session, Stem, Checked) {
 }
 
 #[test]
-fn a_run_is_verified_and_its_record_is_read_by_hoid() {
+fn complete_run_is_verified_and_readable() {
     let dir = tempfile::tempdir().unwrap();
     let (session, stem, checked) = finished(dir.path());
     assert!(checked.is_verified(), "{}", checked.reasons());
@@ -122,7 +122,7 @@ fn a_run_is_verified_and_its_record_is_read_by_hoid() {
 
 /// If the display shows the target, the target has a role in the recording.
 #[test]
-fn a_displayed_target_has_its_role_in_the_recording() {
+fn displayed_target_has_a_role_in_the_recording() {
     for (display, role) in [
         (Display::Compensatory, None),
         (Display::Pursuit, Some("feedforward")),
@@ -167,7 +167,7 @@ fn corrupt(stem: &Stem, end: &str, line: usize, cell: usize, with: impl Fn(f64) 
 type Change<'a> = &'a dyn Fn(f64) -> f64;
 
 #[test]
-fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
+fn each_change_gives_its_own_finding() {
     let last_bit = |v: f64| f64::from_bits(v.to_bits() ^ 1);
     let cases: [(&str, usize, Change<'_>, &str); 8] = [
         ("events.csv", 3, &|raw| raw + 1.0, "lab-input"),
@@ -195,7 +195,7 @@ fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
 }
 
 #[test]
-fn another_target_or_element_is_found() {
+fn changed_target_or_element_is_detected() {
     for change in [
         |begun: &mut RunStart| begun.replication += 1,
         |begun: &mut RunStart| begun.phases[0].plant.b[0] *= 1.001,
@@ -216,7 +216,7 @@ fn another_target_or_element_is_found() {
 }
 
 #[test]
-fn a_session_goes_on_after_its_server_was_killed() {
+fn session_continues_after_the_server_was_killed() {
     let dir = tempfile::tempdir().unwrap();
     let mut session = Session::begin(dir.path(), &config(), "P01", true).unwrap();
     let (stem, log) = run(&mut session, 1234);
@@ -255,7 +255,7 @@ fn a_session_goes_on_after_its_server_was_killed() {
 }
 
 #[test]
-fn batches_that_do_not_continue_are_refused() {
+fn non_contiguous_batches_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let mut session = Session::begin(dir.path(), &config(), "P01", false).unwrap();
     let (_, mut log) = run(&mut session, 100);
@@ -278,7 +278,7 @@ fn batches_that_do_not_continue_are_refused() {
 }
 
 #[test]
-fn people_have_their_rows_and_pseudonyms_are_checked() {
+fn subjects_are_numbered_and_pseudonyms_checked() {
     let dir = tempfile::tempdir().unwrap();
     let row = |subject: &str| Session::begin(dir.path(), &config(), subject, false).unwrap().facts.row;
     assert_eq!(["A", "B", "A", "C"].map(row), [0, 1, 0, 2]);
@@ -290,7 +290,7 @@ fn people_have_their_rows_and_pseudonyms_are_checked() {
 /// Files are truncated at any byte, have flipped bits or are deleted, as after power cuts and on full disks: the
 /// session opens, its damaged runs are unverified, and it can continue.
 #[test]
-fn every_session_opens_whatever_was_cut_or_lost() {
+fn damaged_sessions_still_open() {
     let dir = tempfile::tempdir().unwrap();
     let (mut session, ..) = finished(dir.path());
     drop(run(&mut session, 777));
@@ -348,7 +348,7 @@ fn every_session_opens_whatever_was_cut_or_lost() {
 
 /// Duplicated log entries, matrices of wrong dimensions and a plan of another experiment give findings or errors.
 #[test]
-fn numbers_of_files_are_no_places() {
+fn inconsistent_files_give_findings_or_errors() {
     let dir = tempfile::tempdir().unwrap();
     let (session, stem, _) = finished(dir.path());
     let ticks = stem.file("ticks.csv");

@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_design_is_drawn() {
+    fn design_figures_are_complete() {
         let request = DesignRequest {
             controlled_element: Some("4/s".parse().unwrap()),
             difference: Some(DifferenceRequest::new("crossover=10%".parse().unwrap())),

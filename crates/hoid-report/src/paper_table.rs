@@ -478,7 +478,7 @@ mod tests {
     }
 
     #[test]
-    fn a_result_in_latex_and_markdown() {
+    fn tables_in_latex_and_markdown_match() {
         let latex = operator().text(Markup::Latex);
         assert_eq!(
             latex,
@@ -497,7 +497,7 @@ mod tests {
     }
 
     #[test]
-    fn as_data_every_number_stands_alone() {
+    fn data_table_has_one_number_per_column() {
         let data = operator().data();
         let names: Vec<&str> = data.columns.iter().map(|column| column.name.as_str()).collect();
         assert_eq!(
@@ -511,7 +511,7 @@ mod tests {
     }
 
     #[test]
-    fn people_stand_side_by_side_and_what_is_open_is_left_out() {
+    fn people_are_columns_and_undetermined_values_omitted() {
         let person = |subject: &str, lead: bool| {
             let mut p = json!({
                 "subject": subject, "condition": "C_1", "form": "lead", "verdict": {"level": "not-determined"},

@@ -464,7 +464,7 @@ fn figures() -> Vec<(&'static str, String)> {
 }
 
 #[test]
-fn figures_are_whole_and_the_same_each_time() {
+fn figures_are_complete_and_reproducible() {
     let again = figures();
     for ((name, svg), (_, second)) in figures().iter().zip(&again) {
         assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>"), "{name}");
@@ -481,7 +481,7 @@ fn figures_are_whole_and_the_same_each_time() {
 
 /// In print 420 units are 85 mm, so 7 pt are 12.2 units.
 #[test]
-fn type_is_seven_points_in_print_but_for_subscripts() {
+fn text_is_seven_points_in_print_except_subscripts() {
     for (name, svg) in figures() {
         let sizes = |tag: &str| -> Vec<f64> {
             let tags = svg.split(tag).skip(1).filter_map(|rest| rest.split_once('>'));

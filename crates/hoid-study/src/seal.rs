@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_byte_of_a_block_counts() {
+    fn any_changed_byte_damages_a_block() {
         let dir = tempfile::tempdir().unwrap();
         let d = dir.path();
         fs::create_dir(d.join("parts")).unwrap();

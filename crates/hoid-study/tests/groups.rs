@@ -56,7 +56,7 @@ fn manifest(directory: &Path) -> Manifest {
 }
 
 #[test]
-fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
+fn group_recovers_its_people_and_can_be_resumed() {
     let data = recorded();
     let manifest = manifest(data.path());
     let out = tempfile::tempdir().unwrap();
@@ -207,7 +207,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
 }
 
 #[test]
-fn a_polynomial_model_that_is_not_asked_for_is_in_no_table() {
+fn only_requested_polynomials_are_in_the_tables() {
     let data = recorded();
     let mut manifest = manifest(data.path());
     manifest.runs.retain(|run| run.subject == "A" && run.condition == "C1");
@@ -237,7 +237,7 @@ fn a_polynomial_model_that_is_not_asked_for_is_in_no_table() {
 }
 
 #[test]
-fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
+fn bad_files_are_failed_rows_and_bad_manifests_errors() {
     let data = recorded();
     let mut manifest = manifest(data.path());
     manifest.runs.truncate(2);
@@ -407,7 +407,7 @@ run = "2"
 /// One more sample of delay in every file increases nk by one, both with the delay of the person's operator (C1) and
 /// with the joint fits to all runs (C4, for which a change is declared).
 #[test]
-fn the_delay_moves_with_the_output() {
+fn delay_increases_with_an_output_offset() {
     let data = recorded();
     let late = tempfile::tempdir().unwrap();
     let mut manifest = manifest(data.path());

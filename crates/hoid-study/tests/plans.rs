@@ -208,7 +208,7 @@ fn options_of_an_operator_are_checked() {
 }
 
 #[test]
-fn a_plan_without_scenarios_or_estimators_says_so() {
+fn missing_scenarios_or_estimators_are_errors() {
     for key in ["scenarios", "estimators"] {
         let text = GOOD.replace(&format!("[[{key}]]"), "[[other]]");
         let message = Plan::parse(&text, "bad.toml").unwrap_err().to_string();
@@ -222,7 +222,7 @@ fn a_plan_without_scenarios_or_estimators_says_so() {
 }
 
 #[test]
-fn cells_follow_the_order_of_the_file() {
+fn cells_follow_file_order() {
     let plan = Plan::parse(
         &GOOD.replace("noise_level = 0.1", "noise_level = [0.0, 0.2]"),
         "good.toml",
@@ -243,7 +243,7 @@ fn cells_follow_the_order_of_the_file() {
 
 /// A plan with the earlier name of a method is equivalent to a plan with the current name.
 #[test]
-fn an_earlier_name_of_a_method_is_read() {
+fn former_method_name_is_accepted() {
     let by = |method: &str| {
         let text = GOOD.replace("method = \"rls\"\nmemory = 256", &format!("method = \"{method}\""));
         Plan::parse(&text, "good.toml").unwrap().estimators
@@ -254,7 +254,7 @@ fn an_earlier_name_of_a_method_is_read() {
 
 /// The published schema equals that of the program.
 #[test]
-fn the_book_has_the_schema() {
+fn documented_schema_is_current() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/plan.schema.json");
     let schema = plan_schema();
     if std::env::var_os("HOID_UPDATE_DOCS").is_some() {

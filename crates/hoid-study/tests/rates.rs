@@ -39,7 +39,7 @@ fn analysed(directory: &Path, sample_time_s: f64) -> (Manifest, [(f64, f64); 3])
 }
 
 #[test]
-fn a_group_at_1000_hz_is_that_at_100_hz() {
+fn group_at_1000_hz_matches_100_hz() {
     let directory = tempfile::tempdir().unwrap();
     let (fast, slow) = (directory.path().join("fast"), directory.path().join("slow"));
     fs::create_dir(&fast).unwrap();
@@ -107,7 +107,7 @@ fn a_group_at_1000_hz_is_that_at_100_hz() {
 }
 
 #[test]
-fn the_rate_of_a_group_as_typed() {
+fn decimation_settings_are_parsed() {
     let of = |decimate: Option<NumberOrText>, rate_hz| PreparationSettings {
         decimate,
         rate_hz,

@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_span_of_whole_periods_is_found() {
+    fn longest_span_of_whole_periods_is_found() {
         let found = search(&record(&[1.0, 3.0, 7.0, 12.0]), &LookOptions::default())
             .ok()
             .unwrap();
@@ -194,7 +194,7 @@ mod tests {
     /// The record has a few samples after the last period, as if the recorder was stopped late. The span to the end of
     /// the record leaks little, but does not consist of whole periods.
     #[test]
-    fn a_period_is_not_drawn_out_by_samples_at_the_end() {
+    fn extra_samples_at_the_end_do_not_change_the_period() {
         let whole = record(&[1.0, 2.0, 3.0]);
         let longer = whole.span(0.0, 23.0).unwrap();
         let exact = search(&longer, &LookOptions::default()).ok().unwrap();
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_excitation_is_said() {
+    fn missing_excitation_gives_the_reason() {
         let sine = search(&record(&[2.0]), &LookOptions::default()).err().unwrap();
         assert!(sine.contains("no column among d"), "{sine}");
         let known = |excitation: &str| LookOptions {

@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heads_are_read_and_doubled_lines_are_not() {
+    fn request_heads_are_parsed_and_duplicates_ignored() {
         let head = b"GET /a/b?c HTTP/1.1\r\nHost: x:1\r\nOrigin: http://x:1\r\nUpgrade: WebSocket\r\n\
             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: k\r\n\r\n";
         let request = Request::parse(head).unwrap();

@@ -228,7 +228,7 @@ mod tests {
 
     /// The third file is on a full disk: none of the files contains the batch, and its ticks do not count.
     #[test]
-    fn a_batch_that_a_full_disk_refuses_is_taken_back() {
+    fn batch_on_a_full_disk_is_rolled_back() {
         let dir = tempfile::tempdir().unwrap();
         let stem = Stem::new(dir.path(), "P01", 1, "rate", 1);
         let mut log = RunLog::create(&stem, 100).unwrap();

@@ -188,7 +188,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_tell_their_step_apart() {
+    fn tick_labels_resolve_their_step() {
         assert_eq!(tick_step(1.0, 5.2), 0.2);
         assert_eq!(tick(0.1 + 0.2, 0.1), "0.3");
         assert_eq!(tick(1e-17, 0.1), "0");
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bent_ordinate_is_smooth_enough_and_has_its_ticks_at_decades() {
+    fn symmetric_log_axis_is_continuous_and_invertible() {
         let bent = SymmetricLogAxis { linear_within: 10.0 };
         assert_eq!(
             [-1000.0, -10.0, -5.0, 0.0, 10.0, 100.0].map(|v| bent.height(v)),
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithmic_ranges_hold_their_values() {
+    fn logarithmic_ranges_cover_their_values() {
         assert_eq!(log_range([0.03, 7.0, -1.0, 0.0, f64::NAN]), (0.02, 10.0));
         assert_eq!(log_range([1.0]), (0.5, 2.0));
         assert_eq!(log_range([-1.0, f64::INFINITY]), (0.1, 1.0));

@@ -307,7 +307,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_dead_time_does_not_stretch_the_axis() {
+    fn long_delay_does_not_stretch_the_phase_axis() {
         let truth = |tau_e_s: f64| TrueResponse {
             operator: OperatorParameters {
                 tau_e_s,
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_behind_its_hold_is_the_continuous_operator_at_low_frequency() {
+    fn held_true_operator_matches_continuous_at_low_frequency() {
         let truth = TrueResponse {
             operator: OperatingState::s1().operator,
             sample_time: SampleTime::HUNDREDTH,

@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_stands_at_the_place_of_its_numbers() {
+    fn box_is_drawn_at_its_coordinates() {
         // The ordinate from 0 to 10 has a margin of 5 %, so the axes extend from -0.5 to 10.5.
         let one = BoxStatistics {
             count: 5,
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn outliers_beyond_are_counted_and_missing_boxes_crossed() {
+    fn outliers_off_the_axis_are_counted() {
         let mut one = BoxStatistics::of(&[1.0, 2.0, 3.0, 4.0, 5.0]);
         one.outliers = vec![1000.0, 2000.0, -300.0];
         let missing = BoxStatistics::default();
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bent_ordinate_shows_small_and_large_boxes() {
+    fn symmetric_log_axis_shows_small_and_large_boxes() {
         let [small, large] = [1.0, 1e5].map(|v| BoxStatistics::of(&[v, 1.2 * v, 1.4 * v]));
         let of = |linear_within| {
             let mut grid = grid(vec![vec![small.clone()], vec![large.clone()]]);
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_grid_is_a_small_figure() {
+    fn empty_grid_gives_a_valid_figure() {
         for grid in [BoxGrid::default(), grid(vec![]), grid(vec![vec![]])] {
             let svg = box_plots("b", "t", &grid);
             assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>") && !svg.contains("NaN"));

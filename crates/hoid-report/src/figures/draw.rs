@@ -179,7 +179,7 @@ pub mod tests {
     }
 
     #[test]
-    fn widths_of_text() {
+    fn text_width_matches_helvetica() {
         // In Helvetica, the width of a digit is 0.556 of the font size, and the width of a point 0.278.
         assert!((text_width("-0.55", 10) - 22.9).abs() < 0.5);
         assert_eq!(text_width("", 13), 0.0);

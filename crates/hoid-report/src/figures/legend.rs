@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_names_are_cut() {
+    fn long_names_are_shortened() {
         assert_eq!(shortened("abc", 3), "abc");
         assert_eq!(shortened("\u{3c9}\u{3c9}\u{3c9}\u{3c9}", 3), "\u{3c9}\u{3c9}\u{2026}");
     }

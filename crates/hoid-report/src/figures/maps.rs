@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_stand_at_their_places_with_their_colours() {
+    fn cells_have_their_position_and_colour() {
         let svg = maps("m", "t", &grid(vec![vec![1.0, 2.0], vec![3.0, f64::NAN]])).to_lowercase();
         let width = 0.5 * (style::WIDTH - SPACE_FOR_BAR - style::LEFT - style::RIGHT);
         let top = 8.0;
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn hostile_input_gives_a_figure() {
+    fn invalid_input_gives_a_valid_figure() {
         let nan = f64::NAN;
         let values = [
             vec![],

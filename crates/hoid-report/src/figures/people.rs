@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_stand_at_the_places_of_their_numbers() {
+    fn marks_are_drawn_at_their_coordinates() {
         let svg = people_by_condition("p", "t", &grid());
         // The ordinate from 0 to 11 has a margin of 5 %.
         let y = |v: f64| 8.0 + HEIGHT * (11.55 - v) / 12.1;
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_a_small_figure_and_many_are_grey() {
+    fn empty_grid_is_valid_and_many_people_are_grey() {
         let none = people_by_condition("p", "t", &PeopleGrid::default());
         assert!(none.starts_with("<svg ") && !none.contains("NaN"));
         let mut many = grid();

@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_stays_within_its_ends() {
+    fn thinned_run_keeps_its_ends() {
         let values: Vec<f64> = (0..10_000).map(|k| (k as f64 * 0.05).cos()).collect();
         for run in [0..1, 17..19, 4_000..9_999, 9_999..10_000, 0..10_000] {
             let kept = thinned_run(&values, run.clone(), COLUMNS);
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn bands_keep_their_widest_reach() {
+    fn thinned_bands_keep_their_extremes() {
         let n = 20_000;
         let mut upper = vec![1.0; n];
         upper[777] = 5.0;

@@ -219,7 +219,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_subjects_never_share_a_page() {
+    fn subjects_have_distinct_page_names() {
         let long = "x".repeat(300);
         let subjects = [
             "S1",

@@ -105,7 +105,7 @@ mod tests {
     use crate::columns::Rows;
 
     #[test]
-    fn what_was_written_is_read() {
+    fn run_estimates_are_read_back() {
         let mut estimates = Rows::new(&estimates_schema());
         for (run, estimator, parameter, value, status) in [
             ("2", "family", "tau_e", 0.2, "ok"),

@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_first_order_step_settles_when_it_must() {
+    fn first_order_step_has_the_expected_settling_time() {
         let names = ["K_e".to_owned(), "flat".to_owned()];
         let (mut settling, mut averages) = (Settling::default(), TraceAverages::new(names.to_vec()));
         // The runs cover all phases of the ripple, so the median over the runs is smooth.

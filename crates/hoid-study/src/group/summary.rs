@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_whole_group_has_one_verdict() {
+    fn group_verdict_combines_people_and_failures() {
         use VerdictLevel::{Doubtful, NotDetermined, Trustworthy};
         assert_eq!(judged(2, 0, &[person(Trustworthy)]).level, Trustworthy);
         assert_eq!(judged(2, 1, &[person(Trustworthy)]).level, Doubtful);

@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_passes_beyond_two_errors() {
+    fn cell_passes_beyond_two_standard_errors() {
         use CellOutcome::{Fails, Passes, Undecided};
         for (value, outcome) in [(12.1, Passes), (11.9, Undecided), (8.1, Undecided), (7.9, Fails)] {
             assert_eq!(cell(value, 1.0, Bound::Above(10.0)), outcome);
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn a_larger_effect_than_claimed_exceeds_the_claim() {
+    fn larger_effect_exceeds_the_claim() {
         use CellOutcome::{Exceeds, Fails, Passes, Undecided};
         let times = Bound::Effect(25.0, 75.0);
         for (value, outcome) in [(284.0, Exceeds), (77.1, Exceeds), (76.9, Passes), (22.9, Fails)] {
@@ -371,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn a_part_goes_by_the_share_of_decided_cells() {
+    fn part_verdict_follows_the_share_of_decided_cells() {
         assert_eq!(part(9, 1, 0).verdict(), Some(Verdict::Holds));
         assert_eq!(part(8, 1, 0).verdict(), Some(Verdict::HoldsInPart));
         assert_eq!(part(1, 1, 0).verdict(), Some(Verdict::HoldsInPart));
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn a_claim_goes_by_its_parts() {
+    fn claim_verdict_combines_its_parts() {
         let (yes, half, no, open) = (part(9, 0, 0), part(5, 4, 0), part(0, 9, 0), part(1, 0, 9));
         let of = |parts: &[&Part]| verdict(&parts.iter().map(|part| (*part).clone()).collect::<Vec<_>>());
         assert_eq!(of(&[&yes, &yes]), Verdict::Holds);

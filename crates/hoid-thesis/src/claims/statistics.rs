@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn the_jackknife_of_a_mean_is_its_error() {
+    fn jackknife_error_of_a_mean_is_its_standard_error() {
         // For a mean, the expectation of s^2 is exact. With 9 degrees of freedom s has a spread of 24 %, which
         // averaging over 400 samples reduces to 1.2 %, and its mean is 2.7 % too small (square root of a chi-square
         // variable).
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn pairs_stay_pairs() {
+    fn jackknife_keeps_pairs_together() {
         let a = normals(100, 3);
         let b: Vec<f64> = a.iter().map(|a| a + 1.0).collect();
         let found = jackknife(&[a, b], &|s| med(&s[1]) - med(&s[0]));
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn few_values_say_nothing() {
+    fn too_few_values_give_no_estimate() {
         let most = [1.0, 2.0, f64::NAN];
         let few = [1.0, f64::NAN, f64::NAN];
         assert_eq!(median_of(&most).value, 1.5);
@@ -200,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn linearity_of_a_line_and_of_a_parabola() {
+    fn linearity_is_one_for_a_line_and_less_for_a_parabola() {
         assert!((linearity(&[1.0, 3.0, 5.0, 7.0]) - 1.0).abs() < 1e-12);
         assert!(linearity(&[1.0, 0.0, 0.0, 1.0]) < 1e-12);
         // In NumPy, corrcoef([0, 1, 2, 3], [0, 1, 4, 9])^2 = 0.9184.

@@ -235,7 +235,7 @@ mod tests {
     use super::{super::tests::*, *};
 
     #[test]
-    fn the_search_finds_the_lowest_of_many_minima() {
+    fn search_finds_the_global_minimum() {
         // Rastrigin's function of three genes, independent of the other genes: its minima are a tenth apart, and the
         // lowest minimum is at 0.3, 0.5, 0.7.
         let cost = |genes: &[f64; N]| {
@@ -258,7 +258,7 @@ mod tests {
 
     /// At the true parameters, the criterion is the innovation variance of an AR(1) process with d1 = -e^(-Ts/Tn).
     #[test]
-    fn the_criterion_at_the_truth_is_the_remnant() {
+    fn criterion_at_the_truth_is_the_remnant_variance() {
         let run = Run::of(Condition::C4, 1, 0.1);
         let task = run.task();
         let truth = [0.09, 0.07, 0.4, 1.2, 40.96, 100.0, 11.25, 0.35, 0.28];
@@ -274,7 +274,7 @@ mod tests {
 
     /// From the genetic start, the search ends in the same minimum as from the estimator's own starts.
     #[test]
-    fn it_ends_in_the_minimum_that_other_starts_find() {
+    fn genetic_start_reaches_the_same_minimum() {
         let run = Run::of(Condition::C4, 1, 0.1);
         let genetic = GeneticSigmoid::default().fit(&run.task()).unwrap();
         let own = SigmoidChange {
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_refused() {
+    fn zero_input_is_refused() {
         let silent = record_of(&[0.0; 4000], &[1.0; 4000]);
         assert!(
             GeneticSigmoid::default()

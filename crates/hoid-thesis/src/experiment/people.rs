@@ -181,7 +181,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_plan_is_the_experiment_of_the_text() {
+    fn plan_matches_the_thesis_and_bad_values_are_refused() {
         let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
         assert_eq!((plan.subjects, plan.runs, plan.evaluated), (3, 7, 5));
         for (from, to, named) in [
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_of_one_subject_are_of_one_person_and_differ() {
+    fn runs_of_a_subject_differ_and_are_reproducible() {
         let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
         let gain = |subject, run| {
             plan.record(subject, Condition::C1, run)

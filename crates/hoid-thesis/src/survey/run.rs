@@ -204,7 +204,7 @@ method = "fourier"
 "#;
 
     #[test]
-    fn estimators_and_comparators_meet_on_the_same_runs() {
+    fn estimators_and_comparators_share_the_runs() {
         let plan = SurveyPlan::parse(SMALL, LINES_TOO, "small.toml").unwrap();
         let found = survey(&plan, &|_| ()).unwrap();
         let names: Vec<&str> = found.iter().map(|of| of.name.as_str()).collect();
