@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sentences_are_wrapped_and_points_hang() {
+    fn lists_are_wrapped_with_hanging_indents() {
         let page = "- one two three four\nshort\n\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\nend of it all";
         let expected = "- one two\n  three four\nshort\n\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\nend of it\nall";
         assert_eq!(wrapped(page, 12), expected);
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_verdict_has_a_colour_and_nothing_else_has() {
+    fn only_the_verdict_is_coloured() {
         let page = "Verdict: not determined\n- why\nVerdict: doubtful\n";
         assert_eq!(
             coloured(page),

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_course_turns_on_its_side_and_keeps_its_end() {
+    fn narrow_time_table_is_transposed_and_keeps_its_end() {
         let names = [
             "K_e",
             "T_L (s)",
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_is_wrapped_between_words_and_becomes_a_list_where_that_does_not_do() {
+    fn narrow_table_is_wrapped_or_becomes_a_list() {
         let whole = rows().on(None);
         assert!(
             whole

@@ -12,7 +12,7 @@ use common::{bad, good};
 const HUGE: &str = "18446744073709551615";
 
 #[test]
-fn limits_are_named_at_once() {
+fn exceeded_limits_are_refused_at_once() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     good(d, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
@@ -77,7 +77,7 @@ fn limits_are_named_at_once() {
 }
 
 #[test]
-fn scenarios_beyond_sense_name_the_key_and_its_limits() {
+fn out_of_range_scenarios_name_the_key_and_its_limits() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for (line, said) in [
@@ -106,7 +106,7 @@ fn scenarios_beyond_sense_name_the_key_and_its_limits() {
 }
 
 #[test]
-fn a_table_without_end_to_the_side_is_answered() {
+fn table_with_a_million_columns_is_refused() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let names: Vec<String> = (0..1_000_000).map(|k| format!("c{k}")).collect();

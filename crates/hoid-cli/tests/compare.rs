@@ -86,7 +86,7 @@ fn conditions_are_compared() {
 }
 
 #[test]
-fn mistakes_have_remedies() {
+fn mistakes_are_explained_with_a_remedy() {
     let directory = results();
     let at = directory.path();
     for (arguments, code, word) in [
@@ -110,7 +110,7 @@ fn mistakes_have_remedies() {
 
 /// People have different forms with the two elements, so their parameters are compared in a common form.
 #[test]
-fn recordings_are_analysed_and_compared_in_one_form() {
+fn recordings_are_compared_in_a_common_form() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let people = "simulate-group --people --subjects 3 --runs 1 --plants integrator,double-integrator --remnants lag \

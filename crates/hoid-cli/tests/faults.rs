@@ -92,7 +92,7 @@ fn kinds(found: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn one_sample_of_a_good_record() {
+fn single_outlier_is_repaired() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let clean = simulated(d, "C1", "71");
@@ -136,7 +136,7 @@ fn one_sample_of_a_good_record() {
 }
 
 #[test]
-fn what_is_only_reported_is_doubted_and_what_is_kept_is_not_looked_for() {
+fn reported_faults_are_doubtful_and_kept_ones_ignored() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let mut rows = simulated(d, "C1", "72");
@@ -163,7 +163,7 @@ fn what_is_only_reported_is_doubted_and_what_is_kept_is_not_looked_for() {
 }
 
 #[test]
-fn rest_before_a_run() {
+fn rest_before_a_run_is_cut() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let run = simulated(d, "C1", "73");
@@ -178,7 +178,7 @@ fn rest_before_a_run() {
 }
 
 #[test]
-fn wrong_units_wrong_columns_and_a_wrong_sign() {
+fn wrong_units_columns_and_sign_are_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let run = simulated(d, "C1", "74");
@@ -206,7 +206,7 @@ fn wrong_units_wrong_columns_and_a_wrong_sign() {
 }
 
 #[test]
-fn a_record_that_is_too_short() {
+fn too_short_record_is_not_determined() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let mut rows = simulated(d, "C1", "75");
@@ -219,7 +219,7 @@ fn a_record_that_is_too_short() {
 }
 
 #[test]
-fn an_offset_is_estimated_and_biases_nothing() {
+fn offset_is_estimated_and_causes_no_bias() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let run = simulated(d, "C1", "76");
@@ -264,7 +264,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
 }
 
 #[test]
-fn a_delay_that_jumps_and_a_second_operator_are_told() {
+fn jump_of_delay_or_operator_is_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let (run, other) = (simulated(d, "C1", "77"), simulated(d, "C2", "78"));
@@ -305,7 +305,7 @@ fn a_delay_that_jumps_and_a_second_operator_are_told() {
 }
 
 #[test]
-fn a_robust_fit_of_data_as_they_are_is_moved_by_no_sample() {
+fn robust_fit_is_insensitive_to_a_single_sample() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let mut rows = simulated(d, "C1", "79");

@@ -19,7 +19,7 @@ fn library(folder: &TempDir) {
 }
 
 #[test]
-fn a_unit_is_written_whole_and_the_same_again() {
+fn fmu_is_complete_and_reproducible() {
     let folder = TempDir::new().unwrap();
     library(&folder);
     let with = |more: &[&str]| {
@@ -53,7 +53,7 @@ fn a_unit_is_written_whole_and_the_same_again() {
 }
 
 #[test]
-fn what_makes_no_unit_says_why() {
+fn invalid_fmu_requests_give_the_reason() {
     let folder = TempDir::new().unwrap();
     library(&folder);
     fs::write(folder.path().join("text"), "text").unwrap();

@@ -66,7 +66,7 @@ fn files(directory: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn a_virtual_experiment_is_analysed_and_reported() {
+fn virtual_experiment_is_analysed_and_reported() {
     let directory = experiment();
     let at = directory.path();
     let said = good(at, &["group", "people", "--out", "out", "--csv", "-v"]);
@@ -195,7 +195,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
 }
 
 #[test]
-fn a_group_that_was_killed_goes_on_to_the_same_bytes() {
+fn killed_group_resumes_to_identical_files() {
     let directory = experiment();
     let at = directory.path();
     good(at, &["group", "people", "--out", "whole"]);
@@ -216,7 +216,7 @@ fn a_group_that_was_killed_goes_on_to_the_same_bytes() {
 }
 
 #[test]
-fn init_looks_at_the_files_and_says_what_it_saw() {
+fn init_inspects_the_files_and_reports_findings() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let people = [
@@ -284,7 +284,7 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
 }
 
 #[test]
-fn a_manifest_is_made_from_names_and_mistakes_are_named() {
+fn manifest_is_made_from_file_names() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     good(at, &["simulate", "--condition", "C1", "--out", "anna_C1_1.csv"]);
@@ -333,7 +333,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
 }
 
 #[test]
-fn people_are_simulated_and_their_options_are_theirs() {
+fn people_are_simulated_with_their_own_options() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let default = [

@@ -22,7 +22,7 @@ fn run(directory: &Path) -> String {
 }
 
 #[test]
-fn a_decimal_comma_is_explained_wherever_the_file_is_read() {
+fn decimal_comma_is_explained_by_every_command() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     fs::write(d.join("comma.csv"), "t,e,u\n0.00,\"1,5\",2.5\n0.01,\"1,6\",2.6\n").unwrap();
@@ -37,7 +37,7 @@ fn a_decimal_comma_is_explained_wherever_the_file_is_read() {
 }
 
 #[test]
-fn cut_files_are_named_as_cut() {
+fn truncated_files_are_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let text = run(d);
@@ -108,7 +108,7 @@ fn gains_without_units_are_not_in_degrees() {
 }
 
 #[test]
-fn a_subject_that_a_spreadsheet_would_run_is_text_in_every_table() {
+fn formula_like_subjects_are_escaped_in_every_table() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     good(
@@ -148,7 +148,7 @@ fn a_subject_that_a_spreadsheet_would_run_is_text_in_every_table() {
 }
 
 #[test]
-fn a_stream_at_another_rate_is_told_once() {
+fn wrong_stream_rate_is_reported_once() {
     let mut stream = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args([
             "stream", "--fs", "100", "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",

@@ -68,7 +68,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(21), ..ProptestConfig::with_cases(12) })]
 
     #[test]
-    fn hostile_lines_end_nothing(hostile in vec(line(), 1..120)) {
+    fn hostile_lines_do_not_end_the_stream(hostile in vec(line(), 1..120)) {
         let mut stream = Command::new(env!("CARGO_BIN_EXE_hoid"))
             .args(["stream", "--fs", "100", "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing"])
             .stdin(Stdio::piped())

@@ -47,7 +47,7 @@ fn shown<'a>(text: &'a str, verb: &str) -> Vec<&'a str> {
 }
 
 #[test]
-fn one_file_has_one_reading() {
+fn info_and_identify_read_the_file_alike() {
     let directory = recorded();
     let at = directory.path();
     let file = "runs/A_so_1.csv";
@@ -108,7 +108,7 @@ fn one_file_has_one_reading() {
 }
 
 #[test]
-fn nothing_is_guessed_where_it_is_not_certain() {
+fn uncertain_columns_are_not_guessed() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     common::write(at, "two.csv", "t,r,target,y,u", 300, |k| {
@@ -170,7 +170,7 @@ fn pairs(parameters: &serde_json::Value) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn whole_periods_are_kept_under_an_offset() {
+fn whole_periods_are_kept_with_an_offset() {
     let directory = recorded();
     let at = directory.path();
     let span = words("--input r-y --from 3 --to 43 --offset u=1 --json");
@@ -199,7 +199,7 @@ fn whole_periods_are_kept_under_an_offset() {
 }
 
 #[test]
-fn a_delay_in_seconds_is_nk() {
+fn delay_in_seconds_equals_nk() {
     let directory = common::simulated();
     let at = directory.path();
     let fit = |delay: &[&str]| {
@@ -238,7 +238,7 @@ fn a_delay_in_seconds_is_nk() {
 
 /// `info` interprets a cell in the same way as the reader.
 #[test]
-fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
+fn info_interprets_cells_like_the_reader() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for (cell, is_missing) in [

@@ -87,7 +87,7 @@ fn strings(of: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn a_group_finds_word_for_word_what_identify_finds() {
+fn group_findings_match_identify_word_for_word() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     people(at);
@@ -131,7 +131,7 @@ fn a_group_finds_word_for_word_what_identify_finds() {
 }
 
 #[test]
-fn a_run_that_stands_for_two_is_refused_by_both() {
+fn duplicated_run_is_refused_by_both_commands() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     people(at);

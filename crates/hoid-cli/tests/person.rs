@@ -49,7 +49,7 @@ fn of<'v>(found: &'v Value, name: &str) -> &'v Value {
 }
 
 #[test]
-fn a_person_is_found_by_default() {
+fn operator_is_identified_with_defaults() {
     let directory = runs();
     let at = directory.path();
     let files = files(&directory);
@@ -148,7 +148,7 @@ fn a_person_is_found_by_default() {
 }
 
 #[test]
-fn what_nobody_answers_is_not_determined() {
+fn unrelated_signals_are_not_determined() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let mut state = 11_u64;

@@ -61,7 +61,7 @@ fn pair(found: &Value) -> (f64, f64) {
 }
 
 #[test]
-fn a_person_at_1000_hz_is_the_one_at_100_hz() {
+fn operator_at_1000_hz_matches_100_hz() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     // Each entry contains person, element, true crossover, margin and delay.
@@ -111,7 +111,7 @@ fn a_person_at_1000_hz_is_the_one_at_100_hz() {
 }
 
 #[test]
-fn lines_do_not_depend_on_the_rate() {
+fn describing_function_does_not_depend_on_the_rate() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "C1", 1000.0, 2);
@@ -145,7 +145,7 @@ fn lines_do_not_depend_on_the_rate() {
 }
 
 #[test]
-fn a_track_at_1000_hz_is_determined() {
+fn track_at_1000_hz_is_determined() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     for seed in 1..=5 {
@@ -167,7 +167,7 @@ fn a_track_at_1000_hz_is_determined() {
 }
 
 #[test]
-fn what_counts_samples_keeps_them() {
+fn options_in_samples_keep_the_rate() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "C1", 1000.0, 1);
@@ -204,7 +204,7 @@ fn what_counts_samples_keeps_them() {
 }
 
 #[test]
-fn rates_of_all_kinds() {
+fn common_rates_are_decimated() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     for (hz, factor) in [(200.0, 1), (250.0, 3), (1.0 / 0.003, 3), (2000.0, 20)] {
@@ -243,7 +243,7 @@ fn rates_of_all_kinds() {
 }
 
 #[test]
-fn a_stream_at_1000_hz_is_the_track() {
+fn stream_at_1000_hz_matches_track() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "lead", 1000.0, 1);

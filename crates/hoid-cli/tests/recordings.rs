@@ -60,7 +60,7 @@ fn identify(at: &Path, options: &[&str]) -> Value {
 }
 
 #[test]
-fn what_is_done_is_told_in_every_form() {
+fn preparation_steps_are_reported_in_every_format() {
     let directory = recorded(|_, values| vec![values]);
     let at = directory.path();
     let plain = json(
@@ -166,7 +166,7 @@ fn what_is_done_is_told_in_every_form() {
 }
 
 #[test]
-fn trouble_is_shown_and_handled_only_as_asked() {
+fn data_faults_are_shown_and_repaired_only_on_request() {
     // Every five hundredth row is duplicated, 20 rows are missing, and u is clipped.
     let directory = recorded(|k, [t, e, u]| {
         let values = [t, e, u.clamp(-0.15, 0.15)];
@@ -232,7 +232,7 @@ fn trouble_is_shown_and_handled_only_as_asked() {
 }
 
 #[test]
-fn wrong_preparations_are_told_in_the_users_words() {
+fn invalid_preparations_are_reported_in_plain_words() {
     let directory = recorded(|_, values| vec![values]);
     let at = directory.path();
     for (options, code, words) in [
@@ -267,7 +267,7 @@ fn wrong_preparations_are_told_in_the_users_words() {
 
 /// Eye and stick are in separate files, at 100 and 50 Hz; the message describes how to read them.
 #[test]
-fn two_files_at_two_rates_are_one_recording() {
+fn two_files_at_two_rates_can_be_joined() {
     let directory = recorded(|k, [t, e, u]| {
         assert!(k >= 2);
         vec![[t, e.to_degrees(), u]]

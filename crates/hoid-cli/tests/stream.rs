@@ -141,7 +141,7 @@ fn simulated(directory: &Path, seed: &str) -> String {
 }
 
 #[test]
-fn one_line_gives_one_line_at_once() {
+fn each_line_is_answered_at_once() {
     let mut stream = Stream::new(&AT_ONCE);
     for k in 0..200 {
         let (e, u) = wave(k);
@@ -161,7 +161,7 @@ fn one_line_gives_one_line_at_once() {
 }
 
 #[test]
-fn simulate_into_stream_is_track() {
+fn stream_of_a_simulation_matches_track() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let mut simulate = Command::new(env!("CARGO_BIN_EXE_hoid"))
@@ -206,7 +206,7 @@ fn simulate_into_stream_is_track() {
 }
 
 #[test]
-fn the_default_speaks_from_the_second_second_on() {
+fn default_method_answers_from_the_second_second() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "7");
     let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
@@ -241,7 +241,7 @@ fn the_default_speaks_from_the_second_second_on() {
 }
 
 #[test]
-fn hostile_lines_are_told_and_counted_and_poison_nothing() {
+fn hostile_lines_are_counted_and_have_no_effect() {
     let mut stream = Stream::new(&AT_ONCE);
     let sound = |stream: &mut Stream, from: usize| {
         let mut last = Value::Null;
@@ -291,7 +291,7 @@ fn hostile_lines_are_told_and_counted_and_poison_nothing() {
 }
 
 #[test]
-fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
+fn outliers_and_faulty_spans_are_reported_in_their_lines() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "5");
     let mut lines: Vec<String> = Vec::new();
@@ -341,7 +341,7 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
 }
 
 #[test]
-fn an_idle_head_prolongs_the_warm_up() {
+fn idle_start_prolongs_the_warm_up() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "6");
     let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
@@ -379,7 +379,7 @@ fn an_idle_head_prolongs_the_warm_up() {
 }
 
 #[test]
-fn late_lines_are_bridged_and_lines_behind_are_dropped() {
+fn missing_lines_are_bridged_and_late_lines_dropped() {
     let mut stream = Stream::new(&AT_ONCE);
     stream.write("t;e;u;f_t\n");
     let row = |k: usize| {
@@ -410,7 +410,7 @@ fn late_lines_are_bridged_and_lines_behind_are_dropped() {
 }
 
 #[test]
-fn a_stream_without_a_sample_is_no_success() {
+fn stream_without_samples_exits_with_one() {
     let mut stream = Stream::new(&AT_ONCE);
     stream.write("t;e;u\n");
     for k in 0..5 {
@@ -426,7 +426,7 @@ fn a_stream_without_a_sample_is_no_success() {
 }
 
 #[test]
-fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
+fn failed_warm_up_is_extended() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "1");
     let mut input = String::new();
@@ -472,7 +472,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
 }
 
 #[test]
-fn every_nth_line_and_the_faults_between() {
+fn every_nth_line_reports_faults_in_between() {
     let mut arguments = AT_ONCE.to_vec();
     arguments.extend(["--every", "10"]);
     let mut input: String = (0..40).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
@@ -484,7 +484,7 @@ fn every_nth_line_and_the_faults_between() {
 }
 
 #[test]
-fn a_reader_that_leaves_ends_the_stream_quietly() {
+fn closed_output_pipe_ends_the_stream_quietly() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(["stream", "--fs", "100"])
         .args(AT_ONCE)
@@ -519,7 +519,7 @@ fn a_reader_that_leaves_ends_the_stream_quietly() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupt_ends_with_zero_and_whole_lines() {
+fn interrupt_exits_with_zero_and_complete_lines() {
     // The stream is interrupted while it waits for input.
     let mut stream = Stream::new(&AT_ONCE);
     stream.ask("0.1,0.2");
@@ -555,7 +555,7 @@ fn an_interrupt_ends_with_zero_and_whole_lines() {
 }
 
 #[test]
-fn wrong_usage_and_wrong_headers() {
+fn wrong_usage_and_headers_are_errors() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for arguments in [

@@ -66,7 +66,7 @@ fn lost_samples_are_bridged_and_counted() {
 /// JSON objects on one or several lines are samples with the names of the channels as keys, and are answered by lines.
 #[cfg(unix)]
 #[test]
-fn objects_of_json_are_samples() {
+fn json_objects_are_samples() {
     let udp = stream(&["--input", "error", "--output", "stick"]);
     udp.send(br#"{"t": 0.00, "error": 0.1, "stick": 0.2}"#);
     assert_eq!(told(&udp)["t"].as_f64(), Some(0.0));
@@ -146,14 +146,14 @@ fn every_sample_at_a_rate_is_answered() {
 
 #[cfg(unix)]
 #[test]
-fn readers_stop_either_side_begins_again_clocks_jump() {
+fn stream_survives_restarts_and_clock_jumps() {
     let program = Path::new(env!("CARGO_BIN_EXE_hoid"));
     let outcomes = troubles::all(program, Duration::from_millis(400), 600, &mut Draw(8));
     assert_eq!(outcomes.len(), 7);
 }
 
 #[test]
-fn other_streams_are_in_python() {
+fn lsl_options_refer_to_python() {
     let directory = TempDir::new().unwrap();
     let arguments = ["stream", "--fs", "100", "--lsl-in", "person", "--lsl-out", "estimate"];
     let (code, message) = bad(directory.path(), &arguments);
@@ -161,7 +161,7 @@ fn other_streams_are_in_python() {
 }
 
 #[test]
-fn places_that_cannot_be_are_refused() {
+fn invalid_udp_addresses_are_refused() {
     let directory = TempDir::new().unwrap();
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port();

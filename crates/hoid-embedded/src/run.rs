@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_each_second() {
+    fn one_line_is_printed_each_second() {
         let samples: String = (0..350)
             .map(|k| format!("{},{}\n", f64::from(k % 40) - 20.0, 0.1))
             .collect();
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_sample_is_said() {
+    fn invalid_lines_are_errors() {
         assert!(of("1,2\nx,3\n").unwrap_err().contains("two numbers"));
         assert!(of("1,inf\n").is_err() && of("1\n").is_err());
         assert!(of(&"1".repeat(90)).unwrap_err().contains("80"));

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_becomes_a_status_and_breaks_its_tracker_alone() {
+    fn panic_becomes_a_status_and_breaks_only_its_tracker() {
         let hook = std::panic::take_hook();
         std::panic::set_hook(Box::new(|_| {}));
         let mut trackers = [ptr::null_mut(), ptr::null_mut()];
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn pointers_that_cannot_be_are_refused() {
+    fn invalid_pointers_are_refused() {
         // SAFETY: null is allowed.
         assert_eq!(unsafe { text(ptr::null(), "a") }, Ok(None));
         // SAFETY: null is allowed.

@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_have_the_names_of_the_verdict() {
+    fn level_names_match_the_verdict() {
         for level in VerdictLevel::ALL {
             // SAFETY: a constant text.
             let name = unsafe { CStr::from_ptr(hoid_level_name(number_of(level))) };

@@ -100,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn a_saved_tracker_goes_on_with_the_same_digits() {
+    fn restored_tracker_is_bit_identical() {
         let samples = samples();
         let [taken, all] = TAKEN;
         // The second name is an earlier name of the method, as in older saved trackers.

@@ -247,7 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_units_are_those_of_the_tables() {
+    fn names_and_units_match_the_tables() {
         let operator = OperatorParameters {
             k_e: 0.09,
             t_l_s: 0.4,

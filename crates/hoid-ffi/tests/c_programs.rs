@@ -81,7 +81,7 @@ fn same(found: &str, expected: &[Vec<f64>], columns: &[usize]) {
 }
 
 #[test]
-fn the_example_in_c_gives_the_digits_of_rust() {
+fn c_example_matches_rust() {
     let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11", "-pedantic"]) else {
         return;
     };
@@ -102,7 +102,7 @@ fn the_example_in_c_gives_the_digits_of_rust() {
 
 /// The S-function is compiled with a substitute for Simulink's header, because Simulink itself is not available.
 #[test]
-fn the_s_function_gives_the_digits_of_rust() {
+fn s_function_matches_rust() {
     let stubs = format!("-I{}/tests/stubs", env!("CARGO_MANIFEST_DIR"));
     let Some((_folder, program)) = built("simulink/sfun_hoid.c", "cc", &["-std=c11", &stubs]) else {
         return;
@@ -118,7 +118,7 @@ fn the_s_function_gives_the_digits_of_rust() {
 
 /// The module is compiled with a substitute for DUECA's headers, because DUECA itself is not available.
 #[test]
-fn the_dueca_module_gives_the_digits_of_rust() {
+fn dueca_module_matches_rust() {
     let stubs = format!("-I{}/tests/stubs/dueca", env!("CARGO_MANIFEST_DIR"));
     let Some((_folder, program)) = built("../tests/stubs/dueca/drive.cpp", "c++", &["-std=c++14", &stubs]) else {
         return;
@@ -130,7 +130,7 @@ fn the_dueca_module_gives_the_digits_of_rust() {
 }
 
 #[test]
-fn a_change_is_told_in_c() {
+fn c_example_reports_a_change() {
     let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11"]) else {
         return;
     };
@@ -147,7 +147,7 @@ fn a_change_is_told_in_c() {
 }
 
 #[test]
-fn the_example_in_cpp_gives_the_digits_of_rust() {
+fn cpp_example_matches_rust() {
     let Some((_folder, program)) = built("tracker.cpp", "c++", &["-std=c++14"]) else {
         return;
     };
@@ -168,7 +168,7 @@ fn the_example_in_cpp_gives_the_digits_of_rust() {
 }
 
 #[test]
-fn the_example_in_c_is_clean_under_the_sanitizers() {
+fn c_example_is_clean_under_sanitizers() {
     let sanitizers = ["-std=c11", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let Some(with) = compiler("cc") else { return };
     let folder = TempDir::new().unwrap();

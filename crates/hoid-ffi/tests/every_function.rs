@@ -72,7 +72,7 @@ fn made(method: &str, options: &str) -> *mut HoidTracker {
 }
 
 #[test]
-fn a_tracker_by_every_function_of_the_header() {
+fn every_tracker_function_works() {
     assert_eq!(hoid_abi_version(), HOID_ABI_VERSION);
     assert_eq!(read(hoid_version()), env!("CARGO_PKG_VERSION"));
     let tracker = made("rpem", AT_ONCE);
@@ -152,7 +152,7 @@ fn a_tracker_by_every_function_of_the_header() {
 
 /// The message of a status belongs to its thread; each of two threads has its own tracker.
 #[test]
-fn threads_with_a_tracker_each() {
+fn each_thread_has_its_own_error_message() {
     let tracked = |names: &'static str| {
         let tracker = made("rpem", AT_ONCE);
         let mut odds = 0.0;
@@ -176,7 +176,7 @@ fn threads_with_a_tracker_each() {
 }
 
 #[test]
-fn a_fit_that_is_none_is_refused() {
+fn invalid_fit_is_refused() {
     let mut tracker = ptr::null_mut();
     // SAFETY: the strings are null-terminated, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_from_fit(c"{}".as_ptr(), 0.01, c"{}".as_ptr(), &mut tracker) };
@@ -378,7 +378,7 @@ fn note(environment: *mut c_void, status: c_int, text: *const c_char) {
 }
 
 #[test]
-fn a_unit_by_every_function_of_fmi_2() {
+fn every_fmi_2_function_works() {
     assert_eq!(
         (read(fmi2GetTypesPlatform()), read(fmi2GetVersion())),
         ("default".into(), "2.0".into())
@@ -428,7 +428,7 @@ fn a_unit_by_every_function_of_fmi_2() {
 }
 
 #[test]
-fn a_unit_by_every_function_of_fmi_3() {
+fn every_fmi_3_function_works() {
     assert_eq!(read(fmi3GetVersion()), "3.0");
     let mut notes = Box::new(Vec::<(c_int, String)>::new());
     let environment: *mut Vec<_> = &mut *notes;
@@ -483,7 +483,7 @@ fn a_unit_by_every_function_of_fmi_3() {
 /// All exported functions are called above, except for those that always return an error.
 #[test]
 #[cfg_attr(miri, ignore = "it reads sources, not memory of a caller")]
-fn no_function_is_left_out() {
+fn every_exported_function_is_called() {
     let words = |text: &'static str| {
         text.split(|c: char| !c.is_alphanumeric() && c != '_')
             .collect::<BTreeSet<_>>()

@@ -148,7 +148,7 @@ fn null_pointers_are_refused_everywhere() {
 
 #[test]
 #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there")]
-fn a_fit_is_what_a_tracker_begins_with() {
+fn tracker_starts_from_a_fit() {
     let fit = r#"{"structure": "grey-box", "form": "gain", "neuromuscular": true, "verdict": {"level": "trustworthy"},
         "records": [{"sample_time": 0.01, "units": {"input": "", "output": ""}}], "parameters": [],
         "noise": {"c": [], "d": [-0.9]}, "innovation_variance": 0.1,
@@ -244,7 +244,7 @@ proptest! {
     /// Arbitrary samples leave the tracker in a valid state.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
-    fn any_samples_are_taken(
+    fn arbitrary_samples_are_accepted(
         samples in prop::collection::vec((hostile_number(), hostile_number(), hostile_number(), any::<i32>()), 1..60),
         method in prop_oneof![Just("adaptive"), Just("rpem"), Just("multiple-model")],
     ) {
@@ -270,7 +270,7 @@ proptest! {
     /// Arbitrary options create a tracker or give a reason for the refusal.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
-    fn any_options_have_an_answer(
+    fn arbitrary_options_work_or_give_a_reason(
         method in prop_oneof![Just("adaptive"), Just("rpem"), Just("multiple-model"), Just("rls"), Just("window"), Just("ekf")],
         sample_time in prop_oneof![4 => Just(0.01), 1 => hostile_number()],
         given in prop::collection::btree_map(prop::sample::select(&NAMES[..]), hostile_value(), 0..5),
@@ -292,7 +292,7 @@ proptest! {
 
     /// Arbitrary bytes are refused.
     #[test]
-    fn any_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
+    fn arbitrary_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
         let bytes = if magic { [b"hoid\x01\0\0\0".as_slice(), &bytes].concat() } else { bytes };
         let status = restored(&bytes).err().map(|(status, _)| status);
         prop_assert_eq!(status, Some(HOID_BAD_STATE));

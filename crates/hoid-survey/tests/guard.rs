@@ -34,7 +34,7 @@ fn tracker(options: &TrackOptions, record: &Record) -> Tracker {
 const GUARDED: [fn() -> Method; 5] = [physical, multiple_model, Method::adaptive, Method::rls, Method::rpem];
 
 #[test]
-fn a_guard_that_never_acts_changes_no_digit() {
+fn inactive_guard_changes_no_digit() {
     for method in GUARDED {
         for seed in 0..3 {
             let record = record(seed);
@@ -56,7 +56,7 @@ fn a_guard_that_never_acts_changes_no_digit() {
 }
 
 #[test]
-fn it_stands_before_methods_of_a_person_by_default() {
+fn operator_methods_are_guarded_by_default() {
     for method in methods() {
         let expected = ["physical", "multiple-model", "adaptive"].contains(&method.name());
         assert_eq!(method.is_guarded(), expected, "{method}");
@@ -67,7 +67,7 @@ fn it_stands_before_methods_of_a_person_by_default() {
 
 /// A permanent jump: after the time in which the guard waits for a return, all numbers equal those without a guard.
 #[test]
-fn a_jump_that_stays_is_taken_as_if_nothing_had_been() {
+fn permanent_jump_leaves_the_result_unchanged_after_the_wait() {
     let record = record(5);
     for method in [physical(), multiple_model()] {
         let mut with = tracker(&options(method.clone(), "yes"), &record);
@@ -107,7 +107,7 @@ fn hostile(record: &Record, k: usize) -> (f64, f64) {
 }
 
 #[test]
-fn a_restored_guard_goes_on_with_the_same_digits() {
+fn restored_guard_is_bit_identical() {
     let record = record(6);
     for method in GUARDED {
         let options = options(method(), "yes");
@@ -136,7 +136,7 @@ fn a_restored_guard_goes_on_with_the_same_digits() {
 }
 
 #[test]
-fn what_was_found_and_done_is_told_with_its_place() {
+fn faults_and_actions_are_reported_with_their_times() {
     let record = record(6);
     let mut tracker = tracker(&options(physical(), "yes"), &record);
     let mut told = Vec::new();
@@ -163,7 +163,7 @@ fn what_was_found_and_done_is_told_with_its_place() {
 }
 
 #[test]
-fn streams_of_nothing_and_of_anything_leave_numbers() {
+fn estimates_stay_finite_for_any_stream() {
     let streams: [fn(usize) -> (f64, f64); 6] = [
         |_| (0.0, 0.0),
         |_| (f64::NAN, f64::NAN),

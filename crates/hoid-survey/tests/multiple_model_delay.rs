@@ -71,7 +71,7 @@ fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f
 }
 
 #[test]
-fn a_delay_that_is_not_questioned_is_a_delay_line() {
+fn known_delay_acts_as_a_delay_line() {
     // omega_nm and zeta_nm are known, so the linearisation point stays constant. When this point moves, signals that
     // are still in the delay line differ to second order.
     let prior_of = |delay| ChangePrior {
@@ -103,7 +103,7 @@ fn a_delay_that_is_not_questioned_is_a_delay_line() {
 }
 
 #[test]
-fn a_delay_that_changes_is_found_and_named() {
+fn change_of_delay_is_found_and_named() {
     for (seed, from, to) in [(11, 4, 10), (12, 10, 5), (13, 2, 4)] {
         let data = operator(10_000, seed, |k| if k < 6000 { from } else { to });
         let mut bank = bank(from, OPEN);
@@ -134,7 +134,7 @@ fn a_delay_that_changes_is_found_and_named() {
 }
 
 #[test]
-fn a_first_delay_that_was_wrong_is_mended_without_an_alarm() {
+fn wrong_initial_delay_is_corrected_without_an_alarm() {
     for (seed, wrong) in [(5, 7), (6, 9)] {
         let data = operator(6000, seed, |_| 8);
         let mut bank = bank(wrong, OPEN);
@@ -163,7 +163,7 @@ fn a_steady_operator_raises_no_alarm() {
 }
 
 #[test]
-fn overflow_silence_and_bad_memory() {
+fn extreme_signals_stay_finite_and_bad_memory_is_refused() {
     let mut bank = bank(8, OPEN);
     for (k, (x, u)) in operator(3000, 7, |_| 8).into_iter().enumerate() {
         match k {

@@ -189,7 +189,7 @@ fn no_error_bar_shrinks_through_a_constant_error() {
 }
 
 #[test]
-fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
+fn tracking_resumes_after_a_long_rest() {
     let record = record(Condition::C1);
     for options in all_options() {
         let (mut tracker, begin) = through(&options, &record, Stand::Rest, 1000.0);
@@ -219,7 +219,7 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
 
 /// In a record with a rest, the trace reports the time without information; without a rest, it reports none.
 #[test]
-fn the_time_without_excitation_is_a_finding() {
+fn time_without_excitation_is_reported() {
     let whole = record(Condition::C1);
     let rest = |signal: &[f64]| {
         let (head, tail) = signal.split_at(4100);

@@ -40,7 +40,7 @@ fn refused_as_it_should_be(error: &IdentError, ts: f64) -> bool {
 }
 
 #[test]
-fn every_method_takes_samples_or_says_that_the_sample_time_is_too_long() {
+fn too_long_sample_times_are_refused() {
     for method in hoid_survey::methods() {
         for ts in sample_times() {
             let sample_time = SampleTime::new(ts).unwrap();
@@ -63,7 +63,7 @@ fn every_method_takes_samples_or_says_that_the_sample_time_is_too_long() {
 }
 
 #[test]
-fn a_start_from_a_span_and_a_plan_say_so_too() {
+fn too_long_sample_times_are_refused_in_plans() {
     for ts in sample_times().filter(|ts| *ts >= LONGEST_S) {
         let sample_time = SampleTime::new(ts).unwrap();
         let (e, u) = (0..400).map(signals).unzip();
@@ -94,7 +94,7 @@ fn every_method_refuses_sample_times_below_a_microsecond() {
 }
 
 #[test]
-fn adaptive_by_default_takes_every_sample_time_of_recordings() {
+fn default_method_accepts_common_sample_times() {
     for ts in [0.001, 0.01, 1.0 / 60.0, 0.1] {
         let sample_time = SampleTime::new(ts).unwrap();
         let options = TrackOptions::without_prior(Method::default(), sample_time);

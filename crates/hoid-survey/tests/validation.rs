@@ -35,7 +35,7 @@ fn options(method: Method) -> TrackOptions {
 
 /// Compares a constant model with the difference equation.
 #[test]
-fn the_vaf_of_a_trace_that_stays_is_that_of_its_model() {
+fn vaf_of_a_constant_trace_matches_its_model() {
     let (record, other) = (run(0.1, 1), run(0.1, 2));
     let theta = vec![0.075, -0.074, -0.8, -1.912, 0.924];
     let stays = TrackOptions {
@@ -62,7 +62,7 @@ fn the_vaf_of_a_trace_that_stays_is_that_of_its_model() {
 
 /// Without remnant the best P explains nearly all of the second run, but a P that is too large or too small does not.
 #[test]
-fn the_best_of_the_grid_is_taken() {
+fn best_covariance_of_the_grid_is_chosen() {
     let (record, other) = (run(0.1, 3), run(0.1, 4));
     for method in [Method::rls(), Method::rpem(), hoid_survey::physical()] {
         let (chosen, choice) = choose_covariance(&record, &other, &options(method.clone())).unwrap();
@@ -89,7 +89,7 @@ fn the_best_of_the_grid_is_taken() {
 }
 
 #[test]
-fn what_cannot_choose_is_refused_with_what_to_do() {
+fn invalid_choices_are_refused_with_advice() {
     let (record, other) = (run(0.1, 7), run(0.1, 8));
     let says = |validation: &Record, options: &TrackOptions| {
         choose_covariance(&record, validation, options).unwrap_err().to_string()
@@ -140,7 +140,7 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
 /// With a power of zero the results are bit-identical; with the default power P is reduced, and the estimate for a
 /// person who changes oscillates less, as the thesis expects.
 #[test]
-fn the_covariance_shrinks_where_less_is_explained() {
+fn vaf_power_reduces_the_covariance() {
     let (mut default, mut updated, mut differs) = (0.0, 0.0, false);
     for seed in 20..26 {
         let (record, other) = (run(0.2, seed), run(0.2, seed + 100));

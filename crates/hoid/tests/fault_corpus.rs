@@ -34,7 +34,7 @@ fn fault(what: What, on: On, size: f64, place: FaultPosition) -> Fault {
 }
 
 #[test]
-fn there_are_hundreds_and_no_two_are_alike() {
+fn corpus_has_hundreds_of_distinct_faults() {
     let all = faults();
     assert!(all.len() > 250, "{}", all.len());
     for (i, one) in all.iter().enumerate() {
@@ -44,7 +44,7 @@ fn there_are_hundreds_and_no_two_are_alike() {
 }
 
 #[test]
-fn runs_and_faults_are_the_same_each_time() {
+fn runs_and_faults_are_reproducible() {
     let (clean, second) = two_runs();
     assert_eq!((clean.clone(), second.clone()), two_runs());
     for (case, fault) in (0..).zip(faults()).step_by(7) {
@@ -61,7 +61,7 @@ fn runs_and_faults_are_the_same_each_time() {
 
 /// A fault changes the recording only in its own rows and channels.
 #[test]
-fn each_fault_is_where_it_says_and_nowhere_else() {
+fn faults_change_only_their_rows_and_channels() {
     let (clean, second) = two_runs();
     for (case, fault) in (0..).zip(faults()) {
         let found = inject(&fault, &clean, &second, SEED, case);
@@ -107,7 +107,7 @@ fn each_fault_is_where_it_says_and_nowhere_else() {
 }
 
 #[test]
-fn faults_have_their_size() {
+fn faults_have_the_stated_size() {
     let (clean, second) = two_runs();
     let with = |what, on, size| inject(&fault(what, on, size, FaultPosition::Middle), &clean, &second, SEED, 9);
     let (of_e, of_u) = (spread(&clean.e), spread(&clean.u));
@@ -187,7 +187,7 @@ fn fit(value: f64, error: Option<f64>, level: &str) -> serde_json::Value {
 }
 
 #[test]
-fn fits_are_judged() {
+fn wrong_fits_are_detected() {
     let judged = |json: &serde_json::Value| of_fit(json, &known(Some((10.0, 11.0))));
     let silent = judged(&fit(1.5, Some(0.1), "trustworthy"));
     assert!(silent.wrong && !silent.flagged() && silent.silently_wrong());
@@ -209,7 +209,7 @@ fn fits_are_judged() {
 }
 
 #[test]
-fn a_fault_counts_at_its_place_alone() {
+fn only_faults_at_their_place_count_as_flagged() {
     let with = |from: f64, to: f64, record: &str| {
         let mut json = fit(1.5, Some(0.1), "trustworthy");
         json["faults"] = json!([{"kind": "spike", "from": from, "to": to, "record": record}]);
@@ -228,7 +228,7 @@ fn a_fault_counts_at_its_place_alone() {
 }
 
 #[test]
-fn traces_are_judged_at_the_end_and_on_the_way() {
+fn traces_are_judged_at_the_end_and_during_recovery() {
     let json = json!({"verdict": {"level": "trustworthy", "findings": []}});
     // The trace is wrong by ten standard errors for 8 s after a fault of 1 s, and then near the true value.
     let off_until = |end: f64| -> Vec<Row> {
@@ -274,7 +274,7 @@ fn traces_are_read() {
 }
 
 #[test]
-fn tables_count() {
+fn tables_count_the_results() {
     assert_eq!(median(vec![3.0, f64::INFINITY, 1.0]), Some(3.0));
     assert_eq!(median(Vec::new()), None);
     assert_eq!(Numbers::of(&[]), Numbers::default());
@@ -284,7 +284,7 @@ fn tables_count() {
 /// Acceptance test: every wrong result is flagged.
 #[test]
 #[ignore = "not all faults are found yet; it runs the program `hoid`, which must be built next to this test"]
-fn nothing_is_wrong_and_not_flagged() {
+fn every_wrong_result_is_flagged() {
     let here = std::env::current_exe().unwrap();
     let folder = here.parent().unwrap().parent().unwrap();
     let program = folder.join("hoid").with_extension(std::env::consts::EXE_EXTENSION);

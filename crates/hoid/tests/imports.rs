@@ -305,7 +305,7 @@ fn circles<'p>(arrows: &BTreeMap<&'p Path, BTreeSet<&'p Path>>) -> Vec<Vec<&'p P
 }
 
 #[test]
-fn no_circle_of_imports() {
+fn modules_have_no_import_cycles() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let mut roots: Vec<PathBuf> = fs::read_dir(crates)
         .unwrap()

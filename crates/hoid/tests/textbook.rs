@@ -168,7 +168,7 @@ fn estimates_agree_with_independent_implementations() {
 }
 
 #[test]
-fn estimates_agree_with_the_reference_under_every_rule() {
+fn estimates_agree_with_the_reference_for_each_rule() {
     let mut failures = Vec::new();
     for case in cases() {
         for (_, rule, expected) in estimates(&case).filter(|(by, _, _)| *by == REFERENCE_NAME) {
@@ -233,7 +233,7 @@ fn standard_errors_agree_with_independent_implementations() {
 /// The grid of starts consists of neuromuscular frequencies in rad/s; the results must not depend on it, because these
 /// systems have no neuromuscular part.
 #[test]
-fn the_sample_time_does_not_matter() {
+fn estimates_do_not_depend_on_the_sample_time() {
     for case in cases() {
         let slow = fit(&case, InitialState::Estimate);
         let fast = estimator(&case, InitialState::Estimate)
@@ -246,7 +246,7 @@ fn the_sample_time_does_not_matter() {
 /// Series E of Box and Jenkins, 100 yearly sunspot numbers: distance of c1 of ARMA(2, 1) with each rule, in standard
 /// errors, from exact maximum likelihood (statsmodels), which treats the past correctly.
 #[test]
-fn on_a_short_series_the_rule_decides() {
+fn initial_state_rule_matters_for_a_short_series() {
     let cases = cases();
     let case = cases.iter().find(|c| name(c) == "sunspots").unwrap();
     let exact = case["estimates"]
@@ -270,7 +270,7 @@ fn on_a_short_series_the_rule_decides() {
 /// A search from the true parameters ends in one minimum; a better minimum may exist (for `general` with the roots of A
 /// and D exchanged).
 #[test]
-fn own_starts_end_no_higher_than_the_truth_does() {
+fn default_starts_end_no_higher_than_the_truth() {
     for case in cases() {
         if case["truth"].is_null() {
             continue;
@@ -296,7 +296,7 @@ fn own_starts_end_no_higher_than_the_truth_does() {
 /// ARARX with strong noise, whose pole least squares assigns to A; from such a start, the search ends with a loss that
 /// is up to 40 % too high. There are 40 records of 500 samples, and the noise has the power of the response.
 #[test]
-fn the_pole_of_the_noise_stays_in_d() {
+fn noise_pole_stays_in_d() {
     let mut state = 9_u64;
     let mut draw = move || {
         // A sum of twelve uniform numbers with mean 0 and variance 1.

@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tables_name_what_there_is() {
+    fn help_tables_match_the_commands_and_options() {
         let program = Cli::command();
         let known: BTreeSet<&str> = program.get_subcommands().map(Command::get_name).collect();
         let grouped: BTreeSet<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
@@ -460,7 +460,7 @@ mod tests {
 
     /// An option that the first pages use is found where a newcomer looks first.
     #[test]
-    fn the_options_of_the_first_pages_stand_in_the_short_help() {
+    fn short_help_has_the_options_of_the_first_pages() {
         let mut program = command();
         program.build();
         let pages = [
@@ -488,7 +488,7 @@ mod tests {
     }
 
     #[test]
-    fn choices_are_taken_in_capitals() {
+    fn choices_ignore_case() {
         let typed = "hoid identify run.csv --structure BJ --criterion Aic --method PEM";
         assert!(command().try_get_matches_from(typed.split(' ')).is_ok());
     }

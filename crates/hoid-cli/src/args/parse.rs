@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn widths_as_typed() {
+    fn widths_are_parsed() {
         assert_eq!(parse_width("85mm"), Ok(85.0));
         assert_eq!(parse_width(" 17 cm"), Ok(170.0));
         assert!((parse_width("3.3in").unwrap() - 83.82).abs() < 1e-12);
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_as_typed() {
+    fn spans_are_parsed() {
         assert_eq!(parse_span("0.05..0.6"), Ok((0.05, 0.6)));
         assert_eq!(parse_span("-1 .. -1"), Ok((-1.0, -1.0)));
         for bad in ["", "1", "2..1", "a..b", "0..inf", ".."] {

@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_for_each_estimator_in_each_cell() {
+    fn answer_has_a_row_per_estimator_and_cell() {
         let column = |name: &str, values| OutputColumn {
             name: name.to_owned(),
             values,

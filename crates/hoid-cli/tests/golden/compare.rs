@@ -73,7 +73,7 @@ pub fn line_per_key(value: &Value) -> String {
 }
 
 #[test]
-fn a_change_is_told_by_its_key() {
+fn changes_are_reported_by_key() {
     let was = serde_json::json!({"a": [1.0, {"b": "x"}], "n": 3, "gone": true});
     let now = serde_json::json!({"a": [1.0 + 1e-12, {"b": "y"}], "n": 4});
     assert_eq!(

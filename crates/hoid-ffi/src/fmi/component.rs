@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_of_uris() {
+    fn uris_are_converted_to_paths() {
         for (uri, expected) in [
             ("file:///tmp/a%20b/resources", "/tmp/a b/resources"),
             ("file:/tmp/a", "/tmp/a"),

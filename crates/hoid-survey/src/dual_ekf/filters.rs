@@ -187,7 +187,7 @@ mod tests {
     /// h equals the derivative of the prediction for constant parameters, with and without a Padé approximation of the
     /// delay.
     #[test]
-    fn the_whole_derivative_is_that_of_finite_differences() {
+    fn total_derivative_agrees_with_finite_differences() {
         let e = |k: usize| (0.07 * k as f64).sin() + 0.3 * (0.31 * k as f64).cos();
         let u = |k: usize| 0.1 * (0.05 * k as f64).sin();
         for (w, pade) in [

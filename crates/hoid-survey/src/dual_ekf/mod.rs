@@ -371,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_after_a_change_are_near_the_truth_on_average() {
+    fn gains_after_a_change_are_close_on_average() {
         const RUNS: u64 = 8;
         let mut mean = [0.0; 2];
         for replication in 0..RUNS {
@@ -387,7 +387,7 @@ mod tests {
 
     /// A filter with the delay as a parameter corrects a delay that is wrong by two samples.
     #[test]
-    fn a_delay_behind_pade_is_followed() {
+    fn delay_in_pade_form_is_tracked() {
         let record = run(Condition::C1, 0.01, 0).span(0.0, 30.72).unwrap();
         let own = DualEkfOptions {
             pade: 3,

@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn jitter_and_drift_make_no_gaps_and_gaps_are_counted() {
+    fn gaps_are_counted_despite_jitter_and_drift() {
         let mut clock = Clock::new(0.01);
         for k in 0..20_000 {
             let k = f64::from(k);
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_behind_are_dropped_until_the_clock_is_believed() {
+    fn late_lines_are_dropped_until_the_clock_is_accepted() {
         let mut clock = Clock::new(0.01);
         missing(&mut clock, 1.0);
         for t in [1.0, 0.5, 0.4, 1.0] {
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn another_rate_is_told_from_gaps_and_rounding() {
+    fn other_rates_are_distinguished_from_gaps() {
         let rates = |t: &dyn Fn(f64) -> f64| -> Vec<f64> {
             let mut clock = Clock::new(0.01);
             let take = |k: u32| {
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_come_too_fast_are_noticed() {
+    fn too_fast_lines_are_detected() {
         let mut clock = Clock::new(0.01);
         for k in 0..200 {
             assert_eq!(missing(&mut clock, 0.005 * f64::from(k)), 0);

@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_come_as_structs_and_as_text() {
+    fn samples_are_read_as_structs_and_as_text() {
         let read = |bytes: &[u8]| match Datagram::of(bytes) {
             Datagram::Sample(sample) => sample.read(SampleTime::HUNDREDTH, 1e6),
             other => panic!("{other:?}"),

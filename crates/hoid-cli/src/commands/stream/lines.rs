@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_by_the_names_of_the_channels() {
+    fn json_objects_are_read_by_channel_name() {
         let read = sample(
             &mut default_columns(),
             r#"{"t": 2, "e": 0.5, "u": -1e0, "f_t": 7, "button": [1]}"#,
@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_by_position_and_by_header() {
+    fn columns_are_read_by_position_or_header() {
         for (line, t, reference) in [
             ("0.5,-1", None, None),
             ("2 ; 0.5; -1", Some(2.0), None),
@@ -437,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_told_and_end_nothing() {
+    fn faults_are_reported_and_reading_continues() {
         let mut columns = default_columns();
         for unreadable in ["garbage", "\u{0}\u{1}", ",", "1,2,3,4,5"] {
             assert!(
@@ -464,7 +464,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_any_length_and_end() {
+    fn lines_of_any_length_and_ending_are_read() {
         let mut text = vec![b'x'; 3 * LONGEST];
         text.extend_from_slice(b"\na,b\r\n\n\xff\xfe\nlast");
         let mut lines = Lines::new(io::BufReader::with_capacity(100, text.as_slice()));
