@@ -290,7 +290,7 @@ fn given_orders_replace_those_of_the_operator() {
 /// The rule for a stick at its end applies to all estimators.
 #[test]
 fn every_estimator_reports_saturated_recordings() {
-    fn doubted<E: BatchEstimator>(estimator: E, record: &Record) {
+    fn assert_doubtful<E: BatchEstimator>(estimator: E, record: &Record) {
         let found = Identification::of(estimator)
             .run(Recordings::of_records([record.clone()]))
             .unwrap();
@@ -302,9 +302,9 @@ fn every_estimator_reports_saturated_recordings() {
         orders: [("nd".to_owned(), 1..=1), ("nk".to_owned(), 29..=29)].into(),
         ..Polynomials::new(Structure::BoxJenkins)
     };
-    doubted(polynomials.clone(), &record);
-    doubted(GreyBox::new(1..=1), &record);
-    doubted(SigmoidChange::default(), &record);
+    assert_doubtful(polynomials.clone(), &record);
+    assert_doubtful(GreyBox::new(1..=1), &record);
+    assert_doubtful(SigmoidChange::default(), &record);
     let searched = Polynomials {
         orders: [("nk".to_owned(), 28..=29)].into(),
         start: Some([("b0".to_owned(), 0.04)].into()),

@@ -21,13 +21,13 @@ use std::{
 };
 
 use draw::Draw;
-use interrupted::{Bench, GROUP, REPRODUCE, STUDY, beside_this, compare, files};
+use interrupted::{Bench, GROUP, REPRODUCE, STUDY, built_program_path, compare, files};
 
 /// Number of kills of one run before it may finish.
-const IN_A_ROW: usize = 5;
+const MAX_CONSECUTIVE_KILLS: usize = 5;
 
 fn main() -> ExitCode {
-    let (mut kills, mut damaged, mut seed, mut program, mut only) = (200, 50, 1, beside_this(), None);
+    let (mut kills, mut damaged, mut seed, mut program, mut only) = (200, 50, 1, built_program_path(), None);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().unwrap();
@@ -60,7 +60,7 @@ fn main() -> ExitCode {
         while killed < share(kills, 3) {
             runs += 1;
             let name = format!("killed-{runs}");
-            for _ in 0..IN_A_ROW.min(share(kills, 3) - killed) {
+            for _ in 0..MAX_CONSECUTIVE_KILLS.min(share(kills, 3) - killed) {
                 let child = bench.start(work, &name);
                 let hit = kill(child, took.mul_f64(draw.share()));
                 killed += usize::from(hit);

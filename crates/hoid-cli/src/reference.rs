@@ -257,7 +257,7 @@ mod tests {
     use super::*;
     use crate::args::{Cli, flag, with_settings};
 
-    fn is_as_written(path: &str, expected: &str) {
+    fn assert_up_to_date(path: &str, expected: &str) {
         let path = format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"));
         if std::env::var_os("HOID_UPDATE_DOCS").is_some() {
             std::fs::write(&path, expected).unwrap();
@@ -271,12 +271,12 @@ mod tests {
 
     #[test]
     fn documented_options_are_current() {
-        is_as_written("docs/src/reference/options.md", &options_page(&registry()));
+        assert_up_to_date("docs/src/reference/options.md", &options_page(&registry()));
     }
 
     #[test]
     fn python_options_are_current() {
-        is_as_written(
+        assert_up_to_date(
             "python/src/pyhoid/_settings.py",
             &python_settings(&registry(), &estimators()),
         );

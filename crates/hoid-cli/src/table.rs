@@ -21,7 +21,7 @@ const STYLE: TableStyle = {
 /// Number of blanks on both sides of a cell together.
 const PADDING: usize = 2;
 /// Number of additional blanks between two columns.
-const BETWEEN: usize = 1;
+const COLUMN_GAP: usize = 1;
 /// A blank at which a line is not wrapped.
 const FIXED_BLANK: &str = "\u{a0}";
 
@@ -61,8 +61,8 @@ impl Rows {
         if whole.lines().all(|line| line.chars().count() <= width) {
             return whole;
         }
-        let least = self.least_widths();
-        let blanks = least.len() * PADDING + least.len().saturating_sub(1) * BETWEEN;
+        let least = self.min_widths();
+        let blanks = least.len() * PADDING + least.len().saturating_sub(1) * COLUMN_GAP;
         match least.iter().sum::<usize>() + blanks <= width {
             true => self.drawn(Some((width, &least))),
             false => self.transposed(width).unwrap_or_else(|| self.as_lists()),
@@ -98,7 +98,7 @@ impl Rows {
         table.load_style(STYLE);
         table.set_header(&self.header);
         let cell = |text: &String| match on {
-            Some(_) => kept_together(text),
+            Some(_) => joined_with_error(text),
             None => text.clone(),
         };
         for row in &self.rows {
@@ -119,8 +119,13 @@ impl Rows {
     }
 
     /// Returns the length of the longest word in each column.
-    fn least_widths(&self) -> Vec<usize> {
-        let longest = |text: &String| kept_together(text).split(' ').map(|word| word.chars().count()).max();
+    fn min_widths(&self) -> Vec<usize> {
+        let longest = |text: &String| {
+            joined_with_error(text)
+                .split(' ')
+                .map(|word| word.chars().count())
+                .max()
+        };
         let of = |k: usize| {
             let cells = self.rows.iter().filter_map(|row| row.get(k));
             cells.chain(self.header.get(k)).filter_map(longest).max().unwrap_or(0)
@@ -152,7 +157,7 @@ impl fmt::Display for Rows {
 }
 
 /// Joins a number and its error into one word, so that they are not separated.
-fn kept_together(text: &str) -> String {
+fn joined_with_error(text: &str) -> String {
     text.replace(" ± ", &format!("{FIXED_BLANK}±{FIXED_BLANK}"))
 }
 

@@ -9,7 +9,7 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{good, hoid, json, json_of_any_worth};
+use common::{good, hoid, json, json_with_any_exit_code};
 
 /// Time, error and control of a run.
 type Rows = Vec<[f64; 3]>;
@@ -40,7 +40,7 @@ fn written(d: &Path, rows: &Rows) {
 const BOX_JENKINS: [&str; 4] = ["--structure", "bj", "--nk", "29"];
 
 fn identified(d: &Path, how: &[&str]) -> Value {
-    json_of_any_worth(d, &[&["identify", "c.csv", "--json"], how].concat())
+    json_with_any_exit_code(d, &[&["identify", "c.csv", "--json"], how].concat())
 }
 
 /// Returns the operator parameters with their values and standard errors.
@@ -62,7 +62,7 @@ fn estimates(found: &Value) -> Vec<(String, f64, f64)> {
 
 /// Checks that the estimates are within four standard errors of the true values of C1, or that the result is not
 /// trustworthy.
-fn right_or_said(found: &Value, what: &str) {
+fn assert_correct_or_flagged(found: &Value, what: &str) {
     let truth = [
         ("K_e", 0.09),
         ("T_L", 0.4),
@@ -114,7 +114,7 @@ fn single_outlier_is_repaired() {
             (fault["from"].as_f64().unwrap() - rows[place][0]).abs() < 1e-9,
             "{fault}"
         );
-        right_or_said(&found, "bridged");
+        assert_correct_or_flagged(&found, "bridged");
         assert_eq!(found["verdict"]["level"], "trustworthy", "{}", found["verdict"]);
         for ((name, one, error), (_, other, _)) in estimates(&before).iter().zip(estimates(&found)) {
             assert!((one - other).abs() < 0.1 * error, "{name} {one} {other}");
@@ -123,7 +123,7 @@ fn single_outlier_is_repaired() {
     // The fault is also found by default, and is shown on the page, in the report and in `info`.
     let found = identified(d, &["--form", "lead"]);
     assert_eq!(kinds(&found), ["spike"]);
-    right_or_said(&found, "family");
+    assert_correct_or_flagged(&found, "family");
     let page = good(
         d,
         &[&["identify", "c.csv", "--report", "page"], &BOX_JENKINS[..]].concat(),
@@ -155,7 +155,7 @@ fn reported_faults_are_doubtful_and_kept_ones_ignored() {
         ),
         (Some("cut"), 2)
     );
-    right_or_said(&cut, "cut");
+    assert_correct_or_flagged(&cut, "cut");
     assert_eq!(
         hoid(d, &["identify", "c.csv", "--faults", "mend"]).status.code(),
         Some(2)
@@ -173,8 +173,8 @@ fn rest_before_a_run_is_cut() {
     let found = identified(d, &BOX_JENKINS);
     assert!(kinds(&found).contains(&"idle"), "{found}");
     assert_eq!(found["records"][0]["samples"].as_u64().unwrap() / 10, 819);
-    right_or_said(&found, "rest");
-    right_or_said(&identified(d, &["--form", "lead"]), "rest, family");
+    assert_correct_or_flagged(&found, "rest");
+    assert_correct_or_flagged(&identified(d, &["--form", "lead"]), "rest, family");
 }
 
 #[test]
@@ -349,7 +349,7 @@ fn recorded_people_have_few_faults() {
             "--to",
             "45",
         ];
-        let found = json_of_any_worth(Path::new("."), &[&["identify", file, "--json"], &how[..]].concat());
+        let found = json_with_any_exit_code(Path::new("."), &[&["identify", file, "--json"], &how[..]].concat());
         let of_values = |f: &&Value| {
             !matches!(
                 f["kind"].as_str(),

@@ -37,7 +37,7 @@ fn workplace() -> TempDir {
     directory
 }
 
-const SETTLED: [&str; 8] = [
+const FIT_OPTIONS: [&str; 8] = [
     "--structure",
     "bj",
     "--nk",
@@ -76,7 +76,7 @@ fn output_that_is_an_input_is_refused() {
     fs::create_dir(d.join("pages")).unwrap();
     fs::copy(d.join("in.csv"), d.join("pages/report.html")).unwrap();
     let mut report = vec!["identify", "pages/report.html", "--report", "pages"];
-    report.extend(SETTLED);
+    report.extend(FIT_OPTIONS);
     all.push(report);
     all.push(vec!["group", "g", "--out", "g"]);
     all.push(vec!["group", "g/group.toml", "--out", "g"]);
@@ -107,7 +107,7 @@ fn unwritable_outputs_are_refused_before_the_work() {
 /// Returns each command that prints, with arguments for which it is fast.
 fn printing() -> Vec<Vec<&'static str>> {
     let mut identify = vec!["identify", "in.csv"];
-    identify.extend(SETTLED);
+    identify.extend(FIT_OPTIONS);
     let mut as_json = identify.clone();
     as_json.push("--json");
     vec![
@@ -270,7 +270,7 @@ fn stale_temporary_files_are_removed() {
 }
 
 #[cfg(unix)]
-const LONG: &str = r#"
+const LONG_PLAN: &str = r#"
 name = "long"
 seed = 1
 replications = 100000
@@ -291,7 +291,7 @@ orders.nk = 29
 
 /// True if programs started by this test continue after the terminal is closed (`nohup`).
 #[cfg(unix)]
-fn hang_up_is_ignored() -> bool {
+fn hang_up_signal_is_ignored() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     ignored.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).is_ok_and(|mask| mask & 1 == 1))
@@ -303,9 +303,9 @@ fn hang_up_is_ignored() -> bool {
 fn signals_exit_with_their_code_and_leave_no_files() {
     let directory = workplace();
     let d = directory.path();
-    fs::write(d.join("long.toml"), LONG).unwrap();
+    fs::write(d.join("long.toml"), LONG_PLAN).unwrap();
     for (name, number) in [("INT", 2), ("TERM", 15), ("HUP", 1)] {
-        if name == "HUP" && hang_up_is_ignored() {
+        if name == "HUP" && hang_up_signal_is_ignored() {
             continue;
         }
         let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))

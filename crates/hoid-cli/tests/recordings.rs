@@ -5,7 +5,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{bad, good, hoid, json, json_of_any_worth};
+use common::{bad, good, hoid, json, json_with_any_exit_code};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -56,7 +56,7 @@ fn parameters(found: &Value) -> Vec<f64> {
 }
 
 fn identify(at: &Path, options: &[&str]) -> Value {
-    json_of_any_worth(at, &[&["identify"], options, &FIT[..]].concat())
+    json_with_any_exit_code(at, &[&["identify"], options, &FIT[..]].concat())
 }
 
 #[test]
@@ -300,7 +300,7 @@ fn two_files_at_two_rates_can_be_joined() {
     let advised = message.split("joined.csv with ").nth(1).unwrap().trim();
     let advised: Vec<&str> = advised.split(' ').collect();
     let gain = |options: &[&str]| {
-        let found = json_of_any_worth(at, &[&["identify", "--json"], options].concat());
+        let found = json_with_any_exit_code(at, &[&["identify", "--json"], options].concat());
         found["operator"]["K_e"]["value"].as_f64().unwrap()
     };
     let (joined, whole) = (gain(&[&["joined.csv"], &advised[..]].concat()), gain(&["run.csv"]));

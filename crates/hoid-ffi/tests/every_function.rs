@@ -18,7 +18,7 @@ use hoid_ffi::{
 use hoid_io::fmu::{FmuKind, FmuStart, FmuVariable};
 
 /// Options with which a method is created at once and starts with the first sample.
-const AT_ONCE: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
+const WITHOUT_WARM_UP: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
     "controlled_element": "90/(s(s+6))"}"#;
 const SAMPLES: usize = 2;
 
@@ -54,7 +54,7 @@ fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
 }
 
 /// Reads a value into uninitialised memory.
-fn told<T>(tracker: *const HoidTracker, of: unsafe extern "C" fn(*const HoidTracker, *mut T) -> HoidStatus) -> T {
+fn read_value<T>(tracker: *const HoidTracker, of: unsafe extern "C" fn(*const HoidTracker, *mut T) -> HoidStatus) -> T {
     let mut place = MaybeUninit::uninit();
     // SAFETY: the tracker is valid, and the memory has room for one value.
     assert_eq!(unsafe { of(tracker, place.as_mut_ptr()) }, HOID_OK);
@@ -75,7 +75,7 @@ fn made(method: &str, options: &str) -> *mut HoidTracker {
 fn every_tracker_function_works() {
     assert_eq!(hoid_abi_version(), HOID_ABI_VERSION);
     assert_eq!(read(hoid_version()), env!("CARGO_PKG_VERSION"));
-    let tracker = made("rpem", AT_ONCE);
+    let tracker = made("rpem", WITHOUT_WARM_UP);
     let mut outcome = MaybeUninit::<HoidOutcome>::uninit();
     for k in 0..SAMPLES {
         let [e, u] = sample(k);
@@ -107,9 +107,12 @@ fn every_tracker_function_works() {
     assert_eq!((status, count), (HOID_OK, 2));
     // SAFETY: two values were written.
     assert_eq!(read(unsafe { list[1].assume_init() }.name), "phase_deg");
-    assert_eq!(read(hoid_level_name(told(tracker, hoid_tracker_level))), "doubtful");
-    assert_eq!(told(tracker, hoid_tracker_counts).samples, 2 * SAMPLES as u64);
-    assert_eq!(told(tracker, hoid_tracker_sample_time), 0.01);
+    assert_eq!(
+        read(hoid_level_name(read_value(tracker, hoid_tracker_level))),
+        "doubtful"
+    );
+    assert_eq!(read_value(tracker, hoid_tracker_counts).samples, 2 * SAMPLES as u64);
+    assert_eq!(read_value(tracker, hoid_tracker_sample_time), 0.01);
     let mut change = MaybeUninit::uninit();
     // SAFETY: the tracker is valid, and the pointer refers to the stack.
     assert_eq!(
@@ -154,7 +157,7 @@ fn every_tracker_function_works() {
 #[test]
 fn each_thread_has_its_own_error_message() {
     let tracked = |names: &'static str| {
-        let tracker = made("rpem", AT_ONCE);
+        let tracker = made("rpem", WITHOUT_WARM_UP);
         let mut odds = 0.0;
         // SAFETY: the tracker belongs to this thread.
         let status = unsafe { hoid_tracker_change_log_odds(tracker, &mut odds) };
@@ -237,7 +240,7 @@ macro_rules! life_of_a_unit {
             };
         }
         let set_up = || {
-            let texts = [c"rpem".to_owned(), CString::new(AT_ONCE).unwrap()];
+            let texts = [c"rpem".to_owned(), CString::new(WITHOUT_WARM_UP).unwrap()];
             let references = ["method", "options"].map(|name| unit.reference(name));
             let pointers = texts.each_ref().map(|text| text.as_ptr());
             assert_eq!(counted!($set_text, references, 2, pointers.as_ptr()), 0);

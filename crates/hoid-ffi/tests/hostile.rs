@@ -65,7 +65,7 @@ const ANY: HoidEstimate = HoidEstimate {
 };
 
 /// Requests all results of a tracker; no call may return an error.
-fn asked(tracker: &Owned) -> Vec<HoidStatus> {
+fn request_all(tracker: &Owned) -> Vec<HoidStatus> {
     let t = tracker.0;
     let mut list = [ANY; 64];
     let (room, list) = (list.len(), list.as_mut_ptr());
@@ -114,7 +114,7 @@ fn asked(tracker: &Owned) -> Vec<HoidStatus> {
 #[test]
 fn null_pointers_are_refused_everywhere() {
     let nothing = Owned(ptr::null_mut());
-    assert!(asked(&nothing).iter().all(|status| *status == HOID_BAD_POINTER));
+    assert!(request_all(&nothing).iter().all(|status| *status == HOID_BAD_POINTER));
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
     assert_eq!(status, HOID_BAD_POINTER);
@@ -260,7 +260,7 @@ proptest! {
             let status = unsafe { hoid_tracker_update(tracker.0, e, u, f_t, moves, &mut outcome) };
             prop_assert_eq!(status, HOID_OK);
         }
-        for status in asked(&tracker) {
+        for status in request_all(&tracker) {
             prop_assert!([HOID_OK, HOID_NOTHING].contains(&status), "{}", status);
         }
         let again = restored(&saved(&tracker)).map_err(|(_, said)| TestCaseError::fail(said))?;
@@ -279,7 +279,7 @@ proptest! {
         let options = format!("{{{}}}", each.join(", "));
         match made(method, sample_time, &options) {
             Ok(tracker) => {
-                for status in asked(&tracker) {
+                for status in request_all(&tracker) {
                     prop_assert!([HOID_OK, HOID_NOTHING, HOID_TOO_SMALL].contains(&status), "{}: {}", options, status);
                 }
             }

@@ -67,11 +67,11 @@ pub fn describe(out: &Path, config: &Config) -> Result<(), LabError> {
         "License": "",
         "GeneratedBy": [{"Name": "hoid lab", "Version": env!("CARGO_PKG_VERSION")}],
     });
-    once(&out.join("README"), README)?;
-    once(&out.join("dataset_description.json"), &format!("{description:#}\n"))
+    write_if_missing(&out.join("README"), README)?;
+    write_if_missing(&out.join("dataset_description.json"), &format!("{description:#}\n"))
 }
 
-fn once(path: &Path, text: &str) -> Result<(), LabError> {
+fn write_if_missing(path: &Path, text: &str) -> Result<(), LabError> {
     if path.exists() { Ok(()) } else { write(path, text) }
 }
 

@@ -8,10 +8,10 @@
 //! | file | contents |
 //! |---|---|
 //! | `runs` | the stages of a run: sent, started, received in batches, ended |
-//! | `told` | messages to the pages |
+//! | `messages` | messages to the pages |
 
+mod messages;
 mod runs;
-mod told;
 
 use std::{
     collections::BTreeMap,
@@ -198,7 +198,7 @@ impl Lab {
             let _ = self.shared.end_run(&mut state, RunEnd::Interrupted, BTreeMap::new());
             let left = self.shared.newest_person();
             if let Some(newest) = left {
-                let _ = self.shared.hand_over(&mut state, newest);
+                let _ = self.shared.transfer_session_to(&mut state, newest);
             }
             drop(state);
             if let Some(newest) = left {
@@ -306,7 +306,7 @@ impl Shared {
         if role == Role::Person && state.run.is_none() {
             // The newest window takes over the session; the previous window is notified.
             let before = state.person.filter(|before| *before != id);
-            self.hand_over(&mut state, id)?;
+            self.transfer_session_to(&mut state, id)?;
             if let Some(before) = before {
                 let words = "The session continues in another window; this window is view-only.".to_owned();
                 self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
@@ -331,7 +331,7 @@ impl Shared {
     }
 
     /// Continues the session in the window `id`.
-    fn hand_over(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
+    fn transfer_session_to(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
         state.person = Some(id);
         state.ready = None;
         let browser = self

@@ -22,13 +22,15 @@ use serde_json::json;
 
 const CASES: u64 = 1500;
 /// Cases that failed in the past: a preview of eleven days, and more samples held back than the ring buffer contains.
-const FOUND: [u64; 2] = [6025, 66_758];
+const REGRESSION_CASES: [u64; 2] = [6025, 66_758];
 
 #[test]
 fn hostile_messages_and_files_do_not_stop_the_server() {
     let mut hostile = Hostile::new();
     (0..CASES).for_each(|number| hostile.case(5, number));
-    FOUND.into_iter().for_each(|number| hostile.case(2026, number));
+    REGRESSION_CASES
+        .into_iter()
+        .for_each(|number| hostile.case(2026, number));
 }
 
 /// A page requests a run, continues with a session whose plan is shorter, and tries to start the run there.

@@ -146,12 +146,12 @@ fn requests_without_the_token_are_refused() {
 struct Page(WebSocket<TcpStream>);
 
 impl Page {
-    fn say(&mut self, message: &Value) {
+    fn send(&mut self, message: &Value) {
         self.0.send(Message::text(message.to_string())).unwrap();
     }
 
     /// Returns the next message of this type; other messages are skipped.
-    fn hear(&mut self, kind: &str) -> Value {
+    fn receive(&mut self, kind: &str) -> Value {
         loop {
             if let Message::Text(text) = self.0.read().unwrap() {
                 let message: Value = serde_json::from_str(text.as_str()).unwrap();
@@ -163,19 +163,19 @@ impl Page {
     }
 
     fn hello(&mut self, role: &str) -> Value {
-        self.say(&json!({"type": "hello", "role": role, "browser": {"user_agent": "test"}}));
-        self.hear("state")
+        self.send(&json!({"type": "hello", "role": role, "browser": {"user_agent": "test"}}));
+        self.receive("state")
     }
 
     fn consent(&mut self) {
-        self.say(&json!({"type": "consent", "subject": "P01", "agreed": true, "cc0": false}));
-        while self.hear("state")["phase"] != "runs" {}
+        self.send(&json!({"type": "consent", "subject": "P01", "agreed": true, "cc0": false}));
+        while self.receive("state")["phase"] != "runs" {}
     }
 
     /// Starts the next run and returns its number.
     fn begin(&mut self) -> u64 {
-        self.say(&json!({"type": "next"}));
-        let number = self.hear("run")["number"].as_u64().unwrap();
+        self.send(&json!({"type": "next"}));
+        let number = self.receive("run")["number"].as_u64().unwrap();
         assert!(matches!(self.0.read().unwrap(), Message::Binary(_)));
         let map = InputMap {
             centre: 0.0,
@@ -183,11 +183,11 @@ impl Page {
             dead: 0.0,
             gain: 3.0,
         };
-        self.say(
+        self.send(
             &json!({"type": "begin", "number": number, "input": map, "device": "mouse", "clock": "injected",
             "refresh_ms": 10.0, "zero_ms": 1.0}),
         );
-        while self.hear("state")["running"] != number {}
+        while self.receive("state")["running"] != number {}
         number
     }
 }
@@ -213,16 +213,21 @@ fn complete_run_sends_a_live_estimate() {
         .unwrap()
         .target;
     for first in (0..1500).step_by(50) {
-        person.say(&batch(number, first, &target));
+        person.send(&batch(number, first, &target));
     }
-    let live = other.hear("live");
+    let live = other.receive("live");
     assert_eq!(live["number"], number);
-    person.say(&json!({"type": "finish", "number": number, "counted": {}}));
-    let verdict = person.hear("verdict");
+    person.send(&json!({"type": "finish", "number": number, "counted": {}}));
+    let verdict = person.receive("verdict");
     assert_eq!(verdict["done"]["verdict"], "verified", "{verdict}");
     // A second window cannot control the session.
-    other.say(&json!({"type": "next"}));
-    assert!(other.hear("refused")["words"].as_str().unwrap().contains("view-only"));
+    other.send(&json!({"type": "next"}));
+    assert!(
+        other.receive("refused")["words"]
+            .as_str()
+            .unwrap()
+            .contains("view-only")
+    );
     let zip = at.get(&format!("/{}/export.zip", at.token), "");
     assert!(status(&zip) == "200" && zip.contains("sub-P01/ses-01/lab.toml"));
     let data = at.get(&format!("/{}/data/{number}.json", at.token), "");
@@ -241,21 +246,21 @@ fn closing_the_window_interrupts_the_run() {
     let target = hoid_lab::task::Task::new(&config().condition[0], 0, number)
         .unwrap()
         .target;
-    person.say(&batch(number, 0, &target));
+    person.send(&batch(number, 0, &target));
     // A second window does not take over a current run.
     let mut second = at.page();
-    second.say(&json!({"type": "hello", "role": "person"}));
+    second.send(&json!({"type": "hello", "role": "person"}));
     assert!(
-        second.hear("refused")["words"]
+        second.receive("refused")["words"]
             .as_str()
             .unwrap()
             .contains("another window")
     );
     // When the first window is closed, the session continues in the second.
     drop(person);
-    second.hear("yours");
+    second.receive("yours");
     loop {
-        let state = second.hear("state");
+        let state = second.receive("state");
         if state["running"].is_null() {
             assert_eq!(state["done"][0]["how"], "interrupted");
             assert_eq!(state["next"], 0);

@@ -11,7 +11,7 @@ pub const DASH: &str = "\u{2013}";
 pub const Z_95: f64 = 1.959_963_984_540_054;
 
 const DIGITS_OF_ERROR: i32 = 2;
-const DIGITS_ALONE: i32 = 5;
+const DIGITS_WITHOUT_ERROR: i32 = 5;
 
 /// Relative standard error below which the standard error is attributed to rounding.
 const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
@@ -52,7 +52,7 @@ pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String 
 
 /// Returns a number without a standard error, with five significant digits; a dash for non-finite values.
 pub fn plain(value: f64) -> String {
-    significant(value, DIGITS_ALONE)
+    significant(value, DIGITS_WITHOUT_ERROR)
 }
 
 /// Returns a number with `digits` significant digits; a dash for non-finite values.

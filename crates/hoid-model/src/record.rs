@@ -283,7 +283,7 @@ impl Record {
     /// Returns the record with the mean or the least-squares line of input and output removed; other channels remain
     /// unchanged.
     pub fn detrended(mut self, how: Detrend) -> Self {
-        self.signals_mut().for_each(|values| take_out(how, values));
+        self.signals_mut().for_each(|values| subtract_trend(how, values));
         self
     }
 
@@ -321,12 +321,12 @@ impl Detrend {
     #[must_use]
     pub fn taken_out(self, values: &[f64]) -> Vec<f64> {
         let mut left = values.to_vec();
-        take_out(self, &mut left);
+        subtract_trend(self, &mut left);
         left
     }
 }
 
-fn take_out(how: Detrend, values: &mut [f64]) {
+fn subtract_trend(how: Detrend, values: &mut [f64]) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let centre = (n - 1.0) / 2.0;

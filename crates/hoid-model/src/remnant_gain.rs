@@ -257,7 +257,7 @@ impl Interval {
     }
 }
 
-const MOST_INTERVALS: usize = 4000;
+const MAX_INTERVALS: usize = 4000;
 
 /// Returns the integral from 0 to `band` of a smooth non-negative f that varies on a logarithmic scale.
 fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
@@ -276,7 +276,7 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
     }
     edges.push(band);
     let mut intervals: Vec<Interval> = edges.windows(2).map(|e| Interval::new(&f, e[0], e[1])).collect();
-    while intervals.len() < MOST_INTERVALS {
+    while intervals.len() < MAX_INTERVALS {
         let total: f64 = intervals.iter().map(|i| i.integral).sum();
         // Each interval may contribute an equal share of the tolerance to the error; intervals that exceed this share
         // are halved.

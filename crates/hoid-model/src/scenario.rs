@@ -28,7 +28,7 @@ use crate::{
 
 /// Longest run, in samples: 11 days at 100 Hz. With this limit, a time with a wrong exponent causes an error message
 /// instead of exhausting the memory.
-const MOST_SAMPLES: usize = 100_000_000;
+const MAX_SAMPLES: usize = 100_000_000;
 
 /// A state of adaptation: the operator and the controlled element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -369,7 +369,7 @@ impl Scenario {
             });
         }
         let run_in_samples = samples("run-in time t_0 in s", self.run_in_s)?;
-        if run_in_samples + measurement_samples > MOST_SAMPLES {
+        if run_in_samples + measurement_samples > MAX_SAMPLES {
             return Err(ModelError::OutOfRange {
                 quantity: "run-in and measurement time in s",
                 found: self.run_in_s + self.measurement_s,

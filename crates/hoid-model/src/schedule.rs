@@ -34,7 +34,7 @@ pub enum Schedule {
 /// Number of time constants 1/G after which a transition is complete: e^-40 is below half a unit in the last place.
 const COMPLETE_AFTER: f64 = 40.0;
 /// Shortest interval between two changes, in time constants 1/G.
-const SHORTEST: f64 = 1.0;
+const MIN_INTERVAL: f64 = 1.0;
 
 impl Schedule {
     /// Checks the rate, the time and the interval of the changes.
@@ -67,7 +67,7 @@ impl Schedule {
             });
         }
         let is_single = matches!(self, Self::Sigmoid { .. });
-        let has_time = interval_s.is_finite() && interval_s * rate_per_s >= SHORTEST;
+        let has_time = interval_s.is_finite() && interval_s * rate_per_s >= MIN_INTERVAL;
         if !(is_single || has_time) {
             return Err(ModelError::OutOfRange {
                 quantity: "time from one change to the next in s",

@@ -42,7 +42,7 @@ struct Row {
     error: f64,
     interval: [f64; 2],
     unit: String,
-    worth: String,
+    verdict: String,
 }
 
 impl PaperTable {
@@ -183,7 +183,7 @@ fn number(value: &Value) -> f64 {
 fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     let none = Value::Null;
     let at = |object: &Map<String, Value>, key: &str| object.get(key).cloned().unwrap_or_default();
-    let worth = &object.get("verdict").unwrap_or(&none)["of"];
+    let verdict = &object.get("verdict").unwrap_or(&none)["of"];
     // A trace is represented by its last row.
     let last = object
         .get("kind")
@@ -192,17 +192,17 @@ fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     let of = last.and_then(Value::as_object).unwrap_or(object);
     let mut rows: Vec<Row> = Vec::new();
     for p in at(of, "parameters").as_array().into_iter().flatten() {
-        rows.push(row(p["name"].as_str().unwrap_or_default(), p, worth));
+        rows.push(row(p["name"].as_str().unwrap_or_default(), p, verdict));
     }
     let known = |rows: &[Row], name: &str| rows.iter().any(|row| row.quantity == name);
     for (name, p) in at(of, "operator").as_object().into_iter().flatten() {
         if p["value"].is_number() && !known(&rows, name) && object.get("form").is_none() {
-            rows.push(row(name, p, worth));
+            rows.push(row(name, p, verdict));
         }
     }
     for (name, p) in at(of, "open_loop").as_object().into_iter().flatten() {
         if p["value"].is_number() {
-            rows.push(row(name, p, worth));
+            rows.push(row(name, p, verdict));
         }
     }
     let pairs = |of: &dyn Fn(&Row) -> f64| rows.iter().map(|row| [of(row), row.error]).collect();
@@ -216,11 +216,11 @@ fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
         column("low", Cells::End(pairs(&|row| row.interval[0]))),
         column("high", Cells::End(pairs(&|row| row.interval[1]))),
         column("unit", texts(&|row| &row.unit)),
-        column("verdict", texts(&|row| &row.worth)),
+        column("verdict", texts(&|row| &row.verdict)),
     ]
 }
 
-fn row(name: &str, p: &Value, worth: &Value) -> Row {
+fn row(name: &str, p: &Value, verdict: &Value) -> Row {
     let (value, error) = (number(&p["value"]), number(&p["standard_error"]));
     let interval = match p["interval"].as_array().map(Vec::as_slice) {
         Some([low, high]) => [number(low), number(high)],
@@ -243,7 +243,7 @@ fn row(name: &str, p: &Value, worth: &Value) -> Row {
         error,
         interval,
         unit: p["unit"].as_str().unwrap_or(of_name).to_owned(),
-        worth: match worth[quantity]["level"].as_str() {
+        verdict: match verdict[quantity]["level"].as_str() {
             _ if is_open => "not determined".to_owned(),
             level => level.unwrap_or_default().replace('-', " "),
         },

@@ -27,7 +27,7 @@ impl Noise {
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    fn bell(&mut self) -> f64 {
+    fn normal(&mut self) -> f64 {
         // The third power of a sum has heavy tails and therefore outliers.
         let sum = self.next() + self.next() + self.next();
         sum + 0.3 * sum.powi(3)
@@ -59,7 +59,7 @@ fn boxes(range: BoxRange, method: usize) -> BoxGrid {
             let mut sample = |group: usize, series: usize| {
                 let centre = scale * (series as f64) * (1.0 + row as f64) * (0.3 + 0.2 * (group as f64 - 2.0));
                 let values: Vec<f64> = (0..100)
-                    .map(|_| centre + 0.15 * scale * (0.1 + series as f64) * noise.bell())
+                    .map(|_| centre + 0.15 * scale * (0.1 + series as f64) * noise.normal())
                     .collect();
                 match (column, group, series) {
                     (3, 4, 3) => BoxStatistics::default(),
@@ -338,7 +338,7 @@ fn averages() -> TraceGrid {
                     let values = times.iter().map(|t| {
                         let wanted = truth(row, *t) * (1.0 + bias);
                         estimate +=
-                            0.004 * (wanted - estimate + 0.3 * wanted * (1.0 + level as f64) * 0.3 * noise.bell());
+                            0.004 * (wanted - estimate + 0.3 * wanted * (1.0 + level as f64) * 0.3 * noise.normal());
                         estimate
                     });
                     curves.push(TraceCurve {

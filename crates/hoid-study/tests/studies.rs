@@ -89,7 +89,7 @@ fn whole(jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
 }
 
 /// Checks that the bytes are the same for any number of threads and shards.
-fn division_does_not_show(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTreeMap<String, Vec<u8>> {
+fn assert_independent_of_division(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTreeMap<String, Vec<u8>> {
     let (_one, expected) = whole_of(plan, 1);
     for &jobs in threads {
         assert!(whole_of(plan, jobs).1 == expected, "{jobs} threads");
@@ -117,7 +117,7 @@ fn division_does_not_show(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTr
 
 #[test]
 fn results_do_not_depend_on_threads_or_shards() {
-    let expected = division_does_not_show(&plan(), &[2, 7], &[1, 2, 7]);
+    let expected = assert_independent_of_division(&plan(), &[2, 7], &[1, 2, 7]);
     assert_eq!(
         expected.keys().collect::<Vec<_>>(),
         [
@@ -155,7 +155,7 @@ method = "time-varying"
 name = "SRIV"
 method = "sriv"
 "#;
-    division_does_not_show(&Plan::parse(text, "verdicts.toml").unwrap(), &[3], &[2]);
+    assert_independent_of_division(&Plan::parse(text, "verdicts.toml").unwrap(), &[3], &[2]);
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn starts(options: &TrackOptions) -> Vec<TrackOptions> {
     ]
 }
 
-fn refused_as_it_should_be(error: &IdentError, ts: f64) -> bool {
+fn is_expected_refusal(error: &IdentError, ts: f64) -> bool {
     let text = error.to_string();
     text.contains("sample time of a tracker") && text.contains(&format!("{ts} s")) && text.contains("ms")
 }
@@ -47,7 +47,7 @@ fn too_long_sample_times_are_refused() {
             for options in starts(&TrackOptions::without_prior(method.clone(), sample_time)) {
                 let made = Tracker::new(&options, None, sample_time);
                 if ts >= LONGEST_S {
-                    assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");
+                    assert!(is_expected_refusal(&made.unwrap_err(), ts), "{method} at {ts} s");
                     continue;
                 }
                 let Ok(mut tracker) = made else { continue };
@@ -71,10 +71,10 @@ fn too_long_sample_times_are_refused_in_plans() {
         for method in hoid_survey::methods() {
             let options = TrackOptions::default_for(method.clone(), 2);
             let made = Tracker::new(&options, Some(&record), sample_time);
-            assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");
+            assert!(is_expected_refusal(&made.unwrap_err(), ts), "{method} at {ts} s");
             let ranges = ranges_of(&method, options.structure, &NamedOrders::new(), &[], sample_time).unwrap();
             let planned = TrackPlan::new(options, ranges, Criterion::Bic, sample_time);
-            assert!(refused_as_it_should_be(&planned.unwrap_err(), ts), "{method} at {ts} s");
+            assert!(is_expected_refusal(&planned.unwrap_err(), ts), "{method} at {ts} s");
         }
     }
 }

@@ -29,7 +29,7 @@ fn every_structure_finds_the_truth_with_any_initial_state() {
     for structure in Structure::ALL {
         let truth = Truth::of(structure);
         let cut_out = truth.record(4000, 0.5, 7);
-        let from_rest = truth.record_behind(0, 4000, 0.5, 7);
+        let from_rest = truth.record_after_run_in(0, 4000, 0.5, 7);
         for rule in [
             None,
             Some(InitialState::Zero),

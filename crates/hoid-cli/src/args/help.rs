@@ -353,12 +353,12 @@ fn explained(command: Command) -> Command {
     };
     let examples: String = help.examples.iter().map(|line| format!("  {line}\n")).collect();
     let command = command.after_help(format!("Examples:\n{examples}"));
-    let command = command.mut_subcommands(|inner| inner.mut_args(in_any_case));
+    let command = command.mut_subcommands(|inner| inner.mut_args(ignoring_case));
     command.mut_args(|arg| argument(arg, help))
 }
 
 /// Choices are taken in capitals too.
-fn in_any_case(arg: Arg) -> Arg {
+fn ignoring_case(arg: Arg) -> Arg {
     let takes_value = arg.get_action().takes_values();
     arg.ignore_case(takes_value)
 }
@@ -367,7 +367,7 @@ fn in_any_case(arg: Arg) -> Arg {
 fn argument(arg: Arg, help: &Help) -> Arg {
     let id = arg.get_id().as_str().to_owned();
     let hidden = !arg.is_positional() && !help.shown.is_empty() && !help.shown.contains(&id.as_str());
-    let arg = in_any_case(arg).hide_short_help(hidden);
+    let arg = ignoring_case(arg).hide_short_help(hidden);
     if !WITH_HEADINGS.contains(&help.command) || arg.is_positional() {
         return arg;
     }

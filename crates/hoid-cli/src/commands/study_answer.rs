@@ -25,9 +25,9 @@ const PARAMETERS: [&str; 10] = [
     "t_M",
 ];
 /// Maximum number of parameters on a screen of 80 columns.
-const MOST_PARAMETERS: usize = 3;
+const MAX_PARAMETERS: usize = 3;
 /// Maximum number of rows on a screen.
-const MOST_ROWS: usize = 24;
+const MAX_ROWS: usize = 24;
 
 /// Returns the summary of the tables of a study; empty if they contain no bias of a parameter.
 pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
@@ -66,7 +66,7 @@ fn words(summary: &OutputTable) -> String {
     let shown: Vec<&str> = PARAMETERS
         .into_iter()
         .filter(|name| has(&bias(name)))
-        .take(MOST_PARAMETERS)
+        .take(MAX_PARAMETERS)
         .collect();
     let mut rows: Vec<Row> = Vec::new();
     for i in 0..quantity.len() {
@@ -104,7 +104,7 @@ fn words(summary: &OutputTable) -> String {
     headings.extend(verdicts.then_some("trustworthy"));
     headings.extend(&shown);
     let mut table = text::table(&headings);
-    for row in rows.iter().take(MOST_ROWS) {
+    for row in rows.iter().take(MAX_ROWS) {
         let of_all = |rate: f64| format!("{}/{}", (rate * row.all).round(), row.all);
         let mut cells = vec![row.cell.clone(), row.estimator.clone()];
         cells.push(of_all(1.0 - row.failed - row.not_convertible));
@@ -114,7 +114,7 @@ fn words(summary: &OutputTable) -> String {
         cells.extend(row.biases.iter().cloned());
         table.add_row(cells);
     }
-    let more = match rows.len().checked_sub(MOST_ROWS) {
+    let more = match rows.len().checked_sub(MAX_ROWS) {
         None | Some(0) => String::new(),
         Some(more) => format!("and {}\n", text::counted(more as u64, "more row")),
     };

@@ -17,7 +17,7 @@ use super::values::Levels;
 use crate::wording::{counted, short};
 
 /// Finds the rows whose time does not advance: rows that equal the row before, and rows with other values.
-pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let same = |row: &usize| {
         let repeats = |signal: &Signal<'_>| {
             let step = signal.step_to(*row);

@@ -11,7 +11,7 @@ use crate::wording::{counted, decimal, short};
 const JITTER: f64 = 1e-3;
 /// Relative deviation of a clock from a given rate above which the deviation is reported; crystals are accurate to
 /// 1e-4.
-const OFF: f64 = 2e-4;
+const MAX_RATE_DEVIATION: f64 = 2e-4;
 /// Limits of the relative deviation from the nearest common rate, if no rate was given: a deviation between them is
 /// reported as a clock error, while a larger one means another rate.
 const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
@@ -128,7 +128,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
         },
     };
     let off = hz / expected - 1.0;
-    if !(off.abs() > OFF.max(uncertain) && off.is_finite()) {
+    if !(off.abs() > MAX_RATE_DEVIATION.max(uncertain) && off.is_finite()) {
         return;
     }
     let way = if off > 0.0 { "slow" } else { "fast" };
@@ -172,7 +172,7 @@ fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Ve
     let change = last / first - 1.0;
     let n = third as f64;
     let uncertain = 8.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 4.0) / grid.sample_time_s;
-    if change.is_nan() || change.abs() <= OFF.max(uncertain) {
+    if change.is_nan() || change.abs() <= MAX_RATE_DEVIATION.max(uncertain) {
         return;
     }
     found.push(QualityIssue {
@@ -215,7 +215,7 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
         };
         // The first and last times determine the ratio of the rates up to a jitter of one row at each end.
         let uncertain = 2.0 / pairs.len() as f64;
-        if off.abs() <= OFF.max(uncertain) {
+        if off.abs() <= MAX_RATE_DEVIATION.max(uncertain) {
             continue;
         }
         found.push(QualityIssue {

@@ -10,7 +10,7 @@ use crate::IoError;
 /// Number of bytes to which a file of any size may decompress. Readers hold up to four copies of the values during
 /// conversion (as stored, as numbers, as columns, in a survey), so reading a file of a few bytes takes less than 300
 /// MB.
-const AT_LEAST: u64 = 48 << 20;
+const MIN_BUDGET_BYTES: u64 = 48 << 20;
 /// Additional decompressed bytes allowed per byte of the file.
 const FACTOR: u64 = 64;
 /// Largest number of bytes to which a file may decompress, regardless of its size.
@@ -20,7 +20,7 @@ const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
 /// Memory that a text takes in addition to its characters, in bytes.
 const TEXT: u64 = 64;
 /// Maximum nesting of structures.
-pub(super) const MOST_NESTED: usize = 32;
+pub(super) const MAX_NESTING: usize = 32;
 
 /// Memory that reading a file may still take.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ pub(super) struct Budget {
 impl Budget {
     /// Returns the budget of a file of the given size in bytes.
     pub(super) fn of(file_bytes: usize) -> Self {
-        let by_size = AT_LEAST.saturating_add(FACTOR.saturating_mul(file_bytes as u64));
+        let by_size = MIN_BUDGET_BYTES.saturating_add(FACTOR.saturating_mul(file_bytes as u64));
         Self::up_to(by_size.min(CEILING).max(raised().unwrap_or(0)))
     }
 

@@ -132,7 +132,7 @@ fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
 }
 
 /// Number of bytes at the start of a file from which a table is recognised.
-const START: u64 = 64 << 10;
+const PROBE_BYTES: u64 = 64 << 10;
 
 /// True if a file, which may be packed, starts with a table of text. Pipes are not read, because the bytes read would
 /// be lost.
@@ -144,9 +144,9 @@ fn starts_with_table(path: &Path, is_packed: bool) -> bool {
             return Ok(start);
         }
         if is_packed {
-            MultiGzDecoder::new(file).take(START).read_to_end(&mut start)?;
+            MultiGzDecoder::new(file).take(PROBE_BYTES).read_to_end(&mut start)?;
         } else {
-            file.take(START).read_to_end(&mut start)?;
+            file.take(PROBE_BYTES).read_to_end(&mut start)?;
         }
         Ok(start)
     };

@@ -48,7 +48,7 @@ pub fn read_aligned(
             ..options.clone()
         };
         if let Ok(wide) = read_as_recorded(path, &wider, drop_repeated)
-            && let Some((record, steps)) = moved_within(wide.record, &read.record, preparation, &late)
+            && let Some((record, steps)) = shifted_within(wide.record, &read.record, preparation, &late)
         {
             let steps = [read.steps, steps].concat();
             return Ok(ReadRecord { record, steps, ..read });
@@ -90,7 +90,7 @@ fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
 
 /// Shifts the channels of the longer record `wide`, cuts out the span, and applies the remaining steps; `None` if this
 /// fails: processing the shorter record then gives the error.
-fn moved_within(
+fn shifted_within(
     wide: Record,
     narrow: &Record,
     preparation: &Preparation,

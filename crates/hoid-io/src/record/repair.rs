@@ -120,23 +120,23 @@ fn line(a: f64, b: f64, share: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const GONE: f64 = f64::NAN;
+    const MISSING: f64 = f64::NAN;
 
     #[test]
     fn only_interior_gaps_are_filled() {
-        let mut values = [1.0, GONE, 3.0, 4.0, GONE, GONE, GONE, 0.0];
+        let mut values = [1.0, MISSING, 3.0, 4.0, MISSING, MISSING, MISSING, 0.0];
         let bridged = fill(&mut values, None).unwrap();
         assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0]);
         assert_eq!((bridged.values, bridged.longest), (4, 3));
-        assert_eq!(fill(&mut [GONE, 1.0], None), Err(OpenEnd::Start));
-        assert_eq!(fill(&mut [1.0, GONE], None), Err(OpenEnd::End));
-        assert_eq!(fill(&mut [GONE], None), Err(OpenEnd::Start));
+        assert_eq!(fill(&mut [MISSING, 1.0], None), Err(OpenEnd::Start));
+        assert_eq!(fill(&mut [1.0, MISSING], None), Err(OpenEnd::End));
+        assert_eq!(fill(&mut [MISSING], None), Err(OpenEnd::Start));
         assert_eq!(fill(&mut [], None), Ok(Bridged::default()));
     }
 
     #[test]
     fn gaps_are_filled_linearly_in_time() {
-        let mut values = [0.0, GONE, 10.0];
+        let mut values = [0.0, MISSING, 10.0];
         fill(&mut values, Some(&[0.0, 0.3, 1.0])).unwrap();
         assert!((values[1] - 3.0).abs() < 1e-15);
     }

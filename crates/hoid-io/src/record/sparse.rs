@@ -239,7 +239,7 @@ mod tests {
         }
     }
 
-    const GONE: f64 = f64::NAN;
+    const MISSING: f64 = f64::NAN;
 
     #[test]
     fn sparse_values_are_held_or_interpolated_in_time() {
@@ -248,7 +248,7 @@ mod tests {
             (Sparse::Hold, [1.0, 1.0, 1.0, 6.0, 6.0]),
             (Sparse::Linear, [1.0, 2.0, 5.0, 6.0, 11.0]),
         ] {
-            let mut e = column(&[1.0, GONE, GONE, 6.0, GONE, 12.0]);
+            let mut e = column(&[1.0, MISSING, MISSING, 6.0, MISSING, 12.0]);
             Gaps::of(&e).close(&mut e, how, &x);
             for (found, expected) in e.values.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-14, "{how}: {:?}", e.values);
@@ -256,7 +256,7 @@ mod tests {
             assert_eq!((e.filled_rows, e.is_held), (vec![1, 2, 4], how == Sparse::Hold));
         }
         // The times are constant.
-        let mut e = column(&[1.0, GONE, 2.0]);
+        let mut e = column(&[1.0, MISSING, 2.0]);
         Gaps::of(&e).close(&mut e, Sparse::Linear, &[0.0; 3]);
         assert_eq!(e.values, [1.0, 1.0, 2.0]);
     }

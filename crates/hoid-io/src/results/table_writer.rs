@@ -15,11 +15,11 @@ const GROUP: usize = 1 << 16;
 /// State of a file between two groups of rows.
 enum Sink {
     Rows(Box<dyn RowWriter>),
-    Columns(WaitingColumns),
+    Columns(BufferedColumns),
 }
 
 /// Columns that are kept until all rows are known, since the length of an array is written before its values.
-struct WaitingColumns {
+struct BufferedColumns {
     write: ColumnsWriter,
     schema: TableSchema,
     columns: Vec<ColumnValues>,
@@ -29,7 +29,7 @@ impl Sink {
     fn start(format: &Format, file: &mut dyn Write, schema: TableSchema) -> io::Result<Self> {
         match format.writing {
             Writing::Rows(start) => start(file, &schema).map(Self::Rows),
-            Writing::Columns(write) => Ok(Self::Columns(WaitingColumns {
+            Writing::Columns(write) => Ok(Self::Columns(BufferedColumns {
                 write,
                 columns: schema.columns.iter().map(|column| none(column.kind)).collect(),
                 schema,
@@ -53,7 +53,7 @@ impl Sink {
     fn finish(self, file: &mut dyn Write) -> io::Result<()> {
         match self {
             Self::Rows(rows) => rows.finish(file),
-            Self::Columns(WaitingColumns { write, schema, columns }) => {
+            Self::Columns(BufferedColumns { write, schema, columns }) => {
                 let values: Vec<Values<'_>> = columns.iter().map(ColumnValues::all).collect();
                 write(file, &schema, &values)
             }

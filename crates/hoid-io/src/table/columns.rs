@@ -108,7 +108,7 @@ impl Table<'_> {
     }
 
     /// True if no column has a number in a row, as in a row of units.
-    pub(crate) fn has_no_number_in(&self, row: usize) -> bool {
+    pub(crate) fn is_row_without_numbers(&self, row: usize) -> bool {
         let has_none = |column: &Column| column.values.get(row).is_none_or(|value| value.is_nan());
         self.columns.iter().all(has_none)
     }
@@ -133,7 +133,7 @@ impl Table<'_> {
             } else if is_moment(&found) {
                 "the column mixes numbers with dates or clock times: write it in one format, or give --fs HZ if the \
                  samples are evenly spaced"
-            } else if row == 0 && self.rows > 1 && self.has_no_number_in(row) {
+            } else if row == 0 && self.rows > 1 && self.is_row_without_numbers(row) {
                 UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {
                 "the file is truncated in the middle of this line, the last one: copy or record the file again, or \
@@ -205,17 +205,17 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
 }
 
 /// Maximum number of columns of a table; recordings typically have some tens of columns.
-const MOST_COLUMNS: usize = 10_000;
+const MAX_COLUMNS: usize = 10_000;
 
 /// Checks the number of columns before memory is allocated for them.
 pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
-    if columns <= MOST_COLUMNS {
+    if columns <= MAX_COLUMNS {
         return Ok(());
     }
     Err(IoError::TooManyColumns {
         file: file.to_owned(),
         found: columns,
-        most: MOST_COLUMNS,
+        most: MAX_COLUMNS,
     })
 }
 

@@ -1,7 +1,7 @@
 //! Precision of the printed numbers of a column.
 
 /// Largest number of decimals at which rounding of binary times is recognised (1 µs).
-const MOST_DECIMALS: i32 = 6;
+const MAX_DECIMALS: i32 = 6;
 
 /// Precision with which a column of decimal numbers is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -35,7 +35,7 @@ impl Precision {
         };
         let finite = || values.iter().copied().filter(|value| value.is_finite());
         Self {
-            decimals: (0..=MOST_DECIMALS).find(|decimals| finite().all(|value| is_multiple(value, *decimals))),
+            decimals: (0..=MAX_DECIMALS).find(|decimals| finite().all(|value| is_multiple(value, *decimals))),
             significant: 0,
         }
     }

@@ -28,14 +28,14 @@ use crate::wording::{did_you_mean, list, named, shown};
 /// Size above which the numbers in a time stamp column are assumed to be counted from 1970: 1e8 s is in 1973.
 const STAMP: f64 = 1e8;
 /// Median step above which integer times are assumed not to be in s.
-const STEP_OF_NO_SECONDS: f64 = 5.0;
+const MIN_NON_SECOND_STEP: f64 = 5.0;
 /// Largest sampling frequency that is assumed when the unit is inferred from the steps, Hz.
-const MOST_HZ: f64 = 2000.0;
+const MAX_HZ: f64 = 2000.0;
 
 /// Serial days of spreadsheets from 1954 to 2119, and of MATLAB from 1916 to 2190.
 const SERIAL_DAYS: [Range<f64>; 2] = [20_000.0..80_000.0, 700_000.0..800_000.0];
 /// Steps of serial days, in s.
-const SERIAL_STEPS_S: Range<f64> = 1.0 / MOST_HZ..10.0;
+const SERIAL_STEPS_S: Range<f64> = 1.0 / MAX_HZ..10.0;
 
 /// Column names that denote a time.
 const WORDS: [&str; 11] = [
@@ -204,7 +204,11 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
                 && (is_stamp() || is_serial_days(values) || runs_in_seconds(values))
         })
     };
-    let by_unit = || only(table, |_, column| is_time_unit(&column.unit) && rises(&column.values));
+    let by_unit = || {
+        only(table, |_, column| {
+            is_time_unit(&column.unit) && is_increasing(&column.values)
+        })
+    };
     let pair = || only(table, |at, _| nanoseconds_of(table, at).is_some());
     by_name()
         .or_else(by_type)
@@ -244,13 +248,13 @@ fn first_line(table: &Table<'_>) -> Option<usize> {
     let first = only(table, is_first)?;
     let values = &table.columns.get(first)?.values;
     let counts = steps(values).all(|step| step == 1.0);
-    (rises(values) && !counts).then_some(first)
+    (is_increasing(values) && !counts).then_some(first)
 }
 
 /// True if the values increase from row to row.
-fn rises(values: &[f64]) -> bool {
-    let rises = pairs(values).all(|(value, next)| next > value);
-    values.len() > 2 && rises && values.iter().all(|value| value.is_finite())
+fn is_increasing(values: &[f64]) -> bool {
+    let is_increasing = pairs(values).all(|(value, next)| next > value);
+    values.len() > 2 && is_increasing && values.iter().all(|value| value.is_finite())
 }
 
 /// Returns the median of the steps forward; `None` if there are fewer than two.
@@ -271,7 +275,9 @@ fn is_serial_days(values: &[f64]) -> bool {
 /// True if the values increase in fractions of a second; whole numbers may be a count.
 fn runs_in_seconds(values: &[f64]) -> bool {
     let in_fractions = values.iter().any(|value| value.fract() != 0.0);
-    rises(values) && in_fractions && median_step(values).is_some_and(|step| (1.0 / MOST_HZ..=1.0).contains(&step))
+    is_increasing(values)
+        && in_fractions
+        && median_step(values).is_some_and(|step| (1.0 / MAX_HZ..=1.0).contains(&step))
 }
 
 /// Infers the unit of times whose unit is not stated.
@@ -287,13 +293,13 @@ fn unit_of(values: &[f64]) -> Unit {
     if !values.iter().all(|value| value.fract() == 0.0) {
         return Unit::Power(0);
     }
-    let Some(step) = median_step(values).filter(|step| *step >= STEP_OF_NO_SECONDS) else {
+    let Some(step) = median_step(values).filter(|step| *step >= MIN_NON_SECOND_STEP) else {
         return Unit::Power(0);
     };
     // Sample times from 0.5 ms to 0.5 s are assumed; each unit then covers its own three decades of steps.
     let power = [-3, -6, -9].into_iter().find(|power| {
         let seconds = step * 10_f64.powi(*power);
-        (1.0 / MOST_HZ..1000.0 / MOST_HZ).contains(&seconds)
+        (1.0 / MAX_HZ..1000.0 / MAX_HZ).contains(&seconds)
     });
     Unit::Power(power.unwrap_or(0))
 }

@@ -18,11 +18,11 @@ use std::{
 
 use serde::Deserialize;
 
-use super::{folder::Stem, run_start::APPENDED};
+use super::{folder::Stem, run_start::APPENDED_FILES};
 use crate::LabError;
 
 /// Maximum time until appended data are flushed to the disk.
-const SYNC: Duration = Duration::from_millis(900);
+const SYNC_INTERVAL: Duration = Duration::from_millis(900);
 
 /// An event of the input device.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -121,9 +121,9 @@ impl RunLog {
         };
         Ok(Self {
             files: [
-                make(APPENDED[0], headers[0])?,
-                make(APPENDED[1], headers[1])?,
-                make(APPENDED[2], headers[2])?,
+                make(APPENDED_FILES[0], headers[0])?,
+                make(APPENDED_FILES[1], headers[1])?,
+                make(APPENDED_FILES[2], headers[2])?,
             ],
             whole: headers.map(|header| header.len() as u64),
             synced: Instant::now(),
@@ -179,7 +179,7 @@ impl RunLog {
             *whole = whole.saturating_add(text.len() as u64);
         }
         self.logged = end;
-        if self.synced.elapsed() > SYNC {
+        if self.synced.elapsed() > SYNC_INTERVAL {
             self.sync()?;
         }
         Ok(())

@@ -17,7 +17,7 @@ use super::kernel::Kernel;
 use crate::{ModelError, SampleTime};
 
 /// Maximum number of samples on each side of the filter in a stream.
-const LONGEST: usize = 1_000_000;
+const MAX_HALF_LENGTH: usize = 1_000_000;
 
 /// Decimator of C channels together.
 #[derive(Debug, Clone)]
@@ -60,7 +60,7 @@ impl<const C: usize> Decimator<C> {
     /// [`ModelError::Decimation`] for an invalid factor.
     pub fn new(factor: usize, sample_time: SampleTime, held: [bool; C]) -> Result<Self, ModelError> {
         let found = (factor > 1)
-            .then(|| Decimated::by(factor, sample_time, LONGEST))
+            .then(|| Decimated::by(factor, sample_time, MAX_HALF_LENGTH))
             .flatten();
         let Some((done, kernel, new)) = found else {
             return Err(ModelError::Decimation {
@@ -144,7 +144,7 @@ impl<const C: usize> Decimator<C> {
         let at = self.output_count * factor;
         let found = self.lanes.each_mut().map(|lane| {
             let value = lane.value(at, factor);
-            lane.forget(at + factor, half);
+            lane.discard_before(at + factor, half);
             value
         });
         self.output_count += 1;
@@ -194,7 +194,7 @@ impl DecimatedChannel {
     }
 
     /// Discards the samples that the value at `next` and later values do not need.
-    fn forget(&mut self, next: u64, half: usize) {
+    fn discard_before(&mut self, next: u64, half: usize) {
         while self.first < next as i64 - half as i64 && self.past.pop_front().is_some() {
             self.first += 1;
         }

@@ -26,7 +26,7 @@ const HALF_TRANSITION: f64 = 0.1;
 pub const PASS: f64 = 0.8;
 
 /// Distance from an integer, in samples, up to which the difference counts as rounding.
-const WHOLE: f64 = 1e-9;
+const INTEGER_TOLERANCE: f64 = 1e-9;
 
 /// Continuous impulse response of a low-pass filter, in samples of the record.
 #[derive(Debug, Clone, Copy)]
@@ -102,7 +102,7 @@ impl Kernel {
             .map(|k| {
                 let t = first + k as f64 * step;
                 // A time that equals a sample up to rounding is treated as that sample.
-                let whole = (t - t.round()).abs() < WHOLE;
+                let whole = (t - t.round()).abs() < INTEGER_TOLERANCE;
                 let at = if whole { t.round() } else { t.floor() };
                 let fraction = if whole { 0.0 } else { t - at };
                 // The initial value of `known` is NaN, which differs from every fraction.

@@ -26,7 +26,7 @@ fn record(hz: f64, n: usize, e: impl Fn(f64) -> f64, u: impl Fn(f64) -> f64) -> 
 }
 
 /// Largest deviation from a function of time, except near the ends, where the reflection has an effect.
-fn farthest(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> f64 {
+fn max_deviation(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> f64 {
     let edge = 30;
     (edge..values.len() - edge)
         .map(|k| (values[k] - f(k as f64 * ts + lead)).abs())
@@ -51,7 +51,7 @@ fn sum_of_sines_is_preserved_at_the_new_rate() {
             (found.output(), 0.0, 2.0),
             (found.channel("f_t").unwrap(), 0.0, 2.0),
         ] {
-            let error = farthest(values, ts, lead, |t| times * slow(t)) / times;
+            let error = max_deviation(values, ts, lead, |t| times * slow(t)) / times;
             assert!(error < 6e-4, "{hz} Hz: {error:e}");
         }
     }
@@ -90,7 +90,7 @@ fn aliasing_frequencies_are_removed() {
         .decimated(10)
         .unwrap();
         for values in [found.input(), found.output()] {
-            assert!(farthest(values, 0.01, 0.0, |_| 0.0) < 1e-4, "{hz}");
+            assert!(max_deviation(values, 0.01, 0.0, |_| 0.0) < 1e-4, "{hz}");
         }
     }
 }

@@ -17,7 +17,7 @@ const WIDE_DECADE: f64 = 95.0;
 /// Width of a tick label with the space to its neighbour.
 const TICK_WIDTH: f64 = 34.0;
 /// Smallest number that the library draws on a logarithmic axis.
-const LEAST: f64 = 1e-10;
+const MIN_LOG_VALUE: f64 = 1e-10;
 
 /// Tick spacing of 1, 2 or 5 times a power of ten that gives at most `most` intervals.
 pub fn tick_step(span: f64, most: f64) -> f64 {
@@ -142,7 +142,9 @@ pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool,
 /// Range of a logarithmic axis that contains these values, with ends at 1, 2 or 5 times a power of ten. The range is
 /// 0.1 to 1 if no value can be drawn.
 pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
-    let drawable = values.into_iter().filter(|v| style::is_drawable(*v) && *v >= LEAST);
+    let drawable = values
+        .into_iter()
+        .filter(|v| style::is_drawable(*v) && *v >= MIN_LOG_VALUE);
     let start = (f64::INFINITY, 0.0_f64);
     let (low, high) = drawable.fold(start, |(l, h), v| (l.min(v), h.max(v)));
     if low > high {

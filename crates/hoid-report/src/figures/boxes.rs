@@ -27,10 +27,10 @@ const COUNTS: f64 = 13.0;
 const NAMES_BELOW: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
 /// Fraction of the width of a group that its boxes occupy; `BOX` is the width of a box as a fraction of its place, and
-/// `WIDEST` the largest width.
+/// `MAX_BOX_WIDTH` the largest width.
 const GROUP: f64 = 0.86;
 const BOX: f64 = 0.8;
-const WIDEST: f64 = 26.0;
+const MAX_BOX_WIDTH: f64 = 26.0;
 
 /// Range of the ordinate of box plots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -208,7 +208,7 @@ impl BoxGrid {
             ));
         }
         let pitch = GROUP * of_group / self.series.len().max(1) as f64;
-        let half = 0.5 * (BOX * pitch).min(WIDEST);
+        let half = 0.5 * (BOX * pitch).min(MAX_BOX_WIDTH);
         let (mut above, mut below, mut missing) = (0, 0, false);
         for group in 0..self.groups.len() {
             let start = area.left + of_group * (group as f64 + 0.5 * (1.0 - GROUP));
@@ -345,9 +345,9 @@ mod tests {
         let svg = box_plots("b", "t", &grid(vec![vec![one]]));
         let y = |v: f64| 8.0 + SINGLE_PANEL_HEIGHT * (10.5 - v) / 11.0;
         let middle = style::LEFT + 0.5 * (style::WIDTH - style::LEFT - style::RIGHT);
-        let side = middle - 0.5 * WIDEST;
+        let side = middle - 0.5 * MAX_BOX_WIDTH;
         let height = SINGLE_PANEL_HEIGHT * 6.0 / 11.0;
-        let rect = [("x", side), ("y", y(8.0)), ("width", WIDEST), ("height", height)];
+        let rect = [("x", side), ("y", y(8.0)), ("width", MAX_BOX_WIDTH), ("height", height)];
         assert!(has(&svg, "rect", &rect), "{svg}");
         let line = |from: (f64, f64), to: (f64, f64)| {
             has(
@@ -358,7 +358,7 @@ mod tests {
         };
         assert!(line((middle, y(2.0)), (middle, y(0.0))), "lower whisker");
         assert!(line((middle, y(8.0)), (middle, y(9.0))), "upper whisker");
-        assert!(line((side, y(5.0)), (side + WIDEST, y(5.0))), "median");
+        assert!(line((side, y(5.0)), (side + MAX_BOX_WIDTH, y(5.0))), "median");
         assert!(has(&svg, "circle", &[("cx", middle), ("cy", y(10.0))]), "outlier");
         // The ordinate of the library agrees: its tick at 2 is at the height of the lower quartile.
         assert!(line((style::LEFT - 5.0, y(2.0)), (style::LEFT, y(2.0))), "tick");

@@ -17,9 +17,9 @@ use super::{
     svg,
 };
 
-/// Height of a cell; `LEAST_HEIGHT` is the smallest height of a panel.
+/// Height of a cell; `MIN_PANEL_HEIGHT` is the smallest height of a panel.
 const CELL: f64 = 26.0;
-const LEAST_HEIGHT: f64 = 78.0;
+const MIN_PANEL_HEIGHT: f64 = 78.0;
 /// Distance between the axis and the name of the ordinate.
 const NAME_AT: f64 = 26.0;
 /// Smallest space between category names.
@@ -76,7 +76,7 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
     if n == 0 || nx == 0 || ny == 0 {
         return frame::empty(id, title);
     }
-    let height = (CELL * ny as f64).max(LEAST_HEIGHT);
+    let height = (CELL * ny as f64).max(MIN_PANEL_HEIGHT);
     let frame = Frame::with_space(
         n,
         columns,

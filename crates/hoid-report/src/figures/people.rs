@@ -26,7 +26,7 @@ const PEOPLE: (f64, f64) = (0.18, 0.6);
 const MEAN: f64 = 0.78;
 /// Maximum number of people with individual colours; larger groups are drawn in grey, with one legend entry for all
 /// people.
-const COLOURED: usize = 6;
+const MAX_COLOURED_PEOPLE: usize = 6;
 
 /// Estimate for a person in a category, with its standard error if known; `None` if there is no estimate.
 pub type CategoryEstimate = Option<(f64, Option<f64>)>;
@@ -87,7 +87,7 @@ pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
             grid.add_names(&mut scene, frame.area(i));
         }
     }
-    let mut entries: Vec<Entry> = match grid.people.len() <= COLOURED {
+    let mut entries: Vec<Entry> = match grid.people.len() <= MAX_COLOURED_PEOPLE {
         true => (grid.people.iter().enumerate())
             .map(|(i, name)| Entry::new(name, &colour(i, grid.people.len()), Sample::LineMark(Mark::Circle)))
             .collect(),
@@ -99,7 +99,7 @@ pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
 }
 
 fn colour(person: usize, people: usize) -> String {
-    if people <= COLOURED {
+    if people <= MAX_COLOURED_PEOPLE {
         Shade::of_method(person).colour()
     } else {
         GREY.to_owned()

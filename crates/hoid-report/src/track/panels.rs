@@ -186,7 +186,7 @@ fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
         method,
         level: 0,
         times_s: t.section.trace.times_s().to_vec(),
-        values: sigmas(t),
+        values: innovation_standard_deviations(t),
         band: Vec::new(),
     };
     TracePanel {
@@ -198,7 +198,7 @@ fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
 }
 
 /// Standard deviation of the innovation in each row.
-fn sigmas(t: &Evaluated<'_>) -> Vec<f64> {
+fn innovation_standard_deviations(t: &Evaluated<'_>) -> Vec<f64> {
     let variances = t.section.trace.innovation_variance().iter();
     variances.map(|v| if *v >= 0.0 { v.sqrt() } else { f64::NAN }).collect()
 }
@@ -308,7 +308,7 @@ fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -
 pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     let panel = |(method, t): (usize, &Evaluated<'_>)| {
         let trace = t.section.trace;
-        let sigma = sigmas(t);
+        let sigma = innovation_standard_deviations(t);
         let typical = quantile_of(&sigma, 0.9).unwrap_or(0.0);
         let sizes: Vec<f64> = trace.innovation().iter().map(|e| e.abs()).collect();
         let reach = (4.0 * typical).max(quantile_of(&sizes, 0.99).unwrap_or(0.0));

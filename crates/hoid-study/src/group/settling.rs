@@ -34,14 +34,14 @@ const FIGURES: [&str; 7] = [
 
 /// Results of single runs: times of the change, and noise of each parameter.
 #[derive(Debug, Clone, Default)]
-struct OfRuns {
+struct RunResults {
     change_s: Vec<f64>,
     noise: BTreeMap<String, Vec<f64>>,
 }
 
 /// Results of the runs with a change, by subject, condition and estimator.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Settling(BTreeMap<[String; 3], OfRuns>);
+pub(super) struct Settling(BTreeMap<[String; 3], RunResults>);
 
 /// Returns the rows in the second half of a time interval.
 fn second_half(times: &[f64], from_s: f64, to_s: f64) -> Vec<usize> {

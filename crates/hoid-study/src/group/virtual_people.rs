@@ -66,7 +66,7 @@ impl Default for PeopleExperiment {
 /// Columns of a file, except t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
 /// Columns of `truth.csv` for true values other than the parameters, and for settings of the recording.
-const OTHERS: [&str; 7] = [
+const OTHER_COLUMNS: [&str; 7] = [
     "crossover_rad_s",
     "phase_margin_deg",
     "remnant_share",
@@ -189,7 +189,7 @@ fn truth_schema() -> TableSchema {
         columns: [
             of(ColumnKind::Text, &texts),
             of(ColumnKind::Real, &PARAMETERS.map(|(name, _)| name)),
-            of(ColumnKind::Real, &OTHERS),
+            of(ColumnKind::Real, &OTHER_COLUMNS),
         ]
         .concat(),
     }

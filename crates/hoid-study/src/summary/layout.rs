@@ -46,7 +46,7 @@ pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSc
 }
 
 /// Starts a row with the settings of the cell and the estimator.
-pub(super) fn begin_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
+pub(super) fn start_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
     let scenario = cell.resolved.scenario();
     rows.begin();
     rows.whole("cell", cell.index);

@@ -39,9 +39,9 @@ pub(crate) fn write_traces(
         ("estimator".to_owned(), ColumnKind::Text),
     ];
     columns.extend(["t", "count"].map(|name| (name.to_owned(), ColumnKind::Real)));
-    const OF_A_PARAMETER: [&str; 5] = ["mean", "sd", "lower_quartile", "median", "upper_quartile"];
+    const PARAMETER_STATISTICS: [&str; 5] = ["mean", "sd", "lower_quartile", "median", "upper_quartile"];
     for name in &names {
-        columns.extend(OF_A_PARAMETER.map(|figure| (format!("{name}_{figure}"), ColumnKind::Real)));
+        columns.extend(PARAMETER_STATISTICS.map(|figure| (format!("{name}_{figure}"), ColumnKind::Real)));
     }
     let schema = schema(plan, columns);
     let mut writer = TableWriter::create(path, &schema)?;

@@ -8,7 +8,7 @@ use hoid_model::SampleTime;
 use nalgebra::{DMatrix, DVector};
 
 /// Highest order of the approximation.
-pub(super) const HIGHEST: usize = 3;
+pub(super) const MAX_ORDER: usize = 3;
 
 /// Returns the coefficients c_0 to c_n.
 fn coefficients(order: usize) -> Vec<f64> {

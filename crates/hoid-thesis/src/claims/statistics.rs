@@ -16,7 +16,7 @@ const GROUPS: usize = 10;
 pub(super) const SMALLEST_VALID_SHARE: f64 = 0.5;
 
 /// Missing value, used if too few replications give a value.
-pub(super) const NOTHING: Value = Value {
+pub(super) const NO_VALUE: Value = Value {
     value: f64::NAN,
     error: f64::NAN,
 };
@@ -27,14 +27,14 @@ pub(super) fn magnitudes(values: &[f64]) -> Vec<f64> {
 }
 
 /// True if the share of replications that give a value is at least [`SMALLEST_VALID_SHARE`].
-fn enough(values: &[f64]) -> bool {
+fn has_enough_values(values: &[f64]) -> bool {
     let finite = values.iter().filter(|v| v.is_finite()).count();
     finite > 0 && finite as f64 >= SMALLEST_VALID_SHARE * values.len() as f64
 }
 
 fn value_of(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
-    if !enough(values) {
-        return NOTHING;
+    if !has_enough_values(values) {
+        return NO_VALUE;
     }
     let (value, error) = figure(&Statistics::of(values));
     Value {
@@ -63,7 +63,11 @@ pub(super) fn share_of(values: &[f64]) -> Value {
 
 /// The median; NaN if there are not enough values.
 pub(super) fn med(values: &[f64]) -> f64 {
-    if enough(values) { median(values) } else { f64::NAN }
+    if has_enough_values(values) {
+        median(values)
+    } else {
+        f64::NAN
+    }
 }
 
 /// The magnitude of the median.
@@ -78,7 +82,7 @@ pub(super) fn median_magnitude(values: &[f64]) -> f64 {
 
 /// The interquartile range.
 pub(super) fn interquartile_range(values: &[f64]) -> f64 {
-    if !enough(values) {
+    if !has_enough_values(values) {
         return f64::NAN;
     }
     let s = Statistics::of(values);

@@ -50,7 +50,7 @@ const MIDPOINT: usize = 4;
 /// Number of members that are kept unchanged.
 const ELITE: usize = 2;
 /// Number of members drawn in the tournament for each parent.
-const DRAWN: usize = 3;
+const TOURNAMENT_SIZE: usize = 3;
 /// Distance beyond the parents within which a gene may lie, as a fraction of the distance between the parents.
 const BLEND: f64 = 0.5;
 
@@ -102,7 +102,7 @@ impl GeneticSigmoid {
             .collect();
         for generation in 1..=self.generations {
             all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-            let mut numbers = drawn(generation, self.population * (2 * DRAWN + 4 * N));
+            let mut numbers = drawn(generation, self.population * (2 * TOURNAMENT_SIZE + 4 * N));
             let mut next = || numbers.next().unwrap_or_default();
             // The population contracts around the optimum, and the mutations become smaller accordingly.
             let size = 0.3 * (1.0 - generation as f64 / (self.generations + 1) as f64);
@@ -110,7 +110,7 @@ impl GeneticSigmoid {
             while children.len() < all.len() {
                 // The members are sorted, so the smallest index denotes the best member.
                 let mut parent = || {
-                    let places = (0..DRAWN).map(|_| (next() * all.len() as f64) as usize);
+                    let places = (0..TOURNAMENT_SIZE).map(|_| (next() * all.len() as f64) as usize);
                     all[places.min().unwrap_or(0).min(all.len() - 1)]
                 };
                 let (a, b) = (parent(), parent());

@@ -13,7 +13,7 @@ use crate::ThesisError;
 /// of 81.92 s.
 const SHARE: f64 = 0.375;
 /// Number of samples between stored estimates.
-const EVERY: usize = 32;
+const STORED_SAMPLE_INTERVAL: usize = 32;
 /// Memory length and initial covariance P0, as in section V.B.
 const SETTINGS: [(&str, &str); 2] = [("memory", "256"), ("covariance", "0.1")];
 
@@ -187,7 +187,7 @@ fn course(record: &Record, start: &Fit) -> Result<RecursiveTrace, ThesisError> {
         start: StartAt::Span(Some(spans_s(record)[0])),
         ..options.with(&SETTINGS)?
     };
-    let trace = track_from(record, &options, EVERY, Some(start))?;
+    let trace = track_from(record, &options, STORED_SAMPLE_INTERVAL, Some(start))?;
     let places = places(&orders);
     let mut course = RecursiveTrace::default();
     for row in 0..trace.len() {

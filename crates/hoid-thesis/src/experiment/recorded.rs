@@ -23,7 +23,7 @@ const NEAR_CROSSOVER_RAD_S: f64 = 2.0;
 /// Limit between the slopes of a single and a double integrator.
 const SLOPE_BETWEEN: f64 = -1.5;
 /// Limit for the duration of the middle 80 % of a sudden change, s.
-const SUDDEN_S: f64 = 1.0;
+const MAX_SUDDEN_S: f64 = 1.0;
 
 /// Recordings of people that are evaluated.
 #[derive(Debug, Clone)]
@@ -201,7 +201,7 @@ fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
     };
     let is_sudden = facts
         .change_per_s
-        .is_none_or(|rate| 2.0 * 9.0_f64.ln() / rate < SUDDEN_S);
+        .is_none_or(|rate| 2.0 * 9.0_f64.ln() / rate < MAX_SUDDEN_S);
     match (is_double(before)?, is_double(after)?, is_sudden) {
         (false, true, false) => Ok(Condition::C3),
         (false, true, true) => Ok(Condition::C4),

@@ -12,9 +12,9 @@ use hoid::report::{numbers, sentence_of_operator, undetermined};
 use crate::{error::CliError, text};
 
 /// The delay for an error that is linear between its samples is printed in addition to tau_e only if the two delays
-/// differ by at least this number of standard errors of tau_e; `LEAST_HALF_S` is the smallest such difference in s.
-const STRAIGHT_ERRORS: f64 = 2.0;
-const LEAST_HALF_S: f64 = 0.007;
+/// differ by at least this number of standard errors of tau_e; `MIN_HALF_S` is the smallest such difference in s.
+const MIN_DIFFERENCE_ERRORS: f64 = 2.0;
+const MIN_HALF_S: f64 = 0.007;
 
 /// Frequencies in rad/s at which the product of the response to the target and the response of the controlled element
 /// is printed.
@@ -180,7 +180,7 @@ impl FamilyReport<'_> {
             };
         };
         let half = straight - tau.value;
-        if half < LEAST_HALF_S || half < STRAIGHT_ERRORS * tau.standard_error.unwrap_or(f64::INFINITY) {
+        if half < MIN_HALF_S || half < MIN_DIFFERENCE_ERRORS * tau.standard_error.unwrap_or(f64::INFINITY) {
             return String::new();
         }
         format!(

@@ -14,7 +14,7 @@ use std::{
 };
 
 use super::{
-    Draw, Summary, last_words, sample,
+    Draw, Summary, remaining_output, sample,
     udp::{Stream, as_struct},
 };
 
@@ -124,6 +124,6 @@ pub fn over_pipes(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw, pau
     Tally {
         sent: n,
         trips: received.into_iter().zip(sent).map(|(at, sent)| at - sent).collect(),
-        summary: Summary::of(&last_words(&mut child, &mut said)),
+        summary: Summary::of(&remaining_output(&mut child, &mut said)),
     }
 }

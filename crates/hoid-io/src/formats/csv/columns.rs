@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::text::{comments, escape_formula, is_aside, place, reader, row_start, separator, text, unescape_formula};
+use super::text::{
+    comments, escape_formula, is_comment_or_blank, place, reader, row_start, separator, text, unescape_formula,
+};
 use crate::IoError;
 use crate::formats::format::RowWriter;
 use crate::results::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};
@@ -87,7 +89,7 @@ impl CsvColumns {
 /// Reads the columns from the bytes of a CSV file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
     let text = text(bytes, file)?;
-    let mut lines = text.lines().filter(|line| !is_aside(line));
+    let mut lines = text.lines().filter(|line| !is_comment_or_blank(line));
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };

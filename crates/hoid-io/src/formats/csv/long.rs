@@ -11,8 +11,8 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::foreign::made_plain;
-use super::line_limit::{LONGEST, LineLimit};
+use super::foreign::converted_to_plain_csv;
+use super::line_limit::{LineLimit, MAX_LINE_BYTES};
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::span_end::SpanEnd;
 use super::table::{Parsed, nth_row, parsed};
@@ -23,10 +23,10 @@ use crate::time::{is_time, is_time_unit, may_be_time};
 use crate::wording::shown;
 
 /// Minimum size, in bytes, of a file that is read block by block.
-const LONG: u64 = 16 << 20;
+const MIN_LONG_FILE_BYTES: u64 = 16 << 20;
 /// Number of bytes read to obtain the header and the first rows.
 const HEAD: usize = 256 << 10;
-/// Size of the first block in bytes; each further block is twice as long as the previous block, up to [`LONGEST`].
+/// Size of the first block in bytes; each further block is twice as long as the previous block, up to [`MAX_LINE_BYTES`].
 const BLOCK: usize = 1 << 20;
 /// Number of positions in the unread part of a file at which the time is probed.
 const PROBES: u32 = 64;
@@ -38,7 +38,7 @@ const PROBE: usize = 64 << 10;
 /// # Errors
 /// [`IoError::Unreadable`]; [`IoError::LongLine`].
 pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> Result<Option<Table<'a>>, IoError> {
-    of_length(path, file, options, LONG)
+    of_length(path, file, options, MIN_LONG_FILE_BYTES)
 }
 
 /// Reads the table of a text of at least `long` bytes.
@@ -163,7 +163,7 @@ impl Text {
         }
         // If the head is rewritten, the rest of the text may need the same changes.
         let found = bytes.clone();
-        if !made_plain(&mut bytes).is_empty() || bytes != found {
+        if !converted_to_plain_csv(&mut bytes).is_empty() || bytes != found {
             return Ok(None);
         }
         self.file.seek(SeekFrom::Start(self.at as u64))?;
@@ -196,7 +196,7 @@ impl Text {
                 source,
             })?;
             self.at = self.at.saturating_add(read);
-            self.next = self.next.saturating_mul(2).min(LONGEST);
+            self.next = self.next.saturating_mul(2).min(MAX_LINE_BYTES);
             limit.add(self.buffer.get(from..).unwrap_or_default(), file)?;
             let mut new = self.buffer.iter().enumerate().skip(from);
             let line = new.rfind(|(_, byte)| matches!(byte, b'\n' | b'\r'));
@@ -265,7 +265,7 @@ impl LongSource<'_> {
         // The bytes read end at the next row with a known position, or a fixed length after the start of the last row.
         let end = self
             .starts
-            .before(row.saturating_add(RowStarts::KEPT))
+            .before(row.saturating_add(RowStarts::KEPT_ROW_INTERVAL))
             .map_or(self.starts.last()?.saturating_add(PROBE), |next| next.0);
         let mut bytes = Vec::new();
         file.take(end.saturating_sub(from) as u64)

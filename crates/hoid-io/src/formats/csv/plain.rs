@@ -15,13 +15,13 @@ use crate::table::Precision;
 
 /// Size, in bytes, of a part that one thread reads: large enough to justify a thread, and small compared with the
 /// columns.
-const PART: usize = 4 << 20;
+const PART_BYTES: usize = 4 << 20;
 /// Size in bytes of the first part, which is read without a thread; it contains a row that is not plain if such rows
 /// are frequent.
-const FIRST: usize = 64 << 10;
+const FIRST_PART_BYTES: usize = 64 << 10;
 /// Maximum number of threads.
 const THREADS: usize = 8;
-/// Positions of rows in the text of a table: of every [`KEPT`](RowStarts::KEPT)-th row and of the last row.
+/// Positions of rows in the text of a table: of every [`KEPT_ROW_INTERVAL`](RowStarts::KEPT)-th row and of the last row.
 #[derive(Debug, Default)]
 pub(super) struct RowStarts {
     kept: Vec<usize>,
@@ -31,11 +31,11 @@ pub(super) struct RowStarts {
 
 impl RowStarts {
     /// Interval between rows whose position is kept.
-    pub(super) const KEPT: usize = 1024;
+    pub(super) const KEPT_ROW_INTERVAL: usize = 1024;
 
     /// Adds the position of the next row.
     pub(super) fn push(&mut self, start: usize) {
-        if self.rows.is_multiple_of(Self::KEPT) {
+        if self.rows.is_multiple_of(Self::KEPT_ROW_INTERVAL) {
             self.kept.push(start);
         }
         self.rows = self.rows.saturating_add(1);
@@ -54,7 +54,10 @@ impl RowStarts {
 
     /// Returns the kept position of the nearest row at or before `row`, and the number of rows from that row to `row`.
     pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
-        Some((*self.kept.get(row / Self::KEPT)?, row % Self::KEPT))
+        Some((
+            *self.kept.get(row / Self::KEPT_ROW_INTERVAL)?,
+            row % Self::KEPT_ROW_INTERVAL,
+        ))
     }
 }
 
@@ -86,7 +89,7 @@ pub(super) struct Layout<'a> {
 pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take: impl FnMut(Plain)) -> usize {
     let threads = thread::available_parallelism().map_or(1, |n| n.get().min(THREADS));
     let mut at = from;
-    let first = from..end_of_part(bytes, from, FIRST);
+    let first = from..end_of_part(bytes, from, FIRST_PART_BYTES);
     if !first.is_empty() {
         let run = run(bytes, first.clone(), layout);
         at = run.end;
@@ -99,7 +102,7 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
         let mut parts: Vec<Range<usize>> = Vec::with_capacity(threads);
         let mut start = at;
         while parts.len() < threads && start < bytes.len() {
-            let end = end_of_part(bytes, start, PART);
+            let end = end_of_part(bytes, start, PART_BYTES);
             parts.push(start..end);
             start = end;
         }

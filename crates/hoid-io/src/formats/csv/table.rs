@@ -19,7 +19,7 @@ use std::ops::Range;
 use super::foreign::mismatch;
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::text::{
-    comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, row_start, separator, text,
+    comments, has_decimal_commas, is_comment_or_blank, is_unit, open_line, place, reader, row_start, separator, text,
     unescape_formula,
 };
 use crate::IoError;
@@ -122,7 +122,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
 
 /// Reads the columns of a text.
 pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
-    let mut lines = text.lines().filter(|line| !is_aside(line));
+    let mut lines = text.lines().filter(|line| !is_comment_or_blank(line));
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };
@@ -209,7 +209,7 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
 }
 
 /// Number of rows that the full CSV reader reads before the fast reader is tried again.
-const WHOLE: usize = 256;
+const FULL_READER_ROWS: usize = 256;
 
 /// Reader that adds the rows of a text to the columns of a table.
 struct Rows<'a> {
@@ -255,12 +255,12 @@ impl Rows<'_> {
         })
     }
 
-    /// Reads at most [`WHOLE`] rows starting at position `from` with the full CSV reader; returns the position of the
+    /// Reads at most [`FULL_READER_ROWS`] rows starting at position `from` with the full CSV reader; returns the position of the
     /// next row.
     fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
         let mut reader = reader(self.bytes.get(from..).unwrap_or_default(), self.separator);
         let mut record = csv::ByteRecord::new();
-        for _ in 0..WHOLE {
+        for _ in 0..FULL_READER_ROWS {
             if !matches!(reader.read_byte_record(&mut record), Ok(true)) {
                 return Ok(self.bytes.len());
             }
@@ -315,10 +315,10 @@ impl Rows<'_> {
 }
 
 /// Number of lines whose last cells are compared with the last number of the file.
-const COMPARED: usize = 8;
+const COMPARED_LINES: usize = 8;
 
 /// Detects a truncated last number and returns a note; `None` unless the last line has no line end, its last cell is at
-/// least two characters shorter than the last cell of each of the [`COMPARED`] lines before, and these all have a
+/// least two characters shorter than the last cell of each of the [`COMPARED_LINES`] lines before, and these all have a
 /// decimal point.
 fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
     let last_cell = |row: usize| {
@@ -331,7 +331,7 @@ fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
                 .trim(),
         )
     };
-    let compared = last.checked_sub(COMPARED)?;
+    let compared = last.checked_sub(COMPARED_LINES)?;
     let cut = last_cell(last)?;
     let length = cut.len().saturating_add(1);
     let is_longer = |row: usize| last_cell(row).is_some_and(|cell| cell.contains('.') && cell.len() > length);

@@ -62,7 +62,7 @@ pub(crate) fn reader(bytes: &[u8], separator: u8) -> csv::Reader<&[u8]> {
         .from_reader(bytes)
 }
 
-pub(crate) fn is_aside(line: &str) -> bool {
+pub(crate) fn is_comment_or_blank(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with('#')
 }
 
@@ -105,7 +105,7 @@ pub(crate) fn has_decimal_commas(text: &str, separator: u8) -> bool {
     if quoted
         && !text
             .lines()
-            .filter(|line| !is_aside(line))
+            .filter(|line| !is_comment_or_blank(line))
             .nth(1)
             .is_some_and(|row| row.contains('"'))
     {
@@ -135,7 +135,7 @@ fn may_be_thousands(cell: &str) -> bool {
 
 /// Returns the comment lines above the header without the leading `#`.
 pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
-    let lines = text.lines().take_while(|line| is_aside(line));
+    let lines = text.lines().take_while(|line| is_comment_or_blank(line));
     lines.filter_map(|line| line.strip_prefix('#'))
 }
 

@@ -8,7 +8,7 @@ use super::elements::{Elements, HEADER, data};
 use super::objects::object;
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
-use crate::formats::budget::{Budget, MOST_NESTED};
+use crate::formats::budget::{Budget, MAX_NESTING};
 use crate::wording::{short_error, shown};
 
 const CELL: u32 = 1;
@@ -160,8 +160,8 @@ impl Reader<'_> {
         let dims: Vec<usize> = parts.u32s(dims).iter().map(|side| *side as usize).collect();
         let count = dims.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));
         let count = count.ok_or_else(|| format!("an array of {}", shown(&format!("{dims:?}"))))?;
-        if dims.len() > MOST_NESTED {
-            return Err(format!("an array of {} dimensions, expected at most {MOST_NESTED}", dims.len()).into());
+        if dims.len() > MAX_NESTING {
+            return Err(format!("an array of {} dimensions, expected at most {MAX_NESTING}", dims.len()).into());
         }
         let name = name(parts.next()?.bytes)?;
         // An element without a name is not a variable: MATLAB stores the parts of objects in such elements.
@@ -309,8 +309,8 @@ impl Reader<'_> {
 }
 
 fn deeper(place: VariablePath<'_>) -> Result<usize, Stop> {
-    if place.depth == MOST_NESTED {
-        return Err(format!("structures nested more than {MOST_NESTED} deep").into());
+    if place.depth == MAX_NESTING {
+        return Err(format!("structures nested more than {MAX_NESTING} deep").into());
     }
     Ok(place.depth.saturating_add(1))
 }

@@ -30,7 +30,7 @@ enum Literal {
 }
 
 /// Maximum nesting of sequences; a shape in a field in a list needs three levels.
-const DEEPEST: usize = 6;
+const MAX_NESTING: usize = 6;
 
 /// Parses the header text, which lies between the length and the data.
 pub(super) fn parse(text: &str) -> Option<Header> {
@@ -128,7 +128,7 @@ impl Reader<'_> {
                 self.token(first)?;
                 let mut items = Vec::new();
                 while self.token(end).is_none() {
-                    if depth == DEEPEST {
+                    if depth == MAX_NESTING {
                         return None;
                     }
                     items.push(self.literal(depth.saturating_add(1))?);

@@ -28,7 +28,7 @@ use crate::wording::{short_error, shown, start_of};
 /// Magic bytes at the start and the end of a file.
 const MAGIC: &[u8; 4] = b"PAR1";
 /// Maximum number of rows (a month at 100 samples/s); files with more rows are refused before they exhaust the memory.
-const MOST_ROWS: usize = 1 << 28;
+const MAX_ROWS: usize = 1 << 28;
 const TIME: &str = "a date or time";
 /// Number of ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
@@ -37,7 +37,7 @@ const MILLI: i64 = 1_000_000;
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
 /// Number of values read at a time.
-const PART: usize = 1 << 16;
+const VALUES_PER_READ: usize = 1 << 16;
 
 /// Reads the columns from the bytes of a file.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
@@ -81,10 +81,10 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     let footer = reader.metadata().file_metadata();
     let count = |rows: i64| usize::try_from(rows).map_err(|_| damaged(format!("it states {rows} rows")));
     let rows = count(footer.num_rows())?;
-    if rows > MOST_ROWS {
+    if rows > MAX_ROWS {
         return Err(IoError::Unsupported {
             file: file.to_owned(),
-            found: format!("it holds {rows} rows, more than {MOST_ROWS}"),
+            found: format!("it holds {rows} rows, more than {MAX_ROWS}"),
             remedy: "write it in parts",
         });
     }
@@ -253,7 +253,7 @@ impl ColumnPath<'_> {
         while values.len() < end {
             levels.clear();
             stored.clear();
-            let wanted = PART.min(end.saturating_sub(values.len()));
+            let wanted = VALUES_PER_READ.min(end.saturating_sub(values.len()));
             let (rows, ..) = reader.read_records(wanted, Some(&mut levels), None, &mut stored)?;
             if rows != wanted {
                 let missing = end.saturating_sub(values.len()).saturating_sub(rows);

@@ -35,7 +35,7 @@ const LOST_SAMPLES: f64 = 4.0;
 /// Number of samples on each side of a step from whose medians the lateness is computed.
 const SAMPLES_PER_SIDE: usize = 25;
 /// Relative deviation of the sampling rate from the nominal rate above which the deviation is reported.
-const OFF: f64 = 0.02;
+const MAX_RATE_DEVIATION: f64 = 0.02;
 
 /// Returns the times of the samples, s.
 pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
@@ -56,7 +56,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
         ),
     };
     let nominal_hz = stream.header.nominal_hz;
-    if nominal_hz <= 0.0 || stream.header.can_drop {
+    if nominal_hz <= 0.0 || stream.header.may_drop_samples {
         notes.push(format!(
             "stream {name}: {resets}; its time stamps are kept, because they are not evenly spaced"
         ));
@@ -64,7 +64,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     }
     let longest = BREAK_S.max(BREAK_SAMPLES * stream.nominal_step_s());
     let (parts, effective_hz) = straighten(&mut times, longest, stream.nominal_step_s());
-    if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > OFF) {
+    if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > MAX_RATE_DEVIATION) {
         notes.push(format!(
             "stream {name}: the time stamps give {hz:.4} Hz, but the stated rate is {nominal_hz} Hz: samples are lost at \
              regular intervals, or the stated rate is wrong"

@@ -6,7 +6,7 @@ use super::{coefficients::EXAMPLES, ratio::Ratio};
 /// rounding.
 const HIGHEST_DEGREE: usize = 50;
 /// Largest depth of nested parentheses.
-const DEEPEST: usize = 50;
+const MAX_DEPTH: usize = 50;
 
 /// Parser with the remaining characters and the current depth of parentheses.
 pub(super) struct Reader {
@@ -189,9 +189,9 @@ impl Reader {
         let opened = self.at + 1;
         self.at += 1;
         self.depth += 1;
-        if self.depth > DEEPEST {
+        if self.depth > MAX_DEPTH {
             return Err(format!(
-                "more than {DEEPEST} parentheses are nested at character {opened}; {EXAMPLES}"
+                "more than {MAX_DEPTH} parentheses are nested at character {opened}; {EXAMPLES}"
             ));
         }
         let inside = self.sum()?;

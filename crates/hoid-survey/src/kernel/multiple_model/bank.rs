@@ -69,7 +69,7 @@ pub struct Mixture {
 const NEIGHBOURS: usize = 3;
 /// Smallest probability of a hypothesis relative to the likeliest hypothesis, so that no hypothesis is lost
 /// permanently.
-const LEAST_PROBABILITY: f64 = 1e-12;
+const MIN_PROBABILITY: f64 = 1e-12;
 
 impl<const M: usize> Bank<M> {
     fn bounded(&mut self) {
@@ -163,13 +163,13 @@ impl<const M: usize> Bank<M> {
         if self.until_birth == 0 {
             self.until_birth = self.prior.birth_interval;
             self.drift();
-            self.give_birth();
+            self.create_hypotheses();
         }
         innovation
     }
 
     /// Creates the hypotheses that are due at this birth.
-    fn give_birth(&mut self) {
+    fn create_hypotheses(&mut self) {
         self.births = self.births.wrapping_add(1);
         let probability = self.prior.hazard * f64::from(self.prior.birth_interval);
         self.spawn_changed(probability, false);
@@ -190,7 +190,7 @@ impl<const M: usize> Bank<M> {
     }
 
     /// Scales the probabilities to a sum of one. Probabilities that are too small or not finite are replaced by
-    /// [`LEAST_PROBABILITY`].
+    /// [`MIN_PROBABILITY`].
     fn normalise(&mut self) {
         let mut most = 0.0;
         for h in self.hypotheses.iter().flatten() {
@@ -201,7 +201,7 @@ impl<const M: usize> Bank<M> {
         let (scale, mut sum) = (1.0 / most, 0.0);
         for h in self.hypotheses.iter_mut().flatten() {
             let p = h.probability * scale;
-            h.probability = if p > LEAST_PROBABILITY { p } else { LEAST_PROBABILITY };
+            h.probability = if p > MIN_PROBABILITY { p } else { MIN_PROBABILITY };
             sum += h.probability;
         }
         let scale = 1.0 / sum;

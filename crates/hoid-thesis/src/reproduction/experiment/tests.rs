@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use super::{of_runs::middle, *};
+use super::{of_runs::mean_and_median, *};
 use crate::experiment::{
     RunKey,
     procedure::{RecursiveTrace, RunOutcome, State, Truth},
@@ -63,8 +63,8 @@ fn figures_show_average_and_median_of_the_runs() {
         let mean = column(&made, "mean");
         assert!((mean[0] - expected).abs() < 1e-12, "{mean:?}");
     }
-    assert_eq!(middle([1.0, f64::NAN, 2.0, 6.0].into_iter()), [3.0, 2.0]);
-    assert!(middle([f64::NAN].into_iter())[0].is_nan());
+    assert_eq!(mean_and_median([1.0, f64::NAN, 2.0, 6.0].into_iter()), [3.0, 2.0]);
+    assert!(mean_and_median([f64::NAN].into_iter())[0].is_nan());
     let made = tables::delays(&item(), &runs, &["C4".to_owned()]);
     assert_eq!((column(&made, "nk_true")[0], column(&made, "nk_BJ")[0]), (29.0, 29.0));
 }

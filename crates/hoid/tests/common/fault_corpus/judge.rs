@@ -5,9 +5,9 @@
 //! standard error, is not judged.
 //!
 //! A trace is wrong if it is wrong at its last row or [`LATER_S`] after the fault. Its recovery time is the time from
-//! the end of the fault to the last row in which a parameter differs by more than [`NEAR_ERRORS`] of its standard
+//! the end of the fault to the last row in which a parameter differs by more than [`MAX_NEAR_ERRORS`] of its standard
 //! errors and by more than [`NEAR_SHARE`] of its true value. Its lasting error is the largest error that it had for
-//! [`LASTING_S`] without interruption.
+//! [`MIN_LASTING_S`] without interruption.
 
 use serde_json::Value;
 
@@ -19,11 +19,11 @@ pub const WRONG: f64 = 4.0;
 pub const NEAR_S: f64 = 1.0;
 /// Time after the fault at which a trace is examined again, s.
 pub const LATER_S: f64 = 20.0;
-const NEAR_ERRORS: f64 = 2.5;
+const MAX_NEAR_ERRORS: f64 = 2.5;
 const NEAR_SHARE: f64 = 0.1;
-const LASTING_S: f64 = 5.0;
+const MIN_LASTING_S: f64 = 5.0;
 /// Findings that only report faults of the recording.
-const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
+const FAULT_FINDINGS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
 
 /// Known properties of a case.
 #[derive(Debug, Clone)]
@@ -159,7 +159,7 @@ fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
     };
     CaseOutcome {
         level: verdict["level"].as_str().unwrap_or("none").to_owned(),
-        of_faults: kinds.iter().any(|kind| OF_FAULTS.contains(&kind.as_str())),
+        of_faults: kinds.iter().any(|kind| FAULT_FINDINGS.contains(&kind.as_str())),
         kinds,
         told: faults.len(),
         placed: faults.iter().filter(of_file).any(meets),
@@ -199,20 +199,20 @@ fn is_near(claims: &[Claim], truth: &Truth) -> bool {
     let near = |(name, value, error): &Claim| {
         truth.iter().find(|(known, _)| known == name).is_none_or(|(_, own)| {
             let off = (value - own).abs();
-            off <= NEAR_ERRORS * error || off <= NEAR_SHARE * own.abs()
+            off <= MAX_NEAR_ERRORS * error || off <= NEAR_SHARE * own.abs()
         })
     };
     !claims.is_empty() && claims.iter().all(near)
 }
 
-/// Returns the largest error that lasted for [`LASTING_S`], from pairs of time and error.
+/// Returns the largest error that lasted for [`MIN_LASTING_S`], from pairs of time and error.
 fn lasting(errors: &[(f64, f64)]) -> Option<f64> {
     let (first, last) = (errors.first()?.0, errors.last()?.0);
-    if last - first < LASTING_S {
+    if last - first < MIN_LASTING_S {
         return None;
     }
     let step = (last - first) / (errors.len() - 1) as f64;
-    let rows = ((LASTING_S / step).round() as usize).max(1);
+    let rows = ((MIN_LASTING_S / step).round() as usize).max(1);
     let least = |window: &[(f64, f64)]| window.iter().map(|(_, z)| *z).fold(f64::INFINITY, f64::min);
     errors.windows(rows).map(least).max_by(f64::total_cmp)
 }

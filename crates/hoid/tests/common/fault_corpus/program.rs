@@ -10,16 +10,16 @@ use std::{
 use serde_json::Value;
 
 use super::{
-    bases::{Base, Who, base},
+    bases::{Base, OperatorKind, base},
     inject::inject,
     judge::{self, CaseOutcome, CaseTruth, Row},
-    kinds::{Fault, What},
+    kinds::{Change, Fault},
 };
 
 /// Time limit of a run of the program, s.
 const LONGEST_S: u64 = 120;
 /// Number of samples per row of a trace.
-const EVERY: &str = "10";
+const SAMPLES_PER_ROW: &str = "10";
 
 /// Method by which a record is evaluated, with default options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,9 +67,9 @@ impl Way {
     pub fn of(base: &Base) -> &'static [Self] {
         const LEAD: [Way; 4] = [Way::GreyBox, Way::Adaptive, Way::MultipleModel, Way::Physical];
         match (base.who, base.form) {
-            (Who::C1 | Who::C2, _) => &Self::ALL,
-            (Who::Person, hoid::model::Form::Lead) => &LEAD,
-            (Who::Person, _) => &LEAD[..1],
+            (OperatorKind::C1 | OperatorKind::C2, _) => &Self::ALL,
+            (OperatorKind::Person, hoid::model::Form::Lead) => &LEAD,
+            (OperatorKind::Person, _) => &LEAD[..1],
         }
     }
 }
@@ -79,7 +79,7 @@ impl Way {
 pub struct Outcome {
     pub case: u64,
     pub fault: Fault,
-    pub who: Who,
+    pub who: OperatorKind,
     pub label: String,
     pub way: Way,
     pub seconds: f64,
@@ -97,7 +97,7 @@ pub fn outcomes(
     seed: u64,
     case: u64,
     fault: Fault,
-    who: Who,
+    who: OperatorKind,
     ways: &[Way],
 ) -> Result<Vec<Outcome>, String> {
     let base = base(who, seed, case).map_err(|e| e.to_string())?;
@@ -143,8 +143,8 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
     }
     let known = CaseTruth {
         truth: base.truth.clone(),
-        then: (fault.kind.what == What::SecondOperator).then(|| base.second_truth.clone()),
-        span_s: (fault.kind.what != What::Nothing).then_some((injected.from_s, injected.to_s)),
+        then: (fault.kind.what == Change::SecondOperator).then(|| base.second_truth.clone()),
+        span_s: (fault.kind.what != Change::Nothing).then_some((injected.from_s, injected.to_s)),
         file: "faulty.csv".to_owned(),
         sample_time: injected.table.h,
     };
@@ -169,7 +169,7 @@ fn run(
         _ => command
             .arg("track")
             .args(files.last())
-            .args(["--method", way.name(), "--every", EVERY, "--out"])
+            .args(["--method", way.name(), "--every", SAMPLES_PER_ROW, "--out"])
             .arg(&trace),
     };
     command.arg("--json");

@@ -9,14 +9,14 @@ use std::borrow::Cow;
 use super::lines::{Mark, filled, is_missing, is_number, is_row, is_value, unquoted};
 use super::names::{Extra, Names, names_of, unmarked};
 use super::units;
-use crate::formats::csv::text::is_aside;
+use crate::formats::csv::text::is_comment_or_blank;
 use crate::wording::shown;
 
 /// Number of lines with equally many numbers that are required at the start of a table, unless it has fewer lines.
 const ROWS: usize = 3;
 
 /// Comments that hoid itself writes above a table, and that are not headers.
-const OWN: [&str; 3] = ["units:", "roles:", "sample_time:"];
+const OWN_COMMENTS: [&str; 3] = ["units:", "roles:", "sample_time:"];
 
 /// Structure of the start of a table. Lines are counted from 0.
 #[derive(Debug)]
@@ -157,7 +157,7 @@ impl<'a> Layout<'a> {
         let lines = text.lines().enumerate().take(row);
         let (header, line) = lines.filter(|(_, line)| !line.trim().is_empty()).last()?;
         let words = line.strip_prefix('#')?.trim_start_matches('#').trim();
-        if OWN.iter().any(|own| words.starts_with(own)) {
+        if OWN_COMMENTS.iter().any(|own| words.starts_with(own)) {
             return None;
         }
         let own = names_of(words, mark, rows).or_else(|| names_of_other(words, rows));
@@ -215,7 +215,7 @@ impl<'a> Layout<'a> {
                 None if at == self.header => Cow::Borrowed(&*header),
                 _ if self.above.contains(&at) => Cow::Owned(format!("#{line}")),
                 _ if at < self.row && is_blank(line) => Cow::Borrowed(""),
-                _ if at < self.row || is_aside(line) => Cow::Borrowed(line),
+                _ if at < self.row || is_comment_or_blank(line) => Cow::Borrowed(line),
                 _ if is_repeated(line) => Cow::Owned(format!("#{line}")),
                 _ => self.row_of(line),
             };

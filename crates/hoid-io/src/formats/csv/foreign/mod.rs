@@ -25,7 +25,7 @@ pub(super) use layout::mismatch;
 use layout::Layout;
 
 /// Rewrites the bytes of a table as plain CSV; returns a description of each change.
-pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
+pub(super) fn converted_to_plain_csv(bytes: &mut Vec<u8>) -> Vec<String> {
     let mut notes = Vec::from_iter(encoding::decode(bytes));
     let Ok(text) = std::str::from_utf8(bytes) else {
         return notes;
@@ -84,7 +84,7 @@ mod tests {
 
     fn plain(text: &str) -> (String, usize) {
         let mut bytes = text.as_bytes().to_vec();
-        let notes = made_plain(&mut bytes);
+        let notes = converted_to_plain_csv(&mut bytes);
         (String::from_utf8_lossy(&bytes).into_owned(), notes.len())
     }
 

@@ -58,7 +58,9 @@ pub(super) fn names_of<'a>(header: &'a str, mark: Mark, rows: &[Vec<&str>]) -> O
         if mark != Mark::Blanks && rows.iter().all(ends_empty) {
             return named(words, Extra::SeparatorInRows);
         }
-        return counts_up(rows).then(|| named(words, Extra::RowNumbers)).flatten();
+        return is_row_number_column(rows)
+            .then(|| named(words, Extra::RowNumbers))
+            .flatten();
     }
     let (last, names) = words.split_last()?;
     let is_idle = matches!(unquoted(last).to_lowercase().as_str(), "" | "comment" | "comments");
@@ -68,7 +70,7 @@ pub(super) fn names_of<'a>(header: &'a str, mark: Mark, rows: &[Vec<&str>]) -> O
 }
 
 /// True if the first cells of the rows are consecutive whole numbers from 0 or 1.
-fn counts_up(rows: &[Vec<&str>]) -> bool {
+fn is_row_number_column(rows: &[Vec<&str>]) -> bool {
     let numbers = rows.iter().map(|row| unquoted(row.first()?).parse::<usize>().ok());
     let from = |first: usize| numbers.clone().eq((first..).map(Some).take(rows.len()));
     rows.len() > 1 && (from(0) || from(1))

@@ -57,7 +57,7 @@ impl Shared {
         let next = session.and_then(Session::next);
         let run = |place: usize| facts.and_then(|facts| facts.run(place));
         let done = match (&self.mode, session) {
-            (Mode::Replay(_), Some(session)) => judged_again(session),
+            (Mode::Replay(_), Some(session)) => reverified_runs(session),
             (_, Some(session)) => session.done.clone(),
             _ => Vec::new(),
         };
@@ -96,7 +96,7 @@ impl Shared {
 }
 
 /// Returns the runs that have ended, each with a new verdict on the current state of its files.
-fn judged_again(session: &Session) -> Vec<Done> {
+fn reverified_runs(session: &Session) -> Vec<Done> {
     let again = |done: &Done| {
         let checked = check(&session.stem(&done.condition, done.number));
         let (verdict, reasons) = match &checked {
