@@ -151,20 +151,20 @@ fn settings_list_the_values_used() {
 
 #[test]
 fn faults_are_repaired_or_kept() {
-    let spoilt = || {
+    let with_outlier = || {
         let record = recorded(1, |e, u| (e, u));
         let mut u = record.output().to_vec();
         u[3000] = 5.0;
         let e = Channel::new("e", "", record.input().to_vec());
         Recordings::of_records([Record::new(record.sample_time(), e, Channel::new("u", "", u)).unwrap()])
     };
-    let repaired = quick().run(spoilt()).unwrap();
+    let repaired = quick().run(with_outlier()).unwrap();
     assert_eq!(repaired.data.accounts[0].faults.len(), 1);
     let kept = Identification {
         faults: FaultHandling::Keep,
         ..quick()
     };
-    let kept = kept.run(spoilt()).unwrap();
+    let kept = kept.run(with_outlier()).unwrap();
     assert!(kept.data.accounts[0].faults.is_empty());
     assert!(kept.fit.loss > 3.0 * repaired.fit.loss);
 }
@@ -238,12 +238,12 @@ fn missing_named_excitation_is_reported() {
 #[test]
 fn prior_is_read_by_name_or_from_a_file() {
     assert!(prior_of_text("none").unwrap().entries().is_empty());
-    for (text, says) in [
+    for (text, expected) in [
         ("omega_nm", "prior: found omega_nm; expected population, none, "),
         ("nowhere.json", "nowhere.json"),
     ] {
         let words = prior_of_text(text).unwrap_err().to_string();
-        assert!(words.contains(says), "{words}");
+        assert!(words.contains(expected), "{words}");
     }
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("fit.json");

@@ -48,11 +48,11 @@ fn main() -> ExitCode {
         if only.as_ref().is_some_and(|name| name != work.name) {
             continue;
         }
-        let begun = Instant::now();
+        let start_time = Instant::now();
         bench.whole(work, "whole");
         // The duration of a run depends on the load of the machine: after a kill that was too late, the following kills
         // are earlier.
-        let mut took = begun.elapsed();
+        let mut took = start_time.elapsed();
         let expected = files(&bench.place(work, "whole"));
         // The remainder of the division by three is assigned to the first works.
         let share = |all: usize, of: usize| all / of + usize::from(k < all % of);
@@ -69,9 +69,9 @@ fn main() -> ExitCode {
                     break;
                 }
             }
-            let begun = Instant::now();
+            let start_time = Instant::now();
             bench.whole(work, &name);
-            took = took.max(begun.elapsed());
+            took = took.max(start_time.elapsed());
             failures.extend(compare(
                 &expected,
                 &bench.place(work, &name),
@@ -90,11 +90,11 @@ fn main() -> ExitCode {
             }
             let what = damage(&bench.place(work, &name).join("parts"), &mut draw);
             hit += usize::from(what.is_some());
-            let begun = Instant::now();
+            let start_time = Instant::now();
             bench.whole(work, &name);
-            took = took.max(begun.elapsed());
-            let told = format!("{} {name} ({})", work.name, what.unwrap_or("no block yet"));
-            failures.extend(compare(&expected, &bench.place(work, &name), &told));
+            took = took.max(start_time.elapsed());
+            let description = format!("{} {name} ({})", work.name, what.unwrap_or("no block yet"));
+            failures.extend(compare(&expected, &bench.place(work, &name), &description));
             fs::remove_dir_all(bench.place(work, &name)).unwrap();
         }
         println!(

@@ -63,12 +63,12 @@ const WIDTHS: (usize, usize) = (60, 110);
 /// Returns the width for wrapping in columns, limited to [`WIDTHS`]: the value of `COLUMNS`, otherwise the width of the
 /// terminal. Returns `None` if neither is known, as for output to a file; lines are then not wrapped.
 pub fn width() -> Option<usize> {
-    let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
+    let columns = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
     let asked = || {
         let terminal = io::stdout().is_terminal().then(terminal_size::terminal_size)?;
         terminal.map(|(columns, _)| usize::from(columns.0))
     };
-    told.or_else(asked).map(|columns| columns.clamp(WIDTHS.0, WIDTHS.1))
+    columns.or_else(asked).map(|columns| columns.clamp(WIDTHS.0, WIDTHS.1))
 }
 
 /// Wraps the sentences of a page; tables keep their width. The continuation lines of a list item are indented.
@@ -188,19 +188,19 @@ pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
         bar.set_style(style);
     }
     bar.enable_steady_tick(Duration::from_millis(200));
-    let told = bar.clone();
+    let bar_handle = bar.clone();
     let done = progress::watched(
         move |step| {
-            if told.length() != Some(step.total as u64)
+            if bar_handle.length() != Some(step.total as u64)
                 && let Ok(style) = ProgressStyle::with_template(&format!(
                     "{{bar:30}} {{pos}}/{{len}} {}, {{elapsed}}, {{eta}} left",
                     step.what
                 ))
             {
-                told.set_style(style);
-                told.set_length(step.total as u64);
+                bar_handle.set_style(style);
+                bar_handle.set_length(step.total as u64);
             }
-            told.set_position(step.done as u64);
+            bar_handle.set_position(step.done as u64);
         },
         work,
     );

@@ -167,7 +167,7 @@ fn invalid_pairs_are_refused() {
             "applies only to the structure operator",
         ),
     ] {
-        let (code, said) = bad(at.path(), &[&["identify", "two.csv"], pairs].concat());
-        assert!(code == 2 && said.contains(wanted), "{pairs:?}: {code} {said}");
+        let (code, message) = bad(at.path(), &[&["identify", "two.csv"], pairs].concat());
+        assert!(code == 2 && message.contains(wanted), "{pairs:?}: {code} {message}");
     }
 }

@@ -204,11 +204,11 @@ fn family_scenario_is_simulated() {
     let d = directory.path();
     let person = include_str!("../../../fixtures/scenario/person.toml");
     fs::write(d.join("person.toml"), person).unwrap();
-    let said = good(
+    let printed = good(
         d,
         &["simulate", "--scenario", "person.toml", "--seed", "3", "--out", "p.csv"],
     );
-    assert!(said.contains("a person: 3600 samples"), "{said}");
+    assert!(printed.contains("a person: 3600 samples"), "{printed}");
     let run = fs::read_to_string(d.join("p.csv")).unwrap();
     let header = run.lines().find(|line| !line.starts_with('#')).unwrap();
     for name in ["e", "u", "f_t", "d", "y", "n", "K_over_T_I", "T_I", "zeta_nm", "tau_e"] {

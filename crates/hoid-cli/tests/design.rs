@@ -27,10 +27,10 @@ fn design_is_reported_and_can_be_simulated() {
         "--out",
         "design",
     ];
-    let said = good(at, &arguments);
+    let message = good(at, &arguments);
     assert!(
-        said.starts_with("Expected errors of") && said.contains("With reference they require"),
-        "{said}"
+        message.starts_with("Expected errors of") && message.contains("With reference they require"),
+        "{message}"
     );
     let object = json(
         at,
@@ -170,12 +170,15 @@ fn group_design_has_a_typical_and_a_worst_person() {
             .starts_with("D is left out"),
         "{found}"
     );
-    let (code, said) = bad(at, &["design", "--people", "group.json"]);
-    assert!(code == 2 && said.contains("--controlled-element"), "{code} {said}");
+    let (code, message) = bad(at, &["design", "--people", "group.json"]);
+    assert!(
+        code == 2 && message.contains("--controlled-element"),
+        "{code} {message}"
+    );
     group["people"][1]["condition"] = "position".into();
     fs::write(at.join("group.json"), group.to_string()).unwrap();
-    let (code, said) = bad(at, &[&["design", "--people", "group.json"], &element[..]].concat());
-    assert!(code == 2 && said.contains("rate, position"), "{code} {said}");
+    let (code, message) = bad(at, &[&["design", "--people", "group.json"], &element[..]].concat());
+    assert!(code == 2 && message.contains("rate, position"), "{code} {message}");
     let parameter = |name: &str, value: f64| {
         let people: Vec<serde_json::Value> = [("A", 0.9), ("B", 1.1), ("C", 1.0)]
             .iter()
@@ -330,10 +333,10 @@ fn spread_of_a_difference_comes_from_the_people() {
     );
     // The crossover is not a parameter of a population.
     let all = ["design", "--controlled-element", "4/s", "--difference", "crossover=10%"];
-    let (code, said) = bad(at, &[&all[..], &["--between-people", "population.json"]].concat());
+    let (code, message) = bad(at, &[&all[..], &["--between-people", "population.json"]].concat());
     assert!(
-        code == 2 && said.contains("no spread between people of crossover"),
-        "{code} {said}"
+        code == 2 && message.contains("no spread between people of crossover"),
+        "{code} {message}"
     );
 }
 
@@ -366,7 +369,10 @@ fn mistakes_are_explained_with_a_remedy() {
         (&["--power", ".9"], 2, "--difference"),
     ] {
         let all = [&["design", "--people", "person.toml"], arguments].concat();
-        let (found, said) = bad(at, &all);
-        assert!(found == code && said.contains(word), "{arguments:?}: {found}, {said}");
+        let (found, message) = bad(at, &all);
+        assert!(
+            found == code && message.contains(word),
+            "{arguments:?}: {found}, {message}"
+        );
     }
 }

@@ -268,7 +268,7 @@ fn jump_of_delay_or_operator_is_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let (run, other) = (simulated(d, "C1", "77"), simulated(d, "C2", "78"));
-    let told = |how: &[&str]| {
+    let finding = |how: &[&str]| {
         let found = identified(d, how);
         let findings = found["verdict"]["findings"].as_array().unwrap().clone();
         let mut words = findings.iter().filter(|f| f["kind"] == "not-constant");
@@ -281,7 +281,7 @@ fn jump_of_delay_or_operator_is_reported() {
         .collect();
     written(d, &late);
     for how in fits {
-        let words = told(how).unwrap();
+        let words = finding(how).unwrap();
         assert!(words.contains("tau_e changes by about +"), "{how:?}: {words}");
     }
     let from = 2 * n / 3;
@@ -296,11 +296,11 @@ fn jump_of_delay_or_operator_is_reported() {
         .collect();
     written(d, &second);
     for how in fits {
-        assert!(told(how).is_some(), "{how:?}");
+        assert!(finding(how).is_some(), "{how:?}");
     }
     written(d, &run);
     for how in fits {
-        assert_eq!(told(how), None, "{how:?}");
+        assert_eq!(finding(how), None, "{how:?}");
     }
 }
 

@@ -328,9 +328,9 @@ fn documented_lead_lag_change_is_found() {
     }
     let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
     assert!(trace.contains("t,K,K_se,K_over_T_I,K_over_T_I_se,T_L,T_L_se"));
-    let said = good(d, &arguments);
+    let printed = good(d, &arguments);
     for part in ["of the form lead-lag", "before the change", "after it", "T_I"] {
-        assert!(said.contains(part), "{said} lacks {part}");
+        assert!(printed.contains(part), "{printed} lacks {part}");
     }
 }
 
@@ -351,9 +351,9 @@ fn validation_file_is_reported_once() {
     ] {
         let arguments = [&["identify", "run.csv", "--validate", "again.csv"], structure].concat();
         let output = hoid(d, &arguments);
-        let says = String::from_utf8(output.stderr).unwrap();
-        let told = says.matches("again.csv: u stays at its largest value").count();
-        assert_eq!(told, 1, "{structure:?}: {says}");
+        let warnings = String::from_utf8(output.stderr).unwrap();
+        let count = warnings.matches("again.csv: u stays at its largest value").count();
+        assert_eq!(count, 1, "{structure:?}: {warnings}");
     }
 }
 

@@ -248,13 +248,13 @@ fn group_reports_responses_to_further_inputs() {
     }
     let look = ["--excitation", "d", "--controlled-element", "1/s"];
     let role = ["--role", "f_t=feedforward:0.25"];
-    let (_, said) = bad(
+    let (_, printed) = bad(
         at.path(),
         &[&["group", "init", "data"][..], &look, &["--role", "f_t=guess"]].concat(),
     );
     assert!(
-        said.contains("--role: roles: found \"f_t=guess\"") && said.contains("feedforward"),
-        "{said}"
+        printed.contains("--role: roles: found \"f_t=guess\"") && printed.contains("feedforward"),
+        "{printed}"
     );
     good(at.path(), &[&["group", "init", "data"][..], &look, &role].concat());
     let manifest = fs::read_to_string(data.join("group.toml")).unwrap();
@@ -370,9 +370,9 @@ fn recursion_tracks_both_responses() {
         (&["--method", "rpem", "--nk", "0.2s,0.1s"], "one number of samples"),
         (&["--method", "rpem", "--nk", "14,1", "--validate", &run], "--validate"),
     ] {
-        let (_, told) = bad(at.path(), &[&two[..], options].concat());
-        assert!(told.contains(words), "{options:?}: {told}");
+        let (_, message) = bad(at.path(), &[&two[..], options].concat());
+        assert!(message.contains(words), "{options:?}: {message}");
     }
-    let (_, told) = bad(at.path(), &["track", &run, "--role", "f_t=feedforward"]);
-    assert!(told.contains("add it with --input"), "{told}");
+    let (_, message) = bad(at.path(), &["track", &run, "--role", "f_t=feedforward"]);
+    assert!(message.contains("add it with --input"), "{message}");
 }

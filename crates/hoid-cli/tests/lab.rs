@@ -9,8 +9,8 @@ use common::bad;
 #[test]
 fn error_names_the_missing_feature() {
     let directory = tempfile::TempDir::new().unwrap();
-    let (code, said) = bad(directory.path(), &["lab"]);
+    let (code, message) = bad(directory.path(), &["lab"]);
     assert_eq!(code, 2);
-    assert!(said.contains("--features lab"), "{said}");
+    assert!(message.contains("--features lab"), "{message}");
     assert!(!directory.path().join("hoid-lab").exists());
 }

@@ -146,10 +146,10 @@ fn duplicated_run_is_refused_by_both_commands() {
     let found = json_with_any_exit_code(at, &["group", "people", "--out", "out", "--json"]);
     let alone = common::hoid(&inside, &["identify", "clean_C1_1.csv", "clean_C1_2.csv"]);
     assert_eq!(alone.status.code(), Some(2));
-    let said = String::from_utf8(alone.stderr).unwrap();
+    let stderr = String::from_utf8(alone.stderr).unwrap();
     let reason = found["people"][0]["reason"].as_str().unwrap();
     assert!(
-        reason.contains("hold the same samples") && said.contains(reason),
-        "{reason}\n{said}"
+        reason.contains("hold the same samples") && stderr.contains(reason),
+        "{reason}\n{stderr}"
     );
 }

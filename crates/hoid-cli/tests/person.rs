@@ -102,8 +102,11 @@ fn operator_is_identified_with_defaults() {
         arguments[last] = wrong;
         let found = json(at, &[&arguments[..], &["--json"]].concat());
         let reasons = found["verdict"].to_string();
-        let told = reasons.contains("unstable-loop") || reasons.contains("no-crossover");
-        assert!(told && found["verdict"]["level"] != "trustworthy", "{wrong}: {reasons}");
+        let reported = reasons.contains("unstable-loop") || reasons.contains("no-crossover");
+        assert!(
+            reported && found["verdict"]["level"] != "trustworthy",
+            "{wrong}: {reasons}"
+        );
     }
     // The result is used as a prior for another fit.
     std::fs::write(at.join("person.json"), found.to_string()).unwrap();

@@ -175,10 +175,10 @@ fn options_in_samples_keep_the_rate() {
     let output = hoid(at, &fit);
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["records"][0]["sample_time"].as_f64().unwrap(), 0.001);
-    let told = String::from_utf8(output.stderr).unwrap();
+    let reported = String::from_utf8(output.stderr).unwrap();
     assert!(
-        told.contains("1000 Hz is kept") && told.contains("--decimate 10"),
-        "{told}"
+        reported.contains("1000 Hz is kept") && reported.contains("--decimate 10"),
+        "{reported}"
     );
     let fewer = [
         "identify",
@@ -192,11 +192,11 @@ fn options_in_samples_keep_the_rate() {
         "--json",
     ];
     assert_eq!(json(at, &fewer)["records"][0]["sample_time"].as_f64().unwrap(), 0.01);
-    let told = [
+    let reported = [
         "track", &file, "--nk", "281", "--every", "1000", "--out", "t.csv", "--json",
     ];
     assert_eq!(
-        common::json_with_any_exit_code(at, &told)["records"][0]["sample_time"]
+        common::json_with_any_exit_code(at, &reported)["records"][0]["sample_time"]
             .as_f64()
             .unwrap(),
         0.001
@@ -282,8 +282,11 @@ fn stream_at_1000_hz_matches_track() {
     );
     let behind_s = decimated["behind_s"].as_f64().unwrap();
     assert!((0.1..0.2).contains(&behind_s), "{behind_s}");
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(told.contains("filtered and decimated by 10 to 100 Hz"), "{told}");
+    let reported = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        reported.contains("filtered and decimated by 10 to 100 Hz"),
+        "{reported}"
+    );
     // For the same sample, the digits equal those of the trace.
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     let mut table = trace.lines().filter(|line| !line.starts_with('#'));

@@ -126,13 +126,16 @@ fn common_notes_of_several_files_appear_once() {
         .current_dir(d)
         .output()
         .unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    let of_rows: Vec<&str> = said
+    let printed = String::from_utf8(output.stderr).unwrap();
+    let of_rows: Vec<&str> = printed
         .lines()
         .filter(|line| line.contains("duplicated") || line.contains("repeated"))
         .collect();
-    assert!(of_rows.iter().all(|line| line.contains("1.csv and 1 more: ")), "{said}");
-    assert_eq!(of_rows.len(), 1, "{said}");
+    assert!(
+        of_rows.iter().all(|line| line.contains("1.csv and 1 more: ")),
+        "{printed}"
+    );
+    assert_eq!(of_rows.len(), 1, "{printed}");
 }
 
 #[test]
@@ -252,7 +255,10 @@ fn help_is_plain_and_completions_exist() {
         let text = good(d, &["completions", shell]);
         assert!(text.contains("controlled-element"), "{shell}");
     }
-    let said = good(d, &["man", "pages"]);
+    let printed = good(d, &["man", "pages"]);
     let page = fs::read_to_string(d.join("pages/hoid-identify.1")).unwrap();
-    assert!(page.contains(".TH") && page.contains("controlled\\-element"), "{said}");
+    assert!(
+        page.contains(".TH") && page.contains("controlled\\-element"),
+        "{printed}"
+    );
 }

@@ -209,9 +209,9 @@ fn invalid_displays_are_refused() {
         (["--disturbance", "-1"], "--disturbance is wrong"),
         (["--disturbance", "nan"], "--disturbance is wrong"),
     ] {
-        let said = bad(at.path(), &[&simulate[..], &options].concat());
-        let said = format!("{said:?}");
-        assert!(said.contains(words), "{options:?}: {said}");
+        let message = bad(at.path(), &[&simulate[..], &options].concat());
+        let message = format!("{message:?}");
+        assert!(message.contains(words), "{options:?}: {message}");
     }
     assert!(!at.path().join("run.csv").exists());
 }

@@ -88,12 +88,12 @@ impl Stream {
     /// Waits for the end of the stream; returns the exit status, the remaining lines, and the messages.
     fn end(mut self) -> (ExitStatus, Vec<String>, String) {
         drop(self.input.take());
-        let begun = Instant::now();
+        let start_time = Instant::now();
         let status = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 break status;
             }
-            assert!(begun.elapsed() < PATIENCE, "the stream does not end");
+            assert!(start_time.elapsed() < PATIENCE, "the stream does not end");
             thread::sleep(Duration::from_millis(2));
         };
         let mut said = String::new();
@@ -372,8 +372,8 @@ fn idle_start_prolongs_the_warm_up() {
         (nk(&said) - nk(&without)).abs() <= 1 && (28..=30).contains(&nk(&said)),
         "{said}{without}"
     );
-    let told = answers[2100]["warm_up"]["reason"].as_str().unwrap();
-    assert!(told.contains("neither e nor u moved for 15."), "{told}");
+    let reason = answers[2100]["warm_up"]["reason"].as_str().unwrap();
+    assert!(reason.contains("neither e nor u moved for 15."), "{reason}");
     let began = answers.iter().position(|a| a.get("warm_up").is_none()).unwrap();
     assert!((3490..3560).contains(&began), "{began}");
 }
@@ -524,9 +524,9 @@ fn interrupt_exits_with_zero_and_complete_lines() {
     let mut stream = Stream::new(&WITHOUT_WARM_UP);
     stream.ask("0.1,0.2");
     stream.interrupt();
-    let begun = Instant::now();
+    let start_time = Instant::now();
     while stream.child.try_wait().unwrap().is_none() {
-        assert!(begun.elapsed() < PATIENCE);
+        assert!(start_time.elapsed() < PATIENCE);
         thread::sleep(Duration::from_millis(2));
     }
     let (status, rest, said) = stream.end();

@@ -56,10 +56,10 @@ fn lost_samples_are_bridged_and_counted() {
     udp.send(b"2.00,0.1,0.2");
     let line = received_json(&udp);
     assert_eq!((&line["skipped"], &line["dropped"]), (&5.into(), &2.into()), "{line}");
-    let said = udp.end();
+    let summary = udp.end();
     assert!(
-        said.contains("201 samples: 5 skipped for a fault in e or u (5 of them missing)"),
-        "{said}"
+        summary.contains("201 samples: 5 skipped for a fault in e or u (5 of them missing)"),
+        "{summary}"
     );
 }
 

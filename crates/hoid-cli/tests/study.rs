@@ -69,9 +69,9 @@ fn killed_study_resumes_to_identical_files() {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        let (before, begin) = (parts(&at.join("killed")), Instant::now());
+        let (before, start_time) = (parts(&at.join("killed")), Instant::now());
         while parts(&at.join("killed")) <= before && child.try_wait().unwrap().is_none() {
-            assert!(begin.elapsed() < Duration::from_secs(60), "nothing is written");
+            assert!(start_time.elapsed() < Duration::from_secs(60), "nothing is written");
             std::thread::sleep(Duration::from_millis(1));
         }
         std::thread::sleep(Duration::from_millis(wait_ms));
@@ -222,8 +222,8 @@ name = "SRIV"
 method = "sriv"
 "#;
     fs::write(at.join("twins.toml"), plan).unwrap();
-    let said = good(at, &["study", "run", "twins.toml", "--out", "s", "--csv"]);
-    assert!(said.contains("trustworthy"), "{said}");
+    let printed = good(at, &["study", "run", "twins.toml", "--out", "s", "--csv"]);
+    assert!(printed.contains("trustworthy"), "{printed}");
     let table = hoid::io::read_table(&at.join("s/fits.csv")).unwrap();
     let texts = |column: &str| match table.column(column) {
         Some(hoid::io::ColumnValues::Text(values)) => values.clone(),

@@ -670,13 +670,13 @@ fn second_run_selects_the_start_covariance() {
         page.contains("P0") && page.contains("chosen") && page.contains("second.csv"),
         "{page}"
     );
-    let (status, says) = bad(d, &with(&["--covariance", "0.1"]));
-    assert!(status == 2 && says.contains("--covariance"), "{says}");
+    let (status, warnings) = bad(d, &with(&["--covariance", "0.1"]));
+    assert!(status == 2 && warnings.contains("--covariance"), "{warnings}");
     // The result is independent of the initial P.
     let updated = json(d, &with(&["--json", "--update-covariance", "--covariance", "0.1"]));
     assert!(updated["covariance_choice"].is_null());
     assert!(setting(&updated, "covariance updated").contains("second.csv"));
-    let (status, says) = bad(
+    let (status, warnings) = bad(
         d,
         &[
             "track",
@@ -688,12 +688,12 @@ fn second_run_selects_the_start_covariance() {
             "trace.csv",
         ],
     );
-    assert!(status == 2 && says.contains("--validate"), "{says}");
-    let (status, says) = bad(d, &with(&["--track-delay", "0.2..0.4"]));
-    assert!(status == 1 && says.contains("without track_delay"), "{says}");
+    assert!(status == 2 && warnings.contains("--validate"), "{warnings}");
+    let (status, warnings) = bad(d, &with(&["--track-delay", "0.2..0.4"]));
+    assert!(status == 1 && warnings.contains("without track_delay"), "{warnings}");
     fs::write(d.join("second.csv"), "t,e,u\n0,1,1\n0.01,2,1\n").unwrap();
-    let (_, says) = bad(d, &arguments);
-    assert!(says.contains("in common"), "{says}");
+    let (_, warnings) = bad(d, &arguments);
+    assert!(warnings.contains("in common"), "{warnings}");
 }
 
 #[test]

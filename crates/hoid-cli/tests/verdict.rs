@@ -122,7 +122,7 @@ fn undetermined_result_is_printed_and_exits_with_one() {
     ];
     let output = hoid(d, &arguments);
     assert_eq!(output.status.code(), Some(1));
-    let (page, said) = (
+    let (page, stderr) = (
         String::from_utf8(output.stdout).unwrap(),
         String::from_utf8(output.stderr).unwrap(),
     );
@@ -131,8 +131,8 @@ fn undetermined_result_is_printed_and_exits_with_one() {
         "{page}"
     );
     assert!(
-        page.contains("b0") && said.contains("the data do not determine"),
-        "{said}"
+        page.contains("b0") && stderr.contains("the data do not determine"),
+        "{stderr}"
     );
 }
 

@@ -249,8 +249,8 @@ mod tests {
             (HOID_TOO_SMALL, 3, [0.0; 2])
         );
         // SAFETY: no values are written; the pointer for the count is valid.
-        let told = unsafe { write_array(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
-        assert_eq!((told, count), (Ok(()), 1));
+        let status = unsafe { write_array(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
+        assert_eq!((status, count), (Ok(()), 1));
         // SAFETY: the string is null-terminated.
         let refused = unsafe { text(c"\xff".as_ptr(), "a") }.unwrap_err();
         assert_eq!(refused.status, HOID_BAD_TEXT);

@@ -96,8 +96,8 @@ fn c_example_matches_rust() {
     // The tracker is saved, freed and restored in the middle of the run.
     let output = run(&program, &["adaptive", "0.01", &options, "4000"], &lines(&record));
     same(&good(&output), &expected_rows, &all);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("after 8192 samples, 0 skipped"), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains("after 8192 samples, 0 skipped"), "{message}");
 }
 
 /// The S-function is compiled with a substitute for Simulink's header, because Simulink itself is not available.
@@ -112,8 +112,8 @@ fn s_function_matches_rust() {
     let output = run(&program, &["adaptive", "0.01", ""], &lines(&record));
     same(&good(&output), &rows, &(0..17).collect::<Vec<_>>());
     let refused = run(&program, &["kalman", "0.01", ""], "");
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(!refused.status.success() && said.contains("adaptive"), "{said}");
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success() && message.contains("adaptive"), "{message}");
 }
 
 /// The module is compiled with a substitute for DUECA's headers, because DUECA itself is not available.
@@ -138,12 +138,12 @@ fn c_example_reports_a_change() {
     let options = r#"{"nk": 29, "nd": 1, "warm_up": 20}"#;
     let output = run(&program, &["multiple-model", "0.01", options], &lines(&record));
     assert_eq!(good(&output).lines().count(), record.len());
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
     // The task changes at 40.96 s.
     let place = |line: &str| line.strip_prefix("sample ")?.split(':').next()?.parse::<usize>().ok();
-    let declared: Vec<usize> = said.lines().filter_map(place).collect();
-    assert!(declared.iter().any(|k| (4096..5000).contains(k)), "{said}");
-    assert!(declared.iter().all(|k| *k >= 4096), "{said}");
+    let declared: Vec<usize> = message.lines().filter_map(place).collect();
+    assert!(declared.iter().any(|k| (4096..5000).contains(k)), "{message}");
+    assert!(declared.iter().all(|k| *k >= 4096), "{message}");
 }
 
 #[test]
@@ -191,7 +191,10 @@ fn c_example_is_clean_under_sanitizers() {
     ));
     // A failed example leaves no other files than a successful one.
     let refused = run(&program, &["kalman", "0.01"], "");
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(1));
-    assert!(said.contains("adaptive") && !said.contains("Sanitizer"), "{said}");
+    assert!(
+        message.contains("adaptive") && !message.contains("Sanitizer"),
+        "{message}"
+    );
 }

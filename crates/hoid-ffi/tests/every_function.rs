@@ -426,8 +426,8 @@ fn every_fmi_2_function_works() {
         fmi2DeSerializeFMUstate
     );
     // SAFETY: the list was created above, and no call is in progress.
-    let told = unsafe { &*environment };
-    assert_eq!(told.len() > 5, cfg!(miri));
+    let log = unsafe { &*environment };
+    assert_eq!(log.len() > 5, cfg!(miri));
 }
 
 #[test]
@@ -479,8 +479,8 @@ fn every_fmi_3_function_works() {
         fmi3DeserializeFMUState
     );
     // SAFETY: the list was created above, and no call is in progress.
-    let told = unsafe { &*environment };
-    assert!(told.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && told.len() > 4);
+    let log = unsafe { &*environment };
+    assert!(log.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && log.len() > 4);
 }
 
 /// All exported functions are called above, except for those that always return an error.
@@ -495,7 +495,7 @@ fn every_exported_function_is_called() {
     let not_served: BTreeSet<&str> = [include_str!("../src/fmi/fmi2.rs"), include_str!("../src/fmi/fmi3.rs")]
         .into_iter()
         .flat_map(|source| lists.into_iter().flat_map(|list| source.split(list).skip(1)))
-        .flat_map(|behind| words(behind.split(')').next().unwrap_or_default()))
+        .flat_map(|rest| words(rest.split(')').next().unwrap_or_default()))
         .collect();
     let called = words(include_str!("every_function.rs"));
     let listed = include_str!("../abi/symbols-1.txt")

@@ -182,9 +182,9 @@ fn tracker_starts_from_a_fit() {
     // The restored tracker continues from its bytes, which contain the fit.
     assert_eq!(first(&restored(&saved(&tracker)).ok().unwrap()), first(&tracker));
     // The sample time must equal the sample time of the fit.
-    let (status, said) = of(0.02, fit).err().unwrap();
+    let (status, message) = of(0.02, fit).err().unwrap();
     assert_eq!(status, HOID_BAD_OPTION);
-    assert!(said.contains("these samples are at"), "{said}");
+    assert!(message.contains("these samples are at"), "{message}");
     assert!(of(0.01, "{}").is_err());
 }
 
@@ -253,7 +253,7 @@ proptest! {
         };
         // Methods that require a start fit have a short warm-up.
         let tracker = made(method, 0.01, options).or_else(|_| made(method, 0.01, r#"{"nk": 9, "nd": 1, "warm_up": 0.2}"#));
-        let tracker = tracker.map_err(|(_, said)| TestCaseError::fail(said))?;
+        let tracker = tracker.map_err(|(_, message)| TestCaseError::fail(message))?;
         let mut outcome = HoidOutcome { innovation: 0.0, ready: 0, skipped: 0, held: 0, shortened: 0, changed: 0 };
         for (e, u, f_t, moves) in samples {
             // SAFETY: the tracker is valid, and the pointer refers to the stack.
@@ -263,7 +263,7 @@ proptest! {
         for status in request_all(&tracker) {
             prop_assert!([HOID_OK, HOID_NOTHING].contains(&status), "{}", status);
         }
-        let again = restored(&saved(&tracker)).map_err(|(_, said)| TestCaseError::fail(said))?;
+        let again = restored(&saved(&tracker)).map_err(|(_, message)| TestCaseError::fail(message))?;
         prop_assert_eq!(saved(&again), saved(&tracker));
     }
 
@@ -283,9 +283,9 @@ proptest! {
                     prop_assert!([HOID_OK, HOID_NOTHING, HOID_TOO_SMALL].contains(&status), "{}: {}", options, status);
                 }
             }
-            Err((status, said)) => {
-                prop_assert_eq!(status, HOID_BAD_OPTION, "{}: {}", options, said);
-                prop_assert!(!said.is_empty());
+            Err((status, message)) => {
+                prop_assert_eq!(status, HOID_BAD_OPTION, "{}: {}", options, message);
+                prop_assert!(!message.is_empty());
             }
         }
     }

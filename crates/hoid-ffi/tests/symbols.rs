@@ -22,12 +22,12 @@ fn listed() -> BTreeSet<String> {
 #[test]
 fn library_exports_the_listed_symbols() {
     let library = common::shared_library();
-    let told = Command::new("nm").args(["-D", "--defined-only"]).arg(&library).output();
-    let Ok(told) = told else {
+    let listing = Command::new("nm").args(["-D", "--defined-only"]).arg(&library).output();
+    let Ok(listing) = listing else {
         eprintln!("skipped: nm is not here (binutils)");
         return;
     };
-    let text = String::from_utf8(told.stdout).unwrap();
+    let text = String::from_utf8(listing.stdout).unwrap();
     let symbols: BTreeSet<String> = text
         .lines()
         .filter_map(|line| line.rsplit(' ').next())

@@ -54,7 +54,7 @@ fn decompression_bombs_are_refused() {
     assert_eq!(read.column("e").unwrap().len(), MEGABYTE / 8);
     let header: Vec<String> = (0..10_001).map(|k| format!("c{k}")).collect();
     let unpacks = "unpacks to more than";
-    for (name, bytes, said) in [
+    for (name, bytes, message) in [
         (
             "constant.parquet",
             groups("message m { required double e; }", 64, GROUP),
@@ -105,16 +105,16 @@ fn decompression_bombs_are_refused() {
         fs::write(&path, bytes).unwrap();
         let surveyed = survey(&path).map(drop).unwrap_err().to_string();
         let read = read_table(&path).map(drop).unwrap_err().to_string();
-        assert!(surveyed.contains(said), "{name}: {surveyed}");
-        assert!(read.contains(said), "{name}: {read}");
+        assert!(surveyed.contains(message), "{name}: {surveyed}");
+        assert!(read.contains(message), "{name}: {read}");
     }
     let values = "1.0, ".repeat(3 << 20);
     fs::write(at("long.toml"), format!("x = [{values}]\n")).unwrap();
-    let said = read_any_scenario(&at("long.toml")).map(drop).unwrap_err().to_string();
-    assert!(said.contains("the settings exceed 2 MB"), "{said}");
+    let message = read_any_scenario(&at("long.toml")).map(drop).unwrap_err().to_string();
+    assert!(message.contains("the settings exceed 2 MB"), "{message}");
     fs::write(at("long.json"), format!("{{\"x\": [{values}1]}}")).unwrap();
-    let said = read_fit(&at("long.json")).map(drop).unwrap_err().to_string();
-    assert!(said.contains("the settings exceed 10 MB"), "{said}");
+    let message = read_fit(&at("long.json")).map(drop).unwrap_err().to_string();
+    assert!(message.contains("the settings exceed 10 MB"), "{message}");
     drop(values);
     if let Some(peak) = memory::peak_kb() {
         assert!(peak < MAX_KB, "{peak} kB");

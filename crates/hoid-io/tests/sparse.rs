@@ -220,8 +220,8 @@ fn invalid_sparse_options_are_refused() {
     );
     // Text and infinite numbers do not count as missing values.
     for bad in ["lost", "inf"] {
-        let spoilt = text.replace("0.1000,1.0,", &format!("0.1000,{bad},"));
-        assert!(refused(&spoilt, &[("e", Sparse::Hold)]).contains(bad));
+        let corrupted = text.replace("0.1000,1.0,", &format!("0.1000,{bad},"));
+        assert!(refused(&corrupted, &[("e", Sparse::Hold)]).contains(bad));
     }
     // A column without missing values is reported.
     let read = desk

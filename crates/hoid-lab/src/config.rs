@@ -436,7 +436,7 @@ mod tests {
         assert_eq!(course.times_s(), (10.0, 81.92));
         assert_eq!(course.change_s(), Some(40.96));
         std::fs::write(&path, "nme = \"x\"\n").unwrap();
-        let said = Config::read(&path).unwrap_err().to_string();
-        assert!(said.contains("line 1") && said.contains("nme"), "{said}");
+        let message = Config::read(&path).unwrap_err().to_string();
+        assert!(message.contains("line 1") && message.contains("nme"), "{message}");
     }
 }

@@ -313,8 +313,8 @@ pub(crate) mod tests {
         let open = scenario.initial.operator.transfer_function().unwrap();
         let open = open.series(&scenario.initial.controlled_element.transfer_function().unwrap());
         let truth = hoid_model::margins::margins(|omega| open.response(omega), (0.3, 15.0));
-        let within = |told: ReportedValue, truth: f64| {
-            let (value, error) = (told.0.unwrap(), told.1.unwrap());
+        let within = |reported: ReportedValue, truth: f64| {
+            let (value, error) = (reported.0.unwrap(), reported.1.unwrap());
             assert!(
                 (value - truth).abs() < 4.0 * error + 0.05 * truth.abs(),
                 "{value} {error} {truth}"

@@ -56,8 +56,8 @@ fn run_requested_in_another_session_does_not_start() {
     person
         .say(json!({"type": "resume", "session": "sub-P02/ses-01"}))
         .unwrap();
-    let said = person.say(person::begin(2)).unwrap_err();
-    assert!(said.contains("run 2 was not requested"), "{said}");
+    let message = person.say(person::begin(2)).unwrap_err();
+    assert!(message.contains("run 2 was not requested"), "{message}");
     // The next run of that session can start.
     person.next(1).unwrap();
 }

@@ -387,7 +387,7 @@ fn hostile_connections_do_not_block_the_page() {
         .map(|stranger| {
             let (host, over, begun) = (at.host.clone(), Arc::clone(&over), Arc::clone(&begun));
             thread::spawn(move || {
-                let begin = |k: usize| -> Option<TcpStream> {
+                let connect = |k: usize| -> Option<TcpStream> {
                     begun.fetch_add(1, Ordering::Relaxed);
                     let mut stream = TcpStream::connect(&host).ok()?;
                     stream.set_nonblocking(true).ok()?;
@@ -402,7 +402,7 @@ fn hostile_connections_do_not_block_the_page() {
                     let _ = stream.write_all(said);
                     Some(stream)
                 };
-                let mut all: Vec<Option<TcpStream>> = (0..each).map(|k| begin(k + stranger)).collect();
+                let mut all: Vec<Option<TcpStream>> = (0..each).map(|k| connect(k + stranger)).collect();
                 while !over.load(Ordering::Relaxed) {
                     for (k, place) in all.iter_mut().enumerate() {
                         let closed = place.as_mut().is_none_or(|stream| {
@@ -413,7 +413,7 @@ fn hostile_connections_do_not_block_the_page() {
                             }
                         });
                         if closed {
-                            *place = begin(k + stranger);
+                            *place = connect(k + stranger);
                         }
                     }
                     thread::sleep(Duration::from_millis(10));

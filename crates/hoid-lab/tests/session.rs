@@ -80,9 +80,9 @@ fn batches(task: &Task, until: usize) -> Vec<Batch> {
 
 fn run(session: &mut Session, until: usize) -> (Stem, RunLog) {
     let number = session.new_number().unwrap();
-    let (begun, task) = begun(session, number);
-    let stem = session.stem(&begun.condition.name, number);
-    begun.write(&stem, &task).unwrap();
+    let (run_start, task) = begun(session, number);
+    let stem = session.stem(&run_start.condition.name, number);
+    run_start.write(&stem, &task).unwrap();
     let mut log = RunLog::create(&stem, task.ticks).unwrap();
     for batch in batches(&task, until.min(task.ticks)) {
         log.append(&batch).unwrap();
@@ -107,9 +107,9 @@ fn complete_run_is_verified_and_readable() {
     assert_eq!(session.next(), Some(1));
     assert_eq!(checked.measures.ticks, 4000);
     assert!((checked.measures.input_hz - 125.0).abs() < 1.0);
-    let begun = RunStart::read(&stem).unwrap();
+    let run_start = RunStart::read(&stem).unwrap();
     let logged = hoid_lab::session::Logged::read(&stem).unwrap();
-    let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
+    let record = hoid_lab::record::record(&run_start, &run_start.task(&stem).unwrap(), &logged).unwrap();
     let path = stem.file("beh.parquet");
     hoid_io::write_record(&path, &record).unwrap();
     let read = hoid_io::read(&path).unwrap();
@@ -142,9 +142,9 @@ fn displayed_target_has_a_role_in_the_recording() {
         let (stem, log) = run(&mut session, usize::MAX);
         drop(log);
         session.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
-        let begun = RunStart::read(&stem).unwrap();
+        let run_start = RunStart::read(&stem).unwrap();
         let logged = hoid_lab::session::Logged::read(&stem).unwrap();
-        let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
+        let record = hoid_lab::record::record(&run_start, &run_start.task(&stem).unwrap(), &logged).unwrap();
         hoid_io::write_record(&stem.file("beh.parquet"), &record).unwrap();
         let read = hoid_io::read(stem.file("beh.parquet")).unwrap();
         let shown = read.channels().find(|channel| channel.name == "f_t").unwrap();
@@ -197,15 +197,15 @@ fn each_change_gives_its_own_finding() {
 #[test]
 fn changed_target_or_element_is_detected() {
     for change in [
-        |begun: &mut RunStart| begun.replication += 1,
-        |begun: &mut RunStart| begun.phases[0].plant.b[0] *= 1.001,
+        |run_start: &mut RunStart| run_start.replication += 1,
+        |run_start: &mut RunStart| run_start.phases[0].plant.b[0] *= 1.001,
     ] {
         let dir = tempfile::tempdir().unwrap();
         let (_, stem, _) = finished(dir.path());
-        let mut begun = RunStart::read(&stem).unwrap();
-        let task = begun.task(&stem).unwrap();
-        change(&mut begun);
-        begun.write(&stem, &task).unwrap();
+        let mut run_start = RunStart::read(&stem).unwrap();
+        let task = run_start.task(&stem).unwrap();
+        change(&mut run_start);
+        run_start.write(&stem, &task).unwrap();
         let checked = check(&stem).unwrap();
         assert!(
             checked.verdict.findings().iter().any(|f| f.kind == "lab-task"),
@@ -364,18 +364,21 @@ fn inconsistent_files_give_findings_or_errors() {
         checked.reasons()
     );
     let json = stem.file("run.json");
-    let begun = fs::read_to_string(&json).unwrap();
-    let mut value: serde_json::Value = serde_json::from_str(&begun).unwrap();
+    let run_start = fs::read_to_string(&json).unwrap();
+    let mut value: serde_json::Value = serde_json::from_str(&run_start).unwrap();
     value["phases"][0]["a"] = serde_json::json!([]);
     fs::write(&json, value.to_string()).unwrap();
-    let said = check(&stem).unwrap().reasons();
-    assert!(said.contains("do not fit each other"), "{said}");
+    let message = check(&stem).unwrap().reasons();
+    assert!(message.contains("do not fit each other"), "{message}");
     // With a preview of eleven days, no memory of this length is allocated.
-    let mut value: serde_json::Value = serde_json::from_str(&begun).unwrap();
+    let mut value: serde_json::Value = serde_json::from_str(&run_start).unwrap();
     value["condition"]["preview_s"] = serde_json::json!(1e6);
     fs::write(&json, value.to_string()).unwrap();
-    let said = check(&stem).unwrap().reasons();
-    assert!(said.contains("the task cannot be built from its condition"), "{said}");
+    let message = check(&stem).unwrap().reasons();
+    assert!(
+        message.contains("the task cannot be built from its condition"),
+        "{message}"
+    );
     let toml = session.folder.join("lab.toml");
     let facts = fs::read_to_string(&toml).unwrap();
     let other = facts.replacen("condition = 0", "condition = 9", 1);
@@ -384,8 +387,8 @@ fn inconsistent_files_give_findings_or_errors() {
     // The session opens if the copy contains the plan.
     assert_eq!(Session::open(&session.folder).unwrap().facts, session.facts);
     fs::write(session.folder.join("lab.copy.toml"), other).unwrap();
-    let said = Session::open(&session.folder).unwrap_err().to_string();
-    assert!(said.contains("condition 9 of 1"), "{said}");
+    let message = Session::open(&session.folder).unwrap_err().to_string();
+    assert!(message.contains("condition 9 of 1"), "{message}");
 }
 
 /// `--replay` only reads and does not write.

@@ -76,8 +76,8 @@ fn each_lane_is_bit_identical_to_a_scalar_run() {
     for set in InstructionSet::available() {
         let lanes = set.lanes().unwrap();
         let runs: Vec<Vec<f64>> = (0..lanes).map(run).collect();
-        let beside: Vec<f64> = (0..500 * lanes).map(|i| runs[i % lanes][i / lanes]).collect();
-        let found = set.with_lanes(Recursion(&beside)).unwrap();
+        let interleaved: Vec<f64> = (0..500 * lanes).map(|i| runs[i % lanes][i / lanes]).collect();
+        let found = set.with_lanes(Recursion(&interleaved)).unwrap();
         for (lane, run) in runs.iter().enumerate() {
             let alone = with_one_lane(Recursion(run));
             assert!(alone.iter().all(|y| y.is_finite()));

@@ -415,8 +415,8 @@ fn figures() -> Vec<(&'static str, String)> {
     both.groups = ["nominal", "no hold", "fixed f_s", "a long name here", "short"]
         .map(str::to_owned)
         .to_vec();
-    let mut beside = errors();
-    beside.columns = 2;
+    let mut two_columns = errors();
+    two_columns.columns = 2;
     let mut shared_averages = averages();
     shared_averages.shared_ordinates = true;
     vec![
@@ -452,7 +452,10 @@ fn figures() -> Vec<(&'static str, String)> {
         ("bode_grid", bode_grid("bode_grid", "Frequency responses", &bode())),
         ("obtained", curves("obtained", "Noise levels", &obtained())),
         ("errors", curves("errors", "Errors over memory", &errors())),
-        ("errors_beside", curves("errors_beside", "Errors over memory", &beside)),
+        (
+            "errors_beside",
+            curves("errors_beside", "Errors over memory", &two_columns),
+        ),
         ("spectrum", curves("spectrum", "Forcing function", &spectrum())),
         ("schedules", curves("schedules", "Gain over time", &schedules())),
         ("averages", trace_panels("averages", "Recursive estimates", &averages())),

@@ -288,16 +288,16 @@ fn bad_files_are_failed_rows_and_bad_manifests_errors() {
     }
     let empty = tempfile::tempdir().unwrap();
     let pattern = Pattern::new("{run}.csv").unwrap();
-    let said = |pattern: &Pattern| match Manifest::of_directory(empty.path(), pattern) {
+    let error_for = |pattern: &Pattern| match Manifest::of_directory(empty.path(), pattern) {
         Err(error @ StudyError::NoRuns { .. }) => error.to_string(),
         other => panic!("{other:?}"),
     };
-    assert!(said(&pattern).contains("matches {run}.csv; found no files"));
+    assert!(error_for(&pattern).contains("matches {run}.csv; found no files"));
     for n in 1..=4 {
         std::fs::write(empty.path().join(format!("anna-{n}.csv")), "").unwrap();
     }
     let pattern = Pattern::new("{subject}_{run}*.csv").unwrap();
-    let message = said(&pattern);
+    let message = error_for(&pattern);
     assert!(
         message.contains("{subject}_{run}*.csv; found anna-1.csv, anna-2.csv, anna-3.csv and 1 more"),
         "{message}"
@@ -458,9 +458,9 @@ fn delay_increases_with_an_output_offset() {
         }
     }
     // If the manifest states that u is recorded late, the operator is unchanged, but the orders increase.
-    let mut told = manifest.clone();
-    told.conditions.get_mut("C1").unwrap().offset_samples = 1.0;
-    let (late_nk, told_s) = found(&told, late.path(), "told");
+    let mut with_delay = manifest.clone();
+    with_delay.conditions.get_mut("C1").unwrap().offset_samples = 1.0;
+    let (late_nk, told_s) = found(&with_delay, late.path(), "told");
     assert!((told_s - tau_s).abs() < 1e-3, "{told_s} {tau_s}");
     assert_eq!(late_nk[1], after[1]);
 }

@@ -48,10 +48,11 @@ fn group_at_1000_hz_matches_100_hz() {
     let (_, at_100_hz) = analysed(&slow, 0.01);
     let (files, out) = (fast.join("files"), fast.join("out"));
     let steps = read_table(&out.join("preparation.parquet")).unwrap();
-    let said = "1000 Hz, filtered and decimated by 10 to 100 Hz";
-    let told = texts(&steps, "step").iter().zip(texts(&steps, "what"));
+    let expected = "1000 Hz, filtered and decimated by 10 to 100 Hz";
+    let step_texts = texts(&steps, "step").iter().zip(texts(&steps, "what"));
     assert_eq!(
-        told.filter(|(step, what)| *step == "rate" && what.starts_with(said))
+        step_texts
+            .filter(|(step, what)| *step == "rate" && what.starts_with(expected))
             .count(),
         3
     );

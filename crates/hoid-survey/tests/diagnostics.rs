@@ -78,9 +78,9 @@ fn jump_of_a_fixed_delay_is_reported() {
         Record::new(record.sample_time(), e, u).unwrap()
     };
     let options = TrackOptions::default_for(physical(), 29);
-    let told = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
-    assert!(told(&late(5000, 20)));
-    assert!(!told(&late(5000, 0)));
+    let is_reported = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
+    assert!(is_reported(&late(5000, 20)));
+    assert!(!is_reported(&late(5000, 0)));
     // The trace is shorter than the examined span.
     assert!(
         judged(&record.span(0.0, 12.0).unwrap(), &options)

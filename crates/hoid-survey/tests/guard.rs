@@ -139,25 +139,25 @@ fn restored_guard_is_bit_identical() {
 fn faults_and_actions_are_reported_with_their_times() {
     let record = record(6);
     let mut tracker = tracker(&options(physical(), "yes"), &record);
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for k in 0..record.len() {
         let (e, u) = hostile(&record, k);
         let outcome = tracker.step(e, u);
         assert_eq!(outcome.innovation.is_none(), outcome.held || outcome.skipped, "{k}");
         if let Some(event) = tracker.event() {
-            told.push((event.kind, event.action, k as u64 - event.ago, event.samples));
+            reported.push((event.kind, event.action, k as u64 - event.ago, event.samples));
         }
     }
     use {GuardAction as A, GuardKind as K};
-    assert_eq!(told[0], (K::Outlier, A::Held, 4000, 1));
+    assert_eq!(reported[0], (K::Outlier, A::Held, 4000, 1));
     // Start and end of the gap, of the span with wrong scale and of the frozen span.
-    let of = |kind: K, action: A| told.iter().find(|t| (t.0, t.1) == (kind, action));
-    assert!(of(K::Missing, A::Resumed).is_some(), "{told:?}");
+    let of = |kind: K, action: A| reported.iter().find(|t| (t.0, t.1) == (kind, action));
+    assert!(of(K::Missing, A::Resumed).is_some(), "{reported:?}");
     let level = of(K::Level, A::Restarted).unwrap();
-    assert!(level.2.abs_diff(4800) <= 12 && level.3 >= 400, "{told:?}");
-    assert!(of(K::Frozen, A::Restarted).is_some(), "{told:?}");
+    assert!(level.2.abs_diff(4800) <= 12 && level.3 >= 400, "{reported:?}");
+    assert!(of(K::Frozen, A::Restarted).is_some(), "{reported:?}");
     let counts = tracker.counts();
-    assert_eq!(counts.restarts, 2, "{told:?}");
+    assert_eq!(counts.restarts, 2, "{reported:?}");
     assert!(counts.held > 700 && counts.skipped > 190, "{counts:?}");
     assert!(!tracker.is_paused() && tracker.since_restart_s().is_some());
 }

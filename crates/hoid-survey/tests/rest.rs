@@ -108,23 +108,24 @@ fn after_constant_span(
             smallest(kept.get_or_insert_with(|| bars(&tracker)), bars(&tracker));
         }
     }
-    let (mut begin, before) = (kept.unwrap_or_else(|| bars(&tracker)), at(first - 1));
-    let mut told = Vec::new();
+    let (mut initial_bars, before) = (kept.unwrap_or_else(|| bars(&tracker)), at(first - 1));
+    let mut reported = Vec::new();
     for k in 0..(length_s / ts) as usize {
         // After a step of e, the response contains information as long as it is not constant.
         if span_kind == ConstantSpan::ConstantE && k as f64 * ts <= RESPONSE_S {
-            begin = bars(&tracker);
+            initial_bars = bars(&tracker);
         }
         tracker.update(span_kind.sample(&before, &at(first + k), k), true);
-        told.extend(tracker.event().map(|event| event.kind));
+        reported.extend(tracker.event().map(|event| event.kind));
     }
     assert!(
-        told.iter()
+        reported
+            .iter()
             .any(|kind| matches!(kind, GuardKind::Idle | GuardKind::Frozen)),
-        "{:?} {span_kind:?} is not told: {told:?}",
+        "{:?} {span_kind:?} is not told: {reported:?}",
         options.method.name()
     );
-    (tracker, begin)
+    (tracker, initial_bars)
 }
 
 fn all_options() -> Vec<TrackOptions> {
@@ -149,10 +150,10 @@ fn assert_no_bar_shrinks(span_kind: ConstantSpan, lengths_s: &[f64]) {
     let record = record(Condition::C1);
     for options in all_options() {
         for length in lengths_s {
-            let (tracker, begin) = after_constant_span(&options, &record, span_kind, *length);
+            let (tracker, initial_bars) = after_constant_span(&options, &record, span_kind, *length);
             let end = bars(&tracker);
-            assert_eq!(begin.len(), end.len());
-            for ((name, before), (_, after)) in begin.iter().zip(&end) {
+            assert_eq!(initial_bars.len(), end.len());
+            for ((name, before), (_, after)) in initial_bars.iter().zip(&end) {
                 assert!(
                     *after >= before * (1.0 - 1e-9),
                     "{}: {span_kind:?} of {length} s, {name} from {before:e} to {after:e}",
@@ -197,8 +198,8 @@ fn no_error_bar_shrinks_through_a_constant_error() {
 fn tracking_resumes_after_a_long_rest() {
     let record = record(Condition::C1);
     for options in all_options() {
-        let (mut tracker, begin) = after_constant_span(&options, &record, ConstantSpan::Rest, 1000.0);
-        for ((name, before), (_, after)) in begin.iter().zip(bars(&tracker)) {
+        let (mut tracker, initial_bars) = after_constant_span(&options, &record, ConstantSpan::Rest, 1000.0);
+        for ((name, before), (_, after)) in initial_bars.iter().zip(bars(&tracker)) {
             assert!(after >= before * (1.0 - 1e-9), "{}: {name}", options.method.name());
         }
         let theta = tracker.theta().to_vec();
@@ -212,7 +213,7 @@ fn tracking_resumes_after_a_long_rest() {
             options.method.name()
         );
         // The error bars must not decrease to a hundredth after a few seconds of information.
-        for ((name, before), (_, after)) in begin.iter().zip(bars(&tracker)) {
+        for ((name, before), (_, after)) in initial_bars.iter().zip(bars(&tracker)) {
             assert!(
                 after >= 0.05 * before,
                 "{}: {name} {before:e} {after:e}",

@@ -166,8 +166,8 @@ fn resealed_changed_state_never_panics() {
                     restored.update(if k % 20 < 2 { missing } else { sample(k) }, true);
                 }
                 let numbers = restored.saved();
-                let told = (restored.operator(), restored.covariance(), restored.response(3.0));
-                assert!(numbers.len() > 1 || told.1.is_none());
+                let results = (restored.operator(), restored.covariance(), restored.response(3.0));
+                assert!(numbers.len() > 1 || results.1.is_none());
             }
         }
     }

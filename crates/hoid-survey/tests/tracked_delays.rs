@@ -174,16 +174,19 @@ fn estimates_stay_finite_without_excitation() {
 fn invalid_delay_ranges_are_refused() {
     let record = run(0.28, 0.1);
     let refused = |options: TrackOptions| track(&record, &options, 1).unwrap_err().to_string();
-    let says = refused(options(Some("0..2")));
-    assert!(says.contains("201 samples") && says.contains("at most 128"), "{says}");
-    let says = Method::rpem().with("track_delay", "0.4..0.2").unwrap_err().to_string();
-    assert!(says.contains("LO <= HI"), "{says}");
+    let message = refused(options(Some("0..2")));
+    assert!(
+        message.contains("201 samples") && message.contains("at most 128"),
+        "{message}"
+    );
+    let message = Method::rpem().with("track_delay", "0.4..0.2").unwrap_err().to_string();
+    assert!(message.contains("LO <= HI"), "{message}");
     let ar = Structure::Ar;
     let alone = TrackOptions {
         structure: ar,
         orders: ar.operator_orders(0),
         ..options(Some("0.2..0.4"))
     };
-    let says = refused(alone);
-    assert!(says.contains("no input") && says.contains("bj"), "{says}");
+    let message = refused(alone);
+    assert!(message.contains("no input") && message.contains("bj"), "{message}");
 }

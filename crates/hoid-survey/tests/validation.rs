@@ -91,17 +91,17 @@ fn best_covariance_of_the_grid_is_chosen() {
 #[test]
 fn invalid_choices_are_refused_with_advice() {
     let (record, other) = (run(0.1, 7), run(0.1, 8));
-    let says = |validation: &Record, options: &TrackOptions| {
+    let refusal = |validation: &Record, options: &TrackOptions| {
         choose_covariance(&record, validation, options).unwrap_err().to_string()
     };
     let given = options(Method::rpem()).with(&[("covariance", "0.1")]).unwrap();
-    let found = says(&other, &given);
+    let found = refusal(&other, &given);
     assert!(
         found.contains("covariance: found 0.1") && found.contains("one of the two"),
         "{found}"
     );
     for method in [Method::adaptive(), hoid_survey::multiple_model(), hoid_survey::window()] {
-        let found = says(&other, &options(method.clone()));
+        let found = refusal(&other, &options(method.clone()));
         assert!(
             found.contains(method.name()) && found.contains("rls or rpem"),
             "{found}"
@@ -115,26 +115,26 @@ fn invalid_choices_are_refused_with_advice() {
         );
     }
     let gradient = options(Method::rpem()).with(&[("forgetting", "gradient")]).unwrap();
-    assert!(says(&other, &gradient).contains("has P"));
+    assert!(refusal(&other, &gradient).contains("has P"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
-    assert!(says(&other, &tracked).contains("without track_delay"));
+    assert!(refusal(&other, &tracked).contains("without track_delay"));
     // Second runs with another sample time, too few samples, the sign of u inverted, or only zeros.
     let (e, u) = (other.input().to_vec(), other.output().to_vec());
     let of = |ts: f64, e: &[f64], u: Vec<f64>| {
         let (e, u) = (Channel::new("e", "", e.to_vec()), Channel::new("u", "", u));
         Record::new(SampleTime::new(ts).unwrap(), e, u).unwrap()
     };
-    let found = says(&of(0.02, &e, u.clone()), &options(Method::rls()));
+    let found = refusal(&of(0.02, &e, u.clone()), &options(Method::rls()));
     assert!(found.contains("0.02") && found.contains("0.01"), "{found}");
-    let found = says(&of(0.01, &e[..700], u[..700].to_vec()), &options(Method::rls()));
+    let found = refusal(&of(0.01, &e[..700], u[..700].to_vec()), &options(Method::rls()));
     assert!(found.contains("7 s in common") && found.contains("7.29"), "{found}");
     let turned = of(0.01, &e, u.iter().map(|value| -value).collect());
-    let found = says(&turned, &options(Method::rpem()));
+    let found = refusal(&turned, &options(Method::rpem()));
     assert!(found.contains("VAF of 0 %") && found.contains("signs"), "{found}");
-    let found = says(&of(0.01, &e, vec![0.0; e.len()]), &options(Method::rpem()));
+    let found = refusal(&of(0.01, &e, vec![0.0; e.len()]), &options(Method::rpem()));
     assert!(found.contains("VAF of 0 %"), "{found}");
     let alone = Record::of_output(record.sample_time(), Channel::new("u", "", u)).unwrap();
-    assert!(says(&alone, &options(Method::rls())).contains("no input"));
+    assert!(refusal(&alone, &options(Method::rls())).contains("no input"));
 }
 
 /// With a power of zero the results are bit-identical; with the default power P is reduced, and the estimate for a
@@ -172,16 +172,16 @@ fn vaf_power_reduces_the_covariance() {
     );
     assert!(differs && updated > default, "{default} {updated}");
     let (record, other) = (run(0.1, 30), run(0.1, 31).span(0.0, 60.0).unwrap());
-    let says = |other: &Record, options: TrackOptions| {
+    let refusal = |other: &Record, options: TrackOptions| {
         let updates = CovarianceUpdates::default();
         track_validated(&record, other, &options, &updates, 1)
             .unwrap_err()
             .to_string()
     };
-    assert!(says(&other, options(Method::rpem())).contains("6000 samples"));
-    assert!(says(&record, options(hoid_survey::window())).contains("rls or rpem"));
+    assert!(refusal(&other, options(Method::rpem())).contains("6000 samples"));
+    assert!(refusal(&record, options(hoid_survey::window())).contains("rls or rpem"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
-    assert!(says(&record, tracked).contains("without track_delay"));
+    assert!(refusal(&record, tracked).contains("without track_delay"));
     // A second run without any signal contains no information.
     let n = record.len();
     let silent = Record::new(

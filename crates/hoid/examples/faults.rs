@@ -46,7 +46,7 @@ fn main() {
             other => panic!("{other}: there is --part, --clean, --rows, --program, --seed and --only"),
         }
     }
-    let begun = Instant::now();
+    let start_time = Instant::now();
     let cases: Vec<(u64, Fault, OperatorKind)> = (0..)
         .zip(faults())
         .step_by(part)
@@ -98,7 +98,7 @@ fn main() {
         faults().len(),
         faulty.len(),
         sound.len(),
-        begun.elapsed().as_secs_f64()
+        start_time.elapsed().as_secs_f64()
     );
 }
 

@@ -165,14 +165,14 @@ fn change_of_delay_is_tracked_and_named() {
             ..options(hoid::survey::multiple_model())
         }
     };
-    let says = refused(with((0.3, 0.4)));
-    assert!(says.contains("nk = 29") && says.contains("31 to 41"), "{says}");
+    let message = refused(with((0.3, 0.4)));
+    assert!(message.contains("nk = 29") && message.contains("31 to 41"), "{message}");
     for range in [(0.4, 0.2), (f64::NAN, 0.4), (-0.1, 0.4), (0.2, f64::INFINITY)] {
-        let says = refused(with(range));
-        assert!(says.contains("shorter time first"), "{says}");
+        let message = refused(with(range));
+        assert!(message.contains("shorter time first"), "{message}");
     }
-    let says = refused(tracked.with(&[("smooth", "true")]).unwrap());
-    assert!(says.contains("the same delay"), "{says}");
+    let message = refused(tracked.with(&[("smooth", "true")]).unwrap());
+    assert!(message.contains("the same delay"), "{message}");
 }
 
 #[test]

@@ -68,7 +68,7 @@ fn faults_change_only_their_rows_and_channels() {
         let (from, to) = found.rows;
         let (on, table) = (fault.kind.on, &found.table);
         let added = table.len() as isize - clean.len() as isize;
-        let behind = table.len() - (clean.len() - to);
+        let end_row = table.len() - (clean.len() - to);
         assert!(
             found.from_s <= found.to_s && found.to_s <= table.seconds() + 1e-9,
             "{fault:?}"
@@ -78,7 +78,7 @@ fn faults_change_only_their_rows_and_channels() {
         for (own, was, touched) in [(&table.e, &clean.e, on.e()), (&table.u, &clean.u, on.u())] {
             assert_eq!(own[..from], was[..from], "{fault:?}");
             if fault.kind.what != Change::Short {
-                assert_eq!(own[behind..], was[to..], "{fault:?}");
+                assert_eq!(own[end_row..], was[to..], "{fault:?}");
             }
             let inside = |k: usize| own[k].to_bits() != was[k].to_bits();
             let others = (from..to.min(own.len())).filter(|&k| inside(k)).count();
@@ -192,8 +192,8 @@ fn wrong_fits_are_detected() {
     let silent = judged(&fit(1.5, Some(0.1), "trustworthy"));
     assert!(silent.wrong && !silent.flagged() && silent.silently_wrong());
     assert!(matches!(&silent.worst, Some((name, z)) if name == "K_e" && (z - 5.0).abs() < 1e-9));
-    let told = judged(&fit(1.5, Some(0.1), "doubtful"));
-    assert!(told.wrong && told.flagged() && !told.silently_wrong());
+    let flagged = judged(&fit(1.5, Some(0.1), "doubtful"));
+    assert!(flagged.wrong && flagged.flagged() && !flagged.silently_wrong());
     assert!(!judged(&fit(1.39, Some(0.1), "trustworthy")).wrong);
     // A value without a standard error is not judged, except for a delay in whole samples.
     let open = judged(&fit(9.0, None, "trustworthy"));

@@ -446,13 +446,13 @@ fn one_sample_too_few_is_an_error_and_no_length_panics() {
                     }
                     Err(error) => {
                         // A record of one sample counts as a constant signal.
-                        let told = matches!(
+                        let reported = matches!(
                             error,
                             IdentError::TooFewSamples { .. }
                                 | IdentError::DelayTooLong { .. }
                                 | IdentError::NoExcitation { .. }
                         );
-                        assert!(samples > 34 || told, "{samples} {error}");
+                        assert!(samples > 34 || reported, "{samples} {error}");
                     }
                 }
             }

@@ -402,21 +402,21 @@ fn contradictory_options_are_refused() {
     let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 12);
     let refused = |options: TrackOptions| track(&record, &options, 1).unwrap_err().to_string();
     let bj = Structure::BoxJenkins;
-    let says = refused(TrackOptions::new(Method::rls(), bj, bj.operator_orders(NK)));
-    assert!(says.contains("arx or fir"), "{says}");
-    let says = refused(options(Method::rpem()).with(&[("memory_of", "q7=inf")]).unwrap());
-    assert!(says.contains("q7") && says.contains("f2"), "{says}");
-    let says = refused(with_memory(Method::rpem(), "0.001s"));
-    assert!(says.contains("more than one sample"), "{says}");
-    let says = refused(TrackOptions {
+    let message = refused(TrackOptions::new(Method::rls(), bj, bj.operator_orders(NK)));
+    assert!(message.contains("arx or fir"), "{message}");
+    let message = refused(options(Method::rpem()).with(&[("memory_of", "q7=inf")]).unwrap());
+    assert!(message.contains("q7") && message.contains("f2"), "{message}");
+    let message = refused(with_memory(Method::rpem(), "0.001s"));
+    assert!(message.contains("more than one sample"), "{message}");
+    let message = refused(TrackOptions {
         start: StartAt::Theta(vec![0.1, 0.1, -0.5, -2.5, 1.6]),
         ..options(Method::rpem())
     });
-    assert!(says.contains("stable"), "{says}");
-    let says = refused(TrackOptions {
+    assert!(message.contains("stable"), "{message}");
+    let message = refused(TrackOptions {
         start: StartAt::Span(Some((90.0, 95.0))),
         ..options(Method::rpem())
     });
-    assert!(says.contains("90"), "{says}");
+    assert!(message.contains("90"), "{message}");
     assert!(track(&record, &options(Method::rls()), 0).is_err());
 }

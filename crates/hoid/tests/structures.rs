@@ -195,7 +195,7 @@ fn robust_loss_limits_the_effect_of_outliers() {
     let (mut plain_error, mut robust_error, mut inside) = (0.0, 0.0, 0);
     for seed in 0..runs {
         let clean = truth.record(1500, 0.5, 50 + seed);
-        let spoilt: Vec<f64> = clean
+        let with_outliers: Vec<f64> = clean
             .output()
             .iter()
             .enumerate()
@@ -204,7 +204,7 @@ fn robust_loss_limits_the_effect_of_outliers() {
         let record = Record::new(
             clean.sample_time(),
             clean.input_channel().unwrap().clone(),
-            Channel::new("u", "deg", spoilt),
+            Channel::new("u", "deg", with_outliers),
         )
         .unwrap();
         let error = |fit: &Fit| (fit.model().f()[0] + 1.5).abs() + (fit.model().b()[0] - 1.0).abs();

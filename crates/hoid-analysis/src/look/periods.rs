@@ -131,12 +131,12 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
 /// Returns the spans to try: the longest first and, among spans of equal length, the latest first, since a person needs
 /// time to settle.
 fn spans(record: &Record, known: &LookOptions) -> Vec<(f64, f64)> {
-    let (begin, end) = (record.time_s(0), record.time_s(record.len()));
-    let most = MAX_CUT_S.min(MAX_CUT_SHARE * (end - begin));
+    let (start_s, end) = (record.time_s(0), record.time_s(record.len()));
+    let most = MAX_CUT_S.min(MAX_CUT_SHARE * (end - start_s));
     let whole = |from: f64, to: f64| (from.ceil() as i64..=to.floor() as i64).map(|t| t as f64);
     let begins: Vec<f64> = match known.from_s {
         Some(t) => vec![t],
-        None => std::iter::once(begin).chain(whole(begin, begin + most)).collect(),
+        None => std::iter::once(start_s).chain(whole(start_s, start_s + most)).collect(),
     };
     let ends: Vec<f64> = match known.to_s {
         Some(t) => vec![t],

@@ -46,11 +46,11 @@ fn layout_and_next_command(look: &Look, file: &str) -> String {
     let role = |role: &Role| format!("{} ({})", role.column, role.why);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
     // The printed table of columns already gives the units that it found.
-    let beside = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
+    let has_unit = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
     let units: Vec<String> = look
         .units()
         .iter()
-        .filter(|(column, _)| !beside(column))
+        .filter(|(column, _)| !has_unit(column))
         .map(|(column, unit)| format!("{column} in {unit}"))
         .collect();
     if !units.is_empty() {

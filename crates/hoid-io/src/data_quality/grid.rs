@@ -143,8 +143,8 @@ impl Grid {
 
 /// True if no row is missing and each time is near its grid point.
 fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
-    let begin = times.first().copied().unwrap_or(f64::NAN);
-    let near = |(i, t): (usize, &f64)| (t - begin - i as f64 * ts).abs() < 0.25 * ts;
+    let origin = times.first().copied().unwrap_or(f64::NAN);
+    let near = |(i, t): (usize, &f64)| (t - origin - i as f64 * ts).abs() < 0.25 * ts;
     steps.iter().all(|step| *step == 1.0) && times.iter().enumerate().all(near)
 }
 
@@ -158,7 +158,7 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
     // The phase at the start of a grid is estimated from several times, since a single time deviates by its jitter.
-    let begin = |i: usize| {
+    let origin = |i: usize| {
         let ahead = times[i..]
             .iter()
             .take(START_TIMES)
@@ -167,11 +167,11 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
         let near: Vec<f64> = ahead.filter(|t| (t - times[i]).abs() < 1.5 * ts).collect();
         near.iter().sum::<f64>() / near.len() as f64
     };
-    let (mut phase, mut known) = (begin(0), START_TIMES as f64);
+    let (mut phase, mut known) = (origin(0), START_TIMES as f64);
     for i in 1..times.len() {
         let mut step = ((times[i] - phase) / ts).round();
         if step >= MIN_PAUSE_STEPS {
-            let anew = begin(i);
+            let anew = origin(i);
             step = ((anew - phase) / ts).round();
             (phase, known) = (anew, START_TIMES as f64);
         } else {

@@ -178,7 +178,7 @@ pub(crate) fn saturation_limits(values: &[f64], levels: &Levels) -> Vec<Saturati
         };
         let stays = runs(values.iter().map(|v| *v == extreme));
         let rows: usize = stays.iter().map(Range::len).sum();
-        let beside: usize = next.into_iter().map(count).sum();
+        let next_count: usize = next.into_iter().map(count).sum();
         // A stay at the start or end of the record does not count: the signal may have settled there.
         let inner = || {
             stays
@@ -189,7 +189,7 @@ pub(crate) fn saturation_limits(values: &[f64], levels: &Levels) -> Vec<Saturati
         let longest = inner().max().unwrap_or(0);
         let stayed = inner().filter(|length| *length >= SATURATED_ROWS.0).count();
         let is_rail = if coarse {
-            longest >= SATURATED_ROWS.1 && rows.saturating_mul(3) >= PEAK.saturating_mul(beside) && stayed > 1
+            longest >= SATURATED_ROWS.1 && rows.saturating_mul(3) >= PEAK.saturating_mul(next_count) && stayed > 1
         } else {
             longest >= SATURATED_ROWS.0
         };

@@ -105,9 +105,9 @@ impl Platform {
             return MAC.into_iter().find(|(known, _)| *known == machine).map(|(_, p)| p);
         }
         let head = u32_at(bytes, 0x3c).filter(|_| bytes.starts_with(b"MZ"))? as usize;
-        let behind = head.checked_add(4)?;
+        let end = head.checked_add(4)?;
         let is_one = bytes.get(head..behind)? == b"PE\0\0";
-        (is_one && u16_at(bytes, behind)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
+        (is_one && u16_at(bytes, end)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
     }
 }
 

@@ -118,7 +118,7 @@ mod tests {
         // A larger file may decompress to more.
         Budget::of(10 << 20).take(1 << 29, "a.mat").unwrap();
         assert!(Budget::of(usize::MAX).take(CEILING + 1, "a.mat").is_err());
-        let said = Budget::up_to(1).take(2, "a.mat").unwrap_err().to_string();
-        assert!(said.contains(UNPACKED), "{said}");
+        let message = Budget::up_to(1).take(2, "a.mat").unwrap_err().to_string();
+        assert!(message.contains(UNPACKED), "{message}");
     }
 }

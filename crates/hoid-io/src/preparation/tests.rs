@@ -154,11 +154,11 @@ fn fractional_offsets_interpolate_band_limited() {
         let late = record(n, signal, |t| signal(t - offset * TS));
         let preparation = moved("u", Offset::Samples(offset));
         let (found, steps) = preparation.apply(late).unwrap();
-        let begin = found.time_s(0) - 3.0;
+        let start_s = found.time_s(0) - 3.0;
         // The sum of the amplitudes is 3, with a relative error of 1e-4.
-        let error = largest(found.output(), |k| signal(begin + k as f64 * TS));
+        let error = largest(found.output(), |k| signal(start_s + k as f64 * TS));
         assert!(error < 3e-4, "{offset}: {error:e}");
-        assert!(largest(found.input(), |k| signal(begin + k as f64 * TS)) < 1e-12);
+        assert!(largest(found.input(), |k| signal(start_s + k as f64 * TS)) < 1e-12);
         // The ends are cut, and no values are extrapolated.
         let Step::Offset {
             cut_samples: (start, end),
@@ -200,9 +200,9 @@ fn resampling_to_lower_and_higher_rates_is_accurate() {
         let (found, _) = with(|p| p.rate = NewRate::Hz(hz))
             .apply(record(3000, low, low))
             .unwrap();
-        let (begin, ts) = (found.time_s(0) - 3.0, found.sample_time().s());
+        let (start_s, ts) = (found.time_s(0) - 3.0, found.sample_time().s());
         assert!((ts * hz - 1.0).abs() < 1e-12);
-        let error = largest(found.input(), |k| low(begin + k as f64 * ts));
+        let error = largest(found.input(), |k| low(start_s + k as f64 * ts));
         assert!(error < 2e-4, "{hz}: {error:e}");
         // The new samples are on the grid that starts at the first sample.
         let steps = (found.time_s(0) - 3.0) / ts;

@@ -422,21 +422,21 @@ impl Source<'_> {
         let Some(shape) = shape else {
             return refuse(format!("it lacks a key of its shape, which takes {takes}"));
         };
-        let behind = |owner: &str, is_there: bool, others: bool| {
+        let requires = |owner: &str, is_there: bool, others: bool| {
             if others && !is_there {
                 return Err(self.keys(&format!("[[remnant]] number {k} lacks {owner}")));
             }
             Ok(())
         };
         let follows = given.follows_part.is_some() || given.follows_memory_s.is_some();
-        behind("follows", given.follows.is_some(), follows)?;
-        behind(
+        requires("follows", given.follows.is_some(), follows)?;
+        requires(
             "pulses_per_s",
             given.pulses_per_s.is_some(),
             given.pulses_part.is_some(),
         )?;
-        behind("on_s", given.on_s.is_some(), given.off_s.is_some())?;
-        behind("off_s", given.off_s.is_some(), given.on_s.is_some())?;
+        requires("on_s", given.on_s.is_some(), given.off_s.is_some())?;
+        requires("off_s", given.off_s.is_some(), given.on_s.is_some())?;
         Ok(RemnantPart {
             shape,
             strength,

@@ -106,12 +106,12 @@ fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
             continue;
         }
         seen.push(key);
-        let beside = || columns.iter().filter(|c| (c.parent.as_str(), c.rows) == key);
+        let neighbours = || columns.iter().filter(|c| (c.parent.as_str(), c.rows) == key);
         let time = TIMES
             .iter()
-            .find_map(|name| beside().find(|c| c.name == *name && c.values.is_some()));
+            .find_map(|name| neighbours().find(|c| c.name == *name && c.values.is_some()));
         let is_time = |c: &RawColumn| time.is_some_and(|time| time.path == c.path);
-        let numbers = || beside().filter(|c| c.values.is_some() && !is_time(c));
+        let numbers = || neighbours().filter(|c| c.values.is_some() && !is_time(c));
         let is_clock = |c: &&RawColumn| is_clock_name(&c.name) || TIMES.contains(&c.name.as_str());
         found.extend(issues_of(&Signals {
             columns: numbers().filter(|c| !is_clock(c)).map(signal).collect(),

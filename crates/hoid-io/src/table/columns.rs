@@ -124,8 +124,8 @@ impl Table<'_> {
         let is_last_cell = self.columns.len().checked_sub(1) == Some(at);
         let name = named(&column.name);
         // A sign or a point at the end of a truncated file is the start of a number.
-        let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
-        if begun || column.texts.binary_search(&row).is_ok() {
+        let is_unfinished_number = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
+        if is_unfinished_number || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
             } else if is_moment(&found) && column.texts.len() == self.rows {

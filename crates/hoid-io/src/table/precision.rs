@@ -53,7 +53,7 @@ impl Precision {
             .next()
             .and_then(|text| std::str::from_utf8(text).ok()?.parse().ok());
         let exponent = written.map_or(0, |exponent: i32| exponent.clamp(-400, 400));
-        let behind = digits
+        let fraction_digits = digits
             .iter()
             .skip_while(|byte| **byte != b'.')
             .filter(|byte| byte.is_ascii_digit());
@@ -61,7 +61,7 @@ impl Precision {
             .iter()
             .filter(|byte| byte.is_ascii_digit())
             .skip_while(|byte| **byte == b'0');
-        let decimals = count(behind).saturating_sub(exponent);
+        let decimals = count(fraction_digits).saturating_sub(exponent);
         self.decimals = Some(self.decimals.unwrap_or(i32::MIN).max(decimals));
         self.significant = self.significant.max(count(significant));
     }

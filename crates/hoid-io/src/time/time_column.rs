@@ -306,9 +306,9 @@ fn unit_of(values: &[f64]) -> Unit {
 
 /// Converts a column to the time t.
 fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
-    let beside = nanoseconds_of(table, at).filter(|_| unit == Some(Unit::SecondsAndNanoseconds));
-    let beside = beside.and_then(|beside| table.columns.get(beside));
-    let nanoseconds = beside.map(|column| (column.name.clone(), column.values.clone()));
+    let nanosecond_column = nanoseconds_of(table, at).filter(|_| unit == Some(Unit::SecondsAndNanoseconds));
+    let nanosecond_column = nanosecond_column.and_then(|nanosecond_column| table.columns.get(nanosecond_column));
+    let nanoseconds = nanosecond_column.map(|column| (column.name.clone(), column.values.clone()));
     let mut columns = table.columns.iter_mut().enumerate();
     if let Some((other, column)) = columns.find(|(_, column)| column.name == "t")
         && other != at

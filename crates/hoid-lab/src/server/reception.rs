@@ -43,8 +43,8 @@ impl PendingConnection {
     fn look(&mut self) -> ReadState {
         let mut part = [0; 2048];
         loop {
-            if let Some(said) = Request::of(&self.head) {
-                return ReadState::Complete(said);
+            if let Some(message) = Request::of(&self.head) {
+                return ReadState::Complete(message);
             }
             match self.stream.read(&mut part) {
                 Ok(0) => return ReadState::Closed,
@@ -77,17 +77,17 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
         };
         let mut waiting = VecDeque::with_capacity(all.len());
         for mut stranger in all.drain(..) {
-            let said = match stranger.look() {
+            let message = match stranger.look() {
                 ReadState::Incomplete => {
                     waiting.push_back(stranger);
                     continue;
                 }
                 ReadState::Closed => continue,
-                ReadState::Complete(said) => said,
+                ReadState::Complete(message) => message,
             };
             idle = false;
             let stream = stranger.stream;
-            let refused = match said {
+            let refused = match message {
                 Ok(request) => admitted(request, stream).err(),
                 Err(reply) => Some((reply, stream)),
             };

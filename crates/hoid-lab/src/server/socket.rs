@@ -64,9 +64,9 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
                 words: error.to_string(),
                 elsewhere: false,
             };
-            let told = serde_json::to_string(&words).map(|text| socket.send(Message::text(text)));
+            let sent = serde_json::to_string(&words).map(|text| socket.send(Message::text(text)));
             // A page that violates the protocol is not the page of this program and is disconnected.
-            if matches!(error, LabError::Message(_)) || !matches!(told, Ok(Ok(()))) {
+            if matches!(error, LabError::Message(_)) || !matches!(sent, Ok(Ok(()))) {
                 break;
             }
         }

@@ -73,7 +73,7 @@ impl Person {
             Outgoing::Text(text) => serde_json::from_str::<Value>(&text).ok(),
             Outgoing::Binary(_) => None,
         });
-        states.filter(|told| told["type"] == "state").last().unwrap()
+        states.filter(|state| state["type"] == "state").last().unwrap()
     }
 }
 

@@ -169,11 +169,11 @@ impl DecimatedChannel {
 
     /// Extends the past by the reflection of the start in the first sample.
     fn reflect(&mut self, half: usize) {
-        let begin = self.past.front().copied().unwrap_or(self.last);
+        let first = self.past.front().copied().unwrap_or(self.last);
         for k in 1..=half {
             // The k - 1 values inserted so far have shifted sample k to position 2 k - 1. It is missing only after
             // altered numbers were restored.
-            let value = 2.0 * begin - self.past.get(2 * k - 1).unwrap_or(&begin);
+            let value = 2.0 * first - self.past.get(2 * k - 1).unwrap_or(&first);
             self.past.push_front(value);
         }
         self.first = -(half as i64);

@@ -153,10 +153,10 @@ fn streamed_decimation_is_bit_identical_to_batch() {
         let samples = whole.input().iter().copied().zip(whole.output().iter().copied());
         let found = streamed(hz, factor, samples);
         let (batch, done) = whole.clone().decimated(factor).unwrap();
-        let behind = batch.len() - found.len();
+        let lag_samples = batch.len() - found.len();
         assert!(
-            behind as f64 * factor as f64 / hz <= done.lag_s + 2.0 * factor as f64 / hz,
-            "{behind}"
+            lag_samples as f64 * factor as f64 / hz <= done.lag_s + 2.0 * factor as f64 / hz,
+            "{lag_samples}"
         );
         for (k, [e, u]) in found.iter().enumerate() {
             assert_eq!((*e, *u), (batch.input()[k], batch.output()[k]), "{hz}: {k}");

@@ -105,10 +105,10 @@ impl TraceGrid {
         (from, to): (f64, f64),
         numbered: bool,
     ) -> kuva::prelude::Layout {
-        for &(begin, end) in &self.shaded_s {
-            let (begin, end) = (begin.clamp(from, to), end.clamp(from, to));
-            if begin < end {
-                let region = ShadedRegion::vertical(begin, end).with_color(GREY).with_opacity(0.14);
+        for &(start, end) in &self.shaded_s {
+            let (start, end) = (start.clamp(from, to), end.clamp(from, to));
+            if start < end {
+                let region = ShadedRegion::vertical(start, end).with_color(GREY).with_opacity(0.14);
                 layout = layout.with_shaded_region(region);
             }
         }

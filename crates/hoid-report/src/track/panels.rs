@@ -92,9 +92,9 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
     let mut marks_s: Vec<f64> = Vec::new();
     for trace in traces.iter().map(|t| t.section.trace) {
         if let (StartAt::Span(span), true) = (&trace.options().start, trace.start().is_some()) {
-            let begin = record.time_s(0);
-            let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
-            let span = span.unwrap_or((begin, third));
+            let start_s = record.time_s(0);
+            let third = start_s + record.len() as f64 * record.sample_time().s() / 3.0;
+            let span = span.unwrap_or((start_s, third));
             if !shaded_s.contains(&span) {
                 shaded_s.push(span);
             }

@@ -175,7 +175,7 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
     let sound = |v: f64| v.abs() <= largest;
     let mut response = Response::new(about, record.sample_time().s());
     let settled = SETTLING_TIME_CONSTANTS / (about[0] * about[1] * record.sample_time().s());
-    let begin = nk + d.len() + settled.min(record.len() as f64 / 4.0) as usize;
+    let first_row = nk + d.len() + settled.min(record.len() as f64 / 4.0) as usize;
     let mut signals: Vec<Signals> = Vec::with_capacity(e.len());
     let (mut last, mut held) = (0.0, vec![0.0; e.len()]);
     for (held, e) in held.iter_mut().zip(e) {
@@ -188,7 +188,7 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
         .map(|t| {
             let x = t.checked_sub(nk).map_or(0.0, |s| held[s]);
             signals.push(response.step(x));
-            let known = t >= begin && sound(e[t]) && (0..=d.len()).all(|j| sound(u[t - j]));
+            let known = t >= first_row && sound(e[t]) && (0..=d.len()).all(|j| sound(u[t - j]));
             if !known {
                 return None;
             }

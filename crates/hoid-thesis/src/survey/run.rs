@@ -106,9 +106,9 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
     };
     let measured =
         |name: &str, extra_information: &'static str, follow: &dyn Fn() -> Result<TrackingResult, ThesisError>| {
-            let begin = Instant::now();
+            let start_time = Instant::now();
             let followed = follow();
-            let seconds = begin.elapsed().as_secs_f64();
+            let seconds = start_time.elapsed().as_secs_f64();
             let errors = followed.and_then(|found| errors(record, &at, omega, &found));
             MethodResult {
                 name: name.to_owned(),

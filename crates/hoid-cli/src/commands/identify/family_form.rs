@@ -247,12 +247,12 @@ impl FamilyReport<'_> {
             .collect();
         let mut rows = text::table(&heads);
         for (k, here) in fit.operator(0).parameters.iter().enumerate() {
-            let beside = others.iter().filter_map(|(_, of)| of.get(k));
-            let beside = beside.map(|(_, there)| with_error(there.value, there.standard_error));
+            let other_values = others.iter().filter_map(|(_, of)| of.get(k));
+            let other_values = other_values.map(|(_, there)| with_error(there.value, there.standard_error));
             rows.add_row(
                 [named(here, &gain), with_error(here.value, here.standard_error)]
                     .into_iter()
-                    .chain(beside),
+                    .chain(other_values),
             );
         }
         let mut page = format!("\n{rows}\n");

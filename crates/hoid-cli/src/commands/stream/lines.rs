@@ -405,7 +405,7 @@ mod tests {
             ("{\"e\": 1e999, \"u\": 1}", "not a JSON object"),
         ] {
             match default_columns().read(line).unwrap() {
-                ParsedLine::Unreadable(said) => assert!(said.contains(reason), "{line}: {said}"),
+                ParsedLine::Unreadable(fault) => assert!(fault.contains(reason), "{line}: {fault}"),
                 other => panic!("{line}: {other:?}"),
             }
         }

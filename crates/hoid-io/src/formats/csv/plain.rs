@@ -135,8 +135,8 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
 
 /// Returns the end of the part that starts at `start`, which is after the first line end beyond `length` bytes.
 fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
-    let mut behind = bytes.iter().enumerate().skip(start.saturating_add(length));
-    let line = behind.find(|(_, byte)| **byte == b'\n');
+    let mut remaining = bytes.iter().enumerate().skip(start.saturating_add(length));
+    let line = remaining.find(|(_, byte)| **byte == b'\n');
     line.map_or(bytes.len(), |(at, _)| at.saturating_add(1))
 }
 
@@ -170,13 +170,13 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     found.starts.reserve(rows);
     let mut row = vec![f64::NAN; columns];
     let mut printed: Vec<&[u8]> = vec![b""; columns];
-    while let [first, behind @ ..] = rest {
+    while let [first, remaining @ ..] = rest {
         // Blank lines are not rows.
         if matches!(first, b'\n' | b'\r') {
-            rest = behind;
+            rest = remaining;
             continue;
         }
-        let Some(behind) = plain_row(rest, layout, &mut row, &mut printed) else {
+        let Some(remaining) = plain_row(rest, layout, &mut row, &mut printed) else {
             break;
         };
         found.starts.push(at(rest));
@@ -193,7 +193,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
                 precision.add_bytes(printed);
             }
         }
-        rest = behind;
+        rest = remaining;
     }
     found.end = at(rest);
     found
@@ -230,7 +230,7 @@ fn plain_row<'a>(
             rest = rest.get(length..)?;
         }
         match rest {
-            [byte, behind @ ..] if *byte == layout.separator && column < last => rest = behind,
+            [byte, remaining @ ..] if *byte == layout.separator && column < last => rest = remaining,
             [b'\n' | b'\r', ..] | [] if column == last => {}
             _ => return None,
         }
@@ -240,8 +240,8 @@ fn plain_row<'a>(
 }
 
 fn without_blanks(mut rest: &[u8]) -> &[u8] {
-    while let [b' ', behind @ ..] = rest {
-        rest = behind;
+    while let [b' ', remaining @ ..] = rest {
+        rest = remaining;
     }
     rest
 }

@@ -23,8 +23,8 @@ mod tests {
     #[test]
     fn classes_with_signals_have_an_export_command() {
         for class in ["timetable", "table", "timeseries"] {
-            let said = object(class);
-            assert!(said.contains(class) && said.contains("save run.mat"), "{said}");
+            let message = object(class);
+            assert!(message.contains(class) && message.contains("save run.mat"), "{message}");
         }
         assert!(object("thing").contains("class thing"));
     }

@@ -72,7 +72,7 @@ impl Reader {
     fn sum(&mut self) -> Result<Ratio, String> {
         let mut sum = self.product()?;
         loop {
-            let begin = self.at;
+            let start = self.at;
             let sign = match self.next() {
                 Some('+') => 1.0,
                 Some('-') => -1.0,
@@ -81,10 +81,10 @@ impl Reader {
             self.at += 1;
             let term = self.product()?;
             let Some(total) = sum.plus(&term, sign) else {
-                self.at = begin;
+                self.at = start;
                 return self.refuse("one delay, as a factor of the whole function: 5exp(-0.1s)/(s+1)");
             };
-            sum = self.checked(total, begin)?;
+            sum = self.checked(total, start)?;
         }
     }
 
@@ -92,7 +92,7 @@ impl Reader {
         let mut product = self.factor()?;
         let mut divided = false;
         loop {
-            let begin = self.at;
+            let start = self.at;
             match self.next() {
                 Some('*') => {
                     self.at += 1;
@@ -124,7 +124,7 @@ impl Reader {
                 }
                 _ => return Ok(product),
             }
-            product = self.checked(product, begin)?;
+            product = self.checked(product, start)?;
         }
     }
 
@@ -146,7 +146,7 @@ impl Reader {
             return Ok(base);
         }
         self.next();
-        let begin = self.at;
+        let start = self.at;
         let negative = self.takes('-');
         self.next();
         let from = self.at;
@@ -158,16 +158,16 @@ impl Reader {
         let whole = digits.parse::<usize>().ok().filter(|n| *n <= HIGHEST_DEGREE);
         let fraction = self.signs.get(self.at).is_some_and(|sign| *sign == '.');
         let Some(n) = whole.filter(|_| !fraction) else {
-            self.at = begin;
+            self.at = start;
             return self.refuse(&expected);
         };
         if negative && base.is_zero() {
-            return Err(format!("it divides by zero at character {}; {EXAMPLES}", begin + 1));
+            return Err(format!("it divides by zero at character {}; {EXAMPLES}", start + 1));
         }
         let base = if negative { base.inverse() } else { base };
         let mut power = Ratio::of(&[1.0]);
         for _ in 0..n {
-            power = self.checked(power.times(&base), begin)?;
+            power = self.checked(power.times(&base), start)?;
         }
         Ok(power)
     }
@@ -205,12 +205,12 @@ impl Reader {
     /// Parses `exp(-0.1s)` or `e^(-0.1s)`.
     fn delay(&mut self) -> Result<Ratio, String> {
         const EXPECTED: &str = "exp(-0.1s), a delay in s";
-        let begin = self.at;
-        let rest = &self.signs[begin..];
+        let start = self.at;
+        let rest = &self.signs[start..];
         let length = if rest.starts_with(&['e', 'x', 'p']) { 3 } else { 1 };
         self.at += length;
         if (length == 1 && !self.takes('^')) || self.next() != Some('(') {
-            self.at = begin;
+            self.at = start;
             return self.refuse(EXPECTED);
         }
         let exponent = self.parentheses()?;
@@ -219,7 +219,7 @@ impl Reader {
             _ => None,
         };
         let Some(slope) = slope.filter(|v| v.is_finite()) else {
-            self.at = begin;
+            self.at = start;
             return self.refuse(EXPECTED);
         };
         Ok(Ratio {
@@ -229,10 +229,10 @@ impl Reader {
     }
 
     fn number(&mut self) -> Result<Ratio, String> {
-        let begin = self.at;
+        let start = self.at;
         let signs = &self.signs;
         let digits = |from: usize| signs[from..].iter().take_while(|sign| sign.is_ascii_digit()).count();
-        let mut end = begin + digits(begin);
+        let mut end = start + digits(start);
         if signs.get(end) == Some(&'.') {
             end += 1 + digits(end + 1);
         }
@@ -244,7 +244,7 @@ impl Reader {
                 end += 1 + sign + exponent;
             }
         }
-        let text: String = signs[begin..end].iter().collect();
+        let text: String = signs[start..end].iter().collect();
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => {
                 self.at = end;

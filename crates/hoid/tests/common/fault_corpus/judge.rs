@@ -107,26 +107,26 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
         _ => &known.truth,
     };
     let worst_at = |row: &Row| worst_of(&row.claims, truth_at(row.t));
-    let behind = known.span_s.map_or(0.0, |(_, to)| to);
+    let span_end = known.span_s.map_or(0.0, |(_, to)| to);
     let later = rows
         .iter()
-        .find(|row| known.span_s.is_some() && row.t >= behind + LATER_S);
+        .find(|row| known.span_s.is_some() && row.t >= span_end + LATER_S);
     let looked_at = [rows.last(), later].into_iter().flatten();
     let worst = looked_at.filter_map(worst_at).max_by(|a, b| a.1.total_cmp(&b.1));
-    let begun = known.span_s.map_or(0.0, |(from, _)| from);
+    let span_start = known.span_s.map_or(0.0, |(from, _)| from);
     let errors: Vec<(f64, f64)> = rows
         .iter()
-        .filter(|row| row.t >= begun)
+        .filter(|row| row.t >= span_start)
         .map(|row| (row.t, worst_at(row).map_or(0.0, |(_, z)| z)))
         .collect();
     let recovery_s = known.span_s.and_then(|_| {
-        let after: Vec<&Row> = rows.iter().filter(|row| row.t >= behind).collect();
+        let after: Vec<&Row> = rows.iter().filter(|row| row.t >= span_end).collect();
         let far = |row: &&&Row| !is_near(&row.claims, truth_at(row.t));
         let last = after.last()?.t;
         // A trace that ends with the fault, or soon after it, has no recovery time.
-        (last - behind > 1.0).then(|| match after.iter().rfind(far) {
+        (last - span_end > 1.0).then(|| match after.iter().rfind(far) {
             Some(row) if row.t >= last => f64::INFINITY,
-            Some(row) => row.t - behind,
+            Some(row) => row.t - span_end,
             None => 0.0,
         })
     });

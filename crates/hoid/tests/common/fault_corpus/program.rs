@@ -105,11 +105,11 @@ pub fn outcomes(
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let (files, known) = write(&base, &fault, &folder, seed, case)?;
     let evaluated = |way: &Way| {
-        let begun = Instant::now();
+        let start_time = Instant::now();
         let found = run(program, *way, &base, &files, &known, &folder)?;
         let (judged, refusal) = match found {
             Ok(judged) => (judged, None),
-            Err(said) => (CaseOutcome::refused(), Some(said)),
+            Err(message) => (CaseOutcome::refused(), Some(message)),
         };
         Ok(Outcome {
             case,
@@ -117,7 +117,7 @@ pub fn outcomes(
             who,
             label: base.label.clone(),
             way: *way,
-            seconds: begun.elapsed().as_secs_f64(),
+            seconds: start_time.elapsed().as_secs_f64(),
             judged,
             refusal,
         })
@@ -173,9 +173,9 @@ fn run(
             .arg(&trace),
     };
     command.arg("--json");
-    let (said, printed) = finished(&mut command, folder)?;
+    let (message, printed) = finished(&mut command, folder)?;
     let Ok(json) = serde_json::from_str::<Value>(&printed) else {
-        return Ok(Err(said));
+        return Ok(Err(message));
     };
     if !way.tracks() {
         return Ok(Ok(judge::of_fit(&json, known)));
@@ -195,12 +195,12 @@ fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), St
     let mut child = command
         .spawn()
         .map_err(|e| format!("{}: {e}", command.get_program().display()))?;
-    let begun = Instant::now();
+    let start_time = Instant::now();
     let status = loop {
         if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
             break status;
         }
-        if begun.elapsed() > Duration::from_secs(LONGEST_S) {
+        if start_time.elapsed() > Duration::from_secs(LONGEST_S) {
             child.kill().map_err(|e| e.to_string())?;
             child.wait().map_err(|e| e.to_string())?;
             return Ok((format!("took longer than {LONGEST_S} s"), String::new()));
@@ -209,9 +209,9 @@ fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), St
     };
     let read = |path: &Path| fs::read(path).map_err(|e| format!("{}: {e}", path.display()));
     let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
-    let (said, printed) = (text(read(&errors)?), text(read(&output)?));
-    let said = format!("{status}: {}", said.trim());
-    Ok((said, if status.success() { printed } else { String::new() }))
+    let (message, printed) = (text(read(&errors)?), text(read(&output)?));
+    let message = format!("{status}: {}", message.trim());
+    Ok((message, if status.success() { printed } else { String::new() }))
 }
 
 /// Returns the rows of a trace file: the time, and each column for which a column with the suffix `_se` exists.

@@ -232,8 +232,8 @@ impl<'a> Layout<'a> {
         let lines = text.match_indices(header).skip(1);
         let is_line = |(at, found): &(usize, &str)| {
             let before = text.get(..*at).is_some_and(|before| before.ends_with('\n'));
-            let behind = text.get(at.saturating_add(found.len())..).unwrap_or_default();
-            before && (behind.trim_start_matches([' ', '\t', '\r']).starts_with('\n') || behind.trim().is_empty())
+            let rest = text.get(at.saturating_add(found.len())..).unwrap_or_default();
+            before && (rest.trim_start_matches([' ', '\t', '\r']).starts_with('\n') || rest.trim().is_empty())
         };
         let count = lines.filter(is_line).count();
         (count > 0).then(|| format!("repeated lines of the header are left out: {count}"))
