@@ -146,7 +146,7 @@ pub fn print_notices() {
 pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
     match written.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => {
-            READER_LEFT.store(true, Ordering::Relaxed);
+            OUTPUT_CLOSED.store(true, Ordering::Relaxed);
             Ok(())
         }
         Err(error) => Err(CliError::Output(error)),
@@ -154,11 +154,11 @@ pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
     }
 }
 
-static READER_LEFT: AtomicBool = AtomicBool::new(false);
+static OUTPUT_CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// True if the reader of standard output has closed the pipe.
 pub fn pipe_closed() -> bool {
-    READER_LEFT.load(Ordering::Relaxed)
+    OUTPUT_CLOSED.load(Ordering::Relaxed)
 }
 
 /// Writes a warning, a note or an error to standard error.

@@ -55,7 +55,7 @@ impl Rows {
     }
 
     /// Returns the table for a screen of the given width; the width is unlimited if it is `None`.
-    fn on(&self, width: Option<usize>) -> String {
+    fn for_width(&self, width: Option<usize>) -> String {
         let whole = self.drawn(None);
         let Some(width) = width else { return whole };
         if whole.lines().all(|line| line.chars().count() <= width) {
@@ -152,7 +152,7 @@ impl Rows {
 
 impl fmt::Display for Rows {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.on(output::width()))
+        f.write_str(&self.for_width(output::width()))
     }
 }
 
@@ -188,7 +188,7 @@ mod tests {
             course.add_row(std::iter::once(format!("{t}.00")).chain(values));
         }
         let times = |width| {
-            let drawn = course.on(Some(width));
+            let drawn = course.for_width(Some(width));
             assert_eq!(drawn.lines().count(), 10, "{drawn}");
             assert!(drawn.lines().all(|l| l.chars().count() <= width), "{drawn}");
             drawn
@@ -203,33 +203,33 @@ mod tests {
         assert_eq!(times(80), ["1.00", "4.00", "8.00"]);
         assert_eq!(times(60), ["1.00", "8.00"]);
         assert_eq!(times(40), ["8.00"]);
-        assert!(course.on(Some(30)).starts_with("1.00"));
+        assert!(course.for_width(Some(30)).starts_with("1.00"));
     }
 
     #[test]
     fn narrow_table_is_wrapped_or_becomes_a_list() {
-        let whole = rows().on(None);
+        let whole = rows().for_width(None);
         assert!(
             whole
                 .lines()
                 .any(|l| l.contains("phase margin (deg)") && l.contains("remark"))
         );
-        assert_eq!(rows().on(Some(110)), whole);
-        let narrow = rows().on(Some(38));
+        assert_eq!(rows().for_width(Some(110)), whole);
+        let narrow = rows().for_width(Some(38));
         assert!(narrow.lines().all(|l| l.chars().count() <= 38), "{narrow}");
         for kept in ["anna", "13.5\u{a0}±\u{a0}1.9", "margin", "(deg)", "range"] {
             assert!(narrow.contains(kept), "{kept}\n{narrow}");
         }
         // At no width is a line longer than the screen.
         for width in 20..110 {
-            let page = rows().on(Some(width));
+            let page = rows().for_width(Some(width));
             let is_table = page.contains('─');
             assert!(
                 !is_table || page.lines().all(|l| l.chars().count() <= width),
                 "{width}\n{page}"
             );
         }
-        let list = rows().on(Some(20));
+        let list = rows().for_width(Some(20));
         assert!(list.starts_with("anna\n  phase margin (deg)  13.5 ± 1.9\n"), "{list}");
         assert!(list.ends_with("bert\n  phase margin (deg)  7 ± 19"), "{list}");
     }

@@ -3,7 +3,7 @@
 use hoid_track::Sample;
 
 use crate::{
-    boundary::{HoidTracker, put, with_tracker_mut},
+    boundary::{HoidTracker, with_tracker_mut, write_value},
     session::Session,
     status::HoidStatus,
     types::HoidOutcome,
@@ -50,7 +50,7 @@ pub unsafe extern "C" fn hoid_tracker_update(
             return Ok(());
         }
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { put(outcome, result, "the outcome") }
+        unsafe { write_value(outcome, result, "the outcome") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker_mut(tracker, take) }

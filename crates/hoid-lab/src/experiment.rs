@@ -149,7 +149,7 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
         analysis: Default::default(),
         conditions: conditions
             .iter()
-            .map(|(name, own)| Ok((name.clone(), known(own)?)))
+            .map(|(name, own)| Ok((name.clone(), known_settings(own)?)))
             .collect::<Result<_, LabError>>()?,
         runs,
     };
@@ -157,7 +157,7 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
 }
 
 /// Returns the known properties of a condition for the manifest.
-fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
+fn known_settings(condition: &Condition) -> Result<ConditionSettings, LabError> {
     let course = condition.course()?;
     let [has_target, has_disturbance] = course.has_lines();
     let role = condition.role_of_target()?;
@@ -194,7 +194,7 @@ mod tests {
                 preview_s: 0.5,
                 ..Condition::default()
             };
-            let facts = known(&condition).unwrap();
+            let facts = known_settings(&condition).unwrap();
             (facts.roles.join(" "), facts.excitation.unwrap_or_default())
         };
         let pair = |roles: &str, excitation: &str| (roles.to_owned(), excitation.to_owned());

@@ -104,7 +104,7 @@ struct Ready {
 }
 
 struct Running {
-    begun: RunStart,
+    run_start: RunStart,
     stem: Stem,
     task: Task,
     log: RunLog,
@@ -114,7 +114,7 @@ struct Running {
 impl Current {
     /// Returns the current run if it has this number.
     fn running(&self, number: usize) -> Result<&Running, LabError> {
-        let run = self.run.as_ref().filter(|run| run.begun.number == number);
+        let run = self.run.as_ref().filter(|run| run.run_start.number == number);
         run.ok_or_else(|| LabError::Order(format!("run {number} is not in progress")))
     }
 
@@ -202,9 +202,9 @@ impl Lab {
             }
             drop(state);
             if let Some(newest) = left {
-                self.shared.tell(&ToPage::Yours {}, |page, _| page == newest);
+                self.shared.send_to_pages(&ToPage::Yours {}, |page, _| page == newest);
             }
-            self.shared.tell_state();
+            self.shared.send_state();
         }
     }
 
@@ -234,7 +234,7 @@ impl Lab {
         let obeyed = shared.execute(&mut state, id, message);
         drop(state);
         if !quiet || obeyed.is_err() {
-            shared.tell_state();
+            shared.send_state();
         }
         obeyed
     }
@@ -309,14 +309,14 @@ impl Shared {
             self.transfer_session_to(&mut state, id)?;
             if let Some(before) = before {
                 let words = "The session continues in another window; this window is view-only.".to_owned();
-                self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
+                self.send_to_pages(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
             }
         } else if role == Role::Person {
             let words = "A run is in progress in another window; this window is view-only.".to_owned();
-            self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == id);
+            self.send_to_pages(&ToPage::Refused { words, elsewhere: true }, |page, _| page == id);
         }
         drop(state);
-        self.tell_state();
+        self.send_state();
         Ok(())
     }
 

@@ -54,7 +54,7 @@ pub struct Server {
     address: SocketAddr,
     token: String,
     /// Token of [`Server::address_once`] until it is used.
-    once: Mutex<Option<String>>,
+    single_use_token: Mutex<Option<String>>,
     policy: String,
     lab: Arc<Lab>,
     connection_count: AtomicUsize,
@@ -98,7 +98,7 @@ impl Server {
             listener,
             address,
             token: random_token()?,
-            once: Mutex::new(None),
+            single_use_token: Mutex::new(None),
             policy: policy(PAGE),
             lab: Arc::new(lab),
             connection_count: AtomicUsize::new(0),
@@ -118,14 +118,14 @@ impl Server {
     pub fn address_once(&self) -> Result<String, LabError> {
         let token = random_token()?;
         let address = format!("http://{}/{token}/", self.address);
-        *self.once.lock().unwrap_or_else(PoisonError::into_inner) = Some(token);
+        *self.single_use_token.lock().unwrap_or_else(PoisonError::into_inner) = Some(token);
         Ok(address)
     }
 
     /// True for the first use of the token from [`Server::address_once`].
     fn take_single_use_token(&self, token: &str) -> bool {
-        let mut once = self.once.lock().unwrap_or_else(PoisonError::into_inner);
-        once.take_if(|known| same(known, token)).is_some()
+        let mut single_use_token = self.single_use_token.lock().unwrap_or_else(PoisonError::into_inner);
+        single_use_token.take_if(|known| same(known, token)).is_some()
     }
 
     /// Serves requests while the program runs.

@@ -99,7 +99,7 @@ fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Op
     let mut instant = 0_usize;
     for _ in 0..RUNS {
         let Ok(number) = session.new_number() else { break };
-        let Some((run_start, task)) = run::begun(&session, number, MAP) else {
+        let Some((run_start, task)) = run::started_run(&session, number, MAP) else {
             break;
         };
         let stem = session.stem(&run_start.condition.name, number);

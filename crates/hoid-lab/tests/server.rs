@@ -22,7 +22,7 @@ use hoid_lab::{
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket, client, handshake::client::generate_key, http::Request};
 
-struct At {
+struct ServedLab {
     host: String,
     token: String,
 }
@@ -40,12 +40,12 @@ fn config() -> Config {
     }
 }
 
-fn served(out: &Path, mode: Mode) -> At {
+fn served(out: &Path, mode: Mode) -> ServedLab {
     let server = Server::new(Lab::open(out, config(), mode, None).unwrap(), None).unwrap();
     served_by(server)
 }
 
-fn served_by(server: Server) -> At {
+fn served_by(server: Server) -> ServedLab {
     let address = server.address();
     thread::spawn(move || server.serve());
     let mut parts = address
@@ -53,13 +53,13 @@ fn served_by(server: Server) -> At {
         .unwrap()
         .trim_end_matches('/')
         .split('/');
-    At {
+    ServedLab {
         host: parts.next().unwrap().to_owned(),
         token: parts.next().unwrap().to_owned(),
     }
 }
 
-impl At {
+impl ServedLab {
     /// Sends a request unchanged and returns the reply.
     fn raw(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(&self.host).unwrap();
@@ -381,14 +381,14 @@ fn hostile_connections_do_not_block_the_page() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let over = Arc::new(AtomicBool::new(false));
-    let begun = Arc::new(AtomicUsize::new(0));
+    let connection_count = Arc::new(AtomicUsize::new(0));
     let (strangers, each) = (8, 125);
     let threads: Vec<_> = (0..strangers)
         .map(|stranger| {
-            let (host, over, begun) = (at.host.clone(), Arc::clone(&over), Arc::clone(&begun));
+            let (host, over, connection_count) = (at.host.clone(), Arc::clone(&over), Arc::clone(&connection_count));
             thread::spawn(move || {
                 let connect = |k: usize| -> Option<TcpStream> {
-                    begun.fetch_add(1, Ordering::Relaxed);
+                    connection_count.fetch_add(1, Ordering::Relaxed);
                     let mut stream = TcpStream::connect(&host).ok()?;
                     stream.set_nonblocking(true).ok()?;
                     let said: &[u8] = match k % 6 {
@@ -425,12 +425,13 @@ fn hostile_connections_do_not_block_the_page() {
     // The page receives replies throughout, until strangers have been refused and have reconnected.
     let start = Instant::now();
     let (mut asked, mut slowest) = (0, Duration::ZERO);
-    while asked < 20 || (begun.load(Ordering::Relaxed) <= strangers * each && start.elapsed() < Duration::from_secs(60))
+    while asked < 20
+        || (connection_count.load(Ordering::Relaxed) <= strangers * each && start.elapsed() < Duration::from_secs(60))
     {
-        let begun = Instant::now();
+        let start_time = Instant::now();
         let reply = at.get(&format!("/{}/", at.token), "");
         assert_eq!(status(&reply), "200");
-        slowest = slowest.max(begun.elapsed());
+        slowest = slowest.max(start_time.elapsed());
         asked += 1;
         thread::sleep(Duration::from_millis(50));
     }
@@ -440,8 +441,8 @@ fn hostile_connections_do_not_block_the_page() {
     );
     over.store(true, Ordering::Relaxed);
     threads.into_iter().for_each(|thread| thread.join().unwrap());
-    let begun = begun.load(Ordering::Relaxed);
-    assert!(begun > strangers * each, "{begun} strangers");
+    let connection_count = connection_count.load(Ordering::Relaxed);
+    assert!(connection_count > strangers * each, "{connection_count} strangers");
 }
 
 /// The address for starting a browser is visible in the list of processes, so it works only once.

@@ -41,8 +41,8 @@ const MAP: InputMap = InputMap {
     gain: 3.0,
 };
 
-fn begun(session: &Session, number: usize) -> (RunStart, Task) {
-    run::begun(session, number, MAP).unwrap()
+fn started_run(session: &Session, number: usize) -> (RunStart, Task) {
+    run::started_run(session, number, MAP).unwrap()
 }
 
 /// Returns the batches of a run up to a tick, with an event every 8 ms and a frame every 16.7 ms.
@@ -80,7 +80,7 @@ fn batches(task: &Task, until: usize) -> Vec<Batch> {
 
 fn run(session: &mut Session, until: usize) -> (Stem, RunLog) {
     let number = session.new_number().unwrap();
-    let (run_start, task) = begun(session, number);
+    let (run_start, task) = started_run(session, number);
     let stem = session.stem(&run_start.condition.name, number);
     run_start.write(&stem, &task).unwrap();
     let mut log = RunLog::create(&stem, task.ticks).unwrap();

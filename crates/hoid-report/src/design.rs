@@ -51,7 +51,7 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
     let title = format!(
         "the forcing function, and the response of {} with the expected errors of {} of {} s",
         design.person,
-        counted(design.runs),
+        runs_text(design.runs),
         design.length_s
     );
     curves("design", &title, &grid)
@@ -174,7 +174,7 @@ fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
         .collect()
 }
 
-fn counted(runs: usize) -> String {
+fn runs_text(runs: usize) -> String {
     match runs {
         1 => "1 run".to_owned(),
         runs => format!("{runs} runs"),

@@ -73,7 +73,7 @@ fn content(directory: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-fn whole_of(plan: &Plan, jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
+fn run_whole(plan: &Plan, jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
     let directory = tempfile::tempdir().unwrap();
     let options = RunOptions {
         jobs: Some(jobs),
@@ -85,14 +85,14 @@ fn whole_of(plan: &Plan, jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Ve
 }
 
 fn whole(jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
-    whole_of(&plan(), jobs)
+    run_whole(&plan(), jobs)
 }
 
 /// Checks that the bytes are the same for any number of threads and shards.
 fn assert_independent_of_division(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTreeMap<String, Vec<u8>> {
-    let (_one, expected) = whole_of(plan, 1);
+    let (_one, expected) = run_whole(plan, 1);
     for &jobs in threads {
-        assert!(whole_of(plan, jobs).1 == expected, "{jobs} threads");
+        assert!(run_whole(plan, jobs).1 == expected, "{jobs} threads");
     }
     for &of in shards {
         let directory = tempfile::tempdir().unwrap();

@@ -337,7 +337,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
 ];
 
 /// The commands whose options are under headings.
-const WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "stream"];
+const COMMANDS_WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "stream"];
 
 /// The program as it is parsed and as it explains itself.
 pub fn command() -> Command {
@@ -368,7 +368,7 @@ fn argument(arg: Arg, help: &Help) -> Arg {
     let id = arg.get_id().as_str().to_owned();
     let hidden = !arg.is_positional() && !help.shown.is_empty() && !help.shown.contains(&id.as_str());
     let arg = ignoring_case(arg).hide_short_help(hidden);
-    if !WITH_HEADINGS.contains(&help.command) || arg.is_positional() {
+    if !COMMANDS_WITH_HEADINGS.contains(&help.command) || arg.is_positional() {
         return arg;
     }
     let heading = HEADINGS.iter().find(|(_, ids)| ids.contains(&id.as_str()));

@@ -12,7 +12,7 @@ use std::ops::Range;
 
 use super::grid::Grid;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
-use super::signals::{Signal, Signals, one_row, runs};
+use super::signals::{Signal, Signals, row_range, runs};
 use super::values::Levels;
 use crate::wording::{counted, short};
 
@@ -41,7 +41,7 @@ pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut
         (QualityIssueKind::Repeated, repeated),
         (QualityIssueKind::Unordered, others),
     ] {
-        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&one_row(*row))).collect();
+        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&row_range(*row))).collect();
         let Some(first) = places.first() else { continue };
         let what = if kind == QualityIssueKind::Repeated {
             "duplicated, including the time"

@@ -2,7 +2,7 @@
 
 use super::grid::{Grid, slope};
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
-use super::signals::{Signals, one_row};
+use super::signals::{Signals, row_range};
 use crate::table::Precision;
 use crate::wording::{counted, decimal, short};
 
@@ -46,7 +46,7 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
     let unit = rounding(t, signals.precision).min(ts);
     let jitter = grid.jitter(t);
     if let Some((rms, worst, row)) = jitter.filter(|(_, worst, _)| *worst > (JITTER * ts).max(unit * (1.0 + 1e-6))) {
-        let place = signals.place(&one_row(row));
+        let place = signals.place(&row_range(row));
         found.push(QualityIssue {
             kind: QualityIssueKind::Jitter,
             channel: String::new(),
@@ -78,7 +78,7 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
             rows: missing as usize,
             from_s: signals.at_s(before),
             to_s: signals.at_s(after),
-            ..signals.place(&one_row(before))
+            ..signals.place(&row_range(before))
         })
         .collect();
     let Some(first) = places.first() else { return };

@@ -106,7 +106,7 @@ impl Platform {
         }
         let head = u32_at(bytes, 0x3c).filter(|_| bytes.starts_with(b"MZ"))? as usize;
         let end = head.checked_add(4)?;
-        let is_one = bytes.get(head..behind)? == b"PE\0\0";
+        let is_one = bytes.get(head..end)? == b"PE\0\0";
         (is_one && u16_at(bytes, end)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
     }
 }

@@ -25,7 +25,7 @@ pub(super) const MAX_NESTING: usize = 32;
 /// Memory that reading a file may still take.
 #[derive(Debug)]
 pub(super) struct Budget {
-    left: u64,
+    remaining: u64,
     all: u64,
 }
 
@@ -37,14 +37,14 @@ impl Budget {
     }
 
     fn up_to(all: u64) -> Self {
-        Self { left: all, all }
+        Self { remaining: all, all }
     }
 
     /// Reserves memory before it is filled; an error if the limit is exceeded.
     pub(super) fn take(&mut self, bytes: u64, file: &str) -> Result<(), IoError> {
-        match self.left.checked_sub(bytes) {
-            Some(left) => {
-                self.left = left;
+        match self.remaining.checked_sub(bytes) {
+            Some(remaining) => {
+                self.remaining = remaining;
                 Ok(())
             }
             None => Err(IoError::Unsupported {

@@ -38,12 +38,12 @@ pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, Ope
     let x = |row: usize| t.map_or(Some(row as f64), |t| t.get(row).copied()).unwrap_or(f64::NAN);
     while let Some(run) = next_run(values, at) {
         let last_before = run.start.checked_sub(1).ok_or(OpenEnd::Start)?;
-        let (Some(&before), Some(&behind)) = (values.get(last_before), values.get(run.end)) else {
+        let (Some(&before), Some(&after)) = (values.get(last_before), values.get(run.end)) else {
             return Err(OpenEnd::End);
         };
         let (from, to) = (x(last_before), x(run.end));
         for (row, value) in values.iter_mut().enumerate().take(run.end).skip(run.start) {
-            *value = line(before, behind, (x(row) - from) / (to - from));
+            *value = line(before, after, (x(row) - from) / (to - from));
         }
         bridged.values = bridged.values.saturating_add(run.len());
         bridged.longest = bridged.longest.max(run.len());
@@ -103,10 +103,10 @@ pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: 
         {
             this = next;
         }
-        let ((from, to), (before, behind)) = this;
+        let ((from, to), (before, after)) = this;
         let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
         let share = if is_held { share.floor() } else { share };
-        line(before, behind, share)
+        line(before, after, share)
     };
     (0..n).map(value).collect()
 }

@@ -82,10 +82,10 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
 }
 
 fn note_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
-    let (before, behind) = (bounds.start, table.rows.saturating_sub(bounds.end));
-    if (before, behind) != (0, 0) {
+    let (before, after) = (bounds.start, table.rows.saturating_sub(bounds.end));
+    if (before, after) != (0, 0) {
         table.notes.push(format!(
-            "{} at the start and {behind} at the end cut: a sparse column has no values there",
+            "{} at the start and {after} at the end cut: a sparse column has no values there",
             counted(before, "row")
         ));
     }

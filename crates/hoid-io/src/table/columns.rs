@@ -256,12 +256,12 @@ fn for_each_named(list: &str, columns: &mut [Column], set: impl Fn(&mut Column, 
 }
 
 /// Source of a table from which rows were removed; messages still refer to the rows of the file.
-struct Kept<'a> {
+struct RowSelection<'a> {
     source: Box<dyn Source + 'a>,
     rows: Vec<usize>,
 }
 
-impl Source for Kept<'_> {
+impl Source for RowSelection<'_> {
     fn file(&self) -> &str {
         self.source.file()
     }
@@ -291,7 +291,7 @@ pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
     Table {
         columns,
         rows: rows.len(),
-        source: Box::new(Kept { source, rows }),
+        source: Box::new(RowSelection { source, rows }),
         sample_time_s: table.sample_time_s,
         notes: table.notes,
     }

@@ -125,7 +125,7 @@ pub(crate) fn is_time_unit(unit: &str) -> bool {
 /// Returns the table, in which the column recognised or selected as the time, if any, is named t and is in s.
 pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
     let found = match choice {
-        Some(choice) => Some(chosen(&table, choice)?),
+        Some(choice) => Some(selected_time_column(&table, choice)?),
         None if table.columns.iter().any(|column| column.name == "t" && !column.moments) => table
             .columns
             .iter()
@@ -145,7 +145,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
 }
 
 /// Returns the column that the user selected, and its unit.
-fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
+fn selected_time_column(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
     let position = |name: &str| table.columns.iter().position(|column| column.name == name);
     let unit = choice.unit;
     if let Some((seconds, nanoseconds)) = choice.column.split_once('+')

@@ -40,7 +40,7 @@ enum ReadState {
 }
 
 impl PendingConnection {
-    fn look(&mut self) -> ReadState {
+    fn read_available(&mut self) -> ReadState {
         let mut part = [0; 2048];
         loop {
             if let Some(message) = Request::of(&self.head) {
@@ -77,7 +77,7 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
         };
         let mut waiting = VecDeque::with_capacity(all.len());
         for mut stranger in all.drain(..) {
-            let message = match stranger.look() {
+            let message = match stranger.read_available() {
                 ReadState::Incomplete => {
                     waiting.push_back(stranger);
                     continue;

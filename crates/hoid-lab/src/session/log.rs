@@ -95,8 +95,8 @@ pub struct Batch {
 pub struct RunLog {
     files: [(PathBuf, File); 3],
     /// Size in bytes of the complete batches in each file.
-    whole: [u64; 3],
-    synced: Instant,
+    complete_bytes: [u64; 3],
+    last_sync: Instant,
     logged: usize,
     planned: usize,
 }
@@ -125,8 +125,8 @@ impl RunLog {
                 make(APPENDED_FILES[1], headers[1])?,
                 make(APPENDED_FILES[2], headers[2])?,
             ],
-            whole: headers.map(|header| header.len() as u64),
-            synced: Instant::now(),
+            complete_bytes: headers.map(|header| header.len() as u64),
+            last_sync: Instant::now(),
             logged: 0,
             planned: ticks,
         })
@@ -175,11 +175,11 @@ impl RunLog {
             self.truncate_to_last_batch();
             return Err(error);
         }
-        for (whole, text) in self.whole.iter_mut().zip(&texts) {
-            *whole = whole.saturating_add(text.len() as u64);
+        for (complete_bytes, text) in self.complete_bytes.iter_mut().zip(&texts) {
+            *complete_bytes = complete_bytes.saturating_add(text.len() as u64);
         }
         self.logged = end;
-        if self.synced.elapsed() > SYNC_INTERVAL {
+        if self.last_sync.elapsed() > SYNC_INTERVAL {
             self.sync()?;
         }
         Ok(())
@@ -187,8 +187,8 @@ impl RunLog {
 
     /// Truncates the files to the last complete batch. A failure is ignored, since an incomplete line is never read.
     fn truncate_to_last_batch(&self) {
-        for ((_, file), whole) in self.files.iter().zip(self.whole) {
-            let _ = file.set_len(whole);
+        for ((_, file), complete_bytes) in self.files.iter().zip(self.complete_bytes) {
+            let _ = file.set_len(complete_bytes);
         }
     }
 
@@ -205,7 +205,7 @@ impl RunLog {
         for (path, file) in &self.files {
             file.sync_data().map_err(|source| LabError::file(path, source))?;
         }
-        self.synced = Instant::now();
+        self.last_sync = Instant::now();
         Ok(())
     }
 }

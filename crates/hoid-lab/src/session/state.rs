@@ -139,7 +139,7 @@ impl Session {
         let folder = session_folder(out, subject, session);
         hoid_io::make_directory(&folder)?;
         let now = utc::now();
-        let begun = Self {
+        let session = Self {
             facts: SessionPlan {
                 hoid: env!("CARGO_PKG_VERSION").to_owned(),
                 subject: subject.to_owned(),
@@ -156,8 +156,8 @@ impl Session {
             folder,
             done: Vec::new(),
         };
-        begun.save()?;
-        Ok(begun)
+        session.save()?;
+        Ok(session)
     }
 
     /// Opens a session and evaluates the runs that are missing in `runs.csv`. A run without `end.json` or with a
@@ -263,12 +263,12 @@ impl Session {
 
     /// Appends a run that has ended to `runs.csv`.
     fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
-        let begun = RunStart::read(stem)?;
+        let run_start = RunStart::read(stem)?;
         let done = Done {
-            number: begun.number,
-            planned: begun.planned,
-            condition: begun.condition.name.clone(),
-            training: begun.training,
+            number: run_start.number,
+            planned: run_start.planned,
+            condition: run_start.condition.name.clone(),
+            training: run_start.training,
             how: Ended::read(stem)?.map_or(RunEnd::Interrupted, |ended| ended.how),
             utc: utc::now(),
             verdict: checked.word().to_owned(),

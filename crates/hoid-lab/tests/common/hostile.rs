@@ -81,7 +81,7 @@ pub struct Hostile {
     session: PathBuf,
     files: Vec<String>,
     person: Person,
-    said: usize,
+    message_count: usize,
     record: Record,
     texts: Vec<Text>,
     trackers: Vec<(TrackOptions, Vec<f64>)>,
@@ -127,7 +127,7 @@ impl Hostile {
             session,
             person: Person::begin(&directory.path().join("lab-0"), config()),
             directory,
-            said: 0,
+            message_count: 0,
             texts,
             record,
             trackers,
@@ -152,11 +152,11 @@ impl Hostile {
 
     /// Sends some messages to a lab in the state left by earlier messages.
     fn messages(&mut self, draw: &mut Draw) {
-        if self.said % MESSAGES_PER_LAB == MESSAGES_PER_LAB - 1 {
-            let out = self.directory.path().join(format!("lab-{}", self.said));
+        if self.message_count % MESSAGES_PER_LAB == MESSAGES_PER_LAB - 1 {
+            let out = self.directory.path().join(format!("lab-{}", self.message_count));
             self.person = Person::begin(&out, config());
         }
-        self.said += 1;
+        self.message_count += 1;
         let number = 1 + draw.below(3);
         for _ in 0..1 + draw.below(6) {
             let (first, length) = (draw.below(TICKS), draw.below(60));

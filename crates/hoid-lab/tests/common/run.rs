@@ -8,7 +8,7 @@ use hoid_lab::{
 };
 
 /// Starts the next run with the given number.
-pub fn begun(session: &Session, number: usize, input: InputMap) -> Option<(RunStart, Task)> {
+pub fn started_run(session: &Session, number: usize, input: InputMap) -> Option<(RunStart, Task)> {
     let planned = session.next()?;
     let condition = session.facts.config.condition[0].clone();
     let task = Task::new(&condition, 0, number as u64).ok()?;

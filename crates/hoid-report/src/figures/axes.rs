@@ -174,13 +174,13 @@ pub fn is_power_of_ten(value: f64) -> bool {
 
 /// The nearest 1, 2 or 5 times a power of ten that is at least (`up`) or at most this value.
 pub fn one_two_five(value: f64, up: bool) -> f64 {
-    const MARKS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
+    const ONE_TWO_FIVE: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
     let power = 10f64.powf(value.log10().floor());
     let rest = value / power;
     let mark = if up {
-        MARKS.into_iter().find(|m| *m >= rest * (1.0 - 1e-9))
+        ONE_TWO_FIVE.into_iter().find(|m| *m >= rest * (1.0 - 1e-9))
     } else {
-        MARKS.into_iter().rev().find(|m| *m <= rest * (1.0 + 1e-9))
+        ONE_TWO_FIVE.into_iter().rev().find(|m| *m <= rest * (1.0 + 1e-9))
     };
     power * mark.unwrap_or(1.0)
 }

@@ -13,7 +13,7 @@ use crate::numbers::Z_95;
 
 const RADIUS: f64 = 2.4;
 /// Half of the width of an error bar's cap.
-const CAP: f64 = 2.5;
+const CAP_HALF_WIDTH: f64 = 2.5;
 
 /// Points of a frequency response.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -103,8 +103,8 @@ impl BodePoints {
                 scene.add(draw::line((x, place(low)), (x, place(high)), colour, 1.0, None));
                 for end in [low, high].into_iter().filter(|end| scale.clamp_to_axis(*end) == *end) {
                     scene.add(draw::line(
-                        (x - CAP, place(end)),
-                        (x + CAP, place(end)),
+                        (x - CAP_HALF_WIDTH, place(end)),
+                        (x + CAP_HALF_WIDTH, place(end)),
                         colour,
                         1.0,
                         None,

@@ -26,10 +26,10 @@ const COUNTS: f64 = 13.0;
 /// Distance of the group names below the axis; `ROW_DISTANCE` is the distance of a second row of names below the first.
 const NAMES_BELOW: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
-/// Fraction of the width of a group that its boxes occupy; `BOX` is the width of a box as a fraction of its place, and
+/// Fraction of the width of a group that its boxes occupy; `BOX_WIDTH_SHARE` is the width of a box as a fraction of its place, and
 /// `MAX_BOX_WIDTH` the largest width.
 const GROUP: f64 = 0.86;
-const BOX: f64 = 0.8;
+const BOX_WIDTH_SHARE: f64 = 0.8;
 const MAX_BOX_WIDTH: f64 = 26.0;
 
 /// Range of the ordinate of box plots.
@@ -208,7 +208,7 @@ impl BoxGrid {
             ));
         }
         let pitch = GROUP * of_group / self.series.len().max(1) as f64;
-        let half = 0.5 * (BOX * pitch).min(MAX_BOX_WIDTH);
+        let half = 0.5 * (BOX_WIDTH_SHARE * pitch).min(MAX_BOX_WIDTH);
         let (mut above, mut below, mut missing) = (0, 0, false);
         for group in 0..self.groups.len() {
             let start = area.left + of_group * (group as f64 + 0.5 * (1.0 - GROUP));

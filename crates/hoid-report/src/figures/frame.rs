@@ -110,10 +110,10 @@ impl Frame {
         axes_height: f64,
         ordinates: Ordinates,
         titles: usize,
-        (above, beside): (f64, f64),
+        (above, right_space): (f64, f64),
     ) -> Self {
         let columns = columns.max(1);
-        let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH } - beside;
+        let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH } - right_space;
         let mut frame = Self {
             n,
             columns,
@@ -212,7 +212,7 @@ impl Frame {
         abscissa: &str,
         label: impl Fn(usize) -> String,
         titles: &[String],
-        beside: f64,
+        right_space: f64,
     ) -> Scene {
         let mut scene = style::in_grid(cells, &self.widths, &self.heights);
         for i in (0..self.n).filter(|i| self.has_label(*i)) {
@@ -231,7 +231,7 @@ impl Frame {
             scene.add(draw::fitted(middle, y, marked(title), area.width + SPACE, None));
         }
         // The widths of the cells add up to the width of the figure, up to rounding errors.
-        scene.width = (scene.width + beside).round();
+        scene.width = (scene.width + right_space).round();
         scene
     }
 }

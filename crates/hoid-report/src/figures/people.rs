@@ -20,10 +20,10 @@ const HEIGHT: f64 = 150.0;
 /// first.
 const NAMES_BELOW: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
-/// Horizontal positions of the first and the last person within a category, as fractions of its width; `MEAN` is the
+/// Horizontal positions of the first and the last person within a category, as fractions of its width; `MEAN_POSITION` is the
 /// position of the mean.
 const PEOPLE: (f64, f64) = (0.18, 0.6);
-const MEAN: f64 = 0.78;
+const MEAN_POSITION: f64 = 0.78;
 /// Maximum number of people with individual colours; larger groups are drawn in grey, with one legend entry for all
 /// people.
 const MAX_COLOURED_PEOPLE: usize = 6;
@@ -166,7 +166,7 @@ impl PeopleGrid {
             let Some((value, (from, to))) = mean.filter(|(v, _)| style::is_drawable(*v)) else {
                 continue;
             };
-            let x = x_of(place, MEAN);
+            let x = x_of(place, MEAN_POSITION);
             scene.add(draw::line((x, y_of(from)), (x, y_of(to)), BLACK, 1.4, None));
             for end in [from, to] {
                 scene.add(draw::line((x - 4.0, y_of(end)), (x + 4.0, y_of(end)), BLACK, 1.4, None));
@@ -211,7 +211,7 @@ mod tests {
         ] {
             assert!(has(&svg, "circle", &[("cx", at), ("cy", y(v))]), "{svg}");
         }
-        let m = x(0.0, MEAN);
+        let m = x(0.0, MEAN_POSITION);
         assert!(has(
             &svg,
             "line",

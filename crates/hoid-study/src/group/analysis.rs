@@ -42,7 +42,7 @@ const GREY_BOX: &str = "grey box";
 /// Label of quantities that describe the recording itself.
 pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
-pub(super) const PEOPLE: &str = "people";
+pub(super) const PEOPLE_TABLE: &str = "people";
 
 /// Results from all runs of a person in a condition that the analysis of each run needs.
 pub(super) struct CellResults {
@@ -157,7 +157,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
         }
     }
     let mut tables = analysis.rows.into_tables();
-    tables.account.push((PEOPLE, people_table(&people)));
+    tables.account.push((PEOPLE_TABLE, people_table(&people)));
     tables
 }
 

@@ -41,7 +41,7 @@ pub(super) struct Frequencies {
     pub agreement: OutputTable,
 }
 
-const LINE: [&str; 7] = [
+const LINE_COLUMNS: [&str; 7] = [
     "omega_rad_s",
     "magnitude_db",
     "magnitude_db_se",
@@ -93,7 +93,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
     let numbers = [vec!["runs".to_owned()], with_errors].concat();
     let keys = ["subject", "condition"];
     let mut tables = Tables {
-        lines: Rows::new(&schema(text(&keys).chain(real(&LINE)))),
+        lines: Rows::new(&schema(text(&keys).chain(real(&LINE_COLUMNS)))),
         margins: Rows::new(&schema(
             text(&keys)
                 .chain(text(&["status", "reason", "verdict", "reasons"]))
@@ -197,7 +197,8 @@ fn of_records(
             line.coherence.unwrap_or(f64::NAN),
             line.spread.unwrap_or(f64::NAN),
         ];
-        LINE.iter()
+        LINE_COLUMNS
+            .iter()
             .zip(values)
             .for_each(|(name, value)| lines.real(name, value));
     }

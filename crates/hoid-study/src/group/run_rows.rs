@@ -213,7 +213,7 @@ impl<'a> RunRows<'a> {
     }
 
     fn not_convertible(&mut self, window: Window, estimator: &str, reason: &str) {
-        self.without_value(Some(window), estimator, "not convertible", reason);
+        self.push_without_value(Some(window), estimator, "not convertible", reason);
     }
 
     /// Writes the verdict on a recursion with its reasons, unless the recursion is trustworthy.
@@ -222,20 +222,20 @@ impl<'a> RunRows<'a> {
             return;
         }
         let reasons: Vec<&str> = verdict.reasons().collect();
-        self.without_value(None, estimator, verdict.level.name(), &reasons.join("; "));
+        self.push_without_value(None, estimator, verdict.level.name(), &reasons.join("; "));
     }
 
     /// Writes that an estimator failed, and the reason.
     pub fn failed(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
-        self.without_value(window, estimator, "failed", reason);
+        self.push_without_value(window, estimator, "failed", reason);
     }
 
     /// Writes that an estimator does not apply, and the reason.
     pub fn omitted(&mut self, estimator: &str, reason: &str) {
-        self.without_value(None, estimator, "omitted", reason);
+        self.push_without_value(None, estimator, "omitted", reason);
     }
 
-    fn without_value(&mut self, window: Option<Window>, estimator: &str, status: &str, reason: &str) {
+    fn push_without_value(&mut self, window: Option<Window>, estimator: &str, status: &str, reason: &str) {
         self.begin(window, estimator);
         self.estimates.text("status", status);
         self.estimates.text("reason", reason);

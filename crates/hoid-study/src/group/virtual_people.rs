@@ -76,7 +76,7 @@ const OTHER_COLUMNS: [&str; 7] = [
     "sample_time_s",
 ];
 /// Cell number of the random streams for the defects; no person has this number.
-const DEFECTS: u64 = u64::MAX / 2;
+const DEFECT_STREAM: u64 = u64::MAX / 2;
 
 /// Simulates the experiment and writes its files to a directory: one file per run, `truth.csv`, and `group.toml`.
 ///
@@ -103,7 +103,7 @@ pub fn simulate_people(
         for run in 1..=experiment.runs {
             let found = person.run(run).map_err(|error| virtual_error(&error))?;
             let noise = RunSeed {
-                cell: DEFECTS - person.run_seed(run).cell,
+                cell: DEFECT_STREAM - person.run_seed(run).cell,
                 ..person.run_seed(run)
             }
             .white_noise(found.record.len());

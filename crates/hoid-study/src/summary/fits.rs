@@ -6,7 +6,7 @@ use hoid_io::{ColumnKind, ColumnValues, OutputTable, TableWriter};
 use hoid_model::{Form, NamedChoice, VerdictLevel};
 
 use super::{
-    layout::{BUDGET, PartsOfCell, schema, setting_columns, start_row},
+    layout::{MAX_VALUES, PartsOfCell, schema, setting_columns, start_row},
     traces::SettlingOfMedians,
 };
 use crate::{
@@ -84,7 +84,7 @@ pub(crate) fn write_fits(
     for (at, cell) in plan.cells.iter().enumerate() {
         let estimators: Vec<&EstimatorCell> = plan.estimators_of(cell).map(|(_, e)| e).collect();
         let each = (quantities.len() + 4) * cell.replications as usize;
-        let together = (BUDGET / each.max(1)).clamp(1, estimators.len().max(1));
+        let together = (MAX_VALUES / each.max(1)).clamp(1, estimators.len().max(1));
         for group in estimators.chunks(together) {
             let mut collected = Collected::new(group, &quantities);
             for (directory, block) in parts.get(&at).into_iter().flatten() {

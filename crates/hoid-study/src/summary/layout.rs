@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Largest number of values in memory at a time: 256 MB.
-pub(super) const BUDGET: usize = 1 << 25;
+pub(super) const MAX_VALUES: usize = 1 << 25;
 
 /// The parts of each cell, by the position of the cell in the plan: directory and block number.
 pub(crate) type PartsOfCell<'a> = BTreeMap<usize, Vec<(&'a Path, u64)>>;

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use hoid_io::{ColumnKind, ColumnValues, OutputTable, TableWriter};
 use hoid_numerics::statistics::{mean, sample_variance};
 
-use super::layout::{BUDGET, PartsOfCell, schema};
+use super::layout::{MAX_VALUES, PartsOfCell, schema};
 use crate::{
     Plan, StudyError,
     columns::{OPERATOR, Rows, Schemas},
@@ -54,7 +54,7 @@ pub(crate) fn write_traces(
             .collect();
         let points = cell.resolved.measurement_samples() / every + 1;
         let each = names.len() * cell.replications as usize * points;
-        let together = (BUDGET / each.max(1)).clamp(1, tracking.len().max(1));
+        let together = (MAX_VALUES / each.max(1)).clamp(1, tracking.len().max(1));
         for group in tracking.chunks(together) {
             let mut series: Vec<Series> = vec![Series::default(); group.len()];
             for (directory, block) in parts.get(&at).into_iter().flatten() {

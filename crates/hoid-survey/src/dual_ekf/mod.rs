@@ -46,7 +46,7 @@ use hoid_track::{
 };
 use nalgebra::{DMatrix, DVector};
 
-use crate::known_noise::{check_first_order, lead_of};
+use crate::known_noise::{check_first_order, lead_time_of};
 use filters::{Filters, MAX_PARAMETERS};
 
 const NAME: &str = "dual-ekf";
@@ -332,7 +332,7 @@ impl Recursion for DualEkf {
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let (eta, c) = (self.eta(), self.of_eta());
-        let operator = self.reported.operator(eta, &c, lead_of(eta, &c));
+        let operator = self.reported.operator(eta, &c, lead_time_of(eta, &c));
         Some(match self.delay() {
             Some(Delay { tau_e_s, .. }) => OperatorEstimate { tau_e_s, ..operator },
             None => operator,

@@ -34,7 +34,7 @@ use hoid_numerics::{cholesky, products::dot};
 use hoid_ident::IdentError;
 use hoid_track::building::{Causal, Reported, Setup, StartState, TwoSided};
 
-use super::prior::{change_prior, first_hypothesis, outside};
+use super::prior::{change_prior, first_hypothesis, out_of_range_error};
 
 /// Capacity for hypotheses; `SPACING_S` is the time between two births, s.
 const HYPOTHESES: usize = 64;
@@ -140,7 +140,7 @@ fn two_sided(
     };
     let first = first_hypothesis(from, START_COVARIANCE_FACTOR, sample_time)?;
     let bank = |first: Hypothesis| -> Result<Box<Bank<HYPOTHESES>>, IdentError> {
-        Ok(Box::new(Bank::new(first, supposed).ok_or_else(outside)?))
+        Ok(Box::new(Bank::new(first, supposed).ok_or_else(out_of_range_error)?))
     };
     let d = &from.values[OPERATOR..];
     let seen = whitened(record, setup.orders.nk, largest, d, about);

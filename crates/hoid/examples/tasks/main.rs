@@ -84,16 +84,16 @@ fn main() {
     for task in TASKS {
         if only.is_empty() || only.iter().any(|name| name == task) {
             let (seconds, answer) = run(task, &shared, effort);
-            tell(task, seconds, &answer);
+            print_task(task, seconds, &answer);
         }
     }
     if let Some(replications) = replications {
         let (seconds, answer) = whole_text(directory, replications);
-        tell("reproduce", seconds, &answer);
+        print_task("reproduce", seconds, &answer);
     }
 }
 
-fn tell(task: &str, seconds: f64, answer: &[f64]) {
+fn print_task(task: &str, seconds: f64, answer: &[f64]) {
     let peer = concat!("hoid ", env!("CARGO_PKG_VERSION"));
     println!(
         "{}",
@@ -153,15 +153,15 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
             let (mut noises, mut runs) = (vec![shared.noise.clone(); batch_size], Vec::new());
             median(effort, || {
                 let mut records = Vec::with_capacity(CELL_RUNS as usize + batch_size);
-                for begin in (0..CELL_RUNS).step_by(batch_size) {
-                    for (noise, replication) in noises.iter_mut().zip(begin..CELL_RUNS) {
+                for first_run in (0..CELL_RUNS).step_by(batch_size) {
+                    for (noise, replication) in noises.iter_mut().zip(first_run..CELL_RUNS) {
                         data::run_seed(replication).white_noise_into(noise);
                     }
                     let simulator = &shared.simulator;
                     simulator
                         .batched_signals_into(&noises, InstructionSet::Best, &mut runs)
                         .unwrap();
-                    let count = (CELL_RUNS - begin) as usize;
+                    let count = (CELL_RUNS - first_run) as usize;
                     records.extend(runs.iter().take(count).map(|run| shared.measured(run)));
                 }
                 let records: Vec<&Record> = records.iter().collect();

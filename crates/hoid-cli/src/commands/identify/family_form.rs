@@ -68,7 +68,7 @@ impl FamilyReport<'_> {
             page.push_str(&parameters(&of.parameters, &gain));
             page.push('\n');
         }
-        page.push_str(&self.between_samples());
+        page.push_str(&self.intersample_sentence());
         page.push_str(&self.channels(&gain, verbose));
         if let Some(element) = self.element {
             let here = fit.loop_measures(0, element);
@@ -115,7 +115,7 @@ impl FamilyReport<'_> {
                     page.push_str(&format!("Response to {name} ({role}): {}\n", of.operator.form()));
                     page.push_str(&parameters(&of.parameters, gain));
                     page.push('\n');
-                    page.push_str(&self.with_element(channel));
+                    page.push_str(&self.element_sentence(channel));
                 }
             }
             if verbose {
@@ -136,7 +136,7 @@ impl FamilyReport<'_> {
     /// Returns a sentence with the product of the response to the target and the response of the controlled element;
     /// empty unless both are known. The product is one if the response to the target alone makes the output follow the
     /// target.
-    fn with_element(&self, channel: &ChannelFit) -> String {
+    fn element_sentence(&self, channel: &ChannelFit) -> String {
         let Some(element) = self.element.filter(|_| channel.role == ChannelRole::Feedforward) else {
             return String::new();
         };
@@ -170,7 +170,7 @@ impl FamilyReport<'_> {
 
     /// Returns a sentence on the behaviour of the error between its samples for which tau_e is valid, with the delay
     /// for the other behaviour if the two delays differ noticeably; empty if they do not.
-    fn between_samples(&self) -> String {
+    fn intersample_sentence(&self) -> String {
         let fit = self.fit;
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
         let Some((tau, straight)) = named.zip(fit.delay_if_straight_s(0)) else {

@@ -19,7 +19,7 @@ use super::{
 };
 
 /// Timeout of an answer.
-const SILENCE: Duration = Duration::from_secs(5);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Number of samples sent, and latencies of the answered samples.
 pub struct Tally {
@@ -76,7 +76,7 @@ pub fn over_udp(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw) -> Ta
 
 /// Receives up to n answers until a timeout; returns their sequence numbers and arrival times.
 pub fn received(socket: &UdpSocket, n: usize) -> Vec<(u32, Instant)> {
-    socket.set_read_timeout(Some(SILENCE)).unwrap();
+    socket.set_read_timeout(Some(ANSWER_TIMEOUT)).unwrap();
     let mut all = Vec::with_capacity(n);
     let mut bytes = [0; 256];
     while all.len() < n {

@@ -333,7 +333,7 @@ mod tests {
         text
     }
 
-    fn wanting(columns: &[&str], to_s: Option<f64>) -> ReadOptions {
+    fn options_for(columns: &[&str], to_s: Option<f64>) -> ReadOptions {
         ReadOptions {
             columns: Some(columns.iter().map(|name| (*name).to_owned()).collect()),
             span_s: (None, to_s),
@@ -345,7 +345,7 @@ mod tests {
     fn long_reader_matches_the_whole_text_reader() {
         let text = text(60_000, 60_000);
         let file = file(&text);
-        let options = wanting(&["n"], None);
+        let options = options_for(&["n"], None);
         let found = of_length(file.path(), "run.csv", &options, 0).unwrap().unwrap();
         let whole = parse(text.as_bytes(), "run.csv").unwrap();
         assert_eq!((found.names(), found.rows), (vec!["t", "e", "u", "n"], 60_000));
@@ -369,7 +369,7 @@ mod tests {
                 .unwrap()
                 .is_none()
         );
-        let missing = wanting(&["z"], None);
+        let missing = options_for(&["z"], None);
         assert!(of_length(file.path(), "run.csv", &missing, 0).unwrap().is_none());
         let last = text.rfind(",go,").unwrap();
         let quoted = format!("{},\"go\",{}", &text[..last], &text[last + 4..]);
@@ -435,24 +435,24 @@ mod tests {
                 table.columns[0].values.iter().filter(|t| **t < 10.0).count(),
             )
         };
-        let (first, in_span) = rows(&text(200_000, 200_000), &wanting(&[], Some(10.0)));
+        let (first, in_span) = rows(&text(200_000, 200_000), &options_for(&[], Some(10.0)));
         assert!((1000..60_000).contains(&first), "{first}");
         assert_eq!(in_span, 1000);
-        assert_eq!(rows(&text(200_000, 200_000), &wanting(&[], None)).0, 200_000);
+        assert_eq!(rows(&text(200_000, 200_000), &options_for(&[], None)).0, 200_000);
         // In trials of 1000 s, each trial contains the requested span, so the whole file is read.
         assert_eq!(
-            rows(&text(200_000, 100_000), &wanting(&[], Some(10.0))),
+            rows(&text(200_000, 100_000), &options_for(&[], Some(10.0))),
             (200_000, 2000)
         );
         // The span also ends the reading if samples are counted, or if the time is in another unit.
         let counted = ReadOptions {
             sampling_hz: Some(100.0),
-            ..wanting(&[], Some(10.0))
+            ..options_for(&[], Some(10.0))
         };
         assert!(rows(&text(200_000, 200_000), &counted).0 < 60_000);
         let ms = text(200_000, 200_000).replacen("\nt,", "\ntime_ms,", 1);
-        let whole = rows(&ms, &wanting(&[], Some(10.0)));
+        let whole = rows(&ms, &options_for(&[], Some(10.0)));
         assert_eq!(whole.0, 200_000, "2000 ms are not 10 s");
-        assert!(rows(&ms, &wanting(&[], Some(0.01))).0 < 60_000);
+        assert!(rows(&ms, &options_for(&[], Some(0.01))).0 < 60_000);
     }
 }

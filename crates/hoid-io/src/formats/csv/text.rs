@@ -144,10 +144,10 @@ pub(crate) fn row_start(bytes: &[u8], at: usize) -> usize {
     let mut rest = bytes.get(at..).unwrap_or_default();
     loop {
         rest = match rest {
-            [b'\n' | b'\r', behind @ ..] => behind,
-            [b'#', behind @ ..] => {
-                let end = behind.iter().position(|b| *b == b'\n');
-                end.and_then(|end| behind.get(end..)).unwrap_or_default()
+            [b'\n' | b'\r', rest @ ..] => rest,
+            [b'#', rest @ ..] => {
+                let end = rest.iter().position(|b| *b == b'\n');
+                end.and_then(|end| rest.get(end..)).unwrap_or_default()
             }
             _ => return bytes.len().saturating_sub(rest.len()),
         }

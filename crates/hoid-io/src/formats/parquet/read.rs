@@ -207,7 +207,7 @@ impl ColumnPath<'_> {
             }
             (_, C::DECIMAL) => Data::Unread("decimal numbers of variable length or more than 16 bytes"),
             (Type::FIXED_LEN_BYTE_ARRAY, _) if logical == Some(&LogicalType::Float16) => {
-                Data::Real(self.values::<FixedLenByteArrayType, _>(|value| half(value.data()))?)
+                Data::Real(self.values::<FixedLenByteArrayType, _>(|value| f16_to_f64(value.data()))?)
             }
             (Type::BYTE_ARRAY, C::UTF8 | C::ENUM | C::JSON) => {
                 Data::Text(self.values::<ByteArrayType, _>(|value| String::from_utf8_lossy(value.data()).into_owned())?)
@@ -262,7 +262,7 @@ impl ColumnPath<'_> {
             let first = values.len();
             if defined == 0 {
                 values.extend(stored.iter().map(of));
-                self.weigh(values.get(first..).unwrap_or_default())?;
+                self.reserve_for_values(values.get(first..).unwrap_or_default())?;
                 continue;
             }
             let mut stored = stored.iter();
@@ -273,13 +273,13 @@ impl ColumnPath<'_> {
                 }
                 values.push(value.map_or_else(V::default, of));
             }
-            self.weigh(values.get(first..).unwrap_or_default())?;
+            self.reserve_for_values(values.get(first..).unwrap_or_default())?;
         }
         Ok(())
     }
 
     /// Reserves the memory that the values own outside their vector.
-    fn weigh<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
+    fn reserve_for_values<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
         let bytes = values.iter().map(Weight::bytes).sum();
         let taken = self.budget.take(bytes, self.file);
         taken.map_err(|error| ParquetError::External(Box::new(error)))
@@ -354,7 +354,7 @@ fn refused(what: &str) -> ParquetError {
 }
 
 /// Converts an IEEE 754 binary16 number, little-endian.
-fn half(bytes: &[u8]) -> f64 {
+fn f16_to_f64(bytes: &[u8]) -> f64 {
     <[u8; 2]>::try_from(bytes).map_or(f64::NAN, |bytes| f16::from_le_bytes(bytes).to_f64())
 }
 

@@ -39,13 +39,13 @@ impl Reader {
         self.signs.get(self.at).copied()
     }
 
-    fn takes(&mut self, wanted: char) -> bool {
+    fn accept(&mut self, wanted: char) -> bool {
         let found = self.next() == Some(wanted);
         self.at += usize::from(found);
         found
     }
 
-    fn refuse<T>(&mut self, expected: &str) -> Result<T, String> {
+    fn expected_error<T>(&mut self, expected: &str) -> Result<T, String> {
         let found = match self.next() {
             Some(sign) => format!("{sign:?}"),
             None => "the end".to_owned(),
@@ -63,9 +63,9 @@ impl Reader {
         let all = self.sum()?;
         match self.next() {
             None => Ok(all),
-            Some(')') => self.refuse("a '(' before this ')'"),
-            Some('=' | 'z' | 'p' | 'x') => self.refuse("an expression in s only"),
-            Some(_) => self.refuse("a number, s, a parenthesis, or one of + - * / ^"),
+            Some(')') => self.expected_error("a '(' before this ')'"),
+            Some('=' | 'z' | 'p' | 'x') => self.expected_error("an expression in s only"),
+            Some(_) => self.expected_error("a number, s, a parenthesis, or one of + - * / ^"),
         }
     }
 
@@ -82,7 +82,7 @@ impl Reader {
             let term = self.product()?;
             let Some(total) = sum.plus(&term, sign) else {
                 self.at = start;
-                return self.refuse("one delay, as a factor of the whole function: 5exp(-0.1s)/(s+1)");
+                return self.expected_error("one delay, as a factor of the whole function: 5exp(-0.1s)/(s+1)");
             };
             sum = self.checked(total, start)?;
         }
@@ -110,12 +110,12 @@ impl Reader {
                     }
                     product = product.times(&by.inverse());
                 }
-                Some(sign) if is_of_number(sign) => {
-                    return self.refuse("'^' or '*' before a number: s^2 or s*2");
+                Some(sign) if may_be_in_number(sign) => {
+                    return self.expected_error("'^' or '*' before a number: s^2 or s*2");
                 }
                 Some('s' | '(' | 'e') => {
                     if divided {
-                        return self.refuse(
+                        return self.expected_error(
                             "'*' or parentheses, because this may or may not be part of the divisor: 1/(s(s+6)) \
                              divides by both factors, 1/s*(s+6) by s only",
                         );
@@ -131,9 +131,9 @@ impl Reader {
     fn factor(&mut self) -> Result<Ratio, String> {
         let mut sign = 1.0;
         loop {
-            if self.takes('-') {
+            if self.accept('-') {
                 sign = -sign;
-            } else if !self.takes('+') {
+            } else if !self.accept('+') {
                 break;
             }
         }
@@ -142,12 +142,12 @@ impl Reader {
 
     fn power(&mut self) -> Result<Ratio, String> {
         let base = self.atom()?;
-        if !self.takes('^') {
+        if !self.accept('^') {
             return Ok(base);
         }
         self.next();
         let start = self.at;
-        let negative = self.takes('-');
+        let negative = self.accept('-');
         self.next();
         let from = self.at;
         while self.signs.get(self.at).is_some_and(char::is_ascii_digit) {
@@ -159,7 +159,7 @@ impl Reader {
         let fraction = self.signs.get(self.at).is_some_and(|sign| *sign == '.');
         let Some(n) = whole.filter(|_| !fraction) else {
             self.at = start;
-            return self.refuse(&expected);
+            return self.expected_error(&expected);
         };
         if negative && base.is_zero() {
             return Err(format!("it divides by zero at character {}; {EXAMPLES}", start + 1));
@@ -180,8 +180,8 @@ impl Reader {
             }
             Some('(') => self.parentheses(),
             Some('e') => self.delay(),
-            Some(sign) if is_of_number(sign) => self.number(),
-            _ => self.refuse("a number, s or '('"),
+            Some(sign) if may_be_in_number(sign) => self.number(),
+            _ => self.expected_error("a number, s or '('"),
         }
     }
 
@@ -195,8 +195,8 @@ impl Reader {
             ));
         }
         let inside = self.sum()?;
-        if !self.takes(')') {
-            return self.refuse(&format!("')' for the '(' at character {opened}"));
+        if !self.accept(')') {
+            return self.expected_error(&format!("')' for the '(' at character {opened}"));
         }
         self.depth -= 1;
         Ok(inside)
@@ -209,9 +209,9 @@ impl Reader {
         let rest = &self.signs[start..];
         let length = if rest.starts_with(&['e', 'x', 'p']) { 3 } else { 1 };
         self.at += length;
-        if (length == 1 && !self.takes('^')) || self.next() != Some('(') {
+        if (length == 1 && !self.accept('^')) || self.next() != Some('(') {
             self.at = start;
-            return self.refuse(EXPECTED);
+            return self.expected_error(EXPECTED);
         }
         let exponent = self.parentheses()?;
         let slope = match (exponent.num.as_slice(), exponent.den.as_slice()) {
@@ -220,7 +220,7 @@ impl Reader {
         };
         let Some(slope) = slope.filter(|v| v.is_finite()) else {
             self.at = start;
-            return self.refuse(EXPECTED);
+            return self.expected_error(EXPECTED);
         };
         Ok(Ratio {
             delay_s: -slope,
@@ -250,7 +250,7 @@ impl Reader {
                 self.at = end;
                 Ok(Ratio::of(&[value]))
             }
-            _ => self.refuse("a finite number"),
+            _ => self.expected_error("a finite number"),
         }
     }
 
@@ -258,16 +258,16 @@ impl Reader {
     fn checked(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
         if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
             self.at = at;
-            return self.refuse(&format!("a degree of at most {HIGHEST_DEGREE}"));
+            return self.expected_error(&format!("a degree of at most {HIGHEST_DEGREE}"));
         }
         if ratio.num.iter().chain(&ratio.den).any(|c| !c.is_finite()) {
             self.at = at;
-            return self.refuse("coefficients within the range of floating point");
+            return self.expected_error("coefficients within the range of floating point");
         }
         Ok(ratio)
     }
 }
 
-fn is_of_number(sign: char) -> bool {
+fn may_be_in_number(sign: char) -> bool {
     sign.is_ascii_digit() || sign == '.'
 }

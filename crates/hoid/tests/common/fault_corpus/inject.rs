@@ -55,39 +55,39 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
         Change::Nothing => rows = (0, 0),
         Change::Spike => {
             rows = (at, at + 1);
-            each(&mut table, on, rows, |x, k, e| {
+            change_each(&mut table, on, rows, |x, k, e| {
                 x + sign(1 + k as u64) * size * if e { of_e } else { of_u }
             });
         }
         Change::Burst => {
             rows = (at, until(size as usize));
-            each(&mut table, on, rows, |x, k, e| {
+            change_each(&mut table, on, rows, |x, k, e| {
                 x + sign(1 + 2 * k as u64 + u64::from(e)) * 10.0 * if e { of_e } else { of_u }
             });
         }
         Change::Missing => {
             rows = (at, until(size as usize));
-            each(&mut table, on, rows, |_, _, _| f64::NAN);
+            change_each(&mut table, on, rows, |_, _, _| f64::NAN);
         }
         Change::Wrap => {
             rows = (at, until(seconds));
-            each(&mut table, on, rows, |x, _, _| x + 360.0);
+            change_each(&mut table, on, rows, |x, _, _| x + 360.0);
         }
         Change::Step | Change::Offset => {
             stays = fault.kind.what == Change::Step;
             let by = sign(1) * size / 100.0;
-            each(&mut table, on, rows, |x, _, e| x + by * if e { of_e } else { of_u });
+            change_each(&mut table, on, rows, |x, _, e| x + by * if e { of_e } else { of_u });
         }
         Change::Drift => {
             let by = sign(1) * size / n as f64;
-            each(&mut table, on, rows, |x, k, e| {
+            change_each(&mut table, on, rows, |x, k, e| {
                 x + by * k as f64 * if e { of_e } else { of_u }
             });
         }
         Change::Frozen => {
             rows = (at, until(seconds));
             let (e, u) = (clean.e[at], clean.u[at]);
-            each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
+            change_each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
         }
         Change::Idle | Change::IdleNoisy => {
             // The position is before, inside or after the run.
@@ -118,7 +118,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
         }
         Change::Dropout => {
             rows = (at, until(seconds));
-            each(&mut table, on, rows, |_, _, _| 0.0);
+            change_each(&mut table, on, rows, |_, _, _| 0.0);
         }
         Change::Scaled | Change::ScaledLong => {
             let length = match fault.kind.what {
@@ -126,7 +126,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
                 _ => samples(50.0).min(2 * n / 5),
             };
             rows = (at, until(length));
-            each(&mut table, on, rows, |x, _, _| x * size);
+            change_each(&mut table, on, rows, |x, _, _| x * size);
         }
         Change::Milliseconds => table.t.iter_mut().for_each(|t| *t *= size),
         Change::Swapped => {
@@ -135,13 +135,13 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
         }
         Change::Flipped => {
             rows = (at, until(seconds));
-            each(&mut table, on, rows, |x, _, _| -x);
+            change_each(&mut table, on, rows, |x, _, _| -x);
         }
-        Change::Saturated => each(&mut table, on, rows, |x, _, e| {
+        Change::Saturated => change_each(&mut table, on, rows, |x, _, e| {
             let most = size * if e { of_e } else { of_u };
             x.clamp(-most, most)
         }),
-        Change::Quantised => each(&mut table, on, rows, |x, _, e| {
+        Change::Quantised => change_each(&mut table, on, rows, |x, _, e| {
             let step = size * if e { of_e } else { of_u };
             (x / step).round() * step
         }),
@@ -197,7 +197,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
 
 /// Changes the values of the channels in some rows: `change` receives a value, its row, and true if the value belongs
 /// to e.
-fn each(table: &mut Table, on: Channels, rows: (usize, usize), change: impl Fn(f64, usize, bool) -> f64) {
+fn change_each(table: &mut Table, on: Channels, rows: (usize, usize), change: impl Fn(f64, usize, bool) -> f64) {
     for k in rows.0..rows.1 {
         if on.e() {
             table.e[k] = change(table.e[k], k, true);

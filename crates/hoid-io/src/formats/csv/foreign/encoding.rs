@@ -84,10 +84,10 @@ fn end_with_line_feeds(bytes: &mut [u8]) {
     while let Some(at) = rest.iter().position(|byte| *byte == b'\r') {
         let (_, from) = rest.split_at_mut(at);
         rest = match from {
-            [_, b'\n', behind @ ..] => behind,
-            [end, behind @ ..] => {
+            [_, b'\n', rest @ ..] => rest,
+            [end, rest @ ..] => {
                 *end = b'\n';
-                behind
+                rest
             }
             [] => return,
         };

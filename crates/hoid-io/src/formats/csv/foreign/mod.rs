@@ -88,7 +88,7 @@ mod tests {
         (String::from_utf8_lossy(&bytes).into_owned(), notes.len())
     }
 
-    fn same(text: &str) {
+    fn assert_unchanged(text: &str) {
         assert_eq!(plain(text), (text.to_owned(), 0), "{text:?}");
     }
 
@@ -119,7 +119,7 @@ mod tests {
             "t,e,u\n0,1\n1,2,3\n2,3,4\n3,4,5\n",
             "\"t\",\"e\"\n\"0,02\",\"0,81\"\n\"0,04\",\"0,82\"\n",
         ] {
-            same(text);
+            assert_unchanged(text);
         }
     }
 
@@ -152,7 +152,7 @@ mod tests {
             "# a\nt,e\n#x,y\n0,1\n",
             "#\n0,1\n",
         ] {
-            same(text);
+            assert_unchanged(text);
         }
     }
 
