@@ -591,7 +591,7 @@ fn missing_results_exit_with_one() {
 }
 
 #[test]
-fn other_rates_need_no_other_options() {
+fn other_rates_need_no_extra_options() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for sample_time in ["0.004", "0.001"] {

@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn the_response_is_continuous_where_the_delay_crosses_a_sample() {
+    fn response_is_continuous_across_whole_sample_delays() {
         for (omega, zeta) in [(11.25, 0.35), (60.0, 1.0), (40.0, 2.0)] {
             let at = |tau: f64| delayed_operator([0.09, 0.036, omega, zeta, tau], ts()).unwrap();
             let (before, there, after) = (at(0.28 - 1e-9), at(0.28), at(0.28 + 1e-9));

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn reference_frequencies_and_size() {
+    fn reference_frequencies_and_rms_match_table_1() {
         let f = ForcingFunction::reference();
         // Table 1 prints omega_k to 1e-3; the expected rms is known to 1e-4.
         let printed = [0.230, 0.384, 0.614, 0.997, 1.687, 2.608, 4.065, 6.596, 10.661, 17.564];

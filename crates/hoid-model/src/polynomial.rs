@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn product_and_value() {
+    fn products_and_values_are_exact() {
         assert_eq!(product(&[1.0, -0.5], &[1.0, 2.0, 3.0]), vec![1.0, 1.5, 2.0, -1.5]);
         assert!(product(&[], &[1.0]).is_empty());
         assert!((value(&[1.0, 2.0, 3.0], c(2.0, 0.0)) - 17.0).norm() < 1e-12);

@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn stability_of_predictor_and_system() {
+    fn predictor_may_be_stable_for_an_unstable_model() {
         assert!(general().predictor_is_stable() && general().is_stable());
         let unstable = PolynomialModel::new(
             Structure::Arx,

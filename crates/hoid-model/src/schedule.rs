@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_are_exact_and_nothing_overflows() {
+    fn limits_are_exact_without_overflow() {
         for t in [-1e300, -10.0, 30.0] {
             assert_eq!(FAST.value(0.09, 0.07, t), 0.09);
         }

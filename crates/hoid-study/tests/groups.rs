@@ -306,7 +306,7 @@ fn bad_files_are_failed_rows_and_bad_manifests_errors() {
 
 /// Runs of two persons are joined, and the fits agree with the describing function.
 #[test]
-fn joined_runs_settle_and_fits_agree_with_the_describing_function() {
+fn joined_runs_agree_with_the_describing_function() {
     let data = recorded();
     let text = r#"
 name = "joined"

@@ -72,7 +72,7 @@ fn jitter_and_clock_errors_have_the_simulated_size() {
 }
 
 #[test]
-fn missing_and_repeated_rows_are_counted_one_by_one() {
+fn missing_and_repeated_rows_are_counted_individually() {
     for trouble in [
         vec![SamplingDefect::Missing],
         vec![SamplingDefect::Missing, SamplingDefect::Jitter],

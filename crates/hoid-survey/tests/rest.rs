@@ -170,7 +170,7 @@ fn no_error_bar_shrinks_through_rests() {
 }
 
 #[test]
-fn no_error_bar_shrinks_through_rests_with_the_noise_of_a_sensor() {
+fn no_error_bar_shrinks_through_rests_with_sensor_noise() {
     assert_no_bar_shrinks(ConstantSpan::Noise, &[10.0, 100.0]);
 }
 

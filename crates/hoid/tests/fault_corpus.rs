@@ -264,7 +264,7 @@ fn traces_are_judged_at_the_end_and_during_recovery() {
 }
 
 #[test]
-fn traces_are_read() {
+fn trace_rows_are_parsed() {
     let text = "# of hoid\nt,b0,b0_se,K_e,K_e_se,convertible\n0.1,1,0.5,2,0.25,1\n0.2,1,0.5,,,0\n";
     let found = rows(text);
     assert_eq!(found.len(), 2);

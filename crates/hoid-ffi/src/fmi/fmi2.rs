@@ -53,7 +53,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
     let callbacks = unsafe { callbacks.as_ref() };
     let logger = match callbacks.and_then(|c| Some((c.logger?, c.environment))) {
         Some((function, environment)) => Logger::Two { function, environment },
-        None => Logger::Nobody,
+        None => Logger::Unset,
     };
     // SAFETY: the strings are supplied by the importer.
     let (name, guid, resources) = unsafe { three_strings(name, guid, resources) };

@@ -41,7 +41,7 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
 ) -> *mut Component {
     let logger = match logger {
         Some(function) => Logger::Three { function, environment },
-        None => Logger::Nobody,
+        None => Logger::Unset,
     };
     // SAFETY: the strings are supplied by the importer.
     let (name, token, resources) = unsafe { three_strings(name, token, resources) };

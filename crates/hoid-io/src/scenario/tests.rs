@@ -214,7 +214,7 @@ const SEEN: &str = "condition = \"C4\"\ndisturbance_rms_deg = 0.1\n[feedforward]
                     tau_f_s = 0.1\npreview_s = 0.25\n";
 
 #[test]
-fn a_condition_with_a_displayed_target_and_a_disturbance() {
+fn displayed_target_and_disturbance_are_read() {
     let scenario = parse(SEEN).unwrap();
     let text = "derivative:0.15,tau_f=0.1,preview=0.25";
     let expected = hoid_model::Feedforward::of_text(text, Some((11.25, 0.35))).unwrap();

@@ -320,7 +320,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shape_is_the_numerator_over_its_gain() {
+    fn shape_is_the_numerator_over_its_gain() {
         for form in Form::ALL {
             let x = [3.0, 0.6, 0.4];
             let variables: Vec<Dual> = x.iter().enumerate().map(|(i, v)| Dual::variable(*v, i)).collect();

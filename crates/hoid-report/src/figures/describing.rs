@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn the_figure_has_points_models_and_coherence() {
+    fn figure_has_points_models_and_coherence() {
         let found = described(4);
         let model = ModelCurve::over(&found, 0.0, "gain and delay", 0.3, |w| {
             Complex64::from_polar(2.0, -0.3 * w)

@@ -26,7 +26,7 @@ use hoid_track::{
     BoundOptions, Change, DelayOptions, GuardChoice, GuardOptions, Memory, Sample,
     building::{
         About, Causal, Recursion, RecursiveMethod, Reported, Setup, StartState, StepOutcome, TwoSided,
-        invalid_prior as bad_option,
+        bad as bad_option,
     },
 };
 
