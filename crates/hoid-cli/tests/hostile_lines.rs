@@ -90,9 +90,9 @@ proptest! {
         let writer = thread::spawn(move || input.write_all(&text).unwrap());
         let output = stream.wait_with_output().unwrap();
         writer.join().unwrap();
-        let fault = String::from_utf8_lossy(&output.stderr).into_owned();
-        prop_assert_eq!(output.status.code(), Some(0), "{}", fault);
-        prop_assert!(!fault.contains("panicked"), "{}", fault);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        prop_assert_eq!(output.status.code(), Some(0), "{}", message);
+        prop_assert!(!message.contains("panicked"), "{}", message);
         let lines: Vec<Value> = String::from_utf8(output.stdout)
             .unwrap()
             .lines()

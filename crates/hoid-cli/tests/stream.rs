@@ -21,7 +21,7 @@ use common::{bad, good, json, physical};
 /// Timeout for a line: much longer than its latency, so that no test fails on a slow machine, and a missing line does
 /// not block a test.
 const PATIENCE: Duration = Duration::from_secs(60);
-const WITHOUT_WARM_UP: [&str; 8] = [
+const NO_WARM_UP: [&str; 8] = [
     "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",
 ];
 
@@ -142,7 +142,7 @@ fn simulated(directory: &Path, seed: &str) -> String {
 
 #[test]
 fn each_line_is_answered_at_once() {
-    let mut stream = Stream::new(&WITHOUT_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP);
     for k in 0..200 {
         let (e, u) = wave(k);
         let line = stream.ask(&format!("{e},{u}"));
@@ -242,7 +242,7 @@ fn default_method_answers_from_the_second_second() {
 
 #[test]
 fn hostile_lines_are_counted_and_have_no_effect() {
-    let mut stream = Stream::new(&WITHOUT_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP);
     let sound = |stream: &mut Stream, from: usize| {
         let mut last = Value::Null;
         for k in from..from + 300 {
@@ -380,7 +380,7 @@ fn idle_start_prolongs_the_warm_up() {
 
 #[test]
 fn missing_lines_are_bridged_and_late_lines_dropped() {
-    let mut stream = Stream::new(&WITHOUT_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP);
     stream.write("t;e;u;f_t\n");
     let row = |k: usize| {
         let (e, u) = wave(k);
@@ -411,7 +411,7 @@ fn missing_lines_are_bridged_and_late_lines_dropped() {
 
 #[test]
 fn stream_without_samples_exits_with_one() {
-    let mut stream = Stream::new(&WITHOUT_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP);
     stream.write("t;e;u\n");
     for k in 0..5 {
         let line = stream.ask(&format!("0,0{k};0,{k};-0,{k}"));
@@ -473,7 +473,7 @@ fn failed_warm_up_is_extended() {
 
 #[test]
 fn every_nth_line_reports_faults_in_between() {
-    let mut arguments = WITHOUT_WARM_UP.to_vec();
+    let mut arguments = NO_WARM_UP.to_vec();
     arguments.extend(["--every", "10"]);
     let mut input: String = (0..40).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
     input = input.replacen(&format!("{},{}\n", wave(14).0, wave(14).1), "nan,1\n", 1);
@@ -487,7 +487,7 @@ fn every_nth_line_reports_faults_in_between() {
 fn closed_output_pipe_ends_the_stream_quietly() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(["stream", "--fs", "100"])
-        .args(WITHOUT_WARM_UP)
+        .args(NO_WARM_UP)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -521,7 +521,7 @@ fn closed_output_pipe_ends_the_stream_quietly() {
 #[test]
 fn interrupt_exits_with_zero_and_complete_lines() {
     // The stream is interrupted while it waits for input.
-    let mut stream = Stream::new(&WITHOUT_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP);
     stream.ask("0.1,0.2");
     stream.interrupt();
     let start_time = Instant::now();
@@ -533,7 +533,7 @@ fn interrupt_exits_with_zero_and_complete_lines() {
     assert_eq!(status.code(), Some(0));
     assert!(rest.is_empty() && said.contains("1 samples"), "{said}");
     // The stream is interrupted during a computation.
-    let mut stream = Stream::new(&WITHOUT_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP);
     let mut input = stream.input.take().unwrap();
     let writer = thread::spawn(move || {
         let text: String = (0..1000).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();

@@ -77,7 +77,7 @@ mod tests {
 
     use super::*;
 
-    const WITHOUT_WARM_UP: &str =
+    const NO_WARM_UP: &str =
         r#"{"nk": 29, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92}}"#;
 
     /// Number of samples before saving, and total number; under Miri a few samples suffice.
@@ -109,7 +109,7 @@ mod tests {
             ("population", None, 0.01),
             ("adaptive", None, 0.001),
         ];
-        let at_work = [("rpem", Some(WITHOUT_WARM_UP), 0.01)];
+        let at_work = [("rpem", Some(NO_WARM_UP), 0.01)];
         let warm = [
             ("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 20}"), 0.01),
             ("rpem", Some("{\"nk\": 29, \"nd\": [1, 2], \"warm_up\": 10}"), 0.01),
@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn damaged_bytes_are_refused() {
         let (method, options) = if cfg!(miri) {
-            (Some("rpem"), Some(WITHOUT_WARM_UP))
+            (Some("rpem"), Some(NO_WARM_UP))
         } else {
             (None, None)
         };

@@ -18,7 +18,7 @@ use hoid_ffi::{
 use hoid_io::fmu::{FmuKind, FmuStart, FmuVariable};
 
 /// Options with which a method is created at once and starts with the first sample.
-const WITHOUT_WARM_UP: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
+const NO_WARM_UP: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
     "controlled_element": "90/(s(s+6))"}"#;
 const SAMPLES: usize = 2;
 
@@ -75,7 +75,7 @@ fn made(method: &str, options: &str) -> *mut HoidTracker {
 fn every_tracker_function_works() {
     assert_eq!(hoid_abi_version(), HOID_ABI_VERSION);
     assert_eq!(read(hoid_version()), env!("CARGO_PKG_VERSION"));
-    let tracker = made("rpem", WITHOUT_WARM_UP);
+    let tracker = made("rpem", NO_WARM_UP);
     let mut outcome = MaybeUninit::<HoidOutcome>::uninit();
     for k in 0..SAMPLES {
         let [e, u] = sample(k);
@@ -157,7 +157,7 @@ fn every_tracker_function_works() {
 #[test]
 fn each_thread_has_its_own_error_message() {
     let tracked = |names: &'static str| {
-        let tracker = made("rpem", WITHOUT_WARM_UP);
+        let tracker = made("rpem", NO_WARM_UP);
         let mut odds = 0.0;
         // SAFETY: the tracker belongs to this thread.
         let status = unsafe { hoid_tracker_change_log_odds(tracker, &mut odds) };
@@ -240,7 +240,7 @@ macro_rules! life_of_a_unit {
             };
         }
         let set_up = || {
-            let texts = [c"rpem".to_owned(), CString::new(WITHOUT_WARM_UP).unwrap()];
+            let texts = [c"rpem".to_owned(), CString::new(NO_WARM_UP).unwrap()];
             let references = ["method", "options"].map(|name| unit.reference(name));
             let pointers = texts.each_ref().map(|text| text.as_ptr());
             assert_eq!(counted!($set_text, references, 2, pointers.as_ptr()), 0);

@@ -53,7 +53,7 @@ impl Rows {
     }
 
     /// Starts a row in which texts are empty, real numbers are NaN, and whole numbers are zero.
-    pub fn begin(&mut self) {
+    pub fn start_row(&mut self) {
         self.rows += 1;
         for column in &mut self.columns {
             match &mut column.values {

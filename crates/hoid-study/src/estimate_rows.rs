@@ -67,10 +67,10 @@ impl<'a> EstimateRows<'a> {
     }
 
     /// Starts the row of an estimate with the settings of the scenario and the estimator.
-    pub fn begin(&mut self, estimator: &EstimatorCell, replication: u64) {
+    pub fn start_row(&mut self, estimator: &EstimatorCell, replication: u64) {
         let (cell, rows) = (self.cell, &mut self.fits);
         let scenario = cell.resolved.scenario();
-        rows.begin();
+        rows.start_row();
         rows.whole("cell", cell.index);
         rows.text("scenario", &cell.scenario);
         rows.text("condition", &cell.condition);
@@ -315,7 +315,7 @@ impl<'a> EstimateRows<'a> {
             }
         };
         for k in (step - 1..trace.len()).step_by(step) {
-            rows.begin();
+            rows.start_row();
             rows.whole("cell", self.cell.index);
             rows.whole("replication", replication);
             rows.text("estimator", &estimator.label);

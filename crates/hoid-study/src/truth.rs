@@ -92,7 +92,7 @@ pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
     let mut rows = Rows::new(&schema);
     for cell in &plan.cells {
         let scenario = cell.resolved.scenario();
-        rows.begin();
+        rows.start_row();
         rows.whole("cell", cell.index);
         rows.text("scenario", &cell.scenario);
         rows.text("condition", &cell.condition);

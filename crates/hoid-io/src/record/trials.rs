@@ -4,8 +4,9 @@
 //! Each trial becomes a separate record with its own initial states; in a single record of all trials, the output after
 //! each boundary would depend on inputs that never preceded it. A trial starts where the value of the given column
 //! changes or where t decreases. Without `--trial`, trials are recognised only where t decreases: each trial must have
-//! at least [`MIN_TRIAL_ROWS`] rows, and t must decrease by at least half of its range in the previous trial, which a clock
-//! correction never does. If a column changes exactly where t decreases, the trials have the names in this column.
+//! at least [`MIN_TRIAL_ROWS`] rows, and t must decrease by at least half of its range in the previous trial, which a
+//! clock correction never does. If a column changes exactly where t decreases, the trials have the names in this
+//! column.
 
 use std::ops::Range;
 

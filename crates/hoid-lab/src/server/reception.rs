@@ -3,8 +3,8 @@
 //! While no client is connected, the thread waits for the next connection. Otherwise it accepts connections, examines
 //! each client once (complete head, head too long or too late, connection closed by the client), and pauses for
 //! [`PAUSE`] if nothing has happened. New connections are examined before any connection is closed. The page, whose
-//! head arrives at once, is therefore served regardless of the number of other clients. If there are more than [`MAX_PENDING`]
-//! incomplete connections, the oldest ones are closed.
+//! head arrives at once, is therefore served regardless of the number of other clients. If there are more than
+//! [`MAX_PENDING`] incomplete connections, the oldest ones are closed.
 
 use std::{
     collections::VecDeque,
@@ -32,7 +32,7 @@ struct PendingConnection {
     accepted_at: Instant,
 }
 
-/// Result of an examination of a stranger.
+/// Result of an examination of a connection.
 enum ReadState {
     Incomplete,
     Closed,
@@ -67,7 +67,7 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
     let mut all: VecDeque<PendingConnection> = VecDeque::new();
     loop {
         let mut idle = match take(listener, &mut all) {
-            Ok(accepted_at) => accepted_at == 0,
+            Ok(accepted) => accepted == 0,
             // If no file descriptor is left, the oldest incomplete connection is closed.
             Err(_) => {
                 drop(all.pop_front());
@@ -76,17 +76,17 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
             }
         };
         let mut waiting = VecDeque::with_capacity(all.len());
-        for mut stranger in all.drain(..) {
-            let message = match stranger.read_available() {
+        for mut pending in all.drain(..) {
+            let message = match pending.read_available() {
                 ReadState::Incomplete => {
-                    waiting.push_back(stranger);
+                    waiting.push_back(pending);
                     continue;
                 }
                 ReadState::Closed => continue,
                 ReadState::Complete(message) => message,
             };
             idle = false;
-            let stream = stranger.stream;
+            let stream = pending.stream;
             let refused = match message {
                 Ok(request) => admitted(request, stream).err(),
                 Err(reply) => Some((reply, stream)),
@@ -110,10 +110,10 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
 fn take(listener: &TcpListener, all: &mut VecDeque<PendingConnection>) -> io::Result<usize> {
     let first = all.is_empty();
     listener.set_nonblocking(!first)?;
-    for accepted_at in 0..MAX_ACCEPTED_PER_ROUND {
+    for accepted in 0..MAX_ACCEPTED_PER_ROUND {
         let stream = match listener.accept() {
             Ok((stream, _)) => stream,
-            Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(accepted_at),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(accepted),
             // The client has already closed the connection.
             Err(error) if matches!(error.kind(), ErrorKind::ConnectionAborted | ErrorKind::Interrupted) => continue,
             Err(error) => return Err(error),

@@ -26,8 +26,8 @@ const COUNTS: f64 = 13.0;
 /// Distance of the group names below the axis; `ROW_DISTANCE` is the distance of a second row of names below the first.
 const NAMES_BELOW: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
-/// Fraction of the width of a group that its boxes occupy; `BOX_WIDTH_SHARE` is the width of a box as a fraction of its place, and
-/// `MAX_BOX_WIDTH` the largest width.
+/// Fraction of the width of a group that its boxes occupy; `BOX_WIDTH_SHARE` is the width of a box as a fraction of its
+/// place, and `MAX_BOX_WIDTH` the largest width.
 const GROUP: f64 = 0.86;
 const BOX_WIDTH_SHARE: f64 = 0.8;
 const MAX_BOX_WIDTH: f64 = 26.0;

@@ -20,8 +20,8 @@ const HEIGHT: f64 = 150.0;
 /// first.
 const NAMES_BELOW: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
-/// Horizontal positions of the first and the last person within a category, as fractions of its width; `MEAN_POSITION` is the
-/// position of the mean.
+/// Horizontal positions of the first and the last person within a category, as fractions of its width; `MEAN_POSITION`
+/// is the position of the mean.
 const PEOPLE: (f64, f64) = (0.18, 0.6);
 const MEAN_POSITION: f64 = 0.78;
 /// Maximum number of people with individual colours; larger groups are drawn in grey, with one legend entry for all

@@ -133,7 +133,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
         });
         let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
         let margins = &mut tables.margins;
-        margins.begin();
+        margins.start_row();
         margins.text("subject", key.0);
         margins.text("condition", key.1);
         margins.real("runs", records.len() as f64);
@@ -184,7 +184,7 @@ fn of_records(
     let description = describe_runs(records, &options).map_err(|error| error.to_string())?;
     let found = &description.function;
     for (line, phase) in found.lines.iter().zip(description.phases_deg()) {
-        lines.begin();
+        lines.start_row();
         lines.text("subject", subject);
         lines.text("condition", condition);
         let magnitude = line.magnitude_db();
@@ -233,7 +233,7 @@ fn of_records(
             .map(|(c, m)| (c.value, m.value));
     }
     for (estimator, response) in fits.medians(subject, condition) {
-        agreement.begin();
+        agreement.start_row();
         agreement.text("subject", subject);
         agreement.text("condition", condition);
         agreement.text("estimator", estimator);

@@ -181,7 +181,7 @@ impl Person {
     }
 
     fn write(&self, rows: &mut Rows) {
-        rows.begin();
+        rows.start_row();
         for (name, value) in [
             ("subject", self.subject.as_str()),
             ("condition", &self.condition),

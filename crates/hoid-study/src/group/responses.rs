@@ -139,7 +139,7 @@ impl ResponseAverages {
         ));
         for (key, at) in &self.0 {
             for (bits, both) in at {
-                rows.begin();
+                rows.start_row();
                 for (name, text) in KEYS.iter().zip(key) {
                     rows.text(name, text);
                 }

@@ -165,7 +165,7 @@ impl<'a> RunRows<'a> {
             .collect();
         for ((w, h), phase_deg) in omega.iter().zip(&response).zip(followed_phases_deg(&response)) {
             let rows = &mut self.responses;
-            rows.begin();
+            rows.start_row();
             rows.text("subject", &self.entry.subject);
             rows.text("condition", &self.entry.condition);
             rows.text("run", &self.entry.run);
@@ -187,9 +187,9 @@ impl<'a> RunRows<'a> {
         traces::write(&mut self.traces, &self.columns, self.entry, trace);
     }
 
-    fn begin(&mut self, window: Option<Window>, estimator: &str) {
+    fn start_row(&mut self, window: Option<Window>, estimator: &str) {
         let rows = &mut self.estimates;
-        rows.begin();
+        rows.start_row();
         rows.text("subject", &self.entry.subject);
         rows.text("condition", &self.entry.condition);
         rows.text("run", &self.entry.run);
@@ -203,7 +203,7 @@ impl<'a> RunRows<'a> {
 
     /// Writes a quantity estimated in a window, or without a window for the run as a whole.
     pub fn row(&mut self, window: Option<Window>, estimator: &str, parameter: &str, estimate: Estimate) {
-        self.begin(window, estimator);
+        self.start_row(window, estimator);
         self.estimates.text("parameter", parameter);
         self.estimates.real("value", estimate.value);
         if let Some(se) = estimate.standard_error {
@@ -236,7 +236,7 @@ impl<'a> RunRows<'a> {
     }
 
     fn push_without_value(&mut self, window: Option<Window>, estimator: &str, status: &str, reason: &str) {
-        self.begin(window, estimator);
+        self.start_row(window, estimator);
         self.estimates.text("status", status);
         self.estimates.text("reason", reason);
     }

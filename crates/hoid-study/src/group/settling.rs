@@ -92,7 +92,7 @@ impl Settling {
                 let (times, medians) = traces.medians(key, name);
                 let noise = median(noises);
                 let step = Step::of(&times, &medians, change_s);
-                rows.begin();
+                rows.start_row();
                 for (column, value) in KEYS.iter().zip(key.iter().chain([name])) {
                     rows.text(column, value);
                 }
@@ -165,7 +165,7 @@ mod tests {
             let covered = if t > 10.0 { 1.0 - (-(t - 10.0) / 2.0).exp() } else { 0.0 };
             // The absolute deviations 0, 0.1, 0.1 and 0.2 occur in turn; their median is 0.1.
             let ripple = [0.0, 0.1, -0.1, 0.2][(k as usize + run) % 4];
-            rows.begin();
+            rows.start_row();
             for (name, value) in [("subject", "A"), ("condition", "C"), ("estimator", "RLS")] {
                 rows.text(name, value);
             }

@@ -106,7 +106,7 @@ pub(super) fn write(rows: &mut Rows, columns: &TraceColumns, entry: &RunEntry, t
     let names = trace.parameter_names();
     let correlated = CORRELATED.map(|name| names.iter().position(|n| n == name));
     for k in moving(trace) {
-        rows.begin();
+        rows.start_row();
         rows.text("subject", &entry.subject);
         rows.text("condition", &entry.condition);
         rows.text("run", &entry.run);

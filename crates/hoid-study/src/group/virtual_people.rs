@@ -197,7 +197,7 @@ fn truth_schema() -> TableSchema {
 
 fn truth_row(rows: &mut Rows, subject: u64, run: u64, person: &Person, found: &PersonRun) -> Result<(), StudyError> {
     let wrong = |error: ModelError| virtual_error(&SimError::Model(error));
-    rows.begin();
+    rows.start_row();
     rows.text("subject", &format!("S{subject}"));
     rows.text("condition", &person.plant.to_string());
     rows.text("run", &run.to_string());

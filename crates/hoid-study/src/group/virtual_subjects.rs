@@ -243,7 +243,7 @@ fn truth_schema() -> TableSchema {
 }
 
 fn truth_row(rows: &mut Rows, subject: u64, condition: Condition, run: u64, scenario: &Scenario) {
-    rows.begin();
+    rows.start_row();
     rows.text("subject", &format!("S{subject}"));
     rows.text("condition", &condition.to_string());
     rows.text("run", &run.to_string());

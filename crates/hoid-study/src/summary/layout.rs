@@ -48,7 +48,7 @@ pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSc
 /// Starts a row with the settings of the cell and the estimator.
 pub(super) fn start_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
     let scenario = cell.resolved.scenario();
-    rows.begin();
+    rows.start_row();
     rows.whole("cell", cell.index);
     rows.text("scenario", &cell.scenario);
     rows.text("condition", &cell.condition);

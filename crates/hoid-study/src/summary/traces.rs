@@ -112,7 +112,7 @@ impl Series {
         let mut medians = Vec::with_capacity(self.0.len());
         for (bits, parameters) in &self.0 {
             let t = f64::from_bits(*bits);
-            rows.begin();
+            rows.start_row();
             rows.whole("cell", cell.index);
             rows.text("estimator", &estimator.label);
             rows.real("t", t);

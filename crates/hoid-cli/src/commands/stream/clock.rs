@@ -115,8 +115,8 @@ impl Clock {
         (is_off(median) && is_off(mean)).then_some(1.0 / median)
     }
 
-    /// True, once, after the grid has run ahead of the times by more than [`MAX_LEAD_SAMPLES`] samples, because the times
-    /// advance by less than the sample time per line.
+    /// True, once, after the grid has run ahead of the times by more than [`MAX_LEAD_SAMPLES`] samples, because the
+    /// times advance by less than the sample time per line.
     pub fn too_fast(&mut self) -> bool {
         std::mem::take(&mut self.too_fast)
     }

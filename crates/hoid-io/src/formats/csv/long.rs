@@ -26,7 +26,8 @@ use crate::wording::shown;
 const MIN_LONG_FILE_BYTES: u64 = 16 << 20;
 /// Number of bytes read to obtain the header and the first rows.
 const HEAD: usize = 256 << 10;
-/// Size of the first block in bytes; each further block is twice as long as the previous block, up to [`MAX_LINE_BYTES`].
+/// Size of the first block in bytes; each further block is twice as long as the previous block, up to
+/// [`MAX_LINE_BYTES`].
 const BLOCK: usize = 1 << 20;
 /// Number of positions in the unread part of a file at which the time is probed.
 const PROBES: u32 = 64;

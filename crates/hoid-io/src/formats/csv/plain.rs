@@ -21,7 +21,8 @@ const PART_BYTES: usize = 4 << 20;
 const FIRST_PART_BYTES: usize = 64 << 10;
 /// Maximum number of threads.
 const THREADS: usize = 8;
-/// Positions of rows in the text of a table: of every [`KEPT_ROW_INTERVAL`](RowStarts::KEPT)-th row and of the last row.
+/// Positions of rows in the text of a table: of every [`KEPT_ROW_INTERVAL`](RowStarts::KEPT_ROW_INTERVAL)-th row and of
+/// the last row.
 #[derive(Debug, Default)]
 pub(super) struct RowStarts {
     kept: Vec<usize>,

@@ -255,8 +255,8 @@ impl Rows<'_> {
         })
     }
 
-    /// Reads at most [`FULL_READER_ROWS`] rows starting at position `from` with the full CSV reader; returns the position of the
-    /// next row.
+    /// Reads at most [`FULL_READER_ROWS`] rows starting at position `from` with the full CSV reader; returns the
+    /// position of the next row.
     fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
         let mut reader = reader(self.bytes.get(from..).unwrap_or_default(), self.separator);
         let mut record = csv::ByteRecord::new();
