@@ -16,7 +16,7 @@ pub const RESPONSE: &str = "response";
 /// Names of the answers for the crossover frequency and the phase margin of the loop.
 pub const LOOP: [&str; 2] = ["crossover", "phase_margin"];
 /// Kind of the finding that an individual answer is undetermined.
-const OPEN: &str = "open-answer";
+const UNDETERMINED_ANSWER: &str = "open-answer";
 /// Largest standard errors at which the crossover (relative to its value) and the phase margin (in deg) count as
 /// determined.
 const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
@@ -69,7 +69,9 @@ pub fn with_answers(verdict: Verdict, answers: &[Answered], asked: &[String]) ->
         let is_told = |finding: &Finding| matches!(finding.kind, "no-crossover" | "unstable-loop");
         let wanted = LOOP.iter().filter(|_| !verdict.findings().iter().any(is_told));
         let of_loop = wanted.filter_map(|name| of(name)?.open.clone());
-        of_loop.map(|finding| Finding::doubt(OPEN, finding.message)).collect()
+        of_loop
+            .map(|finding| Finding::doubt(UNDETERMINED_ANSWER, finding.message))
+            .collect()
     } else {
         let wanted = asked.iter().filter_map(|name| match of(name) {
             Some(answer) => answer.open.clone(),
@@ -83,12 +85,15 @@ pub fn with_answers(verdict: Verdict, answers: &[Answered], asked: &[String]) ->
 /// Returns the verdict on one answer: the findings on the fit as a whole and, if this answer is undetermined, the
 /// reason.
 pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
-    let whole = verdict.findings().iter().filter(|finding| finding.kind != OPEN);
+    let whole = verdict
+        .findings()
+        .iter()
+        .filter(|finding| finding.kind != UNDETERMINED_ANSWER);
     Verdict::of(whole.chain(&answer.open).cloned().collect())
 }
 
 fn undetermined(message: String) -> Finding {
-    Finding::undetermined(OPEN, message)
+    Finding::undetermined(UNDETERMINED_ANSWER, message)
 }
 
 fn answered(name: &str, why: Option<String>) -> Answered {
@@ -179,7 +184,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_level_is_that_of_what_was_asked() {
+    fn level_covers_only_the_requested_answers() {
         let answers = [
             answered(RESPONSE, None),
             answered("tau_e", Some("tau_e is not determined by the data".to_owned())),
@@ -200,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crossover_whose_interval_holds_zero_is_open() {
+    fn crossover_with_zero_in_its_interval_is_undetermined() {
         let of = |value: f64, s: f64| {
             let one = Estimate::with_variance(value, s * s);
             let interval = Some((value - 2.0 * s, value + 2.0 * s));
@@ -212,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn names_that_are_asked_for() {
+    fn requested_names_are_parsed() {
         let names = |text: &str| asked_for(&text.split(',').map(str::to_owned).collect::<Vec<_>>());
         assert_eq!(
             names("crossover, delay,margin").unwrap(),

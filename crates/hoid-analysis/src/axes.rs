@@ -25,9 +25,9 @@ use serde_json::{Map, Value, json};
 use crate::{AnalysisError, Excitation, Identification, Identified, Recordings, json};
 
 /// Familywise significance level for reporting a coupling.
-const BY_CHANCE: f64 = 0.01;
+const FAMILYWISE_LEVEL: f64 = 0.01;
 /// Relative difference below which two lines count as equal.
-const SAME_LINE: f64 = 1e-3;
+const LINE_TOLERANCE: f64 = 1e-3;
 /// Value of `kind` in JSON.
 pub const AXES: &str = "axes";
 
@@ -181,7 +181,7 @@ fn coupling(
     });
     Coupling {
         input: other.input.clone(),
-        responds: tested.as_ref().is_ok_and(|p| *p < BY_CHANCE / tests as f64),
+        responds: tested.as_ref().is_ok_and(|p| *p < FAMILYWISE_LEVEL / tests as f64),
         p_value: tested,
     }
 }
@@ -204,7 +204,7 @@ fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Opt
         let (here, there) = (lines(own)?, lines(of_other)?);
         let shared = here
             .iter()
-            .find(|a| there.iter().any(|b| (*a / b - 1.0).abs() < SAME_LINE));
+            .find(|a| there.iter().any(|b| (*a / b - 1.0).abs() < LINE_TOLERANCE));
         if let Some(omega) = shared {
             return Err(format!(
                 "{own} and {of_other} share the line at {omega:.3} rad/s: give each axis its own lines"

@@ -11,7 +11,7 @@ use crate::{
     AnalysisError,
     offset::{late_samples, without_offsets},
     recordings::Recordings,
-    repair::repaired_alike,
+    repair::repaired_in_the_same_way,
 };
 
 /// Channel with the recorded disturbance or target.
@@ -82,7 +82,7 @@ impl Recordings {
             return Ok(Some(describe_runs(&self.records, &options(0.0))?));
         };
         let again = reading.files(&source.paths, |_, _| ())?;
-        let again = repaired_alike(again.records, handling)?;
+        let again = repaired_in_the_same_way(again.records, handling)?;
         let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
         let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
         // The records that were read again are decimated to the sampling rate of the fit.

@@ -19,16 +19,16 @@ impl Reading {
     pub fn files(
         &self,
         paths: &[PathBuf],
-        mut told: impl FnMut(&Path, &ReadRecord),
+        mut on_read: impl FnMut(&Path, &ReadRecord),
     ) -> Result<Recordings, AnalysisError> {
         let mut all = Recordings::default();
         for path in paths {
             let reads = self
                 .segments(path)
-                .map_err(|error| in_another_file(error, path, paths))?;
+                .map_err(|error| column_in_another_file(error, path, paths))?;
             let parts = reads.len() > 1 || !self.mask.is_empty();
             for read in reads {
-                told(path, &read);
+                on_read(path, &read);
                 let (record, account) = with_account(read);
                 // The label of a trial ends with the name of the trial, the label of a segment with its span.
                 let stem = path.file_stem().map_or(0, |stem| stem.to_string_lossy().len());
@@ -65,9 +65,9 @@ impl Reading {
     ///
     /// # Errors
     /// As [`Reading::files`].
-    pub fn file(&self, path: &Path, told: impl FnOnce(&Path, &ReadRecord)) -> Result<Recordings, AnalysisError> {
+    pub fn file(&self, path: &Path, on_read: impl FnOnce(&Path, &ReadRecord)) -> Result<Recordings, AnalysisError> {
         let read = self.one(path)?;
-        told(path, &read);
+        on_read(path, &read);
         let (record, account) = with_account(read);
         let mut one = Recordings::default();
         one.push(path.display().to_string(), record, account);
@@ -81,7 +81,7 @@ impl Reading {
 
 /// Returns the error for a column that is in another of the files. For example, an eye tracker and a stick recorded in
 /// two files, each with its own rate, are not two recordings.
-fn in_another_file(error: AnalysisError, path: &Path, paths: &[PathBuf]) -> AnalysisError {
+fn column_in_another_file(error: AnalysisError, path: &Path, paths: &[PathBuf]) -> AnalysisError {
     let AnalysisError::Io(IoError::NoSuchColumn { missing, .. }) = &error else {
         return error;
     };

@@ -86,9 +86,9 @@ impl Level {
         of: impl Fn(usize, &Record) -> Option<Estimate>,
     ) -> Option<Setting> {
         levels_into(&mut data.accounts, self.as_read.as_ref()?, |k, record| {
-            let beside = self.separate_means.get(k).copied().unwrap_or(0.0);
+            let separate_mean = self.separate_means.get(k).copied().unwrap_or(0.0);
             of(k, record).map(|level| Estimate {
-                value: level.value + beside,
+                value: level.value + separate_mean,
                 ..level
             })
         });

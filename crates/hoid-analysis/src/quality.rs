@@ -19,10 +19,10 @@ use crate::recordings::{Account, RESTING};
 
 /// Limits above which a result is doubtful, because clipping or rounding lost information: the fraction of samples at
 /// the limits of the stick, and the quantisation steps of e and u relative to their standard deviations.
-const AT_ENDS: f64 = 0.05;
-const COARSE: [f64; 2] = [0.05, 0.15];
+const MAX_SATURATED_SHARE: f64 = 0.05;
+const MAX_QUANTUM_RATIOS: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be filled by a straight line, s.
-const BRIDGED_S: f64 = 0.25;
+const MAX_BRIDGED_S: f64 = 0.25;
 
 /// Kind of system whose records are judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,7 +42,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         .filter(|issue| issue.channel == output)
         .map(|issue| issue.share)
         .sum();
-    if at_ends > AT_ENDS {
+    if at_ends > MAX_SATURATED_SHARE {
         all.push(Finding::doubt(
             "stick-at-its-end",
             format!(
@@ -64,7 +64,10 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         ));
     }
     let input = record.input_channel().map_or("", |channel| channel.name.as_str());
-    for (channel, values, least) in [(input, record.input(), COARSE[0]), (output, record.output(), COARSE[1])] {
+    for (channel, values, least) in [
+        (input, record.input(), MAX_QUANTUM_RATIOS[0]),
+        (output, record.output(), MAX_QUANTUM_RATIOS[1]),
+    ] {
         if of == Of::System && channel == input {
             continue;
         }
@@ -91,7 +94,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         _ => 0.0,
     };
     let longest = account.steps.iter().map(seconds).fold(0.0, f64::max);
-    if longest > BRIDGED_S {
+    if longest > MAX_BRIDGED_S {
         all.push(Finding::doubt(
             "bridged",
             format!(
@@ -110,7 +113,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         else {
             continue;
         };
-        if *longest_s > BRIDGED_S {
+        if *longest_s > MAX_BRIDGED_S {
             all.push(Finding::doubt(
                 "held",
                 format!(

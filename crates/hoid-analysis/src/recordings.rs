@@ -88,12 +88,12 @@ impl Recordings {
         let several = self.names.len() > 1;
         let own = |account: &Account| account.findings.iter().filter(|f| f.kind == RESTING).count();
         let resting: usize = self.accounts.iter().map(own).sum();
-        let mut said = false;
+        let mut is_noted = false;
         let mut all = Vec::new();
         for (name, account) in self.names.iter().zip(&self.accounts) {
             for finding in &account.findings {
                 let of_stick = finding.kind == RESTING && resting > 1;
-                if of_stick && std::mem::replace(&mut said, true) {
+                if of_stick && std::mem::replace(&mut is_noted, true) {
                     continue;
                 }
                 let message = match (several, of_stick) {

@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_estimator_says_what_it_is_and_each_option_once() {
+    fn every_estimator_is_documented_with_unique_options() {
         let all = estimators();
         for spec in &all {
             assert!(

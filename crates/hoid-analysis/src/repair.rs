@@ -14,7 +14,7 @@ use crate::{
 /// not determine an operator.
 const SHORTEST_PIECE_S: f64 = 4.0;
 /// Maximum number of levels of a step input.
-const MOST_LEVELS: usize = 16;
+const MAX_LEVELS: usize = 16;
 
 impl Recordings {
     /// Repairs the faults of the recordings; a recording that is cut becomes several. The account of the first segment
@@ -92,7 +92,7 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
         if !levels.contains(value) {
             levels.push(*value);
         }
-        if levels.len() > MOST_LEVELS {
+        if levels.len() > MAX_LEVELS {
             return false;
         }
     }
@@ -100,7 +100,10 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
 }
 
 /// Repairs the same recordings, read with other options, in the same manner.
-pub(crate) fn repaired_alike(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
+pub(crate) fn repaired_in_the_same_way(
+    records: Vec<Record>,
+    handling: FaultHandling,
+) -> Result<Vec<Record>, ModelError> {
     let mut all = Vec::with_capacity(records.len());
     for record in records {
         all.extend(repair(&record, handling)?.segments);

@@ -224,7 +224,7 @@ impl Request {
 
     /// Returns the name of the requested operator estimator.
     fn operator(&self, typed: Option<&str>, notes: &mut Vec<String>) -> Result<&'static str, AnalysisError> {
-        let said = |name: &str| self.options.get(name).map(String::as_str);
+        let option = |name: &str| self.options.get(name).map(String::as_str);
         let was = match typed {
             Some(name @ ("family" | "grey-box")) => Some((name, "")),
             Some(name @ "time-varying") => Some((name, " with change sigmoid")),
@@ -233,14 +233,14 @@ impl Request {
         if let Some((name, with)) = was {
             notes.push(format!("structure {name} is now called operator{with}"));
         }
-        let changes = typed == Some("time-varying") || said("change") == Some("sigmoid");
+        let changes = typed == Some("time-varying") || option("change") == Some("sigmoid");
         let individual = self.options.get("individual").map(String::as_str).unwrap_or_default();
         let of_remnant = self.options.contains_key("remnant_order")
             || individual
                 .split(',')
                 .any(|name| matches!(name.trim(), "K_e_dot" | "T_n"))
             || (self.has(&["fix", "bound"]) && !changes);
-        let noise = said("noise");
+        let noise = option("noise");
         match (changes, noise) {
             (true, Some("arma" | "remnant")) => Err(AnalysisError::Option {
                 name: "noise",

@@ -20,7 +20,7 @@ use crate::{
 /// Frequencies at which responses are given, as fractions of the Nyquist frequency.
 const RESPONSE_AT: [f64; 12] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.2, 0.35, 0.5, 0.9];
 /// Minimum distance from zero, in standard errors, at which a coefficient counts as determined.
-const LEAST_ERRORS: f64 = 2.0;
+const MIN_STANDARD_ERRORS: f64 = 2.0;
 
 /// A fit with several inputs, and its verdict.
 #[derive(Debug, Clone)]
@@ -198,7 +198,8 @@ impl SeveralInputsResult {
                 .into_iter()
                 .filter(|(p, _)| p.starts_with('b') && p.ends_with(&own));
             let open = |e: &hoid_model::uncertainty::Estimate| {
-                e.standard_error.is_some_and(|s| e.value.abs() < LEAST_ERRORS * s)
+                e.standard_error
+                    .is_some_and(|s| e.value.abs() < MIN_STANDARD_ERRORS * s)
             };
             if gains.clone().count() > 0 && gains.clone().all(|(_, e)| open(&e)) {
                 findings.push(Finding::doubt(

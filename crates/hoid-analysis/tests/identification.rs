@@ -52,7 +52,7 @@ fn quick() -> Identification {
 }
 
 #[test]
-fn a_stick_at_its_end_is_told_of_files_and_of_records_alike() {
+fn saturation_is_reported_for_files_and_records() {
     let clean = quick()
         .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
         .unwrap();
@@ -92,7 +92,7 @@ fn a_stick_at_its_end_is_told_of_files_and_of_records_alike() {
 }
 
 #[test]
-fn runs_that_are_no_two_runs_are_refused() {
+fn duplicate_and_unusable_runs_are_refused() {
     let record = recorded(1, |e, u| (e, u));
     let copy = record.clone().labelled("again");
     let refused = quick().run(Recordings::of_records([record.clone(), copy])).unwrap_err();
@@ -112,7 +112,7 @@ fn runs_that_are_no_two_runs_are_refused() {
 }
 
 #[test]
-fn a_loop_that_nobody_could_hold_is_told_where_the_element_is_known() {
+fn unstable_loop_is_reported_if_the_element_is_known() {
     let reversed = || Recordings::of_records([recorded(1, |e, u| (-e, u))]);
     let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
     let with = Identification {
@@ -137,7 +137,7 @@ fn a_loop_that_nobody_could_hold_is_told_where_the_element_is_known() {
 }
 
 #[test]
-fn settings_are_the_values_that_were_used() {
+fn settings_list_the_values_used() {
     let mut how = quick();
     how.estimator.search.tolerance = 1e-7;
     let found = how.run(Recordings::of_records([recorded(1, |e, u| (e, u))])).unwrap();
@@ -150,27 +150,27 @@ fn settings_are_the_values_that_were_used() {
 }
 
 #[test]
-fn faults_are_mended_or_kept() {
-    let spoilt = || {
+fn faults_are_repaired_or_kept() {
+    let with_outlier = || {
         let record = recorded(1, |e, u| (e, u));
         let mut u = record.output().to_vec();
         u[3000] = 5.0;
         let e = Channel::new("e", "", record.input().to_vec());
         Recordings::of_records([Record::new(record.sample_time(), e, Channel::new("u", "", u)).unwrap()])
     };
-    let repaired = quick().run(spoilt()).unwrap();
+    let repaired = quick().run(with_outlier()).unwrap();
     assert_eq!(repaired.data.accounts[0].faults.len(), 1);
     let kept = Identification {
         faults: FaultHandling::Keep,
         ..quick()
     };
-    let kept = kept.run(spoilt()).unwrap();
+    let kept = kept.run(with_outlier()).unwrap();
     assert!(kept.data.accounts[0].faults.is_empty());
     assert!(kept.fit.loss > 3.0 * repaired.fit.loss);
 }
 
 #[test]
-fn a_high_rate_is_lowered_but_for_what_counts_samples() {
+fn high_rates_are_reduced_unless_samples_are_counted() {
     let ts = SampleTime::new(0.002).unwrap();
     let wave = |phase: f64| (0..4000).map(|k| (0.01 * f64::from(k) - phase).sin()).collect();
     let record = Record::new(ts, Channel::new("e", "", wave(0.0)), Channel::new("u", "", wave(0.3))).unwrap();
@@ -190,7 +190,7 @@ fn a_high_rate_is_lowered_but_for_what_counts_samples() {
 }
 
 #[test]
-fn a_rate_in_hz_is_not_lowered_again() {
+fn rate_given_in_hz_is_not_reduced_again() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("run.csv");
     write_record(&path, &recorded(1, |e, u| (e, u))).unwrap();
@@ -202,7 +202,7 @@ fn a_rate_in_hz_is_not_lowered_again() {
 }
 
 #[test]
-fn an_offset_is_a_phase_of_what_is_periodic() {
+fn offsets_are_converted_to_lag_samples() {
     let record = recorded(1, |e, u| (e, u));
     let of = |name: &str, offset| BTreeMap::from([(name.to_owned(), offset)]);
     assert_eq!(late_samples(&record, &of("u", Offset::Samples(2.0))).unwrap(), 2.0);
@@ -239,14 +239,14 @@ fn a_named_excitation_must_be_recorded() {
 }
 
 #[test]
-fn a_prior_is_named_or_stands_in_a_file() {
+fn prior_is_read_by_name_or_from_a_file() {
     assert!(prior_of_text("none").unwrap().entries().is_empty());
-    for (text, says) in [
+    for (text, expected) in [
         ("omega_nm", "prior: found omega_nm; expected population, none, "),
         ("nowhere.json", "nowhere.json"),
     ] {
         let words = prior_of_text(text).unwrap_err().to_string();
-        assert!(words.contains(says), "{words}");
+        assert!(words.contains(expected), "{words}");
     }
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("fit.json");
@@ -255,7 +255,7 @@ fn a_prior_is_named_or_stands_in_a_file() {
 }
 
 #[test]
-fn another_run_of_the_person_judges_the_operator() {
+fn operator_is_validated_on_another_run() {
     let found = quick()
         .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
         .unwrap();
@@ -272,7 +272,7 @@ fn another_run_of_the_person_judges_the_operator() {
 }
 
 #[test]
-fn orders_of_polynomials_are_those_that_were_given_and_the_operators() {
+fn given_orders_replace_those_of_the_operator() {
     let ts = SampleTime::HUNDREDTH;
     let default = Polynomials::new(Structure::BoxJenkins).ranges(ts).unwrap();
     assert_eq!((default.nk, default.nd, default.nb), (6..=61, 1..=4, 2..=2));
@@ -292,8 +292,8 @@ fn orders_of_polynomials_are_those_that_were_given_and_the_operators() {
 
 /// The rule for a stick at its end applies to all estimators.
 #[test]
-fn every_estimator_hears_of_the_recordings() {
-    fn doubted<E: BatchEstimator>(estimator: E, record: &Record) {
+fn every_estimator_reports_saturated_recordings() {
+    fn assert_doubtful<E: BatchEstimator>(estimator: E, record: &Record) {
         let found = Identification::of(estimator)
             .run(Recordings::of_records([record.clone()]))
             .unwrap();
@@ -305,9 +305,9 @@ fn every_estimator_hears_of_the_recordings() {
         orders: [("nd".to_owned(), 1..=1), ("nk".to_owned(), 29..=29)].into(),
         ..Polynomials::new(Structure::BoxJenkins)
     };
-    doubted(polynomials.clone(), &record);
-    doubted(GreyBox::new(1..=1), &record);
-    doubted(SigmoidChange::default(), &record);
+    assert_doubtful(polynomials.clone(), &record);
+    assert_doubtful(GreyBox::new(1..=1), &record);
+    assert_doubtful(SigmoidChange::default(), &record);
     let searched = Polynomials {
         orders: [("nk".to_owned(), 28..=29)].into(),
         start: Some([("b0".to_owned(), 0.04)].into()),
@@ -324,7 +324,7 @@ fn every_estimator_hears_of_the_recordings() {
 
 /// A furnace sampled every 9 s with a two-level input: the rules for people do not apply.
 #[test]
-fn polynomials_are_judged_as_any_system() {
+fn rules_for_people_do_not_apply_to_polynomials() {
     let noise = |seed: u64| {
         RunSeed {
             seed,
@@ -362,7 +362,7 @@ fn polynomials_are_judged_as_any_system() {
 
 /// If u is noise that is unrelated to e, no answer is trustworthy, and the verdict refers to the requested answer.
 #[test]
-fn a_verdict_is_about_what_was_asked() {
+fn verdict_refers_to_the_requested_answers() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let run = simulator.run(RunSeed::default(), false).unwrap();
     let noise = RunSeed {

@@ -52,7 +52,7 @@ fn quick() -> FamilyEstimator {
 }
 
 #[test]
-fn each_result_comes_back_and_predicts_as_before() {
+fn json_round_trip_keeps_predictions() {
     let other = run(2);
     let (one, two) = back(Identification::of(quick()));
     let models = [&one, &two].map(|found| &found.fit.operator(0).polynomial_fit);
@@ -73,7 +73,7 @@ fn each_result_comes_back_and_predicts_as_before() {
 }
 
 #[test]
-fn the_kind_is_found_and_another_is_refused() {
+fn result_kind_is_detected_and_checked() {
     let found = Identification::of(quick())
         .run(Recordings::of_records([run(1)]))
         .unwrap();
@@ -96,7 +96,7 @@ fn the_kind_is_found_and_another_is_refused() {
 }
 
 #[test]
-fn a_setting_is_given_where_it_is_not_the_default() {
+fn non_default_settings_are_marked_as_given() {
     let with = Identification {
         controlled_element: Some("1/s".parse().unwrap()),
         ..Identification::of(quick())

@@ -37,7 +37,7 @@ fn plain(t: f64, r: f64, y: f64, u: f64) -> String {
 }
 
 #[test]
-fn a_file_is_seen_as_a_whole() {
+fn columns_periods_and_lag_are_found() {
     let (_directory, path) = written("Time (s),Target,y,Stick [V]", plain);
     let known = LookOptions {
         controlled_element: Some(("1/s".to_owned(), "1/s".parse().unwrap())),
@@ -72,7 +72,7 @@ fn a_file_is_seen_as_a_whole() {
 }
 
 #[test]
-fn a_file_that_makes_no_record_has_columns_all_the_same() {
+fn unreadable_record_still_gives_column_advice() {
     let (_directory, path) = written("t,r,y,u", |t, r, y, u| {
         if (7.0..7.1).contains(&t) {
             format!("{t},{r},,{u}")
@@ -90,7 +90,7 @@ fn a_file_that_makes_no_record_has_columns_all_the_same() {
 }
 
 #[test]
-fn a_reader_is_told_the_columns() {
+fn error_suggests_other_columns() {
     let (_directory, path) = written("t,r,y,u", plain);
     let refused = |reading: &Reading| reading.file(&path, |_, _| ()).unwrap_err();
     let default = Reading::default();

@@ -19,13 +19,13 @@ use std::process::ExitCode;
 
 use draw::Draw;
 use full_disks::rounds;
-use interrupted::{Bench, GROUP, STUDY, TRACK, beside_this};
+use interrupted::{Bench, GROUP, STUDY, TRACK, built_program_path};
 
 fn main() -> ExitCode {
     let number = |k: usize, default: u64| std::env::args().nth(k).map_or(default, |text| text.parse().unwrap());
     let (count, mut draw) = (number(1, 200) as usize, Draw(number(2, 1)));
     let directory = tempfile::tempdir().unwrap();
-    let bench = Bench::new(beside_this(), directory.path());
+    let bench = Bench::new(built_program_path(), directory.path());
     let mut failed = false;
     let only = std::env::args().nth(3);
     let mut works = vec![STUDY, GROUP, TRACK];

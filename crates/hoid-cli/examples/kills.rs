@@ -21,13 +21,13 @@ use std::{
 };
 
 use draw::Draw;
-use interrupted::{Bench, GROUP, REPRODUCE, STUDY, beside_this, compare, files};
+use interrupted::{Bench, GROUP, REPRODUCE, STUDY, built_program_path, compare, files};
 
 /// Number of kills of one run before it may finish.
-const IN_A_ROW: usize = 5;
+const MAX_CONSECUTIVE_KILLS: usize = 5;
 
 fn main() -> ExitCode {
-    let (mut kills, mut damaged, mut seed, mut program, mut only) = (200, 50, 1, beside_this(), None);
+    let (mut kills, mut damaged, mut seed, mut program, mut only) = (200, 50, 1, built_program_path(), None);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().unwrap();
@@ -48,11 +48,11 @@ fn main() -> ExitCode {
         if only.as_ref().is_some_and(|name| name != work.name) {
             continue;
         }
-        let begun = Instant::now();
+        let start_time = Instant::now();
         bench.whole(work, "whole");
         // The duration of a run depends on the load of the machine: after a kill that was too late, the following kills
         // are earlier.
-        let mut took = begun.elapsed();
+        let mut took = start_time.elapsed();
         let expected = files(&bench.place(work, "whole"));
         // The remainder of the division by three is assigned to the first works.
         let share = |all: usize, of: usize| all / of + usize::from(k < all % of);
@@ -60,7 +60,7 @@ fn main() -> ExitCode {
         while killed < share(kills, 3) {
             runs += 1;
             let name = format!("killed-{runs}");
-            for _ in 0..IN_A_ROW.min(share(kills, 3) - killed) {
+            for _ in 0..MAX_CONSECUTIVE_KILLS.min(share(kills, 3) - killed) {
                 let child = bench.start(work, &name);
                 let hit = kill(child, took.mul_f64(draw.share()));
                 killed += usize::from(hit);
@@ -69,9 +69,9 @@ fn main() -> ExitCode {
                     break;
                 }
             }
-            let begun = Instant::now();
+            let start_time = Instant::now();
             bench.whole(work, &name);
-            took = took.max(begun.elapsed());
+            took = took.max(start_time.elapsed());
             failures.extend(compare(
                 &expected,
                 &bench.place(work, &name),
@@ -90,11 +90,11 @@ fn main() -> ExitCode {
             }
             let what = damage(&bench.place(work, &name).join("parts"), &mut draw);
             hit += usize::from(what.is_some());
-            let begun = Instant::now();
+            let start_time = Instant::now();
             bench.whole(work, &name);
-            took = took.max(begun.elapsed());
-            let told = format!("{} {name} ({})", work.name, what.unwrap_or("no block yet"));
-            failures.extend(compare(&expected, &bench.place(work, &name), &told));
+            took = took.max(start_time.elapsed());
+            let description = format!("{} {name} ({})", work.name, what.unwrap_or("no block yet"));
+            failures.extend(compare(&expected, &bench.place(work, &name), &description));
             fs::remove_dir_all(bench.place(work, &name)).unwrap();
         }
         println!(

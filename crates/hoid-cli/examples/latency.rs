@@ -28,7 +28,7 @@ const PAUSE: Duration = Duration::from_secs(2);
 const HOSTILE: usize = 20_000;
 
 fn main() -> ExitCode {
-    let (mut seconds, mut seed, mut program, mut python) = (600, 1, beside_this(), None);
+    let (mut seconds, mut seed, mut program, mut python) = (600, 1, built_program_path(), None);
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().unwrap();
@@ -112,7 +112,7 @@ fn profile() -> PathBuf {
 }
 
 /// Returns the path of the program built with this example.
-fn beside_this() -> PathBuf {
+fn built_program_path() -> PathBuf {
     profile().join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
 }
 

@@ -13,7 +13,7 @@ type Handler = Box<dyn FnMut(i32) + Send>;
 
 static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
 /// The last signal, for the exit code of the interrupted command.
-static LAST: AtomicI32 = AtomicI32::new(SIGINT);
+static LAST_SIGNAL: AtomicI32 = AtomicI32::new(SIGINT);
 const SIGINT: i32 = 2;
 
 /// From this call on, an interrupt removes partial output before it ends the program. Without this call the system ends
@@ -21,7 +21,7 @@ const SIGINT: i32 = 2;
 pub fn catch() {
     // If interrupts cannot be caught, the command runs without this handling.
     let _ = listen(|signal| {
-        LAST.store(signal, Ordering::Relaxed);
+        LAST_SIGNAL.store(signal, Ordering::Relaxed);
         match answer().as_mut() {
             Some(answer) => answer(signal),
             None => end(exit_code()),
@@ -42,7 +42,7 @@ pub fn end(code: i32) -> ! {
 
 /// Returns the exit code after an interrupt, by the convention of shells.
 pub fn exit_code() -> i32 {
-    128 + LAST.load(Ordering::Relaxed)
+    128 + LAST_SIGNAL.load(Ordering::Relaxed)
 }
 
 fn answer() -> MutexGuard<'static, Option<Handler>> {

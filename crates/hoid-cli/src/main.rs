@@ -37,7 +37,7 @@ fn main() -> ExitCode {
     let cli = match parsed {
         Ok(cli) => cli,
         // Help and version texts are printed like results.
-        Err(said) if !said.use_stderr() => return exit(output::printed(said.print())),
+        Err(error) if !error.use_stderr() => return exit(output::printed(error.print())),
         Err(wrong) => wrong.exit(),
     };
     let outcome = match cli.command {

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn orders_as_typed() {
+    fn orders_are_parsed() {
         let some = named_orders(Some("nd=2, nc=1..3"), Some(&DelayRange::Samples(29..=29))).unwrap();
         assert_eq!((&some["nd"], &some["nc"]), (&(2..=2), &(1..=3)));
         assert!(named_orders(None, Some(&DelayRange::Samples(9..=usize::MAX))).is_err());
@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn a_start_names_each_coefficient_once() {
+    fn start_names_each_coefficient_once() {
         assert_eq!(start("f1=-1.9,b0=.04").unwrap()["f1"], -1.9);
         for bad in ["f1=1,f1=2", "f1=abc", "f1"] {
             assert!(start(bad).is_err(), "{bad}");

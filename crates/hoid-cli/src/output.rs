@@ -63,12 +63,12 @@ const WIDTHS: (usize, usize) = (60, 110);
 /// Returns the width for wrapping in columns, limited to [`WIDTHS`]: the value of `COLUMNS`, otherwise the width of the
 /// terminal. Returns `None` if neither is known, as for output to a file; lines are then not wrapped.
 pub fn width() -> Option<usize> {
-    let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
+    let columns = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
     let asked = || {
         let terminal = io::stdout().is_terminal().then(terminal_size::terminal_size)?;
         terminal.map(|(columns, _)| usize::from(columns.0))
     };
-    told.or_else(asked).map(|columns| columns.clamp(WIDTHS.0, WIDTHS.1))
+    columns.or_else(asked).map(|columns| columns.clamp(WIDTHS.0, WIDTHS.1))
 }
 
 /// Wraps the sentences of a page; tables keep their width. The continuation lines of a list item are indented.
@@ -146,7 +146,7 @@ pub fn print_notices() {
 pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
     match written.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => {
-            READER_LEFT.store(true, Ordering::Relaxed);
+            OUTPUT_CLOSED.store(true, Ordering::Relaxed);
             Ok(())
         }
         Err(error) => Err(CliError::Output(error)),
@@ -154,11 +154,11 @@ pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
     }
 }
 
-static READER_LEFT: AtomicBool = AtomicBool::new(false);
+static OUTPUT_CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// True if the reader of standard output has closed the pipe.
 pub fn pipe_closed() -> bool {
-    READER_LEFT.load(Ordering::Relaxed)
+    OUTPUT_CLOSED.load(Ordering::Relaxed)
 }
 
 /// Writes a warning, a note or an error to standard error.
@@ -188,19 +188,19 @@ pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
         bar.set_style(style);
     }
     bar.enable_steady_tick(Duration::from_millis(200));
-    let told = bar.clone();
+    let bar_handle = bar.clone();
     let done = progress::watched(
         move |step| {
-            if told.length() != Some(step.total as u64)
+            if bar_handle.length() != Some(step.total as u64)
                 && let Ok(style) = ProgressStyle::with_template(&format!(
                     "{{bar:30}} {{pos}}/{{len}} {}, {{elapsed}}, {{eta}} left",
                     step.what
                 ))
             {
-                told.set_style(style);
-                told.set_length(step.total as u64);
+                bar_handle.set_style(style);
+                bar_handle.set_length(step.total as u64);
             }
-            told.set_position(step.done as u64);
+            bar_handle.set_position(step.done as u64);
         },
         work,
     );
@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sentences_are_wrapped_and_points_hang() {
+    fn lists_are_wrapped_with_hanging_indents() {
         let page = "- one two three four\nshort\n\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\nend of it all";
         let expected = "- one two\n  three four\nshort\n\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\u{2500}\nend of it\nall";
         assert_eq!(wrapped(page, 12), expected);
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn the_verdict_has_a_colour_and_nothing_else_has() {
+    fn only_the_verdict_is_coloured() {
         let page = "Verdict: not determined\n- why\nVerdict: doubtful\n";
         assert_eq!(
             coloured(page),

@@ -38,7 +38,7 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
 }
 
 /// Returns the requested recursion of a model with two inputs.
-fn request_of_two(args: &TrackArgs) -> Result<TrackRequest, CliError> {
+fn two_input_request(args: &TrackArgs) -> Result<TrackRequest, CliError> {
     let typed = &args.recursion;
     let samples = |delay: &DelayRange| match delay {
         DelayRange::Samples(range) if range.start() == range.end() => Ok(range.start().to_string()),
@@ -92,7 +92,7 @@ fn of_orders(args: &RecursionArgs, orders: NamedOrders, delay: Option<DelayRange
 /// As [`request`].
 pub fn tracking(args: &TrackArgs) -> Result<Tracking, CliError> {
     let recursion = match (args.read.inputs.len(), &args.role) {
-        (2.., _) => request_of_two(args)?,
+        (2.., _) => two_input_request(args)?,
         (_, None) => request(&args.recursion)?,
         (_, Some(role)) => {
             return Err(CliError::Usage(format!(

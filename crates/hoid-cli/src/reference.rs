@@ -257,7 +257,7 @@ mod tests {
     use super::*;
     use crate::args::{Cli, flag, with_settings};
 
-    fn is_as_written(path: &str, expected: &str) {
+    fn assert_up_to_date(path: &str, expected: &str) {
         let path = format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"));
         if std::env::var_os("HOID_UPDATE_DOCS").is_some() {
             std::fs::write(&path, expected).unwrap();
@@ -270,13 +270,13 @@ mod tests {
     }
 
     #[test]
-    fn the_book_has_the_options_of_the_registry() {
-        is_as_written("docs/src/reference/options.md", &options_page(&registry()));
+    fn documented_options_are_current() {
+        assert_up_to_date("docs/src/reference/options.md", &options_page(&registry()));
     }
 
     #[test]
-    fn python_has_the_options_of_the_registry() {
-        is_as_written(
+    fn python_options_are_current() {
+        assert_up_to_date(
             "python/src/pyhoid/_settings.py",
             &python_settings(&registry(), &estimators()),
         );
@@ -284,7 +284,7 @@ mod tests {
 
     /// Every option of the registry of estimators is a flag of `hoid identify`, with the same default if clap has one.
     #[test]
-    fn identify_has_the_options_of_the_registry() {
+    fn identify_has_all_registry_options() {
         let mut cli = Cli::command();
         cli.build();
         let identify = cli.find_subcommand("identify").unwrap();
@@ -310,7 +310,7 @@ mod tests {
 
     /// An option that is declared once is available in all interfaces.
     #[test]
-    fn a_new_option_needs_no_other_edit() {
+    fn new_option_appears_everywhere() {
         let mut methods = registry();
         let dummy = Setting::of("tremor_band", &(8.0, 12.0))
             .unit("s")
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_option_of_a_batch_estimator_needs_no_other_edit() {
+    fn new_batch_option_appears_everywhere() {
         let mut batch = estimators();
         let dummy = Setting::of("tremor_band", &(8.0, 12.0)).help(&["Frequencies that count as tremor"]);
         batch[0].settings.push(dummy);
@@ -349,7 +349,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_method_needs_no_other_edit() {
+    fn new_method_appears_everywhere() {
         let mut methods = registry();
         methods.push(MethodSpec {
             name: "setpoint",

@@ -21,7 +21,7 @@ const STYLE: TableStyle = {
 /// Number of blanks on both sides of a cell together.
 const PADDING: usize = 2;
 /// Number of additional blanks between two columns.
-const BETWEEN: usize = 1;
+const COLUMN_GAP: usize = 1;
 /// A blank at which a line is not wrapped.
 const FIXED_BLANK: &str = "\u{a0}";
 
@@ -55,14 +55,14 @@ impl Rows {
     }
 
     /// Returns the table for a screen of the given width; the width is unlimited if it is `None`.
-    fn on(&self, width: Option<usize>) -> String {
+    fn for_width(&self, width: Option<usize>) -> String {
         let whole = self.drawn(None);
         let Some(width) = width else { return whole };
         if whole.lines().all(|line| line.chars().count() <= width) {
             return whole;
         }
-        let least = self.least_widths();
-        let blanks = least.len() * PADDING + least.len().saturating_sub(1) * BETWEEN;
+        let least = self.min_widths();
+        let blanks = least.len() * PADDING + least.len().saturating_sub(1) * COLUMN_GAP;
         match least.iter().sum::<usize>() + blanks <= width {
             true => self.drawn(Some((width, &least))),
             false => self.transposed(width).unwrap_or_else(|| self.as_lists()),
@@ -98,7 +98,7 @@ impl Rows {
         table.load_style(STYLE);
         table.set_header(&self.header);
         let cell = |text: &String| match on {
-            Some(_) => kept_together(text),
+            Some(_) => joined_with_error(text),
             None => text.clone(),
         };
         for row in &self.rows {
@@ -119,8 +119,13 @@ impl Rows {
     }
 
     /// Returns the length of the longest word in each column.
-    fn least_widths(&self) -> Vec<usize> {
-        let longest = |text: &String| kept_together(text).split(' ').map(|word| word.chars().count()).max();
+    fn min_widths(&self) -> Vec<usize> {
+        let longest = |text: &String| {
+            joined_with_error(text)
+                .split(' ')
+                .map(|word| word.chars().count())
+                .max()
+        };
         let of = |k: usize| {
             let cells = self.rows.iter().filter_map(|row| row.get(k));
             cells.chain(self.header.get(k)).filter_map(longest).max().unwrap_or(0)
@@ -147,12 +152,12 @@ impl Rows {
 
 impl fmt::Display for Rows {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.on(output::width()))
+        f.write_str(&self.for_width(output::width()))
     }
 }
 
 /// Joins a number and its error into one word, so that they are not separated.
-fn kept_together(text: &str) -> String {
+fn joined_with_error(text: &str) -> String {
     text.replace(" ± ", &format!("{FIXED_BLANK}±{FIXED_BLANK}"))
 }
 
@@ -168,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn a_course_turns_on_its_side_and_keeps_its_end() {
+    fn narrow_time_table_is_transposed_and_keeps_its_end() {
         let names = [
             "K_e",
             "T_L (s)",
@@ -183,7 +188,7 @@ mod tests {
             course.add_row(std::iter::once(format!("{t}.00")).chain(values));
         }
         let times = |width| {
-            let drawn = course.on(Some(width));
+            let drawn = course.for_width(Some(width));
             assert_eq!(drawn.lines().count(), 10, "{drawn}");
             assert!(drawn.lines().all(|l| l.chars().count() <= width), "{drawn}");
             drawn
@@ -198,33 +203,33 @@ mod tests {
         assert_eq!(times(80), ["1.00", "4.00", "8.00"]);
         assert_eq!(times(60), ["1.00", "8.00"]);
         assert_eq!(times(40), ["8.00"]);
-        assert!(course.on(Some(30)).starts_with("1.00"));
+        assert!(course.for_width(Some(30)).starts_with("1.00"));
     }
 
     #[test]
-    fn a_table_is_wrapped_between_words_and_becomes_a_list_where_that_does_not_do() {
-        let whole = rows().on(None);
+    fn narrow_table_is_wrapped_or_becomes_a_list() {
+        let whole = rows().for_width(None);
         assert!(
             whole
                 .lines()
                 .any(|l| l.contains("phase margin (deg)") && l.contains("remark"))
         );
-        assert_eq!(rows().on(Some(110)), whole);
-        let narrow = rows().on(Some(38));
+        assert_eq!(rows().for_width(Some(110)), whole);
+        let narrow = rows().for_width(Some(38));
         assert!(narrow.lines().all(|l| l.chars().count() <= 38), "{narrow}");
         for kept in ["anna", "13.5\u{a0}±\u{a0}1.9", "margin", "(deg)", "range"] {
             assert!(narrow.contains(kept), "{kept}\n{narrow}");
         }
         // At no width is a line longer than the screen.
         for width in 20..110 {
-            let page = rows().on(Some(width));
+            let page = rows().for_width(Some(width));
             let is_table = page.contains('─');
             assert!(
                 !is_table || page.lines().all(|l| l.chars().count() <= width),
                 "{width}\n{page}"
             );
         }
-        let list = rows().on(Some(20));
+        let list = rows().for_width(Some(20));
         assert!(list.starts_with("anna\n  phase margin (deg)  13.5 ± 1.9\n"), "{list}");
         assert!(list.ends_with("bert\n  phase margin (deg)  7 ± 19"), "{list}");
     }

@@ -536,7 +536,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_loop_without_a_margin_is_said_in_words() {
+    fn missing_margins_are_explained_in_words() {
         let known = |value: f64| {
             Some(Estimate {
                 value,

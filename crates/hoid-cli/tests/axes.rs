@@ -80,7 +80,7 @@ fn coupling(found: &Value, axis: usize) -> &Value {
 }
 
 #[test]
-fn each_axis_has_its_operator_and_a_coupling_is_named() {
+fn each_axis_has_an_operator_and_coupling_is_reported() {
     let at = TempDir::new().unwrap();
     two_axes(at.path(), "\"odd\"", 0.4);
     let call = ["identify", "two.csv", "--pair", "ex,ux,rx", "--pair", "ey,uy,ry"];
@@ -128,7 +128,7 @@ fn each_axis_has_its_operator_and_a_coupling_is_named() {
 }
 
 #[test]
-fn a_coupling_is_not_tested_where_the_lines_do_not_allow_it() {
+fn coupling_is_not_tested_if_lines_are_shared() {
     let at = TempDir::new().unwrap();
     two_axes(at.path(), "\"even\"", 0.0);
     let reason = |pairs: [&str; 2]| {
@@ -146,7 +146,7 @@ fn a_coupling_is_not_tested_where_the_lines_do_not_allow_it() {
 }
 
 #[test]
-fn pairs_that_make_no_sense_are_refused() {
+fn invalid_pairs_are_refused() {
     let at = TempDir::new().unwrap();
     fs::write(at.path().join("two.csv"), "t,ex,ux,ey,uy\n0,1,1,1,1\n").unwrap();
     for (pairs, wanted) in [
@@ -167,7 +167,7 @@ fn pairs_that_make_no_sense_are_refused() {
             "applies only to the structure operator",
         ),
     ] {
-        let (code, said) = bad(at.path(), &[&["identify", "two.csv"], pairs].concat());
-        assert!(code == 2 && said.contains(wanted), "{pairs:?}: {code} {said}");
+        let (code, message) = bad(at.path(), &[&["identify", "two.csv"], pairs].concat());
+        assert!(code == 2 && message.contains(wanted), "{pairs:?}: {code} {message}");
     }
 }

@@ -12,7 +12,7 @@ use common::{bad, good};
 const HUGE: &str = "18446744073709551615";
 
 #[test]
-fn limits_are_named_at_once() {
+fn exceeded_limits_are_refused_at_once() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     good(d, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
@@ -22,7 +22,7 @@ fn limits_are_named_at_once() {
     );
     let identify = ["identify", "c1.csv", "--structure", "bj"];
     let track = ["track", "c1.csv", "--out", "t.csv"];
-    for (command, options, said) in [
+    for (command, options, expected) in [
         (&identify[..], vec!["--nk", &delays], "at most 1000000;"),
         (&identify, vec!["--nk", HUGE], "at most 1000000;"),
         (&identify, vec!["--nk", "0..1000000"], "at most 100000"),
@@ -47,7 +47,7 @@ fn limits_are_named_at_once() {
         let arguments: Vec<&str> = command.iter().copied().chain(options).collect();
         let (code, message) = bad(d, &arguments);
         assert_eq!(code, 2, "{arguments:?}: {message}");
-        assert!(message.contains(said), "{arguments:?}: {message}");
+        assert!(message.contains(expected), "{arguments:?}: {message}");
     }
     // A horizon beyond the record is limited to the record.
     good(
@@ -77,10 +77,10 @@ fn limits_are_named_at_once() {
 }
 
 #[test]
-fn scenarios_beyond_sense_name_the_key_and_its_limits() {
+fn out_of_range_scenarios_name_the_key_and_its_limits() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    for (line, said) in [
+    for (line, expected) in [
         ("initial.omega_b_rad_s = 1e300", "initial.omega_b_rad_s is 1e300"),
         ("initial.K_e = -1e300", "initial.K_e is -1e300"),
         ("initial.T_L_s = 1e9", "initial.T_L_s"),
@@ -100,13 +100,16 @@ fn scenarios_beyond_sense_name_the_key_and_its_limits() {
         ] {
             let (code, message) = bad(d, command);
             assert_eq!(code, 1, "{message}");
-            assert!(message.contains(said) && message.contains(" to 1"), "{line}: {message}");
+            assert!(
+                message.contains(expected) && message.contains(" to 1"),
+                "{line}: {message}"
+            );
         }
     }
 }
 
 #[test]
-fn a_table_without_end_to_the_side_is_answered() {
+fn table_with_a_million_columns_is_refused() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let names: Vec<String> = (0..1_000_000).map(|k| format!("c{k}")).collect();

@@ -45,7 +45,7 @@ fn simulate_is_repeatable_and_takes_its_options() {
 }
 
 #[test]
-fn convert_goes_both_ways_and_says_what_does_not_convert() {
+fn convert_works_both_ways_or_gives_a_reason() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let operator = "K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28";
@@ -98,7 +98,7 @@ fn convert_goes_both_ways_and_says_what_does_not_convert() {
 }
 
 #[test]
-fn convert_gives_the_operator_behind_three_poles_and_says_which_is_the_lag() {
+fn convert_identifies_the_lag_among_three_poles() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     // The operator is 25 (.6 s + 1)/(5 s + 1) with omega_nm = 12 rad/s, zeta_nm = .25 and tau_e = .137 s.
@@ -140,7 +140,7 @@ fn convert_gives_the_operator_behind_three_poles_and_says_which_is_the_lag() {
 }
 
 #[test]
-fn margins_of_both_states() {
+fn margins_match_the_reference_states() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let s1 = json(d, &["margins", "--condition", "C1", "--json"]);
@@ -199,16 +199,16 @@ fn demo_writes_its_record_and_report() {
 
 /// A scenario of the family is simulated, and the reported margins are those of its loop.
 #[test]
-fn a_person_of_the_family_is_simulated() {
+fn family_scenario_is_simulated() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let person = include_str!("../../../fixtures/scenario/person.toml");
     fs::write(d.join("person.toml"), person).unwrap();
-    let said = good(
+    let printed = good(
         d,
         &["simulate", "--scenario", "person.toml", "--seed", "3", "--out", "p.csv"],
     );
-    assert!(said.contains("a person: 3600 samples"), "{said}");
+    assert!(printed.contains("a person: 3600 samples"), "{printed}");
     let run = fs::read_to_string(d.join("p.csv")).unwrap();
     let header = run.lines().find(|line| !line.starts_with('#')).unwrap();
     for name in ["e", "u", "f_t", "d", "y", "n", "K_over_T_I", "T_I", "zeta_nm", "tau_e"] {

@@ -36,15 +36,18 @@ fn results() -> TempDir {
 fn conditions_are_compared() {
     let directory = results();
     let at = directory.path();
-    let said = good(at, &["compare", "results.json", "--of", "crossover", "-v"]);
-    assert!(said.starts_with("Verdict: doubtful"), "{said}");
-    assert!(said.contains("without P11 in so: it has no crossover"), "{said}");
+    let output_text = good(at, &["compare", "results.json", "--of", "crossover", "-v"]);
+    assert!(output_text.starts_with("Verdict: doubtful"), "{output_text}");
+    assert!(
+        output_text.contains("without P11 in so: it has no crossover"),
+        "{output_text}"
+    );
     let sentence =
         "crossover fell by 0.63 rad/s from fo to so (95 % 0.12 to 1.15, t(2) = -5.3, p = 0.034, d_z = -3, n = 3)";
-    assert!(said.contains(sentence), "{said}");
+    assert!(output_text.contains(sentence), "{output_text}");
     assert!(
-        said.contains("Means over people") && said.contains("Settings given: of: crossover"),
-        "{said}"
+        output_text.contains("Means over people") && output_text.contains("Settings given: of: crossover"),
+        "{output_text}"
     );
 
     let arguments = [
@@ -86,7 +89,7 @@ fn conditions_are_compared() {
 }
 
 #[test]
-fn mistakes_have_remedies() {
+fn mistakes_are_explained_with_a_remedy() {
     let directory = results();
     let at = directory.path();
     for (arguments, code, word) in [
@@ -97,11 +100,17 @@ fn mistakes_have_remedies() {
         (&["--within", "--between"], 2, "cannot be used with"),
     ] {
         let all = [&["compare", "results.json"], arguments].concat();
-        let (found, said) = bad(at, &all);
-        assert!(found == code && said.contains(word), "{arguments:?}: {found}, {said}");
+        let (found, output_text) = bad(at, &all);
+        assert!(
+            found == code && output_text.contains(word),
+            "{arguments:?}: {found}, {output_text}"
+        );
     }
-    let (code, said) = bad(at, &["compare", "."]);
-    assert!(code == 1 && said.contains("there is no group.toml"), "{said}");
+    let (code, output_text) = bad(at, &["compare", "."]);
+    assert!(
+        code == 1 && output_text.contains("there is no group.toml"),
+        "{output_text}"
+    );
     // No person has a margin, so nothing is determined, and the message reports this.
     let output = hoid(at, &["compare", "results.json", "--of", "phase_margin"]);
     assert_eq!(output.status.code(), Some(1));
@@ -110,7 +119,7 @@ fn mistakes_have_remedies() {
 
 /// People have different forms with the two elements, so their parameters are compared in a common form.
 #[test]
-fn recordings_are_analysed_and_compared_in_one_form() {
+fn recordings_are_compared_in_a_common_form() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let people = "simulate-group --people --subjects 3 --runs 1 --plants integrator,double-integrator --remnants lag \

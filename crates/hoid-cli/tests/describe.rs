@@ -37,7 +37,7 @@ fn number(v: &Value) -> f64 {
 }
 
 #[test]
-fn simulated_runs_have_their_loop() {
+fn describe_finds_the_simulated_loop() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let names = ["1.csv", "2.csv", "3.csv", "4.csv"];
@@ -114,7 +114,7 @@ fn simulated_runs_have_their_loop() {
 }
 
 #[test]
-fn what_was_recorded_late_is_put_back() {
+fn recording_offset_is_compensated() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     write(at, "run.csv", 800, |t, k| {
@@ -174,7 +174,7 @@ fn what_was_recorded_late_is_put_back() {
 }
 
 #[test]
-fn the_figure_is_an_svg_of_the_width_that_is_asked_for() {
+fn figure_is_an_svg_of_the_requested_width() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     write(at, "run.csv", 800, |t, k| {
@@ -196,7 +196,7 @@ fn the_figure_is_an_svg_of_the_width_that_is_asked_for() {
 }
 
 #[test]
-fn a_person_who_does_not_follow_ends_with_1() {
+fn unrelated_control_exits_with_one() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let names = ["a.csv", "b.csv", "c.csv"];
@@ -217,7 +217,7 @@ fn a_person_who_does_not_follow_ends_with_1() {
 }
 
 #[test]
-fn what_cannot_be_described_is_said() {
+fn unusable_records_are_errors() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     write(at, "good.csv", 400, |t, k| excitation(t) + 0.1 * rough(k, 0));

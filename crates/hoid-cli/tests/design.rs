@@ -12,7 +12,7 @@ const PERSON: &str = "form = \"lead\"\n\n[initial]\nK = 1.0\nT_L_s = 0.4\nomega_
                       controlled_element = \"4/(s(s+1))\"\n";
 
 #[test]
-fn a_design_is_judged_and_runs() {
+fn design_is_reported_and_can_be_simulated() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     fs::write(at.join("person.toml"), PERSON).unwrap();
@@ -27,10 +27,10 @@ fn a_design_is_judged_and_runs() {
         "--out",
         "design",
     ];
-    let said = good(at, &arguments);
+    let message = good(at, &arguments);
     assert!(
-        said.starts_with("Expected errors of") && said.contains("With reference they require"),
-        "{said}"
+        message.starts_with("Expected errors of") && message.contains("With reference they require"),
+        "{message}"
     );
     let object = json(
         at,
@@ -90,7 +90,7 @@ fn a_design_is_judged_and_runs() {
 
 /// The number of people for a difference is computed for the population, and the files of a design can be read.
 #[test]
-fn a_difference_has_its_people_and_the_files_are_readable() {
+fn difference_gives_the_number_of_people() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let arguments = [
@@ -143,7 +143,7 @@ fn a_difference_has_its_people_and_the_files_are_readable() {
 
 /// A design for the people of a group, from its printed result, and for its population.
 #[test]
-fn people_of_a_group_have_a_typical_and_a_worst_one() {
+fn group_design_has_a_typical_and_a_worst_person() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let person = |subject: &str, k: f64, tau: f64| {
@@ -170,12 +170,15 @@ fn people_of_a_group_have_a_typical_and_a_worst_one() {
             .starts_with("D is left out"),
         "{found}"
     );
-    let (code, said) = bad(at, &["design", "--people", "group.json"]);
-    assert!(code == 2 && said.contains("--controlled-element"), "{code} {said}");
+    let (code, message) = bad(at, &["design", "--people", "group.json"]);
+    assert!(
+        code == 2 && message.contains("--controlled-element"),
+        "{code} {message}"
+    );
     group["people"][1]["condition"] = "position".into();
     fs::write(at.join("group.json"), group.to_string()).unwrap();
-    let (code, said) = bad(at, &[&["design", "--people", "group.json"], &element[..]].concat());
-    assert!(code == 2 && said.contains("rate, position"), "{code} {said}");
+    let (code, message) = bad(at, &[&["design", "--people", "group.json"], &element[..]].concat());
+    assert!(code == 2 && message.contains("rate, position"), "{code} {message}");
     let parameter = |name: &str, value: f64| {
         let people: Vec<serde_json::Value> = [("A", 0.9), ("B", 1.1), ("C", 1.0)]
             .iter()
@@ -194,7 +197,7 @@ fn people_of_a_group_have_a_typical_and_a_worst_one() {
 
 /// With a displayed target, both responses have expected errors, and the experiment can be simulated and identified.
 #[test]
-fn both_responses_to_a_target_that_is_seen_are_designed() {
+fn both_responses_to_a_displayed_target_are_designed() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let arguments = ["design", "--controlled-element", "4/s", "--display", "pursuit"];
@@ -261,7 +264,7 @@ fn both_responses_to_a_target_that_is_seen_are_designed() {
 
 /// The spread of a difference between people, from a comparison, a group and a population.
 #[test]
-fn the_spread_of_a_difference_is_that_of_the_people() {
+fn spread_of_a_difference_comes_from_the_people() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let person = |subject: &str, condition: &str, tau: f64| {
@@ -330,15 +333,15 @@ fn the_spread_of_a_difference_is_that_of_the_people() {
     );
     // The crossover is not a parameter of a population.
     let all = ["design", "--controlled-element", "4/s", "--difference", "crossover=10%"];
-    let (code, said) = bad(at, &[&all[..], &["--between-people", "population.json"]].concat());
+    let (code, message) = bad(at, &[&all[..], &["--between-people", "population.json"]].concat());
     assert!(
-        code == 2 && said.contains("no spread between people of crossover"),
-        "{code} {said}"
+        code == 2 && message.contains("no spread between people of crossover"),
+        "{code} {message}"
     );
 }
 
 #[test]
-fn mistakes_have_remedies() {
+fn mistakes_are_explained_with_a_remedy() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     fs::write(at.join("person.toml"), PERSON).unwrap();
@@ -366,7 +369,10 @@ fn mistakes_have_remedies() {
         (&["--power", ".9"], 2, "--difference"),
     ] {
         let all = [&["design", "--people", "person.toml"], arguments].concat();
-        let (found, said) = bad(at, &all);
-        assert!(found == code && said.contains(word), "{arguments:?}: {found}, {said}");
+        let (found, message) = bad(at, &all);
+        assert!(
+            found == code && message.contains(word),
+            "{arguments:?}: {found}, {message}"
+        );
     }
 }

@@ -9,7 +9,7 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{good, hoid, json, json_of_any_worth};
+use common::{good, hoid, json, json_with_any_exit_code};
 
 /// Time, error and control of a run.
 type Rows = Vec<[f64; 3]>;
@@ -40,7 +40,7 @@ fn written(d: &Path, rows: &Rows) {
 const BOX_JENKINS: [&str; 4] = ["--structure", "bj", "--nk", "29"];
 
 fn identified(d: &Path, how: &[&str]) -> Value {
-    json_of_any_worth(d, &[&["identify", "c.csv", "--json"], how].concat())
+    json_with_any_exit_code(d, &[&["identify", "c.csv", "--json"], how].concat())
 }
 
 /// Returns the operator parameters with their values and standard errors.
@@ -62,7 +62,7 @@ fn estimates(found: &Value) -> Vec<(String, f64, f64)> {
 
 /// Checks that the estimates are within four standard errors of the true values of C1, or that the result is not
 /// trustworthy.
-fn right_or_said(found: &Value, what: &str) {
+fn assert_correct_or_flagged(found: &Value, what: &str) {
     let truth = [
         ("K_e", 0.09),
         ("T_L", 0.4),
@@ -92,7 +92,7 @@ fn kinds(found: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn one_sample_of_a_good_record() {
+fn single_outlier_is_repaired() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let clean = simulated(d, "C1", "71");
@@ -114,7 +114,7 @@ fn one_sample_of_a_good_record() {
             (fault["from"].as_f64().unwrap() - rows[place][0]).abs() < 1e-9,
             "{fault}"
         );
-        right_or_said(&found, "bridged");
+        assert_correct_or_flagged(&found, "bridged");
         assert_eq!(found["verdict"]["level"], "trustworthy", "{}", found["verdict"]);
         for ((name, one, error), (_, other, _)) in estimates(&before).iter().zip(estimates(&found)) {
             assert!((one - other).abs() < 0.1 * error, "{name} {one} {other}");
@@ -123,7 +123,7 @@ fn one_sample_of_a_good_record() {
     // The fault is also found by default, and is shown on the page, in the report and in `info`.
     let found = identified(d, &["--form", "lead"]);
     assert_eq!(kinds(&found), ["spike"]);
-    right_or_said(&found, "family");
+    assert_correct_or_flagged(&found, "family");
     let page = good(
         d,
         &[&["identify", "c.csv", "--report", "page"], &BOX_JENKINS[..]].concat(),
@@ -136,7 +136,7 @@ fn one_sample_of_a_good_record() {
 }
 
 #[test]
-fn what_is_only_reported_is_doubted_and_what_is_kept_is_not_looked_for() {
+fn reported_faults_are_doubtful_and_kept_ones_ignored() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let mut rows = simulated(d, "C1", "72");
@@ -155,7 +155,7 @@ fn what_is_only_reported_is_doubted_and_what_is_kept_is_not_looked_for() {
         ),
         (Some("cut"), 2)
     );
-    right_or_said(&cut, "cut");
+    assert_correct_or_flagged(&cut, "cut");
     assert_eq!(
         hoid(d, &["identify", "c.csv", "--faults", "mend"]).status.code(),
         Some(2)
@@ -163,7 +163,7 @@ fn what_is_only_reported_is_doubted_and_what_is_kept_is_not_looked_for() {
 }
 
 #[test]
-fn rest_before_a_run() {
+fn rest_before_a_run_is_cut() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let run = simulated(d, "C1", "73");
@@ -173,12 +173,12 @@ fn rest_before_a_run() {
     let found = identified(d, &BOX_JENKINS);
     assert!(kinds(&found).contains(&"idle"), "{found}");
     assert_eq!(found["records"][0]["samples"].as_u64().unwrap() / 10, 819);
-    right_or_said(&found, "rest");
-    right_or_said(&identified(d, &["--form", "lead"]), "rest, family");
+    assert_correct_or_flagged(&found, "rest");
+    assert_correct_or_flagged(&identified(d, &["--form", "lead"]), "rest, family");
 }
 
 #[test]
-fn wrong_units_wrong_columns_and_a_wrong_sign() {
+fn wrong_units_columns_and_sign_are_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let run = simulated(d, "C1", "74");
@@ -206,7 +206,7 @@ fn wrong_units_wrong_columns_and_a_wrong_sign() {
 }
 
 #[test]
-fn a_record_that_is_too_short() {
+fn too_short_record_is_not_determined() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let mut rows = simulated(d, "C1", "75");
@@ -219,7 +219,7 @@ fn a_record_that_is_too_short() {
 }
 
 #[test]
-fn an_offset_is_estimated_and_biases_nothing() {
+fn offset_is_estimated_and_causes_no_bias() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let run = simulated(d, "C1", "76");
@@ -264,11 +264,11 @@ fn an_offset_is_estimated_and_biases_nothing() {
 }
 
 #[test]
-fn a_delay_that_jumps_and_a_second_operator_are_told() {
+fn jump_of_delay_or_operator_is_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let (run, other) = (simulated(d, "C1", "77"), simulated(d, "C2", "78"));
-    let told = |how: &[&str]| {
+    let finding = |how: &[&str]| {
         let found = identified(d, how);
         let findings = found["verdict"]["findings"].as_array().unwrap().clone();
         let mut words = findings.iter().filter(|f| f["kind"] == "not-constant");
@@ -281,7 +281,7 @@ fn a_delay_that_jumps_and_a_second_operator_are_told() {
         .collect();
     written(d, &late);
     for how in fits {
-        let words = told(how).unwrap();
+        let words = finding(how).unwrap();
         assert!(words.contains("tau_e changes by about +"), "{how:?}: {words}");
     }
     let from = 2 * n / 3;
@@ -296,16 +296,16 @@ fn a_delay_that_jumps_and_a_second_operator_are_told() {
         .collect();
     written(d, &second);
     for how in fits {
-        assert!(told(how).is_some(), "{how:?}");
+        assert!(finding(how).is_some(), "{how:?}");
     }
     written(d, &run);
     for how in fits {
-        assert_eq!(told(how), None, "{how:?}");
+        assert_eq!(finding(how), None, "{how:?}");
     }
 }
 
 #[test]
-fn a_robust_fit_of_data_as_they_are_is_moved_by_no_sample() {
+fn robust_fit_is_insensitive_to_a_single_sample() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let mut rows = simulated(d, "C1", "79");
@@ -349,7 +349,7 @@ fn recorded_people_have_few_faults() {
             "--to",
             "45",
         ];
-        let found = json_of_any_worth(Path::new("."), &[&["identify", file, "--json"], &how[..]].concat());
+        let found = json_with_any_exit_code(Path::new("."), &[&["identify", file, "--json"], &how[..]].concat());
         let of_values = |f: &&Value| {
             !matches!(
                 f["kind"].as_str(),

@@ -19,19 +19,19 @@ fn library(folder: &TempDir) {
 }
 
 #[test]
-fn a_unit_is_written_whole_and_the_same_again() {
+fn fmu_is_complete_and_reproducible() {
     let folder = TempDir::new().unwrap();
     library(&folder);
     let with = |more: &[&str]| {
         let default = ["fmu", "--library", "libhoid.so", "--out", "a.fmu"];
-        let said = good(folder.path(), &[&default[..], more].concat());
-        (said, fs::read(folder.path().join("a.fmu")).unwrap())
+        let printed = good(folder.path(), &[&default[..], more].concat());
+        (printed, fs::read(folder.path().join("a.fmu")).unwrap())
     };
-    let (said, bytes) = with(&[]);
-    assert!(said.contains("FMI 2.0") && said.contains("a.fmu"), "{said}");
+    let (printed, bytes) = with(&[]);
+    assert!(printed.contains("FMI 2.0") && printed.contains("a.fmu"), "{printed}");
     assert!(bytes.starts_with(b"PK"));
     assert_eq!(with(&[]).1, bytes);
-    let (said, other) = with(&[
+    let (printed, other) = with(&[
         "--fmi",
         "3",
         "--sample-time",
@@ -39,21 +39,21 @@ fn a_unit_is_written_whole_and_the_same_again() {
         "--controlled-element",
         "90/(s(s+6))",
     ]);
-    assert!(said.contains("FMI 3.0") && said.contains("0.02 s"), "{said}");
+    assert!(printed.contains("FMI 3.0") && printed.contains("0.02 s"), "{printed}");
     assert_ne!(other, bytes);
-    let (said, _) = with(&["--operator", "C4", "--seed", "3"]);
-    assert!(said.contains("e in, u out"), "{said}");
+    let (printed, _) = with(&["--operator", "C4", "--seed", "3"]);
+    assert!(printed.contains("e in, u out"), "{printed}");
     fs::write(
         folder.path().join("mine.toml"),
         "condition = \"C1\"\nsample_time_s = 0.02\n",
     )
     .unwrap();
-    let (said, _) = with(&["--operator", "mine.toml"]);
-    assert!(said.contains("0.02 s"), "{said}");
+    let (printed, _) = with(&["--operator", "mine.toml"]);
+    assert!(printed.contains("0.02 s"), "{printed}");
 }
 
 #[test]
-fn what_makes_no_unit_says_why() {
+fn invalid_fmu_requests_give_the_reason() {
     let folder = TempDir::new().unwrap();
     library(&folder);
     fs::write(folder.path().join("text"), "text").unwrap();

@@ -18,7 +18,7 @@ use full_disks::rounds;
 use interrupted::{Bench, GROUP, STUDY, TRACK};
 
 #[test]
-fn a_full_disk_leaves_whole_files_and_blocks_that_go_on() {
+fn full_disk_leaves_complete_files_and_resumable_blocks() {
     let directory = tempfile::tempdir().unwrap();
     let bench = Bench::new(env!("CARGO_BIN_EXE_hoid").into(), directory.path());
     let mut draw = Draw(54);

@@ -30,8 +30,8 @@ fn experiment() -> TempDir {
         "--out",
         "people",
     ];
-    let said = good(directory.path(), &arguments);
-    assert!(said.contains("8 runs") && said.contains("truth.csv"), "{said}");
+    let printed = good(directory.path(), &arguments);
+    assert!(printed.contains("8 runs") && printed.contains("truth.csv"), "{printed}");
     // A narrow range of delays makes the test fast.
     let manifest = directory.path().join("people/group.toml");
     let text = fs::read_to_string(&manifest).unwrap();
@@ -66,16 +66,16 @@ fn files(directory: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
-fn a_virtual_experiment_is_analysed_and_reported() {
+fn virtual_experiment_is_analysed_and_reported() {
     let directory = experiment();
     let at = directory.path();
-    let said = good(at, &["group", "people", "--out", "out", "--csv", "-v"]);
-    assert!(said.starts_with("Verdict: "), "{said}");
+    let printed = good(at, &["group", "people", "--out", "out", "--csv", "-v"]);
+    assert!(printed.starts_with("Verdict: "), "{printed}");
     // Failures and doubtful results precede the numbers.
-    let at_operators = said.find("Operators").unwrap();
+    let at_operators = printed.find("Operators").unwrap();
     assert!(
-        said.find("C3 has no operator for the whole run").unwrap() < at_operators,
-        "{said}"
+        printed.find("C3 has no operator for the whole run").unwrap() < at_operators,
+        "{printed}"
     );
     for name in [
         "people.csv",
@@ -86,7 +86,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
         "response-averages.csv",
         "report.html",
     ] {
-        assert!(said.contains(name), "{name}: {said}");
+        assert!(printed.contains(name), "{name}: {printed}");
     }
     let page = fs::read_to_string(at.join("out/report.html")).unwrap();
     for part in [
@@ -195,7 +195,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
 }
 
 #[test]
-fn a_group_that_was_killed_goes_on_to_the_same_bytes() {
+fn killed_group_resumes_to_identical_files() {
     let directory = experiment();
     let at = directory.path();
     good(at, &["group", "people", "--out", "whole"]);
@@ -216,7 +216,7 @@ fn a_group_that_was_killed_goes_on_to_the_same_bytes() {
 }
 
 #[test]
-fn init_looks_at_the_files_and_says_what_it_saw() {
+fn init_inspects_the_files_and_reports_findings() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let people = [
@@ -231,8 +231,8 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
     ];
     good(at, &[&people[..], &["--out", "people"]].concat());
     fs::remove_file(at.join("people/group.toml")).unwrap();
-    let said = good(at, &["group", "init", "people", "--controlled-element", "1/s"]);
-    assert!(said.contains("1 runs") && said.contains("d has"), "{said}");
+    let printed = good(at, &["group", "init", "people", "--controlled-element", "1/s"]);
+    assert!(printed.contains("1 runs") && printed.contains("d has"), "{printed}");
     let text = fs::read_to_string(at.join("people/group.toml")).unwrap();
     let manifest: toml::Table = toml::from_str(&text).unwrap();
     let condition = &manifest["conditions"]["integrator"];
@@ -284,14 +284,14 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
 }
 
 #[test]
-fn a_manifest_is_made_from_names_and_mistakes_are_named() {
+fn manifest_is_made_from_file_names() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     good(at, &["simulate", "--condition", "C1", "--out", "anna_C1_1.csv"]);
     fs::write(at.join("notes.txt"), "nothing").unwrap();
     let by_name = ["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"];
-    let said = good(at, &[&by_name[..], &["--excitation", "none"]].concat());
-    assert!(said.contains("1 runs") && said.contains("notes.txt"), "{said}");
+    let printed = good(at, &[&by_name[..], &["--excitation", "none"]].concat());
+    assert!(printed.contains("1 runs") && printed.contains("notes.txt"), "{printed}");
     let (code, message) = bad(
         at,
         &["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"],
@@ -333,7 +333,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
 }
 
 #[test]
-fn people_are_simulated_and_their_options_are_theirs() {
+fn people_are_simulated_with_their_own_options() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let default = [
@@ -356,8 +356,8 @@ fn people_are_simulated_and_their_options_are_theirs() {
         "--sample-time",
         "0.01",
     ];
-    let said = good(at, &[&default[..], &more].concat());
-    assert!(said.contains("1 runs") && said.contains("truth.csv"), "{said}");
+    let printed = good(at, &[&default[..], &more].concat());
+    assert!(printed.contains("1 runs") && printed.contains("truth.csv"), "{printed}");
     let run = fs::read_to_string(at.join("people/S1_integrator_1.csv")).unwrap();
     assert!(run.starts_with("t,e,u,d,y\n") && run.lines().count() == 4001);
     let truth = fs::read_to_string(at.join("people/truth.csv")).unwrap();

@@ -22,22 +22,22 @@ fn run(directory: &Path) -> String {
 }
 
 #[test]
-fn a_decimal_comma_is_explained_wherever_the_file_is_read() {
+fn decimal_comma_is_explained_by_every_command() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     fs::write(d.join("comma.csv"), "t,e,u\n0.00,\"1,5\",2.5\n0.01,\"1,6\",2.6\n").unwrap();
-    let told = good(d, &["info", "comma.csv"]);
-    assert!(told.contains("decimal point instead of a comma"), "{told}");
+    let info = good(d, &["info", "comma.csv"]);
+    assert!(info.contains("decimal point instead of a comma"), "{info}");
     assert!(
-        told.contains("column e, line 2: \"1,5\" is text, 2 of 2 cells"),
-        "{told}"
+        info.contains("column e, line 2: \"1,5\" is text, 2 of 2 cells"),
+        "{info}"
     );
     let (_, message) = bad(d, &["identify", "comma.csv"]);
     assert!(message.contains("decimal point instead of a comma"), "{message}");
 }
 
 #[test]
-fn cut_files_are_named_as_cut() {
+fn truncated_files_are_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let text = run(d);
@@ -58,8 +58,8 @@ fn cut_files_are_named_as_cut() {
     let xdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf/tracking.xdf");
     let bytes = fs::read(xdf).unwrap();
     fs::write(d.join("cut.xdf"), &bytes[..bytes.len() / 2]).unwrap();
-    let told = good(d, &["info", "cut.xdf"]);
-    assert!(told.contains("the file is truncated at byte"), "{told}");
+    let info = good(d, &["info", "cut.xdf"]);
+    assert!(info.contains("the file is truncated at byte"), "{info}");
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn gains_without_units_are_not_in_degrees() {
         "--orders",
         "nd=1",
     ];
-    for (units, declared, said) in [
+    for (units, declared, expected) in [
         ("# units: t s, e deg, u deg\n", None, Some("deg/deg")),
         ("# units: t s, e deg, u V\n", None, Some("V/deg")),
         ("", None, None),
@@ -93,8 +93,8 @@ fn gains_without_units_are_not_in_degrees() {
         arguments.extend(declared.iter().flat_map(|units| ["--unit", units]));
         let page = good(d, &arguments);
         let gain = page.lines().find(|line| line.trim_start().starts_with("K_e ")).unwrap();
-        match said {
-            Some(said) => assert!(gain.contains(said), "{units}: {gain}"),
+        match expected {
+            Some(expected) => assert!(gain.contains(expected), "{units}: {gain}"),
             None => assert!(!gain.contains("deg"), "{gain}"),
         }
     }
@@ -108,7 +108,7 @@ fn gains_without_units_are_not_in_degrees() {
 }
 
 #[test]
-fn a_subject_that_a_spreadsheet_would_run_is_text_in_every_table() {
+fn formula_like_subjects_are_escaped_in_every_table() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     good(
@@ -148,7 +148,7 @@ fn a_subject_that_a_spreadsheet_would_run_is_text_in_every_table() {
 }
 
 #[test]
-fn a_stream_at_another_rate_is_told_once() {
+fn wrong_stream_rate_is_reported_once() {
     let mut stream = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args([
             "stream", "--fs", "100", "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",
@@ -164,7 +164,7 @@ fn a_stream_at_another_rate_is_told_once() {
         writeln!(input, "{t},{},{}", (1.7 * t).sin(), 0.1 * (1.7 * t - 0.8).sin()).unwrap();
     }
     drop(input);
-    let said = String::from_utf8(stream.wait_with_output().unwrap().stderr).unwrap();
-    assert_eq!(said.matches("warning").count(), 1, "{said}");
-    assert!(said.contains("t gives a sampling rate of 50.0000 Hz"), "{said}");
+    let printed = String::from_utf8(stream.wait_with_output().unwrap().stderr).unwrap();
+    assert_eq!(printed.matches("warning").count(), 1, "{printed}");
+    assert!(printed.contains("t gives a sampling rate of 50.0000 Hz"), "{printed}");
 }

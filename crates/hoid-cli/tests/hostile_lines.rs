@@ -68,7 +68,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(21), ..ProptestConfig::with_cases(12) })]
 
     #[test]
-    fn hostile_lines_end_nothing(hostile in vec(line(), 1..120)) {
+    fn hostile_lines_do_not_end_the_stream(hostile in vec(line(), 1..120)) {
         let mut stream = Command::new(env!("CARGO_BIN_EXE_hoid"))
             .args(["stream", "--fs", "100", "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing"])
             .stdin(Stdio::piped())
@@ -90,9 +90,9 @@ proptest! {
         let writer = thread::spawn(move || input.write_all(&text).unwrap());
         let output = stream.wait_with_output().unwrap();
         writer.join().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        prop_assert_eq!(output.status.code(), Some(0), "{}", said);
-        prop_assert!(!said.contains("panicked"), "{}", said);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        prop_assert_eq!(output.status.code(), Some(0), "{}", message);
+        prop_assert!(!message.contains("panicked"), "{}", message);
         let lines: Vec<Value> = String::from_utf8(output.stdout)
             .unwrap()
             .lines()

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use common::{bad, good, hoid, json, setting, simulated, wave, write};
 
 #[test]
-fn identify_prints_the_json_of_the_contract() {
+fn identify_prints_the_documented_json() {
     let directory = simulated();
     let found = json(
         directory.path(),
@@ -69,7 +69,7 @@ fn identify_prints_the_json_of_the_contract() {
 /// The first bytes of a figure file identify its format, and the figure has the requested width.
 #[test]
 #[cfg(feature = "pdf-png")]
-fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
+fn figure_format_follows_the_file_name() {
     let directory = simulated();
     let d = directory.path();
     let draw = |name: &str| {
@@ -89,7 +89,7 @@ fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
 }
 
 #[test]
-fn a_range_is_searched_and_its_table_is_part_of_the_result() {
+fn range_search_reports_its_candidates() {
     let directory = simulated();
     let found = json(
         directory.path(),
@@ -106,7 +106,7 @@ fn a_range_is_searched_and_its_table_is_part_of_the_result() {
 }
 
 #[test]
-fn options_of_the_search_reach_the_fit() {
+fn search_options_reach_the_fit() {
     let directory = simulated();
     let d = directory.path();
     let run = |more: &[&str]| {
@@ -206,7 +206,7 @@ fn every_structure_and_method_runs_from_the_command_line() {
 }
 
 #[test]
-fn a_grey_box_gives_the_delay_an_error_bar_and_reports() {
+fn grey_box_gives_the_delay_a_standard_error() {
     let directory = simulated();
     let d = directory.path();
     let found = json(
@@ -240,7 +240,7 @@ fn a_grey_box_gives_the_delay_an_error_bar_and_reports() {
 }
 
 #[test]
-fn a_change_is_found_and_its_gains_are_written() {
+fn change_is_found_and_its_gains_are_written() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     good(d, &["simulate", "--condition", "C4", "--seed", "3", "--out", "c4.csv"]);
@@ -266,7 +266,7 @@ fn a_change_is_found_and_its_gains_are_written() {
 
 /// The example of the book: a lead-lag whose gain and lead change.
 #[test]
-fn a_change_of_another_form_is_found() {
+fn documented_lead_lag_change_is_found() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let page = include_str!("../../../docs/src/methods/time-varying.md");
@@ -328,14 +328,14 @@ fn a_change_of_another_form_is_found() {
     }
     let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
     assert!(trace.contains("t,K,K_se,K_over_T_I,K_over_T_I_se,T_L,T_L_se"));
-    let said = good(d, &arguments);
+    let printed = good(d, &arguments);
     for part in ["of the form lead-lag", "before the change", "after it", "T_I"] {
-        assert!(said.contains(part), "{said} lacks {part}");
+        assert!(printed.contains(part), "{printed} lacks {part}");
     }
 }
 
 #[test]
-fn a_validation_file_is_read_and_told_once() {
+fn validation_file_is_reported_once() {
     let directory = tempfile::tempdir().unwrap();
     let d = directory.path();
     for name in ["run.csv", "again.csv"] {
@@ -351,14 +351,14 @@ fn a_validation_file_is_read_and_told_once() {
     ] {
         let arguments = [&["identify", "run.csv", "--validate", "again.csv"], structure].concat();
         let output = hoid(d, &arguments);
-        let says = String::from_utf8(output.stderr).unwrap();
-        let told = says.matches("again.csv: u stays at its largest value").count();
-        assert_eq!(told, 1, "{structure:?}: {says}");
+        let warnings = String::from_utf8(output.stderr).unwrap();
+        let count = warnings.matches("again.csv: u stays at its largest value").count();
+        assert_eq!(count, 1, "{structure:?}: {warnings}");
     }
 }
 
 #[test]
-fn several_records_start_validation_report_and_margins() {
+fn several_records_with_all_outputs_are_identified() {
     let directory = simulated();
     let d = directory.path();
     good(
@@ -410,7 +410,7 @@ fn several_records_start_validation_report_and_margins() {
 /// With this element, the gain of the loop is one at three frequencies. The margin at the lowest crossover is positive,
 /// but the loop is unstable.
 #[test]
-fn a_loop_that_is_not_stable_is_a_doubt() {
+fn unstable_loop_is_doubtful() {
     let directory = simulated();
     let d = directory.path();
     let arguments = [
@@ -449,7 +449,7 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
 
 /// From a simulation without noise the exact operator is identified, and the result reports that there is no noise.
 #[test]
-fn a_simulation_without_noise_gives_its_operator_back() {
+fn noise_free_simulation_gives_the_exact_operator() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let elements = ["90/(s(s+6))", "30/(s(s+.2))"];
@@ -497,7 +497,7 @@ fn a_simulation_without_noise_gives_its_operator_back() {
 /// With noise of any share of the power of u, from rounding errors to a thousandth, the form is the same, and there is
 /// no warning.
 #[test]
-fn a_simulation_with_little_noise_is_identified() {
+fn simulation_with_little_noise_is_identified() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for level in ["1e-12", "1e-9", "1e-6", "1e-3"] {
@@ -532,7 +532,7 @@ fn a_simulation_with_little_noise_is_identified() {
 /// If the error is logged at a tenth of its rate, one of the two reported delays is correct, as is the delay for the
 /// given intersample behaviour.
 #[test]
-fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
+fn intersample_behaviour_shifts_the_delay_by_half_a_sample() {
     let directory = simulated();
     let d = directory.path();
     let arguments = ["identify", "c1.csv", "--form", "lead", "--orders", "nd=1", "--json"];
@@ -568,7 +568,7 @@ fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
 /// Without the excitation, other forms may be as likely as the form with K_e, so the interval of K_e is conditional on
 /// this form.
 #[test]
-fn a_parameter_of_a_form_that_is_not_settled_has_a_condition() {
+fn parameters_of_an_uncertain_form_are_conditional() {
     let directory = tempfile::tempdir().unwrap();
     let d = directory.path();
     good(d, &["simulate", "--condition", "C1", "--seed", "5", "--out", "c1.csv"]);

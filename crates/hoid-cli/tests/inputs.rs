@@ -44,7 +44,7 @@ fn kinds(found: &Value) -> Vec<String> {
 }
 
 #[test]
-fn both_responses_are_found_and_one_input_is_told_off() {
+fn both_responses_are_found_and_one_input_is_doubtful() {
     let at = TempDir::new().unwrap();
     let runs = runs(at.path(), PURSUIT, 3);
     let files: Vec<&str> = runs.iter().map(String::as_str).collect();
@@ -104,7 +104,7 @@ fn both_responses_are_found_and_one_input_is_told_off() {
 }
 
 #[test]
-fn a_target_that_is_not_seen_has_no_response() {
+fn hidden_target_has_no_response() {
     let at = TempDir::new().unwrap();
     let start = PURSUIT.find("[feedforward]").unwrap();
     let end = PURSUIT.find("[disturbance]").unwrap();
@@ -121,7 +121,7 @@ fn a_target_that_is_not_seen_has_no_response() {
 }
 
 #[test]
-fn a_target_alone_leaves_a_doubt() {
+fn target_without_disturbance_is_doubtful() {
     let at = TempDir::new().unwrap();
     let alone = PURSUIT.replace("interleaved = \"odd\"", "interleaved = \"odd\"\nrms = 0");
     let runs = runs(at.path(), &alone, 1);
@@ -138,7 +138,7 @@ fn a_target_alone_leaves_a_doubt() {
 }
 
 #[test]
-fn inputs_without_a_meaning_are_refused_with_the_remedy() {
+fn invalid_inputs_are_refused_with_a_remedy() {
     let at = TempDir::new().unwrap();
     let runs = runs(at.path(), PURSUIT, 1);
     let run = runs[0].as_str();
@@ -165,7 +165,7 @@ fn inputs_without_a_meaning_are_refused_with_the_remedy() {
 }
 
 #[test]
-fn polynomials_with_two_inputs() {
+fn polynomials_with_two_inputs_are_identified() {
     let at = TempDir::new().unwrap();
     let runs = runs(at.path(), PURSUIT, 1);
     let run = runs[0].as_str();
@@ -239,7 +239,7 @@ fn polynomials_with_two_inputs() {
 }
 
 #[test]
-fn a_group_has_the_responses_to_further_inputs_of_each_person() {
+fn group_reports_responses_to_further_inputs() {
     let at = TempDir::new().unwrap();
     let data = at.path().join("data");
     fs::create_dir(&data).unwrap();
@@ -248,13 +248,13 @@ fn a_group_has_the_responses_to_further_inputs_of_each_person() {
     }
     let look = ["--excitation", "d", "--controlled-element", "1/s"];
     let role = ["--role", "f_t=feedforward:0.25"];
-    let (_, said) = bad(
+    let (_, printed) = bad(
         at.path(),
         &[&["group", "init", "data"][..], &look, &["--role", "f_t=guess"]].concat(),
     );
     assert!(
-        said.contains("--role: roles: found \"f_t=guess\"") && said.contains("feedforward"),
-        "{said}"
+        printed.contains("--role: roles: found \"f_t=guess\"") && printed.contains("feedforward"),
+        "{printed}"
     );
     good(at.path(), &[&["group", "init", "data"][..], &look, &role].concat());
     let manifest = fs::read_to_string(data.join("group.toml")).unwrap();
@@ -283,7 +283,7 @@ fn a_group_has_the_responses_to_further_inputs_of_each_person() {
 }
 
 #[test]
-fn a_displayed_target_is_never_left_out_without_a_word() {
+fn omitted_displayed_target_is_reported() {
     let at = TempDir::new().unwrap();
     let run = runs(at.path(), PURSUIT, 1).remove(0);
     let text = fs::read_to_string(at.path().join(&run)).unwrap();
@@ -315,7 +315,7 @@ fn a_displayed_target_is_never_left_out_without_a_word() {
 }
 
 #[test]
-fn a_recursion_tracks_both_responses() {
+fn recursion_tracks_both_responses() {
     let at = TempDir::new().unwrap();
     let run = runs(at.path(), PURSUIT, 1).remove(0);
     let two = [
@@ -370,9 +370,9 @@ fn a_recursion_tracks_both_responses() {
         (&["--method", "rpem", "--nk", "0.2s,0.1s"], "one number of samples"),
         (&["--method", "rpem", "--nk", "14,1", "--validate", &run], "--validate"),
     ] {
-        let (_, told) = bad(at.path(), &[&two[..], options].concat());
-        assert!(told.contains(words), "{options:?}: {told}");
+        let (_, message) = bad(at.path(), &[&two[..], options].concat());
+        assert!(message.contains(words), "{options:?}: {message}");
     }
-    let (_, told) = bad(at.path(), &["track", &run, "--role", "f_t=feedforward"]);
-    assert!(told.contains("add it with --input"), "{told}");
+    let (_, message) = bad(at.path(), &["track", &run, "--role", "f_t=feedforward"]);
+    assert!(message.contains("add it with --input"), "{message}");
 }

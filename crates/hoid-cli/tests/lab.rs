@@ -7,10 +7,10 @@ mod common;
 use common::bad;
 
 #[test]
-fn without_its_feature_it_says_how_to_build_it() {
+fn error_names_the_missing_feature() {
     let directory = tempfile::TempDir::new().unwrap();
-    let (code, said) = bad(directory.path(), &["lab"]);
+    let (code, message) = bad(directory.path(), &["lab"]);
     assert_eq!(code, 2);
-    assert!(said.contains("--features lab"), "{said}");
+    assert!(message.contains("--features lab"), "{message}");
     assert!(!directory.path().join("hoid-lab").exists());
 }

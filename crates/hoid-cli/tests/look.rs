@@ -47,16 +47,16 @@ fn shown<'a>(text: &'a str, verb: &str) -> Vec<&'a str> {
 }
 
 #[test]
-fn one_file_has_one_reading() {
+fn info_and_identify_read_the_file_alike() {
     let directory = recorded();
     let at = directory.path();
     let file = "runs/A_so_1.csv";
-    let said = good(at, &["info", file]);
-    let next = shown(&said, "identify");
+    let printed = good(at, &["info", file]);
+    let next = shown(&printed, "identify");
     assert_eq!(
         next,
         words("identify runs/A_so_1.csv --input r-y --output u --from 3 --to 43"),
-        "{said}"
+        "{printed}"
     );
     let look = json(at, &["info", file, "--json"])["look"].clone();
     assert_eq!(look["next"], format!("hoid {}", next.join(" ")));
@@ -108,7 +108,7 @@ fn one_file_has_one_reading() {
 }
 
 #[test]
-fn nothing_is_guessed_where_it_is_not_certain() {
+fn uncertain_columns_are_not_guessed() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     common::write(at, "two.csv", "t,r,target,y,u", 300, |k| {
@@ -137,8 +137,10 @@ fn nothing_is_guessed_where_it_is_not_certain() {
         assert!(!good(at, &columns).contains("not found"));
     }
     let named = ["info", "two.csv", "--input", "r-y", "--excitation", "none"];
-    let said = good(at, &named);
-    assert!(said.contains("excitation  as requested") && said.contains("Next: hoid identify two.csv --input r-y"));
+    let printed = good(at, &named);
+    assert!(
+        printed.contains("excitation  as requested") && printed.contains("Next: hoid identify two.csv --input r-y")
+    );
     let (code, _) = bad(at, &["info", "empty.csv"]);
     assert_eq!(code, 1);
 }
@@ -170,7 +172,7 @@ fn pairs(parameters: &serde_json::Value) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn whole_periods_are_kept_under_an_offset() {
+fn whole_periods_are_kept_with_an_offset() {
     let directory = recorded();
     let at = directory.path();
     let span = words("--input r-y --from 3 --to 43 --offset u=1 --json");
@@ -199,7 +201,7 @@ fn whole_periods_are_kept_under_an_offset() {
 }
 
 #[test]
-fn a_delay_in_seconds_is_nk() {
+fn delay_in_seconds_equals_nk() {
     let directory = common::simulated();
     let at = directory.path();
     let fit = |delay: &[&str]| {
@@ -222,7 +224,7 @@ fn a_delay_in_seconds_is_nk() {
         found["last"].clone()
     };
     assert_eq!(track(&["--nk", "29"]), track(&["--delay", ".28"]));
-    for (wrong, says) in [
+    for (wrong, expected) in [
         (&["--delay", ".28", "--nk", "29"][..], "give only one of them"),
         (&["--delay", "-1"], "expected"),
         (&["--delay", ".4...3"], "as 0.1..0.4"),
@@ -230,7 +232,7 @@ fn a_delay_in_seconds_is_nk() {
     ] {
         let (code, message) = bad(at, &[&["identify", "c1.csv"][..], wrong].concat());
         assert!(
-            code == 2 && (message.contains(says) || message.contains("unexpected")),
+            code == 2 && (message.contains(expected) || message.contains("unexpected")),
             "{message}"
         );
     }
@@ -238,7 +240,7 @@ fn a_delay_in_seconds_is_nk() {
 
 /// `info` interprets a cell in the same way as the reader.
 #[test]
-fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
+fn info_interprets_cells_like_the_reader() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for (cell, is_missing) in [
@@ -255,7 +257,7 @@ fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
                 _ => format!("{t},{e},{u}"),
             }
         });
-        let told = good(d, &["info", "cells.csv"]);
+        let info = good(d, &["info", "cells.csv"]);
         let fill = [
             "identify",
             "cells.csv",
@@ -270,8 +272,8 @@ fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
         let error = String::from_utf8_lossy(&found.stderr).into_owned();
         assert_eq!(error.contains("line 702, column e"), !is_missing, "{cell}: {error}");
         if !is_missing {
-            let said = error.lines().find_map(|line| line.strip_prefix("error: ")).unwrap();
-            assert!(told.contains(said), "{cell}: {said} not in {told}");
+            let printed = error.lines().find_map(|line| line.strip_prefix("error: ")).unwrap();
+            assert!(info.contains(printed), "{cell}: {printed} not in {info}");
         }
     }
 }

@@ -11,7 +11,7 @@ use tempfile::TempDir;
 use common::{bad, good, json, row, simulated, wave, write};
 
 #[test]
-fn info_shows_what_is_inside() {
+fn info_describes_the_columns() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     write(at, "run.csv", "t,e,u,k", 200, |k| {
@@ -55,7 +55,7 @@ fn info_shows_what_is_inside() {
 }
 
 #[test]
-fn bad_input_is_told_in_the_users_words() {
+fn bad_input_is_reported_in_plain_words() {
     let directory = simulated();
     let d = directory.path();
     let n = 400;
@@ -136,7 +136,7 @@ fn bad_input_is_told_in_the_users_words() {
 }
 
 #[test]
-fn wrong_usage_ends_with_two() {
+fn wrong_usage_exits_with_two() {
     let directory = simulated();
     let d = directory.path();
     for arguments in [
@@ -180,7 +180,7 @@ fn wrong_usage_ends_with_two() {
 }
 
 #[test]
-fn what_cannot_be_simulated_ends_with_one_and_writes_nothing() {
+fn invalid_simulations_exit_with_one_and_write_nothing() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for (arguments, expected) in [
@@ -205,7 +205,7 @@ fn what_cannot_be_simulated_ends_with_one_and_writes_nothing() {
 }
 
 #[test]
-fn lines_of_json_and_a_header_of_matlab() {
+fn json_lines_and_matlab_headers_are_handled() {
     let directory = tempfile::tempdir().unwrap();
     let d = directory.path();
     let row = |k: usize| {

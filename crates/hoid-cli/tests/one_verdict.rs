@@ -8,17 +8,17 @@ use std::{collections::BTreeSet, fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{good, json_of_any_worth};
+use common::{good, json_with_any_exit_code};
 
 const ELEMENT: &str = "90/(s(s+6))";
 const ROWS: usize = 4096;
 
 type Rows = Vec<[f64; 2]>;
 /// Name of a fault, and the function that adds it to a recording.
-type Spoilt = (&'static str, fn(&mut Rows));
+type Corruption = (&'static str, fn(&mut Rows));
 
 /// Faults of both runs of a person.
-const SPOILT: [Spoilt; 9] = [
+const CORRUPTIONS: [Corruption; 9] = [
     ("clean", |_| ()),
     ("clipped", |rows| {
         rows.iter_mut().for_each(|row| row[1] = row[1].clamp(-0.086, 0.086))
@@ -68,7 +68,7 @@ fn simulated(at: &Path, seed: usize) -> Rows {
 fn people(at: &Path) {
     let runs = [simulated(at, 1), simulated(at, 2)];
     fs::create_dir(at.join("people")).unwrap();
-    for (name, spoil) in SPOILT {
+    for (name, spoil) in CORRUPTIONS {
         for (k, run) in runs.iter().enumerate() {
             let mut rows = run.clone();
             spoil(&mut rows);
@@ -87,20 +87,20 @@ fn strings(of: &Value) -> Vec<&str> {
 }
 
 #[test]
-fn a_group_finds_word_for_word_what_identify_finds() {
+fn group_findings_match_identify_word_for_word() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     people(at);
     good(at, &["group", "init", "people", "--controlled-element", ELEMENT]);
-    let found = json_of_any_worth(at, &["group", "people", "--out", "out", "--json"]);
+    let found = json_with_any_exit_code(at, &["group", "people", "--out", "out", "--json"]);
     let all = found["people"].as_array().unwrap();
-    assert_eq!(all.len(), SPOILT.len());
+    assert_eq!(all.len(), CORRUPTIONS.len());
     let mut seen = BTreeSet::new();
-    for (name, _) in SPOILT {
+    for (name, _) in CORRUPTIONS {
         let person = all.iter().find(|one| one["subject"] == name).unwrap();
         let [one, two] = [1, 2].map(|run| format!("{name}_C1_{run}.csv"));
         let arguments = ["identify", &one, &two, "--controlled-element", ELEMENT, "--json"];
-        let alone = json_of_any_worth(&at.join("people"), &arguments);
+        let alone = json_with_any_exit_code(&at.join("people"), &arguments);
         let verdict = &alone["verdict"];
         assert_eq!(person["verdict"]["level"], verdict["level"], "{name}: {person}");
         assert_eq!(
@@ -131,7 +131,7 @@ fn a_group_finds_word_for_word_what_identify_finds() {
 }
 
 #[test]
-fn a_run_that_stands_for_two_is_refused_by_both() {
+fn duplicated_run_is_refused_by_both_commands() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     people(at);
@@ -143,13 +143,13 @@ fn a_run_that_stands_for_two_is_refused_by_both() {
     }
     fs::copy(inside.join("clean_C1_1.csv"), inside.join("clean_C1_2.csv")).unwrap();
     good(at, &["group", "init", "people"]);
-    let found = json_of_any_worth(at, &["group", "people", "--out", "out", "--json"]);
+    let found = json_with_any_exit_code(at, &["group", "people", "--out", "out", "--json"]);
     let alone = common::hoid(&inside, &["identify", "clean_C1_1.csv", "clean_C1_2.csv"]);
     assert_eq!(alone.status.code(), Some(2));
-    let said = String::from_utf8(alone.stderr).unwrap();
+    let stderr = String::from_utf8(alone.stderr).unwrap();
     let reason = found["people"][0]["reason"].as_str().unwrap();
     assert!(
-        reason.contains("hold the same samples") && said.contains(reason),
-        "{reason}\n{said}"
+        reason.contains("hold the same samples") && stderr.contains(reason),
+        "{reason}\n{stderr}"
     );
 }

@@ -37,7 +37,7 @@ fn workplace() -> TempDir {
     directory
 }
 
-const SETTLED: [&str; 8] = [
+const FIT_OPTIONS: [&str; 8] = [
     "--structure",
     "bj",
     "--nk",
@@ -49,7 +49,7 @@ const SETTLED: [&str; 8] = [
 ];
 
 #[test]
-fn an_output_that_is_an_input_is_refused() {
+fn output_that_is_an_input_is_refused() {
     let directory = workplace();
     let d = directory.path();
     let kept = fs::read(d.join("in.csv")).unwrap();
@@ -76,7 +76,7 @@ fn an_output_that_is_an_input_is_refused() {
     fs::create_dir(d.join("pages")).unwrap();
     fs::copy(d.join("in.csv"), d.join("pages/report.html")).unwrap();
     let mut report = vec!["identify", "pages/report.html", "--report", "pages"];
-    report.extend(SETTLED);
+    report.extend(FIT_OPTIONS);
     all.push(report);
     all.push(vec!["group", "g", "--out", "g"]);
     all.push(vec!["group", "g/group.toml", "--out", "g"]);
@@ -90,7 +90,7 @@ fn an_output_that_is_an_input_is_refused() {
 }
 
 #[test]
-fn places_that_take_nothing_are_known_before_the_work() {
+fn unwritable_outputs_are_refused_before_the_work() {
     let directory = workplace();
     let d = directory.path();
     for arguments in [
@@ -107,7 +107,7 @@ fn places_that_take_nothing_are_known_before_the_work() {
 /// Returns each command that prints, with arguments for which it is fast.
 fn printing() -> Vec<Vec<&'static str>> {
     let mut identify = vec!["identify", "in.csv"];
-    identify.extend(SETTLED);
+    identify.extend(FIT_OPTIONS);
     let mut as_json = identify.clone();
     as_json.push("--json");
     vec![
@@ -185,7 +185,7 @@ fn printed_into(directory: &Path, arguments: &[&str], out: Stdio) -> (Option<i32
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_output_is_an_error_of_every_command() {
+fn full_output_is_an_error_of_every_command() {
     let directory = workplace();
     for arguments in printing() {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
@@ -208,7 +208,7 @@ fn a_full_output_is_an_error_of_every_command() {
 
 #[cfg(unix)]
 #[test]
-fn a_reader_that_leaves_early_ends_nothing_else() {
+fn closed_output_pipe_does_not_abort_the_work() {
     let directory = workplace();
     for arguments in printing() {
         let (reader, writer) = std::io::pipe().unwrap();
@@ -233,7 +233,7 @@ fn a_reader_that_leaves_early_ends_nothing_else() {
 /// The shell of the test sets a limit on the size of files.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_limit_of_the_size_of_files_leaves_them_whole() {
+fn file_size_limit_leaves_complete_files() {
     let directory = workplace();
     let d = directory.path();
     let limited = |command: &str| {
@@ -261,7 +261,7 @@ fn a_limit_of_the_size_of_files_leaves_them_whole() {
 }
 
 #[test]
-fn parts_of_dead_processes_are_removed() {
+fn stale_temporary_files_are_removed() {
     let directory = workplace();
     let d = directory.path();
     fs::write(d.join(".hoid-Xy12ab.part"), "half a file").unwrap();
@@ -270,7 +270,7 @@ fn parts_of_dead_processes_are_removed() {
 }
 
 #[cfg(unix)]
-const LONG: &str = r#"
+const LONG_PLAN: &str = r#"
 name = "long"
 seed = 1
 replications = 100000
@@ -291,7 +291,7 @@ orders.nk = 29
 
 /// True if programs started by this test continue after the terminal is closed (`nohup`).
 #[cfg(unix)]
-fn hang_up_is_ignored() -> bool {
+fn hang_up_signal_is_ignored() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
     ignored.is_some_and(|mask| u64::from_str_radix(mask.trim(), 16).is_ok_and(|mask| mask & 1 == 1))
@@ -300,12 +300,12 @@ fn hang_up_is_ignored() -> bool {
 /// After each signal that ends a program while it writes, no partial output remains.
 #[cfg(unix)]
 #[test]
-fn signals_end_with_their_code_and_leave_nothing() {
+fn signals_exit_with_their_code_and_leave_no_files() {
     let directory = workplace();
     let d = directory.path();
-    fs::write(d.join("long.toml"), LONG).unwrap();
+    fs::write(d.join("long.toml"), LONG_PLAN).unwrap();
     for (name, number) in [("INT", 2), ("TERM", 15), ("HUP", 1)] {
-        if name == "HUP" && hang_up_is_ignored() {
+        if name == "HUP" && hang_up_signal_is_ignored() {
             continue;
         }
         let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
@@ -340,7 +340,7 @@ fn signals_end_with_their_code_and_leave_nothing() {
 
 /// A table for a paper contains the same estimates, standard errors and intervals as the JSON.
 #[test]
-fn a_result_is_a_table_for_a_paper() {
+fn table_for_a_paper_matches_the_json() {
     let directory = simulated();
     let d = directory.path();
     let identify = ["identify", "c1.csv", "--controlled-element", "90/(s(s+6))", "--json"];

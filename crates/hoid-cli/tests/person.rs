@@ -49,7 +49,7 @@ fn of<'v>(found: &'v Value, name: &str) -> &'v Value {
 }
 
 #[test]
-fn a_person_is_found_by_default() {
+fn operator_is_identified_with_defaults() {
     let directory = runs();
     let at = directory.path();
     let files = files(&directory);
@@ -102,8 +102,11 @@ fn a_person_is_found_by_default() {
         arguments[last] = wrong;
         let found = json(at, &[&arguments[..], &["--json"]].concat());
         let reasons = found["verdict"].to_string();
-        let told = reasons.contains("unstable-loop") || reasons.contains("no-crossover");
-        assert!(told && found["verdict"]["level"] != "trustworthy", "{wrong}: {reasons}");
+        let reported = reasons.contains("unstable-loop") || reasons.contains("no-crossover");
+        assert!(
+            reported && found["verdict"]["level"] != "trustworthy",
+            "{wrong}: {reasons}"
+        );
     }
     // The result is used as a prior for another fit.
     std::fs::write(at.join("person.json"), found.to_string()).unwrap();
@@ -148,7 +151,7 @@ fn a_person_is_found_by_default() {
 }
 
 #[test]
-fn what_nobody_answers_is_not_determined() {
+fn unrelated_signals_are_not_determined() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let mut state = 11_u64;

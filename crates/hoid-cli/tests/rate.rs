@@ -61,7 +61,7 @@ fn pair(found: &Value) -> (f64, f64) {
 }
 
 #[test]
-fn a_person_at_1000_hz_is_the_one_at_100_hz() {
+fn operator_at_1000_hz_matches_100_hz() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     // Each entry contains person, element, true crossover, margin and delay.
@@ -111,7 +111,7 @@ fn a_person_at_1000_hz_is_the_one_at_100_hz() {
 }
 
 #[test]
-fn lines_do_not_depend_on_the_rate() {
+fn describing_function_does_not_depend_on_the_rate() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "C1", 1000.0, 2);
@@ -145,7 +145,7 @@ fn lines_do_not_depend_on_the_rate() {
 }
 
 #[test]
-fn a_track_at_1000_hz_is_determined() {
+fn track_at_1000_hz_is_determined() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     for seed in 1..=5 {
@@ -167,7 +167,7 @@ fn a_track_at_1000_hz_is_determined() {
 }
 
 #[test]
-fn what_counts_samples_keeps_them() {
+fn options_in_samples_keep_the_rate() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "C1", 1000.0, 1);
@@ -175,10 +175,10 @@ fn what_counts_samples_keeps_them() {
     let output = hoid(at, &fit);
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(found["records"][0]["sample_time"].as_f64().unwrap(), 0.001);
-    let told = String::from_utf8(output.stderr).unwrap();
+    let reported = String::from_utf8(output.stderr).unwrap();
     assert!(
-        told.contains("1000 Hz is kept") && told.contains("--decimate 10"),
-        "{told}"
+        reported.contains("1000 Hz is kept") && reported.contains("--decimate 10"),
+        "{reported}"
     );
     let fewer = [
         "identify",
@@ -192,11 +192,11 @@ fn what_counts_samples_keeps_them() {
         "--json",
     ];
     assert_eq!(json(at, &fewer)["records"][0]["sample_time"].as_f64().unwrap(), 0.01);
-    let told = [
+    let reported = [
         "track", &file, "--nk", "281", "--every", "1000", "--out", "t.csv", "--json",
     ];
     assert_eq!(
-        common::json_of_any_worth(at, &told)["records"][0]["sample_time"]
+        common::json_with_any_exit_code(at, &reported)["records"][0]["sample_time"]
             .as_f64()
             .unwrap(),
         0.001
@@ -204,7 +204,7 @@ fn what_counts_samples_keeps_them() {
 }
 
 #[test]
-fn rates_of_all_kinds() {
+fn common_rates_are_decimated() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     for (hz, factor) in [(200.0, 1), (250.0, 3), (1.0 / 0.003, 3), (2000.0, 20)] {
@@ -243,7 +243,7 @@ fn rates_of_all_kinds() {
 }
 
 #[test]
-fn a_stream_at_1000_hz_is_the_track() {
+fn stream_at_1000_hz_matches_track() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "lead", 1000.0, 1);
@@ -282,8 +282,11 @@ fn a_stream_at_1000_hz_is_the_track() {
     );
     let behind_s = decimated["behind_s"].as_f64().unwrap();
     assert!((0.1..0.2).contains(&behind_s), "{behind_s}");
-    let told = String::from_utf8(output.stderr).unwrap();
-    assert!(told.contains("filtered and decimated by 10 to 100 Hz"), "{told}");
+    let reported = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        reported.contains("filtered and decimated by 10 to 100 Hz"),
+        "{reported}"
+    );
     // For the same sample, the digits equal those of the trace.
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     let mut table = trace.lines().filter(|line| !line.starts_with('#'));

@@ -5,7 +5,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{bad, good, hoid, json, json_of_any_worth};
+use common::{bad, good, hoid, json, json_with_any_exit_code};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -56,11 +56,11 @@ fn parameters(found: &Value) -> Vec<f64> {
 }
 
 fn identify(at: &Path, options: &[&str]) -> Value {
-    json_of_any_worth(at, &[&["identify"], options, &FIT[..]].concat())
+    json_with_any_exit_code(at, &[&["identify"], options, &FIT[..]].concat())
 }
 
 #[test]
-fn what_is_done_is_told_in_every_form() {
+fn preparation_steps_are_reported_in_every_format() {
     let directory = recorded(|_, values| vec![values]);
     let at = directory.path();
     let plain = json(
@@ -166,7 +166,7 @@ fn what_is_done_is_told_in_every_form() {
 }
 
 #[test]
-fn trouble_is_shown_and_handled_only_as_asked() {
+fn data_faults_are_shown_and_repaired_only_on_request() {
     // Every five hundredth row is duplicated, 20 rows are missing, and u is clipped.
     let directory = recorded(|k, [t, e, u]| {
         let values = [t, e, u.clamp(-0.15, 0.15)];
@@ -232,7 +232,7 @@ fn trouble_is_shown_and_handled_only_as_asked() {
 }
 
 #[test]
-fn wrong_preparations_are_told_in_the_users_words() {
+fn invalid_preparations_are_reported_in_plain_words() {
     let directory = recorded(|_, values| vec![values]);
     let at = directory.path();
     for (options, code, words) in [
@@ -267,7 +267,7 @@ fn wrong_preparations_are_told_in_the_users_words() {
 
 /// Eye and stick are in separate files, at 100 and 50 Hz; the message describes how to read them.
 #[test]
-fn two_files_at_two_rates_are_one_recording() {
+fn two_files_at_two_rates_can_be_joined() {
     let directory = recorded(|k, [t, e, u]| {
         assert!(k >= 2);
         vec![[t, e.to_degrees(), u]]
@@ -300,7 +300,7 @@ fn two_files_at_two_rates_are_one_recording() {
     let advised = message.split("joined.csv with ").nth(1).unwrap().trim();
     let advised: Vec<&str> = advised.split(' ').collect();
     let gain = |options: &[&str]| {
-        let found = json_of_any_worth(at, &[&["identify", "--json"], options].concat());
+        let found = json_with_any_exit_code(at, &[&["identify", "--json"], options].concat());
         found["operator"]["K_e"]["value"].as_f64().unwrap()
     };
     let (joined, whole) = (gain(&[&["joined.csv"], &advised[..]].concat()), gain(&["run.csv"]));

@@ -61,7 +61,7 @@ fn by_recordings<'a>(more: &[&'a str]) -> Vec<&'a str> {
 }
 
 #[test]
-fn recorded_people_have_the_table_and_the_figures_of_the_text() {
+fn recorded_people_get_the_thesis_table_and_figures() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     recorded(at);
@@ -113,7 +113,7 @@ fn recorded_people_have_the_table_and_the_figures_of_the_text() {
 }
 
 #[test]
-fn recordings_that_cannot_be_used_are_refused_with_the_remedy() {
+fn unusable_recordings_are_refused_with_a_remedy() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     for only in [&["reproduce"][..], &["reproduce", "--only", "experiment,fig-3"]] {

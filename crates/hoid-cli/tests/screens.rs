@@ -41,7 +41,7 @@ fn at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
 }
 
 #[test]
-fn the_answer_comes_first_and_fits_on_a_screen() {
+fn answer_comes_first_and_fits_on_a_screen() {
     let directory = simulated();
     let d = directory.path();
     let page = good(d, &FIT);
@@ -77,7 +77,7 @@ fn the_answer_comes_first_and_fits_on_a_screen() {
 }
 
 #[test]
-fn pages_keep_to_the_width_of_the_screen() {
+fn pages_fit_the_screen_width() {
     let directory = simulated();
     for columns in [60_usize, 80] {
         let text = at_width(directory.path(), &columns.to_string(), &[&FIT[..], &["-v"]].concat());
@@ -102,7 +102,7 @@ fn pages_keep_to_the_width_of_the_screen() {
 }
 
 #[test]
-fn what_is_said_of_several_files_is_said_once_and_after_the_answer() {
+fn common_notes_of_several_files_appear_once() {
     let directory = simulated();
     let d = directory.path();
     // The same row is duplicated in both files.
@@ -126,17 +126,20 @@ fn what_is_said_of_several_files_is_said_once_and_after_the_answer() {
         .current_dir(d)
         .output()
         .unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    let of_rows: Vec<&str> = said
+    let printed = String::from_utf8(output.stderr).unwrap();
+    let of_rows: Vec<&str> = printed
         .lines()
         .filter(|line| line.contains("duplicated") || line.contains("repeated"))
         .collect();
-    assert!(of_rows.iter().all(|line| line.contains("1.csv and 1 more: ")), "{said}");
-    assert_eq!(of_rows.len(), 1, "{said}");
+    assert!(
+        of_rows.iter().all(|line| line.contains("1.csv and 1 more: ")),
+        "{printed}"
+    );
+    assert_eq!(of_rows.len(), 1, "{printed}");
 }
 
 #[test]
-fn mistakes_are_answered_with_what_was_meant() {
+fn mistakes_are_answered_with_suggestions() {
     let directory = simulated();
     let d = directory.path();
     let (code, message) = bad(d, &["identify", "1.csv", "--input", "F_T"]);
@@ -160,7 +163,7 @@ fn mistakes_are_answered_with_what_was_meant() {
 
 /// Typical files of users, with other names, decimal commas, no units, and t in ms.
 #[test]
-fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
+fn unprepared_files_are_read_or_refused_with_advice() {
     let directory = simulated();
     let d = directory.path();
     let simulated = fs::read_to_string(d.join("1.csv")).unwrap();
@@ -226,7 +229,7 @@ fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
 }
 
 #[test]
-fn choices_and_delays_as_people_type_them() {
+fn choices_and_delays_are_parsed_leniently() {
     let directory = simulated();
     let d = directory.path();
     let page = |arguments: &[&str]| good(d, &[&["identify", "1.csv", "--orders", "nd=1"], arguments].concat());
@@ -236,7 +239,7 @@ fn choices_and_delays_as_people_type_them() {
 }
 
 #[test]
-fn help_has_no_colour_where_none_is_wanted_and_shells_have_completions() {
+fn help_is_plain_and_completions_exist() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let help = good(d, &["-h"]);
@@ -252,7 +255,10 @@ fn help_has_no_colour_where_none_is_wanted_and_shells_have_completions() {
         let text = good(d, &["completions", shell]);
         assert!(text.contains("controlled-element"), "{shell}");
     }
-    let said = good(d, &["man", "pages"]);
+    let printed = good(d, &["man", "pages"]);
     let page = fs::read_to_string(d.join("pages/hoid-identify.1")).unwrap();
-    assert!(page.contains(".TH") && page.contains("controlled\\-element"), "{said}");
+    assert!(
+        page.contains(".TH") && page.contains("controlled\\-element"),
+        "{printed}"
+    );
 }

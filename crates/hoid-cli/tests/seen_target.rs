@@ -82,7 +82,7 @@ fn both_responses_are_found_within_their_errors() {
 }
 
 #[test]
-fn without_noise_both_responses_are_exact() {
+fn both_responses_are_exact_without_noise() {
     let at = TempDir::new().unwrap();
     for (condition, element) in ELEMENTS {
         simulate(at.path(), condition, "1", &["--noise-level", "0"]);
@@ -106,7 +106,7 @@ fn without_noise_both_responses_are_exact() {
 
 /// At 40.96 s both the condition and the response to the target change.
 #[test]
-fn a_response_that_changes_is_found_in_both_halves() {
+fn changed_response_is_found_in_both_halves() {
     let at = TempDir::new().unwrap();
     let text = "condition = \"C4\"\nmeasurement_s = 163.84\ndisturbance_rms_deg = 0.1\nremnant.noise_level = 0.01\n\
                 [schedule]\nmidpoint_s = 81.92\n[feedforward]\nform = \"derivative\"\nK_d_s = 0.03\ntau_f_s = 0.1\n\
@@ -147,7 +147,7 @@ fn a_response_that_changes_is_found_in_both_halves() {
 }
 
 #[test]
-fn a_recording_states_what_was_displayed() {
+fn recording_states_the_display() {
     let at = TempDir::new().unwrap();
     simulate(at.path(), "C4", "1", &[]);
     let record = fs::read_to_string(at.path().join("run.csv")).unwrap();
@@ -166,7 +166,7 @@ fn a_recording_states_what_was_displayed() {
 }
 
 #[test]
-fn a_plan_simulates_and_analyses_displays() {
+fn plan_with_displays_is_simulated_and_analysed() {
     let at = TempDir::new().unwrap();
     let plan = "name = \"display\"\ntitle = \"A displayed target\"\nseed = 5\nreplications = 2\n\
                 [[scenarios]]\nname = \"seen\"\ncondition = \"C1\"\ndisturbance_rms_deg = 0.1\n\
@@ -193,7 +193,7 @@ fn a_plan_simulates_and_analyses_displays() {
 }
 
 #[test]
-fn displays_that_mean_nothing_are_refused() {
+fn invalid_displays_are_refused() {
     let at = TempDir::new().unwrap();
     let simulate = ["simulate", "--condition", "C4", "--out", "run.csv"];
     for (options, words) in [
@@ -209,9 +209,9 @@ fn displays_that_mean_nothing_are_refused() {
         (["--disturbance", "-1"], "--disturbance is wrong"),
         (["--disturbance", "nan"], "--disturbance is wrong"),
     ] {
-        let said = bad(at.path(), &[&simulate[..], &options].concat());
-        let said = format!("{said:?}");
-        assert!(said.contains(words), "{options:?}: {said}");
+        let message = bad(at.path(), &[&simulate[..], &options].concat());
+        let message = format!("{message:?}");
+        assert!(message.contains(words), "{options:?}: {message}");
     }
     assert!(!at.path().join("run.csv").exists());
 }

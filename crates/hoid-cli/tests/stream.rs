@@ -21,7 +21,7 @@ use common::{bad, good, json, physical};
 /// Timeout for a line: much longer than its latency, so that no test fails on a slow machine, and a missing line does
 /// not block a test.
 const PATIENCE: Duration = Duration::from_secs(60);
-const AT_ONCE: [&str; 8] = [
+const NO_WARM_UP: [&str; 8] = [
     "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",
 ];
 
@@ -88,12 +88,12 @@ impl Stream {
     /// Waits for the end of the stream; returns the exit status, the remaining lines, and the messages.
     fn end(mut self) -> (ExitStatus, Vec<String>, String) {
         drop(self.input.take());
-        let begun = Instant::now();
+        let start_time = Instant::now();
         let status = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
                 break status;
             }
-            assert!(begun.elapsed() < PATIENCE, "the stream does not end");
+            assert!(start_time.elapsed() < PATIENCE, "the stream does not end");
             thread::sleep(Duration::from_millis(2));
         };
         let mut said = String::new();
@@ -141,8 +141,8 @@ fn simulated(directory: &Path, seed: &str) -> String {
 }
 
 #[test]
-fn one_line_gives_one_line_at_once() {
-    let mut stream = Stream::new(&AT_ONCE);
+fn each_line_is_answered_at_once() {
+    let mut stream = Stream::new(&NO_WARM_UP);
     for k in 0..200 {
         let (e, u) = wave(k);
         let line = stream.ask(&format!("{e},{u}"));
@@ -161,7 +161,7 @@ fn one_line_gives_one_line_at_once() {
 }
 
 #[test]
-fn simulate_into_stream_is_track() {
+fn stream_of_a_simulation_matches_track() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let mut simulate = Command::new(env!("CARGO_BIN_EXE_hoid"))
@@ -206,7 +206,7 @@ fn simulate_into_stream_is_track() {
 }
 
 #[test]
-fn the_default_speaks_from_the_second_second_on() {
+fn default_method_answers_from_the_second_second() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "7");
     let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
@@ -241,8 +241,8 @@ fn the_default_speaks_from_the_second_second_on() {
 }
 
 #[test]
-fn hostile_lines_are_told_and_counted_and_poison_nothing() {
-    let mut stream = Stream::new(&AT_ONCE);
+fn hostile_lines_are_counted_and_have_no_effect() {
+    let mut stream = Stream::new(&NO_WARM_UP);
     let sound = |stream: &mut Stream, from: usize| {
         let mut last = Value::Null;
         for k in from..from + 300 {
@@ -291,7 +291,7 @@ fn hostile_lines_are_told_and_counted_and_poison_nothing() {
 }
 
 #[test]
-fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
+fn outliers_and_faulty_spans_are_reported_in_their_lines() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "5");
     let mut lines: Vec<String> = Vec::new();
@@ -341,7 +341,7 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
 }
 
 #[test]
-fn an_idle_head_prolongs_the_warm_up() {
+fn idle_start_prolongs_the_warm_up() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "6");
     let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
@@ -372,15 +372,15 @@ fn an_idle_head_prolongs_the_warm_up() {
         (nk(&said) - nk(&without)).abs() <= 1 && (28..=30).contains(&nk(&said)),
         "{said}{without}"
     );
-    let told = answers[2100]["warm_up"]["reason"].as_str().unwrap();
-    assert!(told.contains("neither e nor u moved for 15."), "{told}");
+    let reason = answers[2100]["warm_up"]["reason"].as_str().unwrap();
+    assert!(reason.contains("neither e nor u moved for 15."), "{reason}");
     let began = answers.iter().position(|a| a.get("warm_up").is_none()).unwrap();
     assert!((3490..3560).contains(&began), "{began}");
 }
 
 #[test]
-fn late_lines_are_bridged_and_lines_behind_are_dropped() {
-    let mut stream = Stream::new(&AT_ONCE);
+fn missing_lines_are_bridged_and_late_lines_dropped() {
+    let mut stream = Stream::new(&NO_WARM_UP);
     stream.write("t;e;u;f_t\n");
     let row = |k: usize| {
         let (e, u) = wave(k);
@@ -410,8 +410,8 @@ fn late_lines_are_bridged_and_lines_behind_are_dropped() {
 }
 
 #[test]
-fn a_stream_without_a_sample_is_no_success() {
-    let mut stream = Stream::new(&AT_ONCE);
+fn stream_without_samples_exits_with_one() {
+    let mut stream = Stream::new(&NO_WARM_UP);
     stream.write("t;e;u\n");
     for k in 0..5 {
         let line = stream.ask(&format!("0,0{k};0,{k};-0,{k}"));
@@ -426,7 +426,7 @@ fn a_stream_without_a_sample_is_no_success() {
 }
 
 #[test]
-fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
+fn failed_warm_up_is_extended() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "1");
     let mut input = String::new();
@@ -472,8 +472,8 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
 }
 
 #[test]
-fn every_nth_line_and_the_faults_between() {
-    let mut arguments = AT_ONCE.to_vec();
+fn every_nth_line_reports_faults_in_between() {
+    let mut arguments = NO_WARM_UP.to_vec();
     arguments.extend(["--every", "10"]);
     let mut input: String = (0..40).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
     input = input.replacen(&format!("{},{}\n", wave(14).0, wave(14).1), "nan,1\n", 1);
@@ -484,10 +484,10 @@ fn every_nth_line_and_the_faults_between() {
 }
 
 #[test]
-fn a_reader_that_leaves_ends_the_stream_quietly() {
+fn closed_output_pipe_ends_the_stream_quietly() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(["stream", "--fs", "100"])
-        .args(AT_ONCE)
+        .args(NO_WARM_UP)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -519,21 +519,21 @@ fn a_reader_that_leaves_ends_the_stream_quietly() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupt_ends_with_zero_and_whole_lines() {
+fn interrupt_exits_with_zero_and_complete_lines() {
     // The stream is interrupted while it waits for input.
-    let mut stream = Stream::new(&AT_ONCE);
+    let mut stream = Stream::new(&NO_WARM_UP);
     stream.ask("0.1,0.2");
     stream.interrupt();
-    let begun = Instant::now();
+    let start_time = Instant::now();
     while stream.child.try_wait().unwrap().is_none() {
-        assert!(begun.elapsed() < PATIENCE);
+        assert!(start_time.elapsed() < PATIENCE);
         thread::sleep(Duration::from_millis(2));
     }
     let (status, rest, said) = stream.end();
     assert_eq!(status.code(), Some(0));
     assert!(rest.is_empty() && said.contains("1 samples"), "{said}");
     // The stream is interrupted during a computation.
-    let mut stream = Stream::new(&AT_ONCE);
+    let mut stream = Stream::new(&NO_WARM_UP);
     let mut input = stream.input.take().unwrap();
     let writer = thread::spawn(move || {
         let text: String = (0..1000).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
@@ -555,7 +555,7 @@ fn an_interrupt_ends_with_zero_and_whole_lines() {
 }
 
 #[test]
-fn wrong_usage_and_wrong_headers() {
+fn wrong_usage_and_headers_are_errors() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for arguments in [

@@ -26,7 +26,7 @@ use live::{
 
 /// Timeout for an answer that does not come.
 #[cfg(unix)]
-const SHORT: Duration = Duration::from_millis(100);
+const SHORT_TIMEOUT: Duration = Duration::from_millis(100);
 
 #[cfg(unix)]
 fn stream(arguments: &[&str]) -> Stream {
@@ -34,7 +34,7 @@ fn stream(arguments: &[&str]) -> Stream {
 }
 
 #[cfg(unix)]
-fn told(stream: &Stream) -> Value {
+fn received_json(stream: &Stream) -> Value {
     serde_json::from_slice(&stream.answer()).unwrap()
 }
 
@@ -54,29 +54,29 @@ fn lost_samples_are_bridged_and_counted() {
     }
     // A line of text is answered with the state of the stream.
     udp.send(b"2.00,0.1,0.2");
-    let line = told(&udp);
+    let line = received_json(&udp);
     assert_eq!((&line["skipped"], &line["dropped"]), (&5.into(), &2.into()), "{line}");
-    let said = udp.end();
+    let summary = udp.end();
     assert!(
-        said.contains("201 samples: 5 skipped for a fault in e or u (5 of them missing)"),
-        "{said}"
+        summary.contains("201 samples: 5 skipped for a fault in e or u (5 of them missing)"),
+        "{summary}"
     );
 }
 
 /// JSON objects on one or several lines are samples with the names of the channels as keys, and are answered by lines.
 #[cfg(unix)]
 #[test]
-fn objects_of_json_are_samples() {
+fn json_objects_are_samples() {
     let udp = stream(&["--input", "error", "--output", "stick"]);
     udp.send(br#"{"t": 0.00, "error": 0.1, "stick": 0.2}"#);
-    assert_eq!(told(&udp)["t"].as_f64(), Some(0.0));
+    assert_eq!(received_json(&udp)["t"].as_f64(), Some(0.0));
     udp.send(b"{\n  \"stick\": 0.1,\n  \"error\": null,\n  \"t\": 0.01\n}\n");
-    let line = told(&udp);
+    let line = received_json(&udp);
     assert_eq!((&line["t"], &line["skipped"]), (&0.01.into(), &1.into()), "{line}");
     assert!(line["fault"].as_str().unwrap().contains("error is missing"), "{line}");
     // One sample was lost.
     udp.send(b"{\"t\": 0.03, \"error\": 0, \"stick\": 0}\n{\"t\": 0.04, \"error\": 0, \"stick\": 0}");
-    let (first, second) = (told(&udp), told(&udp));
+    let (first, second) = (received_json(&udp), received_json(&udp));
     assert_eq!((&first["skipped"], second["t"].as_f64()), (&2.into(), Some(0.04)));
     assert!(udp.end().contains("5 samples: 2 skipped"));
 }
@@ -88,7 +88,7 @@ fn hostile_datagrams_are_counted() {
     let udp = stream(&[]);
     udp.send(b"t,e,u\n0.00,0.1,0.2\n0.01,0.2,0.1\n");
     assert_eq!(
-        (told(&udp)["t"].as_f64(), told(&udp)["t"].as_f64()),
+        (received_json(&udp)["t"].as_f64(), received_json(&udp)["t"].as_f64()),
         (Some(0.0), Some(0.01))
     );
     let long = vec![b'7'; 60_000];
@@ -111,14 +111,14 @@ fn hostile_datagrams_are_counted() {
     // Empty and meaningless datagrams are not counted.
     udp.send(b"");
     udp.send(b"# a comment\n\n");
-    udp.socket.set_read_timeout(Some(SHORT)).unwrap();
+    udp.socket.set_read_timeout(Some(SHORT_TIMEOUT)).unwrap();
     assert_eq!(udp.receive(&mut [0; 16]), None, "no answer for what is not a sample");
     udp.socket.set_read_timeout(Some(PATIENCE)).unwrap();
     // Invalid values are samples with a fault.
     udp.send(&as_struct(2, f64::NAN, f64::INFINITY, f64::NAN));
     assert!(udp.estimate().1[17].is_nan());
     udp.send(b"0.03,0.1,0.2");
-    let line = told(&udp);
+    let line = received_json(&udp);
     assert_eq!(
         (&line["dropped"], &line["skipped"]),
         (&hostile.len().into(), &1.into()),
@@ -146,14 +146,14 @@ fn every_sample_at_a_rate_is_answered() {
 
 #[cfg(unix)]
 #[test]
-fn readers_stop_either_side_begins_again_clocks_jump() {
+fn stream_survives_restarts_and_clock_jumps() {
     let program = Path::new(env!("CARGO_BIN_EXE_hoid"));
     let outcomes = troubles::all(program, Duration::from_millis(400), 600, &mut Draw(8));
     assert_eq!(outcomes.len(), 7);
 }
 
 #[test]
-fn other_streams_are_in_python() {
+fn lsl_options_refer_to_python() {
     let directory = TempDir::new().unwrap();
     let arguments = ["stream", "--fs", "100", "--lsl-in", "person", "--lsl-out", "estimate"];
     let (code, message) = bad(directory.path(), &arguments);
@@ -161,7 +161,7 @@ fn other_streams_are_in_python() {
 }
 
 #[test]
-fn places_that_cannot_be_are_refused() {
+fn invalid_udp_addresses_are_refused() {
     let directory = TempDir::new().unwrap();
     let taken = UdpSocket::bind("127.0.0.1:0").unwrap();
     let port = taken.local_addr().unwrap().port();

@@ -46,7 +46,7 @@ fn parts(directory: &Path) -> usize {
 }
 
 #[test]
-fn a_study_that_was_killed_goes_on_to_the_same_bytes() {
+fn killed_study_resumes_to_identical_files() {
     let directory = with_plan();
     let at = directory.path();
     good(at, &["study", "run", "plan.toml", "--out", "whole"]);
@@ -69,9 +69,9 @@ fn a_study_that_was_killed_goes_on_to_the_same_bytes() {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        let (before, begin) = (parts(&at.join("killed")), Instant::now());
+        let (before, start_time) = (parts(&at.join("killed")), Instant::now());
         while parts(&at.join("killed")) <= before && child.try_wait().unwrap().is_none() {
-            assert!(begin.elapsed() < Duration::from_secs(60), "nothing is written");
+            assert!(start_time.elapsed() < Duration::from_secs(60), "nothing is written");
             std::thread::sleep(Duration::from_millis(1));
         }
         std::thread::sleep(Duration::from_millis(wait_ms));
@@ -98,7 +98,7 @@ fn a_study_that_was_killed_goes_on_to_the_same_bytes() {
 }
 
 #[test]
-fn shards_are_joined_and_told_apart() {
+fn shards_are_merged_and_missing_ones_reported() {
     let directory = with_plan();
     let at = directory.path();
     let few = ["--replications", "3"];
@@ -125,7 +125,7 @@ fn shards_are_joined_and_told_apart() {
 }
 
 #[test]
-fn a_run_of_a_study_can_be_repeated_by_hand() {
+fn single_run_of_a_study_can_be_repeated() {
     let directory = with_plan();
     let at = directory.path();
     good(
@@ -200,7 +200,7 @@ fn a_run_of_a_study_can_be_repeated_by_hand() {
 
 /// A study gives the same result as `hoid identify` for the same run in a file, digit for digit, including the verdict.
 #[test]
-fn a_study_and_identify_give_the_same_answer() {
+fn study_and_identify_give_the_same_result() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let plan = r#"
@@ -222,8 +222,8 @@ name = "SRIV"
 method = "sriv"
 "#;
     fs::write(at.join("twins.toml"), plan).unwrap();
-    let said = good(at, &["study", "run", "twins.toml", "--out", "s", "--csv"]);
-    assert!(said.contains("trustworthy"), "{said}");
+    let printed = good(at, &["study", "run", "twins.toml", "--out", "s", "--csv"]);
+    assert!(printed.contains("trustworthy"), "{printed}");
     let table = hoid::io::read_table(&at.join("s/fits.csv")).unwrap();
     let texts = |column: &str| match table.column(column) {
         Some(hoid::io::ColumnValues::Text(values)) => values.clone(),
@@ -285,7 +285,7 @@ fn wrong_plans_and_names_are_refused() {
 }
 
 #[test]
-fn the_reproduction_draws_what_is_asked_for() {
+fn reproduction_draws_the_requested_items() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let list = good(at, &["reproduce", "--list"]);

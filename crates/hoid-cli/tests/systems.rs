@@ -55,7 +55,7 @@ fn exact_data_give_exact_coefficients() {
 /// A furnace at a level of 13.5, with a step of 10 after 3 s at rest, a dead time of .35 s, a lag of 1.5 s and a gain
 /// of 2.
 #[test]
-fn a_step_gives_gain_lag_and_level() {
+fn step_response_gives_gain_lag_and_level() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let (ts, at, dead, lag, gain) = (0.05, 60, 7, 1.5, 2.0);

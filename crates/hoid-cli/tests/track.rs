@@ -48,7 +48,7 @@ fn column(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> Vec<f64> {
 
 /// The result is printed in any case; its rows are written only if a file is given.
 #[test]
-fn no_trace_is_needed_for_an_answer() {
+fn answer_needs_no_trace_file() {
     let directory = simulated("C1");
     let d = directory.path();
     let with = good(d, &["track", "c.csv", "--out", "trace.csv"]);
@@ -64,7 +64,7 @@ fn no_trace_is_needed_for_an_answer() {
 }
 
 #[test]
-fn a_start_fit_finds_the_operator_and_its_change() {
+fn start_fit_finds_the_operator_and_its_change() {
     let directory = simulated("C4");
     let d = directory.path();
     let found = tracked(d, &[]);
@@ -116,7 +116,7 @@ fn changed(directory: &Path, change: &mut dyn FnMut(Vec<String>) -> Vec<String>)
 }
 
 #[test]
-fn one_wild_sample_is_held_back_and_told() {
+fn single_outlier_is_held_back_and_reported() {
     let directory = simulated("C1");
     let d = directory.path();
     let mut arguments = KNOWN_ORDERS.to_vec();
@@ -154,7 +154,7 @@ fn one_wild_sample_is_held_back_and_told() {
 }
 
 #[test]
-fn an_idle_head_is_left_out_of_the_start_and_told() {
+fn idle_start_is_excluded_from_the_start_fit() {
     let directory = simulated("C1");
     let d = directory.path();
     changed(d, &mut |rows| {
@@ -182,7 +182,7 @@ fn an_idle_head_is_left_out_of_the_start_and_told() {
 }
 
 #[test]
-fn the_page_reads_well() {
+fn page_contains_the_expected_text() {
     let directory = simulated("C4");
     let d = directory.path();
     let mut arguments = vec!["track", "c.csv", "--out", "trace.csv"];
@@ -213,7 +213,7 @@ fn the_page_reads_well() {
 }
 
 #[test]
-fn every_method_structure_and_way_of_forgetting_runs() {
+fn every_method_structure_and_forgetting_rule_runs() {
     let directory = simulated("C4");
     let d = directory.path();
     let cases: [&[&str]; 17] = [
@@ -286,7 +286,7 @@ fn last_of(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> (f64, f64) {
 }
 
 #[test]
-fn the_default_needs_nothing_and_tells_the_loop() {
+fn default_method_needs_no_start_and_reports_the_loop() {
     let directory = simulated("C4");
     let d = directory.path();
     let arguments = [
@@ -345,7 +345,7 @@ fn the_default_needs_nothing_and_tells_the_loop() {
 
 /// An earlier name of a method gives the same numbers; a note on standard error reports it.
 #[test]
-fn an_earlier_name_of_a_method_is_read_and_said_to_be_one() {
+fn former_method_name_is_accepted_with_a_notice() {
     let directory = simulated("C1");
     let d = directory.path();
     let by = |method: &str| {
@@ -365,7 +365,7 @@ fn an_earlier_name_of_a_method_is_read_and_said_to_be_one() {
 }
 
 #[test]
-fn a_person_is_followed_from_an_earlier_fit_of_them() {
+fn earlier_fit_is_a_prior_for_tracking() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for (seed, file) in [("1", "earlier.csv"), ("2", "c.csv")] {
@@ -442,7 +442,7 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
 }
 
 #[test]
-fn memories_are_the_same_in_every_unit() {
+fn memory_units_are_equivalent() {
     let directory = simulated("C1");
     let d = directory.path();
     let rows = |more: &[&str]| {
@@ -469,7 +469,7 @@ fn memories_are_the_same_in_every_unit() {
 }
 
 #[test]
-fn a_report_with_the_batch_fits() {
+fn report_contains_the_batch_fits() {
     let directory = simulated("C4");
     let d = directory.path();
     let page = |more: &[&str]| {
@@ -494,7 +494,7 @@ fn a_report_with_the_batch_fits() {
 }
 
 #[test]
-fn what_does_not_fit_together_ends_with_two() {
+fn contradictory_options_exit_with_two() {
     let directory = simulated("C1");
     let d = directory.path();
     for (arguments, expected) in [
@@ -557,7 +557,7 @@ fn what_does_not_fit_together_ends_with_two() {
 }
 
 #[test]
-fn what_gives_no_result_ends_with_one() {
+fn missing_results_exit_with_one() {
     let directory = simulated("C1");
     let d = directory.path();
     let text = fs::read_to_string(d.join("c.csv")).unwrap();
@@ -591,7 +591,7 @@ fn what_gives_no_result_ends_with_one() {
 }
 
 #[test]
-fn other_rates_need_no_other_options() {
+fn other_rates_need_no_extra_options() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for sample_time in ["0.004", "0.001"] {
@@ -625,7 +625,7 @@ fn other_rates_need_no_other_options() {
 }
 
 #[test]
-fn a_second_run_chooses_the_start_covariance() {
+fn second_run_selects_the_start_covariance() {
     let directory = simulated("C4");
     let d = directory.path();
     good(
@@ -670,13 +670,13 @@ fn a_second_run_chooses_the_start_covariance() {
         page.contains("P0") && page.contains("chosen") && page.contains("second.csv"),
         "{page}"
     );
-    let (status, says) = bad(d, &with(&["--covariance", "0.1"]));
-    assert!(status == 2 && says.contains("--covariance"), "{says}");
+    let (status, warnings) = bad(d, &with(&["--covariance", "0.1"]));
+    assert!(status == 2 && warnings.contains("--covariance"), "{warnings}");
     // The result is independent of the initial P.
     let updated = json(d, &with(&["--json", "--update-covariance", "--covariance", "0.1"]));
     assert!(updated["covariance_choice"].is_null());
     assert!(setting(&updated, "covariance updated").contains("second.csv"));
-    let (status, says) = bad(
+    let (status, warnings) = bad(
         d,
         &[
             "track",
@@ -688,16 +688,16 @@ fn a_second_run_chooses_the_start_covariance() {
             "trace.csv",
         ],
     );
-    assert!(status == 2 && says.contains("--validate"), "{says}");
-    let (status, says) = bad(d, &with(&["--track-delay", "0.2..0.4"]));
-    assert!(status == 1 && says.contains("without track_delay"), "{says}");
+    assert!(status == 2 && warnings.contains("--validate"), "{warnings}");
+    let (status, warnings) = bad(d, &with(&["--track-delay", "0.2..0.4"]));
+    assert!(status == 1 && warnings.contains("without track_delay"), "{warnings}");
     fs::write(d.join("second.csv"), "t,e,u\n0,1,1\n0.01,2,1\n").unwrap();
-    let (_, says) = bad(d, &arguments);
-    assert!(says.contains("in common"), "{says}");
+    let (_, warnings) = bad(d, &arguments);
+    assert!(warnings.contains("in common"), "{warnings}");
 }
 
 #[test]
-fn a_delay_is_followed_by_rpem_and_the_windup_guard_is_told() {
+fn rpem_tracks_a_delay_and_reports_the_windup_guard() {
     let directory = simulated("C4");
     let d = directory.path();
     let text = [
@@ -730,7 +730,7 @@ fn a_delay_is_followed_by_rpem_and_the_windup_guard_is_told() {
 }
 
 #[test]
-fn the_methods_are_listed_without_a_record() {
+fn methods_are_listed_without_a_record() {
     let directory = TempDir::new().unwrap();
     let text = good(directory.path(), &["track", "--methods"]);
     let lines: Vec<&str> = text.lines().collect();
@@ -752,7 +752,7 @@ fn the_methods_are_listed_without_a_record() {
 }
 
 #[test]
-fn a_method_that_is_no_recursion_says_so() {
+fn non_recursive_methods_are_refused_with_advice() {
     let directory = TempDir::new().unwrap();
     for (typed, name) in [
         ("wavelet", "wavelet is not a recursion"),

@@ -48,7 +48,7 @@ fn without_response(directory: &Path) {
 }
 
 #[test]
-fn a_clean_run_is_trustworthy_on_the_page_and_in_json() {
+fn clean_run_is_trustworthy_in_text_and_json() {
     let directory = simulated("C1");
     let d = directory.path();
     let mut arguments = vec!["identify", "c.csv"];
@@ -76,7 +76,7 @@ fn a_clean_run_is_trustworthy_on_the_page_and_in_json() {
 }
 
 #[test]
-fn a_delay_at_the_end_of_its_range_is_the_first_line_of_the_page() {
+fn delay_at_its_bound_is_the_first_finding() {
     let directory = simulated("C1");
     let d = directory.path();
     let arguments = [
@@ -106,7 +106,7 @@ fn a_delay_at_the_end_of_its_range_is_the_first_line_of_the_page() {
 }
 
 #[test]
-fn what_is_not_determined_is_printed_and_ends_with_one() {
+fn undetermined_result_is_printed_and_exits_with_one() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     without_response(d);
@@ -122,7 +122,7 @@ fn what_is_not_determined_is_printed_and_ends_with_one() {
     ];
     let output = hoid(d, &arguments);
     assert_eq!(output.status.code(), Some(1));
-    let (page, said) = (
+    let (page, stderr) = (
         String::from_utf8(output.stdout).unwrap(),
         String::from_utf8(output.stderr).unwrap(),
     );
@@ -131,13 +131,13 @@ fn what_is_not_determined_is_printed_and_ends_with_one() {
         "{page}"
     );
     assert!(
-        page.contains("b0") && said.contains("the data do not determine"),
-        "{said}"
+        page.contains("b0") && stderr.contains("the data do not determine"),
+        "{stderr}"
     );
 }
 
 #[test]
-fn a_trace_has_the_findings_of_its_start() {
+fn trace_includes_the_findings_of_its_start() {
     let directory = simulated("C4");
     let d = directory.path();
     let physical = [
@@ -194,7 +194,7 @@ fn streamed(directory: &Path, more: &[&str]) -> (Vec<Value>, Option<i32>) {
 }
 
 #[test]
-fn each_line_of_a_stream_has_a_level_and_one_without_an_estimate_ends_with_one() {
+fn stream_lines_have_a_level_that_sets_the_exit_code() {
     let directory = simulated("C1");
     let (lines, code) = streamed(directory.path(), &[]);
     assert_eq!(code, Some(0));
@@ -211,7 +211,7 @@ fn each_line_of_a_stream_has_a_level_and_one_without_an_estimate_ends_with_one()
 }
 
 #[test]
-fn a_controlled_element_that_the_recording_refutes_is_a_doubt_in_every_command() {
+fn wrong_controlled_element_is_doubtful_in_every_command() {
     let directory = simulated("C1");
     let d = directory.path();
     let commands: [&[&str]; 4] = [

@@ -22,11 +22,11 @@ const SAMPLE_TIME_S: f64 = 0.01;
 /// Delay nk, in samples, of the textbook operator, from which the initial delay of the filter follows.
 const NK: f64 = 29.0;
 /// Number of samples per output line.
-const EVERY: u32 = 100;
+const SAMPLES_PER_LINE: u32 = 100;
 /// Length of the memory in numbers: more than `min_memory(SAMPLE_TIME_S)`, but too short for replays.
 const MEMORY: usize = 3 * 128;
 /// Longest input line in bytes.
-const LONGEST: usize = 80;
+const MAX_LINE_BYTES: usize = 80;
 
 /// Recursion with its own memory.
 type Filter = AdaptiveFilter<[f64; MEMORY]>;
@@ -54,7 +54,7 @@ pub fn run(
     while let Some((e, u)) = lines.next()? {
         filter.step(e, u);
         samples += 1;
-        if samples.is_multiple_of(EVERY) && filter.has_started() {
+        if samples.is_multiple_of(SAMPLES_PER_LINE) && filter.has_started() {
             let (values, covariance) = (filter.operator(), filter.operator_covariance());
             let [a, b, c, d, t]: [f64; PARAMETERS] = values;
             let se = |i: usize| libm::sqrt(covariance[i][i]);
@@ -89,7 +89,7 @@ impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> Lines<R> {
 
     /// Returns e and u of the next line; `None` at the end of the file.
     fn next(&mut self) -> Result<Option<(f64, f64)>, &'static str> {
-        let (mut line, mut length) = ([0_u8; LONGEST], 0);
+        let (mut line, mut length) = ([0_u8; MAX_LINE_BYTES], 0);
         loop {
             let byte = self.byte()?;
             match byte {
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_each_second() {
+    fn one_line_is_printed_each_second() {
         let samples: String = (0..350)
             .map(|k| format!("{},{}\n", f64::from(k % 40) - 20.0, 0.1))
             .collect();
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_sample_is_said() {
+    fn invalid_lines_are_errors() {
         assert!(of("1,2\nx,3\n").unwrap_err().contains("two numbers"));
         assert!(of("1,inf\n").is_err() && of("1\n").is_err());
         assert!(of(&"1".repeat(90)).unwrap_err().contains("80"));

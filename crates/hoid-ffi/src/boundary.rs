@@ -72,7 +72,7 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
 ///
 /// # Safety
 /// `pointer` is null or points to memory for one value.
-pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
+pub(crate) unsafe fn write_value<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
     check(pointer, what)?;
     // SAFETY: the pointer is not null and is aligned; the caller guarantees memory for the value. The previous content
     // needs no drop.
@@ -93,7 +93,7 @@ pub(crate) unsafe fn write_array<T: Copy>(
     what: &str,
 ) -> Result<(), Failure> {
     // SAFETY: guaranteed by the caller of this function.
-    unsafe { put(count, values.len(), "the pointer for the count") }?;
+    unsafe { write_value(count, values.len(), "the pointer for the count") }?;
     if list.is_null() && room == 0 {
         return Ok(());
     }
@@ -121,7 +121,7 @@ pub(crate) unsafe fn into_handle(session: Session, place: *mut *mut HoidTracker)
         is_broken: false,
     }));
     // SAFETY: guaranteed by the caller of this function.
-    unsafe { put(place, tracker, "the pointer for the tracker") }
+    unsafe { write_value(place, tracker, "the pointer for the tracker") }
 }
 
 /// Takes a tracker back from the caller and frees it.
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_becomes_a_status_and_breaks_its_tracker_alone() {
+    fn panic_becomes_a_status_and_breaks_only_its_tracker() {
         let hook = std::panic::take_hook();
         std::panic::set_hook(Box::new(|_| {}));
         let mut trackers = [ptr::null_mut(), ptr::null_mut()];
@@ -231,15 +231,15 @@ mod tests {
     }
 
     #[test]
-    fn pointers_that_cannot_be_are_refused() {
+    fn invalid_pointers_are_refused() {
         // SAFETY: null is allowed.
         assert_eq!(unsafe { text(ptr::null(), "a") }, Ok(None));
         // SAFETY: null is allowed.
-        let refused = unsafe { put(ptr::null_mut(), 1.0, "the pointer") }.unwrap_err();
+        let refused = unsafe { write_value(ptr::null_mut(), 1.0, "the pointer") }.unwrap_err();
         assert_eq!(refused.status, HOID_BAD_POINTER);
         let mut room = [0.0_f64; 2];
         // SAFETY: the pointer is misaligned, so nothing is written.
-        let refused = unsafe { put(room.as_mut_ptr().wrapping_byte_add(1), 1.0, "the pointer") }.unwrap_err();
+        let refused = unsafe { write_value(room.as_mut_ptr().wrapping_byte_add(1), 1.0, "the pointer") }.unwrap_err();
         assert!(refused.text.contains("aligned"));
         let mut count = 0;
         // SAFETY: the memory has room for two values.
@@ -249,8 +249,8 @@ mod tests {
             (HOID_TOO_SMALL, 3, [0.0; 2])
         );
         // SAFETY: no values are written; the pointer for the count is valid.
-        let told = unsafe { write_array(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
-        assert_eq!((told, count), (Ok(()), 1));
+        let status = unsafe { write_array(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
+        assert_eq!((status, count), (Ok(()), 1));
         // SAFETY: the string is null-terminated.
         let refused = unsafe { text(c"\xff".as_ptr(), "a") }.unwrap_err();
         assert_eq!(refused.status, HOID_BAD_TEXT);

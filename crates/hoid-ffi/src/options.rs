@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn options_are_those_of_python() {
+    fn options_match_those_of_python() {
         let found = live(
             "rpem",
             r#"{"structure": "bj", "nk": 29, "nd": [1, 2], "memory": 256, "memory_of": {"b": "inf"}, "largest": 50,
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_says_why() {
+    fn invalid_options_give_the_reason() {
         for (method, options, reason) in [
             ("kalman", "{}", "adaptive"),
             ("rpem", "[1]", "not a JSON object"),

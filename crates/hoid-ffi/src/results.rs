@@ -8,7 +8,7 @@ use std::ffi::c_char;
 use hoid_model::VerdictLevel;
 
 use crate::{
-    boundary::{HoidTracker, put, with_tracker, write_array},
+    boundary::{HoidTracker, with_tracker, write_array, write_value},
     session::Session,
     status::{Failure, HoidStatus},
     types::{HoidChange, HoidCounts, HoidEstimate},
@@ -141,7 +141,7 @@ pub unsafe extern "C" fn hoid_tracker_response(
 pub unsafe extern "C" fn hoid_tracker_change(tracker: *const HoidTracker, change: *mut HoidChange) -> HoidStatus {
     let write = |session: &Session| {
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { put(change, session.change()?, "the change") }
+        unsafe { write_value(change, session.change()?, "the change") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker(tracker, write) }
@@ -156,7 +156,7 @@ pub unsafe extern "C" fn hoid_tracker_change(tracker: *const HoidTracker, change
 pub unsafe extern "C" fn hoid_tracker_change_log_odds(tracker: *const HoidTracker, log_odds: *mut f64) -> HoidStatus {
     let write = |session: &Session| {
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { put(log_odds, session.change_log_odds()?, "the pointer for the odds") }
+        unsafe { write_value(log_odds, session.change_log_odds()?, "the pointer for the odds") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker(tracker, write) }
@@ -171,7 +171,7 @@ pub unsafe extern "C" fn hoid_tracker_level(tracker: *const HoidTracker, level: 
     let write = |session: &Session| {
         let number = number_of(session.level());
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { put(level, number, "the pointer for the level") }
+        unsafe { write_value(level, number, "the pointer for the level") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker(tracker, write) }
@@ -206,7 +206,7 @@ pub extern "C" fn hoid_level_name(level: i32) -> *const c_char {
 pub unsafe extern "C" fn hoid_tracker_counts(tracker: *const HoidTracker, counts: *mut HoidCounts) -> HoidStatus {
     let write = |session: &Session| {
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { put(counts, session.counts(), "the counts") }
+        unsafe { write_value(counts, session.counts(), "the counts") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker(tracker, write) }
@@ -220,7 +220,7 @@ pub unsafe extern "C" fn hoid_tracker_counts(tracker: *const HoidTracker, counts
 pub unsafe extern "C" fn hoid_tracker_sample_time(tracker: *const HoidTracker, sample_time: *mut f64) -> HoidStatus {
     let write = |session: &Session| {
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { put(sample_time, session.sample_time_s(), "the pointer for the sample time") }
+        unsafe { write_value(sample_time, session.sample_time_s(), "the pointer for the sample time") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker(tracker, write) }
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn levels_have_the_names_of_the_verdict() {
+    fn level_names_match_the_verdict() {
         for level in VerdictLevel::ALL {
             // SAFETY: a constant text.
             let name = unsafe { CStr::from_ptr(hoid_level_name(number_of(level))) };

@@ -77,15 +77,15 @@ mod tests {
 
     use super::*;
 
-    const AT_ONCE: &str =
+    const NO_WARM_UP: &str =
         r#"{"nk": 29, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92}}"#;
 
     /// Number of samples before saving, and total number; under Miri a few samples suffice.
-    const TAKEN: [usize; 2] = if cfg!(miri) { [5, 8] } else { [1500, 2500] };
+    const SAMPLE_COUNTS: [usize; 2] = if cfg!(miri) { [5, 8] } else { [1500, 2500] };
 
     fn samples() -> Vec<Sample> {
         if cfg!(miri) {
-            let each = (0..TAKEN[1]).map(|k| [(0.3 * k as f64).sin(), (0.2 * k as f64).cos()]);
+            let each = (0..SAMPLE_COUNTS[1]).map(|k| [(0.3 * k as f64).sin(), (0.2 * k as f64).cos()]);
             return each.map(|[e, u]| Sample { e, u, reference: None }).collect();
         }
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
@@ -100,16 +100,16 @@ mod tests {
     }
 
     #[test]
-    fn a_saved_tracker_goes_on_with_the_same_digits() {
+    fn restored_tracker_is_bit_identical() {
         let samples = samples();
-        let [taken, all] = TAKEN;
+        let [taken, all] = SAMPLE_COUNTS;
         // The second name is an earlier name of the method, as in older saved trackers.
         let of_bank = [
             ("adaptive", None, 0.01),
             ("population", None, 0.01),
             ("adaptive", None, 0.001),
         ];
-        let at_work = [("rpem", Some(AT_ONCE), 0.01)];
+        let at_work = [("rpem", Some(NO_WARM_UP), 0.01)];
         let warm = [
             ("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 20}"), 0.01),
             ("rpem", Some("{\"nk\": 29, \"nd\": [1, 2], \"warm_up\": 10}"), 0.01),
@@ -140,7 +140,7 @@ mod tests {
     #[test]
     fn damaged_bytes_are_refused() {
         let (method, options) = if cfg!(miri) {
-            (Some("rpem"), Some(AT_ONCE))
+            (Some("rpem"), Some(NO_WARM_UP))
         } else {
             (None, None)
         };

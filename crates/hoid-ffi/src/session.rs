@@ -102,13 +102,13 @@ impl Session {
         }
         let outcome = taken.outcome;
         let tracker = self.tracker().ok();
-        let told = |of: fn(&Outcome) -> bool| i32::from(outcome.as_ref().is_some_and(of));
+        let flag = |of: fn(&Outcome) -> bool| i32::from(outcome.as_ref().is_some_and(of));
         HoidOutcome {
             innovation: outcome.and_then(|o| o.innovation).unwrap_or(f64::NAN),
             ready: i32::from(tracker.is_some()),
-            skipped: told(|o| o.skipped),
-            held: told(|o| o.held),
-            shortened: told(|o| o.shortened),
+            skipped: flag(|o| o.skipped),
+            held: flag(|o| o.held),
+            shortened: flag(|o| o.shortened),
             changed: i32::from(!taken.between && tracker.is_some_and(|tracker| tracker.change().is_some())),
         }
     }
@@ -247,7 +247,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_units_are_those_of_the_tables() {
+    fn names_and_units_match_the_tables() {
         let operator = OperatorParameters {
             k_e: 0.09,
             t_l_s: 0.4,

@@ -78,7 +78,7 @@ impl From<IoError> for Failure {
 }
 
 thread_local! {
-    static LAST: RefCell<CString> = RefCell::new(CString::default());
+    static LAST_ERROR: RefCell<CString> = RefCell::new(CString::default());
 }
 
 /// Runs a function of the interface and returns its status. Panics are caught, and the message of a failure is stored
@@ -104,7 +104,7 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
 fn remember(text: &str) {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
     // While a thread is terminating, its thread-local storage may no longer exist.
-    let _ = LAST.try_with(|last| *last.borrow_mut() = text);
+    let _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);
 }
 
 /// Returns the message of the last status in this thread that was not HOID_OK, or an empty string if there was none.
@@ -112,5 +112,7 @@ fn remember(text: &str) {
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_last_error() -> *const c_char {
     const EMPTY: &CStr = c"";
-    LAST.try_with(|last| last.borrow().as_ptr()).unwrap_or(EMPTY.as_ptr())
+    LAST_ERROR
+        .try_with(|last| last.borrow().as_ptr())
+        .unwrap_or(EMPTY.as_ptr())
 }

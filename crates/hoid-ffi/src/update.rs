@@ -3,7 +3,7 @@
 use hoid_track::Sample;
 
 use crate::{
-    boundary::{HoidTracker, put, with_tracker_mut},
+    boundary::{HoidTracker, with_tracker_mut, write_value},
     session::Session,
     status::HoidStatus,
     types::HoidOutcome,
@@ -45,12 +45,12 @@ pub unsafe extern "C" fn hoid_tracker_update(
         reference: f_t.is_finite().then_some(f_t),
     };
     let take = |session: &mut Session| {
-        let told = session.take(sample, moves != 0);
+        let result = session.take(sample, moves != 0);
         if outcome.is_null() {
             return Ok(());
         }
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { put(outcome, told, "the outcome") }
+        unsafe { write_value(outcome, result, "the outcome") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker_mut(tracker, take) }

@@ -81,7 +81,7 @@ fn same(found: &str, expected: &[Vec<f64>], columns: &[usize]) {
 }
 
 #[test]
-fn the_example_in_c_gives_the_digits_of_rust() {
+fn c_example_matches_rust() {
     let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11", "-pedantic"]) else {
         return;
     };
@@ -96,13 +96,13 @@ fn the_example_in_c_gives_the_digits_of_rust() {
     // The tracker is saved, freed and restored in the middle of the run.
     let output = run(&program, &["adaptive", "0.01", &options, "4000"], &lines(&record));
     same(&good(&output), &expected_rows, &all);
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(said.contains("after 8192 samples, 0 skipped"), "{said}");
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(message.contains("after 8192 samples, 0 skipped"), "{message}");
 }
 
 /// The S-function is compiled with a substitute for Simulink's header, because Simulink itself is not available.
 #[test]
-fn the_s_function_gives_the_digits_of_rust() {
+fn s_function_matches_rust() {
     let stubs = format!("-I{}/tests/stubs", env!("CARGO_MANIFEST_DIR"));
     let Some((_folder, program)) = built("simulink/sfun_hoid.c", "cc", &["-std=c11", &stubs]) else {
         return;
@@ -112,13 +112,13 @@ fn the_s_function_gives_the_digits_of_rust() {
     let output = run(&program, &["adaptive", "0.01", ""], &lines(&record));
     same(&good(&output), &rows, &(0..17).collect::<Vec<_>>());
     let refused = run(&program, &["kalman", "0.01", ""], "");
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(!refused.status.success() && said.contains("adaptive"), "{said}");
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success() && message.contains("adaptive"), "{message}");
 }
 
 /// The module is compiled with a substitute for DUECA's headers, because DUECA itself is not available.
 #[test]
-fn the_dueca_module_gives_the_digits_of_rust() {
+fn dueca_module_matches_rust() {
     let stubs = format!("-I{}/tests/stubs/dueca", env!("CARGO_MANIFEST_DIR"));
     let Some((_folder, program)) = built("../tests/stubs/dueca/drive.cpp", "c++", &["-std=c++14", &stubs]) else {
         return;
@@ -130,7 +130,7 @@ fn the_dueca_module_gives_the_digits_of_rust() {
 }
 
 #[test]
-fn a_change_is_told_in_c() {
+fn c_example_reports_a_change() {
     let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11"]) else {
         return;
     };
@@ -138,16 +138,16 @@ fn a_change_is_told_in_c() {
     let options = r#"{"nk": 29, "nd": 1, "warm_up": 20}"#;
     let output = run(&program, &["multiple-model", "0.01", options], &lines(&record));
     assert_eq!(good(&output).lines().count(), record.len());
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    let message = String::from_utf8_lossy(&output.stderr).into_owned();
     // The task changes at 40.96 s.
     let place = |line: &str| line.strip_prefix("sample ")?.split(':').next()?.parse::<usize>().ok();
-    let declared: Vec<usize> = said.lines().filter_map(place).collect();
-    assert!(declared.iter().any(|k| (4096..5000).contains(k)), "{said}");
-    assert!(declared.iter().all(|k| *k >= 4096), "{said}");
+    let declared: Vec<usize> = message.lines().filter_map(place).collect();
+    assert!(declared.iter().any(|k| (4096..5000).contains(k)), "{message}");
+    assert!(declared.iter().all(|k| *k >= 4096), "{message}");
 }
 
 #[test]
-fn the_example_in_cpp_gives_the_digits_of_rust() {
+fn cpp_example_matches_rust() {
     let Some((_folder, program)) = built("tracker.cpp", "c++", &["-std=c++14"]) else {
         return;
     };
@@ -168,7 +168,7 @@ fn the_example_in_cpp_gives_the_digits_of_rust() {
 }
 
 #[test]
-fn the_example_in_c_is_clean_under_the_sanitizers() {
+fn c_example_is_clean_under_sanitizers() {
     let sanitizers = ["-std=c11", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
     let Some(with) = compiler("cc") else { return };
     let folder = TempDir::new().unwrap();
@@ -191,7 +191,10 @@ fn the_example_in_c_is_clean_under_the_sanitizers() {
     ));
     // A failed example leaves no other files than a successful one.
     let refused = run(&program, &["kalman", "0.01"], "");
-    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(1));
-    assert!(said.contains("adaptive") && !said.contains("Sanitizer"), "{said}");
+    assert!(
+        message.contains("adaptive") && !message.contains("Sanitizer"),
+        "{message}"
+    );
 }

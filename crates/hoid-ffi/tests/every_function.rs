@@ -18,7 +18,7 @@ use hoid_ffi::{
 use hoid_io::fmu::{FmuKind, FmuStart, FmuVariable};
 
 /// Options with which a method is created at once and starts with the first sample.
-const AT_ONCE: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
+const NO_WARM_UP: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
     "controlled_element": "90/(s(s+6))"}"#;
 const SAMPLES: usize = 2;
 
@@ -54,7 +54,7 @@ fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
 }
 
 /// Reads a value into uninitialised memory.
-fn told<T>(tracker: *const HoidTracker, of: unsafe extern "C" fn(*const HoidTracker, *mut T) -> HoidStatus) -> T {
+fn read_value<T>(tracker: *const HoidTracker, of: unsafe extern "C" fn(*const HoidTracker, *mut T) -> HoidStatus) -> T {
     let mut place = MaybeUninit::uninit();
     // SAFETY: the tracker is valid, and the memory has room for one value.
     assert_eq!(unsafe { of(tracker, place.as_mut_ptr()) }, HOID_OK);
@@ -72,10 +72,10 @@ fn made(method: &str, options: &str) -> *mut HoidTracker {
 }
 
 #[test]
-fn a_tracker_by_every_function_of_the_header() {
+fn every_tracker_function_works() {
     assert_eq!(hoid_abi_version(), HOID_ABI_VERSION);
     assert_eq!(read(hoid_version()), env!("CARGO_PKG_VERSION"));
-    let tracker = made("rpem", AT_ONCE);
+    let tracker = made("rpem", NO_WARM_UP);
     let mut outcome = MaybeUninit::<HoidOutcome>::uninit();
     for k in 0..SAMPLES {
         let [e, u] = sample(k);
@@ -107,9 +107,12 @@ fn a_tracker_by_every_function_of_the_header() {
     assert_eq!((status, count), (HOID_OK, 2));
     // SAFETY: two values were written.
     assert_eq!(read(unsafe { list[1].assume_init() }.name), "phase_deg");
-    assert_eq!(read(hoid_level_name(told(tracker, hoid_tracker_level))), "doubtful");
-    assert_eq!(told(tracker, hoid_tracker_counts).samples, 2 * SAMPLES as u64);
-    assert_eq!(told(tracker, hoid_tracker_sample_time), 0.01);
+    assert_eq!(
+        read(hoid_level_name(read_value(tracker, hoid_tracker_level))),
+        "doubtful"
+    );
+    assert_eq!(read_value(tracker, hoid_tracker_counts).samples, 2 * SAMPLES as u64);
+    assert_eq!(read_value(tracker, hoid_tracker_sample_time), 0.01);
     let mut change = MaybeUninit::uninit();
     // SAFETY: the tracker is valid, and the pointer refers to the stack.
     assert_eq!(
@@ -152,9 +155,9 @@ fn a_tracker_by_every_function_of_the_header() {
 
 /// The message of a status belongs to its thread; each of two threads has its own tracker.
 #[test]
-fn threads_with_a_tracker_each() {
+fn each_thread_has_its_own_error_message() {
     let tracked = |names: &'static str| {
-        let tracker = made("rpem", AT_ONCE);
+        let tracker = made("rpem", NO_WARM_UP);
         let mut odds = 0.0;
         // SAFETY: the tracker belongs to this thread.
         let status = unsafe { hoid_tracker_change_log_odds(tracker, &mut odds) };
@@ -176,7 +179,7 @@ fn threads_with_a_tracker_each() {
 }
 
 #[test]
-fn a_fit_that_is_none_is_refused() {
+fn invalid_fit_is_refused() {
     let mut tracker = ptr::null_mut();
     // SAFETY: the strings are null-terminated, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_from_fit(c"{}".as_ptr(), 0.01, c"{}".as_ptr(), &mut tracker) };
@@ -237,7 +240,7 @@ macro_rules! life_of_a_unit {
             };
         }
         let set_up = || {
-            let texts = [c"rpem".to_owned(), CString::new(AT_ONCE).unwrap()];
+            let texts = [c"rpem".to_owned(), CString::new(NO_WARM_UP).unwrap()];
             let references = ["method", "options"].map(|name| unit.reference(name));
             let pointers = texts.each_ref().map(|text| text.as_ptr());
             assert_eq!(counted!($set_text, references, 2, pointers.as_ptr()), 0);
@@ -378,7 +381,7 @@ fn note(environment: *mut c_void, status: c_int, text: *const c_char) {
 }
 
 #[test]
-fn a_unit_by_every_function_of_fmi_2() {
+fn every_fmi_2_function_works() {
     assert_eq!(
         (read(fmi2GetTypesPlatform()), read(fmi2GetVersion())),
         ("default".into(), "2.0".into())
@@ -423,12 +426,12 @@ fn a_unit_by_every_function_of_fmi_2() {
         fmi2DeSerializeFMUstate
     );
     // SAFETY: the list was created above, and no call is in progress.
-    let told = unsafe { &*environment };
-    assert_eq!(told.len() > 5, cfg!(miri));
+    let log = unsafe { &*environment };
+    assert_eq!(log.len() > 5, cfg!(miri));
 }
 
 #[test]
-fn a_unit_by_every_function_of_fmi_3() {
+fn every_fmi_3_function_works() {
     assert_eq!(read(fmi3GetVersion()), "3.0");
     let mut notes = Box::new(Vec::<(c_int, String)>::new());
     let environment: *mut Vec<_> = &mut *notes;
@@ -476,14 +479,14 @@ fn a_unit_by_every_function_of_fmi_3() {
         fmi3DeserializeFMUState
     );
     // SAFETY: the list was created above, and no call is in progress.
-    let told = unsafe { &*environment };
-    assert!(told.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && told.len() > 4);
+    let log = unsafe { &*environment };
+    assert!(log.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && log.len() > 4);
 }
 
 /// All exported functions are called above, except for those that always return an error.
 #[test]
 #[cfg_attr(miri, ignore = "it reads sources, not memory of a caller")]
-fn no_function_is_left_out() {
+fn every_exported_function_is_called() {
     let words = |text: &'static str| {
         text.split(|c: char| !c.is_alphanumeric() && c != '_')
             .collect::<BTreeSet<_>>()
@@ -492,7 +495,7 @@ fn no_function_is_left_out() {
     let not_served: BTreeSet<&str> = [include_str!("../src/fmi/fmi2.rs"), include_str!("../src/fmi/fmi3.rs")]
         .into_iter()
         .flat_map(|source| lists.into_iter().flat_map(|list| source.split(list).skip(1)))
-        .flat_map(|behind| words(behind.split(')').next().unwrap_or_default()))
+        .flat_map(|rest| words(rest.split(')').next().unwrap_or_default()))
         .collect();
     let called = words(include_str!("every_function.rs"));
     let listed = include_str!("../abi/symbols-1.txt")

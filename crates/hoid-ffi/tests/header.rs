@@ -11,7 +11,7 @@ fn header() -> String {
 
 /// Compares the header with the output of cbindgen, if cbindgen is installed.
 #[test]
-fn the_header_is_what_cbindgen_makes() {
+fn header_matches_cbindgen() {
     let made = Command::new("cbindgen")
         .args(["--quiet", "--config", "cbindgen.toml", "."])
         .current_dir(FOLDER)
@@ -30,7 +30,7 @@ fn the_header_is_what_cbindgen_makes() {
 
 /// Every function is declared with the same number of arguments, and no other function is declared.
 #[test]
-fn the_header_has_the_functions_of_the_sources() {
+fn header_declares_the_functions_of_the_sources() {
     let mut in_sources = BTreeSet::new();
     for file in fs::read_dir(Path::new(FOLDER).join("src")).unwrap() {
         let path = file.unwrap().path();

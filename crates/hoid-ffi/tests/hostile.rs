@@ -65,7 +65,7 @@ const ANY: HoidEstimate = HoidEstimate {
 };
 
 /// Requests all results of a tracker; no call may return an error.
-fn asked(tracker: &Owned) -> Vec<HoidStatus> {
+fn request_all(tracker: &Owned) -> Vec<HoidStatus> {
     let t = tracker.0;
     let mut list = [ANY; 64];
     let (room, list) = (list.len(), list.as_mut_ptr());
@@ -114,7 +114,7 @@ fn asked(tracker: &Owned) -> Vec<HoidStatus> {
 #[test]
 fn null_pointers_are_refused_everywhere() {
     let nothing = Owned(ptr::null_mut());
-    assert!(asked(&nothing).iter().all(|status| *status == HOID_BAD_POINTER));
+    assert!(request_all(&nothing).iter().all(|status| *status == HOID_BAD_POINTER));
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
     assert_eq!(status, HOID_BAD_POINTER);
@@ -148,7 +148,7 @@ fn null_pointers_are_refused_everywhere() {
 
 #[test]
 #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there")]
-fn a_fit_is_what_a_tracker_begins_with() {
+fn tracker_starts_from_a_fit() {
     let fit = r#"{"structure": "grey-box", "form": "gain", "neuromuscular": true, "verdict": {"level": "trustworthy"},
         "records": [{"sample_time": 0.01, "units": {"input": "", "output": ""}}], "parameters": [],
         "noise": {"c": [], "d": [-0.9]}, "innovation_variance": 0.1,
@@ -182,9 +182,9 @@ fn a_fit_is_what_a_tracker_begins_with() {
     // The restored tracker continues from its bytes, which contain the fit.
     assert_eq!(first(&restored(&saved(&tracker)).ok().unwrap()), first(&tracker));
     // The sample time must equal the sample time of the fit.
-    let (status, said) = of(0.02, fit).err().unwrap();
+    let (status, message) = of(0.02, fit).err().unwrap();
     assert_eq!(status, HOID_BAD_OPTION);
-    assert!(said.contains("these samples are at"), "{said}");
+    assert!(message.contains("these samples are at"), "{message}");
     assert!(of(0.01, "{}").is_err());
 }
 
@@ -244,7 +244,7 @@ proptest! {
     /// Arbitrary samples leave the tracker in a valid state.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
-    fn any_samples_are_taken(
+    fn arbitrary_samples_are_accepted(
         samples in prop::collection::vec((hostile_number(), hostile_number(), hostile_number(), any::<i32>()), 1..60),
         method in prop_oneof![Just("adaptive"), Just("rpem"), Just("multiple-model")],
     ) {
@@ -253,24 +253,24 @@ proptest! {
         };
         // Methods that require a start fit have a short warm-up.
         let tracker = made(method, 0.01, options).or_else(|_| made(method, 0.01, r#"{"nk": 9, "nd": 1, "warm_up": 0.2}"#));
-        let tracker = tracker.map_err(|(_, said)| TestCaseError::fail(said))?;
+        let tracker = tracker.map_err(|(_, message)| TestCaseError::fail(message))?;
         let mut outcome = HoidOutcome { innovation: 0.0, ready: 0, skipped: 0, held: 0, shortened: 0, changed: 0 };
         for (e, u, f_t, moves) in samples {
             // SAFETY: the tracker is valid, and the pointer refers to the stack.
             let status = unsafe { hoid_tracker_update(tracker.0, e, u, f_t, moves, &mut outcome) };
             prop_assert_eq!(status, HOID_OK);
         }
-        for status in asked(&tracker) {
+        for status in request_all(&tracker) {
             prop_assert!([HOID_OK, HOID_NOTHING].contains(&status), "{}", status);
         }
-        let again = restored(&saved(&tracker)).map_err(|(_, said)| TestCaseError::fail(said))?;
+        let again = restored(&saved(&tracker)).map_err(|(_, message)| TestCaseError::fail(message))?;
         prop_assert_eq!(saved(&again), saved(&tracker));
     }
 
     /// Arbitrary options create a tracker or give a reason for the refusal.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
-    fn any_options_have_an_answer(
+    fn arbitrary_options_work_or_give_a_reason(
         method in prop_oneof![Just("adaptive"), Just("rpem"), Just("multiple-model"), Just("rls"), Just("window"), Just("ekf")],
         sample_time in prop_oneof![4 => Just(0.01), 1 => hostile_number()],
         given in prop::collection::btree_map(prop::sample::select(&NAMES[..]), hostile_value(), 0..5),
@@ -279,20 +279,20 @@ proptest! {
         let options = format!("{{{}}}", each.join(", "));
         match made(method, sample_time, &options) {
             Ok(tracker) => {
-                for status in asked(&tracker) {
+                for status in request_all(&tracker) {
                     prop_assert!([HOID_OK, HOID_NOTHING, HOID_TOO_SMALL].contains(&status), "{}: {}", options, status);
                 }
             }
-            Err((status, said)) => {
-                prop_assert_eq!(status, HOID_BAD_OPTION, "{}: {}", options, said);
-                prop_assert!(!said.is_empty());
+            Err((status, message)) => {
+                prop_assert_eq!(status, HOID_BAD_OPTION, "{}: {}", options, message);
+                prop_assert!(!message.is_empty());
             }
         }
     }
 
     /// Arbitrary bytes are refused.
     #[test]
-    fn any_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
+    fn arbitrary_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
         let bytes = if magic { [b"hoid\x01\0\0\0".as_slice(), &bytes].concat() } else { bytes };
         let status = restored(&bytes).err().map(|(status, _)| status);
         prop_assert_eq!(status, Some(HOID_BAD_STATE));

@@ -20,14 +20,14 @@ fn listed() -> BTreeSet<String> {
 }
 
 #[test]
-fn the_library_hands_out_what_is_listed() {
+fn library_exports_the_listed_symbols() {
     let library = common::shared_library();
-    let told = Command::new("nm").args(["-D", "--defined-only"]).arg(&library).output();
-    let Ok(told) = told else {
+    let listing = Command::new("nm").args(["-D", "--defined-only"]).arg(&library).output();
+    let Ok(listing) = listing else {
         eprintln!("skipped: nm is not here (binutils)");
         return;
     };
-    let text = String::from_utf8(told.stdout).unwrap();
+    let text = String::from_utf8(listing.stdout).unwrap();
     let symbols: BTreeSet<String> = text
         .lines()
         .filter_map(|line| line.rsplit(' ').next())
@@ -48,7 +48,7 @@ fn the_library_hands_out_what_is_listed() {
 
 /// All declarations of the header are listed, on every platform.
 #[test]
-fn the_header_declares_what_is_listed() {
+fn header_declares_the_listed_symbols() {
     let header = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/include/hoid.h")).unwrap();
     let ours = listed().into_iter().filter(|name| name.starts_with("hoid_"));
     let missing: Vec<String> = ours.filter(|name| !header.contains(&format!("{name}("))).collect();

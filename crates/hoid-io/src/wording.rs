@@ -5,12 +5,12 @@ use std::borrow::Cow;
 use crate::table::{control_among, error_among};
 
 /// Maximum length, in characters, of a cell quoted in a message.
-const SHOWN: usize = 40;
+const MAX_CELL_CHARS: usize = 40;
 
 /// Formats a cell or a name for a message: shortened, and without terminal control characters.
 pub(crate) fn shown(text: &str) -> String {
     let text = text.trim();
-    let cut = match text.char_indices().nth(SHOWN) {
+    let cut = match text.char_indices().nth(MAX_CELL_CHARS) {
         Some((at, _)) => Cow::Owned(format!("{}...", &text[..at])),
         None => Cow::Borrowed(text),
     };
@@ -27,14 +27,14 @@ pub(crate) fn start_of(bytes: &[u8]) -> String {
 }
 
 /// Maximum length, in characters, of a column name in a message.
-const NAMED: usize = 80;
+const MAX_NAME_CHARS: usize = 80;
 
 /// Formats a column name for a message: a long name is shortened, and control characters are escaped; nothing else is
 /// changed.
 pub(crate) fn named(name: &str) -> String {
-    let mut text = String::with_capacity(name.len().min(4 * NAMED));
+    let mut text = String::with_capacity(name.len().min(4 * MAX_NAME_CHARS));
     for (at, character) in name.chars().enumerate() {
-        if at == NAMED {
+        if at == MAX_NAME_CHARS {
             text.push_str("...");
             break;
         }
@@ -79,7 +79,7 @@ pub(crate) fn short_error(what: &str) -> String {
 }
 
 /// Minimum similarity of a suggested name; flags of the command line have the same limit.
-const NEAR: f64 = 0.7;
+const MIN_SIMILARITY: f64 = 0.7;
 
 /// Returns suggestions such as "; did you mean "u"?" for names that do not exist: for each of them the name that
 /// differs only in case, or else the most similar name in Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989)
@@ -96,7 +96,9 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
             .filter(|name| !name.is_empty())
             .filter(is_near)
             .map(|name| score(name));
-        let best = known.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|best| best.0 > NEAR);
+        let best = known
+            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .filter(|best| best.0 > MIN_SIMILARITY);
         let meant = best.map(|best| best.1).or_else(|| by_role(&asked, names))?;
         Some(format!("\"{}\"", named(&meant)))
     };
@@ -121,13 +123,13 @@ fn by_role(asked: &str, names: &[&str]) -> Option<String> {
 
 /// Lists names for a message; a long list is shortened.
 pub(crate) fn list(names: &[&str]) -> String {
-    const SHOWN: usize = 40;
+    const MAX_SHOWN_NAMES: usize = 40;
     let known: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
-    let shown: Vec<String> = known.iter().take(SHOWN).map(|name| named(name)).collect();
+    let shown: Vec<String> = known.iter().take(MAX_SHOWN_NAMES).map(|name| named(name)).collect();
     let mut text = shown.join(", ");
     match known.len() {
         0 => text.push_str("no named columns"),
-        n if n > SHOWN => text.push_str(&format!(" and {} more", n.saturating_sub(SHOWN))),
+        n if n > MAX_SHOWN_NAMES => text.push_str(&format!(" and {} more", n.saturating_sub(MAX_SHOWN_NAMES))),
         _ => {}
     }
     text
@@ -154,7 +156,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn near_names_are_offered_and_far_ones_are_not() {
+    fn only_similar_names_are_suggested() {
         let names = ["t", "error", "stick", "", "E"];
         assert_eq!(did_you_mean(&["eror"], &names), "; did you mean \"error\"?");
         assert_eq!(did_you_mean(&["e"], &names), "; did you mean \"E\"?");
@@ -172,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn long_and_strange_cells_are_shown_short() {
+    fn long_cells_are_shortened_and_escaped() {
         let shown = shown(&"\u{1b}[31mé".repeat(1000));
         assert!(shown.chars().count() < 200 && !shown.contains('\u{1b}'), "{shown}");
     }

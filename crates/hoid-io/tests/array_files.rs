@@ -70,7 +70,7 @@ fn channel<'a>(read: &'a ReadRecord, name: &str) -> &'a [f64] {
 }
 
 #[test]
-fn arrays_of_numpy() {
+fn numpy_archives_are_read() {
     for name in [
         "npz/savez.npz",
         "npz/savez_compressed.npz",
@@ -105,7 +105,7 @@ fn arrays_of_numpy() {
 }
 
 #[test]
-fn types_of_numpy() {
+fn numpy_types_are_read() {
     let found = read("npz/kinds.npz", "le_f8", "be_f8");
     for order in ["le", "be"] {
         for kind in ["f2", "f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"] {
@@ -122,7 +122,7 @@ fn types_of_numpy() {
 }
 
 #[test]
-fn single_arrays_of_numpy() {
+fn single_numpy_arrays_are_read() {
     let found = read("npz/structured.npy", "e", "u");
     assert_eq!(found.record.sample_time().s(), 0.0125);
     close(found.record.input(), &e());
@@ -140,7 +140,7 @@ fn times(factor: f64, values: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn variables_of_matlab() {
+fn matlab_variables_are_read() {
     for name in ["octave_v6", "octave_v7", "scipy_v7", "h5py_v73"] {
         let name = format!("mat/{name}.mat");
         whole(&read(&name, "e", "u"));
@@ -192,7 +192,7 @@ fn variables_of_matlab() {
 }
 
 #[test]
-fn hdf5_of_another_program() {
+fn hdf5_of_h5py_is_read() {
     let name = "mat/h5py.h5";
     whole(&read(name, "e", "u"));
     whole(&read(name, "session.run1.e", "session.run1.u"));
@@ -207,7 +207,7 @@ fn hdf5_of_another_program() {
 }
 
 #[test]
-fn tables_of_records_in_hdf5() {
+fn hdf5_tables_of_records_are_read() {
     let name = "mat/h5py_table.h5";
     for (input, output) in [("run.e", "run.u"), ("e", "u")] {
         let found = read(name, input, output);
@@ -222,7 +222,7 @@ fn tables_of_records_in_hdf5() {
 }
 
 #[test]
-fn objects_of_matlab_come_with_the_line_that_saves_their_numbers() {
+fn matlab_objects_are_refused_with_an_export_command() {
     let message = refused("mat/h5py_objects_v73.mat", "runs", "stick");
     assert!(
         message.contains("runs holds an object of the class timetable") && message.contains("x.Properties.RowTimes"),
@@ -242,7 +242,7 @@ fn objects_of_matlab_come_with_the_line_that_saves_their_numbers() {
 }
 
 #[test]
-fn names_in_the_only_structure() {
+fn names_are_searched_in_nested_structures() {
     let message = refused("mat/octave_struct.mat", "e", "u");
     assert!(
         message.contains("\"e\" may be any of data.run(1).e, data.run(2).e"),
@@ -289,7 +289,7 @@ fn element(kind: u32, bytes: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn streams_of_the_lab_streaming_layer() {
+fn xdf_streams_are_joined() {
     // The error of one stream, interpolated to the times of the stick in another stream.
     let found = read("xdf/tracking.xdf", "e", "u");
     let record = &found.record;
@@ -318,7 +318,7 @@ fn streams_of_the_lab_streaming_layer() {
 }
 
 #[test]
-fn what_cannot_be_meant_says_so() {
+fn unusable_variables_are_refused_with_the_reason() {
     let message = refused("npz/others.npz", "z", "u");
     assert!(
         message.contains("z holds complex numbers") && message.contains("real numbers"),
@@ -396,7 +396,7 @@ fn record(n: usize, ts: f64, start: f64) -> Record {
 }
 
 #[test]
-fn records_come_back_bit_for_bit() {
+fn records_round_trip_bit_for_bit() {
     let dir = tempfile::tempdir().unwrap();
     for extension in WRITTEN {
         let path = dir.path().join("run").with_extension(extension);

@@ -34,7 +34,7 @@ fn damaged_files_are_read_or_refused() {
 }
 
 #[test]
-fn a_case_is_the_same_again_and_good_files_are_read() {
+fn cases_are_reproducible_and_originals_are_readable() {
     let originals = originals();
     for number in 0..50 {
         assert_eq!(

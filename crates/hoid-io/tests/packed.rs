@@ -17,7 +17,7 @@ fn gzip(text: &[u8]) -> Vec<u8> {
 }
 
 #[test]
-fn packed_tables_and_sidecars() {
+fn compressed_tables_and_sidecars_are_read() {
     let desk = Desk::new();
     std::fs::write(desk.path("run.csv.gz"), gzip(b"t,e,u\n0,1,2\n0.02,3,4\n")).unwrap();
     let read = read_record(&desk.path("run.csv.gz"), &ReadOptions::default()).unwrap();
@@ -72,7 +72,7 @@ fn packed_tables_and_sidecars() {
 /// By the inheritance principle of BIDS, a JSON file with fewer entities describes the recording, even from a parent
 /// directory.
 #[test]
-fn sidecars_of_many_recordings() {
+fn inherited_sidecars_are_read() {
     let desk = Desk::new();
     let folder = desk.path("sub-01/ses-1/beh");
     std::fs::create_dir_all(&folder).unwrap();
@@ -111,7 +111,7 @@ fn sidecars_of_many_recordings() {
 }
 
 #[test]
-fn motion_recordings_have_a_table_of_channels() {
+fn channel_tables_of_motion_recordings_are_read() {
     let desk = Desk::new();
     let name = desk.path("sub-01_task-track_motion.tsv");
     std::fs::write(&name, "1\t2\n3\t4\n5\t6\n").unwrap();

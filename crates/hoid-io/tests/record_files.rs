@@ -51,7 +51,7 @@ fn record(n: usize, ts: f64, start: f64) -> Record {
 }
 
 #[test]
-fn what_is_written_is_read_bit_for_bit() {
+fn csv_records_round_trip_bit_for_bit() {
     let desk = Desk::new();
     let path = desk.path("run.csv");
     for (n, ts, start) in [
@@ -90,7 +90,7 @@ fn what_is_written_is_read_bit_for_bit() {
 }
 
 #[test]
-fn columns_are_written_in_the_order_of_the_task() {
+fn columns_are_written_in_task_order() {
     let desk = Desk::new();
     let path = desk.path("run.csv");
     write_record(&path, &record(3, 0.01, 0.0)).unwrap();
@@ -104,7 +104,7 @@ fn columns_are_written_in_the_order_of_the_task() {
 }
 
 #[test]
-fn roles_of_channels_are_read_back() {
+fn channel_roles_round_trip() {
     let desk = Desk::new();
     let seen = Channel::new("seen", "deg", vec![1.0, 2.0, 3.0]).with_role("feedforward:0.5");
     let written = record(3, 0.01, 0.0).with_channel(seen).unwrap();
@@ -121,7 +121,7 @@ fn roles_of_channels_are_read_back() {
 }
 
 #[test]
-fn channels_that_could_not_be_read_back_are_not_written() {
+fn unreadable_channel_names_are_not_written() {
     let desk = Desk::new();
     for name in ["t", "", " x"] {
         let record = record(3, 0.01, 0.0)
@@ -134,7 +134,7 @@ fn channels_that_could_not_be_read_back_are_not_written() {
 }
 
 #[test]
-fn other_extensions_and_places() {
+fn other_extensions_and_missing_files_are_errors() {
     let desk = Desk::new();
     for name in ["run.xlsx", "run", "run.npz.gz", "run.dat"] {
         fs::write(desk.path(name), "PK\u{3}\u{4}\0\0 words only").unwrap();
@@ -159,7 +159,7 @@ fn other_extensions_and_places() {
 
 /// A text table is recognised by its contents, regardless of the name of the file.
 #[test]
-fn text_tables_under_other_names() {
+fn text_tables_with_other_extensions_are_read() {
     let desk = Desk::new();
     let rows = |mark: &str| format!("t{mark}e{mark}u\n0.00{mark}1{mark}2\n0.01{mark}3{mark}4\n0.02{mark}5{mark}6\n");
     for name in [
@@ -202,7 +202,7 @@ fn text_tables_under_other_names() {
 /// Numbers as spreadsheets and programs in several languages write them, all with the values 0.5 and -1234.5 and one
 /// missing value.
 #[test]
-fn numbers_of_many_programs() {
+fn number_notations_of_many_programs_are_read() {
     let desk = Desk::new();
     let fill = ReadOptions {
         repair: hoid_io::Repair {
@@ -239,7 +239,7 @@ fn numbers_of_many_programs() {
 
 /// Rows below the table, repeated headers, preambles, and header cells that the rows lack do not change the record.
 #[test]
-fn lines_around_a_table() {
+fn lines_around_a_table_do_not_change_the_record() {
     let desk = Desk::new();
     let rows: Vec<String> = (0..30)
         .map(|k| format!("{:.2},{k},{}", 0.02 * f64::from(k), -k))
@@ -302,7 +302,7 @@ fn lines_around_a_table() {
 }
 
 #[test]
-fn expressions_choose_and_combine() {
+fn column_expressions_select_and_combine() {
     let desk = Desk::new();
     let text = "# units: t s, r deg, y deg, stick mV\nt,r,y,stick\n0,1,0.25,3\n0.5,2,0.5,4\n";
     let ReadRecord { record, notes, .. } = desk.read(text, &options("r-y", "-stick")).unwrap();
@@ -482,7 +482,7 @@ fn errors_name_line_column_and_remedy() {
 }
 
 #[test]
-fn other_columns_that_are_no_numbers_are_left_out_with_a_note() {
+fn non_numeric_columns_are_omitted_with_a_note() {
     let desk = Desk::new();
     let text = "t,e,u,who,d,\n0,1,2,P1,,\n1,1,2,P1,3,\n2,1,2,P1,4,\n";
     let read = desk.read(text, &defaults()).unwrap();
@@ -595,7 +595,7 @@ fn recordings_of_people_are_read() {
 }
 
 #[test]
-fn a_constant_term_of_a_difference_is_no_fault() {
+fn constant_term_of_a_difference_is_no_issue() {
     let desk = Desk::new();
     let rows: String = (0..50)
         .map(|k| format!("{:.2},0,{},7\n", 0.01 * f64::from(k), f64::from(k * k % 17).sqrt()))
@@ -614,7 +614,7 @@ fn a_constant_term_of_a_difference_is_no_fault() {
 }
 
 #[test]
-fn only_the_columns_asked_for_are_kept() {
+fn only_requested_columns_are_kept() {
     let directory = tempfile::tempdir().unwrap();
     let csv = directory.path().join("run.csv");
     fs::write(

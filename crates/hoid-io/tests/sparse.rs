@@ -30,7 +30,7 @@ fn thirds(rows: i32) -> String {
 }
 
 #[test]
-fn values_are_held_between_their_own() {
+fn sparse_values_are_held() {
     let desk = Desk::new();
     let read = desk.read(thirds(30), &with(&[("e", Sparse::Hold)])).unwrap();
     // The record extends from the first value of e, in row 1, to the last one, in row 28.
@@ -75,7 +75,7 @@ fn values_are_held_between_their_own() {
 }
 
 #[test]
-fn values_lie_on_lines_or_their_rows_are_dropped() {
+fn sparse_values_are_interpolated_or_rows_dropped() {
     let desk = Desk::new();
     let read = desk.read(thirds(30), &with(&[("e", Sparse::Linear)])).unwrap();
     assert_eq!(read.record.len(), 28);
@@ -104,7 +104,7 @@ fn values_lie_on_lines_or_their_rows_are_dropped() {
 }
 
 #[test]
-fn a_span_starts_with_what_was_logged_before_it() {
+fn held_value_before_the_span_is_used() {
     let desk = Desk::new();
     let options = ReadOptions {
         span_s: (Some(0.12), Some(0.2)),
@@ -121,7 +121,7 @@ fn a_span_starts_with_what_was_logged_before_it() {
 
 /// Two separate clocks at 50 and 40 Hz: the grid is that of the faster clock, as with `--fill`.
 #[test]
-fn topics_of_two_clocks_are_resampled_after_the_step() {
+fn topics_with_two_clocks_are_resampled() {
     let desk = Desk::new();
     let mut rows: Vec<(f64, bool)> = (0..50).map(|k| (0.02 * f64::from(k), true)).collect();
     rows.extend((0..40).map(|k| (0.013 + 0.025 * f64::from(k), false)));
@@ -156,7 +156,7 @@ fn topics_of_two_clocks_are_resampled_after_the_step() {
 }
 
 #[test]
-fn without_the_option_all_is_as_before_and_the_remedy_is_named() {
+fn without_sparse_option_the_error_names_it() {
     let desk = Desk::new();
     let refused = desk.error(thirds(60), &defaults());
     assert!(
@@ -185,7 +185,7 @@ fn without_the_option_all_is_as_before_and_the_remedy_is_named() {
 }
 
 #[test]
-fn what_cannot_be_done_is_refused() {
+fn invalid_sparse_options_are_refused() {
     let desk = Desk::new();
     let refused = |text: &str, sparse: &[(&str, Sparse)]| desk.error(text, &with(sparse));
     let text = thirds(30);
@@ -220,8 +220,8 @@ fn what_cannot_be_done_is_refused() {
     );
     // Text and infinite numbers do not count as missing values.
     for bad in ["lost", "inf"] {
-        let spoilt = text.replace("0.1000,1.0,", &format!("0.1000,{bad},"));
-        assert!(refused(&spoilt, &[("e", Sparse::Hold)]).contains(bad));
+        let corrupted = text.replace("0.1000,1.0,", &format!("0.1000,{bad},"));
+        assert!(refused(&corrupted, &[("e", Sparse::Hold)]).contains(bad));
     }
     // A column without missing values is reported.
     let read = desk
@@ -237,7 +237,7 @@ fn what_cannot_be_done_is_refused() {
 }
 
 #[test]
-fn e_and_u_are_input_and_output_and_masks_see_the_column_whole() {
+fn e_and_u_denote_input_and_output() {
     let desk = Desk::new();
     let text = thirds(300).replace("t,e,u", "t,error,stick");
     let options = ReadOptions {

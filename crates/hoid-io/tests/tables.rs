@@ -83,7 +83,7 @@ fn assert_same(a: &OutputTable, b: &OutputTable) {
 }
 
 #[test]
-fn tables_come_back_to_the_last_bit() {
+fn tables_round_trip_bit_for_bit() {
     let dir = tempfile::tempdir().unwrap();
     for extension in FORMATS {
         let path = dir.path().join("table").with_extension(extension);
@@ -109,7 +109,7 @@ fn tables_come_back_to_the_last_bit() {
 }
 
 #[test]
-fn csv_is_for_reading_too() {
+fn csv_tables_are_readable_text() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("table.csv");
     write_table(&path, &table(6)).unwrap();
@@ -132,7 +132,7 @@ fn csv_is_for_reading_too() {
 }
 
 #[test]
-fn a_growing_table_is_the_same_file() {
+fn appending_rows_gives_the_same_file() {
     let dir = tempfile::tempdir().unwrap();
     let whole = table(150_000);
     for extension in ["csv", "parquet"] {
@@ -171,7 +171,7 @@ fn part(table: &OutputTable, start: usize, end: usize) -> OutputTable {
 }
 
 #[test]
-fn an_unfinished_table_is_not_there() {
+fn unfinished_table_leaves_the_old_file() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("study.parquet");
     fs::write(&path, "before").unwrap();
@@ -183,7 +183,7 @@ fn an_unfinished_table_is_not_there() {
 }
 
 #[test]
-fn what_cannot_be_written_says_so() {
+fn invalid_tables_are_not_written() {
     let dir = tempfile::tempdir().unwrap();
     for extension in ["csv", "parquet"] {
         let path = dir.path().join("table").with_extension(extension);
@@ -281,7 +281,7 @@ const NUMBERS: [&str; 13] = [
 ];
 
 #[test]
-fn files_of_another_program_are_read() {
+fn pyarrow_files_are_read() {
     for (name, missing) in [
         ("snappy", false),
         ("missing", true),
@@ -333,7 +333,7 @@ fn files_of_another_program_are_read() {
 
 /// `read_table` reads the values in the same way; kinds and empty texts are specific to it.
 #[test]
-fn kinds_of_another_program() {
+fn pyarrow_column_kinds_are_read() {
     let table = read_table(&fixture("kinds")).unwrap();
     for name in ["t", "e", "i8", "i64", "u32", "u64", "flag", "who", "inner.x"] {
         let (found, expected) = (table.column(name).unwrap(), expected(name, true));
@@ -354,7 +354,7 @@ fn kinds_of_another_program() {
 }
 
 #[test]
-fn missing_values_in_parquet_are_named() {
+fn missing_parquet_values_are_located() {
     let message = |input: &str| {
         let options = ReadOptions {
             input: Some(input.parse().unwrap()),
@@ -405,7 +405,7 @@ fn missing_values_in_parquet_are_named() {
 }
 
 #[test]
-fn records_come_back_from_parquet() {
+fn parquet_records_round_trip() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("run.parquet");
     let values = |a: f64| (0..70_000).map(|k| (a * f64::from(k)).sin()).collect::<Vec<f64>>();
@@ -438,7 +438,7 @@ fn records_come_back_from_parquet() {
 }
 
 #[test]
-fn a_time_in_single_precision_is_even() {
+fn single_precision_time_is_even() {
     // At 2000 s single precision resolves 1.2e-4 s, which is rounding and not jitter.
     let read = read_record(&fixture("single"), &ReadOptions::default()).unwrap();
     assert_eq!(read.record.sample_time().s(), 0.01);
@@ -446,7 +446,7 @@ fn a_time_in_single_precision_is_even() {
 }
 
 #[test]
-fn what_is_no_parquet_says_so() {
+fn invalid_parquet_files_are_errors() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("run.parquet");
     let message = |bytes: &[u8]| {
@@ -530,7 +530,7 @@ fn damaged_parquet_never_panics() {
 }
 
 #[test]
-fn schemas_say_what_a_table_holds() {
+fn schema_matches_the_table() {
     let schema = table(2).schema();
     let kinds: Vec<ColumnKind> = schema.columns.iter().map(|c: &ColumnSchema| c.kind).collect();
     assert_eq!(

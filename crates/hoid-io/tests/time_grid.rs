@@ -17,7 +17,7 @@ const RESAMPLE: Repair = Repair {
 };
 
 #[test]
-fn the_time_may_have_the_name_that_a_recorder_gives_it() {
+fn recorder_names_of_time_are_accepted() {
     let directory = tempfile::tempdir().unwrap();
     let read = |header: &str, factor: f64| {
         let path = directory.path().join("run.csv");
@@ -62,7 +62,7 @@ fn record_with(header: &str, time: impl Fn(i64) -> String, choice: Option<&str>)
 }
 
 #[test]
-fn times_in_any_unit_and_form_are_the_same_record() {
+fn time_units_and_formats_give_the_same_record() {
     let ms = |k: i64| (20 * k).to_string();
     let ns = |k: i64| (1_718_000_000_123_456_789 + 20_000_000 * k).to_string();
     let stamp = |k: i64| {
@@ -152,7 +152,7 @@ fn times_in_any_unit_and_form_are_the_same_record() {
 }
 
 #[test]
-fn a_given_frequency_wins_over_t() {
+fn given_sampling_rate_wins_over_t() {
     let desk = Desk::new();
     let with = |hz| ReadOptions {
         sampling_hz: Some(hz),
@@ -196,7 +196,7 @@ fn a_given_frequency_wins_over_t() {
 }
 
 #[test]
-fn fill_bridges_and_says_so() {
+fn fill_interpolates_and_reports_it() {
     let desk = Desk::new();
     let fill = |repair| ReadOptions { repair, ..defaults() };
     let text = "t,e,u,d\n0,1,2,1\n,NaN,2,NA\n2,,2,\n3,4,2,4\n";
@@ -232,7 +232,7 @@ fn fill_bridges_and_says_so() {
 
 /// An outer join of two topics: each row has a value of only one topic, including the first and the last row.
 #[test]
-fn two_topics_in_one_table_are_read_where_both_have_values() {
+fn two_topics_are_read_where_both_have_values() {
     let desk = Desk::new();
     let both = Repair {
         fill: true,
@@ -295,7 +295,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
 }
 
 #[test]
-fn resample_goes_over_gaps_and_jitter() {
+fn resampling_bridges_gaps_and_jitter() {
     let desk = Desk::new();
     let ask = |repair, sampling_hz| ReadOptions {
         repair,
@@ -349,7 +349,7 @@ fn resample_goes_over_gaps_and_jitter() {
 
 /// If the time is also a signal, it has a value in each row and is resampled to the grid.
 #[test]
-fn the_time_is_resampled_as_a_signal() {
+fn time_as_a_signal_is_resampled() {
     let options = ReadOptions {
         repair: RESAMPLE,
         output: "t".parse().unwrap(),
@@ -380,7 +380,7 @@ fn one_sample_is_not_resampled() {
 }
 
 #[test]
-fn what_lies_outside_the_span_is_not_looked_at() {
+fn rows_outside_the_span_are_ignored() {
     let desk = Desk::new();
     let span = |from, to| ReadOptions {
         span_s: (from, to),
@@ -413,7 +413,7 @@ fn what_lies_outside_the_span_is_not_looked_at() {
 
 /// Serial days are recognised by their size and their steps; the same numbers with longer steps are seconds.
 #[test]
-fn serial_days_and_seconds() {
+fn serial_days_are_recognised() {
     let in_days = |header: &str, step_s: f64, decimals: usize| {
         let time = |k: i64| format!("{:.decimals$}", 45_321.5 + step_s * k as f64 / 86_400.0);
         record_with(header, time, None).unwrap()
@@ -437,7 +437,7 @@ fn serial_days_and_seconds() {
 
 /// The unit below the header also applies if the name denotes a time without a unit.
 #[test]
-fn units_of_the_time_below_the_header() {
+fn time_unit_below_the_header_is_used() {
     let desk = Desk::new();
     let rows: String = (0..40)
         .map(|k| format!("{:.1},{k},{}\n", 12.5 * f64::from(k), 2 * k))

@@ -18,7 +18,7 @@ fn table(step_e: usize, step_u: usize) -> String {
 }
 
 #[test]
-fn topics_of_the_same_times_give_a_record() {
+fn topics_with_the_same_times_are_joined() {
     let read = Desk::new().read(table(1, 1), &defaults()).unwrap();
     assert_eq!((read.record.len(), read.record.sample_time().s()), (300, 0.01));
     assert_eq!(read.record.input()[299], 299.0);
@@ -31,7 +31,7 @@ fn topics_of_the_same_times_give_a_record() {
 }
 
 #[test]
-fn topics_of_two_rates_need_sparse() {
+fn topics_with_two_rates_need_sparse() {
     let desk = Desk::new();
     let message = desk.error(table(5, 1), &defaults());
     assert!(
@@ -48,7 +48,7 @@ fn topics_of_two_rates_need_sparse() {
 }
 
 #[test]
-fn trials_and_tables_without_topics_are_not_joined() {
+fn trials_are_not_joined_as_topics() {
     let desk = Desk::new();
     let trial = |first: i32| {
         (0..20)

@@ -42,7 +42,7 @@ fn first_and_len(read: &[ReadRecord]) -> Vec<(f64, usize)> {
 }
 
 #[test]
-fn a_time_that_starts_again_or_a_column_divides_the_rows() {
+fn trials_are_split_by_restarting_time_or_a_column() {
     let expected = [(0.0, 10), (10.0, 12), (22.0, 14)];
     let number = |trial: usize| format!("{},", trial + 1);
     let name = |trial: usize| format!("{},", ["a", "b", "a"][trial]);
@@ -86,7 +86,7 @@ fn a_time_that_starts_again_or_a_column_divides_the_rows() {
 }
 
 #[test]
-fn one_record_of_several_trials_is_refused_by_name() {
+fn several_trials_without_a_choice_are_refused() {
     let desk = Desk::new();
     let message = desk.error(text("trial,t,e,u", |k| format!("{k},"), true), &defaults());
     assert!(

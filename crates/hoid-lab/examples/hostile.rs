@@ -41,7 +41,7 @@ fn main() -> ExitCode {
         }
     }));
     let jobs = thread::available_parallelism().map_or(1, |n| n.get() as u64);
-    let begun = Instant::now();
+    let start_time = Instant::now();
     let part = |job: u64| {
         let mut hostile = Hostile::new();
         let mut slowest = (Duration::ZERO, 0);
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
     let panics = PANICS.load(Ordering::Relaxed);
     println!(
         "{cases} cases of seed {seed} in {:.0} s: {panics} panics; slowest {:.2} s (case {})",
-        begun.elapsed().as_secs_f64(),
+        start_time.elapsed().as_secs_f64(),
         slowest.0.as_secs_f64(),
         slowest.1
     );

@@ -33,7 +33,7 @@ const DELAY: usize = 150;
 const REMNANT: f64 = 0.05;
 const REMNANT_S: f64 = 0.1;
 /// Prior spread of the neuromuscular parameters, which are known except for the effect of the hold.
-const KNOWN: f64 = 0.01;
+const KNOWN_SPREAD: f64 = 0.01;
 
 /// Result of a calibration, stored in `calibration.toml` of the experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -134,7 +134,8 @@ pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration
     let measured = record.span(0.0, record.time_s(record.len()))?;
     let estimator = FamilyEstimator {
         forms: vec![Form::Gain],
-        prior: format!("omega_nm={OMEGA_RAD_S}:{KNOWN},zeta_nm={ZETA}:{KNOWN}").parse::<OperatorPrior>()?,
+        prior: format!("omega_nm={OMEGA_RAD_S}:{KNOWN_SPREAD},zeta_nm={ZETA}:{KNOWN_SPREAD}")
+            .parse::<OperatorPrior>()?,
         run_to_run: 0.0,
         ..FamilyEstimator::default()
     };

@@ -400,7 +400,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_usual_experiment_is_sound_and_survives_its_text() {
+    fn default_config_is_valid_and_round_trips() {
         let config = Config::default();
         config.check("usual").unwrap();
         let again: Config = toml::from_str(&config.text().unwrap()).unwrap();
@@ -408,7 +408,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_run_is_refused_by_name() {
+    fn invalid_configs_are_refused_by_key() {
         let refused = |change: fn(&mut Config)| {
             let mut config = Config::default();
             change(&mut config);
@@ -427,7 +427,7 @@ mod tests {
     }
 
     #[test]
-    fn conditions_of_hoid_are_taken_by_name() {
+    fn named_scenarios_give_the_condition() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("lab.toml");
         std::fs::write(&path, "[[condition]]\nname = \"c4\"\nscenario = \"C4\"\n").unwrap();
@@ -436,7 +436,7 @@ mod tests {
         assert_eq!(course.times_s(), (10.0, 81.92));
         assert_eq!(course.change_s(), Some(40.96));
         std::fs::write(&path, "nme = \"x\"\n").unwrap();
-        let said = Config::read(&path).unwrap_err().to_string();
-        assert!(said.contains("line 1") && said.contains("nme"), "{said}");
+        let message = Config::read(&path).unwrap_err().to_string();
+        assert!(message.contains("line 1") && message.contains("nme"), "{message}");
     }
 }

@@ -67,11 +67,11 @@ pub fn describe(out: &Path, config: &Config) -> Result<(), LabError> {
         "License": "",
         "GeneratedBy": [{"Name": "hoid lab", "Version": env!("CARGO_PKG_VERSION")}],
     });
-    once(&out.join("README"), README)?;
-    once(&out.join("dataset_description.json"), &format!("{description:#}\n"))
+    write_if_missing(&out.join("README"), README)?;
+    write_if_missing(&out.join("dataset_description.json"), &format!("{description:#}\n"))
 }
 
-fn once(path: &Path, text: &str) -> Result<(), LabError> {
+fn write_if_missing(path: &Path, text: &str) -> Result<(), LabError> {
     if path.exists() { Ok(()) } else { write(path, text) }
 }
 
@@ -149,7 +149,7 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
         analysis: Default::default(),
         conditions: conditions
             .iter()
-            .map(|(name, own)| Ok((name.clone(), known(own)?)))
+            .map(|(name, own)| Ok((name.clone(), known_settings(own)?)))
             .collect::<Result<_, LabError>>()?,
         runs,
     };
@@ -157,7 +157,7 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
 }
 
 /// Returns the known properties of a condition for the manifest.
-fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
+fn known_settings(condition: &Condition) -> Result<ConditionSettings, LabError> {
     let course = condition.course()?;
     let [has_target, has_disturbance] = course.has_lines();
     let role = condition.role_of_target()?;
@@ -185,7 +185,7 @@ mod tests {
     use crate::config::Signal;
 
     #[test]
-    fn a_displayed_target_is_a_further_input_of_the_group() {
+    fn displayed_target_is_a_further_input_of_the_group() {
         let of = |display, disturbance| {
             let condition = Condition {
                 target: Some(Signal::default()),
@@ -194,7 +194,7 @@ mod tests {
                 preview_s: 0.5,
                 ..Condition::default()
             };
-            let facts = known(&condition).unwrap();
+            let facts = known_settings(&condition).unwrap();
             (facts.roles.join(" "), facts.excitation.unwrap_or_default())
         };
         let pair = |roles: &str, excitation: &str| (roles.to_owned(), excitation.to_owned());

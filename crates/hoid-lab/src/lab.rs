@@ -8,10 +8,10 @@
 //! | file | contents |
 //! |---|---|
 //! | `runs` | the stages of a run: sent, started, received in batches, ended |
-//! | `told` | messages to the pages |
+//! | `messages` | messages to the pages |
 
+mod messages;
 mod runs;
-mod told;
 
 use std::{
     collections::BTreeMap,
@@ -104,7 +104,7 @@ struct Ready {
 }
 
 struct Running {
-    begun: RunStart,
+    run_start: RunStart,
     stem: Stem,
     task: Task,
     log: RunLog,
@@ -114,7 +114,7 @@ struct Running {
 impl Current {
     /// Returns the current run if it has this number.
     fn running(&self, number: usize) -> Result<&Running, LabError> {
-        let run = self.run.as_ref().filter(|run| run.begun.number == number);
+        let run = self.run.as_ref().filter(|run| run.run_start.number == number);
         run.ok_or_else(|| LabError::Order(format!("run {number} is not in progress")))
     }
 
@@ -198,13 +198,13 @@ impl Lab {
             let _ = self.shared.end_run(&mut state, RunEnd::Interrupted, BTreeMap::new());
             let left = self.shared.newest_person();
             if let Some(newest) = left {
-                let _ = self.shared.hand_over(&mut state, newest);
+                let _ = self.shared.transfer_session_to(&mut state, newest);
             }
             drop(state);
             if let Some(newest) = left {
-                self.shared.tell(&ToPage::Yours {}, |page, _| page == newest);
+                self.shared.send_to_pages(&ToPage::Yours {}, |page, _| page == newest);
             }
-            self.shared.tell_state();
+            self.shared.send_state();
         }
     }
 
@@ -234,7 +234,7 @@ impl Lab {
         let obeyed = shared.execute(&mut state, id, message);
         drop(state);
         if !quiet || obeyed.is_err() {
-            shared.tell_state();
+            shared.send_state();
         }
         obeyed
     }
@@ -306,17 +306,17 @@ impl Shared {
         if role == Role::Person && state.run.is_none() {
             // The newest window takes over the session; the previous window is notified.
             let before = state.person.filter(|before| *before != id);
-            self.hand_over(&mut state, id)?;
+            self.transfer_session_to(&mut state, id)?;
             if let Some(before) = before {
                 let words = "The session continues in another window; this window is view-only.".to_owned();
-                self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
+                self.send_to_pages(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
             }
         } else if role == Role::Person {
             let words = "A run is in progress in another window; this window is view-only.".to_owned();
-            self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == id);
+            self.send_to_pages(&ToPage::Refused { words, elsewhere: true }, |page, _| page == id);
         }
         drop(state);
-        self.tell_state();
+        self.send_state();
         Ok(())
     }
 
@@ -331,7 +331,7 @@ impl Shared {
     }
 
     /// Continues the session in the window `id`.
-    fn hand_over(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
+    fn transfer_session_to(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
         state.person = Some(id);
         state.ready = None;
         let browser = self

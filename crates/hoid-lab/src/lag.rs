@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lag_that_the_data_show_is_found() {
+    fn lag_is_found_in_sufficient_data() {
         let Lag::Known(found) = Lag::of(record(&with_lag(60.0, 1))) else {
             panic!("60 s of a lag of {LAG_S} s carry no information about it");
         };
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_no_lag_is_given_none() {
+    fn no_lag_is_reported_without_one() {
         // Without the limit of `MIN_SIGNIFICANCE`, a lag would be reported for the last three.
         for (seed, n) in [(1, 3000), (21, 3000), (31, 3000), (2, 8000)] {
             assert_eq!(
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn fits_follow_the_run_and_forget_who_changed() {
+    fn fits_follow_the_run_and_discard_data_before_a_change() {
         let mut fits = LagFits::new(TS);
         let samples = with_lag(60.0, 2);
         let (first, rest) = samples.split_at(3999);

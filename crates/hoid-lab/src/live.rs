@@ -296,7 +296,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_simulated_person_is_found_while_they_track() {
+    fn simulated_person_is_identified_live() {
         let condition = Condition {
             scenario: Some("C1".to_owned()),
             scenario_text: Some("condition = \"C1\"\n".to_owned()),
@@ -313,8 +313,8 @@ pub(crate) mod tests {
         let open = scenario.initial.operator.transfer_function().unwrap();
         let open = open.series(&scenario.initial.controlled_element.transfer_function().unwrap());
         let truth = hoid_model::margins::margins(|omega| open.response(omega), (0.3, 15.0));
-        let within = |told: ReportedValue, truth: f64| {
-            let (value, error) = (told.0.unwrap(), told.1.unwrap());
+        let within = |reported: ReportedValue, truth: f64| {
+            let (value, error) = (reported.0.unwrap(), reported.1.unwrap());
             assert!(
                 (value - truth).abs() < 4.0 * error + 0.05 * truth.abs(),
                 "{value} {error} {truth}"
@@ -326,7 +326,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn margins_are_those_of_the_formula() {
+    fn margins_and_errors_match_the_closed_form() {
         // With Y = 1 and P = 3 e^{-0.2 s}/s, omega_c = 3 and phi_m = 90 deg - 0.6 rad. A change of ln|Y| changes
         // omega_c with the factor 3, and phi_m with the slope -0.2.
         let element: ContinuousTransferFunction = "3/s".parse().unwrap();

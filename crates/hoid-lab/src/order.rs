@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn training_comes_first_and_is_not_counted() {
+    fn training_runs_come_first_and_are_not_counted() {
         let mut config = Config::default();
         config.condition[0].training = 2;
         let plan = plan(&config, 5);

@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_integrator_sums_what_is_held() {
+    fn integrator_sums_held_inputs() {
         let plant = Plant {
             a: vec![1.0],
             b: vec![1e-3],
@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn the_dead_zone_keeps_the_ends() {
+    fn dead_zone_keeps_full_deflection() {
         let map = InputMap {
             centre: 400.0,
             span: 200.0,

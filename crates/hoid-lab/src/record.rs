@@ -17,7 +17,7 @@ pub(crate) const TARGET: &str = "f_t";
 ///
 /// # Errors
 /// [`LabError::Model`] for a run without samples.
-pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, LabError> {
+pub fn record(run_start: &RunStart, task: &Task, logged: &Logged) -> Result<Record, LabError> {
     // If a log is longer than its run, the additional ticks are invalid.
     let n = logged.signals.e.len().min(logged.signals.u.len()).min(task.ticks);
     let every = |values: &[f64]| {
@@ -43,8 +43,8 @@ pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, 
         channel("e", every(&logged.signals.e)),
         channel("u", every(&logged.signals.u)),
     )?
-    .starting_at(-(begun.run_in as f64) * TICK_S);
-    let role_of_target = begun.condition.role_of_target()?.unwrap_or_default();
+    .starting_at(-(run_start.run_in as f64) * TICK_S);
+    let role_of_target = run_start.condition.role_of_target()?.unwrap_or_default();
     for (name, values, role) in [
         (TARGET, &task.target, role_of_target),
         ("d", &task.disturbance, String::new()),

@@ -14,16 +14,16 @@ use crate::{
 /// # Errors
 /// Errors of reading files.
 pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
-    let begun = RunStart::read(stem)?;
-    let task = begun.task(stem)?;
+    let run_start = RunStart::read(stem)?;
+    let task = run_start.task(stem)?;
     let logged = Logged::read(stem)?;
     let checked = check(stem)?;
-    let record = record(&begun, &task, &logged)?;
+    let record = record(&run_start, &task, &logged)?;
     let channel = |name: &str| record.channel(name).map(rounded);
     let data = json!({
-        "number": begun.number,
-        "condition": begun.condition,
-        "training": begun.training,
+        "number": run_start.number,
+        "condition": run_start.condition,
+        "training": run_start.training,
         "start_s": record.time_s(0),
         "step_s": record.sample_time().s(),
         "e": channel("e"),

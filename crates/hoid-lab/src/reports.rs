@@ -73,8 +73,8 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     let place = stem.reports().join(name);
     let mut command = hoid(program);
     command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
-    let begun = crate::session::RunStart::read(stem).ok();
-    let condition = begun.as_ref().map(|begun| &begun.condition);
+    let run_start = crate::session::RunStart::read(stem).ok();
+    let condition = run_start.as_ref().map(|run_start| &run_start.condition);
     let course = condition.and_then(|condition| condition.course().ok());
     let role_of_target =
         (condition.zip(course.as_ref())).and_then(|(condition, course)| condition.role_of_target_in(course));

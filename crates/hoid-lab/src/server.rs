@@ -41,7 +41,7 @@ use http::{Reply, Request};
 /// standard library, a burst of strangers fills the queue, and the page must then retry its connection after a second.
 const QUEUE: i32 = 4096;
 /// Maximum number of simultaneous connections with the token.
-const KNOWN: usize = 64;
+const MAX_CONNECTIONS: usize = 64;
 /// Timeout for reading from and writing to an authorised connection.
 const IO_TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -54,10 +54,10 @@ pub struct Server {
     address: SocketAddr,
     token: String,
     /// Token of [`Server::address_once`] until it is used.
-    once: Mutex<Option<String>>,
+    single_use_token: Mutex<Option<String>>,
     policy: String,
     lab: Arc<Lab>,
-    known: AtomicUsize,
+    connection_count: AtomicUsize,
 }
 
 /// A connection with the token, counted while it is served.
@@ -66,15 +66,15 @@ struct AuthorisedConnection(Arc<Server>);
 impl AuthorisedConnection {
     /// Admits another connection if the limit allows it.
     fn enter(server: &Arc<Server>) -> Option<Self> {
-        let before = server.known.fetch_add(1, Ordering::Relaxed);
+        let before = server.connection_count.fetch_add(1, Ordering::Relaxed);
         let known = Self(Arc::clone(server));
-        (before < KNOWN).then_some(known)
+        (before < MAX_CONNECTIONS).then_some(known)
     }
 }
 
 impl Drop for AuthorisedConnection {
     fn drop(&mut self) {
-        self.0.known.fetch_sub(1, Ordering::Relaxed);
+        self.0.connection_count.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -98,10 +98,10 @@ impl Server {
             listener,
             address,
             token: random_token()?,
-            once: Mutex::new(None),
+            single_use_token: Mutex::new(None),
             policy: policy(PAGE),
             lab: Arc::new(lab),
-            known: AtomicUsize::new(0),
+            connection_count: AtomicUsize::new(0),
         })
     }
 
@@ -118,14 +118,14 @@ impl Server {
     pub fn address_once(&self) -> Result<String, LabError> {
         let token = random_token()?;
         let address = format!("http://{}/{token}/", self.address);
-        *self.once.lock().unwrap_or_else(PoisonError::into_inner) = Some(token);
+        *self.single_use_token.lock().unwrap_or_else(PoisonError::into_inner) = Some(token);
         Ok(address)
     }
 
     /// True for the first use of the token from [`Server::address_once`].
-    fn is_once(&self, token: &str) -> bool {
-        let mut once = self.once.lock().unwrap_or_else(PoisonError::into_inner);
-        once.take_if(|known| same(known, token)).is_some()
+    fn take_single_use_token(&self, token: &str) -> bool {
+        let mut single_use_token = self.single_use_token.lock().unwrap_or_else(PoisonError::into_inner);
+        single_use_token.take_if(|known| same(known, token)).is_some()
     }
 
     /// Serves requests while the program runs.
@@ -133,7 +133,7 @@ impl Server {
         let server = Arc::new(self);
         reception::receive(&server.listener, |request, stream| {
             let busy = |words: &str| Reply::refused(503, words);
-            if let Err(reply) = server.admits(&request) {
+            if let Err(reply) = server.check_origin(&request) {
                 return Err((reply, stream));
             }
             let Some(known) = AuthorisedConnection::enter(&server) else {
@@ -166,7 +166,7 @@ impl Server {
     }
 
     /// Checks that a request comes from the page of this server.
-    fn admits(&self, request: &Request) -> Result<(), Reply> {
+    fn check_origin(&self, request: &Request) -> Result<(), Reply> {
         let own = |authority: &str| {
             let port = self.address.port();
             authority == format!("127.0.0.1:{port}") || authority == format!("localhost:{port}")
@@ -179,7 +179,7 @@ impl Server {
             return Err(Reply::refused(403, "another origin"));
         }
         let (token, rest) = request.token();
-        if request.method == "GET" && rest.is_empty() && self.is_once(token) {
+        if request.method == "GET" && rest.is_empty() && self.take_single_use_token(token) {
             return Err(Reply::moved(&self.address()));
         }
         if !same(token, &self.token) {

@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn a_held_double_integrator_is_exact() {
+    fn held_double_integrator_is_exact() {
         let task = Task::new(
             &Condition {
                 target: None,
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn the_simulator_of_hoid_finds_the_same_loop() {
+    fn loop_matches_the_simulator() {
         // The simulator of C4 at 100 Hz, with u held over ten ticks, agrees with the task at 1 kHz: both holds are
         // exact, and the element changes in the same blocks. The only difference is that the task evaluates the element
         // at the middle of each block.
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn elements_change_by_their_schedule() {
+    fn elements_change_on_schedule() {
         let changing = Condition {
             last_element: Some("8/s".to_owned()),
             change_s: Some(10.0),
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_draw_their_own_phases_and_the_same_again() {
+    fn phases_differ_between_runs_and_are_reproducible() {
         let own = condition("4/s");
         let [a, again, b] = [1, 1, 2].map(|run| Task::new(&own, 0, run).unwrap().target);
         assert_eq!(a, again);
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn inputs_are_held_from_their_tick_on() {
+    fn inputs_are_held_until_the_next() {
         assert_eq!(
             held_inputs(&[(2, 1.0), (2, 3.0), (4, 5.0)], 6),
             [0.0, 0.0, 3.0, 3.0, 5.0, 5.0]

@@ -32,7 +32,7 @@ mod tests {
     use super::of_seconds;
 
     #[test]
-    fn known_instants() {
+    fn known_times_are_formatted_as_utc() {
         for (seconds, text) in [
             (0, "1970-01-01T00:00:00Z"),
             (951_782_400, "2000-02-29T00:00:00Z"),

@@ -91,13 +91,13 @@ impl Checked {
 /// [`LabError`] if `run.json` is missing or the operating system cannot read a file; problems of the other files are
 /// findings.
 pub fn check(stem: &Stem) -> Result<Checked, LabError> {
-    let begun = RunStart::read(stem)?;
+    let run_start = RunStart::read(stem)?;
     let logged = Logged::read(stem)?;
     let ended = Ended::read(stem).unwrap_or_default();
     let mut findings: Vec<Finding> = (logged.faults.iter())
         .map(|words| Finding::doubt("lab-log", words.clone()))
         .collect();
-    let task = match begun.task(stem) {
+    let task = match run_start.task(stem) {
         Ok(task) => task,
         Err(error) => {
             findings.push(Finding::doubt("lab-task", error.to_string()));
@@ -107,18 +107,18 @@ pub fn check(stem: &Stem) -> Result<Checked, LabError> {
             });
         }
     };
-    findings.extend(end_of(&begun, ended.as_ref(), &logged));
-    findings.extend(task_of(&begun, &task));
+    findings.extend(end_of(&run_start, ended.as_ref(), &logged));
+    findings.extend(task_of(&run_start, &task));
     findings.extend(ticks_of(&logged));
-    findings.extend(events_of(&begun, &logged));
-    findings.extend(inputs_of(&begun, &logged));
+    findings.extend(events_of(&run_start, &logged));
+    findings.extend(inputs_of(&run_start, &logged));
     findings.extend(errors_of(&task, &logged));
-    findings.extend(frames_of(&begun, &logged));
+    findings.extend(frames_of(&run_start, &logged));
     if let Some(ended) = &ended {
         findings.extend(files_of(stem, ended)?);
-        findings.extend(input_findings(&begun, ended));
+        findings.extend(input_findings(&run_start, ended));
     }
-    let measures = measures(&begun, &task, &logged);
+    let measures = measures(&run_start, &task, &logged);
     if measures.missed_frames > 0 {
         let words = format!("{} of {} frames were missed", measures.missed_frames, measures.frames);
         findings.push(Finding::note("lab-missed-frames", words));
@@ -129,23 +129,23 @@ pub fn check(stem: &Stem) -> Result<Checked, LabError> {
     })
 }
 
-fn end_of(begun: &RunStart, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
+fn end_of(run_start: &RunStart, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
     let finished = ended.is_some_and(|ended| ended.how == RunEnd::Finished);
     let ticks = logged.numbers.len();
-    (!finished || ticks != begun.ticks).then(|| {
-        let words = format!("the run ended after {ticks} of {} ticks", begun.ticks);
+    (!finished || ticks != run_start.ticks).then(|| {
+        let words = format!("the run ended after {ticks} of {} ticks", run_start.ticks);
         Finding::doubt("lab-interrupted", words)
     })
 }
 
-fn task_of(begun: &RunStart, task: &Task) -> Option<Finding> {
+fn task_of(run_start: &RunStart, task: &Task) -> Option<Finding> {
     let wrong = |what: &str| {
         Some(Finding::doubt(
             "lab-task",
             format!("{what} does not match its condition and seed"),
         ))
     };
-    let Ok(made) = Task::new(&begun.condition, begun.cell, begun.replication) else {
+    let Ok(made) = Task::new(&run_start.condition, run_start.cell, run_start.replication) else {
         return wrong("the task cannot be built from its condition: it");
     };
     let near = |a: &[f64], b: &[f64]| {
@@ -171,7 +171,7 @@ fn ticks_of(logged: &Logged) -> Option<Finding> {
     wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("found tick {tick} where tick {k} was expected")))
 }
 
-fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
+fn events_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
     let mut last = 0.0;
     for (number, event) in (1_usize..).zip(&logged.events) {
         let whole = event.tick >= 0.0 && event.tick.fract() == 0.0 && event.raw.is_finite();
@@ -183,8 +183,8 @@ fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
                 "was used at tick {}, before its time stamp of {:.3} ms",
                 event.tick, event.stamp_ms
             )
-        } else if late > begun.limits.input_ms {
-            let limit = begun.limits.input_ms;
+        } else if late > run_start.limits.input_ms {
+            let limit = run_start.limits.input_ms;
             format!("was used {late:.1} ms after its time stamp, expected at most {limit} ms")
         } else {
             last = event.tick;
@@ -195,9 +195,9 @@ fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     None
 }
 
-fn inputs_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
+fn inputs_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
     let events: Vec<(usize, f64)> = (logged.events.iter())
-        .map(|event| (event.tick as usize, begun.input.u(event.raw)))
+        .map(|event| (event.tick as usize, run_start.input.u(event.raw)))
         .collect();
     let made = held_inputs(&events, logged.signals.u.len());
     differing(&made, &logged.signals.u).map(|(first, count)| {
@@ -228,8 +228,8 @@ fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     Some((*places.first()?, places.len()))
 }
 
-fn frames_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
-    let limit = begun.limits.frame_ms;
+fn frames_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
+    let limit = run_start.limits.frame_ms;
     let wrong = |number: usize, words: String| Some(Finding::doubt("lab-frame", format!("frame {number} {words}")));
     let mut last = 0.0;
     for (number, frame) in (1_usize..).zip(&logged.frames) {
@@ -239,7 +239,7 @@ fn frames_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
         if shown.is_none_or(|e| differing(&[*e], &[frame.e]).is_some()) {
             return wrong(number, format!("does not show e of tick {}", frame.tick));
         }
-        let due = frame.drawn_ms.floor().min(begun.ticks as f64 - 1.0);
+        let due = frame.drawn_ms.floor().min(run_start.ticks as f64 - 1.0);
         if frame.tick != due {
             return wrong(
                 number,
@@ -289,20 +289,20 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
 
 /// Returns notes if a program made input events or the time did not come from the browser; such runs may nevertheless
 /// be verified.
-fn input_findings(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
+fn input_findings(run_start: &RunStart, ended: &Ended) -> Vec<Finding> {
     let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
     let mut notes = Vec::new();
     if made > 0.0 {
         let words = format!("{made} input events were made by a program, not by hand");
         notes.push(Finding::note("lab-simulated", words));
     }
-    if begun.clock != "browser" {
-        notes.push(Finding::note("lab-clock", format!("the time was {}", begun.clock)));
+    if run_start.clock != "browser" {
+        notes.push(Finding::note("lab-clock", format!("the time was {}", run_start.clock)));
     }
     notes
 }
 
-fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
+fn measures(run_start: &RunStart, task: &Task, logged: &Logged) -> Measures {
     let intervals: Vec<f64> = logged
         .frames
         .iter()
@@ -310,8 +310,8 @@ fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
         .map(|(last, next)| next.frame_ms - last.frame_ms)
         .collect();
     let frame_ms = median(&intervals);
-    let typical = if begun.refresh_ms > 0.0 {
-        begun.refresh_ms
+    let typical = if run_start.refresh_ms > 0.0 {
+        run_start.refresh_ms
     } else {
         frame_ms
     };
@@ -330,7 +330,7 @@ fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
     let e = &logged.signals.e;
     // Ticks after the end of the run are invalid.
     let e = e.get(..task.ticks).unwrap_or(e);
-    let measured = |e: &[f64]| rms(e.get(begun.run_in..).unwrap_or_default());
+    let measured = |e: &[f64]| rms(e.get(run_start.run_in..).unwrap_or_default());
     let rms_e = measured(e);
     // The loop is simulated without control.
     let rest = task.run(&vec![0.0; e.len()]);

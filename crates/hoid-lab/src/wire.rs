@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Maximum size of a message from a page in bytes; one second of ticks takes about a tenth of this.
-pub const LARGEST: usize = 1 << 20;
+pub const MAX_MESSAGE_BYTES: usize = 1 << 20;
 
 /// Role of the user of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]

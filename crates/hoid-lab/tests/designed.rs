@@ -9,7 +9,7 @@ use hoid_model::{NamedChoice, family_scenario::Display};
 use tempfile::TempDir;
 
 #[test]
-fn a_designed_experiment_is_read() {
+fn designed_experiments_are_read() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let points = [Enters::Disturbance, Enters::Target];

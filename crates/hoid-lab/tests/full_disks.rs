@@ -99,11 +99,11 @@ fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Op
     let mut instant = 0_usize;
     for _ in 0..RUNS {
         let Ok(number) = session.new_number() else { break };
-        let Some((begun, task)) = run::begun(&session, number, MAP) else {
+        let Some((run_start, task)) = run::started_run(&session, number, MAP) else {
             break;
         };
-        let stem = session.stem(&begun.condition.name, number);
-        let log = begun
+        let stem = session.stem(&run_start.condition.name, number);
+        let log = run_start
             .write(&stem, &task)
             .and_then(|()| RunLog::create(&stem, task.ticks));
         let mut how = RunEnd::Finished;
@@ -136,7 +136,7 @@ fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Op
 }
 
 #[test]
-fn a_disk_that_fills_loses_nothing_that_was_told() {
+fn full_disk_loses_no_confirmed_data() {
     let at = tempfile::tempdir().unwrap();
     let mut state = 54_u64;
     let mut random = move || {
@@ -207,7 +207,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
 /// If the disk becomes full while a person tracks, the page is notified at once, the run does not count, and the
 /// session continues.
 #[test]
-fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
+fn full_disk_ends_the_run_and_notifies_the_page() {
     let at = tempfile::tempdir().unwrap();
     let Some(_disk) = Disk::mount(at.path(), 2048) else {
         eprintln!("skipped: no disk of its own can be mounted here");
@@ -218,16 +218,19 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     person.next(1).unwrap();
     person.track(1, 0..500).unwrap();
     fill(&ballast);
-    let said = person.track(1, 500..4000).unwrap_err();
+    let message = person.track(1, 500..4000).unwrap_err();
     let told =
         "run-01_ticks.csv: No space left on device (os error 28). The run was ended and does not count; free space";
-    assert!(said.contains(told), "{said}");
+    assert!(message.contains(told), "{message}");
     // Messages of the page in the meantime are ignored, and the pages see that no run is in progress.
     person.track(1, 3000..3100).unwrap();
     assert_eq!(person.state()["running"], Value::Null);
     // No run starts while the disk is full.
-    let said = person.next(2).unwrap_err();
-    assert!(said.contains("No space left") && said.contains("free space"), "{said}");
+    let message = person.next(2).unwrap_err();
+    assert!(
+        message.contains("No space left") && message.contains("free space"),
+        "{message}"
+    );
     fs::remove_file(&ballast).unwrap();
     let folder = at.path().join("sub-P01/ses-01");
     let number = 1 + Stem::all(&folder).unwrap().last().unwrap().0;
@@ -235,10 +238,10 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     person.track(number, 0..4000).unwrap();
     // A run that cannot be closed is not verified.
     fill(&ballast);
-    let said = person.finish(number).unwrap_err();
+    let message = person.finish(number).unwrap_err();
     assert!(
-        said.contains("free space on the disk and start the run again"),
-        "{said}"
+        message.contains("free space on the disk and start the run again"),
+        "{message}"
     );
     assert_eq!(person.state()["next"], 0);
     fs::remove_file(&ballast).unwrap();

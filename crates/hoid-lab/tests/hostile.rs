@@ -22,18 +22,20 @@ use serde_json::json;
 
 const CASES: u64 = 1500;
 /// Cases that failed in the past: a preview of eleven days, and more samples held back than the ring buffer contains.
-const FOUND: [u64; 2] = [6025, 66_758];
+const REGRESSION_CASES: [u64; 2] = [6025, 66_758];
 
 #[test]
-fn what_nobody_says_or_saved_ends_nothing() {
+fn hostile_messages_and_files_do_not_stop_the_server() {
     let mut hostile = Hostile::new();
     (0..CASES).for_each(|number| hostile.case(5, number));
-    FOUND.into_iter().for_each(|number| hostile.case(2026, number));
+    REGRESSION_CASES
+        .into_iter()
+        .for_each(|number| hostile.case(2026, number));
 }
 
 /// A page requests a run, continues with a session whose plan is shorter, and tries to start the run there.
 #[test]
-fn a_run_of_one_session_does_not_start_in_another() {
+fn run_requested_in_another_session_does_not_start() {
     let dir = tempfile::tempdir().unwrap();
     let config = |runs: usize| Config {
         condition: vec![Condition {
@@ -54,8 +56,8 @@ fn a_run_of_one_session_does_not_start_in_another() {
     person
         .say(json!({"type": "resume", "session": "sub-P02/ses-01"}))
         .unwrap();
-    let said = person.say(person::begin(2)).unwrap_err();
-    assert!(said.contains("run 2 was not requested"), "{said}");
+    let message = person.say(person::begin(2)).unwrap_err();
+    assert!(message.contains("run 2 was not requested"), "{message}");
     // The next run of that session can start.
     person.next(1).unwrap();
 }

@@ -6,7 +6,7 @@
 mod page;
 
 #[test]
-fn the_page_computes_the_same_bits() {
+fn page_arithmetic_is_bit_identical() {
     let Some(mut engine) = page::Engine::start() else {
         eprintln!("skipped: there is no node");
         return;

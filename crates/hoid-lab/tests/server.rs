@@ -22,7 +22,7 @@ use hoid_lab::{
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket, client, handshake::client::generate_key, http::Request};
 
-struct At {
+struct ServedLab {
     host: String,
     token: String,
 }
@@ -40,12 +40,12 @@ fn config() -> Config {
     }
 }
 
-fn served(out: &Path, mode: Mode) -> At {
+fn served(out: &Path, mode: Mode) -> ServedLab {
     let server = Server::new(Lab::open(out, config(), mode, None).unwrap(), None).unwrap();
     served_by(server)
 }
 
-fn served_by(server: Server) -> At {
+fn served_by(server: Server) -> ServedLab {
     let address = server.address();
     thread::spawn(move || server.serve());
     let mut parts = address
@@ -53,13 +53,13 @@ fn served_by(server: Server) -> At {
         .unwrap()
         .trim_end_matches('/')
         .split('/');
-    At {
+    ServedLab {
         host: parts.next().unwrap().to_owned(),
         token: parts.next().unwrap().to_owned(),
     }
 }
 
-impl At {
+impl ServedLab {
     /// Sends a request unchanged and returns the reply.
     fn raw(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(&self.host).unwrap();
@@ -97,7 +97,7 @@ fn status(reply: &str) -> &str {
 }
 
 #[test]
-fn strangers_are_refused() {
+fn requests_without_the_token_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let own = format!("/{}/", at.token);
@@ -146,12 +146,12 @@ fn strangers_are_refused() {
 struct Page(WebSocket<TcpStream>);
 
 impl Page {
-    fn say(&mut self, message: &Value) {
+    fn send(&mut self, message: &Value) {
         self.0.send(Message::text(message.to_string())).unwrap();
     }
 
     /// Returns the next message of this type; other messages are skipped.
-    fn hear(&mut self, kind: &str) -> Value {
+    fn receive(&mut self, kind: &str) -> Value {
         loop {
             if let Message::Text(text) = self.0.read().unwrap() {
                 let message: Value = serde_json::from_str(text.as_str()).unwrap();
@@ -163,19 +163,19 @@ impl Page {
     }
 
     fn hello(&mut self, role: &str) -> Value {
-        self.say(&json!({"type": "hello", "role": role, "browser": {"user_agent": "test"}}));
-        self.hear("state")
+        self.send(&json!({"type": "hello", "role": role, "browser": {"user_agent": "test"}}));
+        self.receive("state")
     }
 
     fn consent(&mut self) {
-        self.say(&json!({"type": "consent", "subject": "P01", "agreed": true, "cc0": false}));
-        while self.hear("state")["phase"] != "runs" {}
+        self.send(&json!({"type": "consent", "subject": "P01", "agreed": true, "cc0": false}));
+        while self.receive("state")["phase"] != "runs" {}
     }
 
     /// Starts the next run and returns its number.
     fn begin(&mut self) -> u64 {
-        self.say(&json!({"type": "next"}));
-        let number = self.hear("run")["number"].as_u64().unwrap();
+        self.send(&json!({"type": "next"}));
+        let number = self.receive("run")["number"].as_u64().unwrap();
         assert!(matches!(self.0.read().unwrap(), Message::Binary(_)));
         let map = InputMap {
             centre: 0.0,
@@ -183,11 +183,11 @@ impl Page {
             dead: 0.0,
             gain: 3.0,
         };
-        self.say(
+        self.send(
             &json!({"type": "begin", "number": number, "input": map, "device": "mouse", "clock": "injected",
             "refresh_ms": 10.0, "zero_ms": 1.0}),
         );
-        while self.hear("state")["running"] != number {}
+        while self.receive("state")["running"] != number {}
         number
     }
 }
@@ -201,7 +201,7 @@ fn batch(number: u64, first: usize, target: &[f64]) -> Value {
 }
 
 #[test]
-fn a_run_goes_through_and_its_live_estimate_is_told() {
+fn complete_run_sends_a_live_estimate() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let (mut person, mut other) = (at.page(), at.page());
@@ -213,16 +213,21 @@ fn a_run_goes_through_and_its_live_estimate_is_told() {
         .unwrap()
         .target;
     for first in (0..1500).step_by(50) {
-        person.say(&batch(number, first, &target));
+        person.send(&batch(number, first, &target));
     }
-    let live = other.hear("live");
+    let live = other.receive("live");
     assert_eq!(live["number"], number);
-    person.say(&json!({"type": "finish", "number": number, "counted": {}}));
-    let verdict = person.hear("verdict");
+    person.send(&json!({"type": "finish", "number": number, "counted": {}}));
+    let verdict = person.receive("verdict");
     assert_eq!(verdict["done"]["verdict"], "verified", "{verdict}");
     // A second window cannot control the session.
-    other.say(&json!({"type": "next"}));
-    assert!(other.hear("refused")["words"].as_str().unwrap().contains("view-only"));
+    other.send(&json!({"type": "next"}));
+    assert!(
+        other.receive("refused")["words"]
+            .as_str()
+            .unwrap()
+            .contains("view-only")
+    );
     let zip = at.get(&format!("/{}/export.zip", at.token), "");
     assert!(status(&zip) == "200" && zip.contains("sub-P01/ses-01/lab.toml"));
     let data = at.get(&format!("/{}/data/{number}.json", at.token), "");
@@ -231,7 +236,7 @@ fn a_run_goes_through_and_its_live_estimate_is_told() {
 }
 
 #[test]
-fn a_window_that_is_closed_breaks_its_run_off() {
+fn closing_the_window_interrupts_the_run() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let mut person = at.page();
@@ -241,21 +246,21 @@ fn a_window_that_is_closed_breaks_its_run_off() {
     let target = hoid_lab::task::Task::new(&config().condition[0], 0, number)
         .unwrap()
         .target;
-    person.say(&batch(number, 0, &target));
+    person.send(&batch(number, 0, &target));
     // A second window does not take over a current run.
     let mut second = at.page();
-    second.say(&json!({"type": "hello", "role": "person"}));
+    second.send(&json!({"type": "hello", "role": "person"}));
     assert!(
-        second.hear("refused")["words"]
+        second.receive("refused")["words"]
             .as_str()
             .unwrap()
             .contains("another window")
     );
     // When the first window is closed, the session continues in the second.
     drop(person);
-    second.hear("yours");
+    second.receive("yours");
     loop {
-        let state = second.hear("state");
+        let state = second.receive("state");
         if state["running"].is_null() {
             assert_eq!(state["done"][0]["how"], "interrupted");
             assert_eq!(state["next"], 0);
@@ -272,7 +277,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
 }
 
 #[test]
-fn messages_that_are_none_end_the_connection() {
+fn invalid_messages_end_the_connection() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let closed = |message: Message| {
@@ -316,7 +321,7 @@ fn messages_that_are_none_end_the_connection() {
 }
 
 #[test]
-fn one_experiment_has_one_server() {
+fn second_server_of_an_experiment_is_refused() {
     let dir = tempfile::tempdir().unwrap();
     let _at = served(dir.path(), Mode::Sessions);
     let second = Lab::open(dir.path(), config(), Mode::Sessions, None);
@@ -327,7 +332,7 @@ fn one_experiment_has_one_server() {
 /// the client retries after a second.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_burst_of_connections_is_kept_until_it_is_accepted() {
+fn burst_of_connections_is_queued() {
     const BURST: usize = 500;
     let most = std::fs::read_to_string("/proc/sys/net/core/somaxconn").unwrap();
     if most.trim().parse::<usize>().unwrap() < BURST {
@@ -346,7 +351,7 @@ fn a_burst_of_connections_is_kept_until_it_is_accepted() {
 
 /// As many connections as the system allows, each of which sends one byte at intervals, are closed to admit the page.
 #[test]
-fn slow_strangers_do_not_shut_the_page_out() {
+fn slow_connections_do_not_block_the_page() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let mut slow = Vec::new();
@@ -372,18 +377,18 @@ fn slow_strangers_do_not_shut_the_page_out() {
 /// heads without the token or without an end, requests for sockets, or arbitrary bytes. The page receives a reply each
 /// time, and the longest time is printed (less than a second if the machine is otherwise idle).
 #[test]
-fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
+fn hostile_connections_do_not_block_the_page() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let over = Arc::new(AtomicBool::new(false));
-    let begun = Arc::new(AtomicUsize::new(0));
+    let connection_count = Arc::new(AtomicUsize::new(0));
     let (strangers, each) = (8, 125);
     let threads: Vec<_> = (0..strangers)
         .map(|stranger| {
-            let (host, over, begun) = (at.host.clone(), Arc::clone(&over), Arc::clone(&begun));
+            let (host, over, connection_count) = (at.host.clone(), Arc::clone(&over), Arc::clone(&connection_count));
             thread::spawn(move || {
-                let begin = |k: usize| -> Option<TcpStream> {
-                    begun.fetch_add(1, Ordering::Relaxed);
+                let connect = |k: usize| -> Option<TcpStream> {
+                    connection_count.fetch_add(1, Ordering::Relaxed);
                     let mut stream = TcpStream::connect(&host).ok()?;
                     stream.set_nonblocking(true).ok()?;
                     let said: &[u8] = match k % 6 {
@@ -397,7 +402,7 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
                     let _ = stream.write_all(said);
                     Some(stream)
                 };
-                let mut all: Vec<Option<TcpStream>> = (0..each).map(|k| begin(k + stranger)).collect();
+                let mut all: Vec<Option<TcpStream>> = (0..each).map(|k| connect(k + stranger)).collect();
                 while !over.load(Ordering::Relaxed) {
                     for (k, place) in all.iter_mut().enumerate() {
                         let closed = place.as_mut().is_none_or(|stream| {
@@ -408,7 +413,7 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
                             }
                         });
                         if closed {
-                            *place = begin(k + stranger);
+                            *place = connect(k + stranger);
                         }
                     }
                     thread::sleep(Duration::from_millis(10));
@@ -420,12 +425,13 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     // The page receives replies throughout, until strangers have been refused and have reconnected.
     let start = Instant::now();
     let (mut asked, mut slowest) = (0, Duration::ZERO);
-    while asked < 20 || (begun.load(Ordering::Relaxed) <= strangers * each && start.elapsed() < Duration::from_secs(60))
+    while asked < 20
+        || (connection_count.load(Ordering::Relaxed) <= strangers * each && start.elapsed() < Duration::from_secs(60))
     {
-        let begun = Instant::now();
+        let start_time = Instant::now();
         let reply = at.get(&format!("/{}/", at.token), "");
         assert_eq!(status(&reply), "200");
-        slowest = slowest.max(begun.elapsed());
+        slowest = slowest.max(start_time.elapsed());
         asked += 1;
         thread::sleep(Duration::from_millis(50));
     }
@@ -435,13 +441,13 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     );
     over.store(true, Ordering::Relaxed);
     threads.into_iter().for_each(|thread| thread.join().unwrap());
-    let begun = begun.load(Ordering::Relaxed);
-    assert!(begun > strangers * each, "{begun} strangers");
+    let connection_count = connection_count.load(Ordering::Relaxed);
+    assert!(connection_count > strangers * each, "{connection_count} strangers");
 }
 
 /// The address for starting a browser is visible in the list of processes, so it works only once.
 #[test]
-fn the_address_of_the_browser_leads_to_the_page_once() {
+fn browser_address_works_only_once() {
     let dir = tempfile::tempdir().unwrap();
     let server = Server::new(Lab::open(dir.path(), config(), Mode::Sessions, None).unwrap(), None).unwrap();
     let once = server.address_once().unwrap();

@@ -41,8 +41,8 @@ const MAP: InputMap = InputMap {
     gain: 3.0,
 };
 
-fn begun(session: &Session, number: usize) -> (RunStart, Task) {
-    run::begun(session, number, MAP).unwrap()
+fn started_run(session: &Session, number: usize) -> (RunStart, Task) {
+    run::started_run(session, number, MAP).unwrap()
 }
 
 /// Returns the batches of a run up to a tick, with an event every 8 ms and a frame every 16.7 ms.
@@ -80,9 +80,9 @@ fn batches(task: &Task, until: usize) -> Vec<Batch> {
 
 fn run(session: &mut Session, until: usize) -> (Stem, RunLog) {
     let number = session.new_number().unwrap();
-    let (begun, task) = begun(session, number);
-    let stem = session.stem(&begun.condition.name, number);
-    begun.write(&stem, &task).unwrap();
+    let (run_start, task) = started_run(session, number);
+    let stem = session.stem(&run_start.condition.name, number);
+    run_start.write(&stem, &task).unwrap();
     let mut log = RunLog::create(&stem, task.ticks).unwrap();
     for batch in batches(&task, until.min(task.ticks)) {
         log.append(&batch).unwrap();
@@ -99,7 +99,7 @@ fn finished(out: &Path) -> (Session, Stem, Checked) {
 }
 
 #[test]
-fn a_run_is_verified_and_its_record_is_read_by_hoid() {
+fn complete_run_is_verified_and_readable() {
     let dir = tempfile::tempdir().unwrap();
     let (session, stem, checked) = finished(dir.path());
     assert!(checked.is_verified(), "{}", checked.reasons());
@@ -107,9 +107,9 @@ fn a_run_is_verified_and_its_record_is_read_by_hoid() {
     assert_eq!(session.next(), Some(1));
     assert_eq!(checked.measures.ticks, 4000);
     assert!((checked.measures.input_hz - 125.0).abs() < 1.0);
-    let begun = RunStart::read(&stem).unwrap();
+    let run_start = RunStart::read(&stem).unwrap();
     let logged = hoid_lab::session::Logged::read(&stem).unwrap();
-    let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
+    let record = hoid_lab::record::record(&run_start, &run_start.task(&stem).unwrap(), &logged).unwrap();
     let path = stem.file("beh.parquet");
     hoid_io::write_record(&path, &record).unwrap();
     let read = hoid_io::read(&path).unwrap();
@@ -122,7 +122,7 @@ fn a_run_is_verified_and_its_record_is_read_by_hoid() {
 
 /// If the display shows the target, the target has a role in the recording.
 #[test]
-fn a_displayed_target_has_its_role_in_the_recording() {
+fn displayed_target_has_a_role_in_the_recording() {
     for (display, role) in [
         (Display::Compensatory, None),
         (Display::Pursuit, Some("feedforward")),
@@ -142,9 +142,9 @@ fn a_displayed_target_has_its_role_in_the_recording() {
         let (stem, log) = run(&mut session, usize::MAX);
         drop(log);
         session.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
-        let begun = RunStart::read(&stem).unwrap();
+        let run_start = RunStart::read(&stem).unwrap();
         let logged = hoid_lab::session::Logged::read(&stem).unwrap();
-        let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
+        let record = hoid_lab::record::record(&run_start, &run_start.task(&stem).unwrap(), &logged).unwrap();
         hoid_io::write_record(&stem.file("beh.parquet"), &record).unwrap();
         let read = hoid_io::read(stem.file("beh.parquet")).unwrap();
         let shown = read.channels().find(|channel| channel.name == "f_t").unwrap();
@@ -167,7 +167,7 @@ fn corrupt(stem: &Stem, end: &str, line: usize, cell: usize, with: impl Fn(f64) 
 type Change<'a> = &'a dyn Fn(f64) -> f64;
 
 #[test]
-fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
+fn each_change_gives_its_own_finding() {
     let last_bit = |v: f64| f64::from_bits(v.to_bits() ^ 1);
     let cases: [(&str, usize, Change<'_>, &str); 8] = [
         ("events.csv", 3, &|raw| raw + 1.0, "lab-input"),
@@ -195,17 +195,17 @@ fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
 }
 
 #[test]
-fn another_target_or_element_is_found() {
+fn changed_target_or_element_is_detected() {
     for change in [
-        |begun: &mut RunStart| begun.replication += 1,
-        |begun: &mut RunStart| begun.phases[0].plant.b[0] *= 1.001,
+        |run_start: &mut RunStart| run_start.replication += 1,
+        |run_start: &mut RunStart| run_start.phases[0].plant.b[0] *= 1.001,
     ] {
         let dir = tempfile::tempdir().unwrap();
         let (_, stem, _) = finished(dir.path());
-        let mut begun = RunStart::read(&stem).unwrap();
-        let task = begun.task(&stem).unwrap();
-        change(&mut begun);
-        begun.write(&stem, &task).unwrap();
+        let mut run_start = RunStart::read(&stem).unwrap();
+        let task = run_start.task(&stem).unwrap();
+        change(&mut run_start);
+        run_start.write(&stem, &task).unwrap();
         let checked = check(&stem).unwrap();
         assert!(
             checked.verdict.findings().iter().any(|f| f.kind == "lab-task"),
@@ -216,7 +216,7 @@ fn another_target_or_element_is_found() {
 }
 
 #[test]
-fn a_session_goes_on_after_its_server_was_killed() {
+fn session_continues_after_the_server_was_killed() {
     let dir = tempfile::tempdir().unwrap();
     let mut session = Session::begin(dir.path(), &config(), "P01", true).unwrap();
     let (stem, log) = run(&mut session, 1234);
@@ -255,7 +255,7 @@ fn a_session_goes_on_after_its_server_was_killed() {
 }
 
 #[test]
-fn batches_that_do_not_continue_are_refused() {
+fn non_contiguous_batches_are_refused() {
     let dir = tempfile::tempdir().unwrap();
     let mut session = Session::begin(dir.path(), &config(), "P01", false).unwrap();
     let (_, mut log) = run(&mut session, 100);
@@ -278,7 +278,7 @@ fn batches_that_do_not_continue_are_refused() {
 }
 
 #[test]
-fn people_have_their_rows_and_pseudonyms_are_checked() {
+fn subjects_are_numbered_and_pseudonyms_checked() {
     let dir = tempfile::tempdir().unwrap();
     let row = |subject: &str| Session::begin(dir.path(), &config(), subject, false).unwrap().facts.row;
     assert_eq!(["A", "B", "A", "C"].map(row), [0, 1, 0, 2]);
@@ -290,7 +290,7 @@ fn people_have_their_rows_and_pseudonyms_are_checked() {
 /// Files are truncated at any byte, have flipped bits or are deleted, as after power cuts and on full disks: the
 /// session opens, its damaged runs are unverified, and it can continue.
 #[test]
-fn every_session_opens_whatever_was_cut_or_lost() {
+fn damaged_sessions_still_open() {
     let dir = tempfile::tempdir().unwrap();
     let (mut session, ..) = finished(dir.path());
     drop(run(&mut session, 777));
@@ -348,7 +348,7 @@ fn every_session_opens_whatever_was_cut_or_lost() {
 
 /// Duplicated log entries, matrices of wrong dimensions and a plan of another experiment give findings or errors.
 #[test]
-fn numbers_of_files_are_no_places() {
+fn inconsistent_files_give_findings_or_errors() {
     let dir = tempfile::tempdir().unwrap();
     let (session, stem, _) = finished(dir.path());
     let ticks = stem.file("ticks.csv");
@@ -364,18 +364,21 @@ fn numbers_of_files_are_no_places() {
         checked.reasons()
     );
     let json = stem.file("run.json");
-    let begun = fs::read_to_string(&json).unwrap();
-    let mut value: serde_json::Value = serde_json::from_str(&begun).unwrap();
+    let run_start = fs::read_to_string(&json).unwrap();
+    let mut value: serde_json::Value = serde_json::from_str(&run_start).unwrap();
     value["phases"][0]["a"] = serde_json::json!([]);
     fs::write(&json, value.to_string()).unwrap();
-    let said = check(&stem).unwrap().reasons();
-    assert!(said.contains("do not fit each other"), "{said}");
+    let message = check(&stem).unwrap().reasons();
+    assert!(message.contains("do not fit each other"), "{message}");
     // With a preview of eleven days, no memory of this length is allocated.
-    let mut value: serde_json::Value = serde_json::from_str(&begun).unwrap();
+    let mut value: serde_json::Value = serde_json::from_str(&run_start).unwrap();
     value["condition"]["preview_s"] = serde_json::json!(1e6);
     fs::write(&json, value.to_string()).unwrap();
-    let said = check(&stem).unwrap().reasons();
-    assert!(said.contains("the task cannot be built from its condition"), "{said}");
+    let message = check(&stem).unwrap().reasons();
+    assert!(
+        message.contains("the task cannot be built from its condition"),
+        "{message}"
+    );
     let toml = session.folder.join("lab.toml");
     let facts = fs::read_to_string(&toml).unwrap();
     let other = facts.replacen("condition = 0", "condition = 9", 1);
@@ -384,8 +387,8 @@ fn numbers_of_files_are_no_places() {
     // The session opens if the copy contains the plan.
     assert_eq!(Session::open(&session.folder).unwrap().facts, session.facts);
     fs::write(session.folder.join("lab.copy.toml"), other).unwrap();
-    let said = Session::open(&session.folder).unwrap_err().to_string();
-    assert!(said.contains("condition 9 of 1"), "{said}");
+    let message = Session::open(&session.folder).unwrap_err().to_string();
+    assert!(message.contains("condition 9 of 1"), "{message}");
 }
 
 /// `--replay` only reads and does not write.

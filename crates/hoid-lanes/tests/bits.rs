@@ -22,7 +22,7 @@ impl FourLaneTask for Horner<'_> {
 }
 
 #[test]
-fn each_number_goes_alone_and_without_contraction() {
+fn lanes_are_computed_independently_without_fma() {
     let values: Vec<[f64; 4]> = (0..100)
         .map(|t| [0.3, 0.7, 1.1, 1.3].map(|omega: f64| (omega * f64::from(t)).sin()))
         .collect();
@@ -68,7 +68,7 @@ impl LaneTask for Recursion<'_> {
 }
 
 #[test]
-fn each_lane_has_the_bits_of_its_run_alone() {
+fn each_lane_is_bit_identical_to_a_scalar_run() {
     let run = |k: usize| -> Vec<f64> {
         let omega = 0.05 + 0.011 * k as f64;
         (0..500).map(|t| (omega * t as f64).sin() + 0.3 * k as f64).collect()
@@ -76,8 +76,8 @@ fn each_lane_has_the_bits_of_its_run_alone() {
     for set in InstructionSet::available() {
         let lanes = set.lanes().unwrap();
         let runs: Vec<Vec<f64>> = (0..lanes).map(run).collect();
-        let beside: Vec<f64> = (0..500 * lanes).map(|i| runs[i % lanes][i / lanes]).collect();
-        let found = set.with_lanes(Recursion(&beside)).unwrap();
+        let interleaved: Vec<f64> = (0..500 * lanes).map(|i| runs[i % lanes][i / lanes]).collect();
+        let found = set.with_lanes(Recursion(&interleaved)).unwrap();
         for (lane, run) in runs.iter().enumerate() {
             let alone = with_one_lane(Recursion(run));
             assert!(alone.iter().all(|y| y.is_finite()));
@@ -93,7 +93,7 @@ fn each_lane_has_the_bits_of_its_run_alone() {
 }
 
 #[test]
-fn what_the_processor_lacks_is_said() {
+fn unavailable_instruction_sets_give_none() {
     for set in [InstructionSet::Avx2, InstructionSet::Avx512] {
         let four = set.with_four_lanes(Horner(&[]));
         assert!(set.lanes().is_none() || four.is_some(), "{set:?}");

@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn single_integrator_below_and_double_above_the_break() {
+    fn integrator_below_the_break_and_double_integrator_above() {
         // Asymptotes: K_c/omega_b / s far below omega_b, K_c / s^2 far above. The neglected term changes the magnitude
         // by (1e-4)^2/2.
         let low = response(90.0, 6.0, 6e-4);
@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn not_finite_is_refused() {
+    fn non_finite_parameters_are_refused() {
         for (k_c, omega_b_rad_s) in [(f64::NAN, 1.0), (1.0, f64::INFINITY)] {
             assert!(ControlledElement { k_c, omega_b_rad_s }.transfer_function().is_err());
         }

@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_samples_are_the_hold_of_the_operator() {
+    fn whole_sample_delay_matches_the_held_operator() {
         for tau in [0.0, 0.01, 0.28, 0.29, 0.57] {
             let operator = OperatorParameters {
                 k_e: 0.09,
@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_at_a_whole_sample_are_those_for_growing_delay() {
+    fn derivatives_at_a_whole_sample_are_right_sided() {
         let p = [0.09, 0.036, 11.25, 0.35, 0.28];
         let exact = delayed_operator_jacobian(p, ts()).unwrap();
         let at = |h: f64| delayed_operator([p[0], p[1], p[2], p[3], p[4] + h], ts()).unwrap().b;
@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn the_response_is_continuous_where_the_delay_crosses_a_sample() {
+    fn response_is_continuous_across_whole_sample_delays() {
         for (omega, zeta) in [(11.25, 0.35), (60.0, 1.0), (40.0, 2.0)] {
             let at = |tau: f64| delayed_operator([0.09, 0.036, omega, zeta, tau], ts()).unwrap();
             let (before, there, after) = (at(0.28 - 1e-9), at(0.28), at(0.28 + 1e-9));
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn both_samples_give_the_same_response_at_their_border() {
+    fn adjacent_sample_models_agree_at_their_border() {
         let p = [0.09, 0.036, 11.25, 0.35, 0.28];
         let (above, below) = (
             delayed_operator_within(28, p, ts()).unwrap(),

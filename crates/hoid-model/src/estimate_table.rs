@@ -68,7 +68,7 @@ mod tests {
     use crate::uncertainty::{Estimate, OperatorEstimate};
 
     #[test]
-    fn an_operator_is_a_table_whose_digits_the_errors_decide() {
+    fn operator_table_digits_follow_the_errors() {
         let operator = OperatorEstimate {
             k_e: Estimate::with_variance(0.090_134, 0.0012_f64.powi(2)),
             t_l_s: Estimate::with_variance(0.4021, 0.0103_f64.powi(2)),
@@ -88,7 +88,7 @@ tau_e        0.28            s";
     }
 
     #[test]
-    fn an_estimate_is_a_value_and_its_error() {
+    fn estimate_is_printed_as_value_and_error() {
         assert_eq!(
             Estimate::with_variance(11.2499, 0.0996_f64.powi(2)).to_string(),
             "11.25 ± 0.10"

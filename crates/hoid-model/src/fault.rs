@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_a_sentence() {
+    fn fault_is_printed_as_a_sentence() {
         assert_eq!(
             spike(FaultAction::Bridged).to_string(),
             "spike in e at 41.2 s, off by 30 (212 robust standard deviations): bridged"
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_mended_is_a_note_and_what_is_left_a_doubt() {
+    fn handled_faults_are_notes_and_reported_faults_doubts() {
         let of = |action| fault_findings(&[spike(action)], 1000)[0].severity;
         assert_eq!(of(FaultAction::Bridged), Severity::Note);
         assert_eq!(of(FaultAction::Cut), Severity::Note);

@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn text_gives_the_parameters() {
+    fn text_is_parsed_into_parameters() {
         let plain = of("derivative:0.15");
         assert_eq!(plain.operator.coordinates(), [0.15, 11.25_f64.ln(), 0.35_f64.ln(), 0.0]);
         assert_eq!((plain.preview_s, plain.role().as_str()), (0.0, "feedforward"));
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn text_that_says_nothing_is_refused() {
+    fn invalid_text_is_refused() {
         for (text, reason) in [
             ("", "a form and its gain"),
             ("derivative", "a form and its gain"),
@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_follows_the_schedule_and_shares_the_neuromuscular_system() {
+    fn change_follows_schedule_and_shares_neuromuscular_system() {
         let ts = SampleTime::HUNDREDTH;
         let seen = of("derivative:0.1..0.3,tau_f=0.1..0.2");
         let schedule = Schedule::Sigmoid {

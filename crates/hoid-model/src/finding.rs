@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_gravest_finding_decides() {
+    fn worst_finding_sets_the_level() {
         let note = Finding::note("prior", "omega_nm is the prior alone");
         let doubt = Finding::doubt("not-converged", "the search did not converge");
         let open = Finding::undetermined("lag", "T_I is not determined");

@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn reference_frequencies_and_size() {
+    fn reference_frequencies_and_rms_match_table_1() {
         let f = ForcingFunction::reference();
         // Table 1 prints omega_k to 1e-3; the expected rms is known to 1e-4.
         let printed = [0.230, 0.384, 0.614, 0.997, 1.687, 2.608, 4.065, 6.596, 10.661, 17.564];
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_the_disturbance_alternate_with_those_of_the_target() {
+    fn disturbance_and_target_lines_alternate() {
         let (f, d) = (
             ForcingFunction::reference(),
             ForcingFunction::reference_disturbance(0.2).unwrap(),
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_are_the_values() {
+    fn samples_match_pointwise_values() {
         let f = ForcingFunction::reference();
         for (start, n) in [(-10.0, 9192), (0.0, 1), (3.217, 97), (0.0, 0)] {
             let samples = f.samples(start, ts(), n);

@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn integrators_sum_what_is_held() {
+    fn integrators_sum_held_inputs() {
         // For 1/s, y is the sum of v Ts; for 1/s^2 with v = 1, it is t^2/2. Both are exact for held inputs.
         let one = HeldSystem::new(&[1.0], &[1.0, 0.0], 0.0, ts()).unwrap();
         let two = HeldSystem::new(&[1.0], &[1.0, 0.0, 0.0], 0.0, ts()).unwrap();
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn second_order_is_that_of_the_closed_form() {
+    fn second_order_matches_the_closed_form() {
         for (a1, a2) in [(0.7, 9.0), (7.0, 0.0), (0.0, 0.0), (-0.5, 4.0), (30.0, 1.0)] {
             let ours = HeldSystem::new(&[1.0], &[1.0, a1, a2], 0.0, ts()).unwrap();
             let known = HeldStates::new(a1, a2, ts());
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn operators_of_the_family_have_their_exact_hold() {
+    fn family_operators_match_their_exact_hold() {
         // The two matrix exponentials are independent: nalgebra uses a Pade approximation, the family a power series.
         let x = [4.0, 0.6, 0.2, 11.0_f64.ln(), 0.25_f64.ln(), 0.1437];
         let operator = FamilyOperator::new(Form::Lead2Lag, true, &x).unwrap();
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_held_is_refused() {
+    fn invalid_systems_are_refused() {
         let new = |num: &[f64], den: &[f64], late| HeldSystem::new(num, den, late, ts());
         assert!(new(&[1.0, 0.0], &[1.0], 0.0).is_err());
         assert!(new(&[1.0], &[2.0, 1.0], 0.0).is_err());

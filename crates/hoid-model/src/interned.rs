@@ -15,9 +15,9 @@ use serde::{Deserialize, Deserializer, de::Error};
 pub type Name = &'static str;
 
 /// Maximum length of a stored name in bytes.
-const LONGEST: usize = 64;
+const MAX_NAME_BYTES: usize = 64;
 /// Largest number of stored names.
-const MOST: usize = 10_000;
+const MAX_NAMES: usize = 10_000;
 
 static NAMES: LazyLock<Mutex<BTreeSet<Name>>> = LazyLock::new(Mutex::default);
 
@@ -27,7 +27,7 @@ pub fn interned(name: &str) -> Option<Name> {
     if let Some(known) = names.get(name) {
         return Some(known);
     }
-    if name.len() > LONGEST || names.len() >= MOST {
+    if name.len() > MAX_NAME_BYTES || names.len() >= MAX_NAMES {
         return None;
     }
     let kept: Name = Box::leak(name.into());
@@ -43,7 +43,7 @@ pub fn name<'de, D: Deserializer<'de>>(reader: D) -> Result<Name, D::Error> {
     let text = String::deserialize(reader)?;
     interned(&text).ok_or_else(|| {
         D::Error::custom(format!(
-            "found a name of {} bytes, expected at most {LONGEST}",
+            "found a name of {} bytes, expected at most {MAX_NAME_BYTES}",
             text.len()
         ))
     })
@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_name_is_kept_once_and_a_text_is_none() {
+    fn name_is_interned_once_and_long_text_is_refused() {
         let typed: String = ["delay", "at", "bound"].join("-");
         let (one, two) = (interned("delay-at-bound"), interned(&typed));
         assert_eq!(one, Some("delay-at-bound"));

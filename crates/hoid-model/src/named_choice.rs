@@ -111,7 +111,7 @@ mod tests {
     use crate::Structure;
 
     #[test]
-    fn names_are_read_in_any_case_and_unknown_ones_list_the_others() {
+    fn unknown_names_list_the_choices() {
         for structure in Structure::ALL {
             assert_eq!(structure.to_string().parse(), Ok(structure));
             assert_eq!(structure.label().parse(), Ok(structure));

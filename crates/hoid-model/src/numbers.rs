@@ -13,7 +13,7 @@ pub const DASH: &str = "\u{2013}";
 pub const Z_95: f64 = 1.959_963_984_540_054;
 
 const DIGITS_OF_ERROR: i32 = 2;
-const DIGITS_ALONE: i32 = 5;
+const DIGITS_WITHOUT_ERROR: i32 = 5;
 
 /// Relative standard error below which the standard error is attributed to rounding.
 const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
@@ -63,7 +63,7 @@ pub fn counted<N: PartialEq + From<u8> + fmt::Display>(n: N, noun: &str) -> Stri
 
 /// Returns a number without a standard error, with five significant digits; a dash for non-finite values.
 pub fn plain(value: f64) -> String {
-    significant(value, DIGITS_ALONE)
+    significant(value, DIGITS_WITHOUT_ERROR)
 }
 
 /// Returns a number with `digits` significant digits; a dash for non-finite values.
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_decides_the_digits() {
+    fn error_sets_the_number_of_digits() {
         assert_eq!(both(0.090_123_4, 0.001_234), pair("0.0901", "0.0012"));
         assert_eq!(both(11.2499, 0.0996), pair("11.25", "0.10"));
         assert_eq!(both(-1.912_113_05, 0.000_52), pair("-1.91211", "0.00052"));
@@ -166,14 +166,14 @@ mod tests {
     }
 
     #[test]
-    fn an_error_in_the_last_digits_is_none() {
+    fn rounding_sized_error_is_a_dash() {
         assert_eq!(both(0.35 - 1e-16, 1e-17), pair("0.35", DASH));
         assert_eq!(both(-0.499_999_999_999_999_9, 1.2e-16), pair("-0.5", DASH));
         assert_eq!(both(0.5, 1e-13), pair("0.50000000000000", "0.00000000000010"));
     }
 
     #[test]
-    fn what_is_no_number_is_a_dash() {
+    fn non_finite_numbers_are_a_dash() {
         assert_eq!(both(f64::NAN, 1.0), pair(DASH, DASH));
         assert_eq!(with_uncertainty(f64::INFINITY, None), pair(DASH, DASH));
         assert_eq!(both(0.25, f64::NAN), pair("0.25", DASH));
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_alone_have_five_digits() {
+    fn numbers_without_error_have_five_digits() {
         assert_eq!(plain(0.28), "0.28");
         assert_eq!(plain(0.0), "0");
         assert_eq!(plain(13.714_285), "13.714");
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_keep_the_decimals() {
+    fn intervals_use_the_decimals_of_the_error() {
         assert_eq!(interval(0.0901, Some(0.0012), 1.96), "0.0877 to 0.0925");
     }
 }

@@ -241,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn discrete_parameters_of_both_states() {
+    fn discrete_parameters_match_expected_values() {
         // Independent values from the deterministic part of the expected values.
         let expected = [(s1(), 0.0442765923, -0.0431823806), (s2(), 0.1024498216, -0.1015987680)];
         for (operator, b0, b1) in expected {
@@ -255,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn parameters_undo_discretise() {
+    fn parameters_invert_discretise() {
         for operator in others() {
             let back = operator.discretise(ts()).unwrap().parameters().unwrap();
             // b0 and b1 cancel in their sum to a fraction of about (omega_nm Ts)^2, and K_e loses this factor in
@@ -332,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn no_meaning_no_number() {
+    fn non_convertible_models_give_the_reason() {
         let model = |b: [f64; 2], f: [f64; 2], nk| DiscreteOperator {
             held: HeldSecondOrder {
                 b0: b[0],

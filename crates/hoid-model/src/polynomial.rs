@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn roots_undo_from_roots() {
+    fn roots_inverts_from_roots() {
         let sets = [
             vec![c(0.9, 0.2), c(0.9, -0.2)],
             vec![c(0.95, 0.0), c(-0.4, 0.0), c(0.1, 0.0)],
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn multiple_roots_are_found_to_the_accuracy_that_they_allow() {
+    fn multiple_roots_are_found_approximately() {
         // A root of multiplicity m has an accuracy of only eps^(1/m).
         let found = roots(&from_roots(&[c(0.85, 0.0); 4])).unwrap();
         assert!(found.iter().all(|z| (z - 0.85).norm() < 5e-4));
@@ -198,13 +198,13 @@ mod tests {
     }
 
     #[test]
-    fn quadratic_does_not_cancel() {
+    fn quadratic_avoids_cancellation() {
         let found = roots(&[1.0, -1e8, 1.0]).unwrap();
         assert!((found[1].re - 1e-8).abs() < 1e-22);
     }
 
     #[test]
-    fn product_and_value() {
+    fn products_and_values_are_exact() {
         assert_eq!(product(&[1.0, -0.5], &[1.0, 2.0, 3.0]), vec![1.0, 1.5, 2.0, -1.5]);
         assert!(product(&[], &[1.0]).is_empty());
         assert!((value(&[1.0, 2.0, 3.0], c(2.0, 0.0)) - 17.0).norm() < 1e-12);

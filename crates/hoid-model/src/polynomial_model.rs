@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_are_where_their_names_say() {
+    fn named_parts_are_slices_of_theta() {
         let m = general();
         assert_eq!(m.b(), &[0.044, -0.043]);
         assert_eq!(m.c(), &[0.3]);
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn response_is_that_of_the_transfer_function_and_its_gradient_is_right() {
+    fn response_and_gradient_match_the_transfer_function() {
         let arx = PolynomialModel::new(
             Structure::Arx,
             Structure::Arx.operator_orders(3),
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn stability_of_predictor_and_system() {
+    fn predictor_may_be_stable_for_an_unstable_model() {
         assert!(general().predictor_is_stable() && general().is_stable());
         let unstable = PolynomialModel::new(
             Structure::Arx,

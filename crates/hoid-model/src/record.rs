@@ -283,7 +283,7 @@ impl Record {
     /// Returns the record with the mean or the least-squares line of input and output removed; other channels remain
     /// unchanged.
     pub fn detrended(mut self, how: Detrend) -> Self {
-        self.signals_mut().for_each(|values| take_out(how, values));
+        self.signals_mut().for_each(|values| subtract_trend(how, values));
         self
     }
 
@@ -321,12 +321,12 @@ impl Detrend {
     #[must_use]
     pub fn taken_out(self, values: &[f64]) -> Vec<f64> {
         let mut left = values.to_vec();
-        take_out(self, &mut left);
+        subtract_trend(self, &mut left);
         left
     }
 }
 
-fn take_out(how: Detrend, values: &mut [f64]) {
+fn subtract_trend(how: Detrend, values: &mut [f64]) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     let centre = (n - 1.0) / 2.0;
@@ -357,7 +357,7 @@ mod tests {
     }
 
     #[test]
-    fn is_checked_when_made() {
+    fn record_is_validated_on_construction() {
         assert!(matches!(record(&[], &[]), Err(ModelError::EmptyRecord { .. })));
         assert!(matches!(
             record(&[1.0, 2.0], &[1.0]),
@@ -380,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn records_are_joined_by_the_channels_that_both_have() {
+    fn joined_records_keep_common_channels() {
         let first = record(&[1.0, 2.0], &[3.0, 4.0])
             .unwrap()
             .starting_at(5.0)
@@ -416,7 +416,7 @@ mod tests {
     }
 
     #[test]
-    fn an_output_alone_is_a_record_too() {
+    fn output_only_record_is_valid() {
         let ts = SampleTime::new(0.01).unwrap();
         let alone = Record::of_output(ts, channel("u", &[1.0, 2.0, 3.0])).unwrap();
         assert!(alone.input().is_empty() && alone.input_channel().is_none());
@@ -428,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn span_takes_the_samples_from_start_to_before_the_end() {
+    fn span_is_half_open() {
         let values: Vec<f64> = (0..100).map(f64::from).collect();
         let record = record(&values, &vec![0.0; 100]).unwrap().starting_at(-0.2);
         let part = record.span(0.0, 0.3).unwrap();
@@ -443,7 +443,7 @@ mod tests {
     }
 
     #[test]
-    fn detrending_removes_what_it_says() {
+    fn detrending_removes_mean_or_line() {
         let line: Vec<f64> = (0..50).map(|k| 3.0 + 0.5 * f64::from(k)).collect();
         let flat = vec![2.0; 50];
         let record = record(&line, &flat).unwrap();
@@ -456,7 +456,7 @@ mod tests {
     }
 
     #[test]
-    fn a_map_changes_input_and_output_alone() {
+    fn map_signals_changes_only_input_and_output() {
         let whole = record(&[1.0, 2.0], &[3.0, 4.0])
             .unwrap()
             .labelled("run")

@@ -257,7 +257,7 @@ impl Interval {
     }
 }
 
-const MOST_INTERVALS: usize = 4000;
+const MAX_INTERVALS: usize = 4000;
 
 /// Returns the integral from 0 to `band` of a smooth non-negative f that varies on a logarithmic scale.
 fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
@@ -276,7 +276,7 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
     }
     edges.push(band);
     let mut intervals: Vec<Interval> = edges.windows(2).map(|e| Interval::new(&f, e[0], e[1])).collect();
-    while intervals.len() < MOST_INTERVALS {
+    while intervals.len() < MAX_INTERVALS {
         let total: f64 = intervals.iter().map(|i| i.integral).sum();
         // Each interval may contribute an equal share of the tolerance to the error; intervals that exceed this share
         // are halved.
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn unreachable_level_names_the_largest() {
+    fn unreachable_level_reports_the_largest() {
         for m in 1..=4 {
             for s in 0..2 {
                 let Err(ModelError::UnreachableNoiseLevel { largest, order, .. }) =
@@ -450,7 +450,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_gain_is_refused() {
+    fn invalid_arguments_are_refused() {
         let [(operator, element), _] = states();
         let call = |level, definition, order, time, lines: &[SpectralLine]| {
             remnant_gain(level, definition, order, time, &operator, &element, lines, ts())

@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn white_noise_and_what_is_no_filter() {
+    fn white_noise_has_unit_gain_and_bad_filters_are_refused() {
         let white = remnant_noise(f64::NAN, 0, ts()).unwrap();
         assert!(white.c.is_empty() && white.d.is_empty() && white.gain == 1.0);
         for (t_n, m) in [(0.06, 5), (0.0, 1), (-0.1, 2), (f64::NAN, 1), (1e-100, 3), (1e100, 3)] {

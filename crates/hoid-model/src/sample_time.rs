@@ -80,14 +80,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn refuses_what_is_no_time() {
+    fn invalid_times_are_refused() {
         for bad in [0.0, -0.01, f64::NAN, f64::INFINITY] {
             assert!(SampleTime::new(bad).is_err(), "{bad}");
         }
     }
 
     #[test]
-    fn delay_is_rounded_and_not_cut() {
+    fn delay_is_rounded_to_whole_samples() {
         let ts = SampleTime::new(0.01).unwrap();
         assert_eq!(ts.whole_samples(0.29), Some(29));
         assert_eq!(ts.whole_samples(0.28), Some(28));

@@ -28,7 +28,7 @@ use crate::{
 
 /// Longest run, in samples: 11 days at 100 Hz. With this limit, a time with a wrong exponent causes an error message
 /// instead of exhausting the memory.
-const MOST_SAMPLES: usize = 100_000_000;
+const MAX_SAMPLES: usize = 100_000_000;
 
 /// A state of adaptation: the operator and the controlled element.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -369,7 +369,7 @@ impl Scenario {
             });
         }
         let run_in_samples = samples("run-in time t_0 in s", self.run_in_s)?;
-        if run_in_samples + measurement_samples > MOST_SAMPLES {
+        if run_in_samples + measurement_samples > MAX_SAMPLES {
             return Err(ModelError::OutOfRange {
                 quantity: "run-in and measurement time in s",
                 found: self.run_in_s + self.measurement_s,
@@ -505,7 +505,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn conditions_go_where_the_table_says() {
+    fn conditions_follow_the_table() {
         let gain = |c: Condition, t: f64| Scenario::condition(c).resolve().unwrap().parameters_at(t).operator.k_e;
         for (condition, start, end) in [
             (Condition::C1, 0.09, 0.09),
@@ -525,7 +525,7 @@ mod tests {
     }
 
     #[test]
-    fn each_state_has_the_gain_of_its_noise_level() {
+    fn remnant_gain_matches_the_noise_level_of_each_state() {
         // Expected K_n for m = 1 and P_n = 0.1 in s1 and s2.
         let c4 = Scenario::condition(Condition::C4).resolve().unwrap();
         assert!((c4.parameters_at(0.0).k_n - 0.07636).abs() < 5e-6);
@@ -537,7 +537,7 @@ mod tests {
     }
 
     #[test]
-    fn a_delay_goes_along_the_sigmoid_in_whole_samples() {
+    fn delay_follows_the_sigmoid_in_whole_samples() {
         let mut scenario = Scenario::condition(Condition::C3);
         scenario.last.operator.tau_e_s = 0.34;
         let resolved = scenario.resolve().unwrap();
@@ -554,7 +554,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_simulated_is_refused() {
+    fn invalid_scenarios_are_refused() {
         let refused = |change: fn(&mut Scenario)| {
             let mut scenario = Scenario::condition(Condition::C4);
             change(&mut scenario);

@@ -34,7 +34,7 @@ pub enum Schedule {
 /// Number of time constants 1/G after which a transition is complete: e^-40 is below half a unit in the last place.
 const COMPLETE_AFTER: f64 = 40.0;
 /// Shortest interval between two changes, in time constants 1/G.
-const SHORTEST: f64 = 1.0;
+const MIN_INTERVAL: f64 = 1.0;
 
 impl Schedule {
     /// Checks the rate, the time and the interval of the changes.
@@ -67,7 +67,7 @@ impl Schedule {
             });
         }
         let is_single = matches!(self, Self::Sigmoid { .. });
-        let has_time = interval_s.is_finite() && interval_s * rate_per_s >= SHORTEST;
+        let has_time = interval_s.is_finite() && interval_s * rate_per_s >= MIN_INTERVAL;
         if !(is_single || has_time) {
             return Err(ModelError::OutOfRange {
                 quantity: "time from one change to the next in s",
@@ -161,7 +161,7 @@ mod tests {
     };
 
     #[test]
-    fn is_the_sigmoid_as_printed() {
+    fn sigmoid_matches_the_printed_formula() {
         for t in [0.0, 30.0, 40.0, 40.96, 41.5, 60.0, 81.91] {
             let printed = 0.09 + (0.07 - 0.09) / (1.0 + (-0.5 * (t - 40.96f64)).exp());
             assert!((SLOW.value(0.09, 0.07, t) - printed).abs() < 1e-16);
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_are_exact_and_nothing_overflows() {
+    fn limits_are_exact_without_overflow() {
         for t in [-1e300, -10.0, 30.0] {
             assert_eq!(FAST.value(0.09, 0.07, t), 0.09);
         }
@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn there_and_back_again() {
+    fn alternating_schedule_switches_at_each_interval() {
         let often = Schedule::Alternating {
             rate_per_s: 5.0,
             midpoint_s: 20.0,

@@ -321,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn unhold_inverts_hold_for_all_pole_cases() {
+    fn inverse_zoh_inverts_zoh_for_all_pole_cases() {
         for case in cases() {
             let back = case.zoh(ts()).unwrap().inverse_zoh(ts()).unwrap();
             // The poles of a held system are determined to eps/(Ts |p1 - p2|), and double poles to sqrt(eps)/Ts. The
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn held_states_are_the_matrix_exponential() {
+    fn held_states_match_the_matrix_exponential() {
         for case in cases() {
             let ours = HeldStates::new(case.a1, case.a2, ts());
             let m = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, -case.a2, -case.a1, 1.0, 0.0, 0.0, 0.0]) * 0.01;
@@ -375,7 +375,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pole_at_the_origin_stays_there() {
+    fn integrator_pole_is_preserved() {
         let integrator = with_poles(Complex64::new(0.0, 0.0), Complex64::new(-6.0, 0.0));
         let held = integrator.zoh(ts()).unwrap();
         assert!((1.0 + held.f1 + held.f2).abs() < 1e-15);
@@ -383,7 +383,7 @@ mod tests {
     }
 
     #[test]
-    fn poles_on_the_closed_negative_axis_do_not_convert() {
+    fn poles_on_the_closed_negative_axis_are_refused() {
         let held = |f1, f2| HeldSecondOrder {
             b0: 1.0,
             b1: 0.0,
@@ -406,7 +406,7 @@ mod tests {
     }
 
     #[test]
-    fn feedthrough_survives_both_ways() {
+    fn feedthrough_round_trip() {
         let (num, f) = hold_biproper([0.7, 3.0, 11.0], [2.0, 4.0, 30.0], ts()).unwrap();
         let (back, den) = unhold_biproper(num, f, ts()).unwrap();
         for (a, b) in back.iter().zip([0.35, 1.5, 5.5]) {

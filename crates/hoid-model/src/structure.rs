@@ -300,7 +300,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn operator_orders_are_those_of_the_reference() {
+    fn operator_orders_match_the_reference() {
         let bj = Structure::BoxJenkins.operator_orders(29);
         assert_eq!(bj.to_string(), "nb=2, nd=1, nf=2, nk=29");
         assert_eq!(
@@ -317,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn every_structure_takes_its_own_orders_and_no_others() {
+    fn structure_accepts_only_its_own_orders() {
         for structure in Structure::ALL {
             let orders = structure.operator_orders(if structure.has_input() { 5 } else { 0 });
             assert!(orders.check(structure).is_ok(), "{structure}");
@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn contradictions_are_refused() {
+    fn contradictory_orders_are_refused() {
         let bj = Structure::BoxJenkins.operator_orders(29);
         assert!(bj.check(Structure::BoxJenkins).is_ok());
         assert!(
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn theta_is_complete_or_refused() {
+    fn incomplete_theta_is_refused() {
         let names: Vec<String> = ["b0", "f1"].map(str::to_owned).to_vec();
         let of = |start: &[(&str, f64)]| theta_of(&names, &start.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect());
         assert_eq!(of(&[("f1", -1.9), ("b0", 0.04)]), Ok(vec![0.04, -1.9]));

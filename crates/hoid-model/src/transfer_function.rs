@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn discrete_response_at_zero_and_nyquist() {
+    fn discrete_response_is_exact_at_zero_and_nyquist() {
         let ts = SampleTime::new(0.1).unwrap();
         let h = DiscreteTransferFunction::new(&[0.0, 0.5], &[1.0, -0.5], ts).unwrap();
         assert!((h.response(0.0) - 1.0).norm() < 1e-12);

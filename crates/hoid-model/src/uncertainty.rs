@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn no_covariance_no_standard_error() {
+    fn without_covariance_there_is_no_standard_error() {
         let nothing = vec![f64::NAN; 25];
         let estimate = operator_estimate(&model(truth()), &nothing).unwrap();
         assert_eq!(estimate.k_e.standard_error, None);
@@ -308,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_without_meaning_gives_the_reason() {
+    fn non_convertible_model_gives_the_reason() {
         let mut theta = truth();
         theta[4] = -0.05;
         assert!(matches!(

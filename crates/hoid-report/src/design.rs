@@ -89,15 +89,15 @@ fn responses(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [C
 }
 
 /// Smallest upper end of the abscissa, in runs.
-const FEWEST_RUNS: usize = 8;
+const MIN_RUNS: usize = 8;
 /// Largest upper end of the abscissa, in runs.
-const MOST_RUNS: usize = 200;
+const MAX_RUNS: usize = 200;
 
 /// Draws the expected errors as functions of the number of runs: relative to the accepted errors, or in percent of the
 /// values if no accepted errors are given. A second panel shows the number of people needed to detect a planned
 /// difference.
 pub fn runs_figure(design: &ExperimentDesign) -> String {
-    let last = (2 * design.runs_needed).max(design.runs).clamp(FEWEST_RUNS, MOST_RUNS);
+    let last = (2 * design.runs_needed).max(design.runs).clamp(MIN_RUNS, MAX_RUNS);
     let runs: Vec<f64> = (1..=last).map(|runs| runs as f64).collect();
     let of_one = |expected: &Expected| expected.clone().scaled((design.runs as f64).sqrt());
     let falling = |error: f64| runs.iter().map(|n| error / n.sqrt()).collect::<Vec<f64>>();
@@ -209,7 +209,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_design_is_drawn() {
+    fn design_figures_are_complete() {
         let request = DesignRequest {
             controlled_element: Some("4/s".parse().unwrap()),
             difference: Some(DifferenceRequest::new("crossover=10%".parse().unwrap())),

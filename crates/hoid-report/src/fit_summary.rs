@@ -122,7 +122,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_sentence_holds_what_is_known() {
+    fn summary_contains_only_known_values() {
         let loop_of = |v: f64, e: f64| Some(Estimate::with_variance(v, e * e));
         let person = [("K_e", 6.123), ("T_L", 0.6), ("omega_nm", 9.0), ("tau_e", 0.15)];
         let words = sentence(person, loop_of(2.93, 0.11), loop_of(34.2, 2.6)).unwrap();

@@ -32,7 +32,7 @@ impl<'a> Report<'a> {
             pictures: (found.described.as_ref())
                 .map(|described| through_describing_function(fit, described))
                 .into_iter()
-                .chain(to_all_inputs(found).map(|svg| Picture {
+                .chain(responses_figure(found).map(|svg| Picture {
                     svg,
                     caption: "The responses of u to each input, held over a sample, with their 95 % bands.".to_owned(),
                 }))
@@ -62,7 +62,7 @@ impl<'a> Report<'a> {
 /// input it shows the operator with the describing function of the records, or the frequency response with its bands if
 /// the records have no periodic excitation.
 pub fn operator_figure(found: &Identified) -> String {
-    match (&found.described, to_all_inputs(found)) {
+    match (&found.described, responses_figure(found)) {
         (_, Some(all)) => all,
         (Some(described), None) => picture(&found.fit, described),
         (None, None) => model_figure(&found.fit.operator(0).polynomial_fit, &found.data.records, None),
@@ -151,7 +151,7 @@ const CHANNEL_RANGE: (f64, f64) = (0.3, 16.0);
 const CHANNEL_POINTS: usize = 120;
 
 /// The figure of the responses to all inputs; `None` for a fit with a single input.
-fn to_all_inputs(found: &Identified) -> Option<String> {
+fn responses_figure(found: &Identified) -> Option<String> {
     let fit = &found.fit;
     let (low, high) = CHANNEL_RANGE;
     let high = high.min(0.9 * std::f64::consts::PI / fit.sample_time.s());

@@ -42,7 +42,7 @@ struct Row {
     error: f64,
     interval: [f64; 2],
     unit: String,
-    worth: String,
+    verdict: String,
 }
 
 impl PaperTable {
@@ -183,7 +183,7 @@ fn number(value: &Value) -> f64 {
 fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     let none = Value::Null;
     let at = |object: &Map<String, Value>, key: &str| object.get(key).cloned().unwrap_or_default();
-    let worth = &object.get("verdict").unwrap_or(&none)["of"];
+    let verdict = &object.get("verdict").unwrap_or(&none)["of"];
     // A trace is represented by its last row.
     let last = object
         .get("kind")
@@ -192,17 +192,17 @@ fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     let of = last.and_then(Value::as_object).unwrap_or(object);
     let mut rows: Vec<Row> = Vec::new();
     for p in at(of, "parameters").as_array().into_iter().flatten() {
-        rows.push(row(p["name"].as_str().unwrap_or_default(), p, worth));
+        rows.push(row(p["name"].as_str().unwrap_or_default(), p, verdict));
     }
     let known = |rows: &[Row], name: &str| rows.iter().any(|row| row.quantity == name);
     for (name, p) in at(of, "operator").as_object().into_iter().flatten() {
         if p["value"].is_number() && !known(&rows, name) && object.get("form").is_none() {
-            rows.push(row(name, p, worth));
+            rows.push(row(name, p, verdict));
         }
     }
     for (name, p) in at(of, "open_loop").as_object().into_iter().flatten() {
         if p["value"].is_number() {
-            rows.push(row(name, p, worth));
+            rows.push(row(name, p, verdict));
         }
     }
     let pairs = |of: &dyn Fn(&Row) -> f64| rows.iter().map(|row| [of(row), row.error]).collect();
@@ -216,11 +216,11 @@ fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
         column("low", Cells::End(pairs(&|row| row.interval[0]))),
         column("high", Cells::End(pairs(&|row| row.interval[1]))),
         column("unit", texts(&|row| &row.unit)),
-        column("verdict", texts(&|row| &row.worth)),
+        column("verdict", texts(&|row| &row.verdict)),
     ]
 }
 
-fn row(name: &str, p: &Value, worth: &Value) -> Row {
+fn row(name: &str, p: &Value, verdict: &Value) -> Row {
     let (value, error) = (number(&p["value"]), number(&p["standard_error"]));
     let interval = match p["interval"].as_array().map(Vec::as_slice) {
         Some([low, high]) => [number(low), number(high)],
@@ -243,7 +243,7 @@ fn row(name: &str, p: &Value, worth: &Value) -> Row {
         error,
         interval,
         unit: p["unit"].as_str().unwrap_or(of_name).to_owned(),
-        worth: match worth[quantity]["level"].as_str() {
+        verdict: match verdict[quantity]["level"].as_str() {
             _ if is_open => "not determined".to_owned(),
             level => level.unwrap_or_default().replace('-', " "),
         },
@@ -478,7 +478,7 @@ mod tests {
     }
 
     #[test]
-    fn a_result_in_latex_and_markdown() {
+    fn tables_in_latex_and_markdown_match() {
         let latex = operator().text(Markup::Latex);
         assert_eq!(
             latex,
@@ -497,7 +497,7 @@ mod tests {
     }
 
     #[test]
-    fn as_data_every_number_stands_alone() {
+    fn data_table_has_one_number_per_column() {
         let data = operator().data();
         let names: Vec<&str> = data.columns.iter().map(|column| column.name.as_str()).collect();
         assert_eq!(
@@ -511,7 +511,7 @@ mod tests {
     }
 
     #[test]
-    fn people_stand_side_by_side_and_what_is_open_is_left_out() {
+    fn people_are_columns_and_undetermined_values_omitted() {
         let person = |subject: &str, lead: bool| {
             let mut p = json!({
                 "subject": subject, "condition": "C_1", "form": "lead", "verdict": {"level": "not-determined"},

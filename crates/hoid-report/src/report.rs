@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Maximum number of records of a model whose time response is drawn.
-const MOST_TIME_RESPONSES: usize = 4;
+const MAX_TIME_RESPONSES: usize = 4;
 
 /// Contents of the page.
 #[derive(Debug, Clone, PartialEq)]
@@ -145,7 +145,7 @@ fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validat
         .zip(validations)
         .enumerate()
         .filter_map(|(k, (record, validation))| Some((k, record, validation.as_ref().ok()?)))
-        .take(MOST_TIME_RESPONSES)
+        .take(MAX_TIME_RESPONSES)
         .map(|(k, record, validation)| {
             let svg = figures::time_response(&format!("m{index}-time{k}"), record, validation);
             context! { svg => Value::from_safe_string(svg), record => cells::record_name(record, k), close_up => figures::has_close_up(record) }

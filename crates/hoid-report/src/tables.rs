@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Maximum number of candidates in a table.
-const MOST_CANDIDATES: usize = 30;
+const MAX_CANDIDATES: usize = 30;
 
 fn true_value(name: &str, truth: &OperatorParameters) -> Option<f64> {
     Some(match name {
@@ -356,7 +356,7 @@ pub fn candidates(choice: &Choice) -> Value {
                 loss => DASH, aic => DASH, bic => DASH, above => DASH, remark => reason,
             }
         }))
-        .take(MOST_CANDIDATES)
+        .take(MAX_CANDIDATES)
         .collect();
     let more = all - rows.len();
     context! { criterion => name, rows, more, all }

@@ -96,7 +96,7 @@ fn check_page(html: &str) {
 }
 
 #[test]
-fn two_models_with_truth_show_all_that_is_asked_for() {
+fn report_with_two_models_and_truth_is_complete() {
     let records = runs(1);
     let (arx, bj) = (
         fitted(Structure::Arx, &records),
@@ -141,7 +141,7 @@ fn two_models_with_truth_show_all_that_is_asked_for() {
 }
 
 #[test]
-fn the_same_data_give_the_same_bytes() {
+fn report_is_reproducible() {
     let records = runs(1);
     let fit = fitted(Structure::BoxJenkins, &records);
     let make = || page(vec![section("BJ", &fit, &records)]);
@@ -149,7 +149,7 @@ fn the_same_data_give_the_same_bytes() {
 }
 
 #[test]
-fn text_of_the_user_is_escaped() {
+fn user_text_is_escaped() {
     let hostile = "a<script>alert(1)</script> & \"b\" $x^2$";
     let records: Vec<Record> = runs(2).into_iter().map(|r| r.labelled(hostile)).collect();
     let ts = SampleTime::HUNDREDTH;
@@ -179,7 +179,7 @@ fn text_of_the_user_is_escaped() {
 }
 
 #[test]
-fn several_records_are_listed_and_at_most_four_drawn() {
+fn all_records_are_listed_and_at_most_four_drawn() {
     let records = runs(6);
     let fit = fitted(Structure::BoxJenkins, &records);
     let html = page(vec![section("BJ", &fit, &records)]);
@@ -196,7 +196,7 @@ fn several_records_are_listed_and_at_most_four_drawn() {
 }
 
 #[test]
-fn a_series_shorter_than_the_lags_has_its_figures() {
+fn series_shorter_than_the_lags_has_figures() {
     let long = runs(1).remove(0);
     let cut = |n: usize| {
         let part = |v: &[f64]| v[..n].to_vec();
@@ -238,7 +238,7 @@ fn a_series_shorter_than_the_lags_has_its_figures() {
 }
 
 #[test]
-fn an_exact_fit_says_why_it_has_no_standard_errors() {
+fn exact_fit_explains_missing_standard_errors() {
     let e: Vec<f64> = (0..300)
         .map(|k| (0.7 * f64::from(k)).sin() + (0.31 * f64::from(k * k)).cos())
         .collect();
@@ -268,7 +268,7 @@ fn an_exact_fit_says_why_it_has_no_standard_errors() {
 }
 
 #[test]
-fn candidates_are_sorted_and_cut() {
+fn candidates_are_sorted_and_truncated() {
     let records = runs(1);
     let bj = Structure::BoxJenkins;
     let mut ranges = OrderRanges::from(bj.operator_orders(29));
@@ -309,7 +309,7 @@ fn a_report_without_models_is_an_error() {
 }
 
 #[test]
-fn figures_are_the_same_twice_and_bounded_for_unstable_models() {
+fn figures_are_reproducible_and_bounded_if_unstable() {
     let records = runs(1);
     let fit = fitted(Structure::BoxJenkins, &records);
     let mut validation = fit.validate(&records[0]).unwrap();
@@ -331,7 +331,7 @@ fn figures_are_the_same_twice_and_bounded_for_unstable_models() {
 }
 
 #[test]
-fn bode_has_a_band_for_each_model_with_errors_and_the_dashed_truth() {
+fn bode_has_bands_and_a_dashed_truth() {
     let records = runs(1);
     let (arx, bj) = (
         fitted(Structure::Arx, &records),
@@ -369,7 +369,7 @@ fn bode_has_a_band_for_each_model_with_errors_and_the_dashed_truth() {
 }
 
 #[test]
-fn a_describing_function_stands_over_the_models() {
+fn describing_function_is_drawn_over_the_models() {
     let records = runs(5);
     let fit = fitted(Structure::BoxJenkins, &records);
     let model = figures::BodeModel {

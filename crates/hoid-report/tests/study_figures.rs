@@ -27,7 +27,7 @@ impl Noise {
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }
 
-    fn bell(&mut self) -> f64 {
+    fn normal(&mut self) -> f64 {
         // The third power of a sum has heavy tails and therefore outliers.
         let sum = self.next() + self.next() + self.next();
         sum + 0.3 * sum.powi(3)
@@ -59,7 +59,7 @@ fn boxes(range: BoxRange, method: usize) -> BoxGrid {
             let mut sample = |group: usize, series: usize| {
                 let centre = scale * (series as f64) * (1.0 + row as f64) * (0.3 + 0.2 * (group as f64 - 2.0));
                 let values: Vec<f64> = (0..100)
-                    .map(|_| centre + 0.15 * scale * (0.1 + series as f64) * noise.bell())
+                    .map(|_| centre + 0.15 * scale * (0.1 + series as f64) * noise.normal())
                     .collect();
                 match (column, group, series) {
                     (3, 4, 3) => BoxStatistics::default(),
@@ -338,7 +338,7 @@ fn averages() -> TraceGrid {
                     let values = times.iter().map(|t| {
                         let wanted = truth(row, *t) * (1.0 + bias);
                         estimate +=
-                            0.004 * (wanted - estimate + 0.3 * wanted * (1.0 + level as f64) * 0.3 * noise.bell());
+                            0.004 * (wanted - estimate + 0.3 * wanted * (1.0 + level as f64) * 0.3 * noise.normal());
                         estimate
                     });
                     curves.push(TraceCurve {
@@ -415,8 +415,8 @@ fn figures() -> Vec<(&'static str, String)> {
     both.groups = ["nominal", "no hold", "fixed f_s", "a long name here", "short"]
         .map(str::to_owned)
         .to_vec();
-    let mut beside = errors();
-    beside.columns = 2;
+    let mut two_columns = errors();
+    two_columns.columns = 2;
     let mut shared_averages = averages();
     shared_averages.shared_ordinates = true;
     vec![
@@ -452,7 +452,10 @@ fn figures() -> Vec<(&'static str, String)> {
         ("bode_grid", bode_grid("bode_grid", "Frequency responses", &bode())),
         ("obtained", curves("obtained", "Noise levels", &obtained())),
         ("errors", curves("errors", "Errors over memory", &errors())),
-        ("errors_beside", curves("errors_beside", "Errors over memory", &beside)),
+        (
+            "errors_beside",
+            curves("errors_beside", "Errors over memory", &two_columns),
+        ),
         ("spectrum", curves("spectrum", "Forcing function", &spectrum())),
         ("schedules", curves("schedules", "Gain over time", &schedules())),
         ("averages", trace_panels("averages", "Recursive estimates", &averages())),
@@ -464,7 +467,7 @@ fn figures() -> Vec<(&'static str, String)> {
 }
 
 #[test]
-fn figures_are_whole_and_the_same_each_time() {
+fn figures_are_complete_and_reproducible() {
     let again = figures();
     for ((name, svg), (_, second)) in figures().iter().zip(&again) {
         assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>"), "{name}");
@@ -481,7 +484,7 @@ fn figures_are_whole_and_the_same_each_time() {
 
 /// In print 420 units are 85 mm, so 7 pt are 12.2 units.
 #[test]
-fn type_is_seven_points_in_print_but_for_subscripts() {
+fn text_is_seven_points_in_print_except_subscripts() {
     for (name, svg) in figures() {
         let sizes = |tag: &str| -> Vec<f64> {
             let tags = svg.split(tag).skip(1).filter_map(|rest| rest.split_once('>'));

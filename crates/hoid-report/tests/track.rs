@@ -99,7 +99,7 @@ fn figure<'a>(html: &'a str, id: &str) -> &'a str {
 }
 
 #[test]
-fn three_methods_over_each_other_show_all_that_is_asked_for() {
+fn report_with_three_methods_is_complete() {
     let record = run();
     let (arx, bj) = (fits(Structure::Arx, &record), fits(Structure::BoxJenkins, &record));
     let traces = [Method::rls(), Method::rpem(), hoid_survey::physical()].map(|m| tracked(m, &record));
@@ -175,7 +175,7 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
 }
 
 #[test]
-fn a_recording_has_no_truth() {
+fn report_of_a_recording_shows_no_truth() {
     let simulated = run();
     let record = Record::new(
         simulated.sample_time(),
@@ -195,7 +195,7 @@ fn a_recording_has_no_truth() {
 }
 
 #[test]
-fn a_start_from_nothing_and_shortened_steps_are_told() {
+fn start_from_nothing_and_shortened_steps_are_reported() {
     let record = run();
     let mut options = options(Method::rpem());
     options.start = StartAt::Nothing;
@@ -211,7 +211,7 @@ fn a_start_from_nothing_and_shortened_steps_are_told() {
 }
 
 #[test]
-fn orders_that_are_no_operator_have_coefficients_alone() {
+fn non_operator_orders_show_only_coefficients() {
     let record = run();
     let orders = Orders {
         na: 1,
@@ -230,7 +230,7 @@ fn orders_that_are_no_operator_have_coefficients_alone() {
 }
 
 #[test]
-fn short_records_and_averages_have_their_page() {
+fn short_records_and_averages_are_reported() {
     let long = run();
     let record = long.span(0.0, 8.0).unwrap();
     let mut options = options(Method::rls());
@@ -260,7 +260,7 @@ fn short_records_and_averages_have_their_page() {
 }
 
 #[test]
-fn the_delay_is_shown_where_it_is_tracked() {
+fn tracked_delay_is_shown() {
     let record = run();
     let mut with_delay = options(hoid_survey::physical());
     with_delay.method.set("track_delay", "0.2..0.4").unwrap();
@@ -274,7 +274,7 @@ fn the_delay_is_shown_where_it_is_tracked() {
 }
 
 #[test]
-fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
+fn batch_fit_has_the_delay_of_its_span() {
     let mut scenario = Scenario::condition(Condition::C4);
     scenario.last.operator.tau_e_s = 0.34;
     let record = Simulator::new(&scenario)
@@ -292,7 +292,7 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
 }
 
 #[test]
-fn windows_and_instruments_have_their_page() {
+fn window_and_instrument_methods_are_reported() {
     let record = run();
     let mut window = options(hoid_survey::window());
     window.method.set("refit", "500").unwrap();
@@ -308,7 +308,7 @@ fn windows_and_instruments_have_their_page() {
 }
 
 #[test]
-fn reports_of_no_trace_or_of_too_many_are_errors() {
+fn no_trace_or_too_many_traces_are_errors() {
     let record = run();
     assert!(matches!(
         report(&record, Vec::new()).to_html(),

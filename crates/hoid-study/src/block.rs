@@ -135,7 +135,7 @@ impl<'a> CellRun<'a> {
                 if !should_continue() {
                     return None;
                 }
-                self.rows.begin(estimator, *replication);
+                self.rows.start_row(estimator, *replication);
                 let fit = fits.fit_of(place, index);
                 let outcome = match task {
                     Task::Describe => self.describe(simulator, record),
@@ -235,7 +235,7 @@ impl<'a> CellRun<'a> {
 
     fn fail_all(&mut self, replication: u64, reason: &str, done: &(dyn Fn(u64) + Sync)) {
         for (estimator, _) in self.estimators.clone() {
-            self.rows.begin(estimator, replication);
+            self.rows.start_row(estimator, replication);
             self.rows.failed(reason);
             done(1);
         }

@@ -20,7 +20,7 @@ use crate::plan::{Plan, Task, analysis};
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 /// Quantities evaluated in a trace: the parameters of the operator and the delay, in the order of
 /// [`hoid_model::uncertainty::OperatorEstimate::rows`].
-pub(crate) const TRACED: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
+pub(crate) const TRACED_QUANTITIES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
 /// Rows of a table with given columns.
 #[derive(Debug, Clone)]
@@ -53,7 +53,7 @@ impl Rows {
     }
 
     /// Starts a row in which texts are empty, real numbers are NaN, and whole numbers are zero.
-    pub fn begin(&mut self) {
+    pub fn start_row(&mut self) {
         self.rows += 1;
         for column in &mut self.columns {
             match &mut column.values {
@@ -149,7 +149,7 @@ pub(crate) fn comments(plan: &Plan) -> Vec<String> {
 
 /// Returns the axes without a dedicated column; each of them gets a column with its name.
 pub(crate) fn extra_axes(plan: &Plan) -> Vec<String> {
-    const KNOWN: [&str; 15] = [
+    const DEDICATED_COLUMNS: [&str; 15] = [
         "name",
         "condition",
         "sample_time_s",
@@ -170,7 +170,8 @@ pub(crate) fn extra_axes(plan: &Plan) -> Vec<String> {
     let of_estimators = plan.estimators.iter().flat_map(|estimator| &estimator.axes);
     let mut names: Vec<String> = Vec::new();
     for axis in of_cells.chain(of_estimators) {
-        let has_column = KNOWN.contains(&axis.key.as_str()) || axis.key == "start" || axis.key == "decimate";
+        let has_column =
+            DEDICATED_COLUMNS.contains(&axis.key.as_str()) || axis.key == "start" || axis.key == "decimate";
         if !has_column && !names.contains(&axis.key) {
             names.push(axis.key.clone());
         }
@@ -253,7 +254,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
         c.add(Real, &["change_found"]);
     }
     if plan.estimators.iter().any(|e| matches!(e.task, Task::Track(_))) {
-        for name in TRACED {
+        for name in TRACED_QUANTITIES {
             c.add(
                 Real,
                 &[
@@ -264,7 +265,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
             );
         }
         if plan.changes {
-            for name in TRACED {
+            for name in TRACED_QUANTITIES {
                 let of = ["before", "after", "covered", "covered_through"].map(|what| format!("{what}_{name}"));
                 c.add(Real, &of.each_ref().map(String::as_str));
             }

@@ -26,12 +26,12 @@ use hoid_model::{Complex64, Orders, PolynomialModel, Record, Structure, uncertai
 use hoid_numerics::statistics::mean;
 use hoid_track::{StartAt, Trace};
 
-use crate::{columns::TRACED, plan::Cell};
+use crate::{columns::TRACED_QUANTITIES, plan::Cell};
 
 /// Time after which the errors of a trace are evaluated, s.
 const ERRORS_FROM_S: f64 = 10.0;
 /// Magnitude of a coefficient above which a recursion has diverged.
-const DIVERGED: f64 = 10.0;
+const DIVERGENCE_LIMIT: f64 = 10.0;
 
 /// True response of the operator at the lines of the forcing function.
 pub(crate) struct TrueResponse {
@@ -69,9 +69,9 @@ impl TrueResponse {
 
 /// Errors of a trace relative to the true parameters of its record.
 pub(crate) struct TraceErrors {
-    pub rms_percent: [f64; TRACED.len()],
+    pub rms_percent: [f64; TRACED_QUANTITIES.len()],
     /// Times from the change until 50 and 90 % of the step are covered, s.
-    pub settled_s: [[f64; TRACED.len()]; 2],
+    pub settled_s: [[f64; TRACED_QUANTITIES.len()]; 2],
     pub diverged: bool,
     pub share_not_convertible: f64,
 }
@@ -79,18 +79,18 @@ pub(crate) struct TraceErrors {
 impl TraceErrors {
     pub fn of(trace: &Trace, record: &Record, cell: &Cell) -> Self {
         let scenario = cell.resolved.scenario();
-        let truth = TRACED.map(|name| record.channel(name).unwrap_or_default());
+        let truth = TRACED_QUANTITIES.map(|name| record.channel(name).unwrap_or_default());
         let values = |state: &hoid_model::scenario::OperatingState| {
             let o = OperatorEstimate::from(state.operator).rows();
             [0, 1, 2, 3, 4, 5].map(|i| o[i].2.value)
         };
         let (from, to) = (values(&scenario.initial), values(&scenario.last));
         let change_s = scenario.schedule.change_s().unwrap_or(f64::INFINITY);
-        let (mut sums, mut converted, mut counted) = ([0.0; TRACED.len()], 0usize, 0usize);
-        let mut settled_s = [[f64::NAN; TRACED.len()]; 2];
+        let (mut sums, mut converted, mut counted) = ([0.0; TRACED_QUANTITIES.len()], 0usize, 0usize);
+        let mut settled_s = [[f64::NAN; TRACED_QUANTITIES.len()]; 2];
         let mut diverged = false;
         for (row, t) in trace.times_s().iter().enumerate() {
-            let bad = |v: &f64| !v.is_finite() || v.abs() > DIVERGED;
+            let bad = |v: &f64| !v.is_finite() || v.abs() > DIVERGENCE_LIMIT;
             diverged |= trace.theta(row).iter().any(bad);
             if *t < ERRORS_FROM_S - 1e-9 {
                 continue;
@@ -134,11 +134,11 @@ const BAND: f64 = 1.96;
 /// Measures of how a trace responds to a change: its bias, its bands and its declared changes.
 pub(crate) struct ChangeMeasures {
     /// Mean relative error before the change and, in `after_percent`, at the end, %.
-    pub before_percent: [f64; TRACED.len()],
-    pub after_percent: [f64; TRACED.len()],
+    pub before_percent: [f64; TRACED_QUANTITIES.len()],
+    pub after_percent: [f64; TRACED_QUANTITIES.len()],
     /// Coverage of the bands after the start fit and, in `covered_through_percent`, within 5 s after a change, %.
-    pub covered_percent: [f64; TRACED.len()],
-    pub covered_through_percent: [f64; TRACED.len()],
+    pub covered_percent: [f64; TRACED_QUANTITIES.len()],
+    pub covered_through_percent: [f64; TRACED_QUANTITIES.len()],
     pub false_alarms: f64,
     pub hours: f64,
     pub found_percent: f64,
@@ -163,7 +163,7 @@ impl Mean {
 impl ChangeMeasures {
     pub fn of(trace: &Trace, record: &Record, cell: &Cell) -> Self {
         let scenario = cell.resolved.scenario();
-        let truth = TRACED.map(|name| record.channel(name).unwrap_or_default());
+        let truth = TRACED_QUANTITIES.map(|name| record.channel(name).unwrap_or_default());
         let end_s = record.time_s(record.len());
         let changes_s = scenario.schedule.changes_s(end_s);
         let first_s = changes_s.first().copied().unwrap_or(f64::INFINITY);
@@ -174,7 +174,7 @@ impl ChangeMeasures {
             _ => trace.updated_from_s(),
         };
         let within = |t: f64| changes_s.iter().any(|c| (*c..*c + DECLARATION_TIME_S).contains(&t));
-        let [mut before, mut after, mut covered, mut through] = [[Mean::default(); TRACED.len()]; 4];
+        let [mut before, mut after, mut covered, mut through] = [[Mean::default(); TRACED_QUANTITIES.len()]; 4];
         for (row, t) in trace.times_s().iter().enumerate() {
             let Ok(found) = trace.operator(row) else { continue };
             let k = ((t - record.time_s(0)) / record.sample_time().s()).round() as usize;

@@ -14,7 +14,7 @@ use hoid_numerics::statistics::{root_mean_square, variance};
 use hoid_track::Trace;
 
 use crate::{
-    columns::{OPERATOR, Rows, Schemas, TRACED, extra_axes},
+    columns::{OPERATOR, Rows, Schemas, TRACED_QUANTITIES, extra_axes},
     error_measures::{ChangeMeasures, TraceErrors, TrueResponse},
     plan::{Cell, EstimatorCell, Plan},
 };
@@ -67,10 +67,10 @@ impl<'a> EstimateRows<'a> {
     }
 
     /// Starts the row of an estimate with the settings of the scenario and the estimator.
-    pub fn begin(&mut self, estimator: &EstimatorCell, replication: u64) {
+    pub fn start_row(&mut self, estimator: &EstimatorCell, replication: u64) {
         let (cell, rows) = (self.cell, &mut self.fits);
         let scenario = cell.resolved.scenario();
-        rows.begin();
+        rows.start_row();
         rows.whole("cell", cell.index);
         rows.text("scenario", &cell.scenario);
         rows.text("condition", &cell.condition);
@@ -260,14 +260,14 @@ impl<'a> EstimateRows<'a> {
         }
         let errors = TraceErrors::of(trace, record, self.cell);
         let rows = &mut self.fits;
-        for (i, name) in TRACED.iter().enumerate() {
+        for (i, name) in TRACED_QUANTITIES.iter().enumerate() {
             rows.real(&format!("rms_{name}"), errors.rms_percent[i]);
             rows.real(&format!("settle50_{name}"), errors.settled_s[0][i]);
             rows.real(&format!("settle90_{name}"), errors.settled_s[1][i]);
         }
         if self.plan.changes {
             let measures = ChangeMeasures::of(trace, record, self.cell);
-            for (i, name) in TRACED.iter().enumerate() {
+            for (i, name) in TRACED_QUANTITIES.iter().enumerate() {
                 rows.real(&format!("before_{name}"), measures.before_percent[i]);
                 rows.real(&format!("after_{name}"), measures.after_percent[i]);
                 rows.real(&format!("covered_{name}"), measures.covered_percent[i]);
@@ -315,7 +315,7 @@ impl<'a> EstimateRows<'a> {
             }
         };
         for k in (step - 1..trace.len()).step_by(step) {
-            rows.begin();
+            rows.start_row();
             rows.whole("cell", self.cell.index);
             rows.whole("replication", replication);
             rows.text("estimator", &estimator.label);

@@ -68,7 +68,7 @@ fn decimated(record: &Record, n: usize) -> Result<Record, String> {
         .starting_at(record.time_s(0));
     for channel in record
         .channels()
-        .filter(|c| thin_lacks(&thin, c))
+        .filter(|c| is_missing_from_thinned(&thin, c))
         .map(thinned)
         .collect::<Vec<_>>()
     {
@@ -77,6 +77,6 @@ fn decimated(record: &Record, n: usize) -> Result<Record, String> {
     Ok(thin)
 }
 
-fn thin_lacks(thin: &Record, channel: &Channel) -> bool {
+fn is_missing_from_thinned(thin: &Record, channel: &Channel) -> bool {
     thin.channel(&channel.name).is_none()
 }

@@ -89,19 +89,19 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 }
 
 /// Maximum number of damaged blocks that are reported individually.
-const MOST_NAMED: usize = 5;
+const MAX_NAMED: usize = 5;
 
 /// Returns notes on damaged blocks, which are computed again.
 pub(crate) fn notes_on(damaged: &[(u64, String)]) -> Vec<String> {
     let mut notes: Vec<String> = damaged
         .iter()
-        .take(MOST_NAMED)
+        .take(MAX_NAMED)
         .map(|(block, why)| format!("block {block} is damaged ({why}) and was recomputed"))
         .collect();
-    if damaged.len() > MOST_NAMED {
+    if damaged.len() > MAX_NAMED {
         notes.push(format!(
             "further damaged blocks that were recomputed: {}",
-            damaged.len() - MOST_NAMED
+            damaged.len() - MAX_NAMED
         ));
     }
     notes
@@ -116,7 +116,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_byte_of_a_block_counts() {
+    fn any_changed_byte_damages_a_block() {
         let dir = tempfile::tempdir().unwrap();
         let d = dir.path();
         fs::create_dir(d.join("parts")).unwrap();
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn many_damaged_blocks_are_counted() {
         let all: Vec<(u64, String)> = (0..9).map(|block| (block, "cut".to_owned())).collect();
-        assert_eq!(notes_on(&all).len(), MOST_NAMED + 1);
+        assert_eq!(notes_on(&all).len(), MAX_NAMED + 1);
         assert!(notes_on(&[]).is_empty());
     }
 }

@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_box_by_hand() {
+    fn box_statistics_match_a_manual_example() {
         // In NumPy, quantile([1..9, 100], [.25, .5, .75]) = 3.25, 5.5, 7.75; the whiskers are within 3.25 - 6.75 and
         // 7.75 + 6.75.
         let values = [5.0, 1.0, 9.0, 100.0, 2.0, 8.0, 3.0, 7.0, 4.0, 6.0];
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn few_equal_and_missing_values() {
+    fn few_equal_or_missing_values_are_handled() {
         let none = Statistics::of(&[f64::NAN, f64::INFINITY]);
         assert_eq!((none.count, none.missing), (0, 2));
         assert!(none.median.is_nan());
@@ -192,7 +192,7 @@ mod tests {
     /// Compares the computed Monte Carlo errors with the spread of mean, standard deviation and median over many
     /// samples of 100 normal and of 100 uniform numbers.
     #[test]
-    fn monte_carlo_errors_are_the_spread_that_they_claim() {
+    fn monte_carlo_errors_match_the_observed_spread() {
         // With 4000 samples, the standard error of a standard deviation is 1.1 %; the mean of the computed errors is
         // much more accurate. At n = 100, the error of the median of uniform numbers from order statistics is 6 % too
         // small, a small-sample effect of the interpolation.

@@ -75,11 +75,11 @@ pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
         ]
         .map(|n| (n.to_owned(), Real)),
     );
-    const STATE: [&str; 10] = [
+    const STATE_COLUMNS: [&str; 10] = [
         "K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "f1", "f2", "b0", "b1", "K_n",
     ];
     for when in ["initial", "last"] {
-        columns.extend(STATE.map(|name| (format!("{name}_{when}"), Real)));
+        columns.extend(STATE_COLUMNS.map(|name| (format!("{name}_{when}"), Real)));
         columns.push((format!("tau_e_{when}"), Real));
     }
     let schema = TableSchema {
@@ -92,7 +92,7 @@ pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
     let mut rows = Rows::new(&schema);
     for cell in &plan.cells {
         let scenario = cell.resolved.scenario();
-        rows.begin();
+        rows.start_row();
         rows.whole("cell", cell.index);
         rows.text("scenario", &cell.scenario);
         rows.text("condition", &cell.condition);
@@ -114,7 +114,7 @@ pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
             for (name, value) in OPERATOR.iter().zip(state.operator) {
                 rows.real(&format!("{name}_{when}"), value);
             }
-            for (name, value) in STATE[5..9].iter().zip(state.discrete) {
+            for (name, value) in STATE_COLUMNS[5..9].iter().zip(state.discrete) {
                 rows.real(&format!("{name}_{when}"), value);
             }
             rows.real(&format!("K_n_{when}"), state.k_n);

@@ -133,7 +133,7 @@ fn is_operator(table: &OutputTable, row: usize, found: &Identified) {
 
 /// Each row is bit-identical to the result of analysing that run with the options of the plan.
 #[test]
-fn a_row_is_the_analysis_of_the_run() {
+fn rows_match_single_run_analyses() {
     let (directory, fits) = fits(PLAN);
     let steady = || Recordings::of_records([record(Condition::C1, 0)]);
     let changed = || Recordings::of_records([record(Condition::C4, 1)]);
@@ -198,7 +198,7 @@ fn a_row_is_the_analysis_of_the_run() {
 
 /// The lead of a form with a lag is not an estimate of the simulated lead.
 #[test]
-fn a_lead_of_another_form_has_no_bias() {
+fn lead_of_another_form_has_no_bias() {
     let text = PLAN.replace("form = \"lead\"", "form = \"lead-lag\"");
     let (directory, fits) = fits(&text);
     let at = row(&fits, "steady", "lead");
@@ -211,7 +211,7 @@ fn a_lead_of_another_form_has_no_bias() {
 
 /// A failed fit is a row with its reason, and has no verdict.
 #[test]
-fn a_run_that_cannot_be_fitted_says_why() {
+fn failed_fits_are_rows_with_a_reason() {
     let text = PLAN.replace("method = ", "span_s = [0.0, 0.05]\nmethod = ");
     let (directory, fits) = fits(&text);
     assert_eq!(rows(&fits), 2 * (3 + 4));

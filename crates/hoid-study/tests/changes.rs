@@ -34,7 +34,7 @@ start_span_s = [0.0, 30.72]
 "#;
 
 #[test]
-fn changes_there_and_back_are_found_and_measured() {
+fn alternating_changes_are_found_and_measured() {
     let directory = tempfile::tempdir().unwrap();
     let plan = Plan::parse(PLAN, "changes.toml").unwrap();
     let finished = run(&plan, directory.path(), &RunOptions::default(), &|_| (), &|| true).unwrap();
@@ -66,7 +66,7 @@ fn changes_there_and_back_are_found_and_measured() {
 }
 
 #[test]
-fn the_comparison_has_nine_methods_in_all_kinds_of_change() {
+fn adaptation_plan_has_eleven_estimators() {
     let plan = PLANS
         .iter()
         .find(|plan| plan.name == "adaptation")

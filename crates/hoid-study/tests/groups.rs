@@ -56,7 +56,7 @@ fn manifest(directory: &Path) -> Manifest {
 }
 
 #[test]
-fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
+fn group_recovers_its_people_and_can_be_resumed() {
     let data = recorded();
     let manifest = manifest(data.path());
     let out = tempfile::tempdir().unwrap();
@@ -207,7 +207,7 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
 }
 
 #[test]
-fn a_polynomial_model_that_is_not_asked_for_is_in_no_table() {
+fn only_requested_polynomials_are_in_the_tables() {
     let data = recorded();
     let mut manifest = manifest(data.path());
     manifest.runs.retain(|run| run.subject == "A" && run.condition == "C1");
@@ -237,7 +237,7 @@ fn a_polynomial_model_that_is_not_asked_for_is_in_no_table() {
 }
 
 #[test]
-fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
+fn bad_files_are_failed_rows_and_bad_manifests_errors() {
     let data = recorded();
     let mut manifest = manifest(data.path());
     manifest.runs.truncate(2);
@@ -288,16 +288,16 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
     }
     let empty = tempfile::tempdir().unwrap();
     let pattern = Pattern::new("{run}.csv").unwrap();
-    let said = |pattern: &Pattern| match Manifest::of_directory(empty.path(), pattern) {
+    let error_for = |pattern: &Pattern| match Manifest::of_directory(empty.path(), pattern) {
         Err(error @ StudyError::NoRuns { .. }) => error.to_string(),
         other => panic!("{other:?}"),
     };
-    assert!(said(&pattern).contains("matches {run}.csv; found no files"));
+    assert!(error_for(&pattern).contains("matches {run}.csv; found no files"));
     for n in 1..=4 {
         std::fs::write(empty.path().join(format!("anna-{n}.csv")), "").unwrap();
     }
     let pattern = Pattern::new("{subject}_{run}*.csv").unwrap();
-    let message = said(&pattern);
+    let message = error_for(&pattern);
     assert!(
         message.contains("{subject}_{run}*.csv; found anna-1.csv, anna-2.csv, anna-3.csv and 1 more"),
         "{message}"
@@ -306,7 +306,7 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
 
 /// Runs of two persons are joined, and the fits agree with the describing function.
 #[test]
-fn joined_runs_settle_and_fits_agree_with_the_describing_function() {
+fn joined_runs_agree_with_the_describing_function() {
     let data = recorded();
     let text = r#"
 name = "joined"
@@ -407,7 +407,7 @@ run = "2"
 /// One more sample of delay in every file increases nk by one, both with the delay of the person's operator (C1) and
 /// with the joint fits to all runs (C4, for which a change is declared).
 #[test]
-fn the_delay_moves_with_the_output() {
+fn delay_increases_with_an_output_offset() {
     let data = recorded();
     let late = tempfile::tempdir().unwrap();
     let mut manifest = manifest(data.path());
@@ -458,9 +458,9 @@ fn the_delay_moves_with_the_output() {
         }
     }
     // If the manifest states that u is recorded late, the operator is unchanged, but the orders increase.
-    let mut told = manifest.clone();
-    told.conditions.get_mut("C1").unwrap().offset_samples = 1.0;
-    let (late_nk, told_s) = found(&told, late.path(), "told");
+    let mut with_delay = manifest.clone();
+    with_delay.conditions.get_mut("C1").unwrap().offset_samples = 1.0;
+    let (late_nk, told_s) = found(&with_delay, late.path(), "told");
     assert!((told_s - tau_s).abs() < 1e-3, "{told_s} {tau_s}");
     assert_eq!(late_nk[1], after[1]);
 }

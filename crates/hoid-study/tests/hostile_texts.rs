@@ -173,7 +173,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(22), ..ProptestConfig::with_cases(150) })]
 
     #[test]
-    fn plans(by in vec(change(), 0..5)) {
+    fn damaged_plans_are_errors_or_round_trip(by in vec(change(), 0..5)) {
         match Plan::parse(&changed(PLAN, &by), "made-up.toml") {
             Err(error) => message(&error.to_string())?,
             Ok(plan) => {
@@ -185,7 +185,7 @@ proptest! {
     }
 
     #[test]
-    fn manifests(by in vec(change(), 0..5)) {
+    fn damaged_manifests_are_errors_or_round_trip(by in vec(change(), 0..5)) {
         match Manifest::parse(&changed(MANIFEST, &by), "made-up.toml") {
             Err(error) => message(&error.to_string())?,
             Ok(manifest) => {
@@ -196,7 +196,7 @@ proptest! {
     }
 
     #[test]
-    fn scenarios(of_a_person in any::<bool>(), by in vec(change(), 0..5)) {
+    fn damaged_scenarios_give_readable_errors(of_a_person in any::<bool>(), by in vec(change(), 0..5)) {
         let text = fixture(if of_a_person { "person.toml" } else { "full.toml" });
         if let Err(error) = parse_any_scenario(&changed(&text, &by), "made-up.toml", "made-up") {
             message(&error.to_string())?;
@@ -205,7 +205,7 @@ proptest! {
 }
 
 #[test]
-fn the_texts_are_good_before_they_are_changed() {
+fn unchanged_texts_are_valid() {
     Plan::parse(PLAN, "plan.toml").unwrap();
     Manifest::parse(MANIFEST, "group.toml").unwrap();
     for name in ["person.toml", "full.toml"] {

@@ -3,7 +3,7 @@
 
 use hoid_study::{Plan, plan_schema};
 
-const GOOD: &str = "name = \"x\"
+const GOOD_PLAN: &str = "name = \"x\"
 replications = 10
 
 [[scenarios]]
@@ -25,7 +25,7 @@ memory = 256
 
 #[test]
 fn bad_plans_name_line_and_remedy() {
-    assert!(Plan::parse(GOOD, "good.toml").is_ok());
+    assert!(Plan::parse(GOOD_PLAN, "good.toml").is_ok());
     let cases = [
         // (text to replace, replacement, line, words of the message)
         ("name = \"x\"", "nam = \"x\"", 1, vec!["unknown field", "nam"]),
@@ -115,8 +115,8 @@ fn bad_plans_name_line_and_remedy() {
         ("[[scenarios]]", "[[scenarios]\n", 4, vec![]),
     ];
     for (from, to, line, words) in cases {
-        let text = GOOD.replacen(from, to, 1);
-        assert_ne!(text, GOOD, "{from}");
+        let text = GOOD_PLAN.replacen(from, to, 1);
+        assert_ne!(text, GOOD_PLAN, "{from}");
         let message = Plan::parse(&text, "bad.toml").expect_err(to).to_string();
         assert!(
             message.starts_with(&format!("plan bad.toml, line {line}:")),
@@ -133,7 +133,7 @@ fn bad_plans_name_line_and_remedy() {
 #[test]
 fn options_of_an_operator_are_checked() {
     let of = |text: &str| {
-        let text = GOOD.replace("method = \"rls\"\nmemory = 256", text);
+        let text = GOOD_PLAN.replace("method = \"rls\"\nmemory = 256", text);
         Plan::parse(&text, "bad.toml")
     };
     for text in [
@@ -208,13 +208,13 @@ fn options_of_an_operator_are_checked() {
 }
 
 #[test]
-fn a_plan_without_scenarios_or_estimators_says_so() {
+fn missing_scenarios_or_estimators_are_errors() {
     for key in ["scenarios", "estimators"] {
-        let text = GOOD.replace(&format!("[[{key}]]"), "[[other]]");
+        let text = GOOD_PLAN.replace(&format!("[[{key}]]"), "[[other]]");
         let message = Plan::parse(&text, "bad.toml").unwrap_err().to_string();
         assert!(message.contains(&format!("[[{key}]]")), "{message}");
     }
-    let unused = format!("{GOOD}\n[[scenarios]]\nname = \"idle\"\ncondition = \"C2\"\n")
+    let unused = format!("{GOOD_PLAN}\n[[scenarios]]\nname = \"idle\"\ncondition = \"C2\"\n")
         .replace("method = \"fit\"", "method = \"fit\"\nscenarios = [\"C1\"]");
     let unused = unused.replace("method = \"rls\"", "method = \"rls\"\nscenarios = [\"C1\"]");
     let message = Plan::parse(&unused, "bad.toml").unwrap_err().to_string();
@@ -222,9 +222,9 @@ fn a_plan_without_scenarios_or_estimators_says_so() {
 }
 
 #[test]
-fn cells_follow_the_order_of_the_file() {
+fn cells_follow_file_order() {
     let plan = Plan::parse(
-        &GOOD.replace("noise_level = 0.1", "noise_level = [0.0, 0.2]"),
+        &GOOD_PLAN.replace("noise_level = 0.1", "noise_level = [0.0, 0.2]"),
         "good.toml",
     )
     .unwrap();
@@ -243,9 +243,9 @@ fn cells_follow_the_order_of_the_file() {
 
 /// A plan with the earlier name of a method is equivalent to a plan with the current name.
 #[test]
-fn an_earlier_name_of_a_method_is_read() {
+fn former_method_name_is_accepted() {
     let by = |method: &str| {
-        let text = GOOD.replace("method = \"rls\"\nmemory = 256", &format!("method = \"{method}\""));
+        let text = GOOD_PLAN.replace("method = \"rls\"\nmemory = 256", &format!("method = \"{method}\""));
         Plan::parse(&text, "good.toml").unwrap().estimators
     };
     assert_eq!(by("population"), by("adaptive"));
@@ -254,7 +254,7 @@ fn an_earlier_name_of_a_method_is_read() {
 
 /// The published schema equals that of the program.
 #[test]
-fn the_book_has_the_schema() {
+fn documented_schema_is_current() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/plan.schema.json");
     let schema = plan_schema();
     if std::env::var_os("HOID_UPDATE_DOCS").is_some() {

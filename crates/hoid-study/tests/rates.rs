@@ -39,7 +39,7 @@ fn analysed(directory: &Path, sample_time_s: f64) -> (Manifest, [(f64, f64); 3])
 }
 
 #[test]
-fn a_group_at_1000_hz_is_that_at_100_hz() {
+fn group_at_1000_hz_matches_100_hz() {
     let directory = tempfile::tempdir().unwrap();
     let (fast, slow) = (directory.path().join("fast"), directory.path().join("slow"));
     fs::create_dir(&fast).unwrap();
@@ -48,10 +48,11 @@ fn a_group_at_1000_hz_is_that_at_100_hz() {
     let (_, at_100_hz) = analysed(&slow, 0.01);
     let (files, out) = (fast.join("files"), fast.join("out"));
     let steps = read_table(&out.join("preparation.parquet")).unwrap();
-    let said = "1000 Hz, filtered and decimated by 10 to 100 Hz";
-    let told = texts(&steps, "step").iter().zip(texts(&steps, "what"));
+    let expected = "1000 Hz, filtered and decimated by 10 to 100 Hz";
+    let step_texts = texts(&steps, "step").iter().zip(texts(&steps, "what"));
     assert_eq!(
-        told.filter(|(step, what)| *step == "rate" && what.starts_with(said))
+        step_texts
+            .filter(|(step, what)| *step == "rate" && what.starts_with(expected))
             .count(),
         3
     );
@@ -107,7 +108,7 @@ fn a_group_at_1000_hz_is_that_at_100_hz() {
 }
 
 #[test]
-fn the_rate_of_a_group_as_typed() {
+fn decimation_settings_are_parsed() {
     let of = |decimate: Option<NumberOrText>, rate_hz| PreparationSettings {
         decimate,
         rate_hz,

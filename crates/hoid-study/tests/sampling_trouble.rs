@@ -59,7 +59,7 @@ fn only(found: &[Found], kinds: &[QualityIssueKind]) {
 }
 
 #[test]
-fn jitter_and_clocks_have_the_size_that_was_planted() {
+fn jitter_and_clock_errors_have_the_simulated_size() {
     for (found, _) in found(&[SamplingDefect::Jitter], &resampled()) {
         only(&found, &[QualityIssueKind::Jitter]);
         // Jitter of 0.2 of a sample, which is clamped at 2.25 standard deviations, has an RMS value of 0.194.
@@ -72,7 +72,7 @@ fn jitter_and_clocks_have_the_size_that_was_planted() {
 }
 
 #[test]
-fn missing_and_repeated_rows_are_counted_one_by_one() {
+fn missing_and_repeated_rows_are_counted_individually() {
     for trouble in [
         vec![SamplingDefect::Missing],
         vec![SamplingDefect::Missing, SamplingDefect::Jitter],
@@ -98,7 +98,7 @@ fn missing_and_repeated_rows_are_counted_one_by_one() {
 }
 
 #[test]
-fn rails_steps_and_stalls_are_found_where_they_are() {
+fn saturation_quantisation_and_stalls_are_located() {
     for (found, record) in found(&[SamplingDefect::Saturated], &ReadOptions::default()) {
         only(&found, &[QualityIssueKind::Saturated, QualityIssueKind::Saturated]);
         let u = record.output();
@@ -131,7 +131,7 @@ fn rails_steps_and_stalls_are_found_where_they_are() {
 }
 
 #[test]
-fn a_record_is_cut_where_it_is_masked() {
+fn masks_split_the_record() {
     let directory = tempfile::tempdir().unwrap();
     simulate_group(
         &experiment(&[SamplingDefect::Stalled, SamplingDefect::Missing]),
@@ -172,7 +172,7 @@ fn a_record_is_cut_where_it_is_masked() {
 }
 
 #[test]
-fn two_hundred_clean_runs_raise_no_alarm() {
+fn clean_runs_raise_no_issue() {
     let mut runs = 0;
     for (noise_level, remnant_order) in [(0.01, 1), (0.1, 2), (0.2, 3), (0.3, 4)] {
         let clean = VirtualExperiment {

@@ -73,7 +73,7 @@ fn content(directory: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-fn whole_of(plan: &Plan, jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
+fn run_whole(plan: &Plan, jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
     let directory = tempfile::tempdir().unwrap();
     let options = RunOptions {
         jobs: Some(jobs),
@@ -85,14 +85,14 @@ fn whole_of(plan: &Plan, jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Ve
 }
 
 fn whole(jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
-    whole_of(&plan(), jobs)
+    run_whole(&plan(), jobs)
 }
 
 /// Checks that the bytes are the same for any number of threads and shards.
-fn division_does_not_show(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTreeMap<String, Vec<u8>> {
-    let (_one, expected) = whole_of(plan, 1);
+fn assert_independent_of_division(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTreeMap<String, Vec<u8>> {
+    let (_one, expected) = run_whole(plan, 1);
     for &jobs in threads {
-        assert!(whole_of(plan, jobs).1 == expected, "{jobs} threads");
+        assert!(run_whole(plan, jobs).1 == expected, "{jobs} threads");
     }
     for &of in shards {
         let directory = tempfile::tempdir().unwrap();
@@ -116,8 +116,8 @@ fn division_does_not_show(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTr
 }
 
 #[test]
-fn threads_and_shards_do_not_show() {
-    let expected = division_does_not_show(&plan(), &[2, 7], &[1, 2, 7]);
+fn results_do_not_depend_on_threads_or_shards() {
+    let expected = assert_independent_of_division(&plan(), &[2, 7], &[1, 2, 7]);
     assert_eq!(
         expected.keys().collect::<Vec<_>>(),
         [
@@ -132,7 +132,7 @@ fn threads_and_shards_do_not_show() {
 }
 
 #[test]
-fn threads_and_shards_do_not_show_in_verdicts() {
+fn verdicts_do_not_depend_on_threads_or_shards() {
     let text = r#"
 name = "verdicts"
 seed = 7
@@ -155,11 +155,11 @@ method = "time-varying"
 name = "SRIV"
 method = "sriv"
 "#;
-    division_does_not_show(&Plan::parse(text, "verdicts.toml").unwrap(), &[3], &[2]);
+    assert_independent_of_division(&Plan::parse(text, "verdicts.toml").unwrap(), &[3], &[2]);
 }
 
 #[test]
-fn a_stopped_study_goes_on_and_repeats_nothing() {
+fn stopped_study_resumes_without_repetition() {
     let (_whole, expected) = whole(2);
     let directory = tempfile::tempdir().unwrap();
     let plan = plan();
@@ -204,7 +204,7 @@ fn a_stopped_study_goes_on_and_repeats_nothing() {
 }
 
 #[test]
-fn parts_that_do_not_belong_together_are_refused() {
+fn incompatible_shards_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| directory.path().join(name);
     let shard = |index, of| RunOptions {
@@ -289,7 +289,7 @@ fn text<'a>(table: &'a OutputTable, column: &str, row: usize) -> &'a str {
 
 /// A row is bit-identical to the result of simulating and fitting that run separately.
 #[test]
-fn a_row_is_the_run_by_itself() {
+fn rows_match_separate_simulation_and_fit() {
     let (directory, _) = whole(2);
     let fits = read_table(&directory.path().join("fits.parquet")).unwrap();
     let rows = fits.columns[0].values.len();
@@ -337,7 +337,7 @@ fn a_row_is_the_run_by_itself() {
 
 /// A failed estimate is a row with its reason.
 #[test]
-fn failures_are_rows() {
+fn failed_estimates_are_rows_with_a_reason() {
     // With a gain far above the gain margin, the loop diverges in every run.
     let text_of = PLAN.replace(
         "name = \"silent\"\ncondition = \"C1\"",
@@ -388,7 +388,7 @@ fn parts(directory: &Path) -> Vec<PathBuf> {
 }
 
 #[test]
-fn damaged_blocks_are_computed_again() {
+fn damaged_blocks_are_recomputed() {
     let out = tempfile::tempdir().unwrap();
     let (whole, again) = (out.path().join("whole"), out.path().join("again"));
     quiet(&plan(), &whole, RunOptions::default()).unwrap();
@@ -445,7 +445,7 @@ fn damaged_blocks_are_computed_again() {
 }
 
 #[test]
-fn a_damaged_block_of_a_shard_is_found_by_merge() {
+fn merge_recomputes_damaged_blocks() {
     let out = tempfile::tempdir().unwrap();
     let place = |name: &str| out.path().join(name);
     quiet(&plan(), &place("whole"), RunOptions::default()).unwrap();
@@ -471,7 +471,7 @@ fn a_damaged_block_of_a_shard_is_found_by_merge() {
 }
 
 #[test]
-fn blocks_of_an_earlier_program_are_computed_again_or_refused() {
+fn unsealed_blocks_are_recomputed_or_refused() {
     let out = tempfile::tempdir().unwrap();
     let (whole, old) = (out.path().join("whole"), out.path().join("old"));
     quiet(&plan(), &whole, RunOptions::default()).unwrap();
@@ -498,7 +498,7 @@ fn blocks_of_an_earlier_program_are_computed_again_or_refused() {
 }
 
 #[test]
-fn two_runs_do_not_share_a_directory_and_no_plan_is_written_over() {
+fn directory_is_locked_and_plans_are_not_overwritten() {
     let out = tempfile::tempdir().unwrap();
     let directory = out.path().join("study");
     let second = std::sync::Mutex::new(None);

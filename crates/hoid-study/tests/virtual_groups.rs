@@ -17,7 +17,7 @@ use hoid_study::{
 };
 
 #[test]
-fn a_virtual_experiment_has_its_truth_beside_it() {
+fn virtual_experiment_is_reported_with_its_true_values() {
     let experiment = VirtualExperiment {
         subjects: 2,
         conditions: vec![Condition::C1],
@@ -113,7 +113,7 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
 /// The numbers of the guide: with the delay as a separate parameter, the error bars are correct for all six parameters;
 /// ARX selects longer delays than Box-Jenkins.
 #[test]
-fn grey_box_error_bars_hold_in_a_virtual_experiment() {
+fn grey_box_error_bars_cover_the_truth() {
     let experiment = VirtualExperiment {
         subjects: 3,
         conditions: vec![Condition::C1, Condition::C4],
@@ -184,7 +184,7 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
 
 /// The files of virtual people have the format of recorded experiments, together with all true values.
 #[test]
-fn virtual_people_have_their_truth_beside_them() {
+fn virtual_people_are_reported_with_their_true_values() {
     let experiment = PeopleExperiment {
         subjects: 2,
         runs: 2,

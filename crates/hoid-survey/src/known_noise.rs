@@ -49,7 +49,7 @@ pub(crate) fn check_first_order(name: &str, setup: &Setup) -> Result<(), IdentEr
 }
 
 /// Returns T_L = K_e_dot/K_e and its variance to first order, from `d T_L = (d K_e_dot - T_L d K_e)/K_e`.
-pub(crate) fn lead_of(eta: [f64; OPERATOR], c: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
+pub(crate) fn lead_time_of(eta: [f64; OPERATOR], c: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
     let t_l = eta[1] / eta[0];
     let of_ratio = c[1][1] - 2.0 * t_l * c[0][1] + t_l * t_l * c[0][0];
     [t_l, of_ratio.max(0.0) / (eta[0] * eta[0])]

@@ -258,7 +258,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_weight_is_learned_with_its_time_constant() {
+    fn weight_converges_with_its_time_constant() {
         // y_0 = cos and y_1 = sin have a mean square of 1/2 and are orthogonal. K_e changes from 1 to 2.
         let mut neuron = Neuron {
             gains: [1.0, 0.3],
@@ -280,7 +280,7 @@ mod tests {
 
     /// y_0 and y_1 weighted by K_e and K_e_dot give the response of the held operator.
     #[test]
-    fn the_inputs_add_up_to_the_held_operator() {
+    fn weighted_inputs_sum_to_the_held_operator() {
         let operator = OperatorParameters {
             k_e: 0.07,
             t_l_s: 1.2,
@@ -307,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_after_a_change_are_near_the_truth_on_average() {
+    fn gains_after_a_change_are_close_on_average() {
         const RUNS: u64 = 8;
         let mut scenario = Scenario::condition(Condition::C4);
         scenario.remnant.order = 1;

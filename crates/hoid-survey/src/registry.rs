@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_lead_back_to_methods() {
+    fn method_names_round_trip() {
         for method in methods() {
             assert_eq!(self::method(method.name()).unwrap(), method);
             let spec = method.spec();
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_list_starts_with_the_default_and_ends_with_the_survey() {
+    fn list_starts_with_the_default_and_ends_with_the_survey() {
         let all = listed();
         let names: Vec<&str> = all.iter().map(|one| one.spec.name).collect();
         assert_eq!(names[..4], ["adaptive", "rls", "rpem", "physical"]);
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn an_earlier_name_is_read_and_said_to_be_one() {
+    fn former_name_is_accepted_with_a_notice() {
         assert_eq!(method("population").unwrap(), Method::adaptive());
         let (name, note) = renamed(" Population").unwrap();
         assert_eq!(name, "adaptive");
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn an_option_of_one_name_is_the_same_for_all() {
+    fn options_with_the_same_name_are_identical() {
         let all: Vec<_> = registry().into_iter().flat_map(|spec| spec.settings).collect();
         for a in &all {
             let same = all.iter().filter(|b| a.name == b.name);
@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn structures_that_are_not_served_are_refused() {
+    fn unsupported_structures_are_refused() {
         for method in methods() {
             for structure in Structure::ALL {
                 let orders = match structure {
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn what_belongs_to_another_method_is_refused_by_name() {
+    fn options_of_other_methods_are_refused_by_name() {
         let refused = set(&mut Method::rls(), "alarm", "3").unwrap_err().to_string();
         assert!(
             refused.contains("alarm") && refused.contains("multiple-model"),

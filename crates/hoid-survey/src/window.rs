@@ -110,7 +110,7 @@ pub(crate) struct WindowRecursion {
     window: usize,
     every: usize,
     /// Number of samples needed for the first fit.
-    enough: usize,
+    min_samples: usize,
     e: VecDeque<f64>,
     u: VecDeque<f64>,
     predictor: Predictor,
@@ -226,7 +226,7 @@ impl WindowRecursion {
             sample_time,
             window,
             every,
-            enough: (window / FIRST_SHARE).max(least),
+            min_samples: (window / FIRST_SHARE).max(least),
             e: VecDeque::with_capacity(window),
             u: VecDeque::with_capacity(window),
             predictor,
@@ -368,7 +368,7 @@ impl Recursion for WindowRecursion {
             self.innovations += 1.0;
             self.variance = bounded(self.variance + (innovation * innovation - self.variance) / self.innovations);
         }
-        if self.u.len() >= self.enough && self.since_fit >= self.every {
+        if self.u.len() >= self.min_samples && self.since_fit >= self.every {
             self.refit();
         }
         StepOutcome {

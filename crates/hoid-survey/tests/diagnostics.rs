@@ -23,7 +23,7 @@ fn judged(record: &Record, options: &TrackOptions) -> Verdict {
 }
 
 #[test]
-fn a_clean_run_is_trustworthy_and_a_wrong_start_is_named() {
+fn clean_run_is_trustworthy_and_bad_start_is_reported() {
     let record = simulated(Condition::C4);
     let verdict = judged(&record, &TrackOptions::default_for(physical(), 29));
     assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{verdict}");
@@ -33,7 +33,7 @@ fn a_clean_run_is_trustworthy_and_a_wrong_start_is_named() {
 }
 
 #[test]
-fn a_change_inside_the_start_span_is_told() {
+fn change_inside_the_start_span_is_reported() {
     // C4 changes at 40.96 s.
     let record = simulated(Condition::C4);
     for (span, changes) in [((10.0, 36.0), false), ((25.0, 60.0), true)] {
@@ -50,7 +50,7 @@ fn a_change_inside_the_start_span_is_told() {
 }
 
 #[test]
-fn an_output_without_a_response_is_not_determined() {
+fn output_without_response_is_not_trustworthy() {
     let record = simulated(Condition::C1);
     let mut state = 3_u64;
     let mut draw = || {
@@ -69,7 +69,7 @@ fn an_output_without_a_response_is_not_determined() {
 }
 
 #[test]
-fn a_delay_that_jumps_is_not_followed_by_a_fixed_one() {
+fn jump_of_a_fixed_delay_is_reported() {
     let record = simulated(Condition::C1);
     let late = |at: usize, by: usize| {
         let u = |t: usize| record.output()[if t >= at { t - by } else { t }];
@@ -78,9 +78,9 @@ fn a_delay_that_jumps_is_not_followed_by_a_fixed_one() {
         Record::new(record.sample_time(), e, u).unwrap()
     };
     let options = TrackOptions::default_for(physical(), 29);
-    let told = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
-    assert!(told(&late(5000, 20)));
-    assert!(!told(&late(5000, 0)));
+    let is_reported = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
+    assert!(is_reported(&late(5000, 20)));
+    assert!(!is_reported(&late(5000, 0)));
     // The trace is shorter than the examined span.
     assert!(
         judged(&record.span(0.0, 12.0).unwrap(), &options)
@@ -91,7 +91,7 @@ fn a_delay_that_jumps_is_not_followed_by_a_fixed_one() {
 }
 
 #[test]
-fn the_level_of_a_moment_follows_the_estimate() {
+fn instantaneous_level_follows_the_estimate() {
     let options = TrackOptions {
         start: StartAt::Nothing,
         ..TrackOptions::default_for(physical(), 29)

@@ -43,7 +43,7 @@ fn physical<const N: usize, const L: usize>(
 }
 
 #[test]
-fn psi_of_the_physical_recursion_is_its_negative_gradient() {
+fn psi_is_the_negative_gradient_of_the_innovation() {
     fn check<const N: usize, const L: usize>(nc: usize, tracked: Option<usize>, eta: [f64; N], steps: [f64; N]) {
         let data = box_jenkins(300, 6, 0.02);
         let run = |eta: [f64; N]| {
@@ -87,7 +87,7 @@ fn psi_of_the_physical_recursion_is_its_negative_gradient() {
 }
 
 #[test]
-fn a_delay_that_moves_over_a_sample_leaves_the_response_continuous() {
+fn response_is_continuous_across_whole_samples_of_delay() {
     let data = box_jenkins(400, 7, 0.0);
     let run = |tau: f64| {
         let mut recursion = physical::<6, 16>(0, Some(2), [0.09, 0.036, 11.25, 0.35, tau, -0.8]);
@@ -105,7 +105,7 @@ fn a_delay_that_moves_over_a_sample_leaves_the_response_continuous() {
 }
 
 #[test]
-fn a_delay_is_found_from_four_samples_away() {
+fn delay_converges_from_four_samples_away() {
     let mut truth = physical::<6, 16>(0, Some(1), [0.09, 0.036, 11.25, 0.35, 0.0637, 0.0]);
     let mut noise = Noise(8);
     let mut recursion = physical::<6, 16>(0, Some(1), [0.07, 0.05, 9.0, 0.5, 0.02, -0.8]);

@@ -34,7 +34,7 @@ fn tracker(options: &TrackOptions, record: &Record) -> Tracker {
 const GUARDED: [fn() -> Method; 5] = [physical, multiple_model, Method::adaptive, Method::rls, Method::rpem];
 
 #[test]
-fn a_guard_that_never_acts_changes_no_digit() {
+fn inactive_guard_changes_no_digit() {
     for method in GUARDED {
         for seed in 0..3 {
             let record = record(seed);
@@ -56,7 +56,7 @@ fn a_guard_that_never_acts_changes_no_digit() {
 }
 
 #[test]
-fn it_stands_before_methods_of_a_person_by_default() {
+fn operator_methods_are_guarded_by_default() {
     for method in methods() {
         let expected = ["physical", "multiple-model", "adaptive"].contains(&method.name());
         assert_eq!(method.is_guarded(), expected, "{method}");
@@ -67,7 +67,7 @@ fn it_stands_before_methods_of_a_person_by_default() {
 
 /// A permanent jump: after the time in which the guard waits for a return, all numbers equal those without a guard.
 #[test]
-fn a_jump_that_stays_is_taken_as_if_nothing_had_been() {
+fn permanent_jump_leaves_the_result_unchanged_after_the_wait() {
     let record = record(5);
     for method in [physical(), multiple_model()] {
         let mut with = tracker(&options(method.clone(), "yes"), &record);
@@ -107,7 +107,7 @@ fn hostile(record: &Record, k: usize) -> (f64, f64) {
 }
 
 #[test]
-fn a_restored_guard_goes_on_with_the_same_digits() {
+fn restored_guard_is_bit_identical() {
     let record = record(6);
     for method in GUARDED {
         let options = options(method(), "yes");
@@ -136,34 +136,34 @@ fn a_restored_guard_goes_on_with_the_same_digits() {
 }
 
 #[test]
-fn what_was_found_and_done_is_told_with_its_place() {
+fn faults_and_actions_are_reported_with_their_times() {
     let record = record(6);
     let mut tracker = tracker(&options(physical(), "yes"), &record);
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for k in 0..record.len() {
         let (e, u) = hostile(&record, k);
         let outcome = tracker.step(e, u);
         assert_eq!(outcome.innovation.is_none(), outcome.held || outcome.skipped, "{k}");
         if let Some(event) = tracker.event() {
-            told.push((event.kind, event.action, k as u64 - event.ago, event.samples));
+            reported.push((event.kind, event.action, k as u64 - event.ago, event.samples));
         }
     }
     use {GuardAction as A, GuardKind as K};
-    assert_eq!(told[0], (K::Outlier, A::Held, 4000, 1));
+    assert_eq!(reported[0], (K::Outlier, A::Held, 4000, 1));
     // Start and end of the gap, of the span with wrong scale and of the frozen span.
-    let of = |kind: K, action: A| told.iter().find(|t| (t.0, t.1) == (kind, action));
-    assert!(of(K::Missing, A::Resumed).is_some(), "{told:?}");
+    let of = |kind: K, action: A| reported.iter().find(|t| (t.0, t.1) == (kind, action));
+    assert!(of(K::Missing, A::Resumed).is_some(), "{reported:?}");
     let level = of(K::Level, A::Restarted).unwrap();
-    assert!(level.2.abs_diff(4800) <= 12 && level.3 >= 400, "{told:?}");
-    assert!(of(K::Frozen, A::Restarted).is_some(), "{told:?}");
+    assert!(level.2.abs_diff(4800) <= 12 && level.3 >= 400, "{reported:?}");
+    assert!(of(K::Frozen, A::Restarted).is_some(), "{reported:?}");
     let counts = tracker.counts();
-    assert_eq!(counts.restarts, 2, "{told:?}");
+    assert_eq!(counts.restarts, 2, "{reported:?}");
     assert!(counts.held > 700 && counts.skipped > 190, "{counts:?}");
     assert!(!tracker.is_paused() && tracker.since_restart_s().is_some());
 }
 
 #[test]
-fn streams_of_nothing_and_of_anything_leave_numbers() {
+fn estimates_stay_finite_for_any_stream() {
     let streams: [fn(usize) -> (f64, f64); 6] = [
         |_| (0.0, 0.0),
         |_| (f64::NAN, f64::NAN),

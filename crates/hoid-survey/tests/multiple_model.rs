@@ -79,7 +79,7 @@ fn with_noise(
 }
 
 #[test]
-fn responses_times_gains_are_the_held_operator_and_their_derivatives_are_differences() {
+fn responses_and_derivatives_match_the_held_operator() {
     let at = |eta: [f64; 4]| {
         let mut noise = Noise(5);
         let mut response = Response::new([eta[2], eta[3]], TS);
@@ -118,7 +118,7 @@ fn responses_times_gains_are_the_held_operator_and_their_derivatives_are_differe
 }
 
 #[test]
-fn a_point_that_moves_takes_the_past_with_it() {
+fn moved_linearisation_point_updates_past_states() {
     // After a move, the states of the filters differ only to second order from those of filters with this linearisation
     // point from the start.
     let error = |step: f64| {
@@ -142,7 +142,7 @@ fn a_point_that_moves_takes_the_past_with_it() {
 }
 
 #[test]
-fn one_hypothesis_with_a_known_neuromuscular_system_is_least_squares() {
+fn one_hypothesis_is_weighted_least_squares() {
     let d = [-0.85];
     let data = operator(3000, 3, 0.02, |_| S1);
     let prior = [1e-4, 1e-4];
@@ -192,7 +192,7 @@ fn one_hypothesis_with_a_known_neuromuscular_system_is_least_squares() {
 }
 
 #[test]
-fn the_neuromuscular_system_is_found_from_a_quarter_away() {
+fn neuromuscular_system_converges_from_25_percent_off() {
     let data = operator(20_000, 8, 0.002, |_| S1);
     let start = [0.1, 0.03, 14.0, 0.45];
     let mut bank = bank(start, [1e-3, 1e-3, 10.0, 0.02], level(0.002), &[-0.85], steady());
@@ -209,7 +209,7 @@ fn the_neuromuscular_system_is_found_from_a_quarter_away() {
 }
 
 #[test]
-fn a_change_is_declared_once_with_its_time_and_its_gains() {
+fn change_is_declared_once_with_time_and_gains() {
     let change_at = 6000;
     let data = operator(10_000, 21, 0.02, |k| if k < change_at { S1 } else { S2 });
     let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
@@ -248,7 +248,7 @@ fn a_steady_operator_raises_no_alarm_and_memory_grows() {
 }
 
 #[test]
-fn the_variance_of_the_remnant_alone_is_a_change_too() {
+fn change_of_remnant_variance_is_declared() {
     let data = with_noise(8000, 2, |k| if k < 4000 { 0.02 } else { 0.06 }, |_| S1);
     let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
     let mut declared = Vec::new();
@@ -262,7 +262,7 @@ fn the_variance_of_the_remnant_alone_is_a_change_too() {
 }
 
 #[test]
-fn outliers_are_no_change() {
+fn outliers_are_not_declared_as_changes() {
     let mut data = operator(8000, 12, 0.02, |_| S1);
     for k in (500..8000).step_by(700) {
         data[k].1 += 5.0;
@@ -280,7 +280,7 @@ fn outliers_are_no_change() {
 }
 
 #[test]
-fn silence_constants_saturation_and_overflow_leave_everything_finite() {
+fn extreme_signals_leave_everything_finite() {
     let data = operator(2000, 4, 0.02, |_| S1);
     let mut bank = bank(S1, WIDE, level(0.02), &[-1.6, 0.7], prior_of());
     let finite = |bank: &mut MultipleModelFilter<8, 4>, x: f64, u: f64| {
@@ -311,7 +311,7 @@ fn silence_constants_saturation_and_overflow_leave_everything_finite() {
 }
 
 #[test]
-fn a_gap_in_the_output_is_bridged() {
+fn gap_in_the_output_is_bridged() {
     let data = operator(9000, 14, 0.02, |_| S1);
     let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
     for (k, &(x, u)) in data.iter().enumerate() {
@@ -344,7 +344,7 @@ fn t_l_stays_finite_as_k_e_becomes_zero() {
 }
 
 #[test]
-fn starts_that_cannot_be_are_refused() {
+fn invalid_starts_are_refused() {
     let first = |eta| Hypothesis::new(eta, &diagonal(WIDE), level(0.02)).unwrap();
     let new = |eta, d: &[f64], s| MultipleModelFilter::<8, 4>::new(first(eta), d, s);
     assert!(new(S1, &[-0.85], prior_of()).is_some());
@@ -373,7 +373,7 @@ fn starts_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn a_neuromuscular_system_that_changes_is_followed_and_named() {
+fn change_of_the_neuromuscular_system_is_tracked() {
     let slower = [S1[0], S1[1], 9.0, 0.45];
     let at = 4500;
     let mut noise = Noise(17);

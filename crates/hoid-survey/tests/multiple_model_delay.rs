@@ -24,7 +24,7 @@ const DEVIATION: f64 = 0.02;
 
 type Bank = MultipleModelFilter<48, 4, Vec<Signals>>;
 
-const OPEN: DelayPrior = DelayPrior {
+const OPEN_DELAY: DelayPrior = DelayPrior {
     count: COUNT,
     propose_every: 4,
     change_odds: 0.5,
@@ -71,7 +71,7 @@ fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f
 }
 
 #[test]
-fn a_delay_that_is_not_questioned_is_a_delay_line() {
+fn known_delay_acts_as_a_delay_line() {
     // omega_nm and zeta_nm are known, so the linearisation point stays constant. When this point moves, signals that
     // are still in the delay line differ to second order.
     let prior_of = |delay| ChangePrior {
@@ -82,7 +82,7 @@ fn a_delay_that_is_not_questioned_is_a_delay_line() {
     let silent = DelayPrior {
         propose_every: u32::MAX,
         neighbour_probability: 0.0,
-        ..OPEN
+        ..OPEN_DELAY
     };
     let memory = vec![[0.0; 6]; COUNT];
     let mut one: Bank =
@@ -103,10 +103,10 @@ fn a_delay_that_is_not_questioned_is_a_delay_line() {
 }
 
 #[test]
-fn a_delay_that_changes_is_found_and_named() {
+fn change_of_delay_is_found_and_named() {
     for (seed, from, to) in [(11, 4, 10), (12, 10, 5), (13, 2, 4)] {
         let data = operator(10_000, seed, |k| if k < 6000 { from } else { to });
-        let mut bank = bank(from, OPEN);
+        let mut bank = bank(from, OPEN_DELAY);
         let mut declared = Vec::new();
         for (k, &(x, u)) in data.iter().enumerate() {
             bank.step(x, u);
@@ -134,10 +134,10 @@ fn a_delay_that_changes_is_found_and_named() {
 }
 
 #[test]
-fn a_first_delay_that_was_wrong_is_mended_without_an_alarm() {
+fn wrong_initial_delay_is_corrected_without_an_alarm() {
     for (seed, wrong) in [(5, 7), (6, 9)] {
         let data = operator(6000, seed, |_| 8);
-        let mut bank = bank(wrong, OPEN);
+        let mut bank = bank(wrong, OPEN_DELAY);
         for (k, &(x, u)) in data.iter().enumerate() {
             bank.step(x, u);
             assert!(bank.bank().change().is_none(), "{seed}: {k}");
@@ -150,7 +150,7 @@ fn a_first_delay_that_was_wrong_is_mended_without_an_alarm() {
 fn a_steady_operator_raises_no_alarm() {
     // The run lasts ten minutes.
     let data = operator(60_000, 34, |_| 8);
-    let mut bank = bank(8, OPEN);
+    let mut bank = bank(8, OPEN_DELAY);
     for &(x, u) in &data {
         bank.step(x, u);
         assert!(bank.bank().change().is_none());
@@ -163,8 +163,8 @@ fn a_steady_operator_raises_no_alarm() {
 }
 
 #[test]
-fn overflow_silence_and_bad_memory() {
-    let mut bank = bank(8, OPEN);
+fn extreme_signals_stay_finite_and_bad_memory_is_refused() {
+    let mut bank = bank(8, OPEN_DELAY);
     for (k, (x, u)) in operator(3000, 7, |_| 8).into_iter().enumerate() {
         match k {
             500 => _ = bank.step(1e200, u),
@@ -180,23 +180,28 @@ fn overflow_silence_and_bad_memory() {
     let with = |delay: DelayPrior, memory: usize| {
         Bank::with_delays(first(SPREAD), &D, prior_of(delay), vec![[0.0; 6]; memory]).is_some()
     };
-    assert!(with(OPEN, COUNT));
-    assert!(!with(OPEN, COUNT - 1) && !with(OPEN, 0));
-    assert!(!with(DelayPrior { count: 0, ..OPEN }, 0));
+    assert!(with(OPEN_DELAY, COUNT));
+    assert!(!with(OPEN_DELAY, COUNT - 1) && !with(OPEN_DELAY, 0));
+    assert!(!with(DelayPrior { count: 0, ..OPEN_DELAY }, 0));
     assert!(
-        !with(DelayPrior { proposals: 0, ..OPEN }, COUNT)
-            && !with(
-                DelayPrior {
-                    propose_every: 0,
-                    ..OPEN
-                },
-                COUNT
-            )
+        !with(
+            DelayPrior {
+                proposals: 0,
+                ..OPEN_DELAY
+            },
+            COUNT
+        ) && !with(
+            DelayPrior {
+                propose_every: 0,
+                ..OPEN_DELAY
+            },
+            COUNT
+        )
     );
     assert!(!with(
         DelayPrior {
             neighbour_probability: f64::NAN,
-            ..OPEN
+            ..OPEN_DELAY
         },
         COUNT
     ));

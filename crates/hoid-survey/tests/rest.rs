@@ -24,11 +24,11 @@ fn record(condition: Condition) -> Record {
 }
 
 /// Duration of the response to a step of e, including the second in which its end is detected, s.
-const ANSWER_S: f64 = 4.0;
+const RESPONSE_S: f64 = 4.0;
 
 /// Kind of constant signals.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Stand {
+enum ConstantSpan {
     /// e and u are zero.
     Rest,
     /// e and u are nearly zero, with the noise of a sensor.
@@ -40,7 +40,7 @@ enum Stand {
     ConstantE,
 }
 
-impl Stand {
+impl ConstantSpan {
     fn sample(self, before: &Sample, now: &Sample, k: usize) -> Sample {
         let noise = |seed: f64| 1e-5 * (k as f64 * 12.9898 + seed).sin() * (k as f64 * 0.7).cos();
         let (e, u) = match self {
@@ -69,7 +69,7 @@ fn bars(tracker: &Tracker) -> Vec<(String, f64)> {
 }
 
 /// Largest age of the numbers that a guard restores, s.
-const KEPT_S: f64 = 10.0;
+const GUARD_MEMORY_S: f64 = 10.0;
 
 /// Keeps the smaller of both error bars for each parameter.
 fn smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
@@ -80,11 +80,16 @@ fn smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
 
 /// Returns a tracker after the constant span, and the error bars before this span. A guard may restore earlier numbers,
 /// so these are the smallest error bars that it may have kept.
-fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64) -> (Tracker, Vec<(String, f64)>) {
+fn after_constant_span(
+    options: &TrackOptions,
+    record: &Record,
+    span_kind: ConstantSpan,
+    length_s: f64,
+) -> (Tracker, Vec<(String, f64)>) {
     let goes_back = match options.method.name() {
         // This method learns from the first sample on, and its error bars vary with time.
         "adaptive" => true,
-        "multiple-model" | "physical" => stand == Stand::FrozenU,
+        "multiple-model" | "physical" => span_kind == ConstantSpan::FrozenU,
         _ => false,
     };
     let ts = record.sample_time().s();
@@ -99,27 +104,28 @@ fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64)
     let mut kept: Option<Vec<(String, f64)>> = None;
     for k in 0..first {
         tracker.update(at(k), options.method.starts_itself() || k as f64 * ts >= 20.0);
-        if goes_back && (k as f64 * ts) >= BEFORE_S - KEPT_S {
+        if goes_back && (k as f64 * ts) >= BEFORE_S - GUARD_MEMORY_S {
             smallest(kept.get_or_insert_with(|| bars(&tracker)), bars(&tracker));
         }
     }
-    let (mut begin, before) = (kept.unwrap_or_else(|| bars(&tracker)), at(first - 1));
-    let mut told = Vec::new();
+    let (mut initial_bars, before) = (kept.unwrap_or_else(|| bars(&tracker)), at(first - 1));
+    let mut reported = Vec::new();
     for k in 0..(length_s / ts) as usize {
         // After a step of e, the response contains information as long as it is not constant.
-        if stand == Stand::ConstantE && k as f64 * ts <= ANSWER_S {
-            begin = bars(&tracker);
+        if span_kind == ConstantSpan::ConstantE && k as f64 * ts <= RESPONSE_S {
+            initial_bars = bars(&tracker);
         }
-        tracker.update(stand.sample(&before, &at(first + k), k), true);
-        told.extend(tracker.event().map(|event| event.kind));
+        tracker.update(span_kind.sample(&before, &at(first + k), k), true);
+        reported.extend(tracker.event().map(|event| event.kind));
     }
     assert!(
-        told.iter()
+        reported
+            .iter()
             .any(|kind| matches!(kind, GuardKind::Idle | GuardKind::Frozen)),
-        "{:?} {stand:?} is not told: {told:?}",
+        "{:?} {span_kind:?} is not told: {reported:?}",
         options.method.name()
     );
-    (tracker, begin)
+    (tracker, initial_bars)
 }
 
 fn all_options() -> Vec<TrackOptions> {
@@ -140,17 +146,17 @@ fn all_options() -> Vec<TrackOptions> {
     all
 }
 
-fn no_bar_shrinks(stand: Stand, lengths_s: &[f64]) {
+fn assert_no_bar_shrinks(span_kind: ConstantSpan, lengths_s: &[f64]) {
     let record = record(Condition::C1);
     for options in all_options() {
         for length in lengths_s {
-            let (tracker, begin) = through(&options, &record, stand, *length);
+            let (tracker, initial_bars) = after_constant_span(&options, &record, span_kind, *length);
             let end = bars(&tracker);
-            assert_eq!(begin.len(), end.len());
-            for ((name, before), (_, after)) in begin.iter().zip(&end) {
+            assert_eq!(initial_bars.len(), end.len());
+            for ((name, before), (_, after)) in initial_bars.iter().zip(&end) {
                 assert!(
                     *after >= before * (1.0 - 1e-9),
-                    "{}: {stand:?} of {length} s, {name} from {before:e} to {after:e}",
+                    "{}: {span_kind:?} of {length} s, {name} from {before:e} to {after:e}",
                     options.method.name()
                 );
             }
@@ -160,40 +166,40 @@ fn no_bar_shrinks(stand: Stand, lengths_s: &[f64]) {
 
 #[test]
 fn no_error_bar_shrinks_through_rests() {
-    no_bar_shrinks(Stand::Rest, &[10.0, 100.0]);
+    assert_no_bar_shrinks(ConstantSpan::Rest, &[10.0, 100.0]);
 }
 
 #[test]
-fn no_error_bar_shrinks_through_rests_with_the_noise_of_a_sensor() {
-    no_bar_shrinks(Stand::Noise, &[10.0, 100.0]);
+fn no_error_bar_shrinks_through_rests_with_sensor_noise() {
+    assert_no_bar_shrinks(ConstantSpan::Noise, &[10.0, 100.0]);
 }
 
 #[test]
 fn no_error_bar_shrinks_through_a_frozen_error() {
-    no_bar_shrinks(Stand::FrozenE, &[10.0, 100.0]);
+    assert_no_bar_shrinks(ConstantSpan::FrozenE, &[10.0, 100.0]);
 }
 
 #[test]
 fn no_error_bar_shrinks_through_a_frozen_output() {
-    no_bar_shrinks(Stand::FrozenU, &[10.0, 100.0]);
+    assert_no_bar_shrinks(ConstantSpan::FrozenU, &[10.0, 100.0]);
 }
 
 #[test]
 fn no_error_bar_shrinks_through_two_frozen_channels() {
-    no_bar_shrinks(Stand::Frozen, &[10.0, 100.0]);
+    assert_no_bar_shrinks(ConstantSpan::Frozen, &[10.0, 100.0]);
 }
 
 #[test]
 fn no_error_bar_shrinks_through_a_constant_error() {
-    no_bar_shrinks(Stand::ConstantE, &[10.0, 100.0]);
+    assert_no_bar_shrinks(ConstantSpan::ConstantE, &[10.0, 100.0]);
 }
 
 #[test]
-fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
+fn tracking_resumes_after_a_long_rest() {
     let record = record(Condition::C1);
     for options in all_options() {
-        let (mut tracker, begin) = through(&options, &record, Stand::Rest, 1000.0);
-        for ((name, before), (_, after)) in begin.iter().zip(bars(&tracker)) {
+        let (mut tracker, initial_bars) = after_constant_span(&options, &record, ConstantSpan::Rest, 1000.0);
+        for ((name, before), (_, after)) in initial_bars.iter().zip(bars(&tracker)) {
             assert!(after >= before * (1.0 - 1e-9), "{}: {name}", options.method.name());
         }
         let theta = tracker.theta().to_vec();
@@ -207,7 +213,7 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
             options.method.name()
         );
         // The error bars must not decrease to a hundredth after a few seconds of information.
-        for ((name, before), (_, after)) in begin.iter().zip(bars(&tracker)) {
+        for ((name, before), (_, after)) in initial_bars.iter().zip(bars(&tracker)) {
             assert!(
                 after >= 0.05 * before,
                 "{}: {name} {before:e} {after:e}",
@@ -219,7 +225,7 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
 
 /// In a record with a rest, the trace reports the time without information; without a rest, it reports none.
 #[test]
-fn the_time_without_excitation_is_a_finding() {
+fn time_without_excitation_is_reported() {
     let whole = record(Condition::C1);
     let rest = |signal: &[f64]| {
         let (head, tail) = signal.split_at(4100);

@@ -34,20 +34,20 @@ fn starts(options: &TrackOptions) -> Vec<TrackOptions> {
     ]
 }
 
-fn refused_as_it_should_be(error: &IdentError, ts: f64) -> bool {
+fn is_expected_refusal(error: &IdentError, ts: f64) -> bool {
     let text = error.to_string();
     text.contains("sample time of a tracker") && text.contains(&format!("{ts} s")) && text.contains("ms")
 }
 
 #[test]
-fn every_method_takes_samples_or_says_that_the_sample_time_is_too_long() {
+fn too_long_sample_times_are_refused() {
     for method in hoid_survey::methods() {
         for ts in sample_times() {
             let sample_time = SampleTime::new(ts).unwrap();
             for options in starts(&TrackOptions::without_prior(method.clone(), sample_time)) {
                 let made = Tracker::new(&options, None, sample_time);
                 if ts >= LONGEST_S {
-                    assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");
+                    assert!(is_expected_refusal(&made.unwrap_err(), ts), "{method} at {ts} s");
                     continue;
                 }
                 let Ok(mut tracker) = made else { continue };
@@ -63,7 +63,7 @@ fn every_method_takes_samples_or_says_that_the_sample_time_is_too_long() {
 }
 
 #[test]
-fn a_start_from_a_span_and_a_plan_say_so_too() {
+fn too_long_sample_times_are_refused_in_plans() {
     for ts in sample_times().filter(|ts| *ts >= LONGEST_S) {
         let sample_time = SampleTime::new(ts).unwrap();
         let (e, u) = (0..400).map(signals).unzip();
@@ -71,10 +71,10 @@ fn a_start_from_a_span_and_a_plan_say_so_too() {
         for method in hoid_survey::methods() {
             let options = TrackOptions::default_for(method.clone(), 2);
             let made = Tracker::new(&options, Some(&record), sample_time);
-            assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");
+            assert!(is_expected_refusal(&made.unwrap_err(), ts), "{method} at {ts} s");
             let ranges = ranges_of(&method, options.structure, &NamedOrders::new(), &[], sample_time).unwrap();
             let planned = TrackPlan::new(options, ranges, Criterion::Bic, sample_time);
-            assert!(refused_as_it_should_be(&planned.unwrap_err(), ts), "{method} at {ts} s");
+            assert!(is_expected_refusal(&planned.unwrap_err(), ts), "{method} at {ts} s");
         }
     }
 }
@@ -94,7 +94,7 @@ fn every_method_refuses_sample_times_below_a_microsecond() {
 }
 
 #[test]
-fn adaptive_by_default_takes_every_sample_time_of_recordings() {
+fn default_method_accepts_common_sample_times() {
     for ts in [0.001, 0.01, 1.0 / 60.0, 0.1] {
         let sample_time = SampleTime::new(ts).unwrap();
         let options = TrackOptions::without_prior(Method::default(), sample_time);

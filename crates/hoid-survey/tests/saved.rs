@@ -25,7 +25,7 @@ fn record() -> Record {
 
 /// After a stop in the middle of a run, every method and rule of forgetting gives bit-identical results.
 #[test]
-fn a_restored_tracker_goes_on_with_the_same_digits() {
+fn restored_tracker_is_bit_identical() {
     let record = record();
     let span = record.span(0.0, 20.0).unwrap();
     let bj = Structure::BoxJenkins;
@@ -96,7 +96,7 @@ fn a_restored_tracker_goes_on_with_the_same_digits() {
 /// Numbers are changed and given a valid checksum, which does not happen by accident: the tracker is refused or
 /// continues, and no index, length or bound causes a panic.
 #[test]
-fn numbers_that_were_changed_and_sealed_again_end_nothing() {
+fn resealed_changed_state_never_panics() {
     let record = record();
     let span = record.span(0.0, 20.0).unwrap();
     let bj = Structure::BoxJenkins;
@@ -166,8 +166,8 @@ fn numbers_that_were_changed_and_sealed_again_end_nothing() {
                     restored.update(if k % 20 < 2 { missing } else { sample(k) }, true);
                 }
                 let numbers = restored.saved();
-                let told = (restored.operator(), restored.covariance(), restored.response(3.0));
-                assert!(numbers.len() > 1 || told.1.is_none());
+                let results = (restored.operator(), restored.covariance(), restored.response(3.0));
+                assert!(numbers.len() > 1 || results.1.is_none());
             }
         }
     }

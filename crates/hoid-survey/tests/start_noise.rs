@@ -29,7 +29,7 @@ fn outside() -> TrackOptions {
 }
 
 #[test]
-fn a_start_outside_the_bounds_keeps_the_order_of_its_noise_model() {
+fn start_outside_the_bounds_keeps_the_noise_order() {
     let (span, options) = (span(), outside());
     let tracker = Tracker::new(&options, Some(&span), SampleTime::HUNDREDTH).unwrap();
     let names = tracker.parameter_names();

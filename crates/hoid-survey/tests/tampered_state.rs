@@ -133,7 +133,7 @@ fn same(a: &[f64], b: &[f64]) -> bool {
 
 /// Changes each number in turn and writes a valid checksum: no index, length or difference of counters causes a panic.
 #[test]
-fn each_number_may_be_anything() {
+fn changing_any_number_never_panics() {
     let (saved, record) = (saved(), record());
     for (options, numbers) in &saved.trackers {
         let numbers = opened(numbers).unwrap();
@@ -154,7 +154,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(23), ..ProptestConfig::with_cases(200) })]
 
     #[test]
-    fn numbers_that_were_changed_are_refused(which in any::<Index>(), by in vec(tampering(), 1..4)) {
+    fn changed_numbers_are_refused(which in any::<Index>(), by in vec(tampering(), 1..4)) {
         let saved = saved();
         let (options, numbers) = which.get(&saved.trackers);
         let mut changed = numbers.clone();
@@ -170,7 +170,7 @@ proptest! {
     }
 
     #[test]
-    fn numbers_of_another_tracker_are_refused(a in any::<Index>(), b in any::<Index>(), nk in 1..60_usize) {
+    fn state_of_another_tracker_is_refused(a in any::<Index>(), b in any::<Index>(), nk in 1..60_usize) {
         let saved = saved();
         let (options, numbers) = a.get(&saved.trackers);
         let (others, of_others) = b.get(&saved.trackers);
@@ -185,7 +185,7 @@ proptest! {
     }
 
     #[test]
-    fn numbers_that_nobody_saved_are_refused(which in any::<Index>(), numbers in vec(any::<f64>(), 0..50)) {
+    fn arbitrary_numbers_are_refused_as_a_state(which in any::<Index>(), numbers in vec(any::<f64>(), 0..50)) {
         let saved = saved();
         let (options, _) = which.get(&saved.trackers);
         prop_assert!(Tracker::restored(options, saved.sample_time, &numbers).is_err());

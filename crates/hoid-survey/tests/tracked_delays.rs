@@ -44,7 +44,7 @@ fn options(range: Option<&str>) -> TrackOptions {
 }
 
 #[test]
-fn a_range_of_one_delay_is_the_recursion_with_that_delay() {
+fn range_of_one_delay_is_the_fixed_delay_recursion() {
     let record = run(0.28, 0.1);
     let given = track(&record, &options(None), 8).unwrap();
     let tracked = track(&record, &options(Some("0.28..0.28")), 8).unwrap();
@@ -61,7 +61,7 @@ fn a_range_of_one_delay_is_the_recursion_with_that_delay() {
 }
 
 #[test]
-fn a_delay_that_changes_is_followed_and_one_that_stays_is_kept() {
+fn changing_and_constant_delays_are_tracked() {
     for (after_s, seconds, most) in [(0.28, 0.0, 0.02), (0.34, 15.0, 0.02), (0.22, 15.0, 0.02)] {
         let record = run(after_s, 0.1);
         let trace = track(&record, &options(Some("0.2..0.4")), 8).unwrap();
@@ -95,7 +95,7 @@ fn a_delay_that_changes_is_followed_and_one_that_stays_is_kept() {
 
 /// `physical` shifts B along the input as tau_e increases; its response changes accordingly.
 #[test]
-fn the_response_of_physical_has_the_delay_of_its_row() {
+fn physical_response_has_the_delay_of_its_row() {
     let record = run(0.34, 0.1);
     let physical = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
@@ -133,7 +133,7 @@ fn true_phase_deg(record: &Record) -> f64 {
 }
 
 #[test]
-fn nothing_to_follow_is_no_number_lost() {
+fn estimates_stay_finite_without_excitation() {
     let n = 3000;
     let wave = |k: usize| (0.05 * k as f64).sin() + 0.5 * (0.13 * k as f64).cos();
     let noise = |k: usize| 0.01 * (1.7 * (k * k) as f64).sin();
@@ -171,19 +171,22 @@ fn nothing_to_follow_is_no_number_lost() {
 }
 
 #[test]
-fn ranges_that_cannot_be_followed_are_refused() {
+fn invalid_delay_ranges_are_refused() {
     let record = run(0.28, 0.1);
     let refused = |options: TrackOptions| track(&record, &options, 1).unwrap_err().to_string();
-    let says = refused(options(Some("0..2")));
-    assert!(says.contains("201 samples") && says.contains("at most 128"), "{says}");
-    let says = Method::rpem().with("track_delay", "0.4..0.2").unwrap_err().to_string();
-    assert!(says.contains("LO <= HI"), "{says}");
+    let message = refused(options(Some("0..2")));
+    assert!(
+        message.contains("201 samples") && message.contains("at most 128"),
+        "{message}"
+    );
+    let message = Method::rpem().with("track_delay", "0.4..0.2").unwrap_err().to_string();
+    assert!(message.contains("LO <= HI"), "{message}");
     let ar = Structure::Ar;
     let alone = TrackOptions {
         structure: ar,
         orders: ar.operator_orders(0),
         ..options(Some("0.2..0.4"))
     };
-    let says = refused(alone);
-    assert!(says.contains("no input") && says.contains("bj"), "{says}");
+    let message = refused(alone);
+    assert!(message.contains("no input") && message.contains("bj"), "{message}");
 }

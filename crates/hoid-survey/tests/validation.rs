@@ -35,7 +35,7 @@ fn options(method: Method) -> TrackOptions {
 
 /// Compares a constant model with the difference equation.
 #[test]
-fn the_vaf_of_a_trace_that_stays_is_that_of_its_model() {
+fn vaf_of_a_constant_trace_matches_its_model() {
     let (record, other) = (run(0.1, 1), run(0.1, 2));
     let theta = vec![0.075, -0.074, -0.8, -1.912, 0.924];
     let stays = TrackOptions {
@@ -62,7 +62,7 @@ fn the_vaf_of_a_trace_that_stays_is_that_of_its_model() {
 
 /// Without remnant the best P explains nearly all of the second run, but a P that is too large or too small does not.
 #[test]
-fn the_best_of_the_grid_is_taken() {
+fn best_covariance_of_the_grid_is_chosen() {
     let (record, other) = (run(0.1, 3), run(0.1, 4));
     for method in [Method::rls(), Method::rpem(), hoid_survey::physical()] {
         let (chosen, choice) = choose_covariance(&record, &other, &options(method.clone())).unwrap();
@@ -89,19 +89,19 @@ fn the_best_of_the_grid_is_taken() {
 }
 
 #[test]
-fn what_cannot_choose_is_refused_with_what_to_do() {
+fn invalid_choices_are_refused_with_advice() {
     let (record, other) = (run(0.1, 7), run(0.1, 8));
-    let says = |validation: &Record, options: &TrackOptions| {
+    let refusal = |validation: &Record, options: &TrackOptions| {
         choose_covariance(&record, validation, options).unwrap_err().to_string()
     };
     let given = options(Method::rpem()).with(&[("covariance", "0.1")]).unwrap();
-    let found = says(&other, &given);
+    let found = refusal(&other, &given);
     assert!(
         found.contains("covariance: found 0.1") && found.contains("one of the two"),
         "{found}"
     );
     for method in [Method::adaptive(), hoid_survey::multiple_model(), hoid_survey::window()] {
-        let found = says(&other, &options(method.clone()));
+        let found = refusal(&other, &options(method.clone()));
         assert!(
             found.contains(method.name()) && found.contains("rls or rpem"),
             "{found}"
@@ -115,32 +115,32 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
         );
     }
     let gradient = options(Method::rpem()).with(&[("forgetting", "gradient")]).unwrap();
-    assert!(says(&other, &gradient).contains("has P"));
+    assert!(refusal(&other, &gradient).contains("has P"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
-    assert!(says(&other, &tracked).contains("without track_delay"));
+    assert!(refusal(&other, &tracked).contains("without track_delay"));
     // Second runs with another sample time, too few samples, the sign of u inverted, or only zeros.
     let (e, u) = (other.input().to_vec(), other.output().to_vec());
     let of = |ts: f64, e: &[f64], u: Vec<f64>| {
         let (e, u) = (Channel::new("e", "", e.to_vec()), Channel::new("u", "", u));
         Record::new(SampleTime::new(ts).unwrap(), e, u).unwrap()
     };
-    let found = says(&of(0.02, &e, u.clone()), &options(Method::rls()));
+    let found = refusal(&of(0.02, &e, u.clone()), &options(Method::rls()));
     assert!(found.contains("0.02") && found.contains("0.01"), "{found}");
-    let found = says(&of(0.01, &e[..700], u[..700].to_vec()), &options(Method::rls()));
+    let found = refusal(&of(0.01, &e[..700], u[..700].to_vec()), &options(Method::rls()));
     assert!(found.contains("7 s in common") && found.contains("7.29"), "{found}");
     let turned = of(0.01, &e, u.iter().map(|value| -value).collect());
-    let found = says(&turned, &options(Method::rpem()));
+    let found = refusal(&turned, &options(Method::rpem()));
     assert!(found.contains("VAF of 0 %") && found.contains("signs"), "{found}");
-    let found = says(&of(0.01, &e, vec![0.0; e.len()]), &options(Method::rpem()));
+    let found = refusal(&of(0.01, &e, vec![0.0; e.len()]), &options(Method::rpem()));
     assert!(found.contains("VAF of 0 %"), "{found}");
     let alone = Record::of_output(record.sample_time(), Channel::new("u", "", u)).unwrap();
-    assert!(says(&alone, &options(Method::rls())).contains("no input"));
+    assert!(refusal(&alone, &options(Method::rls())).contains("no input"));
 }
 
 /// With a power of zero the results are bit-identical; with the default power P is reduced, and the estimate for a
 /// person who changes oscillates less, as the thesis expects.
 #[test]
-fn the_covariance_shrinks_where_less_is_explained() {
+fn vaf_power_reduces_the_covariance() {
     let (mut default, mut updated, mut differs) = (0.0, 0.0, false);
     for seed in 20..26 {
         let (record, other) = (run(0.2, seed), run(0.2, seed + 100));
@@ -172,16 +172,16 @@ fn the_covariance_shrinks_where_less_is_explained() {
     );
     assert!(differs && updated > default, "{default} {updated}");
     let (record, other) = (run(0.1, 30), run(0.1, 31).span(0.0, 60.0).unwrap());
-    let says = |other: &Record, options: TrackOptions| {
+    let refusal = |other: &Record, options: TrackOptions| {
         let updates = CovarianceUpdates::default();
         track_validated(&record, other, &options, &updates, 1)
             .unwrap_err()
             .to_string()
     };
-    assert!(says(&other, options(Method::rpem())).contains("6000 samples"));
-    assert!(says(&record, options(hoid_survey::window())).contains("rls or rpem"));
+    assert!(refusal(&other, options(Method::rpem())).contains("6000 samples"));
+    assert!(refusal(&record, options(hoid_survey::window())).contains("rls or rpem"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
-    assert!(says(&record, tracked).contains("without track_delay"));
+    assert!(refusal(&record, tracked).contains("without track_delay"));
     // A second run without any signal contains no information.
     let n = record.len();
     let silent = Record::new(

@@ -48,7 +48,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn named_plans_are_right_and_called_as_their_files() {
+    fn named_plans_are_valid_and_match_their_file_names() {
         for named in TEXT_PLANS {
             let plan = named.plan().unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(plan.name, named.name);

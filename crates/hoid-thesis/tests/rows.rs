@@ -49,7 +49,7 @@ fn quoted(cell: &str) -> Vec<String> {
 }
 
 #[test]
-fn the_page_of_rows_is_true() {
+fn documented_rows_match_the_program() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let page = std::fs::read_to_string(root.join("docs/src/thesis/rows.md")).unwrap();
     let [tables, figures, formulas, proposals] = ["Tables", "Figures", "Formulas", "Proposals"].map(|h| rows(&page, h));

@@ -15,7 +15,7 @@ mod fault_corpus;
 use std::{path::PathBuf, time::Instant};
 
 use fault_corpus::{
-    bases::Who,
+    bases::OperatorKind,
     kinds::{Fault, faults},
     program::{Outcome, Way, outcomes},
     summary::{by_fault, by_way, clean, recovery, to_csv},
@@ -28,7 +28,7 @@ const SEED: u64 = 2121;
 const FIRST_CLEAN: u64 = 100_000;
 
 fn main() {
-    let (mut part, mut number, mut rows, mut program, mut seed) = (1, 1000, None, beside_this(), SEED);
+    let (mut part, mut number, mut rows, mut program, mut seed) = (1, 1000, None, built_program_path(), SEED);
     let mut ways = Way::ALL.to_vec();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
@@ -46,11 +46,11 @@ fn main() {
             other => panic!("{other}: there is --part, --clean, --rows, --program, --seed and --only"),
         }
     }
-    let begun = Instant::now();
-    let cases: Vec<(u64, Fault, Who)> = (0..)
+    let start_time = Instant::now();
+    let cases: Vec<(u64, Fault, OperatorKind)> = (0..)
         .zip(faults())
         .step_by(part)
-        .flat_map(|(case, fault)| Who::ALL.map(|who| (case, fault, who)))
+        .flat_map(|(case, fault)| OperatorKind::ALL.map(|who| (case, fault, who)))
         .collect();
     let faulty: Vec<Outcome> = cases
         .into_par_iter()
@@ -63,7 +63,12 @@ fn main() {
         .into_par_iter()
         .flat_map_iter(|i| {
             let i = i / part as u64;
-            let who = [Who::C1, Who::Person, Who::C2, Who::Person][i as usize % 4];
+            let who = [
+                OperatorKind::C1,
+                OperatorKind::Person,
+                OperatorKind::C2,
+                OperatorKind::Person,
+            ][i as usize % 4];
             // The kinds of people are used in turn, according to the number of the case.
             let case = FIRST_CLEAN + i / 2;
             let tracker = [Way::MultipleModel, Way::Physical, Way::Rpem, Way::Rls][i as usize / 4 % 4];
@@ -71,7 +76,7 @@ fn main() {
             let such: Vec<Way> = ways
                 .iter()
                 .copied()
-                .filter(|way| who == Who::Person || [tracker, batch].contains(way))
+                .filter(|way| who == OperatorKind::Person || [tracker, batch].contains(way))
                 .collect();
             outcomes(&program, seed, case, Fault::NONE, who, &such).unwrap()
         })
@@ -93,12 +98,12 @@ fn main() {
         faults().len(),
         faulty.len(),
         sound.len(),
-        begun.elapsed().as_secs_f64()
+        start_time.elapsed().as_secs_f64()
     );
 }
 
 /// Path of the program in the build folder of this example.
-fn beside_this() -> PathBuf {
+fn built_program_path() -> PathBuf {
     let here = std::env::current_exe().unwrap();
     let folder = here.parent().unwrap().parent().unwrap();
     folder.join("hoid").with_extension(std::env::consts::EXE_EXTENSION)

@@ -152,7 +152,7 @@ fn report(variant: Variant, of: &[&Outcome]) {
             .text(),
             part(0.5),
             part(0.9),
-            over_all(&such).text()
+            overall_coverage(&such).text()
         );
     }
     findings(of);
@@ -171,7 +171,7 @@ fn findings(of: &[&Outcome]) {
 }
 
 /// Returns the coverage over all determined quantities, each counted once.
-fn over_all(of: &[&Outcome]) -> Share {
+fn overall_coverage(of: &[&Outcome]) -> Share {
     let each = QUANTITIES
         .iter()
         .filter(|n| !n.contains("1.96"))

@@ -24,11 +24,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         let line = line?;
         let (e, u) = line.split_once(',').ok_or("a line is not two numbers, e,u")?;
         let (e, u) = (e.parse()?, u.parse()?);
-        let begin = Instant::now();
+        let start_time = Instant::now();
         tracker.step(e, u);
         let operator = tracker.operator().ok();
         let found = tracker.open_loop().and_then(Result::ok);
-        let took = begin.elapsed();
+        let took = start_time.elapsed();
         let rows = operator.map(|operator| operator.rows().map(|(.., estimate)| Some(estimate)));
         let of_loop = [found.map(|f| f.crossover_rad_s), found.map(|f| f.phase_margin_deg)];
         for estimate in rows.unwrap_or([None; 6]).into_iter().chain(of_loop) {

@@ -206,7 +206,7 @@ fn crates_depend_only_downwards() {
 }
 
 #[test]
-fn the_kernel_depends_on_nothing_but_libm() {
+fn kernel_depends_only_on_libm() {
     let packages = packages();
     for (name, expected) in [
         ("hoid-core", &["hoid-numerics", "libm"][..]),

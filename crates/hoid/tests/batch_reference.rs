@@ -207,7 +207,7 @@ fn medians_agree_with_the_expected_values() {
 }
 
 #[test]
-fn a_start_from_rest_biases_the_gains_and_estimated_states_do_not() {
+fn only_a_start_from_rest_biases_the_gains() {
     let [_, _, b0, _] = truth(Condition::C1);
     let records = records(Condition::C1, 1, 0.1);
     let errors = |initial_state: InitialState| -> Vec<f64> {
@@ -247,7 +247,7 @@ fn noise_free_ols_returns_the_parameters() {
 }
 
 #[test]
-fn noise_free_box_jenkins_is_exact_and_says_so() {
+fn noise_free_box_jenkins_is_exact() {
     let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.0)).unwrap();
     let record = simulator.run(RunSeed::default(), false).unwrap();
     let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK))
@@ -263,7 +263,7 @@ fn noise_free_box_jenkins_is_exact_and_says_so() {
 }
 
 #[test]
-fn own_starts_reach_the_minimum_that_the_truth_leads_to() {
+fn default_starts_reach_the_minimum_from_the_truth() {
     let (mut fits, mut worse) = (0, 0);
     for condition in [Condition::C1, Condition::C2] {
         let [f1, f2, b0, b1] = truth(condition);

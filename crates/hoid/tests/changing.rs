@@ -63,7 +63,7 @@ fn mean(all: &[[[f64; 5]; 2]], what: usize, i: usize) -> f64 {
 }
 
 #[test]
-fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
+fn two_sided_estimate_is_closer_with_correct_bands() {
     let two_sided = options(hoid::survey::multiple_model())
         .with(&[("smooth", "true")])
         .unwrap();
@@ -88,7 +88,7 @@ fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
 }
 
 #[test]
-fn the_methods_of_the_literature_follow_a_change() {
+fn literature_methods_track_a_change() {
     for method in [hoid::survey::fused(), hoid::survey::ekf(), hoid::survey::ukf()] {
         let all: Vec<_> = (0..4)
             .map(|replication| errors(&run(Condition::C3, 2, 0.1, replication), &options(method.clone())))
@@ -105,7 +105,7 @@ fn the_methods_of_the_literature_follow_a_change() {
 }
 
 #[test]
-fn on_real_dimensions_the_points_and_the_linearisation_agree() {
+fn extended_and_unscented_filters_agree() {
     let record = run(Condition::C5, 1, 0.05, 0);
     let [extended, unscented] =
         [hoid::survey::ekf(), hoid::survey::ukf()].map(|m| track(&record, &options(m), 512).unwrap());
@@ -121,7 +121,7 @@ fn on_real_dimensions_the_points_and_the_linearisation_agree() {
 }
 
 #[test]
-fn a_delay_that_changes_is_followed_and_named() {
+fn change_of_delay_is_tracked_and_named() {
     let mut scenario = Scenario::condition(Condition::C4);
     scenario.realisation = hoid::model::scenario::Realisation::Output;
     scenario.last.operator.tau_e_s = 0.34;
@@ -165,18 +165,18 @@ fn a_delay_that_changes_is_followed_and_named() {
             ..options(hoid::survey::multiple_model())
         }
     };
-    let says = refused(with((0.3, 0.4)));
-    assert!(says.contains("nk = 29") && says.contains("31 to 41"), "{says}");
+    let message = refused(with((0.3, 0.4)));
+    assert!(message.contains("nk = 29") && message.contains("31 to 41"), "{message}");
     for range in [(0.4, 0.2), (f64::NAN, 0.4), (-0.1, 0.4), (0.2, f64::INFINITY)] {
-        let says = refused(with(range));
-        assert!(says.contains("shorter time first"), "{says}");
+        let message = refused(with(range));
+        assert!(message.contains("shorter time first"), "{message}");
     }
-    let says = refused(tracked.with(&[("smooth", "true")]).unwrap());
-    assert!(says.contains("the same delay"), "{says}");
+    let message = refused(tracked.with(&[("smooth", "true")]).unwrap());
+    assert!(message.contains("the same delay"), "{message}");
 }
 
 #[test]
-fn what_has_a_model_of_the_change_takes_no_memory() {
+fn memory_is_refused_by_methods_with_a_change_model() {
     for mut method in [hoid::survey::ekf(), hoid::survey::ukf(), hoid::survey::multiple_model()] {
         for (name, text) in [("memory", "256"), ("covariance", "0.1")] {
             let refused = hoid::survey::set(&mut method, name, text).unwrap_err().to_string();

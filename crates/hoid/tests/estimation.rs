@@ -73,7 +73,7 @@ fn error_bars_cover_the_truth() {
 }
 
 #[test]
-fn several_records_share_theta_and_sharpen_it() {
+fn several_records_share_theta_with_smaller_errors() {
     let records = runs(Condition::C1, 4);
     let one = bj().fit(&records[..1]).unwrap();
     let four = bj().fit(&records).unwrap();
@@ -92,7 +92,7 @@ fn several_records_share_theta_and_sharpen_it() {
 }
 
 #[test]
-fn records_of_other_lengths_and_spans_fit_together() {
+fn records_of_different_lengths_fit_together() {
     let records = runs(Condition::C1, 2);
     let parts = [records[0].span(0.0, 20.0).unwrap(), records[1].span(5.0, 65.5).unwrap()];
     let fit = bj().fit(&parts).unwrap();
@@ -144,7 +144,7 @@ fn open_loop(b: &[f64], c: &[f64], d: &[f64], f: &[f64], n: usize) -> Record {
 }
 
 #[test]
-fn other_orders_find_the_truth_from_own_starts() {
+fn other_orders_find_the_truth_from_default_starts() {
     type Polynomials<'a> = [&'a [f64]; 4];
     let cases: [Polynomials; 6] = [
         [&[1.0, 0.5], &[], &[-0.8], &[-1.5, 0.7]],
@@ -209,7 +209,7 @@ fn undetermined_models_are_refused_by_name() {
 }
 
 #[test]
-fn one_sample_too_few_is_told() {
+fn one_sample_too_few_is_an_error() {
     let record = runs(Condition::C1, 1).remove(0);
     // There are 31 samples before the first residual, 5 parameters and 2 states.
     let enough = record.span(0.0, 0.39).unwrap();
@@ -230,7 +230,7 @@ fn one_sample_too_few_is_told() {
 }
 
 #[test]
-fn no_length_and_no_order_makes_it_panic() {
+fn no_length_or_order_panics() {
     let whole = runs(Condition::C1, 1).remove(0);
     let mut fitted = 0;
     for samples in [1, 2, 3, 5, 8, 13, 30, 31, 32, 33, 40, 60, 120] {
@@ -274,7 +274,7 @@ fn no_length_and_no_order_makes_it_panic() {
 }
 
 #[test]
-fn a_search_that_is_cut_off_says_so() {
+fn iteration_limit_is_reported() {
     let record = runs(Condition::C1, 1);
     let mut cut = bj();
     cut.search.max_iterations = 1;

@@ -15,13 +15,13 @@ fn printed(name: &str) -> String {
 }
 
 #[test]
-fn a_file_is_identified() {
+fn identify_file_example_runs() {
     let text = printed("identify_file");
     assert!(text.contains("omega_nm") && text.contains("report.html"), "{text}");
 }
 
 #[test]
-fn a_person_is_tracked_live() {
+fn track_live_example_runs() {
     let text = printed("track_live");
     assert!(
         text.contains("80.0 s") && text.contains("8192 samples, 0 skipped"),
@@ -30,13 +30,13 @@ fn a_person_is_tracked_live() {
 }
 
 #[test]
-fn a_study_runs() {
+fn study_example_runs() {
     let text = printed("simulate_and_study");
     assert!(text.contains("finished: true") && text.contains("median"), "{text}");
 }
 
 #[test]
-fn each_has_less_than_forty_lines() {
+fn each_example_has_less_than_forty_lines() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/examples");
     for name in ["identify_file", "simulate_and_study", "track_live"] {
         let text = std::fs::read_to_string(format!("{folder}/{name}.rs")).unwrap();

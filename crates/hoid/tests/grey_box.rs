@@ -120,7 +120,7 @@ fn unbiased_with_a_remnant_of_fourth_order() {
 }
 
 #[test]
-fn the_order_of_the_remnant_is_found() {
+fn remnant_order_is_found() {
     let n = 12;
     for m0 in 1..=4 {
         let right = runs(Condition::C1, m0, n)
@@ -139,7 +139,7 @@ fn the_order_of_the_remnant_is_found() {
 }
 
 #[test]
-fn white_remnant_is_told_from_a_coloured_one() {
+fn white_remnant_is_distinguished_from_coloured() {
     let signals = delayed(0.3, 4000, 0.004);
     let fit = GreyBox::new(0..=2).fit(&[signals]).unwrap();
     assert_eq!(fit.order(), 0);
@@ -192,7 +192,7 @@ fn respond([k_e, k_e_dot, omega, zeta, tau]: [f64; 5], n: usize, noise: f64, rep
 }
 
 #[test]
-fn without_noise_every_delay_comes_back() {
+fn every_delay_is_exact_without_noise() {
     for tau in [0.28, 0.2837, 0.2899, 0.115, 0.4003] {
         for initial_state in [InitialState::Estimate, InitialState::Zero] {
             let fit = GreyBox {
@@ -223,7 +223,7 @@ fn without_noise_every_delay_comes_back() {
 }
 
 #[test]
-fn every_person_is_found_from_the_own_starts() {
+fn every_operator_is_found_from_default_starts() {
     let draws = RunSeed {
         seed: 5,
         cell: 2,
@@ -272,7 +272,7 @@ fn every_person_is_found_from_the_own_starts() {
 }
 
 #[test]
-fn a_delay_between_samples_is_found_under_noise() {
+fn delay_between_samples_is_found_in_noise() {
     let fit = grey_box(0).fit(&[delayed(0.2837, 6000, 0.02)]).unwrap();
     let tau = fit.operator(0).unwrap().tau_e_s;
     let error = tau.standard_error.unwrap();
@@ -282,7 +282,7 @@ fn a_delay_between_samples_is_found_under_noise() {
 }
 
 #[test]
-fn constraints_hold_and_cost_no_variance() {
+fn constraints_hold_and_reduce_the_variance() {
     let record = runs(Condition::C1, 2, 1);
     let free = grey_box(2).fit(&record).unwrap();
     let mut held = grey_box(2);
@@ -318,7 +318,7 @@ fn constraints_hold_and_cost_no_variance() {
 }
 
 #[test]
-fn records_share_what_is_common() {
+fn records_share_common_parameters() {
     let mut records = runs(Condition::C1, 1, 2);
     records.extend(runs(Condition::C2, 1, 1));
     let one = grey_box(1).fit(&records[..1]).unwrap();
@@ -352,7 +352,7 @@ fn records_share_what_is_common() {
 }
 
 #[test]
-fn the_polynomials_are_the_same_model() {
+fn polynomial_fit_is_the_same_model() {
     let record = runs(Condition::C1, 3, 1).remove(0);
     let fit = grey_box(3).fit(std::slice::from_ref(&record)).unwrap();
     let same = fit.polynomial_fit(0);
@@ -373,7 +373,7 @@ fn the_polynomials_are_the_same_model() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_told() {
+fn invalid_data_and_options_are_errors() {
     let record = runs(Condition::C1, 1, 1);
     let refused = |change: fn(&mut GreyBox), records: &[Record]| {
         let mut grey = grey_box(1);

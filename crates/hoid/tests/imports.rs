@@ -258,34 +258,40 @@ impl Crate {
     }
 
     /// Returns the files to which each file has an arrow.
-    fn arrows(&self) -> BTreeMap<&Path, BTreeSet<&Path>> {
-        let mut arrows: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
+    fn dependencies(&self) -> BTreeMap<&Path, BTreeSet<&Path>> {
+        let mut dependencies: BTreeMap<&Path, BTreeSet<&Path>> = BTreeMap::new();
         for (at, module) in self.modules.iter().enumerate() {
             let imports = module
                 .imports
                 .iter()
                 .filter(|(_, _, again)| !again)
                 .map(|(_, path, _)| path);
-            let to = arrows.entry(&module.file).or_default();
+            let to = dependencies.entry(&module.file).or_default();
             for path in imports.chain(&module.paths) {
                 to.extend(self.resolve(at, path, 0).map(|to| self.modules[to].file.as_path()));
             }
             to.remove(module.file.as_path());
         }
-        arrows
+        dependencies
     }
 }
 
 /// Returns groups of files in which each file reaches all other files of its group.
-fn circles<'p>(arrows: &BTreeMap<&'p Path, BTreeSet<&'p Path>>) -> Vec<Vec<&'p Path>> {
+fn cycles<'p>(dependencies: &BTreeMap<&'p Path, BTreeSet<&'p Path>>) -> Vec<Vec<&'p Path>> {
     let reached = |from: &'p Path| {
         let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
         while let Some(at) = open.pop() {
-            open.extend(arrows.get(at).into_iter().flatten().filter(|to| seen.insert(**to)));
+            open.extend(
+                dependencies
+                    .get(at)
+                    .into_iter()
+                    .flatten()
+                    .filter(|to| seen.insert(**to)),
+            );
         }
         seen
     };
-    let reach: BTreeMap<&Path, BTreeSet<&Path>> = arrows.keys().map(|&file| (file, reached(file))).collect();
+    let reach: BTreeMap<&Path, BTreeSet<&Path>> = dependencies.keys().map(|&file| (file, reached(file))).collect();
     let mut left: BTreeSet<&Path> = reach
         .iter()
         .filter(|(file, seen)| seen.contains(*file))
@@ -305,7 +311,7 @@ fn circles<'p>(arrows: &BTreeMap<&'p Path, BTreeSet<&'p Path>>) -> Vec<Vec<&'p P
 }
 
 #[test]
-fn no_circle_of_imports() {
+fn modules_have_no_import_cycles() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let mut roots: Vec<PathBuf> = fs::read_dir(crates)
         .unwrap()
@@ -320,12 +326,12 @@ fn no_circle_of_imports() {
                 continue;
             }
             let all = Crate::read(&root);
-            let arrows = all.arrows();
-            for circle in circles(&arrows) {
+            let dependencies = all.dependencies();
+            for circle in cycles(&dependencies) {
                 found += &format!("{}\n", folder.file_name().unwrap().display());
                 for file in &circle {
                     let short = |path: &Path| path.strip_prefix(folder.join("src")).unwrap().display().to_string();
-                    let to: Vec<String> = arrows[file]
+                    let to: Vec<String> = dependencies[file]
                         .iter()
                         .filter(|to| circle.contains(to))
                         .map(|to| short(to))

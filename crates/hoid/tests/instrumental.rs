@@ -116,7 +116,7 @@ fn textbook_orders(method: IvMethod) -> Orders {
 }
 
 #[test]
-fn open_loop_is_unbiased_and_knows_its_errors() {
+fn open_loop_is_unbiased_with_correct_errors() {
     let runs = 100;
     let names = ["b0", "b1", "f1", "f2"];
     let truth = [B[0], B[1], F[0], F[1]];
@@ -164,7 +164,7 @@ fn open_loop_is_unbiased_and_knows_its_errors() {
 }
 
 #[test]
-fn refined_method_agrees_with_the_prediction_error_method_for_c_and_d_too() {
+fn refined_method_agrees_with_pem_for_c_and_d() {
     let orders = Orders {
         nc: 1,
         ..textbook_orders(IvMethod::RivBj)
@@ -310,7 +310,7 @@ fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
 }
 
 #[test]
-fn refined_method_with_the_right_noise_model_is_the_prediction_error_method() {
+fn refined_method_with_the_right_noise_model_is_pem() {
     let records = runs(0.28, 0.06, 1, 0.3, 12);
     for record in &records {
         let a = operator_iv(IvMethod::RivBj, Instruments::Simulated, 29)
@@ -371,7 +371,7 @@ fn reference_loop_table() {
 }
 
 #[test]
-fn a_missing_or_useless_channel_is_told() {
+fn missing_or_useless_channel_is_an_error() {
     let record = runs(0.28, 0.06, 1, 0.1, 1).remove(0);
     let fit = |channel: &str, record: &Record| {
         let instruments = Instruments::External(channel.to_owned());
@@ -395,7 +395,7 @@ fn a_missing_or_useless_channel_is_told() {
 }
 
 #[test]
-fn instruments_that_vanish_where_they_count_are_told() {
+fn instruments_without_power_in_the_span_are_reported() {
     let record = open_loop(&[], 1.0, 2000, 0);
     // The channel is zero except for one sample at the end, so the instruments are zero in all rows that are used.
     let mut late = vec![0.0; 2000];
@@ -413,7 +413,7 @@ fn instruments_that_vanish_where_they_count_are_told() {
 }
 
 #[test]
-fn a_record_without_noise_gives_the_truth() {
+fn noise_free_record_gives_the_truth() {
     let record = open_loop(&[], 0.0, 400, 3);
     for method in IvMethod::ALL {
         let fit = iv(method, Instruments::Simulated, textbook_orders(method))
@@ -430,7 +430,7 @@ fn a_record_without_noise_gives_the_truth() {
 }
 
 #[test]
-fn one_sample_too_few_is_told_and_no_length_panics() {
+fn one_sample_too_few_is_an_error_and_no_length_panics() {
     let whole = runs(0.28, 0.06, 1, 0.1, 1).remove(0);
     let mut fitted = 0;
     for samples in [1, 2, 29, 30, 31, 33, 35, 36, 37, 38, 39, 40, 45, 60, 90, 150, 400] {
@@ -446,13 +446,13 @@ fn one_sample_too_few_is_told_and_no_length_panics() {
                     }
                     Err(error) => {
                         // A record of one sample counts as a constant signal.
-                        let told = matches!(
+                        let reported = matches!(
                             error,
                             IdentError::TooFewSamples { .. }
                                 | IdentError::DelayTooLong { .. }
                                 | IdentError::NoExcitation { .. }
                         );
-                        assert!(samples > 34 || told, "{samples} {error}");
+                        assert!(samples > 34 || reported, "{samples} {error}");
                     }
                 }
             }
@@ -462,7 +462,7 @@ fn one_sample_too_few_is_told_and_no_length_panics() {
 }
 
 #[test]
-fn options_and_orders_are_checked_and_a_limit_is_told() {
+fn options_are_checked_and_the_iteration_limit_reported() {
     let record = open_loop(&[], 1.0, 1000, 0);
     let method = IvMethod::Sriv;
     let sound = iv(method, Instruments::Simulated, textbook_orders(method));
@@ -493,7 +493,7 @@ fn options_and_orders_are_checked_and_a_limit_is_told() {
 }
 
 #[test]
-fn several_records_sharpen_the_estimate() {
+fn several_records_reduce_the_standard_errors() {
     let records = runs(0.28, 0.06, 1, 0.1, 4);
     for method in IvMethod::ALL {
         let estimator = operator_iv(method, external(), 29);

@@ -29,7 +29,7 @@ fn sample(people: std::ops::Range<u64>, variant: Variant) -> Vec<Outcome> {
 }
 
 #[test]
-fn intervals_hold_the_truth_of_virtual_people() {
+fn intervals_cover_the_truth_of_virtual_people() {
     // People 0 to 5 have one or two runs, which is short enough for a test.
     let all = sample(0..6, given(true));
     let of: Vec<&Outcome> = all.iter().collect();
@@ -49,7 +49,7 @@ fn intervals_hold_the_truth_of_virtual_people() {
 /// If the form is selected without lines, a wrong form must not appear to be the only one: either the true form has a
 /// weight, or the intervals of determined quantities contain the true values.
 #[test]
-fn intervals_hold_the_truth_if_the_form_is_chosen_without_lines() {
+fn intervals_cover_the_truth_with_form_selection() {
     let variant = Variant {
         excitation: false,
         form_given: false,
@@ -66,7 +66,7 @@ fn intervals_hold_the_truth_if_the_form_is_chosen_without_lines() {
 }
 
 #[test]
-fn a_sample_is_the_same_on_any_number_of_threads() {
+fn samples_do_not_depend_on_the_number_of_threads() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let found: Vec<_> = pool
@@ -80,7 +80,7 @@ fn a_sample_is_the_same_on_any_number_of_threads() {
 }
 
 #[test]
-fn shares_have_errors() {
+fn shares_have_standard_errors() {
     let share = Share::over([true, true, true, false]);
     assert_eq!((share.of, share.all, share.percent()), (3, 4, 75.0));
     // A share of 100 % also has a standard error.

@@ -36,7 +36,7 @@ fn prepared(record: Record, change: impl FnOnce(&mut Preparation)) -> Record {
 }
 
 #[test]
-fn an_offset_gives_the_fit_of_the_aligned_record() {
+fn offset_gives_the_aligned_record() {
     let whole = run(1);
     // u is recorded three samples late in the file.
     let late = bare(&whole, 3);
@@ -49,7 +49,7 @@ fn an_offset_gives_the_fit_of_the_aligned_record() {
 }
 
 #[test]
-fn units_change_the_gains_and_nothing_else() {
+fn units_change_only_the_gains() {
     let orders = Structure::BoxJenkins.operator_orders(29);
     let fit = |record: Record| Estimator::new(Structure::BoxJenkins, orders).fit(&[record]).unwrap();
     let plain = fit(bare(&run(1), 0)).operator().unwrap();
@@ -70,7 +70,7 @@ fn units_change_the_gains_and_nothing_else() {
 }
 
 #[test]
-fn a_fit_of_every_fourth_sample_is_the_same_person() {
+fn decimated_record_gives_the_same_operator() {
     const RUNS: u64 = 12;
     const FACTOR: usize = 4;
     // Gain, lead, neuromuscular frequency and damping, and delay. The longer hold would shorten the delay by .015 s,

@@ -26,7 +26,7 @@ fn run(hz: f64, noise_level: f64, seed: u64) -> Record {
 }
 
 #[test]
-fn the_delay_is_that_of_the_old_rate() {
+fn decimation_keeps_the_delay() {
     // With a small remnant, a change of the delay of a millisecond is visible; the longer hold alone would change it by
     // 2.7 to 4.8 ms.
     for (hz, factor) in [(250.0, 3), (1000.0, 10), (2000.0, 20)] {
@@ -51,7 +51,7 @@ fn the_delay_is_that_of_the_old_rate() {
 }
 
 #[test]
-fn lines_are_those_of_the_old_rate() {
+fn decimation_keeps_the_describing_function() {
     let whole = run(1000.0, 0.1, 3);
     let of = |record: &Record, offset_samples: f64| {
         let options = DescriptionOptions {

@@ -72,7 +72,7 @@ fn trials(directory: &Path, row: &Row) -> Vec<Record> {
 }
 
 #[test]
-fn describing_functions_are_those_of_the_table() {
+fn describing_functions_match_the_table() {
     let Some(directory) = env::var_os("HOID_HUMAN_DATA") else {
         println!("skipped: HOID_HUMAN_DATA does not name the directory of the recordings");
         return;

@@ -78,7 +78,7 @@ fn with_memory(method: Method, memory: &str) -> TrackOptions {
 }
 
 #[test]
-fn error_bars_hold_with_an_infinite_memory() {
+fn error_bars_are_correct_with_infinite_memory() {
     for method in [Method::rpem(), hoid::survey::physical()] {
         // The start fit uses half of the record, so its errors are nearly normal. The standard error of a standard
         // deviation from 6000 runs is 1/sqrt(12000) = .009.
@@ -93,7 +93,7 @@ fn error_bars_hold_with_an_infinite_memory() {
 }
 
 #[test]
-fn error_bars_hold_with_a_memory_of_256_samples() {
+fn error_bars_are_correct_with_256_samples_of_memory() {
     for method in [Method::rpem(), hoid::survey::physical()] {
         for deviation in z_scores(&with_memory(method.clone(), "256"), 2000) {
             assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
@@ -102,7 +102,7 @@ fn error_bars_hold_with_a_memory_of_256_samples() {
 }
 
 #[test]
-fn error_bars_hold_with_a_memory_for_each_parameter() {
+fn error_bars_are_correct_with_a_memory_per_parameter() {
     for method in [Method::rpem(), hoid::survey::physical()] {
         for deviation in z_scores(&options(method.clone()), 2000) {
             assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
@@ -118,7 +118,7 @@ fn long_record() -> Record {
 }
 
 #[test]
-fn with_an_infinite_memory_it_comes_to_the_batch_fit_from_several_starts() {
+fn infinite_memory_converges_to_the_batch_fit() {
     let record = long_record();
     let structure = Structure::BoxJenkins;
     let orders = structure.operator_orders(NK);
@@ -168,7 +168,7 @@ fn with_an_infinite_memory_it_comes_to_the_batch_fit_from_several_starts() {
 }
 
 #[test]
-fn least_squares_with_an_infinite_memory_is_the_batch_fit() {
+fn rls_with_infinite_memory_is_the_batch_fit() {
     let record = run(&Simulator::new(&scenario(Condition::C1, 3, 0.1)).unwrap(), 5);
     let structure = Structure::Arx;
     let batch = Estimator {
@@ -206,7 +206,7 @@ fn alternating(k: usize, record: &Record) -> (f64, f64) {
 }
 
 #[test]
-fn a_million_samples_in_all_weathers_leave_numbers_and_a_bounded_covariance() {
+fn covariance_stays_bounded_for_a_million_samples() {
     let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 6);
     let span = record.span(0.0, 30.72).unwrap();
     let rules: [&[(&str, &str)]; 6] = [
@@ -255,7 +255,7 @@ fn a_million_samples_in_all_weathers_leave_numbers_and_a_bounded_covariance() {
 }
 
 #[test]
-fn after_silence_the_estimate_recovers_as_fast_as_at_the_start() {
+fn recovery_after_silence_is_as_fast_as_at_the_start() {
     let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap();
     let (first, second) = (run(&simulator, 7), run(&simulator, 8));
     let span = first.span(0.0, 30.72).unwrap();
@@ -295,7 +295,7 @@ fn after_silence_the_estimate_recovers_as_fast_as_at_the_start() {
 }
 
 #[test]
-fn hostile_samples_are_skipped_counted_and_forgotten() {
+fn invalid_samples_are_skipped_and_counted() {
     let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 9);
     let span = record.span(0.0, 30.72).unwrap();
     let hostile = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e7];
@@ -335,7 +335,7 @@ fn hostile_samples_are_skipped_counted_and_forgotten() {
 }
 
 #[test]
-fn no_default_diverges_in_the_reference_conditions() {
+fn defaults_do_not_diverge_in_the_reference_conditions() {
     let methods = [
         Method::rls(),
         Method::rpem(),
@@ -360,7 +360,7 @@ fn no_default_diverges_in_the_reference_conditions() {
 }
 
 #[test]
-fn the_texts_own_settings_are_there() {
+fn thesis_settings_are_available() {
     let record = run(&Simulator::new(&scenario(Condition::C4, 1, 0.1)).unwrap(), 10);
     let settings = [
         ("memory", "256"),
@@ -382,7 +382,7 @@ fn the_texts_own_settings_are_there() {
 }
 
 #[test]
-fn the_delay_is_tracked_with_its_error() {
+fn delay_is_tracked_with_its_error() {
     let mut inside = scenario(Condition::C1, 1, 0.1);
     inside.initial.operator.tau_e_s = 0.3;
     inside.last.operator.tau_e_s = 0.3;
@@ -398,25 +398,25 @@ fn the_delay_is_tracked_with_its_error() {
 }
 
 #[test]
-fn contradictions_are_refused() {
+fn contradictory_options_are_refused() {
     let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 12);
     let refused = |options: TrackOptions| track(&record, &options, 1).unwrap_err().to_string();
     let bj = Structure::BoxJenkins;
-    let says = refused(TrackOptions::new(Method::rls(), bj, bj.operator_orders(NK)));
-    assert!(says.contains("arx or fir"), "{says}");
-    let says = refused(options(Method::rpem()).with(&[("memory_of", "q7=inf")]).unwrap());
-    assert!(says.contains("q7") && says.contains("f2"), "{says}");
-    let says = refused(with_memory(Method::rpem(), "0.001s"));
-    assert!(says.contains("more than one sample"), "{says}");
-    let says = refused(TrackOptions {
+    let message = refused(TrackOptions::new(Method::rls(), bj, bj.operator_orders(NK)));
+    assert!(message.contains("arx or fir"), "{message}");
+    let message = refused(options(Method::rpem()).with(&[("memory_of", "q7=inf")]).unwrap());
+    assert!(message.contains("q7") && message.contains("f2"), "{message}");
+    let message = refused(with_memory(Method::rpem(), "0.001s"));
+    assert!(message.contains("more than one sample"), "{message}");
+    let message = refused(TrackOptions {
         start: StartAt::Theta(vec![0.1, 0.1, -0.5, -2.5, 1.6]),
         ..options(Method::rpem())
     });
-    assert!(says.contains("stable"), "{says}");
-    let says = refused(TrackOptions {
+    assert!(message.contains("stable"), "{message}");
+    let message = refused(TrackOptions {
         start: StartAt::Span(Some((90.0, 95.0))),
         ..options(Method::rpem())
     });
-    assert!(says.contains("90"), "{says}");
+    assert!(message.contains("90"), "{message}");
     assert!(track(&record, &options(Method::rls()), 0).is_err());
 }

@@ -25,11 +25,11 @@ fn distances(fit: &Fit, truth: &[f64]) -> Vec<f64> {
 }
 
 #[test]
-fn every_structure_finds_the_truth_under_every_rule_for_its_past() {
+fn every_structure_finds_the_truth_with_any_initial_state() {
     for structure in Structure::ALL {
         let truth = Truth::of(structure);
         let cut_out = truth.record(4000, 0.5, 7);
-        let from_rest = truth.record_behind(0, 4000, 0.5, 7);
+        let from_rest = truth.record_after_run_in(0, 4000, 0.5, 7);
         for rule in [
             None,
             Some(InitialState::Zero),
@@ -101,7 +101,7 @@ fn search_methods_end_in_the_same_minimum() {
 }
 
 #[test]
-fn fixed_and_bounded_coefficients_keep_their_word() {
+fn constrained_coefficients_stay_in_their_bounds() {
     let truth = Truth::of(Structure::BoxJenkins);
     let record = truth.record(2000, 0.5, 4);
     let mut e = estimator(Structure::BoxJenkins);
@@ -139,7 +139,7 @@ fn fixed_and_bounded_coefficients_keep_their_word() {
 }
 
 #[test]
-fn a_prior_draws_by_its_weight() {
+fn prior_pulls_according_to_its_weight() {
     let record = Truth::of(Structure::OutputError).record(500, 0.5, 6);
     let at = |weight: f64| {
         let mut e = estimator(Structure::OutputError);
@@ -189,13 +189,13 @@ fn a_prior_draws_by_its_weight() {
 }
 
 #[test]
-fn a_robust_loss_shrugs_at_outliers() {
+fn robust_loss_limits_the_effect_of_outliers() {
     let truth = Truth::of(Structure::OutputError);
     let runs = 40;
     let (mut plain_error, mut robust_error, mut inside) = (0.0, 0.0, 0);
     for seed in 0..runs {
         let clean = truth.record(1500, 0.5, 50 + seed);
-        let spoilt: Vec<f64> = clean
+        let with_outliers: Vec<f64> = clean
             .output()
             .iter()
             .enumerate()
@@ -204,7 +204,7 @@ fn a_robust_loss_shrugs_at_outliers() {
         let record = Record::new(
             clean.sample_time(),
             clean.input_channel().unwrap().clone(),
-            Channel::new("u", "deg", spoilt),
+            Channel::new("u", "deg", with_outliers),
         )
         .unwrap();
         let error = |fit: &Fit| (fit.model().f()[0] + 1.5).abs() + (fit.model().b()[0] - 1.0).abs();
@@ -234,7 +234,7 @@ fn a_robust_loss_shrugs_at_outliers() {
 }
 
 #[test]
-fn the_focus_on_simulation_minimises_the_simulation_error_and_its_bars_cover() {
+fn simulation_focus_minimises_the_simulation_error() {
     // An ARX model of an output-error system: the equation error is biased, the simulation error is
     // not.
     let truth = Truth::of(Structure::OutputError);
@@ -277,7 +277,7 @@ fn the_focus_on_simulation_minimises_the_simulation_error_and_its_bars_cover() {
 }
 
 #[test]
-fn a_stable_model_can_be_asked_for() {
+fn stability_can_be_required() {
     // The output grows: least squares reports an unstable model, and with `stable` the best stable model is returned.
     let ts = SampleTime::HUNDREDTH;
     let mut draw = Draw(5);
@@ -301,7 +301,7 @@ fn a_stable_model_can_be_asked_for() {
 }
 
 #[test]
-fn records_without_input_are_told_from_those_with() {
+fn records_without_input_need_a_noise_model() {
     let alone = Truth::of(Structure::Arma).record(200, 1.0, 2);
     assert!(matches!(
         estimator(Structure::Arx).fit(std::slice::from_ref(&alone)),

@@ -14,12 +14,12 @@ use serde_json::Value;
 /// digits.
 const FIVE_DIGITS: f64 = 5e-6;
 /// Tolerance for the reference, which is exact up to rounding; the search of hoid must then have the tolerance
-/// `TO_THE_END`.
+/// `TIGHT_TOLERANCE`.
 const REFERENCE: f64 = 1e-6;
 /// Tolerance of the search with which it ends `sqrt(tolerance n)` = 2e-7 standard errors from the minimum.
-const TO_THE_END: f64 = 1e-16;
+const TIGHT_TOLERANCE: f64 = 1e-16;
 /// Distance from the minimum with the default tolerance, in standard errors: `sqrt(1e-12 n)` = 3e-5 for 1000 samples.
-const BY_DEFAULT: f64 = 1e-4;
+const DEFAULT_DISTANCE: f64 = 1e-4;
 /// Relative difference of the loss: the square of this distance divided by n.
 const LOSS: f64 = 1e-10;
 /// Four digits of a standard error.
@@ -104,7 +104,7 @@ fn fit(case: &Value, rule: InitialState) -> Fit {
 
 fn fit_to_the_end(case: &Value, rule: InitialState) -> Fit {
     let mut estimator = estimator(case, rule);
-    estimator.search.tolerance = TO_THE_END;
+    estimator.search.tolerance = TIGHT_TOLERANCE;
     estimator.fit(&[record(case, SampleTime::new(1.0).unwrap())]).unwrap()
 }
 
@@ -129,7 +129,7 @@ fn estimates(case: &Value) -> impl Iterator<Item = (&str, InitialState, &Value)>
 /// J of the rule backcast depends on the square root of Sigma^-1 from which the residuals are computed. Another square
 /// root rotates the residuals, which adds the contribution of about 1/(1 - r^2) samples to J'J, where r is the largest
 /// root of the noise model. The tolerance is twice this contribution.
-fn square_root_matters(fit: &Fit) -> f64 {
+fn square_root_effect(fit: &Fit) -> f64 {
     let model = fit.model();
     let d = polynomial::product(&monic(model.a()), &monic(model.d()));
     let r = [monic(model.c()), d]
@@ -168,7 +168,7 @@ fn estimates_agree_with_independent_implementations() {
 }
 
 #[test]
-fn estimates_agree_with_the_reference_under_every_rule() {
+fn estimates_agree_with_the_reference_for_each_rule() {
     let mut failures = Vec::new();
     for case in cases() {
         for (_, rule, expected) in estimates(&case).filter(|(by, _, _)| *by == REFERENCE_NAME) {
@@ -186,7 +186,7 @@ fn estimates_agree_with_the_reference_under_every_rule() {
             );
             println!("{line}");
             let converged = found.termination().converged() && sooner.termination().converged();
-            if theta > REFERENCE || loss > LOSS || left > BY_DEFAULT || !converged {
+            if theta > REFERENCE || loss > LOSS || left > DEFAULT_DISTANCE || !converged {
                 failures.push(format!("{line}; from {}, {:?}", found.start(), found.termination()));
             }
             assert_eq!(
@@ -221,7 +221,7 @@ fn standard_errors_agree_with_independent_implementations() {
             let difference = largest_difference(&standard_errors(&found), &other);
             println!("{:9} {rule:?}, {by}: standard errors {difference:.1e}", name(&case));
             let allowed = if rule == InitialState::Backcast {
-                square_root_matters(&found)
+                square_root_effect(&found)
             } else {
                 ERRORS
             };
@@ -233,7 +233,7 @@ fn standard_errors_agree_with_independent_implementations() {
 /// The grid of starts consists of neuromuscular frequencies in rad/s; the results must not depend on it, because these
 /// systems have no neuromuscular part.
 #[test]
-fn the_sample_time_does_not_matter() {
+fn estimates_do_not_depend_on_the_sample_time() {
     for case in cases() {
         let slow = fit(&case, InitialState::Estimate);
         let fast = estimator(&case, InitialState::Estimate)
@@ -246,7 +246,7 @@ fn the_sample_time_does_not_matter() {
 /// Series E of Box and Jenkins, 100 yearly sunspot numbers: distance of c1 of ARMA(2, 1) with each rule, in standard
 /// errors, from exact maximum likelihood (statsmodels), which treats the past correctly.
 #[test]
-fn on_a_short_series_the_rule_decides() {
+fn initial_state_rule_matters_for_a_short_series() {
     let cases = cases();
     let case = cases.iter().find(|c| name(c) == "sunspots").unwrap();
     let exact = case["estimates"]
@@ -270,7 +270,7 @@ fn on_a_short_series_the_rule_decides() {
 /// A search from the true parameters ends in one minimum; a better minimum may exist (for `general` with the roots of A
 /// and D exchanged).
 #[test]
-fn own_starts_end_no_higher_than_the_truth_does() {
+fn default_starts_end_no_higher_than_the_truth() {
     for case in cases() {
         if case["truth"].is_null() {
             continue;
@@ -296,7 +296,7 @@ fn own_starts_end_no_higher_than_the_truth_does() {
 /// ARARX with strong noise, whose pole least squares assigns to A; from such a start, the search ends with a loss that
 /// is up to 40 % too high. There are 40 records of 500 samples, and the noise has the power of the response.
 #[test]
-fn the_pole_of_the_noise_stays_in_d() {
+fn noise_pole_stays_in_d() {
     let mut state = 9_u64;
     let mut draw = move || {
         // A sum of twelve uniform numbers with mean 0 and variance 1.

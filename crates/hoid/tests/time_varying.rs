@@ -78,7 +78,7 @@ fn one(record: &Record) -> &[Record] {
 }
 
 #[test]
-fn a_change_without_noise_is_recovered() {
+fn noise_free_change_is_recovered() {
     for condition in [Condition::C3, Condition::C4, Condition::C5, Condition::C6] {
         let record = without_noise(condition);
         let fit = SigmoidChange::default().fit(one(&record)).unwrap();
@@ -199,7 +199,7 @@ fn abrupt_change_to_the_single_integrator() {
 }
 
 #[test]
-fn where_nothing_changes_it_is_said() {
+fn no_change_is_reported_without_one() {
     for condition in [Condition::C1, Condition::C2] {
         let (mut inside, mut largest) = (0, 0.0_f64);
         let n = 10;
@@ -236,7 +236,7 @@ fn where_nothing_changes_it_is_said() {
 }
 
 #[test]
-fn a_record_without_a_change_agrees_with_box_jenkins() {
+fn record_without_a_change_agrees_with_box_jenkins() {
     let record = &runs(Condition::C1, 1)[0];
     let ours = SigmoidChange {
         delay_range_s: (0.28, 0.28),
@@ -268,7 +268,7 @@ fn a_record_without_a_change_agrees_with_box_jenkins() {
 }
 
 #[test]
-fn several_records_sharpen_the_change() {
+fn several_records_reduce_the_errors_of_the_change() {
     let records = runs(Condition::C5, 4);
     let single = quick().fit(&records[..1]).unwrap();
     let all = quick().fit(&records).unwrap();
@@ -282,7 +282,7 @@ fn several_records_sharpen_the_change() {
 }
 
 #[test]
-fn parameters_can_be_held_and_the_time_axis_moved() {
+fn parameters_can_be_fixed_and_times_shifted() {
     let record = &runs(Condition::C3, 1)[0];
     let constraints = BTreeMap::from([
         ("G".to_owned(), Constraint::Fixed(0.5)),
@@ -321,7 +321,7 @@ fn parameters_can_be_held_and_the_time_axis_moved() {
 }
 
 #[test]
-fn residuals_and_simulation_of_a_fit() {
+fn residuals_and_simulation_match_the_fit() {
     let record = &runs(Condition::C6, 1)[0];
     let fit = SigmoidChange {
         noise_level: NoiseLevel::Constant,
@@ -356,7 +356,7 @@ fn residuals_and_simulation_of_a_fit() {
 }
 
 #[test]
-fn what_cannot_be_fitted_is_refused() {
+fn invalid_data_and_options_are_errors() {
     let record = runs(Condition::C4, 1).remove(0);
     let error = |estimator: SigmoidChange, records: &[Record]| estimator.fit(records).unwrap_err();
     assert!(matches!(error(quick(), &[]), IdentError::NoRecords));

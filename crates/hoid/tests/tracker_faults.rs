@@ -34,7 +34,7 @@ fn effects(references: &[(Run, Reference)], fault: &Fault, at_s: f64) -> Vec<Eff
 
 /// The specified limit is half a standard error.
 #[test]
-fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
+fn outlier_moves_no_parameter_by_half_a_standard_error() {
     use Signal::{E, U};
     for method in [hoid::survey::physical(), hoid::survey::multiple_model(), Method::rpem()] {
         let references = references(&method, 70..73, 120.0);
@@ -59,7 +59,7 @@ fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
 }
 
 #[test]
-fn after_a_hostile_span_the_estimate_comes_back_by_itself() {
+fn estimate_recovers_after_a_faulty_span() {
     for method in [hoid::survey::physical(), hoid::survey::multiple_model()] {
         let references = references(&method, 80..82, 200.0);
         for (fault, at_s) in [
@@ -91,7 +91,7 @@ fn after_a_hostile_span_the_estimate_comes_back_by_itself() {
 
 /// At most one sample in 1e5 is held back.
 #[test]
-fn nothing_is_held_back_where_nothing_is_wrong() {
+fn clean_samples_are_not_held_back() {
     let (mut held, mut samples) = (0, 0);
     for (run, reference) in references(&hoid::survey::physical(), 90..99, 300.0) {
         assert_eq!(reference.restarts, 0, "{:?}", reference.events);

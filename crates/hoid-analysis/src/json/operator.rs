@@ -160,7 +160,7 @@ pub(crate) fn response(points: &[ResponsePoint]) -> Value {
 
 fn lines(found: &Identified) -> Value {
     let Some(lines) = &found.fit.lines else {
-        return why_not(found.fit.no_lines.as_ref());
+        return reason_or_null(found.fit.no_lines.as_ref());
     };
     let mut map = Map::new();
     map.insert("parameters".to_owned(), all_named(&lines.parameters()));
@@ -177,7 +177,7 @@ fn lines(found: &Identified) -> Value {
 
 fn instrumental(found: &Identified) -> Value {
     let Some(of) = &found.fit.instrumental else {
-        return why_not(found.fit.no_instrumental.as_ref());
+        return reason_or_null(found.fit.no_instrumental.as_ref());
     };
     let mut map = Map::new();
     map.insert("parameters".to_owned(), all_named(&of.parameters()));
@@ -227,7 +227,7 @@ fn agreement(found: &Identified) -> Value {
 }
 
 /// Returns the reason why a method gave no result, or null.
-fn why_not(reason: Option<&String>) -> Value {
+fn reason_or_null(reason: Option<&String>) -> Value {
     reason.map_or(Value::Null, |why| json!({"reason": why}))
 }
 

@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_bit_comes_back() {
+    fn round_trip_is_bit_identical() {
         let numbers = [0.1, -0.0, 1.0 / 3.0, f64::INFINITY, f64::MIN_POSITIVE / 3.0];
         let back: Vec<f64> = read(&written(&numbers.to_vec()).unwrap()).unwrap();
         assert!(numbers.iter().zip(&back).all(|(a, b)| a.to_bits() == b.to_bits()));
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_refused() {
+    fn damaged_state_is_refused() {
         let whole = written(&vec![1.0, 2.0]).unwrap();
         for text in ["", "0123", &whole[..whole.len() - 4], &whole.replacen("2", "3", 1)] {
             assert!(read::<Vec<f64>>(text).is_err(), "{text}");

@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_decide_and_what_was_asked_for_wins() {
+    fn roles_follow_names_unless_columns_are_given() {
         let of = |columns: &[&str], input, output| {
             let chosen = Roles::of(columns, input, output);
             (chosen.input.column, chosen.output.column)
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn two_targets_or_no_control_are_not_certain() {
+    fn ambiguous_or_missing_columns_are_not_certain() {
         let certain = |columns: &[&str]| Roles::of(columns, None, None).are_certain();
         assert!(certain(&["t", "r", "y", "u"]) && certain(&["t", "Tracking error", "Stick"]));
         assert!(!certain(&["t", "r", "target", "y", "u"]) && !certain(&["t", "r", "y", "x", "u"]));

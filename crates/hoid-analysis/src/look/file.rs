@@ -67,8 +67,8 @@ pub(super) fn names(found: &FileSurvey) -> Vec<&str> {
 
 /// Returns the unit of a column from the file, or from brackets at the end of its name.
 fn unit_of(column: &ColumnSurvey) -> Option<&str> {
-    let beside = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
-    beside.or_else(|| {
+    let stored_unit = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
+    stored_unit.or_else(|| {
         [('(', ')'), ('[', ']')].into_iter().find_map(|(open, close)| {
             let (name, unit) = column.path.trim().strip_suffix(close)?.rsplit_once(open)?;
             let is_unit = !name.trim().is_empty() && unit.chars().any(|c| c.is_alphabetic() || c == '%' || c == '°');

@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn a_control_that_was_recorded_late_is_found() {
+    fn recording_lag_of_the_control_is_found() {
         let element: ContinuousTransferFunction = "1/s".parse().unwrap();
         for late in [0, 1, 2] {
             let lag = of_control(&integrated(late), Some("d"), &element).unwrap();
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn another_element_and_a_signal_that_is_missing_are_named() {
+    fn wrong_element_and_missing_signal_are_reported() {
         let record = integrated(1);
         let why = of_control(&record, None, &"1/(s^2+0.01s)".parse().unwrap()).unwrap_err();
         assert!(why.contains("the recorded element is 1/s"), "{why}");

@@ -13,12 +13,12 @@ use super::options::LookOptions;
 
 /// Maximum part of a record that a span may leave out at either end: in s, and as a fraction of the record; the smaller
 /// one applies.
-const MOST_CUT_S: f64 = 20.0;
-const MOST_CUT_SHARE: f64 = 0.4;
+const MAX_CUT_S: f64 = 20.0;
+const MAX_CUT_SHARE: f64 = 0.4;
 /// Minimum number of lines of an excitation, since people can predict a single sine.
-const FEWEST_LINES: usize = 3;
+const MIN_LINES: usize = 3;
 /// Largest ratio of two leaked fractions of the power that are treated as equal.
-const LEAKS_ALIKE: f64 = 3.0;
+const MAX_LEAK_RATIO: f64 = 3.0;
 /// Fraction of the power outside the lines that may be due to rounding to about five digits.
 const ROUNDING: f64 = 1e-9;
 
@@ -86,7 +86,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
         .collect();
     let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
     // Of spans with equal leakage the first one, which is the longest, is chosen.
-    let limit = LEAKS_ALIKE * least.max(ROUNDING);
+    let limit = MAX_LEAK_RATIO * least.max(ROUNDING);
     let ((from_s, to_s), excitation, _) = near.into_iter().find(|(.., leak)| *leak <= limit)?;
     let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
     let words = format!(
@@ -109,7 +109,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
 fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
     let span = record.span(from_s, to_s).ok()?;
     let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
-    if excitation.harmonics().len() < FEWEST_LINES {
+    if excitation.harmonics().len() < MIN_LINES {
         return None;
     }
     let values = span.channel(channel)?;
@@ -131,12 +131,12 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
 /// Returns the spans to try: the longest first and, among spans of equal length, the latest first, since a person needs
 /// time to settle.
 fn spans(record: &Record, known: &LookOptions) -> Vec<(f64, f64)> {
-    let (begin, end) = (record.time_s(0), record.time_s(record.len()));
-    let most = MOST_CUT_S.min(MOST_CUT_SHARE * (end - begin));
+    let (start_s, end) = (record.time_s(0), record.time_s(record.len()));
+    let most = MAX_CUT_S.min(MAX_CUT_SHARE * (end - start_s));
     let whole = |from: f64, to: f64| (from.ceil() as i64..=to.floor() as i64).map(|t| t as f64);
     let begins: Vec<f64> = match known.from_s {
         Some(t) => vec![t],
-        None => std::iter::once(begin).chain(whole(begin, begin + most)).collect(),
+        None => std::iter::once(start_s).chain(whole(start_s, start_s + most)).collect(),
     };
     let ends: Vec<f64> = match known.to_s {
         Some(t) => vec![t],
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn the_longest_span_of_whole_periods_is_found() {
+    fn longest_span_of_whole_periods_is_found() {
         let found = search(&record(&[1.0, 3.0, 7.0, 12.0]), &LookOptions::default())
             .ok()
             .unwrap();
@@ -194,7 +194,7 @@ mod tests {
     /// The record has a few samples after the last period, as if the recorder was stopped late. The span to the end of
     /// the record leaks little, but does not consist of whole periods.
     #[test]
-    fn a_period_is_not_drawn_out_by_samples_at_the_end() {
+    fn extra_samples_at_the_end_do_not_change_the_period() {
         let whole = record(&[1.0, 2.0, 3.0]);
         let longer = whole.span(0.0, 23.0).unwrap();
         let exact = search(&longer, &LookOptions::default()).ok().unwrap();
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_excitation_is_said() {
+    fn missing_excitation_gives_the_reason() {
         let sine = search(&record(&[2.0]), &LookOptions::default()).err().unwrap();
         assert!(sine.contains("no column among d"), "{sine}");
         let known = |excitation: &str| LookOptions {

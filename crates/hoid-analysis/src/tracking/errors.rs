@@ -13,13 +13,13 @@ pub fn relative_errors(
     first: usize,
     columns: &[&'static str],
 ) -> Vec<(&'static str, f64)> {
-    let (begin, ts) = (record.time_s(0), record.sample_time().s());
+    let (start_s, ts) = (record.time_s(0), record.sample_time().s());
     let of = |name: &'static str| {
         let truth = record.channel(name)?;
         let squares: Vec<f64> = (first..trace.len())
             .filter_map(|row| {
                 let found = value_of(&operators[row], name)?.value;
-                let k = ((trace.times_s()[row] - begin) / ts).round() as usize;
+                let k = ((trace.times_s()[row] - start_s) / ts).round() as usize;
                 let truth = truth.get(k).copied().filter(|v| *v != 0.0)?;
                 Some((found / truth - 1.0).powi(2))
             })

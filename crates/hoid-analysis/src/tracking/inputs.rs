@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_named() {
+    fn missing_or_extra_numbers_are_refused() {
         assert!(of("nb=2", None, &["e", "r"]).unwrap_err().contains("nk"));
         assert!(
             of("nb=2,1,3", Some("9"), &["e", "r"])

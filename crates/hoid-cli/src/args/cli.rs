@@ -113,7 +113,7 @@ pub enum Command {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_definitions_do_not_contradict_each_other() {
+    fn command_definitions_are_consistent() {
         crate::args::command().debug_assert();
     }
 
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_book_has_the_help_pages() {
+    fn documented_help_pages_are_current() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/reference/command-line.md");
         let page = reference_page();
         if std::env::var_os("HOID_UPDATE_DOCS").is_some() {

@@ -125,7 +125,7 @@ pub struct SimulateGroupArgs {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Recording problems to add: jitter, missing, repeated, slow-clock, saturated, quantised, stalled
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_trouble)]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_defect)]
     pub trouble: Vec<SamplingDefect>,
 }
 
@@ -164,7 +164,7 @@ pub struct PeopleOptions {
     pub sample_time: Option<f64>,
 }
 
-fn parse_trouble(text: &str) -> Result<SamplingDefect, String> {
+fn parse_defect(text: &str) -> Result<SamplingDefect, String> {
     let names = || SamplingDefect::ALL.map(SamplingDefect::name).join(", ");
     SamplingDefect::ALL
         .into_iter()

@@ -337,7 +337,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
 ];
 
 /// The commands whose options are under headings.
-const WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "stream"];
+const COMMANDS_WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "stream"];
 
 /// The program as it is parsed and as it explains itself.
 pub fn command() -> Command {
@@ -353,12 +353,12 @@ fn explained(command: Command) -> Command {
     };
     let examples: String = help.examples.iter().map(|line| format!("  {line}\n")).collect();
     let command = command.after_help(format!("Examples:\n{examples}"));
-    let command = command.mut_subcommands(|inner| inner.mut_args(in_any_case));
+    let command = command.mut_subcommands(|inner| inner.mut_args(ignoring_case));
     command.mut_args(|arg| argument(arg, help))
 }
 
 /// Choices are taken in capitals too.
-fn in_any_case(arg: Arg) -> Arg {
+fn ignoring_case(arg: Arg) -> Arg {
     let takes_value = arg.get_action().takes_values();
     arg.ignore_case(takes_value)
 }
@@ -367,8 +367,8 @@ fn in_any_case(arg: Arg) -> Arg {
 fn argument(arg: Arg, help: &Help) -> Arg {
     let id = arg.get_id().as_str().to_owned();
     let hidden = !arg.is_positional() && !help.shown.is_empty() && !help.shown.contains(&id.as_str());
-    let arg = in_any_case(arg).hide_short_help(hidden);
-    if !WITH_HEADINGS.contains(&help.command) || arg.is_positional() {
+    let arg = ignoring_case(arg).hide_short_help(hidden);
+    if !COMMANDS_WITH_HEADINGS.contains(&help.command) || arg.is_positional() {
         return arg;
     }
     let heading = HEADINGS.iter().find(|(_, ids)| ids.contains(&id.as_str()));
@@ -409,7 +409,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tables_name_what_there_is() {
+    fn help_tables_match_the_commands_and_options() {
         let program = Cli::command();
         let known: BTreeSet<&str> = program.get_subcommands().map(Command::get_name).collect();
         let grouped: BTreeSet<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
@@ -460,7 +460,7 @@ mod tests {
 
     /// An option that the first pages use is found where a newcomer looks first.
     #[test]
-    fn the_options_of_the_first_pages_stand_in_the_short_help() {
+    fn short_help_has_the_options_of_the_first_pages() {
         let mut program = command();
         program.build();
         let pages = [
@@ -488,7 +488,7 @@ mod tests {
     }
 
     #[test]
-    fn choices_are_taken_in_capitals() {
+    fn choices_ignore_case() {
         let typed = "hoid identify run.csv --structure BJ --criterion Aic --method PEM";
         assert!(command().try_get_matches_from(typed.split(' ')).is_ok());
     }

@@ -28,14 +28,13 @@ pub fn parse_width(text: &str) -> Result<f64, String> {
 }
 
 /// Most samples ahead of a prediction that is judged.
-const MOST_AHEAD: usize = 1_000_000;
+const MAX_AHEAD: usize = 1_000_000;
 
 /// A number of samples ahead.
 pub fn parse_horizon(text: &str) -> Result<usize, String> {
-    let samples = text.trim().parse().ok().filter(|k| (1..=MOST_AHEAD).contains(k));
-    samples.ok_or_else(|| {
-        format!("{text:?} is not a number of samples ahead; write a whole number from 1 to {MOST_AHEAD}")
-    })
+    let samples = text.trim().parse().ok().filter(|k| (1..=MAX_AHEAD).contains(k));
+    samples
+        .ok_or_else(|| format!("{text:?} is not a number of samples ahead; write a whole number from 1 to {MAX_AHEAD}"))
 }
 
 #[cfg(test)]
@@ -43,7 +42,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn widths_as_typed() {
+    fn widths_are_parsed() {
         assert_eq!(parse_width("85mm"), Ok(85.0));
         assert_eq!(parse_width(" 17 cm"), Ok(170.0));
         assert!((parse_width("3.3in").unwrap() - 83.82).abs() < 1e-12);
@@ -53,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn spans_as_typed() {
+    fn spans_are_parsed() {
         assert_eq!(parse_span("0.05..0.6"), Ok((0.05, 0.6)));
         assert_eq!(parse_span("-1 .. -1"), Ok((-1.0, -1.0)));
         for bad in ["", "1", "2..1", "a..b", "0..inf", ".."] {

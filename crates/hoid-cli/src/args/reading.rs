@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn channels_as_typed() {
+    fn channel_options_are_parsed() {
         assert_eq!(parse_scale("x(:,2)=-2").unwrap().1.factor(), -2.0);
         assert_eq!(parse_offset(" u =0.5").unwrap(), ("u".to_owned(), Offset::Samples(0.5)));
         for bad in ["", "u", "=2", "u=", "u=0", "u=x"] {

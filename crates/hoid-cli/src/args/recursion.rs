@@ -208,7 +208,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_and_frequencies_as_typed() {
+    fn counts_and_frequencies_are_parsed() {
         assert!(parse_count("0").is_err() && parse_frequency("0").is_err());
         assert_eq!((parse_count(" 7 "), parse_frequency("100")), (Ok(7), Ok(100.0)));
     }

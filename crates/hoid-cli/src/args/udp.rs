@@ -66,7 +66,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn places_as_typed() {
+    fn udp_addresses_are_parsed() {
         let of = |text: &str| {
             text.parse::<UdpPlaces>()
                 .map(|p| (p.input.to_string(), p.output.to_string()))

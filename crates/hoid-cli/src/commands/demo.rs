@@ -72,7 +72,7 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
         .into_iter()
         .map(|method| {
             let structure = method.default_structure();
-            let (options, told) = if method.starts_itself() {
+            let (options, note) = if method.starts_itself() {
                 let options = TrackOptions::without_prior(method.clone(), record.sample_time());
                 (options, "no prior information".to_owned())
             } else {
@@ -82,7 +82,7 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
                 };
                 (options, structure.label())
             };
-            Ok((format!("{}, {told}", method.name()), track(record, &options, 1)?))
+            Ok((format!("{}, {note}", method.name()), track(record, &options, 1)?))
         })
         .collect()
 }

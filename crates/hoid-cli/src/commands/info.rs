@@ -19,7 +19,7 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
     if args.json {
         let mut object = object(&look.survey);
         object["faults"] = faults.iter().map(|fault| json::fault(&file, &fault.into())).collect();
-        object["look"] = looked(&look, &file);
+        object["look"] = survey_json(&look, &file);
         json::print(&object)?;
     } else {
         let mut text = words(&file, &look.survey);
@@ -29,7 +29,7 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
         for fault in &faults {
             text.push_str(&format!("  {fault}\n"));
         }
-        text.push_str(&looks_like(&look, &file));
+        text.push_str(&layout_and_next_command(&look, &file));
         output::show(&text)?;
     }
     Ok(())
@@ -43,15 +43,15 @@ fn faults_of(look: &Look) -> Vec<Fault> {
 }
 
 /// Returns the layout of the file and the next command to use.
-fn looks_like(look: &Look, file: &str) -> String {
+fn layout_and_next_command(look: &Look, file: &str) -> String {
     let role = |role: &Role| format!("{} ({})", role.column, role.why);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
     // The printed table of columns already gives the units that it found.
-    let beside = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
+    let has_unit = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
     let units: Vec<String> = look
         .units()
         .iter()
-        .filter(|(column, _)| !beside(column))
+        .filter(|(column, _)| !has_unit(column))
         .map(|(column, unit)| format!("{column} in {unit}"))
         .collect();
     if !units.is_empty() {
@@ -90,7 +90,7 @@ fn looks_like(look: &Look, file: &str) -> String {
 }
 
 /// Returns the survey as a JSON object.
-fn looked(look: &Look, file: &str) -> Value {
+fn survey_json(look: &Look, file: &str) -> Value {
     let role = |role: &Role| json!({"column": role.column, "why": role.why, "certain": role.certain});
     let seen = look.seen.as_ref().ok();
     let excitation = match seen.map(|seen| &seen.periods) {

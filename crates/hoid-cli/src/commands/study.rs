@@ -188,15 +188,15 @@ fn description(plan: &Plan) -> String {
         plan.estimators.len(),
         plan.estimates()
     ));
-    const MOST: usize = 12;
+    const MAX_ENTRIES: usize = 12;
     let mut list = |title: &str, entries: Vec<String>| {
         text.push_str(&format!("{title}\n"));
         entries
             .iter()
-            .take(MOST)
+            .take(MAX_ENTRIES)
             .for_each(|entry| text.push_str(&format!("  {entry}\n")));
-        if entries.len() > MOST {
-            text.push_str(&format!("  ... and {} more\n", entries.len() - MOST));
+        if entries.len() > MAX_ENTRIES {
+            text.push_str(&format!("  ... and {} more\n", entries.len() - MAX_ENTRIES));
         }
     };
     let of_cell = |cell: &hoid::study::plan::Cell| {

@@ -26,9 +26,9 @@ const PARAMETERS: [&str; 10] = [
     "t_M",
 ];
 /// Maximum number of parameters on a screen of 80 columns.
-const MOST_PARAMETERS: usize = 3;
+const MAX_PARAMETERS: usize = 3;
 /// Maximum number of rows on a screen.
-const MOST_ROWS: usize = 24;
+const MAX_ROWS: usize = 24;
 
 /// Returns the summary of the tables of a study; empty if they contain no bias of a parameter.
 pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
@@ -67,7 +67,7 @@ fn words(summary: &OutputTable) -> String {
     let shown: Vec<&str> = PARAMETERS
         .into_iter()
         .filter(|name| has(&bias(name)))
-        .take(MOST_PARAMETERS)
+        .take(MAX_PARAMETERS)
         .collect();
     let mut rows: Vec<Row> = Vec::new();
     for i in 0..quantity.len() {
@@ -105,7 +105,7 @@ fn words(summary: &OutputTable) -> String {
     headings.extend(verdicts.then_some("trustworthy"));
     headings.extend(&shown);
     let mut table = text::table(&headings);
-    for row in rows.iter().take(MOST_ROWS) {
+    for row in rows.iter().take(MAX_ROWS) {
         let of_all = |rate: f64| format!("{}/{}", (rate * row.all).round(), row.all);
         let mut cells = vec![row.cell.clone(), row.estimator.clone()];
         cells.push(of_all(1.0 - row.failed - row.not_convertible));
@@ -115,7 +115,7 @@ fn words(summary: &OutputTable) -> String {
         cells.extend(row.biases.iter().cloned());
         table.add_row(cells);
     }
-    let more = match rows.len().checked_sub(MOST_ROWS) {
+    let more = match rows.len().checked_sub(MAX_ROWS) {
         None | Some(0) => String::new(),
         Some(more) => format!("and {}\n", counted(more, "more row")),
     };
@@ -150,7 +150,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_for_each_estimator_in_each_cell() {
+    fn answer_has_a_row_per_estimator_and_cell() {
         let column = |name: &str, values| OutputColumn {
             name: name.to_owned(),
             values,

@@ -177,7 +177,7 @@ pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &s
 }
 
 /// Returns the path of the program built with this example.
-pub fn beside_this() -> PathBuf {
+pub fn built_program_path() -> PathBuf {
     let mut path = std::env::current_exe().unwrap();
     path.pop();
     path.pop();

@@ -35,7 +35,7 @@ pub fn json(directory: &Path, arguments: &[&str]) -> Value {
 }
 
 /// Returns the result of a fit with any verdict; a result that is not determined is also printed, with exit code 1.
-pub fn json_of_any_worth(directory: &Path, arguments: &[&str]) -> Value {
+pub fn json_with_any_exit_code(directory: &Path, arguments: &[&str]) -> Value {
     let output = hoid(directory, arguments);
     let found: Value = serde_json::from_slice(&output.stdout)
         .unwrap_or_else(|_| panic!("{arguments:?}: {}", String::from_utf8_lossy(&output.stderr)));

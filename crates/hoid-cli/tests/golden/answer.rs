@@ -13,7 +13,7 @@ use super::manifest::Call;
 /// Keys that are omitted.
 const VOLATILE: [&str; 4] = ["hoid", "seconds", "state", "threads"];
 /// Longest list that is kept completely.
-const LONG: usize = 24;
+const MAX_LIST: usize = 24;
 /// Approximate number of rows of a table that are kept.
 const ROWS: usize = 12;
 
@@ -83,7 +83,7 @@ fn shorter(value: Value) -> Value {
             .map(|(key, value)| (key, shorter(value)))
             .collect::<Map<_, _>>()
             .into(),
-        Value::Array(all) if all.len() > LONG && !all.iter().any(Value::is_string) => {
+        Value::Array(all) if all.len() > MAX_LIST && !all.iter().any(Value::is_string) => {
             let step = all.len().div_ceil(8);
             let kept: Value = all.iter().step_by(step).map(|v| shorter(v.clone())).collect();
             json!({"length": all.len(), "kept": kept})

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 /// Numbers below this value are rounding errors.
-const NOTHING: f64 = 1e-15;
+const ROUNDING_LIMIT: f64 = 1e-15;
 
 /// Returns the changes, each with the key of the call, the old and the new value.
 pub fn changes(key: &str, was: &Value, now: &Value, tolerance: f64) -> Vec<String> {
@@ -11,7 +11,7 @@ pub fn changes(key: &str, was: &Value, now: &Value, tolerance: f64) -> Vec<Strin
         (Value::Object(a), Value::Object(b)) => {
             let gone = a.iter().filter(|(name, _)| !b.contains_key(*name));
             let mut all: Vec<String> = gone
-                .map(|(name, v)| moved(&format!("{key}.{name}"), v, &Value::Null))
+                .map(|(name, v)| change_message(&format!("{key}.{name}"), v, &Value::Null))
                 .collect();
             for (name, now) in b {
                 let was = a.get(name).unwrap_or(&Value::Null);
@@ -27,7 +27,7 @@ pub fn changes(key: &str, was: &Value, now: &Value, tolerance: f64) -> Vec<Strin
         }
         (Value::Number(a), Value::Number(b)) if same(a, b, tolerance) => Vec::new(),
         _ if was == now => Vec::new(),
-        _ => vec![moved(key, was, now)],
+        _ => vec![change_message(key, was, now)],
     }
 }
 
@@ -36,10 +36,10 @@ fn same(a: &serde_json::Number, b: &serde_json::Number, tolerance: f64) -> bool 
         return a == b;
     }
     let (a, b) = (a.as_f64().unwrap(), b.as_f64().unwrap());
-    (a - b).abs() <= tolerance * a.abs().max(b.abs()) || a.abs().max(b.abs()) < NOTHING
+    (a - b).abs() <= tolerance * a.abs().max(b.abs()) || a.abs().max(b.abs()) < ROUNDING_LIMIT
 }
 
-fn moved(key: &str, was: &Value, now: &Value) -> String {
+fn change_message(key: &str, was: &Value, now: &Value) -> String {
     let text = |value: &Value| {
         let text = value.to_string();
         let short: String = text.chars().take(300).collect();
@@ -73,7 +73,7 @@ pub fn line_per_key(value: &Value) -> String {
 }
 
 #[test]
-fn a_change_is_told_by_its_key() {
+fn changes_are_reported_by_key() {
     let was = serde_json::json!({"a": [1.0, {"b": "x"}], "n": 3, "gone": true});
     let now = serde_json::json!({"a": [1.0 + 1e-12, {"b": "y"}], "n": 4});
     assert_eq!(

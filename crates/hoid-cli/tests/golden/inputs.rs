@@ -12,9 +12,9 @@ pub fn write(at: &Path, inputs: &[Input]) {
         if let Some(options) = &input.simulate {
             good(at, &format!("simulate {options} --out {}", input.file));
         } else if let Some(command) = &input.command {
-            let said = good(at, command);
+            let printed = good(at, command);
             if !path.exists() {
-                fs::write(&path, said).unwrap();
+                fs::write(&path, printed).unwrap();
             }
         } else if let Some(text) = &input.text {
             fs::write(&path, text).unwrap();
@@ -28,8 +28,8 @@ pub fn write(at: &Path, inputs: &[Input]) {
 
 fn good(at: &Path, command: &str) -> Vec<u8> {
     let done = run(at, command, None);
-    let said = String::from_utf8_lossy(&done.stderr);
-    assert!(matches!(done.status.code(), Some(0 | 1)), "{command}: {said}");
+    let printed = String::from_utf8_lossy(&done.stderr);
+    assert!(matches!(done.status.code(), Some(0 | 1)), "{command}: {printed}");
     done.stdout
 }
 

@@ -25,7 +25,7 @@ fn folder() -> PathBuf {
 }
 
 #[test]
-fn answers_are_what_they_were() {
+fn answers_match_the_golden_files() {
     let manifest: Manifest = toml::from_str(&fs::read_to_string(folder().join("calls.toml")).unwrap()).unwrap();
     let at = tempfile::TempDir::new().unwrap();
     inputs::write(at.path(), &manifest.inputs);
@@ -57,7 +57,7 @@ fn answers_are_what_they_were() {
 }
 
 #[test]
-fn every_answer_belongs_to_a_call() {
+fn every_golden_file_belongs_to_a_call() {
     let manifest: Manifest = toml::from_str(&fs::read_to_string(folder().join("calls.toml")).unwrap()).unwrap();
     let kept_of = |of: &str, has: &dyn Fn(&Call) -> bool| {
         let mut names: Vec<String> = manifest

@@ -23,7 +23,7 @@ pub type Fmi3Logger = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *c
 /// Logging callback of the importer.
 #[derive(Clone, Copy)]
 pub(super) enum Logger {
-    Nobody,
+    Unset,
     Two {
         function: Fmi2Logger,
         environment: *mut c_void,
@@ -44,7 +44,7 @@ impl Logger {
     unsafe fn log(self, name: &CString, status: i32, message: &str) {
         let message = CString::new(message.replace('\0', " ")).unwrap_or_default();
         match self {
-            Self::Nobody => {}
+            Self::Unset => {}
             Self::Two { function, environment } => {
                 // SAFETY: the strings are null-terminated and exist during the call; the format consumes exactly one
                 // string, the message.
@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn folders_of_uris() {
+    fn uris_are_converted_to_paths() {
         for (uri, expected) in [
             ("file:///tmp/a%20b/resources", "/tmp/a b/resources"),
             ("file:/tmp/a", "/tmp/a"),

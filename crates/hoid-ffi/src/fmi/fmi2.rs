@@ -53,10 +53,10 @@ pub unsafe extern "C" fn fmi2Instantiate(
     let callbacks = unsafe { callbacks.as_ref() };
     let logger = match callbacks.and_then(|c| Some((c.logger?, c.environment))) {
         Some((function, environment)) => Logger::Two { function, environment },
-        None => Logger::Nobody,
+        None => Logger::Unset,
     };
     // SAFETY: the strings are supplied by the importer.
-    let (name, guid, resources) = unsafe { three(name, guid, resources) };
+    let (name, guid, resources) = unsafe { three_strings(name, guid, resources) };
     let instance = || {
         if kind != CO_SIMULATION {
             return Err("the unit supports only co-simulation, not model exchange".to_owned());
@@ -71,7 +71,11 @@ pub unsafe extern "C" fn fmi2Instantiate(
 ///
 /// # Safety
 /// As for [`string`].
-pub(super) unsafe fn three<'a>(a: *const c_char, b: *const c_char, c: *const c_char) -> (&'a str, &'a str, &'a str) {
+pub(super) unsafe fn three_strings<'a>(
+    a: *const c_char,
+    b: *const c_char,
+    c: *const c_char,
+) -> (&'a str, &'a str, &'a str) {
     // SAFETY: guaranteed by the caller of this function.
     let a = unsafe { string(a) };
     // SAFETY: guaranteed by the caller of this function.

@@ -15,7 +15,7 @@ use hoid_io::fmu::FmuStart;
 
 use super::{
     component::{Component, ERROR, Fmi3Logger, Logger, create, free, with_instance},
-    fmi2::{as_text, boolean, get, integer, not_served, real, set, text, three},
+    fmi2::{as_text, boolean, get, integer, not_served, real, set, text, three_strings},
     instance::Instance,
 };
 
@@ -41,10 +41,10 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
 ) -> *mut Component {
     let logger = match logger {
         Some(function) => Logger::Three { function, environment },
-        None => Logger::Nobody,
+        None => Logger::Unset,
     };
     // SAFETY: the strings are supplied by the importer.
-    let (name, token, resources) = unsafe { three(name, token, resources) };
+    let (name, token, resources) = unsafe { three_strings(name, token, resources) };
     // FMI 3.0 passes the resources as a path, whereas FMI 2.0 passes a URI.
     let folder = Some(PathBuf::from(resources)).filter(|path| !path.as_os_str().is_empty());
     // SAFETY: the logger is supplied by the importer.

@@ -248,7 +248,7 @@ mod tests {
     /// Every output has a value, in the order and with the type of the description.
     #[test]
     #[cfg_attr(miri, ignore = "safe code, and a simulated run takes minutes there")]
-    fn outputs_are_those_of_the_description() {
+    fn outputs_match_the_description() {
         for kind in FmuKind::ALL {
             let folder = tempfile::tempdir().unwrap();
             let settings = FmuSettings::new(kind).with_scenario("condition = \"C4\"".to_owned());
@@ -273,7 +273,7 @@ mod tests {
     /// Steps of a tenth of the sample time give the same estimate as steps of the sample time.
     #[test]
     #[cfg_attr(miri, ignore = "safe code, and a simulated run takes minutes there")]
-    fn shorter_steps_take_the_same_samples() {
+    fn shorter_steps_give_the_same_estimate() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let ended = |parts: u32| {
@@ -304,7 +304,7 @@ mod tests {
         miri,
         ignore = "safe code, and the filters of the method adaptive take minutes there"
     )]
-    fn a_unit_begins_with_its_fit() {
+    fn fmu_starts_from_its_fit() {
         let fit = r#"{"form": "gain", "neuromuscular": true, "verdict": {"level": "trustworthy"}, "parameters": [],
             "records": [{"sample_time": 0.01, "units": {"input": "", "output": ""}}],
             "noise": {"c": [], "d": [-0.9]}, "innovation_variance": 0.1,
@@ -338,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_is_said() {
+    fn invalid_calls_give_the_reason() {
         let why = |done: Done| done.unwrap_err();
         assert!(
             Instance::new("hoid-0.0.0-tracker", None)

@@ -43,8 +43,8 @@ impl Model {
     pub fn saved(&mut self) -> (Vec<f64>, Vec<u8>) {
         match self {
             Self::Tracker(tracker) => {
-                let told = vec![tracker.innovation, f64::from(tracker.changes), tracker.change_t_s];
-                (told, tracker.session.saved())
+                let outputs = vec![tracker.innovation, f64::from(tracker.changes), tracker.change_t_s];
+                (outputs, tracker.session.saved())
             }
             Self::Operator(operator) => (Vec::new(), as_bytes(&operator.saved())),
         }

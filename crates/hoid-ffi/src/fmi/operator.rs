@@ -25,19 +25,19 @@ impl OperatorModel {
             replication: given.count("replication"),
             ..RunSeed::default()
         };
-        let said = |error: hoid_sim::SimError| error.to_string();
+        let to_text = |error: hoid_sim::SimError| error.to_string();
         let scenario = parse_any_scenario(text, "the scenario of the unit", "scenario");
         Ok(match scenario.map_err(|error| error.to_string())? {
             AnyScenario::Reference(scenario) => {
-                let simulator = Simulator::new(&scenario).map_err(said)?;
+                let simulator = Simulator::new(&scenario).map_err(to_text)?;
                 Self {
                     run: Run::Reference(Box::new(OperatorRun::new(simulator, seed, start_s))),
                     sample_time_s: scenario.sample_time.s(),
                 }
             }
             AnyScenario::Family(scenario) => {
-                let simulator = FamilySimulator::new(&scenario).map_err(said)?;
-                let run = FamilyOperatorRun::new(simulator, seed, start_s).map_err(said)?;
+                let simulator = FamilySimulator::new(&scenario).map_err(to_text)?;
+                let run = FamilyOperatorRun::new(simulator, seed, start_s).map_err(to_text)?;
                 Self {
                     run: Run::Family(Box::new(run)),
                     sample_time_s: scenario.sample_time.s(),

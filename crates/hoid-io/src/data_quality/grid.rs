@@ -14,14 +14,14 @@ use std::borrow::Cow;
 use crate::time::sampling::every;
 
 /// Maximum and minimum number of rows of a part to which a line is fitted.
-const PART: usize = 256;
-const LEAST_PART: usize = 5;
+const MAX_PART_ROWS: usize = 256;
+const MIN_PART_ROWS: usize = 5;
 /// A step of at least this many sample times is a pause, after which the grid restarts.
-const PAUSE: f64 = 10.0;
+const MIN_PAUSE_STEPS: f64 = 10.0;
 /// Maximum distance in rows between an excess step and the row that appears not to advance.
-const NEAR: usize = 4;
+const MAX_ROW_DISTANCE: usize = 4;
 /// Number of times from which the phase at the start of a grid is estimated.
-const BEGIN: usize = 8;
+const START_TIMES: usize = 8;
 
 /// Positions of the rows on an evenly spaced grid.
 pub(crate) struct Grid {
@@ -115,10 +115,10 @@ impl Grid {
         let mut start = 0;
         while start < self.rows.len() {
             let mut end = start + 1;
-            while end < self.rows.len() && end - start < PART && self.steps[end] < 1.5 {
+            while end < self.rows.len() && end - start < MAX_PART_ROWS && self.steps[end] < 1.5 {
                 end += 1;
             }
-            if end - start >= LEAST_PART {
+            if end - start >= MIN_PART_ROWS {
                 let times: Vec<f64> = self.rows[start..end]
                     .iter()
                     .map(|row| t[*row] - t[self.rows[start]])
@@ -143,8 +143,8 @@ impl Grid {
 
 /// True if no row is missing and each time is near its grid point.
 fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
-    let begin = times.first().copied().unwrap_or(f64::NAN);
-    let near = |(i, t): (usize, &f64)| (t - begin - i as f64 * ts).abs() < 0.25 * ts;
+    let origin = times.first().copied().unwrap_or(f64::NAN);
+    let near = |(i, t): (usize, &f64)| (t - origin - i as f64 * ts).abs() < 0.25 * ts;
     steps.iter().all(|step| *step == 1.0) && times.iter().enumerate().all(near)
 }
 
@@ -158,22 +158,22 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
     // The phase at the start of a grid is estimated from several times, since a single time deviates by its jitter.
-    let begin = |i: usize| {
+    let origin = |i: usize| {
         let ahead = times[i..]
             .iter()
-            .take(BEGIN)
+            .take(START_TIMES)
             .enumerate()
             .map(|(j, t)| t - j as f64 * ts);
         let near: Vec<f64> = ahead.filter(|t| (t - times[i]).abs() < 1.5 * ts).collect();
         near.iter().sum::<f64>() / near.len() as f64
     };
-    let (mut phase, mut known) = (begin(0), BEGIN as f64);
+    let (mut phase, mut known) = (origin(0), START_TIMES as f64);
     for i in 1..times.len() {
         let mut step = ((times[i] - phase) / ts).round();
-        if step >= PAUSE {
-            let anew = begin(i);
+        if step >= MIN_PAUSE_STEPS {
+            let anew = origin(i);
             step = ((anew - phase) / ts).round();
-            (phase, known) = (anew, BEGIN as f64);
+            (phase, known) = (anew, START_TIMES as f64);
         } else {
             phase += step * ts;
             phase += f64::max(pull, 1.0 / (known + 1.0)) * (times[i] - phase);
@@ -183,11 +183,11 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
         // If a row appears not to advance, an excess step just before is undone; otherwise the next excess step is
         // reduced.
         if step < 1.0 {
-            match (i.saturating_sub(NEAR)..i).rev().find(|j| steps[*j] > 1.5) {
+            match (i.saturating_sub(MAX_ROW_DISTANCE)..i).rev().find(|j| steps[*j] > 1.5) {
                 Some(taken) => steps[taken] -= 1.0,
                 None => owed = Some(i),
             }
-        } else if step > 1.5 && owed.take_if(|at| i - *at <= NEAR).is_some() {
+        } else if step > 1.5 && owed.take_if(|at| i - *at <= MAX_ROW_DISTANCE).is_some() {
             steps[i] -= 1.0;
         }
     }

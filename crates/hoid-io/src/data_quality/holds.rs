@@ -12,14 +12,14 @@ use std::ops::Range;
 
 use super::grid::Grid;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
-use super::signals::{Signal, Signals, one_row, runs};
+use super::signals::{Signal, Signals, row_range, runs};
 use super::values::Levels;
 use hoid_model::numbers::counted;
 
 use crate::wording::short;
 
 /// Finds the rows whose time does not advance: rows that equal the row before, and rows with other values.
-pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let same = |row: &usize| {
         let repeats = |signal: &Signal<'_>| {
             let step = signal.step_to(*row);
@@ -43,7 +43,7 @@ pub(super) fn without_advance(signals: &Signals<'_>, grid: &Grid, found: &mut Ve
         (QualityIssueKind::Repeated, repeated),
         (QualityIssueKind::Unordered, others),
     ] {
-        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&one_row(*row))).collect();
+        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&row_range(*row))).collect();
         let Some(first) = places.first() else { continue };
         let what = if kind == QualityIssueKind::Repeated {
             "duplicated, including the time"

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::issue::{QualityIssue, QualityIssueKind};
-use super::search::{issues_of, names_a_clock};
+use super::search::{is_clock_name, issues_of};
 use super::signals::{Signal, Signals};
 use crate::IoError;
 use crate::record::ReadOptions;
@@ -100,7 +100,7 @@ fn of_columns<'a>(
         name: &column.name,
         values: column.values.get(rows.clone()).unwrap_or_default(),
     };
-    let is_clock = |(at, column): &(usize, &Column)| Some(*at) != time && names_a_clock(&column.name);
+    let is_clock = |(at, column): &(usize, &Column)| Some(*at) != time && is_clock_name(&column.name);
     let clocks = table.columns.iter().enumerate().filter(is_clock);
     let time = time.and_then(|time| table.columns.get(time));
     let mut found = issues_of(&Signals {

@@ -28,9 +28,9 @@ pub(crate) use grid::Grid;
 pub(crate) use in_table::{issues_of_record, issues_of_signals};
 pub use issue::{QualityIssue, QualityIssueKind, RowSpan};
 pub use search::quality_of_record;
-pub(crate) use search::{issues_of, names_a_clock};
+pub(crate) use search::{is_clock_name, issues_of};
 pub(crate) use signals::{Signal, Signals};
-pub(crate) use values::{Levels, rails};
+pub(crate) use values::{Levels, saturation_limits};
 
 #[cfg(test)]
 mod tests;

@@ -16,7 +16,7 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     }
     let grid = signals.time.map(|time| Grid::of(time.values));
     if let Some(grid) = &grid {
-        holds::without_advance(signals, grid, &mut found);
+        holds::non_advancing_rows(signals, grid, &mut found);
         timing::find(signals, grid, &mut found);
     }
     let levels: Vec<Levels> = signals.columns.iter().map(|signal| Levels::of(signal.values)).collect();
@@ -46,7 +46,7 @@ pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
 }
 
 /// True if a name denotes a time column.
-pub(crate) fn names_a_clock(name: &str) -> bool {
+pub(crate) fn is_clock_name(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     ["time", "clock", "stamp"].iter().any(|word| name.contains(word))
 }

@@ -40,7 +40,7 @@ pub(crate) struct Signals<'a> {
 }
 
 /// Returns a row as a range.
-pub(super) fn one_row(row: usize) -> Range<usize> {
+pub(super) fn row_range(row: usize) -> Range<usize> {
     row..row.saturating_add(1)
 }
 
@@ -49,8 +49,8 @@ pub(super) fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     for (row, _) in holds.enumerate().filter(|(_, hold)| *hold) {
         match runs.last_mut() {
-            Some(run) if run.end == row => run.end = one_row(row).end,
-            _ => runs.push(one_row(row)),
+            Some(run) if run.end == row => run.end = row_range(row).end,
+            _ => runs.push(row_range(row)),
         }
     }
     runs

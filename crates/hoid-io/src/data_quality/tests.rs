@@ -79,7 +79,7 @@ fn smooth_and_quiet_channels_have_no_faults() {
 }
 
 #[test]
-fn gaps_are_found_under_jitter_of_nearly_half_a_sample() {
+fn gaps_are_found_despite_large_jitter() {
     let mut any = Arbitrary(3);
     let mut t: Vec<f64> = even().iter().map(|t| t + 0.45 * TS * any.next()).collect();
     let [mut e, mut u] = smooth();
@@ -103,7 +103,7 @@ fn gaps_are_found_under_jitter_of_nearly_half_a_sample() {
 }
 
 #[test]
-fn stalls_and_rows_there_twice() {
+fn stalls_and_repeated_rows_are_found() {
     let [mut e, mut u] = smooth();
     let (held_e, held_u) = (e[700], u[700]);
     e[700..792].fill(held_e);
@@ -144,7 +144,7 @@ fn stalls_and_rows_there_twice() {
 }
 
 #[test]
-fn rails_and_steps() {
+fn saturation_and_quantisation_are_found() {
     let [e, u] = smooth();
     let clipped: Vec<f64> = u.iter().map(|v| v.clamp(-0.9, 1.0)).collect();
     let found = look(&even(), &e, &clipped);
@@ -183,7 +183,7 @@ fn rails_and_steps() {
 }
 
 #[test]
-fn clocks() {
+fn clock_errors_and_drift_are_found() {
     let [e, u] = smooth();
     let slow: Vec<f64> = even().iter().map(|t| 0.998 * t).collect();
     let found = look(&slow, &e, &u);
@@ -223,7 +223,7 @@ fn clocks() {
 }
 
 #[test]
-fn nothing_panics() {
+fn arbitrary_data_never_panic() {
     let mut any = Arbitrary(11);
     let odd = [
         f64::NAN,
@@ -265,7 +265,7 @@ fn nothing_panics() {
 /// In a recording of hours, all values are sorted only if values are repeated in the first rows. A later value of
 /// another order of magnitude may leave fewer than eight levels.
 #[test]
-fn an_outlier_after_a_million_rows() {
+fn late_outlier_raises_no_issue() {
     let mut u: Vec<f64> = (0..(1 << 20) + 1000).map(|k| (0.37 * f64::from(k)).sin()).collect();
     u[(1 << 20) + 500] = 1e30;
     let channel = hoid_model::Channel::new("u", "", u);

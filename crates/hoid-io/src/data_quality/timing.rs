@@ -2,7 +2,7 @@
 
 use super::grid::{Grid, slope};
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
-use super::signals::{Signals, one_row};
+use super::signals::{Signals, row_range};
 use crate::table::Precision;
 use hoid_model::numbers::counted;
 
@@ -13,7 +13,7 @@ use crate::wording::{decimal, short};
 const JITTER: f64 = 1e-3;
 /// Relative deviation of a clock from a given rate above which the deviation is reported; crystals are accurate to
 /// 1e-4.
-const OFF: f64 = 2e-4;
+const MAX_RATE_DEVIATION: f64 = 2e-4;
 /// Limits of the relative deviation from the nearest common rate, if no rate was given: a deviation between them is
 /// reported as a clock error, while a larger one means another rate.
 const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
@@ -48,7 +48,7 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
     let unit = rounding(t, signals.precision).min(ts);
     let jitter = grid.jitter(t);
     if let Some((rms, worst, row)) = jitter.filter(|(_, worst, _)| *worst > (JITTER * ts).max(unit * (1.0 + 1e-6))) {
-        let place = signals.place(&one_row(row));
+        let place = signals.place(&row_range(row));
         found.push(QualityIssue {
             kind: QualityIssueKind::Jitter,
             channel: String::new(),
@@ -80,7 +80,7 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
             rows: missing as usize,
             from_s: signals.at_s(before),
             to_s: signals.at_s(after),
-            ..signals.place(&one_row(before))
+            ..signals.place(&row_range(before))
         })
         .collect();
     let Some(first) = places.first() else { return };
@@ -130,7 +130,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
         },
     };
     let off = hz / expected - 1.0;
-    if !(off.abs() > OFF.max(uncertain) && off.is_finite()) {
+    if !(off.abs() > MAX_RATE_DEVIATION.max(uncertain) && off.is_finite()) {
         return;
     }
     let way = if off > 0.0 { "slow" } else { "fast" };
@@ -174,7 +174,7 @@ fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Ve
     let change = last / first - 1.0;
     let n = third as f64;
     let uncertain = 8.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 4.0) / grid.sample_time_s;
-    if change.is_nan() || change.abs() <= OFF.max(uncertain) {
+    if change.is_nan() || change.abs() <= MAX_RATE_DEVIATION.max(uncertain) {
         return;
     }
     found.push(QualityIssue {
@@ -217,7 +217,7 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
         };
         // The first and last times determine the ratio of the rates up to a jitter of one row at each end.
         let uncertain = 2.0 / pairs.len() as f64;
-        if off.abs() <= OFF.max(uncertain) {
+        if off.abs() <= MAX_RATE_DEVIATION.max(uncertain) {
             continue;
         }
         found.push(QualityIssue {

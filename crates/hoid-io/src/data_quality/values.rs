@@ -22,7 +22,7 @@ use crate::wording::short;
 
 /// Smallest reported quantisation step, relative to the standard deviation; its quantisation noise has 1e-5 of the
 /// power of the signal.
-const COARSE: f64 = 1e-2;
+const MIN_QUANTUM_RATIO: f64 = 1e-2;
 /// Number of consecutive rows at the extreme that count as saturation, for channels in full precision and for quantised
 /// channels.
 const SATURATED_ROWS: (usize, usize) = (3, 5);
@@ -63,7 +63,7 @@ pub(crate) struct Levels {
 
 impl Levels {
     /// Number of levels kept at each end of a channel in full precision.
-    const END: usize = 4;
+    const LEVELS_AT_EACH_END: usize = 4;
 
     pub(crate) fn of(values: &[f64]) -> Self {
         Self::examined(values, EXAMINED)
@@ -75,7 +75,7 @@ impl Levels {
         let finite = values.iter().filter(|v| v.is_finite()).count();
         if let Some((start, [_, ..])) = values.split_at_checked(most) {
             let first = distinct(start);
-            if first.len() > most / 2 && first.len() > 2 * Self::END {
+            if first.len() > most / 2 && first.len() > 2 * Self::LEVELS_AT_EACH_END {
                 return Self {
                     count: rows,
                     rows,
@@ -87,7 +87,7 @@ impl Levels {
         let mut levels = distinct(values);
         let count = levels.len();
         if count > rows / 2 {
-            keep_ends(&mut levels);
+            keep_only_ends(&mut levels);
             levels.shrink_to_fit();
         }
         Self {
@@ -145,25 +145,28 @@ fn distinct(values: &[f64]) -> Vec<f64> {
 /// Returns the levels at both ends of all values. Only values at or beyond the end levels of `first`, the distinct
 /// values of the first rows, are sorted.
 fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
-    let (lower, upper) = (first.get(Levels::END - 1), first.iter().nth_back(Levels::END - 1));
+    let (lower, upper) = (
+        first.get(Levels::LEVELS_AT_EACH_END - 1),
+        first.iter().nth_back(Levels::LEVELS_AT_EACH_END - 1),
+    );
     let is_outer = |v: &f64| lower.is_some_and(|lower| v <= lower) || upper.is_some_and(|upper| v >= upper);
     let outer: Vec<f64> = values.iter().copied().filter(is_outer).collect();
     // Relative to a later value of another order of magnitude, the end levels of `first` may count as a single level.
     let mut levels = distinct(&outer);
-    keep_ends(&mut levels);
+    keep_only_ends(&mut levels);
     levels
 }
 
 /// Removes all levels but those at both ends.
-fn keep_ends(levels: &mut Vec<f64>) {
-    let upper = levels.len().saturating_sub(Levels::END);
-    if upper > Levels::END {
-        levels.drain(Levels::END..upper);
+fn keep_only_ends(levels: &mut Vec<f64>) {
+    let upper = levels.len().saturating_sub(Levels::LEVELS_AT_EACH_END);
+    if upper > Levels::LEVELS_AT_EACH_END {
+        levels.drain(Levels::LEVELS_AT_EACH_END..upper);
     }
 }
 
 /// Returns the saturation limits of a channel, the lower one first.
-pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
+pub(crate) fn saturation_limits(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
     if levels.count < 4 {
         // A switch or a constant signal has fewer than four levels and stays at its extremes by nature.
         return Vec::new();
@@ -177,7 +180,7 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
         };
         let stays = runs(values.iter().map(|v| *v == extreme));
         let rows: usize = stays.iter().map(Range::len).sum();
-        let beside: usize = next.into_iter().map(count).sum();
+        let next_count: usize = next.into_iter().map(count).sum();
         // A stay at the start or end of the record does not count: the signal may have settled there.
         let inner = || {
             stays
@@ -188,7 +191,7 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<SaturationLimit> {
         let longest = inner().max().unwrap_or(0);
         let stayed = inner().filter(|length| *length >= SATURATED_ROWS.0).count();
         let is_rail = if coarse {
-            longest >= SATURATED_ROWS.1 && rows.saturating_mul(3) >= PEAK.saturating_mul(beside) && stayed > 1
+            longest >= SATURATED_ROWS.1 && rows.saturating_mul(3) >= PEAK.saturating_mul(next_count) && stayed > 1
         } else {
             longest >= SATURATED_ROWS.0
         };
@@ -234,7 +237,7 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
         }
         return;
     }
-    for rail in rails(values, levels) {
+    for rail in saturation_limits(values, levels) {
         let places: Vec<RowSpan> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
         let seconds = |place: &RowSpan| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
         let longest = places.iter().map(seconds).fold(0.0, f64::max);
@@ -252,7 +255,10 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
     let count = levels.finite as f64;
     let mean = finite().map(|v| v / count).sum::<f64>();
     let deviation = finite().map(|v| (v - mean).powi(2) / count).sum::<f64>().sqrt();
-    if let Some((step, count)) = levels.quantum().filter(|(step, _)| *step >= COARSE * deviation) {
+    if let Some((step, count)) = levels
+        .quantum()
+        .filter(|(step, _)| *step >= MIN_QUANTUM_RATIO * deviation)
+    {
         let text = format!(
             "{name} is quantised: {count} levels in steps of {} ({} % of its standard deviation)",
             short(step),
@@ -288,17 +294,17 @@ mod tests {
     /// An outlier of another order of magnitude after the first rows: relative to it, the lowest levels count as a
     /// single level.
     #[test]
-    fn an_outlier_in_a_long_channel() {
+    fn outlier_in_a_long_channel_is_no_saturation() {
         for outlier in [1e30, -1e30, 1e308] {
             let mut values: Vec<f64> = (0..200).map(|k| (0.37 * f64::from(k)).sin()).collect();
             (values[150], values[151]) = (outlier, -0.5 * outlier);
             let quick = Levels::examined(&values, 64);
-            assert!(quick.kept.len() < 4 && rails(&values, &quick).is_empty());
+            assert!(quick.kept.len() < 4 && saturation_limits(&values, &quick).is_empty());
         }
     }
 
     #[test]
-    fn a_long_channel_in_full_precision_is_known_by_its_first_rows() {
+    fn first_rows_decide_whether_a_channel_is_quantised() {
         let wave = |k: usize| (0.37 * k as f64).sin() + 0.3 * (1.01 * k as f64).cos();
         let mut values: Vec<f64> = (0..4000).map(wave).collect();
         values[3000..3005].fill(2.0);
@@ -307,7 +313,7 @@ mod tests {
             let (quick, all) = (Levels::examined(&values, most), Levels::of(&values));
             assert_eq!((&quick.kept, quick.finite), (&all.kept, 3999));
             assert!(!quick.is_quantised() && quick.quantum().is_none());
-            let found = rails(&values, &quick);
+            let found = saturation_limits(&values, &quick);
             assert_eq!((found.len(), found[0].value, found[0].stays.len()), (1, 2.0, 1));
             assert_eq!(found[0].stays[0], 3000..3005);
         }

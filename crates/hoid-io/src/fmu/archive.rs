@@ -22,8 +22,8 @@ pub struct Library {
 /// Platform of a shared library: folder names and file extension.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Platform {
-    in_two: &'static str,
-    in_three: &'static str,
+    fmi2_folder: &'static str,
+    fmi3_folder: &'static str,
     ending: &'static str,
 }
 
@@ -33,23 +33,23 @@ const LINUX: [(u16, Platform); 2] = [
     (
         62,
         Platform {
-            in_two: "linux64",
-            in_three: "x86_64-linux",
+            fmi2_folder: "linux64",
+            fmi3_folder: "x86_64-linux",
             ending: "so",
         },
     ),
     (
         183,
         Platform {
-            in_two: "aarch64-linux",
-            in_three: "aarch64-linux",
+            fmi2_folder: "aarch64-linux",
+            fmi3_folder: "aarch64-linux",
             ending: "so",
         },
     ),
 ];
 const WINDOWS: Platform = Platform {
-    in_two: "win64",
-    in_three: "x86_64-windows",
+    fmi2_folder: "win64",
+    fmi3_folder: "x86_64-windows",
     ending: "dll",
 };
 const MACHINE_OF_WINDOWS: u16 = 0x8664;
@@ -59,16 +59,16 @@ const MAC: [(u32, Platform); 2] = [
     (
         0x0100_0007,
         Platform {
-            in_two: "darwin64",
-            in_three: "x86_64-darwin",
+            fmi2_folder: "darwin64",
+            fmi3_folder: "x86_64-darwin",
             ending: "dylib",
         },
     ),
     (
         0x0100_000c,
         Platform {
-            in_two: "aarch64-darwin",
-            in_three: "aarch64-darwin",
+            fmi2_folder: "aarch64-darwin",
+            fmi3_folder: "aarch64-darwin",
             ending: "dylib",
         },
     ),
@@ -83,12 +83,12 @@ fn exports(bytes: &[u8], function: &str) -> bool {
     bytes.windows(name.len()).any(|part| part == name)
 }
 
-fn two_bytes(bytes: &[u8], at: usize) -> Option<u16> {
+fn u16_at(bytes: &[u8], at: usize) -> Option<u16> {
     let found = bytes.get(at..at.checked_add(2)?)?;
     Some(u16::from_le_bytes(found.try_into().ok()?))
 }
 
-fn four_bytes(bytes: &[u8], at: usize) -> Option<u32> {
+fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
     let found = bytes.get(at..at.checked_add(4)?)?;
     Some(u32::from_le_bytes(found.try_into().ok()?))
 }
@@ -97,17 +97,17 @@ impl Platform {
     /// Determines the platform from the header of a shared library (ELF, PE or Mach-O).
     fn of(bytes: &[u8]) -> Option<Self> {
         if bytes.starts_with(ELF) {
-            let machine = two_bytes(bytes, 18)?;
+            let machine = u16_at(bytes, 18)?;
             return LINUX.into_iter().find(|(known, _)| *known == machine).map(|(_, p)| p);
         }
         if bytes.starts_with(MACH_O) {
-            let machine = four_bytes(bytes, 4)?;
+            let machine = u32_at(bytes, 4)?;
             return MAC.into_iter().find(|(known, _)| *known == machine).map(|(_, p)| p);
         }
-        let head = four_bytes(bytes, 0x3c).filter(|_| bytes.starts_with(b"MZ"))? as usize;
-        let behind = head.checked_add(4)?;
-        let is_one = bytes.get(head..behind)? == b"PE\0\0";
-        (is_one && two_bytes(bytes, behind)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
+        let head = u32_at(bytes, 0x3c).filter(|_| bytes.starts_with(b"MZ"))? as usize;
+        let end = head.checked_add(4)?;
+        let is_one = bytes.get(head..end)? == b"PE\0\0";
+        (is_one && u16_at(bytes, end)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
     }
 }
 
@@ -159,8 +159,8 @@ pub fn write_fmu(
     for library in libraries {
         let platform = library.platform;
         let folder = match version {
-            FmiVersion::Two => platform.in_two,
-            FmiVersion::Three => platform.in_three,
+            FmiVersion::Two => platform.fmi2_folder,
+            FmiVersion::Three => platform.fmi3_folder,
         };
         let name = format!("binaries/{folder}/{MODEL}.{}", platform.ending);
         if parts.iter().any(|(other, _)| *other == name) {
@@ -222,11 +222,11 @@ mod tests {
                 "aarch64-darwin/hoid.dylib",
             ),
         ]
-        .map(|(head, in_two, in_three)| ([head, names.clone().into_bytes()].concat(), in_two, in_three))
+        .map(|(head, fmi2_folder, fmi3_folder)| ([head, names.clone().into_bytes()].concat(), fmi2_folder, fmi3_folder))
     }
 
     #[test]
-    fn each_library_lies_where_its_platform_looks() {
+    fn libraries_are_stored_in_their_platform_folder() {
         let folder = tempfile::tempdir().unwrap();
         let files: Vec<_> = (heads().into_iter().enumerate())
             .map(|(i, (bytes, ..))| {
@@ -247,8 +247,12 @@ mod tests {
             write_fmu(&path, version, &settings, &read(), 0.01).unwrap();
             let written = fs::read(&path).unwrap();
             let mut archive = ZipArchive::new(Cursor::new(&written)).unwrap();
-            for (bytes, in_two, in_three) in heads() {
-                let place = if version == FmiVersion::Two { in_two } else { in_three };
+            for (bytes, fmi2_folder, fmi3_folder) in heads() {
+                let place = if version == FmiVersion::Two {
+                    fmi2_folder
+                } else {
+                    fmi3_folder
+                };
                 let mut found = Vec::new();
                 let mut file = archive.by_name(&format!("binaries/{place}")).unwrap();
                 file.read_to_end(&mut found).unwrap();
@@ -269,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_library_is_refused() {
+    fn other_files_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         for (bytes, ..) in heads() {

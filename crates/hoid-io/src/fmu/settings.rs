@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn settings_come_back_from_their_text() {
+    fn settings_round_trip() {
         let settings = FmuSettings::new(FmuKind::Tracker)
             .with_fit("{}".to_owned())
             .with("sample_time", FmuStart::Real(0.02))

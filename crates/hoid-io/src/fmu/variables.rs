@@ -213,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_unique_and_in_the_order_of_roles() {
+    fn names_are_unique_and_ordered_by_role() {
         for kind in FmuKind::ALL {
             let all = kind.variables();
             let roles: Vec<u8> = all.iter().map(|v| v.role as u8).collect();

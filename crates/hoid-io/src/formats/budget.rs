@@ -10,7 +10,7 @@ use crate::IoError;
 /// Number of bytes to which a file of any size may decompress. Readers hold up to four copies of the values during
 /// conversion (as stored, as numbers, as columns, in a survey), so reading a file of a few bytes takes less than 300
 /// MB.
-const AT_LEAST: u64 = 48 << 20;
+const MIN_BUDGET_BYTES: u64 = 48 << 20;
 /// Additional decompressed bytes allowed per byte of the file.
 const FACTOR: u64 = 64;
 /// Largest number of bytes to which a file may decompress, regardless of its size.
@@ -20,31 +20,31 @@ const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
 /// Memory that a text takes in addition to its characters, in bytes.
 const TEXT: u64 = 64;
 /// Maximum nesting of structures.
-pub(super) const MOST_NESTED: usize = 32;
+pub(super) const MAX_NESTING: usize = 32;
 
 /// Memory that reading a file may still take.
 #[derive(Debug)]
 pub(super) struct Budget {
-    left: u64,
+    remaining: u64,
     all: u64,
 }
 
 impl Budget {
     /// Returns the budget of a file of the given size in bytes.
     pub(super) fn of(file_bytes: usize) -> Self {
-        let by_size = AT_LEAST.saturating_add(FACTOR.saturating_mul(file_bytes as u64));
+        let by_size = MIN_BUDGET_BYTES.saturating_add(FACTOR.saturating_mul(file_bytes as u64));
         Self::up_to(by_size.min(CEILING).max(raised().unwrap_or(0)))
     }
 
     fn up_to(all: u64) -> Self {
-        Self { left: all, all }
+        Self { remaining: all, all }
     }
 
     /// Reserves memory before it is filled; an error if the limit is exceeded.
     pub(super) fn take(&mut self, bytes: u64, file: &str) -> Result<(), IoError> {
-        match self.left.checked_sub(bytes) {
-            Some(left) => {
-                self.left = left;
+        match self.remaining.checked_sub(bytes) {
+            Some(remaining) => {
+                self.remaining = remaining;
                 Ok(())
             }
             None => Err(IoError::Unsupported {
@@ -108,7 +108,7 @@ mod tests {
 
     /// A damaged HDF5 file of 31 kB stated an array of 128 MB, although it did not contain the data.
     #[test]
-    fn a_small_file_does_not_unpack_to_hundreds_of_megabytes() {
+    fn small_files_have_a_small_budget() {
         let mut budget = Budget::of(31_128);
         assert!(budget.take(1 << 27, "a.mat").is_err());
         budget.take(1 << 25, "a.mat").unwrap();
@@ -118,7 +118,7 @@ mod tests {
         // A larger file may decompress to more.
         Budget::of(10 << 20).take(1 << 29, "a.mat").unwrap();
         assert!(Budget::of(usize::MAX).take(CEILING + 1, "a.mat").is_err());
-        let said = Budget::up_to(1).take(2, "a.mat").unwrap_err().to_string();
-        assert!(said.contains(UNPACKED), "{said}");
+        let message = Budget::up_to(1).take(2, "a.mat").unwrap_err().to_string();
+        assert!(message.contains(UNPACKED), "{message}");
     }
 }

@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_panic_is_a_message_and_the_next_is_reported_again() {
+    fn panic_becomes_an_error_message() {
         assert_eq!(without_panic(|| 1), Ok(1));
         let nested = without_panic(|| {
             assert_eq!(

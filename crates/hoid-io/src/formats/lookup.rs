@@ -132,7 +132,7 @@ fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
 }
 
 /// Number of bytes at the start of a file from which a table is recognised.
-const START: u64 = 64 << 10;
+const PROBE_BYTES: u64 = 64 << 10;
 
 /// True if a file, which may be packed, starts with a table of text. Pipes are not read, because the bytes read would
 /// be lost.
@@ -144,9 +144,9 @@ fn starts_with_table(path: &Path, is_packed: bool) -> bool {
             return Ok(start);
         }
         if is_packed {
-            MultiGzDecoder::new(file).take(START).read_to_end(&mut start)?;
+            MultiGzDecoder::new(file).take(PROBE_BYTES).read_to_end(&mut start)?;
         } else {
-            file.take(START).read_to_end(&mut start)?;
+            file.take(PROBE_BYTES).read_to_end(&mut start)?;
         }
         Ok(start)
     };
@@ -248,7 +248,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_ending_stands_for_one_format() {
+    fn each_extension_belongs_to_one_format() {
         let mut endings: Vec<&str> = ALL.iter().flat_map(|format| format.extensions).copied().collect();
         let count = endings.len();
         endings.sort_unstable();
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn each_other_ending_has_one_remedy() {
+    fn each_unsupported_extension_has_one_remedy() {
         let mut endings: Vec<&str> = ELSEWHERE.iter().flat_map(|(endings, _)| *endings).copied().collect();
         assert!(
             endings
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn endings_as_text() {
+    fn extensions_are_listed_as_text() {
         assert_eq!(extensions(&[&csv::CSV]), ".csv (also as .txt)");
         assert_eq!(
             extensions(&[&csv::CSV, &csv::TSV, &csv::TSV]),

@@ -9,7 +9,7 @@ use super::budget::Budget;
 use crate::IoError;
 
 /// Number of bytes decompressed at a time.
-const PART: usize = 1 << 16;
+const PART_BYTES: usize = 1 << 16;
 
 /// Returns the path without `.gz`; `None` if the file has another extension.
 pub(super) fn inner(path: &Path) -> Option<PathBuf> {
@@ -22,7 +22,7 @@ pub(super) fn decompressed(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError>
     let mut budget = Budget::of(bytes.len());
     let mut reader = MultiGzDecoder::new(bytes);
     let mut text = Vec::new();
-    let mut part = vec![0; PART];
+    let mut part = vec![0; PART_BYTES];
     loop {
         let read = reader.read(&mut part).map_err(|error| IoError::Damaged {
             file: file.to_owned(),

@@ -136,7 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_error_leaves_the_old_file_and_nothing_beside_it() {
+    fn failed_write_leaves_only_the_old_file() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.csv");
         write_atomically(&path, |file| file.write_all(b"old")).unwrap();
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_cannot_be_written() {
+    fn unwritable_paths_are_errors() {
         let dir = tempfile::tempdir().unwrap();
         let write = |path: &Path| write_atomically(path, |_| Ok(())).unwrap_err();
         assert!(matches!(write(dir.path()), IoError::Directory { .. }));
@@ -166,7 +166,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn links_and_permissions_stay_what_they_are() {
+    fn links_and_permissions_are_preserved() {
         use std::os::unix::fs::PermissionsExt;
         let dir = tempfile::tempdir().unwrap();
         let (path, link) = (dir.path().join("a.csv"), dir.path().join("link.csv"));

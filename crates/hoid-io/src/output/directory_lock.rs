@@ -46,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_directory_has_one_worker_at_a_time() {
+    fn directory_lock_is_exclusive() {
         let dir = tempfile::tempdir().unwrap();
         let first = DirectoryLock::take(dir.path()).unwrap();
         let message = DirectoryLock::take(dir.path()).unwrap_err().to_string();

@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_of_the_dead_are_swept_and_those_of_the_living_are_not() {
+    fn stale_parts_are_removed_and_locked_parts_kept() {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         let (file, living) = Part::create_in(dir.path()).unwrap();
@@ -167,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_does_not_name_the_part() {
+    fn errors_do_not_name_the_temporary_file() {
         let dir = tempfile::tempdir().unwrap();
         let error = Part::create_in(&dir.path().join("none")).err().unwrap();
         assert_eq!(error.kind(), io::ErrorKind::NotFound);
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupt_leaves_nothing_on_its_way() {
+    fn parts_are_registered_and_removed() {
         let dir = tempfile::tempdir().unwrap();
         let (_file, part) = Part::create_in(dir.path()).unwrap();
         // Only the file in this directory is examined: other tests have temporary files in progress.

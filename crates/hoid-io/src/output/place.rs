@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn places_that_take_nothing_are_known_before() {
+    fn unwritable_outputs_are_refused_in_advance() {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         fs::write(path("file"), "").unwrap();

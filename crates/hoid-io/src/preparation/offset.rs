@@ -16,7 +16,7 @@ use crate::IoError;
 use crate::wording::decimal;
 
 /// Largest distance from a whole number of samples at which an offset counts as a whole number.
-const WHOLE: f64 = 1e-6;
+const INTEGER_TOLERANCE: f64 = 1e-6;
 
 /// Recording delay of a channel; negative if it was recorded early.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -65,7 +65,7 @@ impl RecordParts {
                     Offset::Samples(samples) => samples,
                     Offset::Seconds(seconds) => seconds / ts,
                 };
-                let interpolated = (samples - samples.round()).abs() > WHOLE;
+                let interpolated = (samples - samples.round()).abs() > INTEGER_TOLERANCE;
                 let samples = if interpolated { samples } else { samples.round() };
                 (channel, Shift { samples, interpolated })
             })

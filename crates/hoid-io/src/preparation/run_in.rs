@@ -7,7 +7,7 @@ use crate::wording::decimal;
 
 impl RecordParts {
     /// Drops all samples before the end of the run-in.
-    pub(super) fn run_in(&mut self, begin_s: f64, run_in_s: f64) -> Result<(), IoError> {
+    pub(super) fn run_in(&mut self, file_start_s: f64, run_in_s: f64) -> Result<(), IoError> {
         const STEP: &str = "run-in";
         if run_in_s == 0.0 {
             return Ok(());
@@ -17,13 +17,13 @@ impl RecordParts {
         }
         let ts = self.sample_time.s();
         // A sample at the end of the run-in, up to rounding, is kept.
-        let first = ((begin_s + run_in_s - self.start_s) / ts - 1e-6).ceil().max(0.0);
+        let first = ((file_start_s + run_in_s - self.start_s) / ts - 1e-6).ceil().max(0.0);
         if first >= self.len() as f64 {
             return Err(self.error(
                 STEP,
                 format!(
                     "{run_in_s} s in a record of {} s",
-                    decimal(self.start_s + self.len() as f64 * ts - begin_s)
+                    decimal(self.start_s + self.len() as f64 * ts - file_start_s)
                 ),
                 "a run-in shorter than the record",
             ));

@@ -55,14 +55,14 @@ fn largest(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
 }
 
 #[test]
-fn nothing_asked_for_changes_nothing() {
+fn default_preparation_changes_nothing() {
     let whole = record(50, signal, f64::sin);
     let (same, steps) = Preparation::default().apply(whole.clone()).unwrap();
     assert_eq!((same, steps.len()), (whole, 0));
 }
 
 #[test]
-fn scales_and_units() {
+fn scaling_changes_values_and_units() {
     let preparation = with(|p| {
         p.scale.insert("e".into(), "rad:deg".parse().unwrap());
         p.scale.insert("stick".into(), "12.5:deg".parse().unwrap());
@@ -123,7 +123,7 @@ fn scales_and_units() {
 }
 
 #[test]
-fn whole_offsets_move_rows_and_change_no_number() {
+fn whole_sample_offsets_shift_rows_exactly() {
     // The output is two samples late in the file.
     let late = record(100, signal, |t| signal(t - 2.0 * TS));
     let preparation = moved("u", Offset::Samples(2.0));
@@ -148,17 +148,17 @@ fn whole_offsets_move_rows_and_change_no_number() {
 }
 
 #[test]
-fn parts_of_a_sample_are_band_limited_interpolation() {
+fn fractional_offsets_interpolate_band_limited() {
     for offset in [0.5, 1.0 / 3.0, -0.71, 3.017] {
         let n = 600;
         let late = record(n, signal, |t| signal(t - offset * TS));
         let preparation = moved("u", Offset::Samples(offset));
         let (found, steps) = preparation.apply(late).unwrap();
-        let begin = found.time_s(0) - 3.0;
+        let start_s = found.time_s(0) - 3.0;
         // The sum of the amplitudes is 3, with a relative error of 1e-4.
-        let error = largest(found.output(), |k| signal(begin + k as f64 * TS));
+        let error = largest(found.output(), |k| signal(start_s + k as f64 * TS));
         assert!(error < 3e-4, "{offset}: {error:e}");
-        assert!(largest(found.input(), |k| signal(begin + k as f64 * TS)) < 1e-12);
+        assert!(largest(found.input(), |k| signal(start_s + k as f64 * TS)) < 1e-12);
         // The ends are cut, and no values are extrapolated.
         let Step::Offset {
             cut_samples: (start, end),
@@ -172,7 +172,7 @@ fn parts_of_a_sample_are_band_limited_interpolation() {
 }
 
 #[test]
-fn decimation_is_that_of_the_library_and_keeps_all_samples() {
+fn decimation_matches_the_model_crate() {
     for factor in [2_usize, 3, 10] {
         let whole = record(4000, signal, |t| signal(t) + 1.0);
         let decimate = with(|p| p.rate = NewRate::Decimated(factor));
@@ -193,16 +193,16 @@ fn decimation_is_that_of_the_library_and_keeps_all_samples() {
 }
 
 #[test]
-fn a_new_rate_down_and_up() {
+fn resampling_to_lower_and_higher_rates_is_accurate() {
     for hz in [60.0, 128.0, 250.0, 36.7] {
         let edge = 0.8 * 0.5 * f64::min(hz, 100.0);
         let low = |t: f64| (2.0 * PI * 0.99 * edge * t).cos() + (2.0 * PI * 0.5 * t).sin();
         let (found, _) = with(|p| p.rate = NewRate::Hz(hz))
             .apply(record(3000, low, low))
             .unwrap();
-        let (begin, ts) = (found.time_s(0) - 3.0, found.sample_time().s());
+        let (start_s, ts) = (found.time_s(0) - 3.0, found.sample_time().s());
         assert!((ts * hz - 1.0).abs() < 1e-12);
-        let error = largest(found.input(), |k| low(begin + k as f64 * ts));
+        let error = largest(found.input(), |k| low(start_s + k as f64 * ts));
         assert!(error < 2e-4, "{hz}: {error:e}");
         // The new samples are on the grid that starts at the first sample.
         let steps = (found.time_s(0) - 3.0) / ts;
@@ -219,7 +219,7 @@ fn a_new_rate_down_and_up() {
 }
 
 #[test]
-fn run_in_counts_from_the_file_and_trend_comes_last() {
+fn run_in_is_counted_in_file_time_and_trend_removed_last() {
     let preparation = with(|p| {
         p.run_in_s = 5.0;
         p.rate = NewRate::Decimated(4);
@@ -241,7 +241,7 @@ fn run_in_counts_from_the_file_and_trend_comes_last() {
 }
 
 #[test]
-fn what_cannot_be_done_is_said() {
+fn invalid_preparations_are_errors() {
     let rate = |rate| with(|p| p.rate = rate);
     for (preparation, n, words) in [
         (rate(NewRate::Decimated(0)), 10, "found a factor of 0"),
@@ -318,7 +318,7 @@ impl Arbitrary {
 }
 
 #[test]
-fn nothing_panics_and_what_comes_out_is_a_record() {
+fn arbitrary_preparations_never_panic() {
     let mut any = Arbitrary(7);
     let mut done = 0;
     for _ in 0..4000 {

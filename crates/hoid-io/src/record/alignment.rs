@@ -39,7 +39,7 @@ pub fn read_aligned(
     let spanned = options.span_s != (None, None);
     if spanned && preparation.rate == NewRate::Kept && (late_samples != 0.0 || !preparation.offset.is_empty()) {
         let ts_s = read.record.sample_time().s();
-        let reach_s = ts_s * reach(preparation, late_samples, ts_s);
+        let reach_s = ts_s * max_shift(preparation, late_samples, ts_s);
         let wider = ReadOptions {
             span_s: (
                 options.span_s.0.map(|t| t - reach_s),
@@ -48,7 +48,7 @@ pub fn read_aligned(
             ..options.clone()
         };
         if let Ok(wide) = read_as_recorded(path, &wider, drop_repeated)
-            && let Some((record, steps)) = moved_within(wide.record, &read.record, preparation, &late)
+            && let Some((record, steps)) = shifted_within(wide.record, &read.record, preparation, &late)
         {
             let steps = [read.steps, steps].concat();
             return Ok(ReadRecord { record, steps, ..read });
@@ -77,7 +77,7 @@ pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated
 }
 
 /// Returns an upper bound of the shift of a channel in samples, including the samples needed for interpolation.
-fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
+fn max_shift(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     let samples = |offset: &Offset| match offset {
         Offset::Samples(samples) => *samples,
         Offset::Seconds(seconds) => seconds / ts_s,
@@ -90,7 +90,7 @@ fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
 
 /// Shifts the channels of the longer record `wide`, cuts out the span, and applies the remaining steps; `None` if this
 /// fails: processing the shorter record then gives the error.
-fn moved_within(
+fn shifted_within(
     wide: Record,
     narrow: &Record,
     preparation: &Preparation,

@@ -116,7 +116,7 @@ impl TrialChoice {
     }
 
     /// True if the choice selects a single trial.
-    pub(super) fn is_one(&self) -> bool {
+    pub(super) fn selects_one_trial(&self) -> bool {
         self.value.is_some()
     }
 }

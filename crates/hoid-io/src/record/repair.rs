@@ -38,12 +38,12 @@ pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, Ope
     let x = |row: usize| t.map_or(Some(row as f64), |t| t.get(row).copied()).unwrap_or(f64::NAN);
     while let Some(run) = next_run(values, at) {
         let last_before = run.start.checked_sub(1).ok_or(OpenEnd::Start)?;
-        let (Some(&before), Some(&behind)) = (values.get(last_before), values.get(run.end)) else {
+        let (Some(&before), Some(&after)) = (values.get(last_before), values.get(run.end)) else {
             return Err(OpenEnd::End);
         };
         let (from, to) = (x(last_before), x(run.end));
         for (row, value) in values.iter_mut().enumerate().take(run.end).skip(run.start) {
-            *value = line(before, behind, (x(row) - from) / (to - from));
+            *value = line(before, after, (x(row) - from) / (to - from));
         }
         bridged.values = bridged.values.saturating_add(run.len());
         bridged.longest = bridged.longest.max(run.len());
@@ -103,10 +103,10 @@ pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: 
         {
             this = next;
         }
-        let ((from, to), (before, behind)) = this;
+        let ((from, to), (before, after)) = this;
         let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
         let share = if is_held { share.floor() } else { share };
-        line(before, behind, share)
+        line(before, after, share)
     };
     (0..n).map(value).collect()
 }
@@ -120,23 +120,23 @@ fn line(a: f64, b: f64, share: f64) -> f64 {
 mod tests {
     use super::*;
 
-    const GONE: f64 = f64::NAN;
+    const MISSING: f64 = f64::NAN;
 
     #[test]
-    fn bridges_inside_only() {
-        let mut values = [1.0, GONE, 3.0, 4.0, GONE, GONE, GONE, 0.0];
+    fn only_interior_gaps_are_filled() {
+        let mut values = [1.0, MISSING, 3.0, 4.0, MISSING, MISSING, MISSING, 0.0];
         let bridged = fill(&mut values, None).unwrap();
         assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0]);
         assert_eq!((bridged.values, bridged.longest), (4, 3));
-        assert_eq!(fill(&mut [GONE, 1.0], None), Err(OpenEnd::Start));
-        assert_eq!(fill(&mut [1.0, GONE], None), Err(OpenEnd::End));
-        assert_eq!(fill(&mut [GONE], None), Err(OpenEnd::Start));
+        assert_eq!(fill(&mut [MISSING, 1.0], None), Err(OpenEnd::Start));
+        assert_eq!(fill(&mut [1.0, MISSING], None), Err(OpenEnd::End));
+        assert_eq!(fill(&mut [MISSING], None), Err(OpenEnd::Start));
         assert_eq!(fill(&mut [], None), Ok(Bridged::default()));
     }
 
     #[test]
-    fn bridges_along_time() {
-        let mut values = [0.0, GONE, 10.0];
+    fn gaps_are_filled_linearly_in_time() {
+        let mut values = [0.0, MISSING, 10.0];
         fill(&mut values, Some(&[0.0, 0.3, 1.0])).unwrap();
         assert!((values[1] - 3.0).abs() < 1e-15);
     }

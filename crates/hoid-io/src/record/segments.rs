@@ -37,7 +37,9 @@ pub fn read_segments(
 ) -> Result<Vec<ReadRecord>, IoError> {
     let read = read_trial(path, options, preparation, mask, shortest_s);
     let (by, trials) = match read {
-        Err(IoError::SeveralTrials { by, trials, .. }) if !options.trial.as_ref().is_some_and(TrialChoice::is_one) => {
+        Err(IoError::SeveralTrials { by, trials, .. })
+            if !options.trial.as_ref().is_some_and(TrialChoice::selects_one_trial) =>
+        {
             (by, trials)
         }
         read => return read,

@@ -84,10 +84,10 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
 }
 
 fn note_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
-    let (before, behind) = (bounds.start, table.rows.saturating_sub(bounds.end));
-    if (before, behind) != (0, 0) {
+    let (before, after) = (bounds.start, table.rows.saturating_sub(bounds.end));
+    if (before, after) != (0, 0) {
         table.notes.push(format!(
-            "{} at the start and {behind} at the end cut: a sparse column has no values there",
+            "{} at the start and {after} at the end cut: a sparse column has no values there",
             counted(before, "row")
         ));
     }
@@ -241,16 +241,16 @@ mod tests {
         }
     }
 
-    const GONE: f64 = f64::NAN;
+    const MISSING: f64 = f64::NAN;
 
     #[test]
-    fn values_are_held_or_lie_on_lines_along_time() {
+    fn sparse_values_are_held_or_interpolated_in_time() {
         let x = [0.0, 0.1, 0.4, 0.5, 1.0, 1.1];
         for (how, expected) in [
             (Sparse::Hold, [1.0, 1.0, 1.0, 6.0, 6.0]),
             (Sparse::Linear, [1.0, 2.0, 5.0, 6.0, 11.0]),
         ] {
-            let mut e = column(&[1.0, GONE, GONE, 6.0, GONE, 12.0]);
+            let mut e = column(&[1.0, MISSING, MISSING, 6.0, MISSING, 12.0]);
             Gaps::of(&e).close(&mut e, how, &x);
             for (found, expected) in e.values.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-14, "{how}: {:?}", e.values);
@@ -258,7 +258,7 @@ mod tests {
             assert_eq!((e.filled_rows, e.is_held), (vec![1, 2, 4], how == Sparse::Hold));
         }
         // The times are constant.
-        let mut e = column(&[1.0, GONE, 2.0]);
+        let mut e = column(&[1.0, MISSING, 2.0]);
         Gaps::of(&e).close(&mut e, Sparse::Linear, &[0.0; 3]);
         assert_eq!(e.values, [1.0, 1.0, 2.0]);
     }

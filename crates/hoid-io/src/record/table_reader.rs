@@ -45,12 +45,12 @@ impl TableReader<'_> {
             return rows;
         };
         let kept = first..last.saturating_add(1);
-        let (before, behind) = (kept.start.saturating_sub(rows.start), rows.end.saturating_sub(kept.end));
-        if (before, behind) != (0, 0) {
+        let (before, after) = (kept.start.saturating_sub(rows.start), rows.end.saturating_sub(kept.end));
+        if (before, after) != (0, 0) {
             let columns = self.signals.iter().filter_map(|column| self.table.columns.get(*column));
             let names: Vec<String> = columns.map(|column| named(&column.name)).collect();
             self.table.notes.push(format!(
-                "{} at the start and {behind} at the end left out: --fill has no value to bridge to there (columns: {})",
+                "{} at the start and {after} at the end left out: --fill has no value to bridge to there (columns: {})",
                 counted(before, "row"),
                 names.join(", ")
             ));
@@ -77,14 +77,14 @@ impl TableReader<'_> {
             return None;
         }
         let finite = |row: &usize| self.table.value(column, *row).is_finite();
-        let (before, behind) = (
+        let (before, after) = (
             (rows.start..at).rev().find(finite)?,
             (at..rows.end).skip(1).find(finite)?,
         );
         let x = |row: usize| time.map_or(row as f64, |time| self.table.value(time, row));
-        let part = (x(at) - x(before)) / (x(behind) - x(before));
-        let [before, behind] = [before, behind].map(|row| self.table.value(column, row));
-        let value = before + part * (behind - before);
+        let part = (x(at) - x(before)) / (x(after) - x(before));
+        let [before, after] = [before, after].map(|row| self.table.value(column, row));
+        let value = before + part * (after - before);
         value.is_finite().then_some(value)
     }
 

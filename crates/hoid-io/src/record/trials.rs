@@ -4,8 +4,9 @@
 //! Each trial becomes a separate record with its own initial states; in a single record of all trials, the output after
 //! each boundary would depend on inputs that never preceded it. A trial starts where the value of the given column
 //! changes or where t decreases. Without `--trial`, trials are recognised only where t decreases: each trial must have
-//! at least [`SHORTEST`] rows, and t must decrease by at least half of its range in the previous trial, which a clock
-//! correction never does. If a column changes exactly where t decreases, the trials have the names in this column.
+//! at least [`MIN_TRIAL_ROWS`] rows, and t must decrease by at least half of its range in the previous trial, which a
+//! clock correction never does. If a column changes exactly where t decreases, the trials have the names in this
+//! column.
 
 use std::ops::Range;
 
@@ -17,7 +18,7 @@ use crate::time::sampling::pairs;
 use crate::wording::{did_you_mean, list, shown};
 
 /// Minimum number of rows of a trial that is recognised automatically.
-const SHORTEST: usize = 8;
+const MIN_TRIAL_ROWS: usize = 8;
 
 /// Names and rows of the trials found.
 type Parts = Vec<(String, Range<usize>)>;
@@ -62,7 +63,7 @@ fn several(file: String, by: &str, names: Vec<&str>) -> IoError {
 }
 
 /// Returns the rows at which t decreases.
-fn falls(table: &Table<'_>) -> Vec<usize> {
+fn rows_with_decreasing_time(table: &Table<'_>) -> Vec<usize> {
     let time = table.columns.iter().find(|column| column.name == "t");
     let pairs = (1..).zip(time.into_iter().flat_map(|t| pairs(&t.values)));
     pairs
@@ -90,7 +91,7 @@ fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
 
 /// Divides a table into trials by a column and by t, or only by t.
 fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
-    let mut begins = falls(table);
+    let mut begins = rows_with_decreasing_time(table);
     if choice.column == "t" {
         return Ok(numbered(between(&begins, table.rows)));
     }
@@ -140,7 +141,7 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
 /// Returns the name of the column that names the trials, or `t` if no column does, and the trials between restarts of
 /// t; `None` if t does not restart.
 fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
-    let begins = falls(table);
+    let begins = rows_with_decreasing_time(table);
     let time = table.columns.iter().position(|column| column.name == "t")?;
     let t = |row: usize| table.value(time, row);
     let parts = between(&begins, table.rows);
@@ -148,7 +149,7 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
         let (first, last) = (t(part.start), t(part.end.saturating_sub(1)));
         last - t(next.start) >= 0.5 * (last - first)
     });
-    if begins.is_empty() || !starts_again || parts.iter().any(|rows| rows.len() < SHORTEST) {
+    if begins.is_empty() || !starts_again || parts.iter().any(|rows| rows.len() < MIN_TRIAL_ROWS) {
         return None;
     }
     let counts = |at: usize| {

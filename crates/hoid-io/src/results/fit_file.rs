@@ -40,7 +40,7 @@ impl FitFile {
     /// # Errors
     /// [`IoError::NoFit`] for a fit of another structure, without covariance, or without determined parameters.
     pub fn operator(self) -> Result<FittedOperator, IoError> {
-        self.operator.map_err(|reason| no_fit(&self.source, reason))
+        self.operator.map_err(|reason| not_a_fit(&self.source, reason))
     }
 }
 
@@ -64,7 +64,7 @@ pub fn read_fit(path: &Path) -> Result<FitFile, IoError> {
 /// # Errors
 /// [`IoError::NoFit`] for a text that is not such a fit.
 pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
-    let found: FitObject = serde_json::from_str(text).map_err(|error| no_fit(source, error.to_string()))?;
+    let found: FitObject = serde_json::from_str(text).map_err(|error| not_a_fit(source, error.to_string()))?;
     let of = |p: &ParameterObject| {
         Some(FitParameter {
             name: p.name.clone(),
@@ -83,7 +83,7 @@ pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
     })
 }
 
-fn no_fit(source: &str, reason: String) -> IoError {
+fn not_a_fit(source: &str, reason: String) -> IoError {
     IoError::NoFit {
         file: source.to_owned(),
         reason,
@@ -235,7 +235,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_response_to_a_target_has_its_delay_behind_the_preview() {
+    fn feedforward_delay_includes_the_preview() {
         let of = |channels: &str| {
             let text = FIT.trim_end().strip_suffix('}').unwrap();
             parse_fit(&format!("{text}, \"channels\": [{channels}]}}"), "fit.json")
@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_fit_of_a_person_says_why() {
+    fn unusable_fits_give_the_reason() {
         assert!(why("{}").contains("parameters") && why("[1").contains("hoid identify --json"));
         for (from, to, expected) in [
             (r#""form": "gain", "#, "", "structure grey-box"),

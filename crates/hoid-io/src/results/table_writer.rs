@@ -15,11 +15,11 @@ const GROUP: usize = 1 << 16;
 /// State of a file between two groups of rows.
 enum Sink {
     Rows(Box<dyn RowWriter>),
-    Columns(WaitingColumns),
+    Columns(BufferedColumns),
 }
 
 /// Columns that are kept until all rows are known, since the length of an array is written before its values.
-struct WaitingColumns {
+struct BufferedColumns {
     write: ColumnsWriter,
     schema: TableSchema,
     columns: Vec<ColumnValues>,
@@ -29,9 +29,9 @@ impl Sink {
     fn start(format: &Format, file: &mut dyn Write, schema: TableSchema) -> io::Result<Self> {
         match format.writing {
             Writing::Rows(start) => start(file, &schema).map(Self::Rows),
-            Writing::Columns(write) => Ok(Self::Columns(WaitingColumns {
+            Writing::Columns(write) => Ok(Self::Columns(BufferedColumns {
                 write,
-                columns: schema.columns.iter().map(|column| none(column.kind)).collect(),
+                columns: schema.columns.iter().map(|column| empty_values(column.kind)).collect(),
                 schema,
             })),
             Writing::ReadOnly(what) => Err(io::Error::other(what)),
@@ -53,7 +53,7 @@ impl Sink {
     fn finish(self, file: &mut dyn Write) -> io::Result<()> {
         match self {
             Self::Rows(rows) => rows.finish(file),
-            Self::Columns(WaitingColumns { write, schema, columns }) => {
+            Self::Columns(BufferedColumns { write, schema, columns }) => {
                 let values: Vec<Values<'_>> = columns.iter().map(ColumnValues::all).collect();
                 write(file, &schema, &values)
             }
@@ -118,7 +118,7 @@ impl TableWriter {
         Ok(Self {
             file,
             name,
-            waiting: columns.iter().map(|column| none(column.kind)).collect(),
+            waiting: columns.iter().map(|column| empty_values(column.kind)).collect(),
             columns,
             sink: Some(sink),
         })
@@ -163,31 +163,31 @@ impl TableWriter {
         if self.waiting.iter().any(|waiting| !waiting.is_empty()) {
             self.group()?;
         }
-        let sink = self.sink.take().ok_or_else(|| broken(&self.name))?;
+        let sink = self.sink.take().ok_or_else(|| unfinished_error(&self.name))?;
         self.file.write(|file| sink.finish(file))?;
         self.file.finish()
     }
 
     fn group(&mut self) -> Result<(), IoError> {
-        let mut sink = self.sink.take().ok_or_else(|| broken(&self.name))?;
+        let mut sink = self.sink.take().ok_or_else(|| unfinished_error(&self.name))?;
         let values: Vec<Values<'_>> = self.waiting.iter().map(ColumnValues::all).collect();
         self.file.write(|file| sink.group(file, &values))?;
         self.sink = Some(sink);
         for (waiting, column) in self.waiting.iter_mut().zip(&self.columns) {
-            *waiting = none(column.kind);
+            *waiting = empty_values(column.kind);
         }
         Ok(())
     }
 }
 
-fn broken(name: &str) -> IoError {
+fn unfinished_error(name: &str) -> IoError {
     IoError::Unwritable {
         file: name.to_owned(),
         source: io::Error::other("an earlier write failed"),
     }
 }
 
-fn none(kind: ColumnKind) -> ColumnValues {
+fn empty_values(kind: ColumnKind) -> ColumnValues {
     match kind {
         ColumnKind::Real => ColumnValues::Real(Vec::new()),
         ColumnKind::Whole => ColumnValues::Whole(Vec::new()),

@@ -184,13 +184,13 @@ mod tests {
     }
 
     #[test]
-    fn without_changes_a_scenario_is_the_same() {
+    fn empty_changes_leave_the_scenario_unchanged() {
         let same = changed(Condition::C4, &ScenarioChanges::default()).unwrap();
         assert_eq!(same, Scenario::condition(Condition::C4));
     }
 
     #[test]
-    fn a_display_and_a_disturbance_are_added_and_taken_away() {
+    fn display_and_disturbance_are_added_and_removed() {
         let changes = ScenarioChanges {
             feedforward: Some("derivative:0.15,tau_f=0.1,preview=0.25".to_owned()),
             disturbance: Some(0.2),
@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_scenario_cannot_take_is_refused_by_name() {
+    fn invalid_changes_name_their_option() {
         let with = |change: &dyn Fn(&mut ScenarioChanges)| {
             let mut changes = ScenarioChanges::default();
             change(&mut changes);

@@ -16,7 +16,7 @@ use super::keys::{DefinitionKey, File, RealisationKey, RemnantTable, ScheduleTab
 use super::values::{Limits, Source};
 
 /// Maximum number of lines (sinusoids) of a forcing function.
-pub(super) const MOST_LINES: usize = 10_000;
+pub(super) const MAX_LINES: usize = 10_000;
 
 impl Source<'_> {
     pub(super) fn scenario(&self, file: File, name: &str) -> Result<Scenario, ScenarioFileError> {
@@ -235,9 +235,9 @@ impl Source<'_> {
         tables: Vec<SinusoidTable>,
         measurement_s: f64,
     ) -> Result<ForcingFunction, ScenarioFileError> {
-        if tables.len() > MOST_LINES {
+        if tables.len() > MAX_LINES {
             return Err(self.keys(&format!(
-                "there are {} tables [[{name}]], expected at most {MOST_LINES}",
+                "there are {} tables [[{name}]], expected at most {MAX_LINES}",
                 tables.len()
             )));
         }

@@ -13,7 +13,7 @@ use hoid_model::{
 };
 use toml::Spanned;
 
-use super::condition::MOST_LINES;
+use super::condition::MAX_LINES;
 use super::error::ScenarioFileError;
 use super::family_keys::{ExcitationTable, FamilyFile, FamilyStateTable, FollowsKey, PartTable, ShapeKey};
 use super::keys::{FeedforwardTable, RealisationKey};
@@ -62,7 +62,7 @@ impl Source<'_> {
                 return Err(self.keys("[schedule] is given, but no [last]: add [last] with the values that change"));
             }
             (Some(last), _) => {
-                let last = last.over(&file.initial);
+                let last = last.with_defaults_from(&file.initial);
                 scenario.last = self.family_state(form, file.neuromuscular, "last", &last)?;
             }
         }
@@ -265,7 +265,7 @@ impl Source<'_> {
                 ..FamilyStateTable::default()
             };
             let tau_f_s = last.tau_f_s.unwrap_or(given.tau_f_s);
-            of(&format!("{name}.last"), tau_f_s, own.over(&before()))
+            of(&format!("{name}.last"), tau_f_s, own.with_defaults_from(&before()))
         });
         Ok(Feedforward {
             operator: of(name, given.tau_f_s, before())?,
@@ -321,9 +321,9 @@ impl Source<'_> {
                 "[{name}] has both lines and the keys of a multi-sine: give only one of the two"
             )));
         }
-        if lines.len() > MOST_LINES {
+        if lines.len() > MAX_LINES {
             return Err(self.keys(&format!(
-                "[{name}] has {} lines, expected at most {MOST_LINES}",
+                "[{name}] has {} lines, expected at most {MAX_LINES}",
                 lines.len()
             )));
         }
@@ -422,21 +422,21 @@ impl Source<'_> {
         let Some(shape) = shape else {
             return refuse(format!("it lacks a key of its shape, which takes {takes}"));
         };
-        let behind = |owner: &str, is_there: bool, others: bool| {
+        let requires = |owner: &str, is_there: bool, others: bool| {
             if others && !is_there {
                 return Err(self.keys(&format!("[[remnant]] number {k} lacks {owner}")));
             }
             Ok(())
         };
         let follows = given.follows_part.is_some() || given.follows_memory_s.is_some();
-        behind("follows", given.follows.is_some(), follows)?;
-        behind(
+        requires("follows", given.follows.is_some(), follows)?;
+        requires(
             "pulses_per_s",
             given.pulses_per_s.is_some(),
             given.pulses_part.is_some(),
         )?;
-        behind("on_s", given.on_s.is_some(), given.off_s.is_some())?;
-        behind("off_s", given.off_s.is_some(), given.on_s.is_some())?;
+        requires("on_s", given.on_s.is_some(), given.off_s.is_some())?;
+        requires("off_s", given.off_s.is_some(), given.on_s.is_some())?;
         Ok(RemnantPart {
             shape,
             strength,
@@ -491,7 +491,7 @@ impl FamilyStateTable {
     }
 
     /// Takes missing settings from `base`. If both define the gain, the definition in `self` applies.
-    fn over(&self, base: &Self) -> Self {
+    fn with_defaults_from(&self, base: &Self) -> Self {
         let says_gain = self.k.is_some() || self.k_over_t_i.is_some();
         let gain = |own: Option<f64>, of_base: Option<f64>| if says_gain { own } else { of_base };
         Self {

@@ -61,7 +61,7 @@ fn a_file_with_every_table_is_read() {
 const SHORT: &str = "form = \"lead-lag\"\n[initial]\nK_over_T_I = 4\nT_L_s = 0.6\nT_I_s = inf\nomega_nm_rad_s = 11\nzeta_nm = 0.3\ntau_e_s = 0.15\ncontrolled_element = \"1/1,0\"\n";
 
 #[test]
-fn a_pure_integration_is_an_infinite_lag() {
+fn pure_integration_has_an_infinite_lag() {
     let scenario = parse(SHORT).unwrap();
     assert_eq!(scenario.initial.operator.coordinates()[2], 0.0);
     assert_eq!(
@@ -72,7 +72,7 @@ fn a_pure_integration_is_an_infinite_lag() {
 }
 
 #[test]
-fn an_element_is_written_as_a_transfer_function() {
+fn controlled_element_is_read_as_a_transfer_function() {
     let element = |text: &str| parse(&SHORT.replace("1/1,0", text)).unwrap().initial.controlled_element;
     let expected = element("90/1,6,0");
     assert_eq!((expected.num(), expected.den()), (&[90.0][..], &[1.0, 6.0, 0.0][..]));
@@ -83,7 +83,7 @@ fn an_element_is_written_as_a_transfer_function() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_with_its_remedy() {
+fn invalid_files_are_refused_with_a_remedy() {
     let with = |from: &str, to: &str| SHORT.replace(from, to);
     let more = |tail: &str| format!("{SHORT}{tail}\n");
     for (text, part) in [
@@ -144,7 +144,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
 const PURSUIT: &str = include_str!("../../../../fixtures/scenario/pursuit.toml");
 
 #[test]
-fn a_target_that_is_seen_is_read() {
+fn displayed_target_is_read() {
     let scenario = parse(PURSUIT).unwrap();
     let seen = scenario.feedforward.as_ref().unwrap();
     let muscles = [11.0_f64.ln(), 0.3_f64.ln()];
@@ -168,7 +168,7 @@ fn a_target_that_is_seen_is_read() {
 }
 
 #[test]
-fn a_person_who_feels_motion() {
+fn motion_feedback_is_read() {
     let motion = include_str!("../../../../fixtures/scenario/motion.toml");
     let felt = parse(motion).unwrap().motion.unwrap();
     assert_eq!(felt.form(), Form::Canals);

@@ -24,7 +24,7 @@ fn named(condition: Condition) -> Scenario {
 }
 
 #[test]
-fn the_example_of_the_documentation_is_read() {
+fn documentation_example_is_read() {
     let example: String = include_str!("mod.rs")
         .lines()
         .skip_while(|l| *l != "//! ```toml")
@@ -52,7 +52,7 @@ fn the_example_of_the_documentation_is_read() {
 }
 
 #[test]
-fn a_delay_of_its_own_for_each_state() {
+fn each_state_may_have_its_own_delay() {
     let delays = |text: &str| {
         let scenario = parse(text).unwrap();
         [scenario.initial, scenario.last].map(|state| state.operator.tau_e_s)
@@ -66,7 +66,7 @@ fn a_delay_of_its_own_for_each_state() {
 }
 
 #[test]
-fn an_interval_is_there_and_back_again() {
+fn interval_gives_an_alternating_schedule() {
     let mut expected = named(Condition::C4);
     expected.schedule = Schedule::Alternating {
         rate_per_s: 100.0,
@@ -78,14 +78,14 @@ fn an_interval_is_there_and_back_again() {
 }
 
 #[test]
-fn a_condition_alone_is_that_condition() {
+fn condition_key_alone_gives_the_named_condition() {
     for condition in Condition::ALL {
         assert_eq!(parse(&format!("condition = \"{condition}\"")), Ok(named(condition)));
     }
 }
 
 #[test]
-fn a_file_with_every_key_is_c4() {
+fn file_with_every_key_matches_c4() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/scenario/full.toml");
     let expected = Scenario {
         name: "s1 to s2, fast".to_owned(),
@@ -164,7 +164,7 @@ fn bad_values_name_line_key_and_remedy() {
 }
 
 #[test]
-fn keys_that_do_not_fit_are_refused() {
+fn missing_and_unknown_keys_are_refused() {
     let c1 = "condition = \"C1\"\n";
     for (text, part) in [
         (String::new(), "initial.omega_b_rad_s"),
@@ -202,7 +202,7 @@ fn keys_that_do_not_fit_are_refused() {
 }
 
 #[test]
-fn what_the_model_refuses_names_the_file() {
+fn errors_of_the_model_name_the_file() {
     let unreachable = "condition = \"C1\"\n[remnant]\nnoise_level = 3\nnoise_definition = \"remnant\"";
     assert!(refusal(unreachable).contains("largest reachable"));
     assert!(refusal("condition = \"C1\"\n[initial]\nK_e = 5").contains("x.toml"));
@@ -214,7 +214,7 @@ const SEEN: &str = "condition = \"C4\"\ndisturbance_rms_deg = 0.1\n[feedforward]
                     tau_f_s = 0.1\npreview_s = 0.25\n";
 
 #[test]
-fn a_condition_with_a_displayed_target_and_a_disturbance() {
+fn displayed_target_and_disturbance_are_read() {
     let scenario = parse(SEEN).unwrap();
     let text = "derivative:0.15,tau_f=0.1,preview=0.25";
     let expected = hoid_model::Feedforward::of_text(text, Some((11.25, 0.35))).unwrap();
@@ -245,7 +245,7 @@ fn a_condition_with_a_displayed_target_and_a_disturbance() {
 }
 
 #[test]
-fn displays_that_mean_nothing_are_refused() {
+fn invalid_displays_are_refused() {
     for (from, to, words) in [
         ("form = \"derivative\"", "form = \"wheel\"", "feedforward.form is wheel"),
         ("K_d_s = 0.15", "K = 0.15", "lacks K_d_s"),

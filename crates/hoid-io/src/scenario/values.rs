@@ -7,7 +7,7 @@ use super::keys::Number;
 use crate::wording::printable;
 
 /// Maximum number of samples of a run, so that a wrong unit does not exhaust the memory.
-const MOST_SAMPLES: f64 = 1e7;
+const MAX_SAMPLES: f64 = 1e7;
 
 /// Admissible range of a number of a scenario, so that a wrong unit is reported instead of simulated.
 #[derive(Clone, Copy)]
@@ -63,7 +63,7 @@ impl std::fmt::Display for Limits {
 }
 
 /// Formats a number, with an exponent if it would otherwise have many digits.
-fn in_short(value: f64) -> String {
+fn short_number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&value.abs()) {
         value.to_string()
     } else {
@@ -96,7 +96,7 @@ impl Source<'_> {
     ) -> Result<f64, ScenarioFileError> {
         let time_s = given.as_ref().map_or(default, |n| *n.get_ref());
         let whole = sample_time.whole_samples(time_s).map(|n| n as f64);
-        if whole.is_some_and(|n| (least..=MOST_SAMPLES).contains(&n)) {
+        if whole.is_some_and(|n| (least..=MAX_SAMPLES).contains(&n)) {
             return Ok(time_s);
         }
         let expected = format!(
@@ -104,7 +104,7 @@ impl Source<'_> {
             sample_time.s()
         );
         Err(match given {
-            Some(given) => self.value(key, given.span().start, &in_short(time_s), &expected),
+            Some(given) => self.value(key, given.span().start, &short_number(time_s), &expected),
             None => self.keys(&format!("{key} is {time_s} by default, expected {expected}")),
         })
     }
@@ -124,7 +124,7 @@ impl Source<'_> {
         if limits.hold(value) {
             return Ok(value);
         }
-        Err(self.value(key, given.span().start, &in_short(value), &limits.to_string()))
+        Err(self.value(key, given.span().start, &short_number(value), &limits.to_string()))
     }
 
     /// Checks that a number, whose line in the file is unknown, is within its limits.
@@ -132,7 +132,7 @@ impl Source<'_> {
         if limits.hold(value) {
             return Ok(());
         }
-        Err(self.keys(&format!("{key} is {}, expected {limits}", in_short(value))))
+        Err(self.keys(&format!("{key} is {}, expected {limits}", short_number(value))))
     }
 
     pub(super) fn value(

@@ -9,7 +9,7 @@ use super::read::{RawColumn, of_arrays, of_table};
 use super::sampling::{SamplingSurvey, sampling};
 use super::values::{ValueSurvey, values};
 use crate::IoError;
-use crate::data_quality::{QualityIssue, QualityIssueKind, Signal, Signals, issues_of, names_a_clock};
+use crate::data_quality::{QualityIssue, QualityIssueKind, Signal, Signals, is_clock_name, issues_of};
 use crate::formats::arrays::TIMES;
 use crate::formats::{Format, Reading, bytes_of, long_text};
 use crate::record::ReadOptions;
@@ -106,13 +106,13 @@ fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
             continue;
         }
         seen.push(key);
-        let beside = || columns.iter().filter(|c| (c.parent.as_str(), c.rows) == key);
+        let neighbours = || columns.iter().filter(|c| (c.parent.as_str(), c.rows) == key);
         let time = TIMES
             .iter()
-            .find_map(|name| beside().find(|c| c.name == *name && c.values.is_some()));
+            .find_map(|name| neighbours().find(|c| c.name == *name && c.values.is_some()));
         let is_time = |c: &RawColumn| time.is_some_and(|time| time.path == c.path);
-        let numbers = || beside().filter(|c| c.values.is_some() && !is_time(c));
-        let is_clock = |c: &&RawColumn| names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
+        let numbers = || neighbours().filter(|c| c.values.is_some() && !is_time(c));
+        let is_clock = |c: &&RawColumn| is_clock_name(&c.name) || TIMES.contains(&c.name.as_str());
         found.extend(issues_of(&Signals {
             columns: numbers().filter(|c| !is_clock(c)).map(signal).collect(),
             time: time.map(signal),

@@ -45,13 +45,14 @@ pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<Sampli
         return None;
     }
     let all = time.values.as_ref()?;
-    let beside: Vec<&Vec<f64>> = columns
+    let neighbours: Vec<&Vec<f64>> = columns
         .iter()
         .filter(|column| column.parent == time.parent && column.rows == time.rows && column.path != time.path)
         .filter_map(|column| column.values.as_ref())
         .filter(|values| pairs(values).any(|(value, next)| value != next && !value.is_nan() && !next.is_nan()))
         .collect();
-    let repeats = |(before, row): &(usize, usize)| beside.iter().all(|values| values.get(*before) == values.get(*row));
+    let repeats =
+        |(before, row): &(usize, usize)| neighbours.iter().all(|values| values.get(*before) == values.get(*row));
     Some(SamplingSurvey {
         path: time.path.clone(),
         rows: time.rows,
@@ -65,7 +66,7 @@ pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<Sampli
             .fold(0, u64::saturating_add),
         first_gap_s: grid.gaps().next().and_then(|(before, ..)| all.get(before).copied()),
         not_increasing: pairs(&t).filter(|(time, next)| next <= time).count(),
-        repeated: if beside.is_empty() {
+        repeated: if neighbours.is_empty() {
             0
         } else {
             (0..).zip(1..time.rows).filter(repeats).count()
@@ -79,7 +80,7 @@ mod tests {
     use crate::table::Precision;
 
     #[test]
-    fn time_and_its_faults() {
+    fn time_column_faults_are_reported() {
         let read = |name: &str, values: Vec<f64>| RawColumn {
             path: name.into(),
             parent: String::new(),

@@ -1,6 +1,6 @@
 //! Statistics of a column: missing values, range, course over time, quantisation and saturation.
 
-use crate::data_quality::{Levels, rails};
+use crate::data_quality::{Levels, saturation_limits};
 
 /// Number of characters of a sketch.
 const SKETCH: usize = 32;
@@ -50,7 +50,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     let deviation = (finite.iter().map(|v| (v - mean).powi(2) / n).sum::<f64>()).sqrt();
     let constant = min == max;
     let levels = Levels::of(all);
-    let found = rails(all, &levels);
+    let found = saturation_limits(all, &levels);
     let at_rail = |upper: bool| {
         let rail = found.iter().find(|rail| rail.is_upper == upper);
         rail.map_or(0, |rail| rail.rows())
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_and_their_faults() {
+    fn value_column_faults_are_reported() {
         let sine: Vec<f64> = (0..400).map(|k| (0.05 * f64::from(k)).sin()).collect();
         let found = values(&sine).unwrap();
         assert_eq!(

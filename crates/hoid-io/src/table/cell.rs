@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells() {
+    fn cells_are_missing_text_or_numbers() {
         for missing in [
             "", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN", "None", "<NA>", "#N/A", "-", "-1.#IND", "#DIV/0!",
             "n.a.",
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn thousands() {
+    fn thousands_separators_are_removed() {
         for (cell, number) in [
             ("4.000,25", "4000.25"),
             ("-1.234.567,5", "-1234567.5"),
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn decimal_commas_and_moments() {
+    fn decimal_commas_and_moments_are_recognised() {
         assert_eq!(with_decimal_point("-1,5e-3", true), "-1.5e-3");
         assert_eq!(
             Cell::parse(&with_decimal_point("\u{2212}1,5", true)),

@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn name_negative_and_difference() {
+    fn names_negatives_and_differences_are_resolved() {
         let signed = |text: &str| {
             text.parse::<ColumnExpression>()
                 .unwrap()
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn hyphens_in_names() {
+    fn hyphenated_names_win_over_differences() {
         assert_eq!(resolve("stick-x").unwrap(), Signal::Column(3));
         assert_eq!(resolve("-stick-x").unwrap(), Signal::Negative(3));
         assert_eq!(resolve("stick-x-y").unwrap(), Signal::Difference(3, 2));
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_is_named() {
+    fn missing_columns_are_named() {
         let message = |text| resolve(text).unwrap_err().to_string();
         assert!(message("q").contains("no column \"q\" (requested: q); it has t, r, y, stick-x, r-d"));
         assert!(message("r-q").contains("no column \"q\" (requested: r-q)"));
@@ -213,7 +213,7 @@ mod tests {
     }
 
     #[test]
-    fn two_readings_are_refused() {
+    fn ambiguous_expressions_are_refused() {
         let names = ["a", "a-b", "c", "b-c"];
         let expression = ColumnExpression::column("a-b-c");
         assert!(matches!(
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn long_lists_are_cut() {
+    fn long_lists_are_truncated() {
         let names: Vec<String> = (0..45).map(|k| format!("x{k}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         assert!(list(&names).ends_with("x39 and 5 more"));

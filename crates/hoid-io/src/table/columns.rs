@@ -108,7 +108,7 @@ impl Table<'_> {
     }
 
     /// True if no column has a number in a row, as in a row of units.
-    pub(crate) fn has_no_number_in(&self, row: usize) -> bool {
+    pub(crate) fn is_row_without_numbers(&self, row: usize) -> bool {
         let has_none = |column: &Column| column.values.get(row).is_none_or(|value| value.is_nan());
         self.columns.iter().all(has_none)
     }
@@ -124,8 +124,8 @@ impl Table<'_> {
         let is_last_cell = self.columns.len().checked_sub(1) == Some(at);
         let name = named(&column.name);
         // A sign or a point at the end of a truncated file is the start of a number.
-        let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
-        if begun || column.texts.binary_search(&row).is_ok() {
+        let is_unfinished_number = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
+        if is_unfinished_number || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
             } else if is_moment(&found) && column.texts.len() == self.rows {
@@ -133,7 +133,7 @@ impl Table<'_> {
             } else if is_moment(&found) {
                 "the column mixes numbers with dates or clock times: write it in one format, or give --fs HZ if the \
                  samples are evenly spaced"
-            } else if row == 0 && self.rows > 1 && self.has_no_number_in(row) {
+            } else if row == 0 && self.rows > 1 && self.is_row_without_numbers(row) {
                 UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {
                 "the file is truncated in the middle of this line, the last one: copy or record the file again, or \
@@ -205,17 +205,17 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
 }
 
 /// Maximum number of columns of a table; recordings typically have some tens of columns.
-const MOST_COLUMNS: usize = 10_000;
+const MAX_COLUMNS: usize = 10_000;
 
 /// Checks the number of columns before memory is allocated for them.
 pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
-    if columns <= MOST_COLUMNS {
+    if columns <= MAX_COLUMNS {
         return Ok(());
     }
     Err(IoError::TooManyColumns {
         file: file.to_owned(),
         found: columns,
-        most: MOST_COLUMNS,
+        most: MAX_COLUMNS,
     })
 }
 
@@ -256,12 +256,12 @@ fn for_each_named(list: &str, columns: &mut [Column], set: impl Fn(&mut Column, 
 }
 
 /// Source of a table from which rows were removed; messages still refer to the rows of the file.
-struct Kept<'a> {
+struct RowSelection<'a> {
     source: Box<dyn Source + 'a>,
     rows: Vec<usize>,
 }
 
-impl Source for Kept<'_> {
+impl Source for RowSelection<'_> {
     fn file(&self) -> &str {
         self.source.file()
     }
@@ -291,7 +291,7 @@ pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
     Table {
         columns,
         rows: rows.len(),
-        source: Box::new(Kept { source, rows }),
+        source: Box::new(RowSelection { source, rows }),
         sample_time_s: table.sample_time_s,
         notes: table.notes,
     }
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_topic_of_another_rate_is_sparse_and_a_dropout_is_not() {
+    fn slower_topic_is_sparse_but_a_dropout_is_not() {
         let every = |m: usize| {
             column(
                 &(0..100)

@@ -69,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_names_before_words_and_of_words_the_only_one() {
+    fn whole_names_win_over_single_words() {
         assert_eq!(error_among(&["t", "Error", "e"]), Some("e"));
         assert_eq!(
             error_among(&["Time (s)", "Tracking error", "Stick"]),

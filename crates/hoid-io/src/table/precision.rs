@@ -1,7 +1,7 @@
 //! Precision of the printed numbers of a column.
 
 /// Largest number of decimals at which rounding of binary times is recognised (1 µs).
-const MOST_DECIMALS: i32 = 6;
+const MAX_DECIMALS: i32 = 6;
 
 /// Precision with which a column of decimal numbers is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -35,7 +35,7 @@ impl Precision {
         };
         let finite = || values.iter().copied().filter(|value| value.is_finite());
         Self {
-            decimals: (0..=MOST_DECIMALS).find(|decimals| finite().all(|value| is_multiple(value, *decimals))),
+            decimals: (0..=MAX_DECIMALS).find(|decimals| finite().all(|value| is_multiple(value, *decimals))),
             significant: 0,
         }
     }
@@ -53,7 +53,7 @@ impl Precision {
             .next()
             .and_then(|text| std::str::from_utf8(text).ok()?.parse().ok());
         let exponent = written.map_or(0, |exponent: i32| exponent.clamp(-400, 400));
-        let behind = digits
+        let fraction_digits = digits
             .iter()
             .skip_while(|byte| **byte != b'.')
             .filter(|byte| byte.is_ascii_digit());
@@ -61,7 +61,7 @@ impl Precision {
             .iter()
             .filter(|byte| byte.is_ascii_digit())
             .skip_while(|byte| **byte == b'0');
-        let decimals = count(behind).saturating_sub(exponent);
+        let decimals = count(fraction_digits).saturating_sub(exponent);
         self.decimals = Some(self.decimals.unwrap_or(i32::MIN).max(decimals));
         self.significant = self.significant.max(count(significant));
     }
@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn unit_of_the_last_digit() {
+    fn last_digit_unit_follows_the_printed_format() {
         let fixed = precision(&["0.0000", "0.0167", "45.0167"]);
         for t in [0.0, 0.0167, 45.0] {
             assert!((fixed.unit(t) - 1e-4).abs() < 1e-18, "{t}");
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn times_that_were_rounded_are_known_as_such() {
+    fn rounded_times_are_detected() {
         let times = |rate_hz: f64| (0..5000).map(move |k| f64::from(k) / rate_hz);
         let rounded: Vec<f64> = times(60.0).map(|t| (t * 1e4).round() / 1e4).collect();
         assert!((Precision::of_times(&rounded, false).unit(45.0) - 1e-4).abs() < 1e-18);

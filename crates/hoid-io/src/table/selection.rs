@@ -7,12 +7,12 @@ use crate::record::ReadOptions;
 use crate::wording::{did_you_mean, list};
 
 /// Source of a table from which columns were removed; messages still refer to the columns of the file.
-struct Selected<'a> {
+struct ColumnSelection<'a> {
     source: Box<dyn Source + 'a>,
     columns: Vec<usize>,
 }
 
-impl Source for Selected<'_> {
+impl Source for ColumnSelection<'_> {
     fn file(&self) -> &str {
         self.source.file()
     }
@@ -50,7 +50,7 @@ pub(crate) fn selected<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool)
             .filter(kept)
             .map(|(_, column)| column)
             .collect(),
-        source: Box::new(Selected { source, columns }),
+        source: Box::new(ColumnSelection { source, columns }),
         ..table
     }
 }

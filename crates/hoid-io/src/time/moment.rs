@@ -286,7 +286,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moments_against_the_clock_of_unix() {
+    fn moments_match_unix_time() {
         // Result of `date -u -d '2024-03-05 10:11:12' +%s`.
         let s = 1_709_633_472 * NS_PER_S;
         for (cell, ns) in [
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_moment() {
+    fn other_text_is_no_moment() {
         for cell in [
             "",
             "abc",
@@ -364,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_without_a_date_passes_midnight() {
+    fn clock_times_continue_past_midnight() {
         assert_eq!(column(&["23:59:59.5", "00:00:00.0", "00:00:00.5"]), [0.0, 0.5, 1.0]);
         assert_eq!(column(&["11:59:59 PM", "12:00:00 AM"]), [0.0, 1.0]);
         assert_eq!(

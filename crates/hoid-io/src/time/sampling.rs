@@ -230,7 +230,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_in_memory_are_judged_as_those_of_files() {
+    fn times_in_memory_follow_the_rules_for_files() {
         let rounded: Vec<f64> = (0..2702).map(|k| (f64::from(k) / 60.0 * 1e4).round() / 1e4).collect();
         assert_eq!(even_times(&rounded), Ok(1.0 / 60.0));
         let mut missing = rounded.clone();
@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn other_rates_stay_what_they_are() {
+    fn other_rates_are_not_rounded() {
         let (t, precision) = printed(grid(5000, 0.0, 0.0125 / 0.79), 12);
         let ts = even(&t, precision, None).unwrap().sample_time_s;
         assert!((ts - 0.0125 / 0.79).abs() < 1e-12);
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stated_sample_time_counts_where_t_agrees() {
+    fn stated_sample_time_is_used_if_t_agrees() {
         let (t, precision) = printed(grid(500, 0.0, 0.015), 17);
         let stated = f64::from_bits(0.015_f64.to_bits() + 1);
         assert_eq!(even(&t, precision, Some(stated)).unwrap().sample_time_s, stated);
@@ -360,7 +360,7 @@ mod tests {
     }
 
     #[test]
-    fn time_that_stands_or_runs_back_or_overflows() {
+    fn non_increasing_or_overflowing_time_is_an_error() {
         let p = Precision::default();
         assert_eq!(
             even(&[0.0, 0.1, 0.1, 0.2], p, None),
@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn the_typical_step_ignores_gaps_and_sees_through_jitter() {
+    fn typical_step_ignores_gaps_and_rounding() {
         let (mut t, precision) = printed(grid(1000, 5.0, 1.0 / 60.0), 4);
         t.iter_mut().skip(300).for_each(|t| *t += 7.0);
         assert_eq!(typical(&t, precision).unwrap(), 1.0 / 60.0);

@@ -28,14 +28,14 @@ use crate::wording::{did_you_mean, list, named, shown};
 /// Size above which the numbers in a time stamp column are assumed to be counted from 1970: 1e8 s is in 1973.
 const STAMP: f64 = 1e8;
 /// Median step above which integer times are assumed not to be in s.
-const STEP_OF_NO_SECONDS: f64 = 5.0;
+const MIN_NON_SECOND_STEP: f64 = 5.0;
 /// Largest sampling frequency that is assumed when the unit is inferred from the steps, Hz.
-const MOST_HZ: f64 = 2000.0;
+const MAX_HZ: f64 = 2000.0;
 
 /// Serial days of spreadsheets from 1954 to 2119, and of MATLAB from 1916 to 2190.
 const SERIAL_DAYS: [Range<f64>; 2] = [20_000.0..80_000.0, 700_000.0..800_000.0];
 /// Steps of serial days, in s.
-const SERIAL_STEPS_S: Range<f64> = 1.0 / MOST_HZ..10.0;
+const SERIAL_STEPS_S: Range<f64> = 1.0 / MAX_HZ..10.0;
 
 /// Column names that denote a time.
 const WORDS: [&str; 11] = [
@@ -125,7 +125,7 @@ pub(crate) fn is_time_unit(unit: &str) -> bool {
 /// Returns the table, in which the column recognised or selected as the time, if any, is named t and is in s.
 pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
     let found = match choice {
-        Some(choice) => Some(chosen(&table, choice)?),
+        Some(choice) => Some(selected_time_column(&table, choice)?),
         None if table.columns.iter().any(|column| column.name == "t" && !column.moments) => table
             .columns
             .iter()
@@ -145,7 +145,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
 }
 
 /// Returns the column that the user selected, and its unit.
-fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
+fn selected_time_column(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
     let position = |name: &str| table.columns.iter().position(|column| column.name == name);
     let unit = choice.unit;
     if let Some((seconds, nanoseconds)) = choice.column.split_once('+')
@@ -204,7 +204,11 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
                 && (is_stamp() || is_serial_days(values) || runs_in_seconds(values))
         })
     };
-    let by_unit = || only(table, |_, column| is_time_unit(&column.unit) && rises(&column.values));
+    let by_unit = || {
+        only(table, |_, column| {
+            is_time_unit(&column.unit) && is_increasing(&column.values)
+        })
+    };
     let pair = || only(table, |at, _| nanoseconds_of(table, at).is_some());
     by_name()
         .or_else(by_type)
@@ -244,13 +248,13 @@ fn first_line(table: &Table<'_>) -> Option<usize> {
     let first = only(table, is_first)?;
     let values = &table.columns.get(first)?.values;
     let counts = steps(values).all(|step| step == 1.0);
-    (rises(values) && !counts).then_some(first)
+    (is_increasing(values) && !counts).then_some(first)
 }
 
 /// True if the values increase from row to row.
-fn rises(values: &[f64]) -> bool {
-    let rises = pairs(values).all(|(value, next)| next > value);
-    values.len() > 2 && rises && values.iter().all(|value| value.is_finite())
+fn is_increasing(values: &[f64]) -> bool {
+    let is_increasing = pairs(values).all(|(value, next)| next > value);
+    values.len() > 2 && is_increasing && values.iter().all(|value| value.is_finite())
 }
 
 /// Returns the median of the steps forward; `None` if there are fewer than two.
@@ -271,7 +275,9 @@ fn is_serial_days(values: &[f64]) -> bool {
 /// True if the values increase in fractions of a second; whole numbers may be a count.
 fn runs_in_seconds(values: &[f64]) -> bool {
     let in_fractions = values.iter().any(|value| value.fract() != 0.0);
-    rises(values) && in_fractions && median_step(values).is_some_and(|step| (1.0 / MOST_HZ..=1.0).contains(&step))
+    is_increasing(values)
+        && in_fractions
+        && median_step(values).is_some_and(|step| (1.0 / MAX_HZ..=1.0).contains(&step))
 }
 
 /// Infers the unit of times whose unit is not stated.
@@ -287,22 +293,22 @@ fn unit_of(values: &[f64]) -> Unit {
     if !values.iter().all(|value| value.fract() == 0.0) {
         return Unit::Power(0);
     }
-    let Some(step) = median_step(values).filter(|step| *step >= STEP_OF_NO_SECONDS) else {
+    let Some(step) = median_step(values).filter(|step| *step >= MIN_NON_SECOND_STEP) else {
         return Unit::Power(0);
     };
     // Sample times from 0.5 ms to 0.5 s are assumed; each unit then covers its own three decades of steps.
     let power = [-3, -6, -9].into_iter().find(|power| {
         let seconds = step * 10_f64.powi(*power);
-        (1.0 / MOST_HZ..1000.0 / MOST_HZ).contains(&seconds)
+        (1.0 / MAX_HZ..1000.0 / MAX_HZ).contains(&seconds)
     });
     Unit::Power(power.unwrap_or(0))
 }
 
 /// Converts a column to the time t.
 fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
-    let beside = nanoseconds_of(table, at).filter(|_| unit == Some(Unit::SecondsAndNanoseconds));
-    let beside = beside.and_then(|beside| table.columns.get(beside));
-    let nanoseconds = beside.map(|column| (column.name.clone(), column.values.clone()));
+    let nanosecond_column = nanoseconds_of(table, at).filter(|_| unit == Some(Unit::SecondsAndNanoseconds));
+    let nanosecond_column = nanosecond_column.and_then(|nanosecond_column| table.columns.get(nanosecond_column));
+    let nanoseconds = nanosecond_column.map(|column| (column.name.clone(), column.values.clone()));
     let mut columns = table.columns.iter_mut().enumerate();
     if let Some((other, column)) = columns.find(|(_, column)| column.name == "t")
         && other != at
@@ -405,7 +411,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_times_and_their_units() {
+    fn time_columns_and_units_are_recognised_by_name() {
         use ColumnRole::{Other, Stamp, Time};
         let power = |power| Time(Some(Unit::Power(power)));
         for (name, meant) in [
@@ -440,7 +446,7 @@ mod tests {
     }
 
     #[test]
-    fn units_by_stamps_and_steps() {
+    fn time_units_are_inferred_from_values() {
         let unit = |first: f64, step: f64| unit_of(&(0..9).map(|k| first + step * f64::from(k)).collect::<Vec<_>>());
         for (first, step, power) in [
             (1.7e9, 1.0, 0),
@@ -477,7 +483,7 @@ mod tests {
     }
 
     #[test]
-    fn choices() {
+    fn time_choices_are_parsed() {
         for text in [
             "clock",
             "clock:ms",

@@ -47,7 +47,7 @@ impl Shared {
             tables: vec![task.target.len(), task.disturbance.len(), noise.len()],
             operator: simulated.as_ref().map(|(operator, _)| operator),
         };
-        self.tell(&run, |page, _| page == id);
+        self.send_to_pages(&run, |page, _| page == id);
         let numbers = task.target.iter().chain(&task.disturbance).chain(noise);
         let bytes: Vec<u8> = numbers.flat_map(|v| v.to_le_bytes()).collect();
         if let Some(page) = self.pages().get(&id) {
@@ -94,7 +94,7 @@ impl Shared {
         };
         let condition = condition.clone();
         let stem = session.stem(&condition.name, number);
-        let begun = RunStart {
+        let run_start = RunStart {
             hoid: env!("CARGO_PKG_VERSION").to_owned(),
             number,
             planned,
@@ -113,18 +113,18 @@ impl Shared {
             phases: task.phases.clone(),
             condition,
         };
-        begun.write(&stem, &task).map_err(unverified_run_error)?;
+        run_start.write(&stem, &task).map_err(unverified_run_error)?;
         let log = RunLog::create(&stem, task.ticks).map_err(unverified_run_error)?;
-        let live = LiveRun::new(&session.facts.config.method, begun.condition.course()?)?;
+        let live = LiveRun::new(&session.facts.config.method, run_start.condition.course()?)?;
         let teller = Arc::downgrade(self);
         let live = start(live, &stem, move |line| {
             if let Some(shared) = teller.upgrade() {
-                shared.tell_live(number, line);
+                shared.send_live(number, line);
             }
         });
         state.run = Some(Running {
             log,
-            begun,
+            run_start,
             stem,
             task,
             live: Some(live),
@@ -171,8 +171,8 @@ impl Shared {
         counted: BTreeMap<String, f64>,
     ) -> Result<(), LabError> {
         let run = state.running(number)?;
-        if run.log.ticks() != run.begun.ticks {
-            let (ticks, all) = (run.log.ticks(), run.begun.ticks);
+        if run.log.ticks() != run.run_start.ticks {
+            let (ticks, all) = (run.log.ticks(), run.run_start.ticks);
             return Err(LabError::Order(format!(
                 "the run has only {ticks} of {all} ticks and cannot be finished"
             )));
@@ -197,11 +197,11 @@ impl Shared {
         counted: BTreeMap<String, f64>,
     ) -> Result<(), LabError> {
         let Some(run) = state.run.take() else { return Ok(()) };
-        state.last_ended_run = Some(run.begun.number);
+        state.last_ended_run = Some(run.run_start.number);
         let measures = self.close(state, run, how, counted).map_err(unverified_run_error)?;
         let done = state.session.as_ref().and_then(|session| session.done.last());
         if let (Some(done), Some(measures)) = (done, &measures) {
-            self.tell(&ToPage::Verdict { done, measures }, |_, page| page.role.is_some());
+            self.send_to_pages(&ToPage::Verdict { done, measures }, |_, page| page.role.is_some());
         }
         if self.mode == Mode::Sessions {
             experiment::manifest(&self.out)?;
@@ -225,7 +225,7 @@ impl Shared {
         };
         let logged = Logged::read(&run.stem)?;
         let record = (logged.signals.e.len() > 2 * TICKS_PER_SAMPLE)
-            .then(|| record(&run.begun, &run.task, &logged))
+            .then(|| record(&run.run_start, &run.task, &logged))
             .transpose()?;
         if let Some(record) = &record {
             hoid_io::write_record(&run.stem.file("beh.parquet"), record)?;
@@ -251,13 +251,13 @@ impl Shared {
         thread::spawn(move || {
             let pages = reports::make(&program, &out, &folder, &|pages| {
                 shared.state().pages = pages.clone();
-                shared.tell_state();
+                shared.send_state();
             });
             let mut state = shared.state();
             state.reporting = false;
             state.pages = pages;
             drop(state);
-            shared.tell_state();
+            shared.send_state();
         });
     }
 }

@@ -6,9 +6,9 @@ use std::{
 };
 
 /// Maximum length of a head in bytes.
-const LONGEST: usize = 16 * 1024;
+const MAX_HEAD_BYTES: usize = 16 * 1024;
 /// Maximum number of lines of a head.
-const MOST_LINES: usize = 64;
+const MAX_LINES: usize = 64;
 
 /// The parts of a request that are used.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -27,7 +27,7 @@ impl Request {
     /// incomplete.
     pub fn of(head: &[u8]) -> Option<Result<Self, Reply>> {
         if !head.windows(4).any(|four| four == b"\r\n\r\n") {
-            let long = head.len() > LONGEST;
+            let long = head.len() > MAX_HEAD_BYTES;
             return long.then(|| Err(Reply::refused(431, "the header of the request is too long")));
         }
         Some(Self::parse(head).ok_or_else(|| Reply::refused(400, "not an HTTP request")))
@@ -40,7 +40,7 @@ impl Request {
     }
 
     fn parse(head: &[u8]) -> Option<Self> {
-        let mut headers = [httparse::EMPTY_HEADER; MOST_LINES];
+        let mut headers = [httparse::EMPTY_HEADER; MAX_LINES];
         let mut parsed = httparse::Request::new(&mut headers);
         if !parsed.parse(head).ok()?.is_complete() {
             return None;
@@ -157,7 +157,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heads_are_read_and_doubled_lines_are_not() {
+    fn request_heads_are_parsed_and_duplicates_ignored() {
         let head = b"GET /a/b?c HTTP/1.1\r\nHost: x:1\r\nOrigin: http://x:1\r\nUpgrade: WebSocket\r\n\
             Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: k\r\n\r\n";
         let request = Request::parse(head).unwrap();
@@ -169,7 +169,7 @@ mod tests {
         for more in [&b""[..], b"GET / HTTP", &head[..head.len() - 1]] {
             assert!(Request::of(more).is_none());
         }
-        assert!(Request::of(&[b'x'; LONGEST + 1]).unwrap().is_err());
+        assert!(Request::of(&[b'x'; MAX_HEAD_BYTES + 1]).unwrap().is_err());
         for bad in [&b"GET\r\n\r\n"[..], b"\x16\x03\x01\r\n\r\n", b"GET / HTTP/1.1\r\nHost"] {
             assert_eq!(Request::parse(bad), None);
         }

@@ -3,8 +3,8 @@
 //! While no client is connected, the thread waits for the next connection. Otherwise it accepts connections, examines
 //! each client once (complete head, head too long or too late, connection closed by the client), and pauses for
 //! [`PAUSE`] if nothing has happened. New connections are examined before any connection is closed. The page, whose
-//! head arrives at once, is therefore served regardless of the number of other clients. If there are more than [`MOST`]
-//! incomplete connections, the oldest ones are closed.
+//! head arrives at once, is therefore served regardless of the number of other clients. If there are more than
+//! [`MAX_PENDING`] incomplete connections, the oldest ones are closed.
 
 use std::{
     collections::VecDeque,
@@ -17,8 +17,8 @@ use std::{
 use super::http::{Reply, Request};
 
 /// Maximum number of connections with an incomplete head, and number of connections accepted before all are examined.
-const MOST: usize = 256;
-const AT_ONCE: usize = 64;
+const MAX_PENDING: usize = 256;
+const MAX_ACCEPTED_PER_ROUND: usize = 64;
 /// Time within which a complete head must arrive.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
 /// Pause if nothing has happened, and pause if the operating system provides no connection.
@@ -26,48 +26,48 @@ const PAUSE: Duration = Duration::from_millis(1);
 const BACK_OFF: Duration = Duration::from_millis(50);
 
 /// A connection with an incomplete head.
-struct Stranger {
+struct PendingConnection {
     stream: TcpStream,
     head: Vec<u8>,
-    came: Instant,
+    accepted_at: Instant,
 }
 
-/// Result of an examination of a stranger.
-enum Look {
-    Waits,
-    Gone,
-    Said(Result<Request, Reply>),
+/// Result of an examination of a connection.
+enum ReadState {
+    Incomplete,
+    Closed,
+    Complete(Result<Request, Reply>),
 }
 
-impl Stranger {
-    fn look(&mut self) -> Look {
+impl PendingConnection {
+    fn read_available(&mut self) -> ReadState {
         let mut part = [0; 2048];
         loop {
-            if let Some(said) = Request::of(&self.head) {
-                return Look::Said(said);
+            if let Some(message) = Request::of(&self.head) {
+                return ReadState::Complete(message);
             }
             match self.stream.read(&mut part) {
-                Ok(0) => return Look::Gone,
+                Ok(0) => return ReadState::Closed,
                 Ok(n) => self.head.extend(part.iter().take(n)),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
-                Err(_) => return Look::Gone,
+                Err(_) => return ReadState::Closed,
             }
         }
-        if self.came.elapsed() > HEAD_TIMEOUT {
-            return Look::Said(Err(Reply::refused(408, "the request did not arrive in time")));
+        if self.accepted_at.elapsed() > HEAD_TIMEOUT {
+            return ReadState::Complete(Err(Reply::refused(408, "the request did not arrive in time")));
         }
-        Look::Waits
+        ReadState::Incomplete
     }
 }
 
 /// Accepts connections while the program runs. `admitted` takes over a request with its connection, or returns the
 /// refusal.
 pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStream) -> Result<(), (Reply, TcpStream)>) {
-    let mut all: VecDeque<Stranger> = VecDeque::new();
+    let mut all: VecDeque<PendingConnection> = VecDeque::new();
     loop {
         let mut idle = match take(listener, &mut all) {
-            Ok(came) => came == 0,
+            Ok(accepted) => accepted == 0,
             // If no file descriptor is left, the oldest incomplete connection is closed.
             Err(_) => {
                 drop(all.pop_front());
@@ -76,18 +76,18 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
             }
         };
         let mut waiting = VecDeque::with_capacity(all.len());
-        for mut stranger in all.drain(..) {
-            let said = match stranger.look() {
-                Look::Waits => {
-                    waiting.push_back(stranger);
+        for mut pending in all.drain(..) {
+            let message = match pending.read_available() {
+                ReadState::Incomplete => {
+                    waiting.push_back(pending);
                     continue;
                 }
-                Look::Gone => continue,
-                Look::Said(said) => said,
+                ReadState::Closed => continue,
+                ReadState::Complete(message) => message,
             };
             idle = false;
-            let stream = stranger.stream;
-            let refused = match said {
+            let stream = pending.stream;
+            let refused = match message {
                 Ok(request) => admitted(request, stream).err(),
                 Err(reply) => Some((reply, stream)),
             };
@@ -97,7 +97,7 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
             }
         }
         all = waiting;
-        while all.len() > MOST {
+        while all.len() > MAX_PENDING {
             drop(all.pop_front());
         }
         if idle {
@@ -107,27 +107,27 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
 }
 
 /// Accepts pending connections; waits for one if no client is connected.
-fn take(listener: &TcpListener, all: &mut VecDeque<Stranger>) -> io::Result<usize> {
+fn take(listener: &TcpListener, all: &mut VecDeque<PendingConnection>) -> io::Result<usize> {
     let first = all.is_empty();
     listener.set_nonblocking(!first)?;
-    for came in 0..AT_ONCE {
+    for accepted in 0..MAX_ACCEPTED_PER_ROUND {
         let stream = match listener.accept() {
             Ok((stream, _)) => stream,
-            Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(came),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(accepted),
             // The client has already closed the connection.
             Err(error) if matches!(error.kind(), ErrorKind::ConnectionAborted | ErrorKind::Interrupted) => continue,
             Err(error) => return Err(error),
         };
         if stream.set_nonblocking(true).is_ok() {
-            all.push_back(Stranger {
+            all.push_back(PendingConnection {
                 stream,
                 head: Vec::new(),
-                came: Instant::now(),
+                accepted_at: Instant::now(),
             });
         }
         if first {
             return Ok(1);
         }
     }
-    Ok(AT_ONCE)
+    Ok(MAX_ACCEPTED_PER_ROUND)
 }

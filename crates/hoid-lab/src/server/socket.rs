@@ -17,7 +17,7 @@ use tungstenite::{
 use crate::{
     LabError,
     lab::{Lab, Outgoing},
-    wire::{FromPage, LARGEST, ToPage},
+    wire::{FromPage, MAX_MESSAGE_BYTES, ToPage},
 };
 
 const WAIT: Duration = Duration::from_millis(10);
@@ -35,8 +35,8 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
         return;
     }
     let limits = WebSocketConfig::default()
-        .max_message_size(Some(LARGEST))
-        .max_frame_size(Some(LARGEST));
+        .max_message_size(Some(MAX_MESSAGE_BYTES))
+        .max_frame_size(Some(MAX_MESSAGE_BYTES));
     let mut socket = WebSocket::from_raw_socket(stream, Role::Server, Some(limits));
     let (sender, receiver) = channel();
     let id = lab.join(sender);
@@ -64,9 +64,9 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
                 words: error.to_string(),
                 elsewhere: false,
             };
-            let told = serde_json::to_string(&words).map(|text| socket.send(Message::text(text)));
+            let sent = serde_json::to_string(&words).map(|text| socket.send(Message::text(text)));
             // A page that violates the protocol is not the page of this program and is disconnected.
-            if matches!(error, LabError::Message(_)) || !matches!(told, Ok(Ok(()))) {
+            if matches!(error, LabError::Message(_)) || !matches!(sent, Ok(Ok(()))) {
                 break;
             }
         }

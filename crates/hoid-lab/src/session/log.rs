@@ -18,11 +18,11 @@ use std::{
 
 use serde::Deserialize;
 
-use super::{folder::Stem, run_start::APPENDED};
+use super::{folder::Stem, run_start::APPENDED_FILES};
 use crate::LabError;
 
 /// Maximum time until appended data are flushed to the disk.
-const SYNC: Duration = Duration::from_millis(900);
+const SYNC_INTERVAL: Duration = Duration::from_millis(900);
 
 /// An event of the input device.
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
@@ -95,8 +95,8 @@ pub struct Batch {
 pub struct RunLog {
     files: [(PathBuf, File); 3],
     /// Size in bytes of the complete batches in each file.
-    whole: [u64; 3],
-    synced: Instant,
+    complete_bytes: [u64; 3],
+    last_sync: Instant,
     logged: usize,
     planned: usize,
 }
@@ -121,12 +121,12 @@ impl RunLog {
         };
         Ok(Self {
             files: [
-                make(APPENDED[0], headers[0])?,
-                make(APPENDED[1], headers[1])?,
-                make(APPENDED[2], headers[2])?,
+                make(APPENDED_FILES[0], headers[0])?,
+                make(APPENDED_FILES[1], headers[1])?,
+                make(APPENDED_FILES[2], headers[2])?,
             ],
-            whole: headers.map(|header| header.len() as u64),
-            synced: Instant::now(),
+            complete_bytes: headers.map(|header| header.len() as u64),
+            last_sync: Instant::now(),
             logged: 0,
             planned: ticks,
         })
@@ -175,11 +175,11 @@ impl RunLog {
             self.truncate_to_last_batch();
             return Err(error);
         }
-        for (whole, text) in self.whole.iter_mut().zip(&texts) {
-            *whole = whole.saturating_add(text.len() as u64);
+        for (complete_bytes, text) in self.complete_bytes.iter_mut().zip(&texts) {
+            *complete_bytes = complete_bytes.saturating_add(text.len() as u64);
         }
         self.logged = end;
-        if self.synced.elapsed() > SYNC {
+        if self.last_sync.elapsed() > SYNC_INTERVAL {
             self.sync()?;
         }
         Ok(())
@@ -187,8 +187,8 @@ impl RunLog {
 
     /// Truncates the files to the last complete batch. A failure is ignored, since an incomplete line is never read.
     fn truncate_to_last_batch(&self) {
-        for ((_, file), whole) in self.files.iter().zip(self.whole) {
-            let _ = file.set_len(whole);
+        for ((_, file), complete_bytes) in self.files.iter().zip(self.complete_bytes) {
+            let _ = file.set_len(complete_bytes);
         }
     }
 
@@ -205,7 +205,7 @@ impl RunLog {
         for (path, file) in &self.files {
             file.sync_data().map_err(|source| LabError::file(path, source))?;
         }
-        self.synced = Instant::now();
+        self.last_sync = Instant::now();
         Ok(())
     }
 }
@@ -228,7 +228,7 @@ mod tests {
 
     /// The third file is on a full disk: none of the files contains the batch, and its ticks do not count.
     #[test]
-    fn a_batch_that_a_full_disk_refuses_is_taken_back() {
+    fn batch_on_a_full_disk_is_rolled_back() {
         let dir = tempfile::tempdir().unwrap();
         let stem = Stem::new(dir.path(), "P01", 1, "rate", 1);
         let mut log = RunLog::create(&stem, 100).unwrap();

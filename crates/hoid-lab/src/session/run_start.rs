@@ -81,7 +81,7 @@ pub struct Ended {
 }
 
 /// Names of the three appended files.
-pub(super) const APPENDED: [&str; 3] = ["ticks.csv", "events.csv", "frames.csv"];
+pub(super) const APPENDED_FILES: [&str; 3] = ["ticks.csv", "events.csv", "frames.csv"];
 
 impl RunStart {
     /// Writes `run.json` and the tables of the task.
@@ -175,7 +175,7 @@ impl Ended {
     /// # Errors
     /// [`LabError::Io`].
     pub fn hashes(stem: &Stem) -> Result<Vec<String>, LabError> {
-        APPENDED
+        APPENDED_FILES
             .iter()
             .map(|end| match stem.file(end) {
                 path if path.exists() => Ok(digest(&hoid_io::read_bytes(&path)?)),

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     folder::{Stem, check_subject, session_folder},
     log::{RunLog, whole_lines},
-    run_start::{APPENDED, Ended, RunEnd, RunStart},
+    run_start::{APPENDED_FILES, Ended, RunEnd, RunStart},
 };
 use crate::{
     LabError,
@@ -23,12 +23,14 @@ use crate::{
 };
 
 /// Name of the file with the plan, and name of its backup copy.
-const FACTS: &str = "lab.toml";
-const FACTS_AGAIN: &str = "lab.copy.toml";
+const PLAN_FILE: &str = "lab.toml";
+const PLAN_COPY_FILE: &str = "lab.copy.toml";
 
 /// True if a folder contains a session.
 fn is_session(folder: &Path) -> bool {
-    [FACTS, FACTS_AGAIN].iter().any(|name| folder.join(name).exists())
+    [PLAN_FILE, PLAN_COPY_FILE]
+        .iter()
+        .any(|name| folder.join(name).exists())
 }
 
 /// Contents of `lab.toml` in the folder of a session.
@@ -137,7 +139,7 @@ impl Session {
         let folder = session_folder(out, subject, session);
         hoid_io::make_directory(&folder)?;
         let now = utc::now();
-        let begun = Self {
+        let session = Self {
             facts: SessionPlan {
                 hoid: env!("CARGO_PKG_VERSION").to_owned(),
                 subject: subject.to_owned(),
@@ -154,8 +156,8 @@ impl Session {
             folder,
             done: Vec::new(),
         };
-        begun.save()?;
-        Ok(begun)
+        session.save()?;
+        Ok(session)
     }
 
     /// Opens a session and evaluates the runs that are missing in `runs.csv`. A run without `end.json` or with a
@@ -170,7 +172,7 @@ impl Session {
                 continue;
             }
             if RunStart::read(&stem).is_err() {
-                session.lost(number, &stem)?;
+                session.mark_run_as_lost(number, &stem)?;
             } else if Ended::read(&stem).is_ok_and(|ended| ended.is_some()) {
                 session.note(&stem, &check(&stem)?)?;
             } else {
@@ -186,9 +188,9 @@ impl Session {
     /// [`LabError::Damaged`].
     pub fn read(folder: &Path) -> Result<Self, LabError> {
         // The copy is used only if the file is unreadable; it may lack the last change.
-        let facts = match SessionPlan::read(&folder.join(FACTS)) {
+        let facts = match SessionPlan::read(&folder.join(PLAN_FILE)) {
             Ok(facts) => facts,
-            Err(damaged) => SessionPlan::read(&folder.join(FACTS_AGAIN)).map_err(|_| damaged)?,
+            Err(damaged) => SessionPlan::read(&folder.join(PLAN_COPY_FILE)).map_err(|_| damaged)?,
         };
         Ok(Self {
             done: read_runs(&folder.join("runs.csv"))?,
@@ -202,7 +204,7 @@ impl Session {
     /// # Errors
     /// [`LabError::Io`].
     pub fn save(&self) -> Result<(), LabError> {
-        for name in [FACTS, FACTS_AGAIN] {
+        for name in [PLAN_FILE, PLAN_COPY_FILE] {
             let path = self.folder.join(name);
             let text = toml::to_string(&self.facts).map_err(|error| LabError::damaged(&path, error.to_string()))?;
             hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
@@ -239,7 +241,7 @@ impl Session {
     /// # Errors
     /// Errors of reading or writing files.
     pub fn end(&mut self, stem: &Stem, how: RunEnd, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
-        if !APPENDED.iter().any(|end| stem.file(end).exists()) {
+        if !APPENDED_FILES.iter().any(|end| stem.file(end).exists()) {
             // The run ended before its first tick: empty files are created.
             drop(RunLog::create(stem, 0)?);
         }
@@ -261,12 +263,12 @@ impl Session {
 
     /// Appends a run that has ended to `runs.csv`.
     fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
-        let begun = RunStart::read(stem)?;
+        let run_start = RunStart::read(stem)?;
         let done = Done {
-            number: begun.number,
-            planned: begun.planned,
-            condition: begun.condition.name.clone(),
-            training: begun.training,
+            number: run_start.number,
+            planned: run_start.planned,
+            condition: run_start.condition.name.clone(),
+            training: run_start.training,
             how: Ended::read(stem)?.map_or(RunEnd::Interrupted, |ended| ended.how),
             utc: utc::now(),
             verdict: checked.word().to_owned(),
@@ -275,16 +277,16 @@ impl Session {
             rms_e: checked.measures.rms_e,
             score: checked.measures.score,
         };
-        self.write_down(done)
+        self.append_to_log(done)
     }
 
     /// Records a run of which only the file names are known.
-    fn lost(&mut self, number: usize, stem: &Stem) -> Result<(), LabError> {
+    fn mark_run_as_lost(&mut self, number: usize, stem: &Stem) -> Result<(), LabError> {
         let condition = stem
             .text()
             .split_once("_task-")
             .and_then(|(_, rest)| rest.rsplit_once("_run-"));
-        self.write_down(Done {
+        self.append_to_log(Done {
             number,
             // No plan contains this index.
             planned: u32::MAX as usize,
@@ -301,7 +303,7 @@ impl Session {
     }
 
     /// Appends a line to `runs.csv`, completely or not at all, after the last complete line.
-    fn write_down(&mut self, done: Done) -> Result<(), LabError> {
+    fn append_to_log(&mut self, done: Done) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
             whole_lines(&hoid_io::read_bytes(&path)?).len()

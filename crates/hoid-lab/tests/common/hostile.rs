@@ -35,12 +35,12 @@ use crate::{
 /// Number of ticks of a run.
 const TICKS: usize = 500;
 /// Number of messages to one lab.
-const OF_A_LAB: usize = 200;
+const MESSAGES_PER_LAB: usize = 200;
 /// Number of samples for a restored tracker.
 const SAMPLES: usize = 25;
 
 /// Numbers at which indices, lengths and sums fail.
-const EXTREMES: [f64; 16] = [
+const EXTREME_NUMBERS: [f64; 16] = [
     0.0,
     -0.0,
     -1.0,
@@ -71,7 +71,7 @@ fn extreme(draw: &mut Draw) -> Value {
         6 => json!(draw.below(TICKS)),
         7 => json!([1.0, 1.0, 1e300, 1.0]),
         8 => json!(true),
-        _ => json!(EXTREMES[draw.below(EXTREMES.len())]),
+        _ => json!(EXTREME_NUMBERS[draw.below(EXTREME_NUMBERS.len())]),
     }
 }
 
@@ -81,7 +81,7 @@ pub struct Hostile {
     session: PathBuf,
     files: Vec<String>,
     person: Person,
-    said: usize,
+    message_count: usize,
     record: Record,
     texts: Vec<Text>,
     trackers: Vec<(TrackOptions, Vec<f64>)>,
@@ -127,7 +127,7 @@ impl Hostile {
             session,
             person: Person::begin(&directory.path().join("lab-0"), config()),
             directory,
-            said: 0,
+            message_count: 0,
             texts,
             record,
             trackers,
@@ -152,11 +152,11 @@ impl Hostile {
 
     /// Sends some messages to a lab in the state left by earlier messages.
     fn messages(&mut self, draw: &mut Draw) {
-        if self.said % OF_A_LAB == OF_A_LAB - 1 {
-            let out = self.directory.path().join(format!("lab-{}", self.said));
+        if self.message_count % MESSAGES_PER_LAB == MESSAGES_PER_LAB - 1 {
+            let out = self.directory.path().join(format!("lab-{}", self.message_count));
             self.person = Person::begin(&out, config());
         }
-        self.said += 1;
+        self.message_count += 1;
         let number = 1 + draw.below(3);
         for _ in 0..1 + draw.below(6) {
             let (first, length) = (draw.below(TICKS), draw.below(60));
@@ -233,7 +233,7 @@ impl Hostile {
                 1 => numbers[at] = f64::from_bits(draw.bits()),
                 2 => numbers.swap(at, draw.below(saved.len() - 1)),
                 3 => numbers[at] += 1.0,
-                _ => numbers[at] = EXTREMES[draw.below(EXTREMES.len())],
+                _ => numbers[at] = EXTREME_NUMBERS[draw.below(EXTREME_NUMBERS.len())],
             }
         }
         let sample_time = self.record.sample_time();

@@ -17,7 +17,7 @@ const BATCH: usize = 50;
 pub struct Person {
     pub lab: Lab,
     pub page: u64,
-    heard: Receiver<Outgoing>,
+    received: Receiver<Outgoing>,
     target: Vec<f64>,
 }
 
@@ -25,12 +25,12 @@ impl Person {
     /// Starts a session with consent.
     pub fn begin(out: &Path, config: Config) -> Self {
         let lab = Lab::open(out, config, Mode::Sessions, None).unwrap();
-        let (sender, heard) = channel();
+        let (sender, received) = channel();
         let page = lab.join(sender);
         let person = Self {
             lab,
             page,
-            heard,
+            received,
             target: Vec::new(),
         };
         person.say(json!({"type": "hello", "role": "person"})).unwrap();
@@ -47,7 +47,7 @@ impl Person {
     /// Starts the next run, which has this number.
     pub fn next(&mut self, number: usize) -> Result<(), String> {
         self.say(json!({"type": "next"}))?;
-        let tables = self.heard.try_iter().filter_map(|outgoing| match outgoing {
+        let tables = self.received.try_iter().filter_map(|outgoing| match outgoing {
             Outgoing::Binary(bytes) => Some(bytes),
             Outgoing::Text(_) => None,
         });
@@ -69,11 +69,11 @@ impl Person {
 
     /// Returns the state of the session, as last sent to the page.
     pub fn state(&self) -> Value {
-        let states = self.heard.try_iter().filter_map(|outgoing| match outgoing {
+        let states = self.received.try_iter().filter_map(|outgoing| match outgoing {
             Outgoing::Text(text) => serde_json::from_str::<Value>(&text).ok(),
             Outgoing::Binary(_) => None,
         });
-        states.filter(|told| told["type"] == "state").last().unwrap()
+        states.filter(|state| state["type"] == "state").last().unwrap()
     }
 }
 

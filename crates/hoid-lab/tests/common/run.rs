@@ -8,11 +8,11 @@ use hoid_lab::{
 };
 
 /// Starts the next run with the given number.
-pub fn begun(session: &Session, number: usize, input: InputMap) -> Option<(RunStart, Task)> {
+pub fn started_run(session: &Session, number: usize, input: InputMap) -> Option<(RunStart, Task)> {
     let planned = session.next()?;
     let condition = session.facts.config.condition[0].clone();
     let task = Task::new(&condition, 0, number as u64).ok()?;
-    let begun = RunStart {
+    let run_start = RunStart {
         hoid: "test".to_owned(),
         number,
         planned,
@@ -31,5 +31,5 @@ pub fn begun(session: &Session, number: usize, input: InputMap) -> Option<(RunSt
         limits: Limits::default(),
         phases: task.phases.clone(),
     };
-    Some((begun, task))
+    Some((run_start, task))
 }

@@ -97,7 +97,7 @@ fn agrees_with_scipy() {
 }
 
 #[test]
-fn delay_of_whole_samples_is_leading_zeros() {
+fn whole_sample_delay_adds_leading_zeros() {
     let h = tf(&[4.0, 11.0], &[1.0, 7.9, 126.0]);
     for method in [
         Method::ForwardEuler,
@@ -144,7 +144,7 @@ fn response_to(h: &DiscreteTransferFunction, input: impl Fn(usize) -> f64, sampl
 }
 
 #[test]
-fn holds_with_a_fraction_of_a_sample_of_delay() {
+fn holds_are_exact_with_fractional_delay() {
     // 0.7 + 2/(s + 3) with a delay of 2.3 samples, computed by hand. Step and ramp start at t = 0, so the holds are
     // exact.
     let sample_time = ts(0.1);
@@ -198,7 +198,7 @@ fn prewarped_tustin_is_exact_at_its_frequency() {
 }
 
 #[test]
-fn matched_has_the_images_of_poles_and_zeros() {
+fn matched_method_maps_poles_and_zeros() {
     let sample_time = ts(0.1);
     // 3 (s + 2) / ((s + 1) (s^2 + 2 s + 26)) has one finite zero and two zeros at infinity.
     let h = tf(&[3.0, 6.0], &polynomial::product(&[1.0, 1.0], &[1.0, 2.0, 26.0]));

@@ -120,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_are_primes_and_fall() {
+    fn multiples_are_primes_and_amplitudes_decrease() {
         let sum = MultiSine::default();
         assert_eq!(sum.multiples(), [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31]);
         let excitation = sum.excitation().unwrap();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn interleaved_lines_do_not_meet() {
+    fn interleaved_lines_are_disjoint() {
         let of = |interleaved| MultiSine {
             interleaved,
             ..MultiSine::default()
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn senseless_ones_are_refused() {
+    fn invalid_multisines_are_refused() {
         let default = MultiSine::default();
         for bad in [
             MultiSine {

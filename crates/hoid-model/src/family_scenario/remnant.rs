@@ -279,7 +279,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn senseless_parts_are_refused() {
+    fn invalid_parts_are_refused() {
         let good = RemnantPart::new(RemnantShape::White, 0.2);
         assert!(good.check().is_ok());
         let shaped = |shape| RemnantPart { shape, ..good.clone() };

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// Longest run, in samples.
-const MOST_SAMPLES: usize = 100_000_000;
+const MAX_SAMPLES: usize = 100_000_000;
 
 /// One task: operator, controlled element, excitation, remnant, stick and change over time.
 #[derive(Debug, Clone, PartialEq)]
@@ -100,7 +100,7 @@ impl FamilyScenario {
         let measurement_samples = whole("measurement time T_m in s", self.measurement_s)?;
         let run_in_samples = whole("run-in time t_0 in s", self.run_in_s)?;
         let all = run_in_samples + measurement_samples;
-        if measurement_samples == 0 || all > MOST_SAMPLES {
+        if measurement_samples == 0 || all > MAX_SAMPLES {
             let expected = "one to 1e8 samples including the run-in";
             return Err(wrong("measurement time T_m in s", self.measurement_s, expected));
         }

@@ -25,7 +25,7 @@ pub const FOLLOWED_FRACTION: f64 = 0.7;
 /// Preview in s, the default of a condition of `hoid lab`.
 pub const PREVIEW_S: f64 = 1.0;
 /// Largest absolute slope for which the form is a gain.
-const HALF: f64 = 0.5;
+const GAIN_SLOPE_LIMIT: f64 = 0.5;
 
 /// Returns the slope `d ln|P|/d ln omega` near the crossover.
 pub fn slope(element: &ContinuousTransferFunction) -> f64 {
@@ -57,8 +57,8 @@ pub fn typical_feedforward(
     let (operator, element) = (&state.operator, &state.controlled_element);
     let rise = -slope(element);
     let (form, lead_s) = match rise {
-        r if r.abs() <= HALF => (Form::Gain, None),
-        r if r > HALF && r <= 1.0 => (Form::Derivative, None),
+        r if r.abs() <= GAIN_SLOPE_LIMIT => (Form::Gain, None),
+        r if r > GAIN_SLOPE_LIMIT && r <= 1.0 => (Form::Derivative, None),
         r if r > 1.0 && operator.has_neuromuscular() => {
             (Form::DerivativeLead, Some(time_constant(r - 1.0, LONGEST_LEAD_S)))
         }
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn the_machine_moves_along_with_the_target() {
+    fn controlled_element_follows_the_target() {
         for (element, form) in [
             ("2", Form::Gain),
             ("4/s", Form::Derivative),
@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn elements_without_a_typical_response() {
+    fn some_elements_have_no_typical_response() {
         let of = |state: &FamilyState| typical_feedforward(state, Display::Pursuit, 0.7, 0.0).unwrap();
         // An element whose gain rises with frequency, and an element whose inverse is improper without a neuromuscular
         // system.

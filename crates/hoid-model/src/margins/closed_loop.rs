@@ -4,12 +4,12 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::crossings::{LARGEST_TURN_RAD, turn};
+use super::crossings::{LARGEST_TURN_RAD, total_turn};
 use crate::{ContinuousTransferFunction, polynomial};
 
 /// Maximum number of subdivisions of frequency intervals in the stability test; if more are needed, the loop is not
 /// proven stable.
-const MOST_EVALUATIONS: usize = 4_000_000;
+const MAX_EVALUATIONS: usize = 4_000_000;
 
 /// True if unit negative feedback around the open loop gives a stable loop: all closed-loop poles are in the open left
 /// half plane. Poles of the open loop may be anywhere, including the origin.
@@ -24,9 +24,9 @@ pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
 
 /// Lowest frequency at which a closed loop is evaluated, relative to the magnitude of the largest pole of the
 /// controlled element or to 1 rad/s, whichever is lower.
-const LOWEST: f64 = 1e-4;
+const MIN_RELATIVE_FREQUENCY: f64 = 1e-4;
 /// Deviation of the phase, in rad, from an integer number of half turns above which it is not attributed to rounding.
-const NO_HALF_TURN_RAD: f64 = 0.5;
+const HALF_TURN_TOLERANCE_RAD: f64 = 0.5;
 
 /// Returns the number of closed-loop poles in the right half plane of a loop with unit negative feedback, which
 /// consists of a stable operator, given by its frequency response, and a controlled element.
@@ -49,25 +49,26 @@ pub fn unstable_poles(
         let loop_part = horner(element.num(), s) * (-s * element.delay_s()).exp() * operator(omega);
         (horner(element.den(), s) + loop_part) / Complex64::new(scale, omega).powu(order as u32)
     };
-    let low = LOWEST * scale.min(1.0);
+    let low = MIN_RELATIVE_FREQUENCY * scale.min(1.0);
     // Beyond `highest_rad_s` the phase of D/(s + a)^n alone is followed, without the operator; this requires |L| < 1
     // there.
     if !(highest_rad_s > low && (operator(highest_rad_s) * element.response(highest_rad_s)).norm() < 1.0) {
         return None;
     }
-    let (turned, first, last) = turn(characteristic, (low, highest_rad_s))?;
+    let (turned, first, last) = total_turn(characteristic, (low, highest_rad_s))?;
     let element_alone = |omega: f64| {
         let s = Complex64::new(0.0, omega);
         horner(element.den(), s) / Complex64::new(scale, omega).powu(order as u32)
     };
     let far = 1e3 * highest_rad_s.max(scale);
-    let (beyond, from, to) = turn(element_alone, (highest_rad_s, far))?;
+    let (beyond, from, to) = total_turn(element_alone, (highest_rad_s, far))?;
     // F(0) and the limit of F/(s + a)^n at infinite frequency are real; the argument of 1 + L is between -90 and 90 deg
     // from the last frequency on.
     let at_zero = if first.re >= 0.0 { first } else { -first }.arg();
     let total = at_zero + turned - (last / from).arg() + beyond - to.arg();
     let half_turns = (-total / PI).round();
-    ((-total / PI - half_turns).abs() * PI < NO_HALF_TURN_RAD && half_turns >= 0.0).then_some(half_turns as usize)
+    ((-total / PI - half_turns).abs() * PI < HALF_TURN_TOLERANCE_RAD && half_turns >= 0.0)
+        .then_some(half_turns as usize)
 }
 
 /// Returns the magnitude of the largest root of a polynomial, estimated from its coefficients.
@@ -172,7 +173,7 @@ impl<'a> Characteristic<'a> {
                 let loop_matters = gain.max(next.2) > 0.5;
                 if turn.abs() > LARGEST_TURN_RAD || (delay_turn > LARGEST_TURN_RAD && loop_matters) {
                     evaluations += 1;
-                    if depth > 60 || evaluations > MOST_EVALUATIONS {
+                    if depth > 60 || evaluations > MAX_EVALUATIONS {
                         return None;
                     }
                     let middle = 0.5 * (here.0 + omega);

@@ -63,10 +63,10 @@ const POINTS_PER_DECADE: f64 = 100.0;
 /// Largest accepted phase change between neighbouring points of the scan, rad.
 pub(super) const LARGEST_TURN_RAD: f64 = 0.5;
 /// Phase change between neighbouring points above which the direction of the change is uncertain, rad.
-const MOST_TURN_RAD: f64 = 2.0;
+const MAX_CERTAIN_TURN_RAD: f64 = 2.0;
 /// Maximum number of successive halvings of a step of the grid: the resulting 4096 points per step are enough to follow
 /// a delay of 90 s at 1000 rad/s.
-const DEEPEST_HALVING: u32 = 12;
+const MAX_HALVINGS: u32 = 12;
 /// Returns the margins nearest to zero of any frequency response; the arguments are those of [`crossings`].
 pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Margins {
     crossings(open_loop, range_rad_s).margins()
@@ -114,13 +114,16 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
 
 /// Returns the total phase change of a response from the lower to the upper end of a range, in rad, and the response at
 /// both ends. `None` if the response is not finite, or if its phase turns too fast to be followed.
-pub(super) fn turn(of: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Option<(f64, Complex64, Complex64)> {
+pub(super) fn total_turn(
+    of: impl Fn(f64) -> Complex64,
+    range_rad_s: (f64, f64),
+) -> Option<(f64, Complex64, Complex64)> {
     let points = scan(&of, range_rad_s);
     let (first, last) = (points.first()?.l, points.last()?.l);
     let mut turned = 0.0;
     for pair in points.windows(2) {
         let by = (pair[1].l * pair[0].l.conj()).arg();
-        if !by.is_finite() || by.abs() > MOST_TURN_RAD {
+        if !by.is_finite() || by.abs() > MAX_CERTAIN_TURN_RAD {
             return None;
         }
         turned += by;
@@ -162,7 +165,7 @@ fn scan(open_loop: &impl Fn(f64) -> Complex64, (low, high): (f64, f64)) -> Vec<P
         };
         let before = points[points.len() - 1];
         let next = Point::new(open_loop, omega);
-        halve(open_loop, before, next, DEEPEST_HALVING, &mut points);
+        halve(open_loop, before, next, MAX_HALVINGS, &mut points);
     }
     points
 }

@@ -49,7 +49,7 @@ fn assert_margins(found: Margins, expected: [(f64, f64); 4]) {
 }
 
 #[test]
-fn both_states_of_the_reference() {
+fn reference_states_match_scipy() {
     // Computed by scipy.optimize.brentq on |L| - 1 and on Im L. The printed expected values agree, with fewer digits
     // (their 5.52 rad/s is 5.525, truncated).
     let tolerance = 1e-9;
@@ -89,7 +89,7 @@ fn crossover_model_in_closed_form() {
 }
 
 #[test]
-fn the_margins_nearest_to_zero_govern() {
+fn margins_nearest_to_zero_are_selected() {
     // e^{-0.1 s}/s with a lightly damped mode at 9 rad/s crosses gain one at 1.013, 8.482 and 9.428 rad/s with phase
     // margins of 83.94, 22.75 and -120.7 deg, and the negative real axis at 8.786 and 47.2 rad/s with -5.392 and 61.95
     // dB. These values were computed with numpy at two million frequencies; `stability_margins` of python-control
@@ -103,7 +103,7 @@ fn the_margins_nearest_to_zero_govern() {
 }
 
 #[test]
-fn fast_turning_phase_is_followed() {
+fn fast_phase_rotation_is_tracked() {
     // |L| rises towards 0.9, so the phase crossover nearest to the end of the range determines the gain margin. Over
     // the last step of the grid, from 977.2 to 1000 rad/s, the delay turns the phase by exactly four revolutions, which
     // the phases at the ends of the step do not show.
@@ -117,7 +117,7 @@ fn fast_turning_phase_is_followed() {
 }
 
 #[test]
-fn discrete_loops_end_at_half_the_sampling_frequency() {
+fn discrete_phase_crossover_at_nyquist_is_found() {
     // L = k/(z + 0.5): at z = -1, L = -2 k; with k = 0.2 the gain margin is 1/0.4.
     let sample_time = SampleTime::new(0.1).unwrap();
     let h = DiscreteTransferFunction::new(&[0.0, 0.2], &[1.0, 0.5], sample_time).unwrap();
@@ -128,7 +128,7 @@ fn discrete_loops_end_at_half_the_sampling_frequency() {
 }
 
 #[test]
-fn no_range_no_margins() {
+fn invalid_range_has_no_margins() {
     let none = Margins {
         crossover_rad_s: None,
         phase_margin_deg: None,
@@ -154,7 +154,7 @@ fn no_range_no_margins() {
 }
 
 #[test]
-fn stability_turns_at_the_gain_margin() {
+fn stability_changes_at_the_gain_margin() {
     for h in [s1(), s2()] {
         let gain = 10f64.powf(continuous(&h).gain_margin_db.unwrap() / 20.0);
         assert!(closed_loop_is_stable(&h));
@@ -264,7 +264,7 @@ fn marginal_and_hidden_modes_are_not_stable() {
 /// 2.5/s after an operator with a neuromuscular resonance that lifts |L| above one again: there are three crossings,
 /// and the margin nearest to zero is not at the lowest of them.
 #[test]
-fn all_crossings_are_given() {
+fn all_crossings_are_found() {
     let resonance = delayed(&[81.0], &[1.0, 1.0, 81.0], 0.15);
     let l = resonance.series(&tf(&[2.5], &[1.0, 0.0]));
     let found = crossings(|w| l.response(w), MANUAL_CONTROL_RANGE_RAD_S);
@@ -284,7 +284,7 @@ fn all_crossings_are_given() {
 }
 
 #[test]
-fn poles_of_a_response_are_those_of_the_transfer_function() {
+fn unstable_pole_counts_match_the_transfer_function() {
     let operators = [
         delayed(&[1.0], &[1.0], 0.2),
         delayed(&[81.0], &[1.0, 1.0, 81.0], 0.15),

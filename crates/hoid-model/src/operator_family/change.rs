@@ -64,7 +64,7 @@ mod tests {
     use super::super::{Form, examples::operator};
 
     #[test]
-    fn halfway_in_the_parameters_and_otherwise_unchanged() {
+    fn between_interpolates_only_changed_parameters() {
         let (a, b) = (operator(Form::LeadLag, true, 0.1), operator(Form::LeadLag, true, 0.3));
         let b = b.with_neuromuscular(9.0, 0.45).unwrap();
         let half = a.between(&b, |x, y| 0.5 * (x + y)).unwrap();

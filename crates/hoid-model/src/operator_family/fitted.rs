@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fit_of_other_samples_is_refused_with_the_remedy() {
+    fn fit_with_other_rate_or_units_is_refused_with_a_remedy() {
         let fit = fitted().checked().unwrap();
         let ts = SampleTime::HUNDREDTH;
         for units in [["deg", "mm"], ["", ""]] {
@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_without_a_meaning_are_refused() {
+    fn invalid_numbers_are_refused() {
         let short = FittedOperator {
             covariance: vec![1.0; 4],
             ..fitted()

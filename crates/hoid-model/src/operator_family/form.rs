@@ -320,7 +320,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_shape_is_the_numerator_over_its_gain() {
+    fn shape_is_the_numerator_over_its_gain() {
         for form in Form::ALL {
             let x = [3.0, 0.6, 0.4];
             let variables: Vec<Dual> = x.iter().enumerate().map(|(i, v)| Dual::variable(*v, i)).collect();
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn the_canals_are_those_of_the_literature() {
+    fn canal_models_match_the_literature() {
         use crate::FamilyOperator;
         let (nm, zeta): (f64, f64) = (11.0, 0.3);
         let x = [-0.4, nm.ln(), zeta.ln(), 0.18];

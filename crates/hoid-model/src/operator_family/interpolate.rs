@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn response_is_that_of_the_operator_half_a_sample_late() {
+    fn response_matches_operator_delayed_by_half_a_sample() {
         for ts in [1e-3, 1.0 / 60.0] {
             let sample_time = SampleTime::new(ts).unwrap();
             for operator in all() {
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_delay_has_no_kink_where_the_step_response_has_a_slope() {
+    fn delay_derivative_is_continuous_across_sample_borders() {
         let ts = SampleTime::new(1.0 / 60.0).unwrap();
         let slope = |tau: f64| {
             let x = [6.0, 0.65, 0.5, 2.5, -0.7, tau];

@@ -432,7 +432,7 @@ mod tests {
     }
 
     #[test]
-    fn the_names_are_those_of_all_forms() {
+    fn parameter_names_cover_all_forms() {
         let mut seen = Vec::new();
         for form in Form::ALL {
             for named in typical(form).named() {
@@ -474,7 +474,7 @@ mod tests {
     }
 
     #[test]
-    fn response_is_that_of_the_transfer_function() {
+    fn response_matches_the_transfer_function() {
         for form in Form::ALL {
             let operator = typical(form);
             let transfer = operator.transfer_function().unwrap();
@@ -486,7 +486,7 @@ mod tests {
     }
 
     #[test]
-    fn names_and_coordinates_are_inverse() {
+    fn names_and_coordinates_round_trip() {
         for form in Form::ALL {
             let operator = typical(form);
             let pairs: Vec<(String, f64)> = operator
@@ -510,7 +510,7 @@ mod tests {
     }
 
     #[test]
-    fn gradients_of_names_agree_with_finite_differences() {
+    fn named_gradients_agree_with_finite_differences() {
         for form in Form::ALL {
             let operator = typical(form);
             for (k, (parameter, gradient)) in operator.named_gradients().into_iter().enumerate() {
@@ -533,7 +533,7 @@ mod tests {
     }
 
     #[test]
-    fn what_has_no_meaning_is_refused() {
+    fn invalid_operators_are_refused() {
         assert!(FamilyOperator::new(Form::Lead, false, &[1.0, 0.5, 0.2]).is_err());
         assert!(FamilyOperator::new(Form::Gain, false, &[1.0]).is_err());
         assert!(FamilyOperator::new(Form::Gain, false, &[1.0, -0.1]).is_err());

@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn the_lead_is_the_delayed_operator() {
+    fn lead_form_matches_delayed_operator() {
         for tau in [0.0, 0.1, 0.1437, 0.2] {
             let of_family = operator(Form::Lead, true, tau).zoh(ts()).unwrap();
             let known = delayed_operator([4.0, 2.4, 11.0, 0.25, tau], ts()).unwrap();
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn response_is_that_of_the_operator_behind_a_hold() {
+    fn response_matches_the_operator_after_a_hold() {
         let ts_s = 1e-3;
         let fine = SampleTime::new(ts_s).unwrap();
         for operator in all() {
@@ -344,7 +344,7 @@ mod tests {
     }
 
     #[test]
-    fn powers_make_up_the_operator() {
+    fn weighted_powers_sum_to_the_operator() {
         for operator in all() {
             let sample = whole_samples(operator.tau_e_s(), ts()).unwrap();
             let whole = operator.zoh(ts()).unwrap();
@@ -372,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn gain_at_zero_and_continuity_in_the_delay() {
+    fn static_gain_and_continuity_in_the_delay() {
         for form in [Form::Gain, Form::Lead, Form::LeadLag, Form::Lead2Lag] {
             let held = operator(form, true, 0.13).zoh(ts()).unwrap();
             let sum: f64 = held.b.iter().sum::<f64>() / (1.0 + held.f.iter().sum::<f64>());
@@ -395,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn extremes_stay_finite_or_are_refused() {
+    fn extreme_parameters_stay_finite_or_are_refused() {
         let with = |log_omega: f64, log_zeta: f64, rate: f64| {
             FamilyOperator::new(Form::LeadLag, true, &[1.0, 0.5, rate, log_omega, log_zeta, 0.2]).unwrap()
         };

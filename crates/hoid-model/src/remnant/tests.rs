@@ -110,7 +110,7 @@ fn noise_model_has_the_spectrum_of_the_filter() {
 }
 
 #[test]
-fn zeros_go_to_the_euler_frobenius_zeros() {
+fn zeros_approach_the_euler_frobenius_zeros() {
     for (m, expected) in [
         (2, vec![-1.0]),
         (3, vec![-2.0 - 3f64.sqrt(), -2.0 + 3f64.sqrt()]),
@@ -159,7 +159,7 @@ fn retrieve_inverts_noise_model() {
 }
 
 #[test]
-fn retrieval_of_perturbed_coefficients_is_the_mean() {
+fn perturbed_coefficients_give_the_mean_time_constant() {
     // Computed by hand for m = 2 and backward Euler: d1 = -1.7 gives alpha = 0.85, d2 = 0.7396 gives alpha = 0.86.
     let found = retrieve(&[-1.7, 0.7396], 0.02, ts(), RemnantDiscretisation::BackwardEuler).unwrap();
     let expected = 0.5 * 0.01 * (0.85 / 0.15 + 0.86 / 0.14);
@@ -207,7 +207,7 @@ fn jacobian_agrees_with_finite_differences() {
 }
 
 #[test]
-fn what_is_no_remnant_filter_is_named() {
+fn non_convertible_filters_give_the_reason() {
     let reason = |d: &[f64], sd: f64| {
         let error = retrieve(d, sd, ts(), RemnantDiscretisation::ZeroOrderHold).unwrap_err();
         // The errors are compared as text, because NaN is not equal to itself.

@@ -152,7 +152,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rates_above_200_hz_come_near_to_100() {
+    fn rates_above_200_hz_are_reduced_to_about_100() {
         for (hz, factor) in [
             (60.0, 1),
             (100.0, 1),
@@ -177,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn as_typed() {
+    fn text_round_trip() {
         for (text, found) in [
             ("auto", Decimation::Auto),
             (" Off", Decimation::Off),

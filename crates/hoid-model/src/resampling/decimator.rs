@@ -17,7 +17,7 @@ use super::kernel::Kernel;
 use crate::{ModelError, SampleTime};
 
 /// Maximum number of samples on each side of the filter in a stream.
-const LONGEST: usize = 1_000_000;
+const MAX_HALF_LENGTH: usize = 1_000_000;
 
 /// Decimator of C channels together.
 #[derive(Debug, Clone)]
@@ -48,9 +48,9 @@ struct DecimatedChannel {
     /// Last valid value of the channel.
     last: f64,
     /// True if a valid value has been received.
-    seen: bool,
+    has_valid_sample: bool,
     /// Indices of samples that are not finite, from the sample of the last output on.
-    bad: VecDeque<u64>,
+    invalid_samples: VecDeque<u64>,
 }
 
 impl<const C: usize> Decimator<C> {
@@ -60,7 +60,7 @@ impl<const C: usize> Decimator<C> {
     /// [`ModelError::Decimation`] for an invalid factor.
     pub fn new(factor: usize, sample_time: SampleTime, held: [bool; C]) -> Result<Self, ModelError> {
         let found = (factor > 1)
-            .then(|| Decimated::by(factor, sample_time, LONGEST))
+            .then(|| Decimated::by(factor, sample_time, MAX_HALF_LENGTH))
             .flatten();
         let Some((done, kernel, new)) = found else {
             return Err(ModelError::Decimation {
@@ -79,8 +79,8 @@ impl<const C: usize> Decimator<C> {
                 past: VecDeque::new(),
                 first: 0,
                 last: 0.0,
-                seen: false,
-                bad: VecDeque::new(),
+                has_valid_sample: false,
+                invalid_samples: VecDeque::new(),
             }
         };
         Ok(Self {
@@ -144,7 +144,7 @@ impl<const C: usize> Decimator<C> {
         let at = self.output_count * factor;
         let found = self.lanes.each_mut().map(|lane| {
             let value = lane.value(at, factor);
-            lane.forget(at + factor, half);
+            lane.discard_before(at + factor, half);
             value
         });
         self.output_count += 1;
@@ -156,24 +156,24 @@ impl DecimatedChannel {
     fn take(&mut self, value: f64, number: u64) {
         if value.is_finite() {
             self.last = value;
-            if !self.seen {
+            if !self.has_valid_sample {
                 // The samples before the first value are not known: they are set to this value.
                 self.past.iter_mut().for_each(|past| *past = value);
-                self.seen = true;
+                self.has_valid_sample = true;
             }
         } else {
-            self.bad.push_back(number);
+            self.invalid_samples.push_back(number);
         }
         self.past.push_back(self.last);
     }
 
     /// Extends the past by the reflection of the start in the first sample.
     fn reflect(&mut self, half: usize) {
-        let begin = self.past.front().copied().unwrap_or(self.last);
+        let first = self.past.front().copied().unwrap_or(self.last);
         for k in 1..=half {
             // The k - 1 values inserted so far have shifted sample k to position 2 k - 1. It is missing only after
             // altered numbers were restored.
-            let value = 2.0 * begin - self.past.get(2 * k - 1).unwrap_or(&begin);
+            let value = 2.0 * first - self.past.get(2 * k - 1).unwrap_or(&first);
             self.past.push_front(value);
         }
         self.first = -(half as i64);
@@ -181,7 +181,7 @@ impl DecimatedChannel {
 
     /// Returns the new value for the `factor` old samples from `at` on; NaN if one of them is not finite.
     fn value(&mut self, at: u64, factor: u64) -> f64 {
-        if self.bad.iter().any(|bad| (at..at + factor).contains(bad)) {
+        if self.invalid_samples.iter().any(|bad| (at..at + factor).contains(bad)) {
             return f64::NAN;
         }
         let from = (at as i64 + self.lead + self.offset - self.first).max(0) as usize;
@@ -194,12 +194,12 @@ impl DecimatedChannel {
     }
 
     /// Discards the samples that the value at `next` and later values do not need.
-    fn forget(&mut self, next: u64, half: usize) {
+    fn discard_before(&mut self, next: u64, half: usize) {
         while self.first < next as i64 - half as i64 && self.past.pop_front().is_some() {
             self.first += 1;
         }
-        while self.bad.front().is_some_and(|bad| *bad < next) {
-            self.bad.pop_front();
+        while self.invalid_samples.front().is_some_and(|bad| *bad < next) {
+            self.invalid_samples.pop_front();
         }
     }
 }
@@ -213,19 +213,19 @@ impl<const C: usize> State for Decimator<C> {
         self.output_count.visit(each);
         self.output_count = self.output_count.min(self.input_count / factor as u64 + 1);
         for lane in &mut self.lanes {
-            let mut numbers = [lane.first as f64, lane.last, f64::from(u8::from(lane.seen))];
+            let mut numbers = [lane.first as f64, lane.last, f64::from(u8::from(lane.has_valid_sample))];
             numbers.iter_mut().for_each(&mut *each);
             lane.first = (numbers[0] as i64).clamp(-(half as i64), self.input_count as i64);
             lane.last = numbers[1];
-            lane.seen = numbers[2] != 0.0;
+            lane.has_valid_sample = numbers[2] != 0.0;
             let mut length = lane.past.len() as f64;
             each(&mut length);
             lane.past.resize((length.max(0.0) as usize).min(most), 0.0);
             lane.past.iter_mut().for_each(&mut *each);
-            let mut bad = lane.bad.len() as f64;
+            let mut bad = lane.invalid_samples.len() as f64;
             each(&mut bad);
-            lane.bad.resize((bad.max(0.0) as usize).min(most), 0);
-            for number in &mut lane.bad {
+            lane.invalid_samples.resize((bad.max(0.0) as usize).min(most), 0);
+            for number in &mut lane.invalid_samples {
                 let mut value = *number as f64;
                 each(&mut value);
                 *number = value.max(0.0) as u64;

@@ -26,7 +26,7 @@ const HALF_TRANSITION: f64 = 0.1;
 pub const PASS: f64 = 0.8;
 
 /// Distance from an integer, in samples, up to which the difference counts as rounding.
-const WHOLE: f64 = 1e-9;
+const INTEGER_TOLERANCE: f64 = 1e-9;
 
 /// Continuous impulse response of a low-pass filter, in samples of the record.
 #[derive(Debug, Clone, Copy)]
@@ -102,7 +102,7 @@ impl Kernel {
             .map(|k| {
                 let t = first + k as f64 * step;
                 // A time that equals a sample up to rounding is treated as that sample.
-                let whole = (t - t.round()).abs() < WHOLE;
+                let whole = (t - t.round()).abs() < INTEGER_TOLERANCE;
                 let at = if whole { t.round() } else { t.floor() };
                 let fraction = if whole { 0.0 } else { t - at };
                 // The initial value of `known` is NaN, which differs from every fraction.
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bessel_function_against_the_tables() {
+    fn bessel_function_matches_tables() {
         // Abramowitz and Stegun, Table 9.8, which contains these values multiplied by exp(-x).
         for (x, expected) in [
             (0.0, 1.0),
@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn pass_band_and_stop_band_are_what_is_stated() {
+    fn pass_band_and_stop_band_meet_their_specification() {
         let stop = 10_f64.powf(-STOP_DB / 20.0);
         for factor in [2.0, 3.0, 4.0, 10.0, 1.7] {
             let kernel = Kernel::limiting(1.0 / factor, 100_000).unwrap();
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn the_filter_of_decimation_folds_into_the_last_fifth_alone() {
+    fn decimation_filter_aliases_only_into_the_last_fifth() {
         for factor in [2.0, 3.0, 10.0, 20.0] {
             let kernel = Kernel::folding(1.0 / factor, 100_000).unwrap();
             let nyquist = 0.5 / factor;
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn a_filter_that_would_be_too_long_is_none() {
+    fn too_long_filter_is_none() {
         assert!(Kernel::limiting(1e-3, 1000).is_none());
         for bad in [0.0, f64::NAN, -1.0] {
             assert!(

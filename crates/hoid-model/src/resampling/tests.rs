@@ -26,7 +26,7 @@ fn record(hz: f64, n: usize, e: impl Fn(f64) -> f64, u: impl Fn(f64) -> f64) -> 
 }
 
 /// Largest deviation from a function of time, except near the ends, where the reflection has an effect.
-fn farthest(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> f64 {
+fn max_deviation(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> f64 {
     let edge = 30;
     (edge..values.len() - edge)
         .map(|k| (values[k] - f(k as f64 * ts + lead)).abs())
@@ -34,7 +34,7 @@ fn farthest(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> f64 {
 }
 
 #[test]
-fn a_sum_of_sines_is_the_same_at_the_new_rate() {
+fn sum_of_sines_is_preserved_at_the_new_rate() {
     for hz in [250.0, 1000.0 / 3.0, 500.0, 1000.0, 1024.0, 2000.0] {
         let (n, slow) = ((8.0 * hz) as usize, |t: f64| 3.0 + waves(t));
         let (found, done) = Decimation::Auto.of(record(hz, n, slow, |t| 2.0 * slow(t))).unwrap();
@@ -51,14 +51,14 @@ fn a_sum_of_sines_is_the_same_at_the_new_rate() {
             (found.output(), 0.0, 2.0),
             (found.channel("f_t").unwrap(), 0.0, 2.0),
         ] {
-            let error = farthest(values, ts, lead, |t| times * slow(t)) / times;
+            let error = max_deviation(values, ts, lead, |t| times * slow(t)) / times;
             assert!(error < 6e-4, "{hz} Hz: {error:e}");
         }
     }
 }
 
 #[test]
-fn a_ratio_keeps_its_value_and_its_phase() {
+fn gain_and_phase_between_channels_are_preserved() {
     // At each frequency, u is e with half the amplitude and a delay of .1 s.
     for hz in [1.0, 5.0, 20.0, 39.0] {
         let wave = |t: f64| (2.0 * PI * hz * t).cos();
@@ -79,7 +79,7 @@ fn a_ratio_keeps_its_value_and_its_phase() {
 }
 
 #[test]
-fn what_would_fold_down_is_kept_out() {
+fn aliasing_frequencies_are_removed() {
     for hz in [60.0, 65.0, 99.0, 100.0, 250.0, 499.0] {
         let (found, _) = record(
             1000.0,
@@ -90,13 +90,13 @@ fn what_would_fold_down_is_kept_out() {
         .decimated(10)
         .unwrap();
         for values in [found.input(), found.output()] {
-            assert!(farthest(values, 0.01, 0.0, |_| 0.0) < 1e-4, "{hz}");
+            assert!(max_deviation(values, 0.01, 0.0, |_| 0.0) < 1e-4, "{hz}");
         }
     }
 }
 
 #[test]
-fn lines_and_constants_stay_to_the_ends() {
+fn straight_lines_are_preserved_to_the_ends() {
     let line = |t: f64| 5.0 - 3.0 * t;
     let (found, done) = record(1000.0, 3000, line, line).decimated(10).unwrap();
     for (k, (e, u)) in found.input().iter().zip(found.output()).enumerate() {
@@ -112,7 +112,7 @@ fn lines_and_constants_stay_to_the_ends() {
 }
 
 #[test]
-fn what_cannot_be_decimated_is_said() {
+fn records_that_cannot_be_decimated_are_refused() {
     let short = |n| record(1000.0, n, f64::sin, f64::cos);
     let half = short(2000).decimated(10).unwrap().1.taps / 2;
     for n in [1, 10, half] {
@@ -147,16 +147,16 @@ fn streamed(hz: f64, factor: usize, samples: impl Iterator<Item = (f64, f64)>) -
 }
 
 #[test]
-fn a_stream_has_the_digits_of_the_record() {
+fn streamed_decimation_is_bit_identical_to_batch() {
     for (hz, factor) in [(1000.0, 10), (250.0, 3), (2000.0, 20), (500.0, 5), (400.0, 2)] {
         let whole = record(hz, (4.0 * hz) as usize, waves, |t| waves(t - 0.2));
         let samples = whole.input().iter().copied().zip(whole.output().iter().copied());
         let found = streamed(hz, factor, samples);
         let (batch, done) = whole.clone().decimated(factor).unwrap();
-        let behind = batch.len() - found.len();
+        let lag_samples = batch.len() - found.len();
         assert!(
-            behind as f64 * factor as f64 / hz <= done.lag_s + 2.0 * factor as f64 / hz,
-            "{behind}"
+            lag_samples as f64 * factor as f64 / hz <= done.lag_s + 2.0 * factor as f64 / hz,
+            "{lag_samples}"
         );
         for (k, [e, u]) in found.iter().enumerate() {
             assert_eq!((*e, *u), (batch.input()[k], batch.output()[k]), "{hz}: {k}");
@@ -165,7 +165,7 @@ fn a_stream_has_the_digits_of_the_record() {
 }
 
 #[test]
-fn missing_values_are_nobodys() {
+fn missing_values_stay_missing_and_are_not_used() {
     let value = |k: usize| waves(k as f64 * 1e-3);
     let samples = |k: usize| match k {
         // A gap in e and u, a single invalid value of u, and missing samples at the start.
@@ -185,7 +185,7 @@ fn missing_values_are_nobodys() {
 }
 
 #[test]
-fn a_saved_decimator_goes_on_with_the_same_digits() {
+fn restored_decimator_is_bit_identical() {
     let fresh = || Decimator::new(10, SampleTime::new(1e-3).unwrap(), [true, false]).unwrap();
     for at in [0, 100, 290, 777, 1503] {
         let value = |k: usize| if k % 97 == 3 { f64::NAN } else { waves(k as f64 * 1e-3) };

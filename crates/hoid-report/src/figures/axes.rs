@@ -17,7 +17,7 @@ const WIDE_DECADE: f64 = 95.0;
 /// Width of a tick label with the space to its neighbour.
 const TICK_WIDTH: f64 = 34.0;
 /// Smallest number that the library draws on a logarithmic axis.
-const LEAST: f64 = 1e-10;
+const MIN_LOG_VALUE: f64 = 1e-10;
 
 /// Tick spacing of 1, 2 or 5 times a power of ten that gives at most `most` intervals.
 pub fn tick_step(span: f64, most: f64) -> f64 {
@@ -142,7 +142,9 @@ pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool,
 /// Range of a logarithmic axis that contains these values, with ends at 1, 2 or 5 times a power of ten. The range is
 /// 0.1 to 1 if no value can be drawn.
 pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
-    let drawable = values.into_iter().filter(|v| style::is_drawable(*v) && *v >= LEAST);
+    let drawable = values
+        .into_iter()
+        .filter(|v| style::is_drawable(*v) && *v >= MIN_LOG_VALUE);
     let start = (f64::INFINITY, 0.0_f64);
     let (low, high) = drawable.fold(start, |(l, h), v| (l.min(v), h.max(v)));
     if low > high {
@@ -172,13 +174,13 @@ pub fn is_power_of_ten(value: f64) -> bool {
 
 /// The nearest 1, 2 or 5 times a power of ten that is at least (`up`) or at most this value.
 pub fn one_two_five(value: f64, up: bool) -> f64 {
-    const MARKS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
+    const ONE_TWO_FIVE: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
     let power = 10f64.powf(value.log10().floor());
     let rest = value / power;
     let mark = if up {
-        MARKS.into_iter().find(|m| *m >= rest * (1.0 - 1e-9))
+        ONE_TWO_FIVE.into_iter().find(|m| *m >= rest * (1.0 - 1e-9))
     } else {
-        MARKS.into_iter().rev().find(|m| *m <= rest * (1.0 + 1e-9))
+        ONE_TWO_FIVE.into_iter().rev().find(|m| *m <= rest * (1.0 + 1e-9))
     };
     power * mark.unwrap_or(1.0)
 }
@@ -188,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_tell_their_step_apart() {
+    fn tick_labels_resolve_their_step() {
         assert_eq!(tick_step(1.0, 5.2), 0.2);
         assert_eq!(tick(0.1 + 0.2, 0.1), "0.3");
         assert_eq!(tick(1e-17, 0.1), "0");
@@ -202,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bent_ordinate_is_smooth_enough_and_has_its_ticks_at_decades() {
+    fn symmetric_log_axis_is_continuous_and_invertible() {
         let bent = SymmetricLogAxis { linear_within: 10.0 };
         assert_eq!(
             [-1000.0, -10.0, -5.0, 0.0, 10.0, 100.0].map(|v| bent.height(v)),
@@ -215,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithmic_ranges_hold_their_values() {
+    fn logarithmic_ranges_cover_their_values() {
         assert_eq!(log_range([0.03, 7.0, -1.0, 0.0, f64::NAN]), (0.02, 10.0));
         assert_eq!(log_range([1.0]), (0.5, 2.0));
         assert_eq!(log_range([-1.0, f64::INFINITY]), (0.1, 1.0));

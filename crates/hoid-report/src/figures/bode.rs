@@ -24,7 +24,7 @@ const UPPER: f64 = 175.0;
 const LOWER: f64 = 205.0;
 
 const MAGNITUDE_STEPS: [f64; 5] = [1.0, 2.0, 5.0, 10.0, 20.0];
-const MOST_STEPS: f64 = 6.5;
+const MAX_STEPS: f64 = 6.5;
 const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 
 /// Number of frequencies of a curve.
@@ -269,12 +269,12 @@ impl Curve {
 /// last element.
 fn tick_step(span: f64, steps: &[f64]) -> f64 {
     let largest = steps.last().copied().unwrap_or(1.0);
-    let enough = |step: &&f64| span / **step <= MOST_STEPS;
+    let enough = |step: &&f64| span / **step <= MAX_STEPS;
     steps
         .iter()
         .find(enough)
         .copied()
-        .unwrap_or_else(|| largest * (span / (MOST_STEPS * largest)).ceil())
+        .unwrap_or_else(|| largest * (span / (MAX_STEPS * largest)).ceil())
 }
 
 /// The 95 % band, limited to the range of the figure; `None` without standard errors.
@@ -307,7 +307,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_dead_time_does_not_stretch_the_axis() {
+    fn long_delay_does_not_stretch_the_phase_axis() {
         let truth = |tau_e_s: f64| TrueResponse {
             operator: OperatorParameters {
                 tau_e_s,
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn the_truth_behind_its_hold_is_the_continuous_operator_at_low_frequency() {
+    fn held_true_operator_matches_continuous_at_low_frequency() {
         let truth = TrueResponse {
             operator: OperatingState::s1().operator,
             sample_time: SampleTime::HUNDREDTH,

@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn the_band_follows_its_phase_through_the_turns() {
+    fn phase_band_is_unwrapped_with_the_phase() {
         let mut curve = delayed(0.3);
         curve.phase_band = curve.phase_deg.iter().map(|p| (p - 5.0, p + 7.0)).collect();
         let phase = curve.phase();
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn error_bars_follow_their_phase_through_the_turns() {
+    fn error_bars_are_unwrapped_with_the_phase() {
         let curve = delayed(0.3);
         let estimate = |value: &f64| Estimate {
             value: *value,
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_stand_side_by_side_and_hostile_input_gives_a_figure() {
+    fn three_columns_are_drawn_even_for_invalid_input() {
         let column = |curve| BodeColumn {
             title: "m^0 = 1".to_owned(),
             curves: vec![curve],

@@ -13,7 +13,7 @@ use crate::numbers::Z_95;
 
 const RADIUS: f64 = 2.4;
 /// Half of the width of an error bar's cap.
-const CAP: f64 = 2.5;
+const CAP_HALF_WIDTH: f64 = 2.5;
 
 /// Points of a frequency response.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -103,8 +103,8 @@ impl BodePoints {
                 scene.add(draw::line((x, place(low)), (x, place(high)), colour, 1.0, None));
                 for end in [low, high].into_iter().filter(|end| scale.clamp_to_axis(*end) == *end) {
                     scene.add(draw::line(
-                        (x - CAP, place(end)),
-                        (x + CAP, place(end)),
+                        (x - CAP_HALF_WIDTH, place(end)),
+                        (x + CAP_HALF_WIDTH, place(end)),
                         colour,
                         1.0,
                         None,
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn phases_join_the_branch_of_the_curve() {
+    fn phases_are_moved_to_the_branch_of_the_curve() {
         let joined = points(&[100.0, 60.0, -170.0]).on_branch_of(Some((&[0.5, 3.5], &[-200.0, -600.0])));
         let phases: Vec<f64> = joined.phase_deg.iter().map(|p| p.value).collect();
         assert_eq!(phases, [-260.0, -300.0, -530.0]);
@@ -165,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_drawn_is_left_out() {
+    fn invalid_points_are_omitted() {
         let mut broken = points(&[1.0, f64::NAN, 3.0, 4.0]);
         broken.omega_rad_s[0] = 0.0;
         broken.magnitude_db.truncate(3);

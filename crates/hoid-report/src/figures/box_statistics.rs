@@ -73,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn statistics_are_those_of_tukey() {
+    fn statistics_follow_tukey() {
         let mut values: Vec<f64> = (1..=11).map(f64::from).collect();
         values.extend([100.0, -50.0, f64::NAN]);
         let found = BoxStatistics::of(&values);

@@ -26,11 +26,11 @@ const COUNTS: f64 = 13.0;
 /// Distance of the group names below the axis; `ROW_DISTANCE` is the distance of a second row of names below the first.
 const NAMES_BELOW: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
-/// Fraction of the width of a group that its boxes occupy; `BOX` is the width of a box as a fraction of its place, and
-/// `WIDEST` the largest width.
+/// Fraction of the width of a group that its boxes occupy; `BOX_WIDTH_SHARE` is the width of a box as a fraction of its
+/// place, and `MAX_BOX_WIDTH` the largest width.
 const GROUP: f64 = 0.86;
-const BOX: f64 = 0.8;
-const WIDEST: f64 = 26.0;
+const BOX_WIDTH_SHARE: f64 = 0.8;
+const MAX_BOX_WIDTH: f64 = 26.0;
 
 /// Range of the ordinate of box plots.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -208,7 +208,7 @@ impl BoxGrid {
             ));
         }
         let pitch = GROUP * of_group / self.series.len().max(1) as f64;
-        let half = 0.5 * (BOX * pitch).min(WIDEST);
+        let half = 0.5 * (BOX_WIDTH_SHARE * pitch).min(MAX_BOX_WIDTH);
         let (mut above, mut below, mut missing) = (0, 0, false);
         for group in 0..self.groups.len() {
             let start = area.left + of_group * (group as f64 + 0.5 * (1.0 - GROUP));
@@ -331,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_stands_at_the_place_of_its_numbers() {
+    fn box_is_drawn_at_its_coordinates() {
         // The ordinate from 0 to 10 has a margin of 5 %, so the axes extend from -0.5 to 10.5.
         let one = BoxStatistics {
             count: 5,
@@ -345,9 +345,9 @@ mod tests {
         let svg = box_plots("b", "t", &grid(vec![vec![one]]));
         let y = |v: f64| 8.0 + SINGLE_PANEL_HEIGHT * (10.5 - v) / 11.0;
         let middle = style::LEFT + 0.5 * (style::WIDTH - style::LEFT - style::RIGHT);
-        let side = middle - 0.5 * WIDEST;
+        let side = middle - 0.5 * MAX_BOX_WIDTH;
         let height = SINGLE_PANEL_HEIGHT * 6.0 / 11.0;
-        let rect = [("x", side), ("y", y(8.0)), ("width", WIDEST), ("height", height)];
+        let rect = [("x", side), ("y", y(8.0)), ("width", MAX_BOX_WIDTH), ("height", height)];
         assert!(has(&svg, "rect", &rect), "{svg}");
         let line = |from: (f64, f64), to: (f64, f64)| {
             has(
@@ -358,7 +358,7 @@ mod tests {
         };
         assert!(line((middle, y(2.0)), (middle, y(0.0))), "lower whisker");
         assert!(line((middle, y(8.0)), (middle, y(9.0))), "upper whisker");
-        assert!(line((side, y(5.0)), (side + WIDEST, y(5.0))), "median");
+        assert!(line((side, y(5.0)), (side + MAX_BOX_WIDTH, y(5.0))), "median");
         assert!(has(&svg, "circle", &[("cx", middle), ("cy", y(10.0))]), "outlier");
         // The ordinate of the library agrees: its tick at 2 is at the height of the lower quartile.
         assert!(line((style::LEFT - 5.0, y(2.0)), (style::LEFT, y(2.0))), "tick");
@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn outliers_beyond_are_counted_and_missing_boxes_crossed() {
+    fn outliers_off_the_axis_are_counted() {
         let mut one = BoxStatistics::of(&[1.0, 2.0, 3.0, 4.0, 5.0]);
         one.outliers = vec![1000.0, 2000.0, -300.0];
         let missing = BoxStatistics::default();
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bent_ordinate_shows_small_and_large_boxes() {
+    fn symmetric_log_axis_shows_small_and_large_boxes() {
         let [small, large] = [1.0, 1e5].map(|v| BoxStatistics::of(&[v, 1.2 * v, 1.4 * v]));
         let of = |linear_within| {
             let mut grid = grid(vec![vec![small.clone()], vec![large.clone()]]);
@@ -410,7 +410,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_grid_is_a_small_figure() {
+    fn empty_grid_gives_a_valid_figure() {
         for grid in [BoxGrid::default(), grid(vec![]), grid(vec![vec![]])] {
             let svg = box_plots("b", "t", &grid);
             assert!(svg.starts_with("<svg ") && svg.ends_with("</svg>") && !svg.contains("NaN"));

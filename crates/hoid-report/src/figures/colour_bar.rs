@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_bar_has_three_ticks() {
+    fn every_bar_has_at_least_three_ticks() {
         for colours in [MapColours::Sequential, MapColours::Diverging] {
             for (low, high) in [
                 (-4.9, 4.9),

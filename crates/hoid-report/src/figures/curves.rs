@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn stems_and_bars_stand_at_their_numbers() {
+    fn stems_and_bars_are_drawn_at_their_coordinates() {
         let mut stems = curve(LineKind::Stems, &[1.0, 10.0, 100.0], &[1.0, 10.0, 100.0]);
         stems.bars = vec![(0.5, 2.0), (f64::NAN, 1.0), (-1.0, 1000.0)];
         let svg = curves("c", "t", &grid(vec![stems], true));
@@ -388,7 +388,7 @@ mod tests {
     }
 
     #[test]
-    fn gaps_part_lines_and_a_lone_value_is_a_point() {
+    fn gaps_split_lines_and_single_values_are_points() {
         let nan = f64::NAN;
         let y = [1.0, 2.0, nan, 5.0, nan, 3.0, 2.0, f64::INFINITY];
         let x: Vec<f64> = (0..8).map(f64::from).collect();
@@ -401,7 +401,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_names_stand_once_and_the_truth_is_black() {
+    fn legend_lists_names_once_and_the_truth_in_black() {
         let x = [1.0, 2.0];
         let truth = curve(LineKind::Truth, &x, &[1.0, 2.0]);
         let line = curve(LineKind::Line, &x, &[2.0, 1.0]);
@@ -413,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn hostile_input_gives_a_figure() {
+    fn invalid_input_gives_a_valid_figure() {
         let empty = CurveGrid::default();
         let none = grid(vec![curve(LineKind::Line, &[], &[])], true);
         let negative = grid(vec![curve(LineKind::Stems, &[-1.0, 0.0], &[-1.0, 0.0])], true);

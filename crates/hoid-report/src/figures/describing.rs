@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_lies_in_the_turn_of_the_points() {
+    fn model_phase_is_unwrapped_to_the_points() {
         let found = described(4);
         let model = |turn: f64| ModelCurve::over(&found, 0.0, "m", 0.3, |w| Complex64::from_polar(2.0, turn - 0.3 * w));
         let points: Vec<(f64, f64)> = found
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_has_its_band() {
+    fn model_band_is_drawn() {
         let found = described(4);
         let of = |error: Option<f64>| {
             ModelCurve::with_band(&found, 0.0, "m", 0.3, |omega| {
@@ -350,7 +350,7 @@ mod tests {
     }
 
     #[test]
-    fn the_figure_has_points_models_and_coherence() {
+    fn figure_has_points_models_and_coherence() {
         let found = described(4);
         let model = ModelCurve::over(&found, 0.0, "gain and delay", 0.3, |w| {
             Complex64::from_polar(2.0, -0.3 * w)
@@ -373,7 +373,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_reach_beyond_the_last_line() {
+    fn curves_extend_beyond_the_last_line() {
         let found = described(4);
         let last = found.function.lines.last().unwrap().omega_rad_s;
         for (asked, reached) in [(0.0, 1.1 * last), (last, 1.1 * last), (3.0 * last, 3.0 * last)] {
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn models_that_agree_are_all_seen() {
+    fn identical_models_are_all_visible() {
         let found = described(4);
         let model = |name: &str| ModelCurve::over(&found, 0.0, name, 0.3, |w| Complex64::from_polar(2.0, -0.3 * w));
         let broken = |models: &[ModelCurve]| describing("d", "t", &found, models).matches("stroke-dasharray").count();
@@ -397,7 +397,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bar_that_is_not_drawn_to_its_end_is_told() {
+    fn truncated_error_bars_are_noted() {
         let mut found = described(4);
         assert!(!describing("d", "t", &found, &[]).contains("cut at 180"));
         let line = &mut found.function.lines[0];

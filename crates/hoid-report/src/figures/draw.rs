@@ -14,7 +14,7 @@ use super::{
 /// Colour of outlines, whiskers and marks of missing values.
 pub const INK: &str = "#333333";
 /// Font size of labels that would otherwise be too long.
-const SMALL: u32 = 10;
+const SMALL_FONT_SIZE: u32 = 10;
 /// Opacity of bands around lines.
 pub const BAND_OPACITY: f64 = 0.2;
 
@@ -134,7 +134,7 @@ pub fn centred(x: f64, y: f64, content: String, rotate: Option<f64>) -> Primitiv
 /// Text centred at a position, with a smaller font if it is longer than the available space.
 pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -> Primitive {
     let size = match text_width(&content, TEXT) > room {
-        true => SMALL,
+        true => SMALL_FONT_SIZE,
         false => TEXT,
     };
     text(x, y, content, size, TextAnchor::Middle, rotate)
@@ -179,7 +179,7 @@ pub mod tests {
     }
 
     #[test]
-    fn widths_of_text() {
+    fn text_width_matches_helvetica() {
         // In Helvetica, the width of a digit is 0.556 of the font size, and the width of a point 0.278.
         assert!((text_width("-0.55", 10) - 22.9).abs() < 0.5);
         assert_eq!(text_width("", 13), 0.0);

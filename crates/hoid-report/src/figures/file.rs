@@ -148,7 +148,7 @@ mod tests {
                        <rect width=\"100%\" height=\"100%\" fill=\"white\"/><text x=\"9\" y=\"99\">omega</text></svg>";
 
     #[test]
-    fn a_figure_has_the_width_that_is_asked_for() {
+    fn requested_width_is_set() {
         let wide = with_width_mm(SVG, 85.0);
         assert!(
             wide.contains("width=\"85mm\" height=\"42.50mm\"") && wide.contains("100%"),
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ending_says_the_format() {
+    fn format_follows_the_extension() {
         let of = |name: &str| FigureFormat::of(Path::new(name));
         assert_eq!(of("a.SVG"), Some(FigureFormat::Svg));
         assert_eq!(
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     #[cfg(not(feature = "pdf-png"))]
-    fn without_the_feature_the_error_names_it() {
+    fn error_names_the_missing_feature() {
         for format in [FigureFormat::Pdf, FigureFormat::Png] {
             assert!(!format.is_built());
             assert!(format.bytes(SVG).unwrap_err().to_string().contains("pdf-png"));
@@ -180,7 +180,7 @@ mod tests {
 
     #[test]
     #[cfg(feature = "pdf-png")]
-    fn pdf_and_png_have_the_size_on_paper() {
+    fn pdf_and_png_have_the_requested_size() {
         let svg = with_width_mm(SVG, 85.0);
         let pdf = FigureFormat::Pdf.bytes(&svg).unwrap();
         assert!(pdf.starts_with(b"%PDF-"));

@@ -110,10 +110,10 @@ impl Frame {
         axes_height: f64,
         ordinates: Ordinates,
         titles: usize,
-        (above, beside): (f64, f64),
+        (above, right_space): (f64, f64),
     ) -> Self {
         let columns = columns.max(1);
-        let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH } - beside;
+        let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH } - right_space;
         let mut frame = Self {
             n,
             columns,
@@ -212,7 +212,7 @@ impl Frame {
         abscissa: &str,
         label: impl Fn(usize) -> String,
         titles: &[String],
-        beside: f64,
+        right_space: f64,
     ) -> Scene {
         let mut scene = style::in_grid(cells, &self.widths, &self.heights);
         for i in (0..self.n).filter(|i| self.has_label(*i)) {
@@ -231,7 +231,7 @@ impl Frame {
             scene.add(draw::fitted(middle, y, marked(title), area.width + SPACE, None));
         }
         // The widths of the cells add up to the width of the figure, up to rounding errors.
-        scene.width = (scene.width + beside).round();
+        scene.width = (scene.width + right_space).round();
         scene
     }
 }
@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn titles_have_room_above_the_rows_that_have_them() {
+    fn titles_add_space_above_their_rows() {
         let tops = |titles| {
             let frame = Frame::new(5, 2, 80.0, Ordinates::Shared, titles);
             [0, 2, 4].map(|i| frame.area(i).top)
@@ -288,14 +288,14 @@ mod tests {
     }
 
     #[test]
-    fn the_lowest_of_a_short_last_row_are_known() {
+    fn lowest_panels_of_a_short_last_row_are_found() {
         let frame = Frame::new(5, 2, 80.0, Ordinates::Shared, 0);
         let lowest: Vec<bool> = (0..5).map(|i| frame.is_lowest(i)).collect();
         assert_eq!(lowest, [false, false, false, true, true]);
     }
 
     #[test]
-    fn rows_of_several_quantities_have_a_label_for_each() {
+    fn rows_with_several_quantities_label_each_panel() {
         let of = |labels: [&'static str; 4], shared| Ordinates::of(labels.into_iter().map(|l| (l, "s")), 2, shared);
         assert_eq!(of(["a", "a", "b", "b"], false), Ordinates::Ticks);
         assert_eq!(of(["a", "b", "a", "b"], false), Ordinates::Each);
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_share_their_widest_range() {
+    fn rows_share_the_widest_range() {
         let own = vec![(0.0, 1.0), (-1.0, 0.5), (3.0, 4.0)];
         assert_eq!(of_rows(own.clone(), 2, true), [(-1.0, 1.0), (-1.0, 1.0), (3.0, 4.0)]);
         assert_eq!(of_rows(own.clone(), 2, false), own);

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn only_the_texts_of_a_figure_are_tagged() {
+    fn only_text_elements_are_tagged() {
         let figure = format!("<text x=\"1\">{}</text><line/><text>b</text>", marked("K_e (s)"));
         assert_eq!(
             tagged(&figure),

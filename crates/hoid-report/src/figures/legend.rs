@@ -12,8 +12,8 @@ use super::{
 const ROW: f64 = 18.0;
 const SAMPLE: f64 = 22.0;
 const GAP: f64 = 6.0;
-const BETWEEN: f64 = 14.0;
-const LONGEST: usize = 48;
+const ENTRY_GAP: f64 = 14.0;
+const MAX_NAME_CHARS: usize = 48;
 
 /// Graphical sample next to the text of a legend entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,12 +69,15 @@ pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
     if entries.is_empty() {
         return;
     }
-    let names: Vec<String> = entries.iter().map(|e| marked(&shortened(&e.name, LONGEST))).collect();
+    let names: Vec<String> = entries
+        .iter()
+        .map(|e| marked(&shortened(&e.name, MAX_NAME_CHARS)))
+        .collect();
     let widths: Vec<f64> = names
         .iter()
-        .map(|n| SAMPLE + GAP + draw::text_space(n, TEXT) + BETWEEN)
+        .map(|n| SAMPLE + GAP + draw::text_space(n, TEXT) + ENTRY_GAP)
         .collect();
-    let last = scene.width - 4.0 + BETWEEN;
+    let last = scene.width - 4.0 + ENTRY_GAP;
     let whole: f64 = widths.iter().sum();
     let pitch = widths.iter().copied().fold(0.0, f64::max);
     let columns = ((last - LEFT) / pitch) as usize;
@@ -150,7 +153,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn long_names_are_cut() {
+    fn long_names_are_shortened() {
         assert_eq!(shortened("abc", 3), "abc");
         assert_eq!(shortened("\u{3c9}\u{3c9}\u{3c9}\u{3c9}", 3), "\u{3c9}\u{3c9}\u{2026}");
     }

@@ -17,9 +17,9 @@ use super::{
     svg,
 };
 
-/// Height of a cell; `LEAST_HEIGHT` is the smallest height of a panel.
+/// Height of a cell; `MIN_PANEL_HEIGHT` is the smallest height of a panel.
 const CELL: f64 = 26.0;
-const LEAST_HEIGHT: f64 = 78.0;
+const MIN_PANEL_HEIGHT: f64 = 78.0;
 /// Distance between the axis and the name of the ordinate.
 const NAME_AT: f64 = 26.0;
 /// Smallest space between category names.
@@ -76,7 +76,7 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
     if n == 0 || nx == 0 || ny == 0 {
         return frame::empty(id, title);
     }
-    let height = (CELL * ny as f64).max(LEAST_HEIGHT);
+    let height = (CELL * ny as f64).max(MIN_PANEL_HEIGHT);
     let frame = Frame::with_space(
         n,
         columns,
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_stand_at_their_places_with_their_colours() {
+    fn cells_have_their_position_and_colour() {
         let svg = maps("m", "t", &grid(vec![vec![1.0, 2.0], vec![3.0, f64::NAN]])).to_lowercase();
         let width = 0.5 * (style::WIDTH - SPACE_FOR_BAR - style::LEFT - style::RIGHT);
         let top = 8.0;
@@ -333,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn hostile_input_gives_a_figure() {
+    fn invalid_input_gives_a_valid_figure() {
         let nan = f64::NAN;
         let values = [
             vec![],

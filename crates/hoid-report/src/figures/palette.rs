@@ -118,7 +118,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lightness_falls_evenly_with_the_level_in_every_hue() {
+    fn lightness_decreases_evenly_with_the_level() {
         for method in 0..MODEL_COLOURS.len() {
             for levels in [2, 3, 4, 7] {
                 let of = |level| lightness(channels(&shade(method, level, levels)));
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn one_level_is_the_hue_itself() {
+    fn single_level_has_the_base_colour() {
         assert_eq!(shade(0, 0, 1), MODEL_COLOURS[0]);
         assert_eq!(shade(7, 3, 0), MODEL_COLOURS[1]);
         assert_eq!(shade(1, 9, 3), shade(1, 2, 3));

@@ -207,7 +207,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn a_method_far_from_the_truth_does_not_flatten_the_others() {
+    fn distant_estimates_do_not_widen_the_ordinate() {
         let truth = || curve(CurveKind::Truth, vec![11.25; 100]);
         let near = curve(
             CurveKind::Estimate,

@@ -20,13 +20,13 @@ const HEIGHT: f64 = 150.0;
 /// first.
 const NAMES_BELOW: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
-/// Horizontal positions of the first and the last person within a category, as fractions of its width; `MEAN` is the
-/// position of the mean.
+/// Horizontal positions of the first and the last person within a category, as fractions of its width; `MEAN_POSITION`
+/// is the position of the mean.
 const PEOPLE: (f64, f64) = (0.18, 0.6);
-const MEAN: f64 = 0.78;
+const MEAN_POSITION: f64 = 0.78;
 /// Maximum number of people with individual colours; larger groups are drawn in grey, with one legend entry for all
 /// people.
-const COLOURED: usize = 6;
+const MAX_COLOURED_PEOPLE: usize = 6;
 
 /// Estimate for a person in a category, with its standard error if known; `None` if there is no estimate.
 pub type CategoryEstimate = Option<(f64, Option<f64>)>;
@@ -87,7 +87,7 @@ pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
             grid.add_names(&mut scene, frame.area(i));
         }
     }
-    let mut entries: Vec<Entry> = match grid.people.len() <= COLOURED {
+    let mut entries: Vec<Entry> = match grid.people.len() <= MAX_COLOURED_PEOPLE {
         true => (grid.people.iter().enumerate())
             .map(|(i, name)| Entry::new(name, &colour(i, grid.people.len()), Sample::LineMark(Mark::Circle)))
             .collect(),
@@ -99,7 +99,7 @@ pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
 }
 
 fn colour(person: usize, people: usize) -> String {
-    if people <= COLOURED {
+    if people <= MAX_COLOURED_PEOPLE {
         Shade::of_method(person).colour()
     } else {
         GREY.to_owned()
@@ -166,7 +166,7 @@ impl PeopleGrid {
             let Some((value, (from, to))) = mean.filter(|(v, _)| style::is_drawable(*v)) else {
                 continue;
             };
-            let x = x_of(place, MEAN);
+            let x = x_of(place, MEAN_POSITION);
             scene.add(draw::line((x, y_of(from)), (x, y_of(to)), BLACK, 1.4, None));
             for end in [from, to] {
                 scene.add(draw::line((x - 4.0, y_of(end)), (x + 4.0, y_of(end)), BLACK, 1.4, None));
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_stand_at_the_places_of_their_numbers() {
+    fn marks_are_drawn_at_their_coordinates() {
         let svg = people_by_condition("p", "t", &grid());
         // The ordinate from 0 to 11 has a margin of 5 %.
         let y = |v: f64| 8.0 + HEIGHT * (11.55 - v) / 12.1;
@@ -211,7 +211,7 @@ mod tests {
         ] {
             assert!(has(&svg, "circle", &[("cx", at), ("cy", y(v))]), "{svg}");
         }
-        let m = x(0.0, MEAN);
+        let m = x(0.0, MEAN_POSITION);
         assert!(has(
             &svg,
             "line",
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_is_a_small_figure_and_many_are_grey() {
+    fn empty_grid_is_valid_and_many_people_are_grey() {
         let none = people_by_condition("p", "t", &PeopleGrid::default());
         assert!(none.starts_with("<svg ") && !none.contains("NaN"));
         let mut many = grid();

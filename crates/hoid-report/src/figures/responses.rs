@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_input_has_its_column() {
+    fn each_input_has_a_column() {
         let points = |gain: f64, standard_error: Option<f64>| {
             let of = |omega: f64| ResponsePoint {
                 omega_rad_s: omega,

@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_have_places() {
+    fn values_are_mapped_to_coordinates() {
         let area = Area {
             left: 10.0,
             top: 20.0,

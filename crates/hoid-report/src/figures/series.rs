@@ -8,7 +8,7 @@ pub const COLUMNS: usize = 340;
 
 /// Maximum number of runs of consecutive known values; if there are more, runs that are separated by gaps narrower than
 /// a column are joined.
-const MOST_RUNS: usize = 200;
+const MAX_RUNS: usize = 200;
 
 /// Indices of the smallest and the largest value in each column, in ascending order; all indices of a short series.
 pub fn thinned(values: &[f64]) -> Vec<usize> {
@@ -78,7 +78,7 @@ pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -
     needed.map(|(_, &k)| k).collect()
 }
 
-/// Runs of consecutive indices with known values. If there are more than `MOST_RUNS` runs, runs that are separated by
+/// Runs of consecutive indices with known values. If there are more than `MAX_RUNS` runs, runs that are separated by
 /// less than a column are joined.
 pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut found: Vec<Range<usize>> = Vec::new();
@@ -88,7 +88,7 @@ pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
             _ => found.push(k..k + 1),
         }
     }
-    if found.len() <= MOST_RUNS {
+    if found.len() <= MAX_RUNS {
         return found;
     }
     let mut joined: Vec<Range<usize>> = Vec::new();
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn a_run_stays_within_its_ends() {
+    fn thinned_run_keeps_its_ends() {
         let values: Vec<f64> = (0..10_000).map(|k| (k as f64 * 0.05).cos()).collect();
         for run in [0..1, 17..19, 4_000..9_999, 9_999..10_000, 0..10_000] {
             let kept = thinned_run(&values, run.clone(), COLUMNS);
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn bands_keep_their_widest_reach() {
+    fn thinned_bands_keep_their_extremes() {
         let n = 20_000;
         let mut upper = vec![1.0; n];
         upper[777] = 5.0;

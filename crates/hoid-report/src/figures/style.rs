@@ -130,7 +130,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_short() {
+    fn tick_labels_are_short() {
         assert_eq!(tick(0.1 + 0.2), "0.3");
         assert_eq!(tick(-0.0), "0");
         assert_eq!(tick(-1e-12), "0");

@@ -101,7 +101,7 @@ mod tests {
     };
 
     #[test]
-    fn ids_count_from_one() {
+    fn ids_are_renumbered_from_one() {
         let text = "<a id=\"k-12\"/><b id=\"k-7\"/> url(#k-7) url(#k-12)";
         assert_eq!(
             renumbered(text, "k-", "f-"),
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn text_of_the_user_stays_text() {
+    fn user_text_is_escaped() {
         let plots = vec![line([(0.0, 0.0), (1.0, 1.0)], BLUE, 1.0).into()];
         let layout = layout((0.0, 1.0), (0.0, 1.0), 200.0).with_x_label(axis_label("a<b> & $x^2$", "\"s\""));
         let svg = finish("f<1", "t & t", stacked(vec![(plots, layout, 200.0)]));
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_text_with_tags_begins_where_it_would_if_it_were_centred() {
+    fn tagged_text_starts_where_centred_text_would() {
         let mut scene = Scene::new(100.0, 100.0);
         for (content, rotate) in [("m_0", None), ("m_0", Some(-90.0)), ("m", None)] {
             scene.add(draw::text(50.0, 50.0, marked(content), 13, TextAnchor::Middle, rotate));

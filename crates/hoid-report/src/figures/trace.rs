@@ -105,10 +105,10 @@ impl TraceGrid {
         (from, to): (f64, f64),
         numbered: bool,
     ) -> kuva::prelude::Layout {
-        for &(begin, end) in &self.shaded_s {
-            let (begin, end) = (begin.clamp(from, to), end.clamp(from, to));
-            if begin < end {
-                let region = ShadedRegion::vertical(begin, end).with_color(GREY).with_opacity(0.14);
+        for &(start, end) in &self.shaded_s {
+            let (start, end) = (start.clamp(from, to), end.clamp(from, to));
+            if start < end {
+                let region = ShadedRegion::vertical(start, end).with_color(GREY).with_opacity(0.14);
                 layout = layout.with_shaded_region(region);
             }
         }
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_stays_a_jump_and_a_level_costs_nothing() {
+    fn constant_levels_need_few_points_and_jumps_stay_sharp() {
         let values: Vec<f64> = (0..100_000).map(|k| if k < 50_000 { 1.0 } else { 2.0 }).collect();
         let truth = curve(CurveKind::Truth, values);
         let points = truth.points(0..100_000, COLUMNS, |v| v);
@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn grids_may_have_a_short_last_row_or_nothing() {
+    fn short_last_rows_and_empty_grids_are_drawn() {
         let one = || panel(vec![curve(CurveKind::Estimate, vec![1.0, 2.0, 1.5])]);
         for (n, columns, shared) in [(5, 2, false), (5, 3, true), (1, 4, true), (3, 0, false), (0, 2, false)] {
             let grid = TraceGrid {
@@ -323,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_have_a_number_and_a_name() {
+    fn changes_are_numbered_and_named() {
         let one = || panel(vec![curve(CurveKind::Estimate, vec![1.0, 2.0, 1.5])]);
         let with = |n: usize| TraceGrid {
             panels: vec![one(), one()],
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn names_have_subscripts_and_hostile_text_stays_text() {
+    fn names_have_subscripts_and_text_is_escaped() {
         let mut hostile = panel(vec![curve(CurveKind::Estimate, vec![1.0, 2.0])]);
         hostile.name = "a1, f1".to_owned();
         hostile.unit = "<\u{e000}b>".to_owned();
@@ -356,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_are_shades_and_a_row_of_one_quantity_has_one_label() {
+    fn levels_are_shades_and_rows_share_a_label() {
         let of = |kind, level| TraceCurve {
             level,
             ..curve(kind, vec![1.0, 2.0, 1.5])
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn a_logarithmic_panel_leaves_out_what_has_no_logarithm() {
+    fn logarithmic_panel_omits_non_positive_values() {
         let mut errors = panel(vec![curve(
             CurveKind::Estimate,
             vec![0.0, 0.01, -1.0, 0.02, 0.03, f64::NAN],

@@ -15,7 +15,7 @@ use super::{
 use crate::{ReportError, page};
 
 /// Maximum number of runs whose preparation and problems are listed.
-const MOST_LISTED: usize = 24;
+const MAX_LISTED_RUNS: usize = 24;
 
 /// The tables in the directory of a group.
 struct Tables {
@@ -203,8 +203,8 @@ fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, Str
         }));
     }
     // The complete lists are in the tables of the directory.
-    let more = rows.len().saturating_sub(MOST_LISTED);
-    rows.truncate(MOST_LISTED);
+    let more = rows.len().saturating_sub(MAX_LISTED_RUNS);
+    rows.truncate(MAX_LISTED_RUNS);
     if more > 0 {
         rows.push((
             "more runs".to_owned(),
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_subjects_never_share_a_page() {
+    fn subjects_have_distinct_page_names() {
         let long = "x".repeat(300);
         let subjects = [
             "S1",

@@ -209,7 +209,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_not_determined_is_no_number_with_an_error() {
+    fn undetermined_values_have_no_standard_error() {
         let of = |value, standard_error, interval, determined| {
             parameter(&Parameter {
                 name: "T_I".to_owned(),
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn crossovers_have_their_intervals_beside_them() {
+    fn crossover_is_printed_with_its_interval() {
         let crossover = Estimate {
             value: 3.05,
             standard_error: Some(0.12),

@@ -92,9 +92,9 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
     let mut marks_s: Vec<f64> = Vec::new();
     for trace in traces.iter().map(|t| t.section.trace) {
         if let (StartAt::Span(span), true) = (&trace.options().start, trace.start().is_some()) {
-            let begin = record.time_s(0);
-            let third = begin + record.len() as f64 * record.sample_time().s() / 3.0;
-            let span = span.unwrap_or((begin, third));
+            let start_s = record.time_s(0);
+            let third = start_s + record.len() as f64 * record.sample_time().s() / 3.0;
+            let span = span.unwrap_or((start_s, third));
             if !shaded_s.contains(&span) {
                 shaded_s.push(span);
             }
@@ -186,7 +186,7 @@ fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
         method,
         level: 0,
         times_s: t.section.trace.times_s().to_vec(),
-        values: sigmas(t),
+        values: innovation_standard_deviations(t),
         band: Vec::new(),
     };
     TracePanel {
@@ -198,7 +198,7 @@ fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
 }
 
 /// Standard deviation of the innovation in each row.
-fn sigmas(t: &Evaluated<'_>) -> Vec<f64> {
+fn innovation_standard_deviations(t: &Evaluated<'_>) -> Vec<f64> {
     let variances = t.section.trace.innovation_variance().iter();
     variances.map(|v| if *v >= 0.0 { v.sqrt() } else { f64::NAN }).collect()
 }
@@ -308,7 +308,7 @@ fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -
 pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
     let panel = |(method, t): (usize, &Evaluated<'_>)| {
         let trace = t.section.trace;
-        let sigma = sigmas(t);
+        let sigma = innovation_standard_deviations(t);
         let typical = quantile_of(&sigma, 0.9).unwrap_or(0.0);
         let sizes: Vec<f64> = trace.innovation().iter().map(|e| e.abs()).collect();
         let reach = (4.0 * typical).max(quantile_of(&sizes, 0.99).unwrap_or(0.0));

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Maximum number of traces on a page: more curves cannot be distinguished.
-const MOST_TRACES: usize = 4;
+const MAX_TRACES: usize = 4;
 
 /// Contents of the page.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,11 +95,11 @@ impl TrackReport<'_> {
             counts => tables::counts(&traces),
             errors => tables::errors(&traces, self.record),
             response => response.as_ref().map(|grid| draw("response", "Response over time", grid)),
-            response_beyond => response.as_ref().map(beyond),
+            response_beyond => response.as_ref().map(rows_beyond_axes),
             operator => draw("operator", "Parameters of the operator over time", &operator),
-            operator_beyond => beyond(&operator),
+            operator_beyond => rows_beyond_axes(&operator),
             coefficients => draw("coefficients", "Coefficients over time", &coefficients),
-            coefficients_beyond => beyond(&coefficients),
+            coefficients_beyond => rows_beyond_axes(&coefficients),
             innovation => draw("innovation", "Innovations over time", &innovation),
             spread => draw("errors", "Standard errors over time", &errors),
             spread_of_operator => panels::of_operator(&traces),
@@ -141,7 +141,7 @@ impl TrackReport<'_> {
     }
 
     fn check(&self) -> Result<(), ReportError> {
-        let maximum = MOST_TRACES;
+        let maximum = MAX_TRACES;
         match self.traces.len() {
             0 => return Err(ReportError::NoTraces { maximum }),
             found if found > maximum => return Err(ReportError::TooManyTraces { found, maximum }),
@@ -177,7 +177,7 @@ impl TrackReport<'_> {
 }
 
 /// Number of rows of each method beyond the axes of each panel, for a caption.
-fn beyond(grid: &TraceGrid) -> Vec<Value> {
+fn rows_beyond_axes(grid: &TraceGrid) -> Vec<Value> {
     let of = |panel: &figures::TracePanel| -> Vec<Value> {
         let label = tables::symbol_of(&panel.name);
         let rows = panel.beyond().into_iter();

@@ -42,10 +42,10 @@ const GREY_BOX: &str = "grey box";
 /// Label of quantities that describe the recording itself.
 pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
-pub(super) const PEOPLE: &str = "people";
+pub(super) const PEOPLE_TABLE: &str = "people";
 
 /// Results from all runs of a person in a condition that the analysis of each run needs.
-pub(super) struct FromCell {
+pub(super) struct CellResults {
     arx: Result<Orders, String>,
     box_jenkins: Result<Orders, String>,
     /// Form of the operator of the person; `None` if the person has no operator.
@@ -54,7 +54,7 @@ pub(super) struct FromCell {
     channels: Vec<SeenChannel>,
 }
 
-impl FromCell {
+impl CellResults {
     /// Reads the results from two tables of the cell: its estimates and its people.
     pub fn of(estimates: &OutputTable, people: &OutputTable) -> Self {
         let people = people_of(people);
@@ -69,7 +69,7 @@ impl FromCell {
     }
 
     /// Returns the reason why models with one input do not apply; `None` if they do.
-    fn against_one_input(&self) -> Option<String> {
+    fn reason_against_one_input(&self) -> Option<String> {
         let names: Vec<&str> = self.channels.iter().map(|channel| channel.name.as_str()).collect();
         (!names.is_empty()).then(|| {
             let names = names.join(" and ");
@@ -87,7 +87,7 @@ impl FromCell {
 }
 
 /// Analyses a run; `base` is the directory of the manifest.
-pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry, from_cell: &FromCell) -> RunTables {
+pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry, from_cell: &CellResults) -> RunTables {
     let mut analysis = RunAnalysis::new(manifest, entry);
     let files = read_files(manifest, base, entry, Pairing::Recorded);
     let account = account(entry, &files);
@@ -157,7 +157,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
         }
     }
     let mut tables = analysis.rows.into_tables();
-    tables.account.push((PEOPLE, people_table(&people)));
+    tables.account.push((PEOPLE_TABLE, people_table(&people)));
     tables
 }
 
@@ -175,7 +175,7 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    fn analyse(&mut self, run: &Run, from_cell: &FromCell) {
+    fn analyse(&mut self, run: &Run, from_cell: &CellResults) {
         let record = &run.record;
         let windows = windows(self.settings, record);
         let change = run.seam_s.or(self.rows.condition.change_s).map(|at| ("change_s", at));
@@ -186,7 +186,7 @@ impl<'a> RunAnalysis<'a> {
         for (name, value) in of_record.into_iter().chain(change) {
             self.rows.row(Some(windows[2]), RECORD, name, Estimate::fixed(value));
         }
-        if let Some(reason) = from_cell.against_one_input() {
+        if let Some(reason) = from_cell.reason_against_one_input() {
             return self.one_input(&reason);
         }
         // The names of structures and recursions were checked with the manifest.
@@ -236,7 +236,7 @@ impl<'a> RunAnalysis<'a> {
 
     /// Applies a recursion to the run. A method that needs no start fit gets no prior information; any other method
     /// gets the orders chosen for the cell and starts from a fit of the first window.
-    fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &FromCell) {
+    fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &CellResults) {
         let label = traces::label_of(method);
         let mut tracking = Tracking {
             // The run has already been repaired and reduced to its final rate.

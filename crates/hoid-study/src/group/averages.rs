@@ -45,7 +45,7 @@ impl Averages {
         ));
         for (key, values) in &self.0 {
             let s = Statistics::of(values);
-            rows.begin();
+            rows.start_row();
             for (name, text) in ["subject", "condition", "window", "estimator", "parameter"]
                 .iter()
                 .zip(key)
@@ -97,7 +97,7 @@ impl Delays {
         let columns = DELAY_COLUMNS.map(|(_, _, column)| column);
         let mut rows = Rows::new(&schema(text(&["subject", "condition"]).chain(real(&columns))));
         for ((subject, condition), values) in &self.0 {
-            rows.begin();
+            rows.start_row();
             rows.text("subject", subject);
             rows.text("condition", condition);
             for column in columns {
@@ -174,7 +174,7 @@ impl TraceAverages {
         let mut rows = Rows::new(&Self::schema(&self.names));
         for (key, times) in &self.values {
             for (bits, all) in times {
-                rows.begin();
+                rows.start_row();
                 for (name, text) in ["subject", "condition", "estimator"].iter().zip(key) {
                     rows.text(name, text);
                 }

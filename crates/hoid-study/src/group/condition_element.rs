@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn elements_and_their_change_are_written_to_the_conditions() {
+    fn elements_and_changes_are_applied_to_conditions() {
         let found = applied(&["C1-*=90/(s(s+6))", "C3-roll=90/(s(s+6)) > 30/(s(s+.2)) @ 50 : 0.5"]).unwrap();
         let facts = |name: &str| found.conditions.get(name).unwrap();
         for name in ["C1-roll", "C1-pitch"] {
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_element_of_a_condition_is_refused() {
+    fn invalid_elements_are_refused() {
         for (text, named) in [
             ("C1-roll", "NAMES=ELEMENT"),
             ("C1-roll,=1/s", "a name is empty"),

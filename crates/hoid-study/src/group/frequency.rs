@@ -41,7 +41,7 @@ pub(super) struct Frequencies {
     pub agreement: OutputTable,
 }
 
-const LINE: [&str; 7] = [
+const LINE_COLUMNS: [&str; 7] = [
     "omega_rad_s",
     "magnitude_db",
     "magnitude_db_se",
@@ -93,7 +93,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
     let numbers = [vec!["runs".to_owned()], with_errors].concat();
     let keys = ["subject", "condition"];
     let mut tables = Tables {
-        lines: Rows::new(&schema(text(&keys).chain(real(&LINE)))),
+        lines: Rows::new(&schema(text(&keys).chain(real(&LINE_COLUMNS)))),
         margins: Rows::new(&schema(
             text(&keys)
                 .chain(text(&["status", "reason", "verdict", "reasons"]))
@@ -133,7 +133,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
         });
         let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
         let margins = &mut tables.margins;
-        margins.begin();
+        margins.start_row();
         margins.text("subject", key.0);
         margins.text("condition", key.1);
         margins.real("runs", records.len() as f64);
@@ -184,7 +184,7 @@ fn of_records(
     let description = describe_runs(records, &options).map_err(|error| error.to_string())?;
     let found = &description.function;
     for (line, phase) in found.lines.iter().zip(description.phases_deg()) {
-        lines.begin();
+        lines.start_row();
         lines.text("subject", subject);
         lines.text("condition", condition);
         let magnitude = line.magnitude_db();
@@ -197,7 +197,8 @@ fn of_records(
             line.coherence.unwrap_or(f64::NAN),
             line.spread.unwrap_or(f64::NAN),
         ];
-        LINE.iter()
+        LINE_COLUMNS
+            .iter()
             .zip(values)
             .for_each(|(name, value)| lines.real(name, value));
     }
@@ -232,7 +233,7 @@ fn of_records(
             .map(|(c, m)| (c.value, m.value));
     }
     for (estimator, response) in fits.medians(subject, condition) {
-        agreement.begin();
+        agreement.start_row();
         agreement.text("subject", subject);
         agreement.text("condition", condition);
         agreement.text("estimator", estimator);

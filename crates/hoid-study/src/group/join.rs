@@ -7,7 +7,7 @@ use std::{collections::BTreeMap, path::Path};
 use hoid_io::{OutputTable, TableSchema, TableWriter};
 
 use super::{
-    analysis::PEOPLE,
+    analysis::PEOPLE_TABLE,
     averages::{Averages, Delays, TraceAverages},
     block::Block,
     frequency,
@@ -122,11 +122,11 @@ pub(super) fn join(
 
     let mut people: Vec<Person> = Vec::new();
     for (block, _) in blocks.iter().enumerate().filter(|(_, of)| matches!(of, Block::Cell(_))) {
-        people.extend(people_of(&read(block, PEOPLE)?));
+        people.extend(people_of(&read(block, PEOPLE_TABLE)?));
     }
     let people = people_table(&people);
     for csv in [false, true] {
-        hoid_io::write_table(&table_path(directory, PEOPLE, csv), &people)?;
+        hoid_io::write_table(&table_path(directory, PEOPLE_TABLE, csv), &people)?;
     }
 
     let mut whole = vec![

@@ -91,16 +91,16 @@ pub struct RunEntry {
     /// Number or name of the run.
     pub run: String,
     /// Whether the run is analysed. Training runs are listed but not analysed.
-    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    #[serde(default = "default_true", skip_serializing_if = "is_true")]
     pub counts: bool,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)]
-fn is_yes(counts: &bool) -> bool {
+fn is_true(counts: &bool) -> bool {
     *counts
 }
 

@@ -10,13 +10,13 @@ use super::tables::{numbers, texts};
 use crate::columns::Rows;
 
 /// Suffixes of the numeric columns of a parameter.
-const REAL: [&str; 6] = ["", "_se", "_se_person", "_low", "_high", "_prior_share"];
+const NUMERIC_SUFFIXES: [&str; 6] = ["", "_se", "_se_person", "_low", "_high", "_prior_share"];
 /// Suffix of the text column of a parameter.
 const DETERMINED: &str = "_determined";
 
 /// Returns the names of the numeric columns of a parameter.
 pub(super) fn real_names(name: &str) -> impl Iterator<Item = String> {
-    REAL.into_iter().map(move |end| format!("{name}{end}"))
+    NUMERIC_SUFFIXES.into_iter().map(move |end| format!("{name}{end}"))
 }
 
 /// Returns the name of the text column of a parameter.
@@ -36,7 +36,7 @@ pub(super) fn write(rows: &mut Rows, name: &str, p: &Parameter) {
         high,
         p.prior_share,
     ];
-    for (end, value) in REAL.iter().zip(values) {
+    for (end, value) in NUMERIC_SUFFIXES.iter().zip(values) {
         rows.real(&format!("{name}{end}"), value);
     }
     rows.text(&text_name(name), if p.determined { "yes" } else { "no" });

@@ -154,7 +154,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_found() {
+    fn patterns_match_file_names() {
         let pattern = Pattern::new("{subject}_{condition}_{run}_d_only.csv").unwrap();
         let found = pattern.matches("P03_fo_11_d_only.csv").unwrap();
         assert_eq!(
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn an_axis_is_a_part_of_the_condition() {
+    fn axis_is_appended_to_the_condition() {
         let of = |pattern: &str, name: &str| {
             let found = Pattern::new(pattern).unwrap().matches(name).unwrap();
             (found.condition_of_axis(), found.run)

@@ -181,7 +181,7 @@ impl Person {
     }
 
     fn write(&self, rows: &mut Rows) {
-        rows.begin();
+        rows.start_row();
         for (name, value) in [
             ("subject", self.subject.as_str()),
             ("condition", &self.condition),
@@ -353,7 +353,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_row_gives_the_person_back() {
+    fn person_round_trip_through_table() {
         let parameter = |name: &str, unit, interval, determined| Parameter {
             name: name.to_owned(),
             unit,

@@ -272,7 +272,7 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
             continue;
         };
         for fault in faults {
-            begin(&mut trouble, entry, file);
+            start_row(&mut trouble, entry, file);
             trouble.text("kind", fault.kind.name());
             trouble.text("channel", &fault.channel);
             trouble.whole("rows", fault.samples as u64);
@@ -284,12 +284,12 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
             trouble.text("remedy", fault.remedy());
         }
         for step in &read.steps {
-            begin(&mut steps, entry, file);
+            start_row(&mut steps, entry, file);
             steps.text("step", step.name());
             steps.text("what", &step.to_string());
         }
         for one in &read.quality_issues {
-            begin(&mut trouble, entry, file);
+            start_row(&mut trouble, entry, file);
             trouble.text("kind", one.kind.name());
             trouble.text("channel", &one.channel);
             trouble.whole("rows", one.rows as u64);
@@ -311,8 +311,8 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
     ]
 }
 
-fn begin(rows: &mut Rows, entry: &RunEntry, file: &Path) {
-    rows.begin();
+fn start_row(rows: &mut Rows, entry: &RunEntry, file: &Path) {
+    rows.start_row();
     rows.text("subject", &entry.subject);
     rows.text("condition", &entry.condition);
     rows.text("run", &entry.run);

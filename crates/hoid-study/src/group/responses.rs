@@ -139,7 +139,7 @@ impl ResponseAverages {
         ));
         for (key, at) in &self.0 {
             for (bits, both) in at {
-                rows.begin();
+                rows.start_row();
                 for (name, text) in KEYS.iter().zip(key) {
                     rows.text(name, text);
                 }
@@ -163,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn phases_are_followed_and_the_median_is_read_between_the_points() {
+    fn phases_are_unwrapped_and_medians_interpolated() {
         // A delay of half a second has a phase of 20 rad at 40 rad/s.
         let omega = grid(0.01);
         assert_eq!((omega.len(), grid(0.1).len()), (84, 80));

@@ -10,7 +10,7 @@ use hoid_io::DirectoryLock;
 use sha2::{Digest, Sha256};
 
 use super::{
-    analysis::{FromCell, PEOPLE, analyse, analyse_together},
+    analysis::{CellResults, PEOPLE_TABLE, analyse, analyse_together},
     block::{Block, blocks},
     join::join,
     manifest::{MANIFEST, Manifest},
@@ -87,7 +87,7 @@ pub fn run_group(
                 let of_run = |block: &Block<'_>| matches!(block, Block::Cell(cell) if cell.key() == key);
                 let place = blocks.iter().position(of_run).unwrap_or(i) as u64;
                 let read = |table: &str| hoid_io::read_table(&part(directory, place, table));
-                let from_cell = FromCell::of(&read("estimates")?, &read(PEOPLE)?);
+                let from_cell = CellResults::of(&read("estimates")?, &read(PEOPLE_TABLE)?);
                 analyse(manifest, base, run, &from_cell)
             }
             Block::Cell(cell) => analyse_together(manifest, base, cell),
@@ -183,7 +183,7 @@ fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bo
 }
 
 const TABLES: [&str; 14] = [
-    PEOPLE,
+    PEOPLE_TABLE,
     "preparation",
     "trouble",
     "estimates",

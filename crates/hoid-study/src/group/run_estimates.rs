@@ -105,7 +105,7 @@ mod tests {
     use crate::columns::Rows;
 
     #[test]
-    fn what_was_written_is_read() {
+    fn run_estimates_are_read_back() {
         let mut estimates = Rows::new(&estimates_schema());
         for (run, estimator, parameter, value, status) in [
             ("2", "family", "tau_e", 0.2, "ok"),
@@ -114,7 +114,7 @@ mod tests {
             ("1", "record", "rms_e", 1.5, "ok"),
             ("3", "family", "", f64::NAN, "failed"),
         ] {
-            estimates.begin();
+            estimates.start_row();
             for (name, text) in [
                 ("subject", "P"),
                 ("condition", "c"),
@@ -129,7 +129,7 @@ mod tests {
         }
         let mut responses = Rows::new(&responses_schema());
         for (omega, gain, phase) in [(1.0, 0.0, 0.0), (4.0, -20.0, -90.0)] {
-            responses.begin();
+            responses.start_row();
             for (name, text) in [
                 ("subject", "P"),
                 ("condition", "c"),

@@ -119,7 +119,7 @@ mod tests {
     use super::nk_of;
 
     #[test]
-    fn a_sample_more_of_delay_is_a_sample_more_of_nk() {
+    fn extra_samples_of_delay_increase_nk() {
         // nk = 1 corresponds to a delay of zero.
         assert_eq!(nk_of(0.0, 0.01, 0.0), 1);
         assert_eq!(nk_of(0.28, 0.01, 0.0), 29);

@@ -165,7 +165,7 @@ impl<'a> RunRows<'a> {
             .collect();
         for ((w, h), phase_deg) in omega.iter().zip(&response).zip(followed_phases_deg(&response)) {
             let rows = &mut self.responses;
-            rows.begin();
+            rows.start_row();
             rows.text("subject", &self.entry.subject);
             rows.text("condition", &self.entry.condition);
             rows.text("run", &self.entry.run);
@@ -187,9 +187,9 @@ impl<'a> RunRows<'a> {
         traces::write(&mut self.traces, &self.columns, self.entry, trace);
     }
 
-    fn begin(&mut self, window: Option<Window>, estimator: &str) {
+    fn start_row(&mut self, window: Option<Window>, estimator: &str) {
         let rows = &mut self.estimates;
-        rows.begin();
+        rows.start_row();
         rows.text("subject", &self.entry.subject);
         rows.text("condition", &self.entry.condition);
         rows.text("run", &self.entry.run);
@@ -203,7 +203,7 @@ impl<'a> RunRows<'a> {
 
     /// Writes a quantity estimated in a window, or without a window for the run as a whole.
     pub fn row(&mut self, window: Option<Window>, estimator: &str, parameter: &str, estimate: Estimate) {
-        self.begin(window, estimator);
+        self.start_row(window, estimator);
         self.estimates.text("parameter", parameter);
         self.estimates.real("value", estimate.value);
         if let Some(se) = estimate.standard_error {
@@ -213,7 +213,7 @@ impl<'a> RunRows<'a> {
     }
 
     fn not_convertible(&mut self, window: Window, estimator: &str, reason: &str) {
-        self.without_value(Some(window), estimator, "not convertible", reason);
+        self.push_without_value(Some(window), estimator, "not convertible", reason);
     }
 
     /// Writes the verdict on a recursion with its reasons, unless the recursion is trustworthy.
@@ -222,21 +222,21 @@ impl<'a> RunRows<'a> {
             return;
         }
         let reasons: Vec<&str> = verdict.reasons().collect();
-        self.without_value(None, estimator, verdict.level.name(), &reasons.join("; "));
+        self.push_without_value(None, estimator, verdict.level.name(), &reasons.join("; "));
     }
 
     /// Writes that an estimator failed, and the reason.
     pub fn failed(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
-        self.without_value(window, estimator, "failed", reason);
+        self.push_without_value(window, estimator, "failed", reason);
     }
 
     /// Writes that an estimator does not apply, and the reason.
     pub fn omitted(&mut self, estimator: &str, reason: &str) {
-        self.without_value(None, estimator, "omitted", reason);
+        self.push_without_value(None, estimator, "omitted", reason);
     }
 
-    fn without_value(&mut self, window: Option<Window>, estimator: &str, status: &str, reason: &str) {
-        self.begin(window, estimator);
+    fn push_without_value(&mut self, window: Option<Window>, estimator: &str, status: &str, reason: &str) {
+        self.start_row(window, estimator);
         self.estimates.text("status", status);
         self.estimates.text("reason", reason);
     }

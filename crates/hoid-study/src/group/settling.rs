@@ -34,14 +34,14 @@ const FIGURES: [&str; 7] = [
 
 /// Results of single runs: times of the change, and noise of each parameter.
 #[derive(Debug, Clone, Default)]
-struct OfRuns {
+struct RunResults {
     change_s: Vec<f64>,
     noise: BTreeMap<String, Vec<f64>>,
 }
 
 /// Results of the runs with a change, by subject, condition and estimator.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Settling(BTreeMap<[String; 3], OfRuns>);
+pub(super) struct Settling(BTreeMap<[String; 3], RunResults>);
 
 /// Returns the rows in the second half of a time interval.
 fn second_half(times: &[f64], from_s: f64, to_s: f64) -> Vec<usize> {
@@ -92,7 +92,7 @@ impl Settling {
                 let (times, medians) = traces.medians(key, name);
                 let noise = median(noises);
                 let step = Step::of(&times, &medians, change_s);
-                rows.begin();
+                rows.start_row();
                 for (column, value) in KEYS.iter().zip(key.iter().chain([name])) {
                     rows.text(column, value);
                 }
@@ -165,7 +165,7 @@ mod tests {
             let covered = if t > 10.0 { 1.0 - (-(t - 10.0) / 2.0).exp() } else { 0.0 };
             // The absolute deviations 0, 0.1, 0.1 and 0.2 occur in turn; their median is 0.1.
             let ripple = [0.0, 0.1, -0.1, 0.2][(k as usize + run) % 4];
-            rows.begin();
+            rows.start_row();
             for (name, value) in [("subject", "A"), ("condition", "C"), ("estimator", "RLS")] {
                 rows.text(name, value);
             }
@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn a_first_order_step_settles_when_it_must() {
+    fn first_order_step_has_the_expected_settling_time() {
         let names = ["K_e".to_owned(), "flat".to_owned()];
         let (mut settling, mut averages) = (Settling::default(), TraceAverages::new(names.to_vec()));
         // The runs cover all phases of the ripple, so the median over the runs is smooth.

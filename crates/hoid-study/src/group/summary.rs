@@ -20,7 +20,7 @@ use hoid_io::{OutputTable, read_table};
 use hoid_model::{Finding, Verdict, VerdictLevel};
 
 use super::{
-    analysis::{PEOPLE, READ},
+    analysis::{PEOPLE_TABLE, READ},
     manifest::Manifest,
     person::{Person, PersonStatus, cell_name, people_of},
     tables::texts,
@@ -60,7 +60,7 @@ impl GroupSummary {
     /// [`StudyError::Io`] if a table cannot be read.
     pub fn read(manifest: &Manifest, directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
-        let (people, estimates) = (people_of(&table(PEOPLE)?), table("estimates")?);
+        let (people, estimates) = (people_of(&table(PEOPLE_TABLE)?), table("estimates")?);
         let (failures, other) = failures(&estimates);
         let runs = manifest.runs.iter().filter(|run| run.counts).count();
         let verdict = Verdict::of(findings(runs, &failures, &people, other));
@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn the_whole_group_has_one_verdict() {
+    fn group_verdict_combines_people_and_failures() {
         use VerdictLevel::{Doubtful, NotDetermined, Trustworthy};
         assert_eq!(judged(2, 0, &[person(Trustworthy)]).level, Trustworthy);
         assert_eq!(judged(2, 1, &[person(Trustworthy)]).level, Doubtful);

@@ -42,16 +42,16 @@ pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
 }
 
 /// Separator between sentences in one cell.
-const BETWEEN: &str = " | ";
+const SENTENCE_SEPARATOR: &str = " | ";
 
 /// Joins sentences into the text of one cell.
 pub(super) fn joined<'a>(sentences: impl Iterator<Item = &'a str>) -> String {
-    sentences.collect::<Vec<_>>().join(BETWEEN)
+    sentences.collect::<Vec<_>>().join(SENTENCE_SEPARATOR)
 }
 
 /// Splits the text of a cell into its sentences.
 pub(super) fn sentences(cell: &str) -> Vec<String> {
-    cell.split(BETWEEN)
+    cell.split(SENTENCE_SEPARATOR)
         .filter(|sentence| !sentence.is_empty())
         .map(str::to_owned)
         .collect()

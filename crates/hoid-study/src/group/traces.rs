@@ -17,7 +17,7 @@ use super::{
 use crate::columns::{OPERATOR, Rows};
 
 /// Maximum number of noise-model coefficients in the tables.
-const MOST_ND: usize = 20;
+const MAX_ND: usize = 20;
 
 /// Coefficients of RPEM whose correlations are stored.
 const CORRELATED: [&str; 4] = ["f1", "f2", "b0", "b1"];
@@ -40,7 +40,7 @@ pub(super) fn response_names(omega_rad_s: f64) -> [String; 2] {
 impl TraceColumns {
     pub fn of(analysis: &AnalysisSettings) -> Self {
         let fixed = ["a1", "a2", "b0", "b1", "f1", "f2"].map(str::to_owned);
-        let d = (1..=analysis.nd.1.min(MOST_ND)).map(|i| format!("d{i}"));
+        let d = (1..=analysis.nd.1.min(MAX_ND)).map(|i| format!("d{i}"));
         let correlations = pairs().map(|(i, j)| format!("correlation_{}_{}", CORRELATED[i], CORRELATED[j]));
         let responses = analysis.response_at_rad_s.iter().flat_map(|w| response_names(*w));
         Self {
@@ -106,7 +106,7 @@ pub(super) fn write(rows: &mut Rows, columns: &TraceColumns, entry: &RunEntry, t
     let names = trace.parameter_names();
     let correlated = CORRELATED.map(|name| names.iter().position(|n| n == name));
     for k in moving(trace) {
-        rows.begin();
+        rows.start_row();
         rows.text("subject", &entry.subject);
         rows.text("condition", &entry.condition);
         rows.text("run", &entry.run);

@@ -66,7 +66,7 @@ impl Default for PeopleExperiment {
 /// Columns of a file, except t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
 /// Columns of `truth.csv` for true values other than the parameters, and for settings of the recording.
-const OTHERS: [&str; 7] = [
+const OTHER_COLUMNS: [&str; 7] = [
     "crossover_rad_s",
     "phase_margin_deg",
     "remnant_share",
@@ -76,7 +76,7 @@ const OTHERS: [&str; 7] = [
     "sample_time_s",
 ];
 /// Cell number of the random streams for the defects; no person has this number.
-const DEFECTS: u64 = u64::MAX / 2;
+const DEFECT_STREAM: u64 = u64::MAX / 2;
 
 /// Simulates the experiment and writes its files to a directory: one file per run, `truth.csv`, and `group.toml`.
 ///
@@ -103,7 +103,7 @@ pub fn simulate_people(
         for run in 1..=experiment.runs {
             let found = person.run(run).map_err(|error| virtual_error(&error))?;
             let noise = RunSeed {
-                cell: DEFECTS - person.run_seed(run).cell,
+                cell: DEFECT_STREAM - person.run_seed(run).cell,
                 ..person.run_seed(run)
             }
             .white_noise(found.record.len());
@@ -189,7 +189,7 @@ fn truth_schema() -> TableSchema {
         columns: [
             of(ColumnKind::Text, &texts),
             of(ColumnKind::Real, &PARAMETERS.map(|(name, _)| name)),
-            of(ColumnKind::Real, &OTHERS),
+            of(ColumnKind::Real, &OTHER_COLUMNS),
         ]
         .concat(),
     }
@@ -197,7 +197,7 @@ fn truth_schema() -> TableSchema {
 
 fn truth_row(rows: &mut Rows, subject: u64, run: u64, person: &Person, found: &PersonRun) -> Result<(), StudyError> {
     let wrong = |error: ModelError| virtual_error(&SimError::Model(error));
-    rows.begin();
+    rows.start_row();
     rows.text("subject", &format!("S{subject}"));
     rows.text("condition", &person.plant.to_string());
     rows.text("run", &run.to_string());

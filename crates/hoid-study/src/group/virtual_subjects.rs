@@ -54,7 +54,7 @@ pub struct VirtualExperiment {
 /// Cell number of the random stream of subject 0; no cell of a study has a number near it.
 const SUBJECTS: u64 = u64::MAX;
 /// Maximum number of draws for a stable loop; if all fail, the spreads are too large.
-const MOST_DRAWS: usize = 100;
+const MAX_DRAWS: usize = 100;
 
 /// Simulates the experiment and writes its files to a directory: one file per run, `truth.csv`, and `group.toml`.
 ///
@@ -108,18 +108,18 @@ pub fn simulate_group(
 }
 
 /// Maximum number of runs of a virtual experiment; each run is a file.
-const MOST_RUNS: u64 = 100_000;
+const MAX_RUNS: u64 = 100_000;
 
 /// Checks that an experiment does not have too many runs.
 pub(super) fn check_number(factors: &[u64]) -> Result<(), StudyError> {
     let runs = factors.iter().try_fold(1_u64, |all, n| all.checked_mul(*n));
-    if runs.is_some_and(|runs| runs <= MOST_RUNS) {
+    if runs.is_some_and(|runs| runs <= MAX_RUNS) {
         return Ok(());
     }
     let found: Vec<String> = factors.iter().map(u64::to_string).collect();
     Err(StudyError::Virtual {
         reason: format!(
-            "subjects times runs times conditions is {}, expected at most {MOST_RUNS} runs in all: ask for fewer runs, \
+            "subjects times runs times conditions is {}, expected at most {MAX_RUNS} runs in all: ask for fewer runs, \
              or make several experiments with different seeds",
             found.join(" x ")
         ),
@@ -168,12 +168,12 @@ impl VirtualExperiment {
                 cell: SUBJECTS - subject,
                 replication,
             };
-            run_seed.white_noise(6 * MOST_DRAWS)
+            run_seed.white_noise(6 * MAX_DRAWS)
         };
         let of_subject = deviates(0);
         let of_run = deviates(1 + cell * 1_000_000 + run);
         let mut reason = String::new();
-        for draw in 0..MOST_DRAWS {
+        for draw in 0..MAX_DRAWS {
             // The deviates of the run are replaced in each draw, the deviates of the subject in every tenth draw.
             let (s, r) = (&of_subject[6 * (draw / 10)..], &of_run[6 * draw..]);
             let factor = |i: usize| (self.between_subjects * s[i] + self.between_runs * r[i]).exp();
@@ -205,7 +205,7 @@ impl VirtualExperiment {
         }
         Err(StudyError::Virtual {
             reason: format!(
-                "subject {subject} has no stable loop in {condition} after {MOST_DRAWS} draws ({reason}): use smaller \
+                "subject {subject} has no stable loop in {condition} after {MAX_DRAWS} draws ({reason}): use smaller \
                  spreads"
             ),
         })
@@ -243,7 +243,7 @@ fn truth_schema() -> TableSchema {
 }
 
 fn truth_row(rows: &mut Rows, subject: u64, condition: Condition, run: u64, scenario: &Scenario) {
-    rows.begin();
+    rows.start_row();
     rows.text("subject", &format!("S{subject}"));
     rows.text("condition", &condition.to_string());
     rows.text("run", &run.to_string());

@@ -17,18 +17,18 @@ pub(super) struct Window {
 
 /// Returns the two sub-batches and the whole run.
 pub(super) fn windows(settings: &AnalysisSettings, record: &Record) -> [Window; 3] {
-    let (begin, end) = (
+    let (start, end) = (
         record.time_s(0),
         record.time_s(0) + record.len() as f64 * record.sample_time().s(),
     );
-    let eighth = (end - begin) / 8.0;
+    let eighth = (end - start) / 8.0;
     let [first, last] = settings
         .windows_s
-        .unwrap_or([(begin, begin + 3.0 * eighth), (end - 3.0 * eighth, end)]);
+        .unwrap_or([(start, start + 3.0 * eighth), (end - 3.0 * eighth, end)]);
     let window = |name, (from_s, to_s)| Window { name, from_s, to_s };
     [
         window("first", first),
         window("last", last),
-        window(WHOLE, (begin, end)),
+        window(WHOLE, (start, end)),
     ]
 }

@@ -78,13 +78,13 @@ struct OwnKeys {
 }
 
 /// Largest number of replications of a cell.
-const MOST_REPLICATIONS: u64 = 100_000_000;
+const MAX_REPLICATIONS: u64 = 100_000_000;
 
 /// Largest number of estimates of a study.
-const MOST_ESTIMATES: u128 = 10_000_000_000;
+const MAX_ESTIMATES: u128 = 10_000_000_000;
 
 /// Largest number of blocks of a study; each block is stored as a few files.
-const MOST_BLOCKS: u128 = 1_000_000;
+const MAX_BLOCKS: u128 = 1_000_000;
 
 impl Plan {
     /// Reads and checks a plan.
@@ -217,11 +217,11 @@ impl Plan {
     /// # Errors
     /// [`StudyError::Plan`] if the number is zero.
     pub fn with_replications(mut self, replications: u64) -> Result<Self, StudyError> {
-        if !(1..=MOST_REPLICATIONS).contains(&replications) {
+        if !(1..=MAX_REPLICATIONS).contains(&replications) {
             return Err(StudyError::Plan {
                 path: self.name,
                 line: None,
-                reason: format!("replications is {replications}, expected 1 to {MOST_REPLICATIONS}"),
+                reason: format!("replications is {replications}, expected 1 to {MAX_REPLICATIONS}"),
             });
         }
         for cell in &mut self.cells {
@@ -244,16 +244,16 @@ impl Plan {
     fn check_size(&self) -> Result<(), String> {
         let estimates = |cell: &Cell| u128::from(cell.replications) * self.estimators_of(cell).count() as u128;
         let estimates: u128 = self.cells.iter().map(estimates).sum();
-        if estimates > MOST_ESTIMATES {
+        if estimates > MAX_ESTIMATES {
             return Err(format!(
-                "the plan has {estimates} estimates, expected at most {MOST_ESTIMATES}: reduce replications or split the plan"
+                "the plan has {estimates} estimates, expected at most {MAX_ESTIMATES}: reduce replications or split the plan"
             ));
         }
         let blocks = |cell: &Cell| u128::from(cell.replications.div_ceil(self.block.max(1)));
         let blocks: u128 = self.cells.iter().map(blocks).sum();
-        if blocks > MOST_BLOCKS {
+        if blocks > MAX_BLOCKS {
             return Err(format!(
-                "the plan has {blocks} blocks, expected at most {MOST_BLOCKS}: increase block or split the plan"
+                "the plan has {blocks} blocks, expected at most {MAX_BLOCKS}: increase block or split the plan"
             ));
         }
         Ok(())
@@ -306,8 +306,8 @@ fn check_head(head: &Head, at: &impl Fn(&str) -> Option<usize>) -> Result<(), Pl
         );
     }
     for (key, n) in [("replications", head.replications), ("block", head.block)] {
-        if !(1..=MOST_REPLICATIONS).contains(&n) {
-            return bad(key, format!("{n}, expected 1 to {MOST_REPLICATIONS}"));
+        if !(1..=MAX_REPLICATIONS).contains(&n) {
+            return bad(key, format!("{n}, expected 1 to {MAX_REPLICATIONS}"));
         }
     }
     if head.keep.trace_every == Some(0) {

@@ -256,7 +256,7 @@ impl EstimatorTable {
             ));
         }
         if let (None, None, Some(key)) = (method, asked, self.settings.keys().next()) {
-            return Err(at(key, misplaced(key)));
+            return Err(at(key, unknown_key_problem(key)));
         }
         if self.method == analysis::TIME_VARYING && self.change == Some(Change::None) {
             return Err(at(
@@ -334,7 +334,7 @@ impl EstimatorTable {
             }
         }
         if let Some(key) = left.keys().next() {
-            return Err(at(key, misplaced(key)));
+            return Err(at(key, unknown_key_problem(key)));
         }
         for (name, key, text) in [
             (
@@ -364,7 +364,7 @@ impl EstimatorTable {
                 other => at(&key, format!("is invalid: {other}")),
             })?;
             if !known {
-                return Err(at(&key, misplaced(&key)));
+                return Err(at(&key, unknown_key_problem(&key)));
             }
         }
         Ok(Some(asked))
@@ -496,7 +496,7 @@ fn methods_with(key: &str) -> Vec<&'static str> {
 }
 
 /// Returns the problem with a key that the method does not have.
-fn misplaced(key: &str) -> String {
+fn unknown_key_problem(key: &str) -> String {
     match methods_with(key).as_slice() {
         [] => "is unknown; the page Monte Carlo studies of the book lists the keys of an estimator".to_owned(),
         of => format!("has no effect here: it applies to {}", of.join(", ")),

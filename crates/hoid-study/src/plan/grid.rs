@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_become_axes_in_the_order_of_the_file() {
+    fn lists_become_axes_in_file_order() {
         let text = "condition = ['C2', \"C1\"]\nname = \"x\"\n[remnant]\norder = [1,\n 2]\nnoise_level = 0.1\n";
         let all = of(text, &[]).unwrap();
         let shown: Vec<String> = all
@@ -252,7 +252,7 @@ mod tests {
     }
 
     #[test]
-    fn what_wants_a_list_keeps_it() {
+    fn list_valued_keys_are_kept() {
         let text = "span_s = [0, 30.72]\n[[forcing]]\namplitude_deg = 1.0\n[[forcing]]\namplitude_deg = 2.0\n";
         let all = of(text, &["span_s", "forcing"]).unwrap();
         assert_eq!(all.len(), 1);
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn a_list_of_tables_is_told_by_name() {
+    fn tables_in_a_list_are_labelled_by_name() {
         let text = "start = [{ name = \"IC1\", b0 = 0.1 }, { b0 = 0.2 }]";
         let all = of(text, &[]).unwrap();
         assert_eq!(all[0].axes[0].value, "IC1");
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_list_and_a_flood_are_refused_with_their_line() {
+    fn empty_lists_and_too_many_cells_are_refused() {
         let problem = of("a = 1\nb = []", &[]).unwrap_err();
         assert_eq!(problem.line, Some(2));
         assert!(problem.reason.contains("empty list"), "{}", problem.reason);

@@ -33,7 +33,7 @@ impl Results {
             "K_n_backward_euler",
             "T_n",
         ];
-        const OTHERS: [&str; 14] = [
+        const OTHER_COLUMNS: [&str; 14] = [
             "K_n",
             "loss",
             "vaf",
@@ -56,7 +56,11 @@ impl Results {
         for pair in &mut results.pairs {
             let (cell, estimator) = (&results.plan.cells[pair.cell], &results.plan.estimators[pair.estimator]);
             for replication in 0..cell.replications {
-                for name in WITH_TRUTH.into_iter().chain(OTHERS).chain(["share_not_convertible"]) {
+                for name in WITH_TRUTH
+                    .into_iter()
+                    .chain(OTHER_COLUMNS)
+                    .chain(["share_not_convertible"])
+                {
                     let truth = true_value(cell, estimator, name);
                     let found = data(cell, estimator, name, replication);
                     let value = if truth.is_finite() {

@@ -59,7 +59,7 @@ fn study(csv: bool) -> (tempfile::TempDir, Results) {
 }
 
 #[test]
-fn rows_are_found_by_what_describes_them() {
+fn queries_find_their_rows() {
     let (_directory, results) = study(false);
     let arx = Query::of("bias_b0").name("ARX");
     assert_eq!(results.find(&arx).len(), 8);
@@ -90,7 +90,7 @@ fn rows_are_found_by_what_describes_them() {
 }
 
 #[test]
-fn values_say_what_the_summary_says() {
+fn values_agree_with_the_summary() {
     let (_directory, results) = study(false);
     for quantity in ["bias_b0", "b0", "vaf", "response_error", "bias_K_e"] {
         let query = Query::of(quantity).name("ARX").remnant_order(2).noise_level(0.1).nk(29);
@@ -144,7 +144,7 @@ fn traces_are_read_by_cell_and_label() {
 }
 
 #[test]
-fn csv_is_read_like_parquet() {
+fn csv_results_match_parquet_results() {
     let (_one, parquet) = study(false);
     let (_other, csv) = study(true);
     for quantity in [
@@ -176,7 +176,7 @@ fn csv_is_read_like_parquet() {
 }
 
 #[test]
-fn what_is_no_finished_study_is_refused() {
+fn missing_and_unfinished_studies_are_refused() {
     let empty = tempfile::tempdir().unwrap();
     assert!(matches!(Results::read(empty.path()), Err(StudyError::NoStudy { .. })));
     let plan = Plan::parse(PLAN_TEXT, "tiny.toml").unwrap();

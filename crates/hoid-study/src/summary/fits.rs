@@ -6,7 +6,7 @@ use hoid_io::{ColumnKind, ColumnValues, OutputTable, TableWriter};
 use hoid_model::{Form, NamedChoice, VerdictLevel};
 
 use super::{
-    layout::{BUDGET, PartsOfCell, begin_row, schema, setting_columns},
+    layout::{MAX_VALUES, PartsOfCell, schema, setting_columns, start_row},
     traces::SettlingOfMedians,
 };
 use crate::{
@@ -84,7 +84,7 @@ pub(crate) fn write_fits(
     for (at, cell) in plan.cells.iter().enumerate() {
         let estimators: Vec<&EstimatorCell> = plan.estimators_of(cell).map(|(_, e)| e).collect();
         let each = (quantities.len() + 4) * cell.replications as usize;
-        let together = (BUDGET / each.max(1)).clamp(1, estimators.len().max(1));
+        let together = (MAX_VALUES / each.max(1)).clamp(1, estimators.len().max(1));
         for group in estimators.chunks(together) {
             let mut collected = Collected::new(group, &quantities);
             for (directory, block) in parts.get(&at).into_iter().flatten() {
@@ -97,7 +97,7 @@ pub(crate) fn write_fits(
                     if statistics.count == 0 {
                         return;
                     }
-                    begin_row(&mut rows, &extra, cell, estimator);
+                    start_row(&mut rows, &extra, cell, estimator);
                     statistics_row(&mut rows, quantity, &statistics, values, truth);
                 };
                 for (name, values) in quantities.iter().zip(&found.values) {
@@ -126,7 +126,7 @@ pub(crate) fn write_fits(
                 }
                 for (name, hits) in rates {
                     let (p, se) = rate(hits, found.count);
-                    begin_row(&mut rows, &extra, cell, estimator);
+                    start_row(&mut rows, &extra, cell, estimator);
                     rows.text("quantity", name);
                     rows.whole("count", found.count as u64);
                     rows.real("mean", p);
@@ -137,7 +137,7 @@ pub(crate) fn write_fits(
                     .into_iter()
                     .flatten()
                 {
-                    begin_row(&mut rows, &extra, cell, estimator);
+                    start_row(&mut rows, &extra, cell, estimator);
                     rows.text("quantity", name);
                     rows.whole("count", found.count as u64);
                     rows.real("median", *value);
@@ -181,11 +181,11 @@ fn statistics_row(rows: &mut Rows, quantity: &str, s: &Statistics, values: &[f64
 struct Collected<'a> {
     at: BTreeMap<&'a str, usize>,
     quantities: &'a [&'a str],
-    estimators: Vec<OfEstimator>,
+    estimators: Vec<EstimatorResults>,
 }
 
 #[derive(Clone, Default)]
-struct OfEstimator {
+struct EstimatorResults {
     values: Vec<Vec<f64>>,
     /// For each fit, true if its form is a gain with a lead, as simulated, or if no form was selected.
     leads: Vec<bool>,
@@ -200,9 +200,9 @@ struct OfEstimator {
 
 impl<'a> Collected<'a> {
     fn new(group: &[&'a EstimatorCell], quantities: &'a [&'a str]) -> Self {
-        let empty = OfEstimator {
+        let empty = EstimatorResults {
             values: vec![Vec::new(); quantities.len()],
-            ..OfEstimator::default()
+            ..EstimatorResults::default()
         };
         Self {
             at: group.iter().enumerate().map(|(i, e)| (e.label.as_str(), i)).collect(),

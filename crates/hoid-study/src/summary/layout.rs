@@ -11,7 +11,7 @@ use crate::{
 };
 
 /// Largest number of values in memory at a time: 256 MB.
-pub(super) const BUDGET: usize = 1 << 25;
+pub(super) const MAX_VALUES: usize = 1 << 25;
 
 /// The parts of each cell, by the position of the cell in the plan: directory and block number.
 pub(crate) type PartsOfCell<'a> = BTreeMap<usize, Vec<(&'a Path, u64)>>;
@@ -46,9 +46,9 @@ pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSc
 }
 
 /// Starts a row with the settings of the cell and the estimator.
-pub(super) fn begin_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
+pub(super) fn start_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
     let scenario = cell.resolved.scenario();
-    rows.begin();
+    rows.start_row();
     rows.whole("cell", cell.index);
     rows.text("scenario", &cell.scenario);
     rows.text("condition", &cell.condition);

@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, path::Path};
 use hoid_io::{ColumnKind, ColumnValues, OutputTable, TableWriter};
 use hoid_numerics::statistics::{mean, sample_variance};
 
-use super::layout::{BUDGET, PartsOfCell, schema};
+use super::layout::{MAX_VALUES, PartsOfCell, schema};
 use crate::{
     Plan, StudyError,
     columns::{OPERATOR, Rows, Schemas},
@@ -39,9 +39,9 @@ pub(crate) fn write_traces(
         ("estimator".to_owned(), ColumnKind::Text),
     ];
     columns.extend(["t", "count"].map(|name| (name.to_owned(), ColumnKind::Real)));
-    const OF_A_PARAMETER: [&str; 5] = ["mean", "sd", "lower_quartile", "median", "upper_quartile"];
+    const PARAMETER_STATISTICS: [&str; 5] = ["mean", "sd", "lower_quartile", "median", "upper_quartile"];
     for name in &names {
-        columns.extend(OF_A_PARAMETER.map(|figure| (format!("{name}_{figure}"), ColumnKind::Real)));
+        columns.extend(PARAMETER_STATISTICS.map(|figure| (format!("{name}_{figure}"), ColumnKind::Real)));
     }
     let schema = schema(plan, columns);
     let mut writer = TableWriter::create(path, &schema)?;
@@ -54,7 +54,7 @@ pub(crate) fn write_traces(
             .collect();
         let points = cell.resolved.measurement_samples() / every + 1;
         let each = names.len() * cell.replications as usize * points;
-        let together = (BUDGET / each.max(1)).clamp(1, tracking.len().max(1));
+        let together = (MAX_VALUES / each.max(1)).clamp(1, tracking.len().max(1));
         for group in tracking.chunks(together) {
             let mut series: Vec<Series> = vec![Series::default(); group.len()];
             for (directory, block) in parts.get(&at).into_iter().flatten() {
@@ -112,7 +112,7 @@ impl Series {
         let mut medians = Vec::with_capacity(self.0.len());
         for (bits, parameters) in &self.0 {
             let t = f64::from_bits(*bits);
-            rows.begin();
+            rows.start_row();
             rows.whole("cell", cell.index);
             rows.text("estimator", &estimator.label);
             rows.real("t", t);

@@ -10,12 +10,12 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 use super::pade;
 
 /// Largest number of parameters: the operator parameters and the delay.
-pub(super) const LARGEST: usize = OPERATOR + 1;
+pub(super) const MAX_PARAMETERS: usize = OPERATOR + 1;
 
 /// Relative step of the central differences of A and B.
 const STEP: f64 = 1e-5;
 /// Largest number of times that a step of the parameters is halved.
-const MOST_HALVINGS: usize = 30;
+const MAX_HALVINGS: usize = 30;
 
 /// The filter of the state and the filter of the parameters.
 #[derive(Debug, Clone)]
@@ -127,7 +127,7 @@ impl Filters {
         let gain = &self.p_w * h.transpose() / s;
         let mut step = &gain * innovation;
         // A full step may be too large: omega_nm, zeta_nm and the delay must stay positive.
-        for _ in 0..MOST_HALVINGS {
+        for _ in 0..MAX_HALVINGS {
             let moved = &self.w + &step;
             if moved.rows(2, moved.len() - 2).iter().all(|x| *x > 0.0) {
                 self.w = moved;
@@ -151,7 +151,7 @@ impl Filters {
     }
 
     /// Keeps the parameters within their bounds. Returns true if a parameter was changed.
-    pub fn bound(&mut self, bounds: &[[f64; 2]; LARGEST]) -> bool {
+    pub fn bound(&mut self, bounds: &[[f64; 2]; MAX_PARAMETERS]) -> bool {
         let before = self.w.clone();
         for (w, bounds) in self.w.iter_mut().zip(bounds) {
             *w = within(*w, *bounds);
@@ -187,7 +187,7 @@ mod tests {
     /// h equals the derivative of the prediction for constant parameters, with and without a Padé approximation of the
     /// delay.
     #[test]
-    fn the_whole_derivative_is_that_of_finite_differences() {
+    fn total_derivative_agrees_with_finite_differences() {
         let e = |k: usize| (0.07 * k as f64).sin() + 0.3 * (0.31 * k as f64).cos();
         let u = |k: usize| 0.1 * (0.05 * k as f64).sin();
         for (w, pade) in [

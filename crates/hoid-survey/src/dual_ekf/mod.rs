@@ -46,8 +46,8 @@ use hoid_track::{
 };
 use nalgebra::{DMatrix, DVector};
 
-use crate::known_noise::{check_first_order, lead_of};
-use filters::{Filters, LARGEST};
+use crate::known_noise::{check_first_order, lead_time_of};
+use filters::{Filters, MAX_PARAMETERS};
 
 const NAME: &str = "dual-ekf";
 /// Range of the delay if it is estimated with a Padé approximation, s.
@@ -104,11 +104,11 @@ impl RecursiveMethod for DualEkfOptions {
 
     fn check(&self, setup: &Setup) -> Result<(), IdentError> {
         check_first_order(NAME, setup)?;
-        if self.pade > pade::HIGHEST {
+        if self.pade > pade::MAX_ORDER {
             return Err(bad(
                 "the order of the Padé approximation",
                 self.pade.to_string(),
-                &format!("0 to {}", pade::HIGHEST),
+                &format!("0 to {}", pade::MAX_ORDER),
             ));
         }
         Ok(())
@@ -159,13 +159,13 @@ impl RecursiveMethod for DualEkfOptions {
 struct DualEkf {
     filters: Filters,
     first: Filters,
-    bounds: [[f64; 2]; LARGEST],
+    bounds: [[f64; 2]; MAX_PARAMETERS],
     delay: DelayLine<Vec<f64>>,
     reported: Reported,
     /// Noise added to e, relative to the root mean square of e. `power` is the mean square of e, either given or
     /// computed from the samples so far.
     state_noise: f64,
-    size_is_given: bool,
+    has_given_variance: bool,
     power: f64,
     samples: f64,
     /// Predicted innovation variance at the last sample.
@@ -229,7 +229,7 @@ impl DualEkf {
             delay: DelayLine::new(vec![0.0; late]),
             reported: Reported::new(from, setup.orders.nk, sample_time),
             state_noise: own.state_noise,
-            size_is_given: own.error_size.is_some(),
+            has_given_variance: own.error_size.is_some(),
             power,
             samples: 0.0,
             expected: from.variance,
@@ -238,7 +238,7 @@ impl DualEkf {
     }
 
     fn predict(&mut self, e: f64) {
-        if !self.size_is_given {
+        if !self.has_given_variance {
             self.samples += 1.0;
             self.power += (e * e - self.power) / self.samples;
             self.filters.input_noise_variance = self.state_noise * self.state_noise * self.power;
@@ -332,7 +332,7 @@ impl Recursion for DualEkf {
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let (eta, c) = (self.eta(), self.of_eta());
-        let operator = self.reported.operator(eta, &c, lead_of(eta, &c));
+        let operator = self.reported.operator(eta, &c, lead_time_of(eta, &c));
         Some(match self.delay() {
             Some(Delay { tau_e_s, .. }) => OperatorEstimate { tau_e_s, ..operator },
             None => operator,
@@ -371,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_after_a_change_are_near_the_truth_on_average() {
+    fn gains_after_a_change_are_close_on_average() {
         const RUNS: u64 = 8;
         let mut mean = [0.0; 2];
         for replication in 0..RUNS {
@@ -387,7 +387,7 @@ mod tests {
 
     /// A filter with the delay as a parameter corrects a delay that is wrong by two samples.
     #[test]
-    fn a_delay_behind_pade_is_followed() {
+    fn delay_in_pade_form_is_tracked() {
         let record = run(Condition::C1, 0.01, 0).span(0.0, 30.72).unwrap();
         let own = DualEkfOptions {
             pade: 3,

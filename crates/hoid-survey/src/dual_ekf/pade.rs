@@ -8,7 +8,7 @@ use hoid_model::SampleTime;
 use nalgebra::{DMatrix, DVector};
 
 /// Highest order of the approximation.
-pub(super) const HIGHEST: usize = 3;
+pub(super) const MAX_ORDER: usize = 3;
 
 /// Returns the coefficients c_0 to c_n.
 fn coefficients(order: usize) -> Vec<f64> {
@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coefficients_are_those_of_the_tables() {
+    fn coefficients_match_the_tables() {
         assert_eq!(coefficients(1), [1.0, 0.5]);
         assert_eq!(coefficients(2)[..2], [1.0, 0.5]);
         for (found, expected) in coefficients(3).iter().zip([1.0, 0.5, 0.1, 1.0 / 120.0]) {
@@ -91,7 +91,7 @@ mod tests {
 
     /// Compares the held system with the frequency response of the delay and the second-order system.
     #[test]
-    fn the_phase_is_that_of_the_delay() {
+    fn phase_approximates_the_delay() {
         let ts = SampleTime::new(0.01).unwrap();
         let (omega, zeta, tau) = (11.25, 0.35, 0.28);
         // Frequency and largest error for each order; the error is the phase error of the Padé approximation.

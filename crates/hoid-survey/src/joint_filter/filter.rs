@@ -13,7 +13,7 @@ use hoid_track::{
     building::{OPERATOR, Recursion, Reported, Setup, StartState, StepOutcome, physical_bounds},
 };
 
-use crate::known_noise::lead_of;
+use crate::known_noise::lead_time_of;
 
 use super::belief::{AugmentedState, ETA, Model, N};
 
@@ -215,6 +215,6 @@ impl Recursion for JointFilter {
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let (eta, c) = (self.eta(), self.of_eta());
-        Some(self.reported.operator(eta, &c, lead_of(eta, &c)))
+        Some(self.reported.operator(eta, &c, lead_time_of(eta, &c)))
     }
 }

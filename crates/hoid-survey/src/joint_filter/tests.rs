@@ -15,7 +15,7 @@ const MODEL: Model = Model {
 const X: [f64; N] = [0.4, -1.2, 0.09, 0.036, 11.25, 0.35];
 
 #[test]
-fn the_transition_is_the_exact_hold() {
+fn transition_matches_the_exact_hold() {
     let mut response = Response::new([X[4], X[5]], MODEL.ts);
     let mut x = [0.0, 0.0, X[2], X[3], X[4], X[5]];
     for t in 0..300 {
@@ -29,7 +29,7 @@ fn the_transition_is_the_exact_hold() {
 }
 
 #[test]
-fn jacobian_and_gradient_are_differences() {
+fn jacobian_and_gradient_agree_with_differences() {
     let e = 0.7;
     let by = MODEL.jacobian(&X, e);
     let gradient = Model::output_gradient(&X);
@@ -78,7 +78,7 @@ fn both_filters_agree_on_a_linear_model() {
 
 /// Near the true values, with small variances, the sigma points stay in the range in which the model is nearly linear.
 #[test]
-fn with_little_doubt_both_filters_nearly_agree() {
+fn with_small_covariance_both_filters_nearly_agree() {
     let mut p = [[0.0; N]; N];
     for (i, x) in X.iter().enumerate() {
         p[i][i] = (1e-4 * x).powi(2);
@@ -107,7 +107,7 @@ fn with_little_doubt_both_filters_nearly_agree() {
 }
 
 #[test]
-fn the_power_of_a_first_order_filter_is_known() {
+fn first_order_filter_power_matches_the_closed_form() {
     assert!((power(&[-0.8]) - 1.0 / (1.0 - 0.64)).abs() < 1e-12);
     assert_eq!(power(&[]), 1.0);
     assert_eq!(power(&[-3.0]), 1.0);

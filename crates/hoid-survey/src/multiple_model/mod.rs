@@ -36,7 +36,7 @@ use crate::{
     },
     known_noise::{LARGEST_ND, check_model_of_change},
 };
-use prior::{bad, change_prior, delays, first_hypothesis, outside};
+use prior::{change_prior, delays, first_hypothesis, invalid_prior, out_of_range_error};
 
 /// Capacity for hypotheses if the delay is known; `WITH_DELAYS` is the capacity if it is tracked.
 const HYPOTHESES: usize = 16;
@@ -184,7 +184,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
         let (nk, delays) = (setup.orders.nk, delays(setup, sample_time));
         let shortest = *delays.start();
         if !delays.contains(&nk) {
-            return Err(bad(&format!(
+            return Err(invalid_prior(&format!(
                 "its delay of nk = {nk} is not among the tracked delays, {shortest} to {}",
                 delays.end()
             )));
@@ -194,7 +194,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
         let memory = vec![[0.0; 6]; delays.count()];
         let model =
             MultipleModelFilter::with_delays(first, d, change_prior(options.alarm, setup, sample_time)?, memory)
-                .ok_or_else(outside)?;
+                .ok_or_else(out_of_range_error)?;
         Ok(Self {
             model: Box::new(model),
             delay: DelayLine::new(vec![0.0; shortest]),

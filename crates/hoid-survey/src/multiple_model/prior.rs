@@ -115,7 +115,7 @@ pub(super) fn first_hypothesis(
     sample_time: SampleTime,
 ) -> Result<Hypothesis, IdentError> {
     if !from.from_fit {
-        return Err(bad(
+        return Err(invalid_prior(
             "multiple-model needs the noise model of a batch fit; start it from the fit of a span",
         ));
     }
@@ -123,15 +123,15 @@ pub(super) fn first_hypothesis(
     let covariance = std::array::from_fn(|i| std::array::from_fn(|j| times * from.variance * from.spread[i * p + j]));
     let memory = (LEVEL_MEMORY_S / sample_time.s()).max(10.0);
     let level = InnovationVariance::new(from.variance, from.residuals.clamp(1.0, memory), 1.0 - 1.0 / memory);
-    Hypothesis::new(std::array::from_fn(|i| from.values[i]), &covariance, level).ok_or_else(outside)
+    Hypothesis::new(std::array::from_fn(|i| from.values[i]), &covariance, level).ok_or_else(out_of_range_error)
 }
 
-pub(super) fn bad(reason: &str) -> IdentError {
+pub(super) fn invalid_prior(reason: &str) -> IdentError {
     IdentError::BadStart {
         reason: reason.to_owned(),
     }
 }
 
-pub(super) fn outside() -> IdentError {
-    bad("it lies outside the bounds of the physical parameters, or its covariance is not positive")
+pub(super) fn out_of_range_error() -> IdentError {
+    invalid_prior("it lies outside the bounds of the physical parameters, or its covariance is not positive")
 }

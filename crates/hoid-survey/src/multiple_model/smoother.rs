@@ -34,7 +34,7 @@ use hoid_numerics::{cholesky, products::dot};
 use hoid_ident::IdentError;
 use hoid_track::building::{Causal, Reported, Setup, StartState, TwoSided};
 
-use super::prior::{change_prior, first_hypothesis, outside};
+use super::prior::{change_prior, first_hypothesis, out_of_range_error};
 
 /// Capacity for hypotheses; `SPACING_S` is the time between two births, s.
 const HYPOTHESES: usize = 64;
@@ -43,12 +43,12 @@ const SPACING_S: f64 = 0.08;
 const START_COVARIANCE_FACTOR: f64 = 100.0;
 /// Time after which the effect of starting the filters at rest is negligible, in time constants of the neuromuscular
 /// system.
-const SETTLED: f64 = 6.0;
+const SETTLING_TIME_CONSTANTS: f64 = 6.0;
 /// Smallest probability of a hypothesis that is combined with others, and smallest weight of a pair relative to the
 /// largest weight.
-const LEAST: f64 = 1e-3;
+const MIN_RELATIVE_PROBABILITY: f64 = 1e-3;
 /// Limit of the signals beyond which their products would overflow.
-const LARGEST: f64 = 1e60;
+const OVERFLOW_LIMIT: f64 = 1e60;
 
 /// A forward or backward hypothesis in the form in which it is combined with others.
 #[derive(Debug, Clone, Copy)]
@@ -140,7 +140,7 @@ fn two_sided(
     };
     let first = first_hypothesis(from, START_COVARIANCE_FACTOR, sample_time)?;
     let bank = |first: Hypothesis| -> Result<Box<Bank<HYPOTHESES>>, IdentError> {
-        Ok(Box::new(Bank::new(first, supposed).ok_or_else(outside)?))
+        Ok(Box::new(Bank::new(first, supposed).ok_or_else(out_of_range_error)?))
     };
     let d = &from.values[OPERATOR..];
     let seen = whitened(record, setup.orders.nk, largest, d, about);
@@ -149,7 +149,7 @@ fn two_sided(
     for (k, seen) in seen.iter().enumerate() {
         front.update_hypotheses(seen.as_ref().map(|(y, r)| (*y, DelayedSignals::known(r))), about);
         if rows.get(before.len()) == Some(&k) {
-            before.push(sides(&front));
+            before.push(likely_hypotheses(&front));
         }
     }
     let mut last = first;
@@ -160,7 +160,7 @@ fn two_sided(
         if before.len().checked_sub(1).and_then(|last| rows.get(last)) == Some(&k)
             && let Some(before) = before.pop()
         {
-            joined.push(join(&before, &sides(&back)));
+            joined.push(join(&before, &likely_hypotheses(&back)));
         }
         back.update_hypotheses(seen.as_ref().map(|(y, r)| (*y, DelayedSignals::known(r))), about);
     }
@@ -174,8 +174,8 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
     let (e, u) = (record.input(), record.output());
     let sound = |v: f64| v.abs() <= largest;
     let mut response = Response::new(about, record.sample_time().s());
-    let settled = SETTLED / (about[0] * about[1] * record.sample_time().s());
-    let begin = nk + d.len() + settled.min(record.len() as f64 / 4.0) as usize;
+    let settled = SETTLING_TIME_CONSTANTS / (about[0] * about[1] * record.sample_time().s());
+    let first_row = nk + d.len() + settled.min(record.len() as f64 / 4.0) as usize;
     let mut signals: Vec<Signals> = Vec::with_capacity(e.len());
     let (mut last, mut held) = (0.0, vec![0.0; e.len()]);
     for (held, e) in held.iter_mut().zip(e) {
@@ -188,7 +188,7 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
         .map(|t| {
             let x = t.checked_sub(nk).map_or(0.0, |s| held[s]);
             signals.push(response.step(x));
-            let known = t >= begin && sound(e[t]) && (0..=d.len()).all(|j| sound(u[t - j]));
+            let known = t >= first_row && sound(e[t]) && (0..=d.len()).all(|j| sound(u[t - j]));
             if !known {
                 return None;
             }
@@ -199,7 +199,7 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
                     *r += d * past;
                 }
             }
-            let finite = y.abs() < LARGEST && r.iter().all(|r| r.abs() < LARGEST);
+            let finite = y.abs() < OVERFLOW_LIMIT && r.iter().all(|r| r.abs() < OVERFLOW_LIMIT);
             finite.then_some((y, r))
         })
         .collect()
@@ -207,8 +207,8 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
 
 /// Returns the likely hypotheses with the likeliest first, because a pair of likely hypotheses allows most other pairs
 /// to be skipped.
-fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
-    let likely = bank.hypotheses().filter(|h| h.probability >= LEAST);
+fn likely_hypotheses(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
+    let likely = bank.hypotheses().filter(|h| h.probability >= MIN_RELATIVE_PROBABILITY);
     let mut sides: Vec<Side> = likely.map(Side::of).collect();
     sides.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     sides
@@ -217,7 +217,7 @@ fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
 /// Returns the product of two mixtures.
 fn join(before: &[Side], after: &[Side]) -> Joined {
     let mut pairs: Vec<(f64, ForwardBackward)> = Vec::with_capacity(before.len() + after.len());
-    let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
+    let (mut most, least) = (f64::NEG_INFINITY, MIN_RELATIVE_PROBABILITY.ln());
     for f in before {
         for b in after {
             // The comparison is written so that a pair is not skipped if this bound is NaN.
@@ -234,7 +234,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     pairs.retain(|(log, _)| *log >= most + least);
     let each: Vec<(f64, Joined)> = if pairs.is_empty() {
         // If no pair can be combined, the causal estimate is used.
-        let shares = before.iter().map(|f| (f.log_weight.exp(), alone(f)));
+        let shares = before.iter().map(|f| (f.log_weight.exp(), unpaired(f)));
         shares.collect()
     } else {
         let shares = pairs.iter().map(|(log, pair)| ((log - most).exp(), pair.product()));
@@ -268,7 +268,7 @@ fn mixed(each: &[(f64, Joined)]) -> Joined {
     mixture
 }
 
-fn alone(f: &Side) -> Joined {
+fn unpaired(f: &Side) -> Joined {
     Joined {
         eta: f.eta,
         covariance: f.covariance,

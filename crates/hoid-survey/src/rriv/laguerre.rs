@@ -18,7 +18,7 @@ const TIME_CONSTANT: f64 = 16.0;
 const MEMORY: f64 = 4096.0;
 /// Initial variance of the weights for signals of unit power; the prior at zero has the weight of a hundredth of a
 /// sample.
-const START: f64 = 100.0;
+const INITIAL_VARIANCE: f64 = 100.0;
 
 /// The Laguerre filters and their weights.
 #[derive(Debug, Clone)]
@@ -41,7 +41,7 @@ impl LaguerreRegression {
             pole: (-1.0 / TIME_CONSTANT).exp(),
             filters: [0.0; FILTERS],
             weights: [0.0; FILTERS],
-            p: Forgetting::diagonal(START, 1.0 - 1.0 / MEMORY),
+            p: Forgetting::diagonal(INITIAL_VARIANCE, 1.0 - 1.0 / MEMORY),
             power: 0.0,
             samples: 0.0,
         }

@@ -56,9 +56,9 @@ const RADIUS: f64 = 0.9999;
 /// Number of halvings after which a step is omitted.
 const HALVINGS: usize = 20;
 /// Smallest weight of the newest theta in the low-pass filter of the auxiliary model.
-const LEAST_SHARE: f64 = 1.0 / 1024.0;
+const MIN_SHARE: f64 = 1.0 / 1024.0;
 /// Smallest innovation variance, as a fraction of the initial one.
-const LEAST: f64 = 1e-16;
+const MIN_VARIANCE_RATIO: f64 = 1e-16;
 
 /// Start of the recursion: a batch fit or a guess.
 #[derive(Debug, Clone, Copy)]
@@ -172,11 +172,11 @@ impl RefinedRecursion {
         Ok(Self {
             theta: start.theta.to_vec(),
             auxiliary: start.theta.to_vec(),
-            share: system.iter().map(|i| 1.0 - lambda[*i]).fold(LEAST_SHARE, f64::max),
+            share: system.iter().map(|i| 1.0 - lambda[*i]).fold(MIN_SHARE, f64::max),
             system_gain: gain_of(&system)?,
             noise_gain: gain_of(&noise)?,
             variance,
-            least_variance: LEAST * variance,
+            least_variance: MIN_VARIANCE_RATIO * variance,
             samples: start.samples as f64,
             newest_share: 1.0 - lambda.iter().copied().fold(1.0, f64::min),
             measured: Simulated::new(&orders),

@@ -91,7 +91,7 @@ fn errors(recursion: &RefinedRecursion) -> Vec<f64> {
 }
 
 #[test]
-fn without_forgetting_it_comes_to_the_batch_estimate() {
+fn without_forgetting_it_converges_to_the_batch_estimate() {
     for (orders, d) in [(textbook(), &D[..]), (Orders { nd: 0, ..textbook() }, &[])] {
         let mut worst = 0.0_f64;
         for replication in 0..4 {
@@ -118,7 +118,7 @@ fn without_forgetting_it_comes_to_the_batch_estimate() {
 }
 
 #[test]
-fn errors_are_known_whatever_is_forgotten() {
+fn standard_errors_are_correct_with_any_forgetting() {
     let runs = 200;
     let (short, middle) = (1.0 - 1.0 / 256.0, 1.0 - 1.0 / 1000.0);
     for lambda in [[1.0; 5], [short; 5], [short, short, 1.0, middle, middle]] {
@@ -149,7 +149,7 @@ fn errors_are_known_whatever_is_forgotten() {
 }
 
 #[test]
-fn it_follows_a_jump_of_the_gain() {
+fn jump_of_the_gain_is_tracked() {
     let short = 1.0 - 1.0 / 256.0;
     for lambda in [[short; 5], [short, short, 1.0, 1.0, 1.0]] {
         let (e, u) = open_loop(6000, 7, &D, 2.0);
@@ -177,7 +177,7 @@ fn it_follows_a_jump_of_the_gain() {
 type Shape = fn(usize, f64) -> (f64, f64);
 
 #[test]
-fn any_data_leave_numbers() {
+fn estimates_stay_finite_for_any_data() {
     let noise = RunSeed::default().white_noise(100_000);
     let (e, u) = open_loop(1000, 3, &D, 1.0);
     let warm = record(&e, &u);
@@ -221,7 +221,7 @@ fn any_data_leave_numbers() {
 }
 
 #[test]
-fn silence_is_forgotten_quickly() {
+fn silence_has_no_lasting_effect() {
     let lambda = [1.0 - 1.0 / 256.0; 5];
     let (e, u) = open_loop(6000, 4, &D, 1.0);
     let warm = record(&e[..2000], &u[..2000]);
@@ -255,7 +255,7 @@ fn silence_is_forgotten_quickly() {
 }
 
 #[test]
-fn a_pole_at_the_border_shortens_the_step() {
+fn pole_near_the_unit_circle_shortens_the_step() {
     let orders = Orders {
         nb: 1,
         nf: 1,
@@ -281,7 +281,7 @@ fn a_pole_at_the_border_shortens_the_step() {
 }
 
 #[test]
-fn what_cannot_be_tracked_is_refused() {
+fn invalid_arguments_are_refused() {
     let (theta, covariance) = (TRUTH, [0.0; 25]);
     let start = RefinedStart {
         theta: &theta,
@@ -338,7 +338,7 @@ fn what_cannot_be_tracked_is_refused() {
 }
 
 #[test]
-fn a_missing_output_is_bridged_by_its_prediction() {
+fn missing_output_is_replaced_by_its_prediction() {
     let (e, u) = open_loop(2000, 5, &D, 1.0);
     let warm = record(&e[..1000], &u[..1000]);
     let mut recursion = from_fit(&riv(&warm, textbook()), &warm, &[1.0; 5], false);

@@ -43,7 +43,7 @@ fn part(record: &Record, from: usize, to: usize) -> Record {
 }
 
 #[test]
-fn every_fit_is_the_batch_fit_of_its_window() {
+fn every_fit_matches_the_batch_fit_of_its_window() {
     for condition in [Condition::C1, Condition::C4] {
         let record = run(condition, 0);
         let (window, every) = (2000, 100);
@@ -116,7 +116,7 @@ fn time_of_a_fit() {
 }
 
 #[test]
-fn without_excitation_the_last_theta_stays() {
+fn last_theta_is_kept_without_excitation() {
     let record = run(Condition::C1, 2);
     let mut recursion = WindowRecursion::new(operator(), record.sample_time(), 800, 50, None).unwrap();
     samples(&record).take(2000).for_each(|s| {
@@ -154,7 +154,7 @@ fn without_excitation_the_last_theta_stays() {
 }
 
 #[test]
-fn a_wrong_start_is_left_and_a_given_one_is_kept_until_the_first_fit() {
+fn start_is_kept_until_the_first_fit_even_if_wrong() {
     let record = run(Condition::C1, 3);
     let wrong = [0.5, -0.4, 0.9, 0.9, 0.8];
     let start = Some((&wrong[..], None));
@@ -175,7 +175,7 @@ fn a_wrong_start_is_left_and_a_given_one_is_kept_until_the_first_fit() {
 }
 
 #[test]
-fn a_window_follows_samples_without_fitting() {
+fn window_collects_samples_without_fitting() {
     let record = run(Condition::C1, 4);
     let mut recursion = WindowRecursion::new(operator(), record.sample_time(), 1000, 100, None).unwrap();
     samples(&record).take(1500).for_each(|s| {
@@ -201,7 +201,7 @@ fn a_window_follows_samples_without_fitting() {
 type Shape = fn(usize, f64) -> (f64, f64);
 
 #[test]
-fn any_data_leave_numbers() {
+fn estimates_stay_finite_for_any_data() {
     let noise = RunSeed::default().white_noise(4000);
     let shapes: [(&str, Shape); 7] = [
         ("silence", |_, _| (0.0, 0.0)),
@@ -240,7 +240,7 @@ fn any_data_leave_numbers() {
 }
 
 #[test]
-fn what_cannot_be_tracked_is_refused() {
+fn invalid_arguments_are_refused() {
     let make = |window, every, start: Option<(&[f64], Option<&[f64]>)>| {
         WindowRecursion::new(operator(), SampleTime::HUNDREDTH, window, every, start)
     };

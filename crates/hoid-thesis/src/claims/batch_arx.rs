@@ -3,8 +3,8 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
-    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, Part, RELEVANT_DIFFERENCE},
-    settings::{DELAYS, DISCRETE, HIGHER, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
+    rules::{ACCEPTABLE, CLOSE_BIAS, LARGE_BIAS, LINEAR, Part, RELEVANT_DIFFERENCE},
+    settings::{DELAYS, DISCRETE, HIGHER_ORDERS, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
     statistics::{linearity, med, median_bias, share_of},
     value::Value,
 };
@@ -37,7 +37,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
         measure: "Magnitude of the median bias of a1 and a2 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29.",
         plans: PLANS,
-        source: Source::Data(a_acceptable),
+        source: Source::Data(acceptable_a),
     },
     Claim {
         id: "arx-linear-in-delay",
@@ -162,7 +162,7 @@ fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         &settings(&["C1"], &[1], &LEVELS),
         &DISCRETE,
         &mut part,
-        LARGE,
+        LARGE_BIAS,
         true,
     )?;
     for name in DISCRETE {
@@ -182,7 +182,7 @@ fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn b_around_fifty(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|median bias| from 25 to 75 %");
-    for at in settings(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         for name in ["b0", "b1"] {
             let found = study.median(&at.arx(&bias_of(name), TRUE_DELAY))?;
             part.around(at.label(name), found.abs(), 50.0);
@@ -194,11 +194,11 @@ fn b_around_fifty(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-fn a_acceptable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn acceptable_a(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("|median bias| within 10 %");
     biases(
         evidence.study("bias")?,
-        &settings(&["C1"], &HIGHER, &LEVELS),
+        &settings(&["C1"], &HIGHER_ORDERS, &LEVELS),
         &["a1", "a2"],
         &mut part,
         ACCEPTABLE,
@@ -249,7 +249,7 @@ fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut lower = Part::new("omega_nm at smaller n_k* lower than at 29");
     let mut higher = Part::new("omega_nm at n_k* = 30 higher than at 29");
-    for at in settings(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         let omega = |nk| at.arx("bias_omega_nm", nk);
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
             let change = study.difference(&omega(nk), &omega(TRUE_DELAY))?;
@@ -294,11 +294,18 @@ fn null_without_remnant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn only_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let cells = settings(&["C1"], &HIGHER, &LEVELS);
+    let cells = settings(&["C1"], &HIGHER_ORDERS, &LEVELS);
     let mut gain = Part::new("|median bias| of K_e within 5 %");
-    biases(study, &cells, &["K_e"], &mut gain, CLOSE, false)?;
+    biases(study, &cells, &["K_e"], &mut gain, CLOSE_BIAS, false)?;
     let mut others = Part::new("|median bias| of T_L, omega_nm, zeta_nm beyond 5 %");
-    biases(study, &cells, &["T_L", "omega_nm", "zeta_nm"], &mut others, CLOSE, true)?;
+    biases(
+        study,
+        &cells,
+        &["T_L", "omega_nm", "zeta_nm"],
+        &mut others,
+        CLOSE_BIAS,
+        true,
+    )?;
     Ok(vec![gain, others])
 }
 
@@ -329,19 +336,19 @@ fn second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     conditions(
         &|at, quantity| Ok(study.median(&at.arx(quantity, TRUE_DELAY))?.abs()),
-        &HIGHER,
+        &HIGHER_ORDERS,
     )
 }
 
 fn poles_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("change of the median bias of omega_nm from each m0 to the next, below 0");
-    for at in settings(&["C1", "C2"], &HIGHER[1..], &LEVELS) {
+    for at in settings(&["C1", "C2"], &HIGHER_ORDERS[1..], &LEVELS) {
         let [lower, higher] =
             [at.m0 - 1, at.m0].map(|m0| study.median(&Setting { m0, ..at }.arx("bias_omega_nm", TRUE_DELAY)));
         part.below(at.label(""), higher?.minus(lower?), 0.0);
     }
-    for at in settings(&["C1"], &HIGHER, &[0.1]) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &[0.1]) {
         part.show(
             format!("median bias of omega_nm at m0 = {}, P_n = 0.1, C1, %", at.m0),
             study.median(&at.arx("bias_omega_nm", TRUE_DELAY))?,
@@ -353,7 +360,7 @@ fn poles_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn zero_by_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("growth of the median T_L with the noise level above 0.1 %");
-    for at in settings(&["C1"], &HIGHER, &LEVELS[..2]) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS[..2]) {
         let more = Setting {
             level: if at.level < 0.15 { 0.2 } else { 0.3 },
             ..at
@@ -371,7 +378,7 @@ fn poles_missed(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         let omega = study.sample(&at.arx("bias_omega_nm", TRUE_DELAY))?;
         let missed: Vec<f64> = omega
             .iter()
-            .map(|bias| f64::from(u8::from(bias.is_nan() || bias.abs() > LARGE)))
+            .map(|bias| f64::from(u8::from(bias.is_nan() || bias.abs() > LARGE_BIAS)))
             .collect();
         part.above(at.label(""), share_of(&missed), 0.9);
     }

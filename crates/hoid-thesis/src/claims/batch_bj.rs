@@ -5,8 +5,10 @@ use super::{
     batch_arx::conditions,
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{ACCEPTABLE, CLOSE, LARGE, LINEAR, Part},
-    settings::{DELAYS, DISCRETE, HIGHER, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings},
+    rules::{ACCEPTABLE, CLOSE_BIAS, LARGE_BIAS, LINEAR, Part},
+    settings::{
+        DELAYS, DISCRETE, HIGHER_ORDERS, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings,
+    },
     statistics::{linearity, med},
     value::Value,
 };
@@ -110,11 +112,11 @@ pub(super) const CLAIMS: &[Claim] = &[
 fn all_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|difference of the median bias from that at m0 = 1| within 5 points");
-    for at in settings(&["C1", "C2"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1", "C2"], &HIGHER_ORDERS, &LEVELS) {
         for name in DISCRETE {
             let first = study.median(&Setting { m0: 1, ..at }.bj(&bias_of(name), 1, TRUE_DELAY))?;
             let found = study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?;
-            part.below(at.label(name), found.minus(first).abs(), CLOSE);
+            part.below(at.label(name), found.minus(first).abs(), CLOSE_BIAS);
         }
     }
     Ok(vec![part])
@@ -128,7 +130,7 @@ fn close_to_zero(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             part.below(
                 at.label(name),
                 study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?.abs(),
-                CLOSE,
+                CLOSE_BIAS,
             );
         }
     }
@@ -145,7 +147,7 @@ fn around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                 for name in DISCRETE {
                     let fit = |at: Setting| study.median(&at.bj(&bias_of(name), at.m0, nk));
                     let change = fit(at)?.minus(fit(Setting { level: 0.0, ..at })?);
-                    part.below(at.label(&format!("n_k* = {nk}, {name}")), change.abs(), CLOSE);
+                    part.below(at.label(&format!("n_k* = {nk}, {name}")), change.abs(), CLOSE_BIAS);
                 }
             }
         }
@@ -226,7 +228,7 @@ fn remnant(
     test: &dyn Fn(&mut Part, String, Value),
 ) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    for at in settings(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         let found = study.median(&at.bj(&format!("bias_{name}_backward_euler"), at.m0, TRUE_DELAY))?;
         test(&mut part, at.label(""), found.abs());
         if at.level == 0.1 {
@@ -251,7 +253,7 @@ fn remnant_time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn remnant_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let part = Part::new("|median bias| of K_n beyond 25 %");
     remnant(evidence, "K_n", part, &|part, label, found| {
-        part.above(label, found, LARGE)
+        part.above(label, found, LARGE_BIAS)
     })
 }
 

@@ -4,7 +4,9 @@ use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
     rules::{HEAVY_REDUCTION, Part},
-    settings::{DELAYS, DISCRETE, HIGHER, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings},
+    settings::{
+        DELAYS, DISCRETE, HIGHER_ORDERS, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings,
+    },
     statistics::{med, median_magnitude},
 };
 
@@ -125,7 +127,7 @@ fn more_robust(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn half_the_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("reduction of the median |bias| from 25 to 75 %");
-    for at in settings(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         for name in DISCRETE {
             let queries = [
                 at.bj(&bias_of(name), at.m0, TRUE_DELAY),

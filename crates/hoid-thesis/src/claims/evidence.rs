@@ -22,7 +22,7 @@ use hoid_study::{
 use hoid_track::Memory;
 
 use super::{
-    statistics::{NOTHING, SMALLEST_VALID_SHARE, jackknife, magnitudes, mean_of, median_of, share_of},
+    statistics::{NO_VALUE, SMALLEST_VALID_SHARE, jackknife, magnitudes, mean_of, median_of, share_of},
     value::Value,
 };
 
@@ -133,16 +133,20 @@ impl<'a> Study<'a> {
     pub fn trace_bias(&self, query: &Query, parameter: &str) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
-            return Ok(NOTHING);
+            return Ok(NO_VALUE);
         };
         // If only a few runs can be converted, their median carries no information about the others.
         if OPERATOR.contains(&parameter)
             && self.mean(&query.clone().quantity_of("share_not_convertible"))?.value > SMALLEST_VALID_SHARE
         {
-            return Ok(NOTHING);
+            return Ok(NO_VALUE);
         }
         let replications = self.results.cells(query).first().map_or(1, |cell| cell.replications);
-        let alike = if self.results.estimator(query).is_some_and(|of| forgets(of, parameter)) {
+        let alike = if self
+            .results
+            .estimator(query)
+            .is_some_and(|of| has_short_memory(of, parameter))
+        {
             0.5
         } else {
             1.0
@@ -167,7 +171,7 @@ impl<'a> Study<'a> {
     pub fn trace_range(&self, query: &Query, parameter: &str, (from_s, to_s): (f64, f64)) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
-            return Ok(NOTHING);
+            return Ok(NO_VALUE);
         };
         let replications = self.results.cells(query).first().map_or(1, |cell| cell.replications);
         let within = traces
@@ -191,7 +195,7 @@ impl<'a> Study<'a> {
         let (traces, _) = self.trace(query, parameter)?;
         let cell = self.results.cells(query);
         let (Some(bands), Some(cell)) = (traces.parameters.get(parameter), cell.first()) else {
-            return Ok(NOTHING);
+            return Ok(NO_VALUE);
         };
         let Some(midpoint_s) = cell.resolved.scenario().schedule.change_s() else {
             return Err(format!("nothing changes in {query}"));
@@ -259,7 +263,7 @@ impl<'a> Study<'a> {
 
 /// True if the estimate of a parameter forgets within a small part of the span: a gain if the memory length of b is
 /// short, any other parameter if all memory lengths are short.
-fn forgets(estimator: &EstimatorCell, parameter: &str) -> bool {
+fn has_short_memory(estimator: &EstimatorCell, parameter: &str) -> bool {
     const LONGEST_S: f64 = 5.0;
     const TEXT_SAMPLE_TIME_S: f64 = 0.01;
     let Task::Track(options) = &estimator.task else {

@@ -4,7 +4,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{ACCEPTABLE, CLOSE, HEAVY_REDUCTION, Part},
+    rules::{ACCEPTABLE, CLOSE_BIAS, HEAVY_REDUCTION, Part},
     settings::{DISCRETE, LEVELS, ORDERS, RECURSIVE_LEVELS, Setting, settings, with_f},
     value::Value,
 };
@@ -80,7 +80,7 @@ fn diminished(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 }
 
 /// Share of the runs with an error above 100 % or without an estimate.
-fn beyond(errors: &[Vec<f64>]) -> f64 {
+fn failed_share(errors: &[Vec<f64>]) -> f64 {
     let all = errors.concat();
     let far = all.iter().filter(|error| error.is_nan() || **error > 100.0);
     far.count() as f64 / all.len() as f64
@@ -95,13 +95,13 @@ fn t_l_stable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         let (rls, rpem) = (of(|at| at.rls("rms_T_L")), of(|at| at.rpem("rms_T_L")));
         let ratio = study.of(&[rpem.clone(), rls.clone()].concat(), &|s| {
             let (rpem, rls) = s.split_at(s.len() / 2);
-            beyond(rpem) / beyond(rls)
+            failed_share(rpem) / failed_share(rls)
         })?;
         part.below(format!("C2, m0 = {m0}"), ratio, HEAVY_REDUCTION);
         for (name, queries) in [("RLS", rls), ("RPEM", rpem)] {
             part.show(
                 format!("share of {name} at m0 = {m0}"),
-                study.of(&queries, &|s| beyond(s))?,
+                study.of(&queries, &|s| failed_share(s))?,
             );
         }
     }
@@ -157,11 +157,11 @@ fn depends_on_start(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                 let rms = format!("rms_{name}");
                 let label = at.label(&format!("{start}, {name}"));
                 let of_all = study.difference(&given(&rms), &fitted(&rms))?;
-                whole.above(label.clone(), of_all.abs(), CLOSE);
+                whole.above(label.clone(), of_all.abs(), CLOSE_BIAS);
                 let end: Value = study
                     .trace_bias(&given("loss"), name)?
                     .minus(study.trace_bias(&fitted("loss"), name)?);
-                last.above(label, end.abs(), CLOSE);
+                last.above(label, end.abs(), CLOSE_BIAS);
             }
         }
     }

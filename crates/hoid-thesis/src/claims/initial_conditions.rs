@@ -3,7 +3,7 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
-    rules::{CLOSE, LARGE, Part, RELEVANT_DIFFERENCE},
+    rules::{CLOSE_BIAS, LARGE_BIAS, Part, RELEVANT_DIFFERENCE},
     settings::{DISCRETE, LEVELS, ORDERS, RECURSIVE_LEVELS, Setting, TRUE_DELAY, bias_of, settings, with_f},
     statistics::{jackknife, median_of, share_of},
     value::Value,
@@ -92,7 +92,11 @@ fn medians(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             for nk in IC_DELAYS {
                 for name in DISCRETE {
                     let found = median_of(&differences(study, at, name, nk, start)?);
-                    part.below(at.label(&format!("{start}, n_k* = {nk}, {name}")), found.abs(), CLOSE);
+                    part.below(
+                        at.label(&format!("{start}, n_k* = {nk}, {name}")),
+                        found.abs(),
+                        CLOSE_BIAS,
+                    );
                 }
             }
         }
@@ -108,7 +112,7 @@ fn single_runs(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for at in settings(&["C1"], &ORDERS, &LEVELS) {
             for nk in IC_DELAYS {
                 let found = differences(study, at, "b0", nk, start)?;
-                beyond.extend(found.iter().map(|d| f64::from(u8::from(d.abs() > LARGE))));
+                beyond.extend(found.iter().map(|d| f64::from(u8::from(d.abs() > LARGE_BIAS))));
             }
         }
         part.above(start.to_owned(), share_of(&beyond), 1e-3);
@@ -198,7 +202,7 @@ fn from_ols(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             let f1 = study.sample(&at.query("f1").name(name))?;
             // The poles are the same in all conditions.
             let truth = study.truth(&at.query("f1").name(name))?.discrete[0];
-            let off = |f1: f64| f1.is_nan() || (f1 - truth).abs() > LARGE / 100.0 * truth.abs();
+            let off = |f1: f64| f1.is_nan() || (f1 - truth).abs() > LARGE_BIAS / 100.0 * truth.abs();
             wrong.extend(
                 converged
                     .iter()

@@ -3,8 +3,8 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{CLOSE, Part},
-    settings::{DISCRETE, HIGHER, ORDERS, bias_of, settings, with_f},
+    rules::{CLOSE_BIAS, Part},
+    settings::{DISCRETE, HIGHER_ORDERS, ORDERS, bias_of, settings, with_f},
 };
 use hoid_study::Query;
 
@@ -50,7 +50,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 fn mean_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("noise-level")?;
     let mut part = Part::new("|mean obtained less demanded level| within 0.02");
-    for at in settings(&["C1"], &ORDERS, &demanded()) {
+    for at in settings(&["C1"], &ORDERS, &specified_levels()) {
         let mut found = study.mean(&at.query("noise_level_obtained"))?;
         found.value -= at.level;
         part.below(at.label(""), found.abs(), 0.02);
@@ -61,7 +61,7 @@ fn mean_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn scatter_of_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("noise-level")?;
     let mut part = Part::new("standard deviation of the obtained level within 0.05");
-    for at in settings(&["C1"], &ORDERS, &demanded()) {
+    for at in settings(&["C1"], &ORDERS, &specified_levels()) {
         let found = study.of(&[at.query("noise_level_obtained")], &|s| {
             hoid_study::Statistics::of(&s[0]).sd
         })?;
@@ -71,14 +71,14 @@ fn scatter_of_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 }
 
 /// Noise levels specified in the plan.
-fn demanded() -> [f64; 18] {
+fn specified_levels() -> [f64; 18] {
     std::array::from_fn(|i| (5 * (i + 1)) as f64 / 100.0)
 }
 
 fn time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("remnant-time-constant")?;
     let mut parts = Vec::new();
-    for (name, orders) in [("BJ", &ORDERS[..]), ("ARX", &HIGHER[..])] {
+    for (name, orders) in [("BJ", &ORDERS[..]), ("ARX", &HIGHER_ORDERS[..])] {
         let mut part = Part::new(&format!("{name}: |change of the median bias| within 5 points"));
         for at in settings(&["C1", "C2"], orders, &[0.1, 0.3]) {
             for coefficient in DISCRETE {
@@ -88,7 +88,7 @@ fn time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                     coefficient.to_owned()
                 });
                 let fit = |t_n_s| study.median(&at.query(&quantity).name(name).t_n_s(t_n_s));
-                part.below(at.label(coefficient), fit(0.2)?.minus(fit(0.06)?).abs(), CLOSE);
+                part.below(at.label(coefficient), fit(0.2)?.minus(fit(0.06)?).abs(), CLOSE_BIAS);
             }
         }
         parts.push(part);
@@ -113,7 +113,7 @@ fn pade(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             let full = fit("BJ, whole delay", 1);
             for decimate in 2..=8 {
                 let found = study.difference(&fit(&format!("BJ, Pade {order}"), decimate), &full)?;
-                part.below(format!("m0 = {m0}, Ts = 0.0{decimate} s"), found, CLOSE);
+                part.below(format!("m0 = {m0}, Ts = 0.0{decimate} s"), found, CLOSE_BIAS);
             }
         }
         parts.push(part);

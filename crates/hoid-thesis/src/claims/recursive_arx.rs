@@ -4,8 +4,8 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{ACCEPTABLE, CLOSE, HEAVY_REDUCTION, LARGE, Part},
-    settings::{DISCRETE, HIGHER, LEVELS, NMS, RECURSIVE_LEVELS, Setting, bias_of, settings, with_f},
+    rules::{ACCEPTABLE, CLOSE_BIAS, HEAVY_REDUCTION, LARGE_BIAS, Part},
+    settings::{DISCRETE, HIGHER_ORDERS, LEVELS, NMS, RECURSIVE_LEVELS, Setting, bias_of, settings, with_f},
     statistics::med,
 };
 
@@ -90,11 +90,11 @@ fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut bj = Part::new("RPEM: |bias of the median trace| within 5 %");
     for at in settings(&["C4"], &[1], &RECURSIVE_LEVELS) {
         for name in DISCRETE {
-            arx.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), LARGE);
+            arx.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), LARGE_BIAS);
             bj.below(
                 at.label(name),
                 study.trace_bias(&at.rpem(""), &with_f(name))?.abs(),
-                CLOSE,
+                CLOSE_BIAS,
             );
         }
     }
@@ -105,7 +105,7 @@ fn ten_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut discrete = Part::new("coefficients: bias at m0 = 1 over that at higher m0 from 5 to 15");
     let mut nms = Part::new("omega_nm and zeta_nm: RMS error at m0 = 1 over that at higher m0 from 5 to 15");
-    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         let first = Setting { m0: 1, ..at };
         for name in DISCRETE {
             let [reference, found] = [first, at].map(|at| study.trace_bias(&at.rls(""), name));
@@ -122,9 +122,9 @@ fn ten_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn persistent(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut part = Part::new("|bias of the median trace| beyond 5 %");
-    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         for name in NMS {
-            part.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), CLOSE);
+            part.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), CLOSE_BIAS);
         }
     }
     Ok(vec![part])
@@ -142,12 +142,12 @@ fn like_batch(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             arx.below(
                 at.label(name),
                 study.trace_bias(&at.rls(""), name)?.minus(ols).abs(),
-                CLOSE,
+                CLOSE_BIAS,
             );
             bj.below(
                 at.label(name),
                 study.trace_bias(&at.rpem(""), &with_f_name)?.minus(pem).abs(),
-                CLOSE,
+                CLOSE_BIAS,
             );
         }
     }
@@ -183,7 +183,7 @@ fn gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         })?;
         first.below(at.label(""), found.abs(), ACCEPTABLE);
     }
-    for at in settings(&["C3"], &HIGHER, &LEVELS) {
+    for at in settings(&["C3"], &HIGHER_ORDERS, &LEVELS) {
         others.below(at.label(""), study.trace_bias(&at.rls(""), "K_e")?.abs(), ACCEPTABLE);
     }
     Ok(vec![first, others])
@@ -192,7 +192,7 @@ fn gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn heavily_reduced(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
     let mut part = Part::new("|bias| at higher m0 over that at m0 = 1 below 0.25");
-    for at in settings(&["C3"], &HIGHER, &LEVELS) {
+    for at in settings(&["C3"], &HIGHER_ORDERS, &LEVELS) {
         for name in DISCRETE {
             let [reference, found] = [Setting { m0: 1, ..at }, at].map(|at| study.trace_bias(&at.rls(""), name));
             part.below(at.label(name), found?.abs().over(reference?.abs()), HEAVY_REDUCTION);
@@ -204,7 +204,7 @@ fn heavily_reduced(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn more_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
     let mut part = Part::new("growth of |bias| with the noise level above 0");
-    for at in settings(&["C3"], &HIGHER, &LEVELS[..2]) {
+    for at in settings(&["C3"], &HIGHER_ORDERS, &LEVELS[..2]) {
         let more = Setting {
             level: if at.level < 0.15 { 0.2 } else { 0.3 },
             ..at

@@ -5,7 +5,7 @@ use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
     rules::{ACCEPTABLE, Part},
-    settings::{DISCRETE, HIGHER, NMS, ORDERS, RECURSIVE_LEVELS, Setting, settings, with_f},
+    settings::{DISCRETE, HIGHER_ORDERS, NMS, ORDERS, RECURSIVE_LEVELS, Setting, settings, with_f},
     statistics::{med, share_of},
     value::Value,
 };
@@ -138,7 +138,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 fn less_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut part = Part::new("|bias| of RLS minus that of RPEM above 0");
-    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         for name in DISCRETE {
             let rls = study.trace_bias(&at.rls(""), name)?.abs();
             let rpem = study.trace_bias(&at.rpem(""), &with_f(name))?.abs();
@@ -153,7 +153,7 @@ fn five_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in GAINS {
         let mut part = Part::new(&format!("settling time of {name}, RPEM over RLS, from 2.5 to 7.5"));
-        for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
             let (rls, rpem) = (rls?, rpem?);
             part.effect(at.label(""), rpem.over(rls), 5.0);
@@ -172,7 +172,7 @@ fn slower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in GAINS {
         let mut part = Part::new(&format!("settling time of {name}, RPEM less RLS, above 0 s"));
-        for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+        for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
             part.above(at.label(""), rpem?.minus(rls?), 0.0);
         }
@@ -219,7 +219,7 @@ fn better_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut gains = Part::new("K_e, T_L, K_e_dot: RMS error of RPEM minus that of RLS above 0");
     let mut nms = Part::new("omega_nm, zeta_nm: RMS error of RPEM minus that of RLS below 0");
-    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         for name in GAINS {
             gains.above(at.label(name), rms(study, at, name)?, 0.0);
         }
@@ -234,7 +234,7 @@ fn zero_to_five(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut bias = Part::new("|bias| of RLS is less than that of RPEM by 0 to 5 %");
     let mut error = Part::new("RMS error of RLS is less than that of RPEM by 0 to 5 %");
-    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         for name in ["K_e", "T_L"] {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
             let rms = format!("rms_{name}");
@@ -249,7 +249,7 @@ fn nms_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut bias = Part::new("|bias| of RPEM is less than that of RLS by 12.5 to 37.5 %");
     let mut error = Part::new("RMS error of RPEM is less than that of RLS by 12.5 to 37.5 %");
-    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         for name in NMS {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
             let rms = format!("rms_{name}");
@@ -278,7 +278,7 @@ fn first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn oscillates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut part = Part::new("RMS error of T_L less the larger of K_e and K_e_dot above 0");
-    for at in settings(&["C4"], &HIGHER, &RECURSIVE_LEVELS) {
+    for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         let queries = ["rms_T_L", "rms_K_e", "rms_K_e_dot"].map(|quantity| at.rpem(quantity));
         part.above(
             at.label(""),
@@ -294,7 +294,7 @@ fn coupling(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("RMS error at m0 = 2 less the larger of m0 = 3 and 4 above 0");
     for at in settings(&["C4"], &[2], &RECURSIVE_LEVELS) {
         for name in GAINS.into_iter().chain(NMS) {
-            let queries = HIGHER.map(|m0| Setting { m0, ..at }.rpem(&format!("rms_{name}")));
+            let queries = HIGHER_ORDERS.map(|m0| Setting { m0, ..at }.rpem(&format!("rms_{name}")));
             part.above(
                 at.label(name),
                 study.of(&queries, &|s| med(&s[0]) - med(&s[1]).max(med(&s[2])))?,

@@ -3,8 +3,8 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{CLOSE, LARGE, Part, RELEVANT_DIFFERENCE},
-    settings::{DELAYS, DISCRETE, HIGHER, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
+    rules::{CLOSE_BIAS, LARGE_BIAS, Part, RELEVANT_DIFFERENCE},
+    settings::{DELAYS, DISCRETE, HIGHER_ORDERS, LEVELS, NMS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
     statistics::{interquartile_range, mean_of, med, median_bias, median_magnitude, spread},
     value::Value,
 };
@@ -210,10 +210,14 @@ fn vaf_of_arx(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn same_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|paired difference of the bias, m* = 1 minus m* = m0| within 5 points");
-    for at in settings(&["C1", "C2"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1", "C2"], &HIGHER_ORDERS, &LEVELS) {
         for name in DISCRETE {
             let fit = |m| at.bj(&bias_of(name), m, TRUE_DELAY);
-            part.below(at.label(name), study.difference(&fit(1), &fit(at.m0))?.abs(), CLOSE);
+            part.below(
+                at.label(name),
+                study.difference(&fit(1), &fit(at.m0))?.abs(),
+                CLOSE_BIAS,
+            );
         }
     }
     Ok(vec![part])
@@ -256,7 +260,7 @@ fn loss_at_high_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn wider_boxes(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("interquartile range with m* = 1 over that with m* = m0, mean over P_n, from 1 to 1.5");
-    for at in settings(&["C1", "C2"], &HIGHER, &[0.1]) {
+    for at in settings(&["C1", "C2"], &HIGHER_ORDERS, &[0.1]) {
         for name in DISCRETE {
             let fits =
                 LEVELS.map(|level| [1, at.m0].map(|m| Setting { level, ..at }.bj(&bias_of(name), m, TRUE_DELAY)));
@@ -276,7 +280,7 @@ fn by_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut higher = Part::new("K_e and T_L: growth of the median |bias| with m* = 1 above 0");
     let mut same = Part::new("omega_nm and zeta_nm: |change of the median |bias| with m* = 1| within 5 points");
-    for at in settings(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
             let change = |name: &str| {
                 let queries = [1, at.m0].map(|m| at.bj(&bias_of(name), m, nk));
@@ -286,7 +290,11 @@ fn by_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                 higher.above(at.label(&format!("n_k* = {nk}, {name}")), change(name)?, 0.0);
             }
             for name in NMS {
-                same.below(at.label(&format!("n_k* = {nk}, {name}")), change(name)?.abs(), CLOSE);
+                same.below(
+                    at.label(&format!("n_k* = {nk}, {name}")),
+                    change(name)?.abs(),
+                    CLOSE_BIAS,
+                );
             }
         }
     }
@@ -298,9 +306,9 @@ fn remnant_wrong(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in ["T_n", "K_n"] {
         let mut part = Part::new(&format!("|median bias| of {name} beyond 25 %"));
-        for at in settings(&["C1"], &HIGHER, &LEVELS) {
+        for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
             let found = study.median(&at.bj(&format!("bias_{name}_backward_euler"), 1, TRUE_DELAY))?;
-            part.above(at.label(""), found.abs(), LARGE);
+            part.above(at.label(""), found.abs(), LARGE_BIAS);
         }
         parts.push(part);
     }
@@ -308,7 +316,7 @@ fn remnant_wrong(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 }
 
 /// Queries for a quantity: for all delays with m* = m0, followed by those for all orders at the true delay.
-fn over_both(at: Setting, quantity: &str) -> Vec<hoid_study::Query> {
+fn over_delays_and_orders(at: Setting, quantity: &str) -> Vec<hoid_study::Query> {
     let delays = DELAYS.map(|nk| at.bj(quantity, at.m0, nk));
     delays
         .into_iter()
@@ -321,7 +329,7 @@ fn delay_over_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("spread over n_k* less that over m* above 0");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
-            let found = study.of(&over_both(at, &bias_of(name)), &|s| {
+            let found = study.of(&over_delays_and_orders(at, &bias_of(name)), &|s| {
                 let (delays, orders) = s.split_at(DELAYS.len());
                 spread(delays.iter().map(|v| median_magnitude(v))) - spread(orders.iter().map(|v| median_magnitude(v)))
             })?;
@@ -361,7 +369,7 @@ fn order_over_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     for name in ["innovation_variance", "d1"] {
         let mut part = Part::new(&format!("{name}: spread over m* over that over n_k* above 1"));
         for at in settings(&["C1"], &ORDERS, &LEVELS) {
-            let found = study.of(&over_both(at, name), &|s| {
+            let found = study.of(&over_delays_and_orders(at, name), &|s| {
                 let (delays, orders) = s.split_at(DELAYS.len());
                 spread(orders.iter().map(|v| med(v))) / spread(delays.iter().map(|v| med(v)))
             })?;

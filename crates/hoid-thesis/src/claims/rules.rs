@@ -37,11 +37,11 @@
 use super::value::Value;
 
 /// Limit for a large bias, % of the true value.
-pub(super) const LARGE: f64 = 25.0;
+pub(super) const LARGE_BIAS: f64 = 25.0;
 /// Limit for an acceptable bias, % of the true value.
 pub(super) const ACCEPTABLE: f64 = 10.0;
 /// Limit for a bias close to zero or to another bias, percentage points of the true value.
-pub(super) const CLOSE: f64 = 5.0;
+pub(super) const CLOSE_BIAS: f64 = 5.0;
 /// Smallest relevant difference, percentage points of the true value.
 pub(super) const RELEVANT_DIFFERENCE: f64 = 0.1;
 /// Largest remaining fraction of a quantity that is heavily reduced.
@@ -61,7 +61,7 @@ pub enum Verdict {
     /// The claim holds.
     Holds,
     /// The claim is true, and the effect is larger than the claimed number.
-    HoldsAndMoreSo,
+    HoldsWithLargerEffect,
     /// The claim holds in part.
     HoldsInPart,
     /// The claim does not hold.
@@ -75,7 +75,7 @@ impl Verdict {
     pub fn words(&self) -> &'static str {
         match self {
             Self::Holds => "holds",
-            Self::HoldsAndMoreSo => "holds, and more so",
+            Self::HoldsWithLargerEffect => "holds, and more so",
             Self::HoldsInPart => "holds in part",
             Self::DoesNotHold => "does not hold",
             Self::CannotBeTested(_) => "cannot be tested",
@@ -254,7 +254,7 @@ impl Part {
         Some(if share(passes) >= HOLDS_SHARE {
             Verdict::Holds
         } else if share(passes + exceeds) >= HOLDS_SHARE {
-            Verdict::HoldsAndMoreSo
+            Verdict::HoldsWithLargerEffect
         } else if share(passes + exceeds) >= HOLDS_IN_PART_SHARE {
             Verdict::HoldsInPart
         } else {
@@ -273,11 +273,11 @@ pub fn verdict(parts: &[Part]) -> Verdict {
         return Verdict::CannotBeTested(format!("the replications leave {open} of {cells} cells undecided"));
     }
     let [holds, more_so, in_part] =
-        [Verdict::Holds, Verdict::HoldsAndMoreSo, Verdict::HoldsInPart].map(|asked| is(&asked));
+        [Verdict::Holds, Verdict::HoldsWithLargerEffect, Verdict::HoldsInPart].map(|asked| is(&asked));
     if holds == each.len() {
         Verdict::Holds
     } else if holds + more_so == each.len() {
-        Verdict::HoldsAndMoreSo
+        Verdict::HoldsWithLargerEffect
     } else if holds + more_so + in_part == 0 {
         Verdict::DoesNotHold
     } else {
@@ -309,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cell_passes_beyond_two_errors() {
+    fn cell_passes_beyond_two_standard_errors() {
         use CellOutcome::{Fails, Passes, Undecided};
         for (value, outcome) in [(12.1, Passes), (11.9, Undecided), (8.1, Undecided), (7.9, Fails)] {
             assert_eq!(cell(value, 1.0, Bound::Above(10.0)), outcome);
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn a_larger_effect_than_claimed_exceeds_the_claim() {
+    fn larger_effect_exceeds_the_claim() {
         use CellOutcome::{Exceeds, Fails, Passes, Undecided};
         let times = Bound::Effect(25.0, 75.0);
         for (value, outcome) in [(284.0, Exceeds), (77.1, Exceeds), (76.9, Passes), (22.9, Fails)] {
@@ -361,17 +361,17 @@ mod tests {
             part
         };
         assert_eq!(part(&[50.0, 50.0]).verdict(), Some(Verdict::Holds));
-        assert_eq!(part(&[50.0, 284.0]).verdict(), Some(Verdict::HoldsAndMoreSo));
+        assert_eq!(part(&[50.0, 284.0]).verdict(), Some(Verdict::HoldsWithLargerEffect));
         assert_eq!(part(&[1.0, 284.0]).verdict(), Some(Verdict::HoldsInPart));
         assert_eq!(part(&[1.0, 2.0, 284.0]).verdict(), Some(Verdict::DoesNotHold));
         let (plain, more, not) = (part(&[50.0]), part(&[284.0]), part(&[1.0]));
-        assert_eq!(verdict(&[plain.clone(), more.clone()]), Verdict::HoldsAndMoreSo);
+        assert_eq!(verdict(&[plain.clone(), more.clone()]), Verdict::HoldsWithLargerEffect);
         assert_eq!(verdict(&[more.clone(), not]), Verdict::HoldsInPart);
         assert_eq!(more.beyond(), (0, 0));
     }
 
     #[test]
-    fn a_part_goes_by_the_share_of_decided_cells() {
+    fn part_verdict_follows_the_share_of_decided_cells() {
         assert_eq!(part(9, 1, 0).verdict(), Some(Verdict::Holds));
         assert_eq!(part(8, 1, 0).verdict(), Some(Verdict::HoldsInPart));
         assert_eq!(part(1, 1, 0).verdict(), Some(Verdict::HoldsInPart));
@@ -382,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn a_claim_goes_by_its_parts() {
+    fn claim_verdict_combines_its_parts() {
         let (yes, half, no, open) = (part(9, 0, 0), part(5, 4, 0), part(0, 9, 0), part(1, 0, 9));
         let of = |parts: &[&Part]| verdict(&parts.iter().map(|part| (*part).clone()).collect::<Vec<_>>());
         assert_eq!(of(&[&yes, &yes]), Verdict::Holds);

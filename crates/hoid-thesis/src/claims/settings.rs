@@ -7,7 +7,7 @@ pub(super) const LEVELS: [f64; 3] = [0.1, 0.2, 0.3];
 /// Orders of the simulated remnant.
 pub(super) const ORDERS: [usize; 4] = [1, 2, 3, 4];
 /// Orders of the simulated remnant above one.
-pub(super) const HIGHER: [usize; 3] = [2, 3, 4];
+pub(super) const HIGHER_ORDERS: [usize; 3] = [2, 3, 4];
 /// Delays in the batch plans, samples.
 pub(super) const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
 /// The simulated delay, samples.

@@ -16,7 +16,7 @@ const GROUPS: usize = 10;
 pub(super) const SMALLEST_VALID_SHARE: f64 = 0.5;
 
 /// Missing value, used if too few replications give a value.
-pub(super) const NOTHING: Value = Value {
+pub(super) const NO_VALUE: Value = Value {
     value: f64::NAN,
     error: f64::NAN,
 };
@@ -27,14 +27,14 @@ pub(super) fn magnitudes(values: &[f64]) -> Vec<f64> {
 }
 
 /// True if the share of replications that give a value is at least [`SMALLEST_VALID_SHARE`].
-fn enough(values: &[f64]) -> bool {
+fn has_enough_values(values: &[f64]) -> bool {
     let finite = values.iter().filter(|v| v.is_finite()).count();
     finite > 0 && finite as f64 >= SMALLEST_VALID_SHARE * values.len() as f64
 }
 
 fn value_of(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
-    if !enough(values) {
-        return NOTHING;
+    if !has_enough_values(values) {
+        return NO_VALUE;
     }
     let (value, error) = figure(&Statistics::of(values));
     Value {
@@ -63,7 +63,11 @@ pub(super) fn share_of(values: &[f64]) -> Value {
 
 /// The median; NaN if there are not enough values.
 pub(super) fn med(values: &[f64]) -> f64 {
-    if enough(values) { median(values) } else { f64::NAN }
+    if has_enough_values(values) {
+        median(values)
+    } else {
+        f64::NAN
+    }
 }
 
 /// The magnitude of the median.
@@ -78,7 +82,7 @@ pub(super) fn median_magnitude(values: &[f64]) -> f64 {
 
 /// The interquartile range.
 pub(super) fn interquartile_range(values: &[f64]) -> f64 {
-    if !enough(values) {
+    if !has_enough_values(values) {
         return f64::NAN;
     }
     let s = Statistics::of(values);
@@ -157,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn the_jackknife_of_a_mean_is_its_error() {
+    fn jackknife_error_of_a_mean_is_its_standard_error() {
         // For a mean, the expectation of s^2 is exact. With 9 degrees of freedom s has a spread of 24 %, which
         // averaging over 400 samples reduces to 1.2 %, and its mean is 2.7 % too small (square root of a chi-square
         // variable).
@@ -168,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn pairs_stay_pairs() {
+    fn jackknife_keeps_pairs_together() {
         let a = normals(100, 3);
         let b: Vec<f64> = a.iter().map(|a| a + 1.0).collect();
         let found = jackknife(&[a, b], &|s| med(&s[1]) - med(&s[0]));
@@ -176,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn few_values_say_nothing() {
+    fn too_few_values_give_no_estimate() {
         let most = [1.0, 2.0, f64::NAN];
         let few = [1.0, f64::NAN, f64::NAN];
         assert_eq!(median_of(&most).value, 1.5);
@@ -200,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn linearity_of_a_line_and_of_a_parabola() {
+    fn linearity_is_one_for_a_line_and_less_for_a_parabola() {
         assert!((linearity(&[1.0, 3.0, 5.0, 7.0]) - 1.0).abs() < 1e-12);
         assert!(linearity(&[1.0, 0.0, 0.0, 1.0]) < 1e-12);
         // In NumPy, corrcoef([0, 1, 2, 3], [0, 1, 4, 9])^2 = 0.9184.

@@ -41,7 +41,7 @@ fn verdict_of(id: &str, results: &[Results]) -> Verdict {
 }
 
 #[test]
-fn claims_are_told_apart_and_short() {
+fn claim_ids_are_unique_and_statements_short() {
     let all = claims();
     let ids: BTreeSet<&str> = all.iter().map(|claim| claim.id).collect();
     assert_eq!(ids.len(), all.len());
@@ -63,7 +63,7 @@ fn claims_are_told_apart_and_short() {
 
 /// A query that selects nothing, or several estimators, would give a reason but no parts.
 #[test]
-fn each_claim_finds_all_its_cells_in_its_own_plans() {
+fn each_claim_finds_its_cells_in_its_plans() {
     let data: &Data = &|_, _, column, replication| 0.01 + scatter(column, replication);
     let all: Vec<Results> = TEXT_PLANS.iter().map(|plan| synthetic(plan.name, data)).collect();
     for claim in claims().iter().filter(|claim| !claim.plans.is_empty()) {
@@ -86,7 +86,7 @@ fn each_claim_finds_all_its_cells_in_its_own_plans() {
 }
 
 #[test]
-fn a_verdict_flips_with_the_data() {
+fn verdicts_depend_on_the_data() {
     let with_arx_bias = |of_b: f64| {
         synthetic("bias", &move |_, estimator, column, replication| {
             let is_b = estimator.name == "ARX" && column.starts_with('b');
@@ -183,7 +183,7 @@ fn traces_give_bias_and_settling() {
 }
 
 #[test]
-fn a_small_study_of_the_same_name_is_no_evidence_for_cells_that_it_lacks() {
+fn missing_cells_give_no_evidence() {
     let text = r#"
 name = "bias"
 replications = 3

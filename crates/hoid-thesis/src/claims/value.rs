@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn errors_of_differences_and_ratios() {
+    fn errors_of_differences_and_ratios_are_propagated() {
         let (a, b) = (Value { value: 8.0, error: 0.3 }, Value { value: 2.0, error: 0.4 });
         assert_eq!(a.minus(b), Value { value: 6.0, error: 0.5 });
         assert_eq!(

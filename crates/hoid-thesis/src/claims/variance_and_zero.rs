@@ -9,8 +9,8 @@
 use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
-    rules::{LARGE, MUCH_HIGHER_RATIO, Part},
-    settings::{HIGHER, LEVELS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
+    rules::{LARGE_BIAS, MUCH_HIGHER_RATIO, Part},
+    settings::{HIGHER_ORDERS, LEVELS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
     statistics::{interquartile_range, med, median_magnitude},
     value::Value,
 };
@@ -92,10 +92,10 @@ fn variance_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut important = Part::new("|median bias| of the innovation variance beyond 25 %, m0 >= 2");
     let mut growth = Part::new("|median bias| of the innovation variance less that at the order below, above 0");
-    for at in settings(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         let found = variance(study, at, med)?;
         let below = variance(study, Setting { m0: at.m0 - 1, ..at }, med)?;
-        important.above(at.label(""), found.abs(), LARGE);
+        important.above(at.label(""), found.abs(), LARGE_BIAS);
         growth.above(at.label(""), found.abs().minus(below.abs()), 0.0);
     }
     for at in settings(&["C1"], &ORDERS, &[0.1]) {
@@ -149,7 +149,7 @@ fn wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                     [at.bj(&bias_of(name), at.m0, nk), at.arx(&bias_of(name), nk)].map(|query| study.median(&query));
                 let (bj, arx) = (bj?.abs(), arx?.abs());
                 let label = at.label(&format!("n_k* = {nk}, {name}"));
-                large.above(label.clone(), bj, LARGE);
+                large.above(label.clone(), bj, LARGE_BIAS);
                 smaller.below(label, bj.minus(arx), 0.0);
             }
         }
@@ -184,7 +184,7 @@ fn zero_in_second(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         of_bj.above(at.label(""), zero_change(study, &bj, at)?, 0.0);
     }
     let mut of_arx = Part::new("ARX: |error of the zero| in C2 less that in C1 above 0");
-    for at in settings(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         of_arx.above(at.label(""), zero_change(study, &arx, at)?, 0.0);
     }
     Ok(vec![of_bj, of_arx])
@@ -194,7 +194,7 @@ fn zero_matters(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let both = |at: Setting| vec![at.arx("bias_T_L", TRUE_DELAY), at.bj("bias_T_L", at.m0, TRUE_DELAY)];
     let mut part = Part::new("|error of the zero|, ARX less BJ, in C2 less that in C1 above 0");
-    for at in settings(&["C1"], &HIGHER, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         part.above(at.label(""), zero_change(study, &both, at)?, 0.0);
     }
     Ok(vec![part])

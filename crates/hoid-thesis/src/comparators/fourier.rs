@@ -91,7 +91,7 @@ mod tests {
     use super::{super::tests::*, *};
 
     #[test]
-    fn a_whole_period_gives_the_coefficients_of_the_fourier_transform() {
+    fn whole_period_window_gives_exact_coefficients() {
         // Lines 3 and 8 of a period of 512 samples; in u the first line has twice the amplitude, and the second line is
         // delayed.
         let omega = [3.0, 8.0].map(|n| n * std::f64::consts::TAU / 5.12);
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_window_that_is_longer_than_the_record_is_the_record() {
+    fn window_is_limited_to_the_record() {
         let run = Run::of(hoid_model::scenario::Condition::C1, 1, 0.0);
         let whole = FourierCoefficients { window: 1e4 }.follow(&run.task()).unwrap();
         let truth = run.responses();

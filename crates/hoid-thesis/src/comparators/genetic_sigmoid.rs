@@ -50,7 +50,7 @@ const MIDPOINT: usize = 4;
 /// Number of members that are kept unchanged.
 const ELITE: usize = 2;
 /// Number of members drawn in the tournament for each parent.
-const DRAWN: usize = 3;
+const TOURNAMENT_SIZE: usize = 3;
 /// Distance beyond the parents within which a gene may lie, as a fraction of the distance between the parents.
 const BLEND: f64 = 0.5;
 
@@ -102,7 +102,7 @@ impl GeneticSigmoid {
             .collect();
         for generation in 1..=self.generations {
             all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-            let mut numbers = drawn(generation, self.population * (2 * DRAWN + 4 * N));
+            let mut numbers = drawn(generation, self.population * (2 * TOURNAMENT_SIZE + 4 * N));
             let mut next = || numbers.next().unwrap_or_default();
             // The population contracts around the optimum, and the mutations become smaller accordingly.
             let size = 0.3 * (1.0 - generation as f64 / (self.generations + 1) as f64);
@@ -110,7 +110,7 @@ impl GeneticSigmoid {
             while children.len() < all.len() {
                 // The members are sorted, so the smallest index denotes the best member.
                 let mut parent = || {
-                    let places = (0..DRAWN).map(|_| (next() * all.len() as f64) as usize);
+                    let places = (0..TOURNAMENT_SIZE).map(|_| (next() * all.len() as f64) as usize);
                     all[places.min().unwrap_or(0).min(all.len() - 1)]
                 };
                 let (a, b) = (parent(), parent());
@@ -235,7 +235,7 @@ mod tests {
     use super::{super::tests::*, *};
 
     #[test]
-    fn the_search_finds_the_lowest_of_many_minima() {
+    fn search_finds_the_global_minimum() {
         // Rastrigin's function of three genes, independent of the other genes: its minima are a tenth apart, and the
         // lowest minimum is at 0.3, 0.5, 0.7.
         let cost = |genes: &[f64; N]| {
@@ -258,7 +258,7 @@ mod tests {
 
     /// At the true parameters, the criterion is the innovation variance of an AR(1) process with d1 = -e^(-Ts/Tn).
     #[test]
-    fn the_criterion_at_the_truth_is_the_remnant() {
+    fn criterion_at_the_truth_is_the_remnant_variance() {
         let run = Run::of(Condition::C4, 1, 0.1);
         let task = run.task();
         let truth = [0.09, 0.07, 0.4, 1.2, 40.96, 100.0, 11.25, 0.35, 0.28];
@@ -274,7 +274,7 @@ mod tests {
 
     /// From the genetic start, the search ends in the same minimum as from the estimator's own starts.
     #[test]
-    fn it_ends_in_the_minimum_that_other_starts_find() {
+    fn genetic_start_reaches_the_same_minimum() {
         let run = Run::of(Condition::C4, 1, 0.1);
         let genetic = GeneticSigmoid::default().fit(&run.task()).unwrap();
         let own = SigmoidChange {
@@ -293,7 +293,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_refused() {
+    fn zero_input_is_refused() {
         let silent = record_of(&[0.0; 4000], &[1.0; 4000]);
         assert!(
             GeneticSigmoid::default()

@@ -75,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weighted_sums_give_weighted_least_squares() {
+    fn normal_equations_solve_weighted_least_squares() {
         // y = 2 x_1 - x_2 exactly, for any weights.
         let mut all = NormalEquations::new(2, 1);
         for k in 0..20 {

@@ -216,7 +216,7 @@ mod tests {
     /// A second-order system of the assumed structure, with white input and innovations of a tenth of the output: the
     /// response is correct before and after the change.
     #[test]
-    fn a_system_of_its_kind_is_found() {
+    fn system_of_the_assumed_structure_is_found() {
         let white = |cell| {
             RunSeed {
                 cell,
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn the_operator_after_the_change_is_near_the_truth_on_average() {
+    fn operator_after_the_change_is_close_on_average() {
         const RUNS: u64 = 4;
         let mut mean = [0.0; 2];
         for replication in 0..RUNS {
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn an_order_that_is_not_there_is_refused() {
+    fn too_high_order_is_refused() {
         let e: Vec<f64> = (0..2000).map(|k| (0.1 * f64::from(k)).sin()).collect();
         let record = record_of(&e, &vec![0.0; 2000]);
         let refused = LpvSubspace::default()

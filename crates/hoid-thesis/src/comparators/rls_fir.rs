@@ -130,7 +130,7 @@ mod tests {
     /// The same minimum is computed in another way: the regularised sum of squares is a tall least-squares problem,
     /// with rows for the prior in addition to those for the data, which is solved by Householder reflections.
     #[test]
-    fn the_recursion_gives_the_minimum_of_its_criterion() {
+    fn recursion_minimises_its_criterion() {
         let method = RlsFir {
             nb: 6,
             memory: 50.0,
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn two_hundred_and_fifty_six_coefficients_follow_a_change_of_the_gain() {
+    fn coefficients_follow_a_change_of_gain() {
         // u = g(t) e(t - 20) with white e; the gain doubles in the middle.
         let e = RunSeed::default().white_noise(8000);
         let gain = |k: usize| if k < 4000 { 0.5 } else { 1.0 };
@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_alone_leave_it_finite_and_silence_is_refused() {
+    fn few_lines_stay_finite_and_zero_input_is_refused() {
         // Two lines excite only four of 256 directions.
         let e: Vec<f64> = (0..3000)
             .map(|k| (0.02 * k as f64).sin() + (0.005 * k as f64).cos())

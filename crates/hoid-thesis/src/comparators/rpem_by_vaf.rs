@@ -103,7 +103,7 @@ mod tests {
     use super::{super::tests::*, *};
 
     #[test]
-    fn a_power_of_zero_leaves_the_covariance_alone_and_another_does_not() {
+    fn only_nonzero_power_changes_the_covariance() {
         let run = Run::of(Condition::C4, 2, 0.2);
         let of = |power: f64| {
             let method = RpemByVaf {

@@ -119,7 +119,7 @@ pub(super) fn error(found: &[Complex64], expected: &[Complex64]) -> f64 {
 }
 
 #[test]
-fn names_lead_to_comparators_and_all_say_where_they_are_from() {
+fn comparators_have_unique_names_and_sources() {
     let all = comparators();
     let names: BTreeSet<&str> = all.iter().map(|c| c.about().name).collect();
     assert_eq!(names.len(), all.len());
@@ -137,7 +137,7 @@ fn names_lead_to_comparators_and_all_say_where_they_are_from() {
 /// All comparators are applied to a run with a small remnant: before the change and long after it, the error of the
 /// response is below one half. NaN is reported as a missing value.
 #[test]
-fn all_follow_a_run_of_the_text() {
+fn all_comparators_follow_a_reference_run() {
     let run = Run::of(Condition::C4, 1, 0.01);
     let truth = run.responses();
     for comparator in comparators() {
@@ -154,7 +154,7 @@ fn all_follow_a_run_of_the_text() {
 }
 
 #[test]
-fn silence_and_samples_beyond_the_record_are_refused_by_all() {
+fn zero_input_and_late_samples_are_refused_by_all() {
     let silent = record_of(&[0.0; 4000], &[1.0; 4000]);
     let moving = Run::of(Condition::C1, 1, 0.1);
     let beyond = Task {
@@ -174,7 +174,7 @@ fn silence_and_samples_beyond_the_record_are_refused_by_all() {
 }
 
 #[test]
-fn what_is_no_recursion_says_what_it_is_and_where_it_runs() {
+fn non_recursive_methods_are_refused_with_advice() {
     for (typed, words) in [
         ("wavelet", "data after each time as before it"),
         ("lpv", "lpv-subspace is not a recursion"),

@@ -36,7 +36,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn they_add_up_to_the_held_operator() {
+    fn weighted_responses_sum_to_the_held_operator() {
         let ts = SampleTime::new(0.01).unwrap();
         let operator = OperatorParameters {
             k_e: 0.07,

@@ -79,7 +79,7 @@ mod tests {
     use super::{super::tests::*, *};
 
     #[test]
-    fn a_line_whose_gain_changes_is_followed_where_the_wavelet_is_short() {
+    fn short_wavelets_follow_a_change_of_gain() {
         let omega = 8.0;
         let wave = |k: usize| (omega * 0.01 * k as f64).sin();
         let e: Vec<f64> = (0..6000).map(wave).collect();
@@ -101,7 +101,7 @@ mod tests {
     /// The transform of a sinusoid is compared with the known continuous transform, `sqrt(2 pi) s e^(j phase)/2` in
     /// samples.
     #[test]
-    fn the_transform_of_a_wave_is_half_its_envelope() {
+    fn transform_of_a_sinusoid_is_half_its_envelope() {
         let omega = 5.0;
         let cosine: Vec<f64> = (0..4000)
             .map(|k| (omega * 0.01 * (f64::from(k) - 2000.0) + 0.7).cos())
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn silence_is_refused_and_a_silent_output_has_no_response() {
+    fn zero_input_is_refused_and_zero_output_has_no_response() {
         let silent = record_of(&[0.0; 50], &[1.0; 50]);
         assert!(WaveletRatio::default().follow(&task_of(&silent, &[9], &[1.0])).is_err());
         let e: Vec<f64> = (0..500).map(|k| (0.1 * f64::from(k)).sin()).collect();

@@ -143,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn each_subject_has_the_last_runs_of_each_condition() {
+    fn last_runs_of_each_condition_are_evaluated() {
         let plan = ExperimentPlan {
             subjects: 1,
             runs: 2,

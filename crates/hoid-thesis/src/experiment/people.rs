@@ -31,7 +31,7 @@ pub struct ExperimentPlan {
     pub delays: (usize, usize),
 }
 
-fn wrong(key: &str, found: &str, expected: &str) -> ThesisError {
+fn invalid_value(key: &str, found: &str, expected: &str) -> ThesisError {
     ThesisError::Unsuited {
         method: "the plan of the experiment",
         quantity: key.to_owned(),
@@ -69,19 +69,19 @@ impl ExperimentPlan {
         ];
         let table: Table = text
             .parse()
-            .map_err(|error: toml::de::Error| wrong("its text", error.message(), "TOML"))?;
+            .map_err(|error: toml::de::Error| invalid_value("its text", error.message(), "TOML"))?;
         if let Some(key) = table.keys().find(|key| !KEYS.contains(&key.as_str())) {
-            return Err(wrong("a key", key, &format!("one of {}", KEYS.join(", "))));
+            return Err(invalid_value("a key", key, &format!("one of {}", KEYS.join(", "))));
         }
         let shown = |key: &str| table.get(key).map_or("missing".to_owned(), Value::to_string);
         let whole = |key: &str| {
             let value = table.get(key).and_then(Value::as_integer);
             let value = value.and_then(|n| u64::try_from(n).ok());
-            value.ok_or_else(|| wrong(key, &shown(key), "a whole number, 0 or larger"))
+            value.ok_or_else(|| invalid_value(key, &shown(key), "a whole number, 0 or larger"))
         };
         let number = |key: &str| {
             let value = table.get(key).and_then(Value::as_float);
-            value.ok_or_else(|| wrong(key, &shown(key), "a number with a decimal point"))
+            value.ok_or_else(|| invalid_value(key, &shown(key), "a number with a decimal point"))
         };
         let delays: Vec<usize> = table
             .get("delays")
@@ -92,7 +92,13 @@ impl ExperimentPlan {
             .collect();
         let (first, last) = match delays.as_slice() {
             [first, last] if 1 <= *first && first <= last => (*first, *last),
-            _ => return Err(wrong("delays", &shown("delays"), "[first, last], both 1 or larger")),
+            _ => {
+                return Err(invalid_value(
+                    "delays",
+                    &shown("delays"),
+                    "[first, last], both 1 or larger",
+                ));
+            }
         };
         let plan = Self {
             seed: whole("seed")?,
@@ -105,7 +111,11 @@ impl ExperimentPlan {
             delays: (first, last),
         };
         if plan.evaluated == 0 || plan.evaluated > plan.runs {
-            return Err(wrong("evaluated", &shown("evaluated"), "1 to the number of runs"));
+            return Err(invalid_value(
+                "evaluated",
+                &shown("evaluated"),
+                "1 to the number of runs",
+            ));
         }
         Ok(plan)
     }
@@ -164,11 +174,11 @@ impl Experiment for ExperimentPlan {
     fn measured(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
         let number = |key: &str, text: &str| {
             let number = text.parse::<u64>();
-            number.map_err(|_| wrong(key, text, "a whole number, 1 or larger"))
+            number.map_err(|_| invalid_value(key, text, "a whole number, 1 or larger"))
         };
         let record = self.record(
             number("subject", &key.subject)?,
-            (key.condition.parse()).map_err(|_| wrong("condition", &key.condition, "C1 to C6"))?,
+            (key.condition.parse()).map_err(|_| invalid_value("condition", &key.condition, "C1 to C6"))?,
             number("run", &key.run)?,
         )?;
         Ok(MeasuredRun { record, change_s: None })
@@ -181,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_plan_is_the_experiment_of_the_text() {
+    fn plan_matches_the_thesis_and_bad_values_are_refused() {
         let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
         assert_eq!((plan.subjects, plan.runs, plan.evaluated), (3, 7, 5));
         for (from, to, named) in [
@@ -197,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_of_one_subject_are_of_one_person_and_differ() {
+    fn runs_of_a_subject_differ_and_are_reproducible() {
         let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
         let gain = |subject, run| {
             plan.record(subject, Condition::C1, run)

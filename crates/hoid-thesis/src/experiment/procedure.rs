@@ -13,7 +13,7 @@ use crate::ThesisError;
 /// of 81.92 s.
 const SHARE: f64 = 0.375;
 /// Number of samples between stored estimates.
-const EVERY: usize = 32;
+const STORED_SAMPLE_INTERVAL: usize = 32;
 /// Memory length and initial covariance P0, as in section V.B.
 const SETTINGS: [(&str, &str); 2] = [("memory", "256"), ("covariance", "0.1")];
 
@@ -187,7 +187,7 @@ fn course(record: &Record, start: &Fit) -> Result<RecursiveTrace, ThesisError> {
         start: StartAt::Span(Some(spans_s(record)[0])),
         ..options.with(&SETTINGS)?
     };
-    let trace = track_from(record, &options, EVERY, Some(start))?;
+    let trace = track_from(record, &options, STORED_SAMPLE_INTERVAL, Some(start))?;
     let places = places(&orders);
     let mut course = RecursiveTrace::default();
     for row in 0..trace.len() {
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn without_remnant_the_procedure_finds_the_operator() {
+    fn procedure_finds_the_operator_without_remnant() {
         let found = evaluate(&run(0.0), (27, 31)).unwrap();
         let truth = found.truth.unwrap();
         assert_eq!((found.nk[0], truth.nk), (29, 29));
@@ -303,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_remnant_leaves_delay_and_time_constant() {
+    fn delay_and_time_constant_are_found_with_small_remnant() {
         let found = evaluate(&run(0.05), (26, 32)).unwrap();
         assert!((28..=30).contains(&found.nk[1]), "{:?}", found.nk);
         // The remnant is held exactly, so d1 gives T_n* = .055 by backward Euler; the standard error is .006.
@@ -316,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn a_range_without_delays_is_refused() {
+    fn empty_delay_range_is_refused() {
         assert!(evaluate(&run(0.05), (30, 29)).is_err());
     }
 }

@@ -23,7 +23,7 @@ const NEAR_CROSSOVER_RAD_S: f64 = 2.0;
 /// Limit between the slopes of a single and a double integrator.
 const SLOPE_BETWEEN: f64 = -1.5;
 /// Limit for the duration of the middle 80 % of a sudden change, s.
-const SUDDEN_S: f64 = 1.0;
+const MAX_SUDDEN_S: f64 = 1.0;
 
 /// Recordings of people that are evaluated.
 #[derive(Debug, Clone)]
@@ -201,7 +201,7 @@ fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
     };
     let is_sudden = facts
         .change_per_s
-        .is_none_or(|rate| 2.0 * 9.0_f64.ln() / rate < SUDDEN_S);
+        .is_none_or(|rate| 2.0 * 9.0_f64.ln() / rate < MAX_SUDDEN_S);
     match (is_double(before)?, is_double(after)?, is_sudden) {
         (false, true, false) => Ok(Condition::C3),
         (false, true, true) => Ok(Condition::C4),
@@ -239,7 +239,7 @@ mod tests {
     }
 
     #[test]
-    fn a_condition_is_that_of_the_text_with_the_same_course() {
+    fn conditions_are_matched_by_elements_and_change() {
         let (s1, s2) = ("90/(s(s+6))", "30/(s(s+.2))");
         for (found, expected) in [
             (facts(s1, None, None), Condition::C1),
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_runs_by_their_numbers_are_evaluated() {
+    fn last_runs_are_selected_by_number() {
         let run = |number: u64, counts: bool| {
             format!(
                 "[[runs]]\nfile = \"{number}.csv\"\nsubject = \"a\"\ncondition = \"C1\"\nrun = \"{number}\"\ncounts = {counts}\n"
@@ -274,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn a_directory_without_a_manifest_is_refused() {
+    fn directory_without_manifest_is_refused() {
         let directory = tempfile::tempdir().unwrap();
         let refused = RecordedPeople::open(directory.path()).unwrap_err().to_string();
         assert!(

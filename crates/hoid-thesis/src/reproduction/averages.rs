@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_average_and_the_median_are_drawn_of_each_order() {
+    fn average_and_median_are_drawn_for_each_order() {
         let text = r#"
 name = "recursive"
 replications = 1

@@ -57,7 +57,7 @@ impl IndexPage {
             let heading = (claim.theme.title() != theme).then(|| claim.theme.title());
             theme = claim.theme.title();
             let class = match finding.verdict {
-                Verdict::Holds | Verdict::HoldsAndMoreSo => "holds",
+                Verdict::Holds | Verdict::HoldsWithLargerEffect => "holds",
                 Verdict::HoldsInPart => "part",
                 Verdict::DoesNotHold => "not",
                 Verdict::CannotBeTested(_) => "open",
@@ -71,7 +71,7 @@ impl IndexPage {
         let count = |of: fn(&Verdict) -> bool| findings.iter().filter(|(_, finding)| of(&finding.verdict)).count();
         self.tally = [
             count(|v| *v == Verdict::Holds),
-            count(|v| *v == Verdict::HoldsAndMoreSo),
+            count(|v| *v == Verdict::HoldsWithLargerEffect),
             count(|v| *v == Verdict::HoldsInPart),
             count(|v| *v == Verdict::DoesNotHold),
             count(|v| matches!(v, Verdict::CannotBeTested(_))),

@@ -93,7 +93,7 @@ pub fn reproduce(
     notify: &(dyn Fn(ReproductionEvent<'_>) + Sync),
     keep_running: &(dyn Fn() -> bool + Sync),
 ) -> Result<Option<ReproductionSummary>, ThesisError> {
-    let begin = Instant::now();
+    let start_time = Instant::now();
     let mut index = IndexPage::default();
     let all = match &wanted.recordings {
         Some(_) if wanted.only != [EXPERIMENT_RUNS] => return Err(ThesisError::NotTheExperiment),
@@ -132,7 +132,7 @@ pub fn reproduce(
         if !keep_running() {
             return Ok(None);
         }
-        let begin = Instant::now();
+        let start_time = Instant::now();
         let done = AtomicU64::new(0);
         let watch = ProgressCallbacks {
             done: &|estimates| {
@@ -155,12 +155,12 @@ pub fn reproduce(
             title: shared.title.to_owned(),
             directory: String::new(),
             estimates: shared.estimates,
-            seconds: Some(begin.elapsed().as_secs_f64()),
+            seconds: Some(start_time.elapsed().as_secs_f64()),
         };
         notify(ReproductionEvent::Study(&entry));
         index.add_study(&entry);
     }
-    let simulated_s = begin.elapsed().as_secs_f64();
+    let simulated_s = start_time.elapsed().as_secs_f64();
     for name in ["figures", "tables"] {
         make_directory(&directory.join(name))?;
     }
@@ -199,7 +199,7 @@ pub fn reproduce(
         items: chosen.len(),
         tally,
         simulated_s,
-        drawn_s: begin.elapsed().as_secs_f64() - simulated_s,
+        drawn_s: start_time.elapsed().as_secs_f64() - simulated_s,
     }))
 }
 
@@ -265,7 +265,7 @@ fn study(
 ) -> Result<Option<(StudyEntry, Results)>, ThesisError> {
     let plan = named.plan()?.with_replications(wanted.replications)?;
     let directory = directory.join("studies").join(named.name);
-    let begin = Instant::now();
+    let start_time = Instant::now();
     let options = RunOptions {
         jobs: wanted.jobs,
         resume: true,
@@ -289,7 +289,7 @@ fn study(
         title: plan.title.clone(),
         directory: format!("studies/{}", plan.name),
         estimates: plan.estimates(),
-        seconds: (outcome.estimates > 0).then(|| begin.elapsed().as_secs_f64()),
+        seconds: (outcome.estimates > 0).then(|| start_time.elapsed().as_secs_f64()),
     };
     Ok(Some((entry, Results::read(&directory)?)))
 }

@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_known_error_is_measured_where_it_is() {
+    fn known_errors_are_measured() {
         let scenario = Scenario::condition(Condition::C4);
         let record = Simulator::new(&scenario)
             .unwrap()

@@ -98,7 +98,7 @@ method = "rls"
 "#;
 
     #[test]
-    fn the_plan_of_the_book_has_all_comparators() {
+    fn survey_plan_has_all_comparators() {
         let plan = SurveyPlan::parse(SURVEY.text, super::super::COMPARATORS, "survey.toml").unwrap();
         let methods: Vec<&str> = plan.comparators.iter().map(|(_, of)| of.about().name).collect();
         for comparator in comparators() {
@@ -111,7 +111,7 @@ method = "rls"
     }
 
     #[test]
-    fn options_are_set_and_what_is_unknown_is_refused_by_name() {
+    fn options_are_set_and_unknown_names_refused() {
         let parse = |tail: &str| SurveyPlan::parse(HEAD, &format!("[[comparators]]\n{tail}"), "small.toml");
         let plan = parse("name = \"FIR\"\nmethod = \"rls-fir\"\nnb = 64\n").unwrap();
         assert_eq!(plan.comparators[0].1.get("nb").as_deref(), Some("64"));

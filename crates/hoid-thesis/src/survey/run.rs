@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// Number of samples between stored estimates.
-const EVERY: usize = 32;
+const STORED_SAMPLE_INTERVAL: usize = 32;
 /// Number of the first replication used as a validation set; it is larger than the number of any evaluated run.
 const VALIDATION: u64 = 1 << 40;
 
@@ -91,7 +91,9 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
     let scenario = cell.resolved.scenario();
     let lines: Vec<f64> = scenario.forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect();
     let omega = &lines[LINES.start.min(lines.len())..LINES.end.min(lines.len())];
-    let at: Vec<usize> = (EVERY - 1..record.len()).step_by(EVERY).collect();
+    let at: Vec<usize> = (STORED_SAMPLE_INTERVAL - 1..record.len())
+        .step_by(STORED_SAMPLE_INTERVAL)
+        .collect();
     let task = Task {
         record,
         at: &at,
@@ -104,9 +106,9 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
     };
     let measured =
         |name: &str, extra_information: &'static str, follow: &dyn Fn() -> Result<TrackingResult, ThesisError>| {
-            let begin = Instant::now();
+            let start_time = Instant::now();
             let followed = follow();
-            let seconds = begin.elapsed().as_secs_f64();
+            let seconds = start_time.elapsed().as_secs_f64();
             let errors = followed.and_then(|found| errors(record, &at, omega, &found));
             MethodResult {
                 name: name.to_owned(),
@@ -130,7 +132,7 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
 /// same estimate at all times.
 fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
     match estimator.task_for(&cell.resolved) {
-        StudyTask::Track(options) => of_trace(&track(task.record, &options, EVERY)?, task),
+        StudyTask::Track(options) => of_trace(&track(task.record, &options, STORED_SAMPLE_INTERVAL)?, task),
         StudyTask::Fit(options) => {
             let (from_s, to_s) = estimator.span_s.unwrap_or((task.record.time_s(0), f64::INFINITY));
             let span = task
@@ -175,7 +177,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    const SMALL: &str = r#"
+    const SMALL_PLAN: &str = r#"
 name = "small"
 seed = 5
 replications = 2
@@ -197,15 +199,15 @@ name = "network"
 method = "linear-network"
 orders.nk = 29
 "#;
-    const LINES_TOO: &str = r#"
+    const FOURIER_COMPARATOR: &str = r#"
 [[comparators]]
 name = "lines"
 method = "fourier"
 "#;
 
     #[test]
-    fn estimators_and_comparators_meet_on_the_same_runs() {
-        let plan = SurveyPlan::parse(SMALL, LINES_TOO, "small.toml").unwrap();
+    fn estimators_and_comparators_share_the_runs() {
+        let plan = SurveyPlan::parse(SMALL_PLAN, FOURIER_COMPARATOR, "small.toml").unwrap();
         let found = survey(&plan, &|_| ()).unwrap();
         let names: Vec<&str> = found.iter().map(|of| of.name.as_str()).collect();
         assert_eq!(names, ["RLS", "BJ", "network", "lines"]);

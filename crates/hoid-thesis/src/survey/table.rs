@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn medians_are_of_the_runs_that_give_a_number() {
+    fn medians_ignore_failed_runs() {
         let errors = |before: f64, k_e: f64| {
             Ok(Errors {
                 response: [before, 20.0, 30.0],

@@ -34,16 +34,16 @@ pub fn measure(name: &str, n: usize, further: &[String]) {
     }
     let work = work(name, parameters);
     let before = resident_peak();
-    let begun = Instant::now();
+    let start_time = Instant::now();
     work(&record);
-    let mut seconds = begun.elapsed().as_secs_f64();
+    let mut seconds = start_time.elapsed().as_secs_f64();
     let peak = resident_peak();
     if seconds < SHORT_S {
         let mut times: Vec<f64> = (0..(SHORT_S / seconds).clamp(3.0, 200.0) as usize)
             .map(|_| {
-                let begun = Instant::now();
+                let start_time = Instant::now();
                 work(&record);
-                begun.elapsed().as_secs_f64()
+                start_time.elapsed().as_secs_f64()
             })
             .collect();
         times.sort_by(f64::total_cmp);

@@ -84,16 +84,16 @@ fn main() {
     for task in TASKS {
         if only.is_empty() || only.iter().any(|name| name == task) {
             let (seconds, answer) = run(task, &shared, effort);
-            tell(task, seconds, &answer);
+            print_task(task, seconds, &answer);
         }
     }
     if let Some(replications) = replications {
         let (seconds, answer) = whole_text(directory, replications);
-        tell("reproduce", seconds, &answer);
+        print_task("reproduce", seconds, &answer);
     }
 }
 
-fn tell(task: &str, seconds: f64, answer: &[f64]) {
+fn print_task(task: &str, seconds: f64, answer: &[f64]) {
     let peer = concat!("hoid ", env!("CARGO_PKG_VERSION"));
     println!(
         "{}",
@@ -149,19 +149,19 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
         }
         "cell" => {
             // As many runs as there are lanes are computed at a time, in existing memory.
-            let beside = InstructionSet::Best.lanes().unwrap();
-            let (mut noises, mut runs) = (vec![shared.noise.clone(); beside], Vec::new());
+            let batch_size = InstructionSet::Best.lanes().unwrap();
+            let (mut noises, mut runs) = (vec![shared.noise.clone(); batch_size], Vec::new());
             median(effort, || {
-                let mut records = Vec::with_capacity(CELL_RUNS as usize + beside);
-                for begin in (0..CELL_RUNS).step_by(beside) {
-                    for (noise, replication) in noises.iter_mut().zip(begin..CELL_RUNS) {
+                let mut records = Vec::with_capacity(CELL_RUNS as usize + batch_size);
+                for first_run in (0..CELL_RUNS).step_by(batch_size) {
+                    for (noise, replication) in noises.iter_mut().zip(first_run..CELL_RUNS) {
                         data::run_seed(replication).white_noise_into(noise);
                     }
                     let simulator = &shared.simulator;
                     simulator
                         .batched_signals_into(&noises, InstructionSet::Best, &mut runs)
                         .unwrap();
-                    let count = (CELL_RUNS - begin) as usize;
+                    let count = (CELL_RUNS - first_run) as usize;
                     records.extend(runs.iter().take(count).map(|run| shared.measured(run)));
                 }
                 let records: Vec<&Record> = records.iter().collect();
@@ -193,9 +193,9 @@ fn whole_text(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
         replications,
         ..Reproduction::default()
     };
-    let begun = Instant::now();
+    let start_time = Instant::now();
     let made = reproduce(&wanted, &out, &|_| {}, &|| true).unwrap().unwrap();
-    (begun.elapsed().as_secs_f64(), vec![made.items as f64])
+    (start_time.elapsed().as_secs_f64(), vec![made.items as f64])
 }
 
 fn forgetting<const N: usize>() -> Covariance<N> {
@@ -283,13 +283,13 @@ impl Default for Effort {
 
 /// Runs the work once to warm up, and then at least as long and as often as the effort requires.
 fn median<T>(effort: Effort, mut work: impl FnMut() -> T) -> (f64, T) {
-    let begun = Instant::now();
+    let start_time = Instant::now();
     let mut answer = black_box(work());
     let mut times = Vec::new();
-    while times.len() < effort.times || begun.elapsed().as_secs_f64() < effort.seconds {
-        let begun = Instant::now();
+    while times.len() < effort.times || start_time.elapsed().as_secs_f64() < effort.seconds {
+        let start_time = Instant::now();
         answer = black_box(work());
-        times.push(begun.elapsed().as_secs_f64());
+        times.push(start_time.elapsed().as_secs_f64());
     }
     times.sort_by(f64::total_cmp);
     (times[times.len() / 2], answer)

@@ -73,12 +73,12 @@ impl Truth<'_> {
 
     /// Returns a record of n samples that is cut out of a longer record.
     pub fn record(&self, n: usize, noise: f64, seed: u64) -> Record {
-        self.record_behind(500, n, noise, seed)
+        self.record_after_run_in(500, n, noise, seed)
     }
 
     /// Returns a record of n samples after a run-in, with white input of unit variance and innovations of the given
     /// size.
-    pub fn record_behind(&self, run_in: usize, n: usize, noise: f64, seed: u64) -> Record {
+    pub fn record_after_run_in(&self, run_in: usize, n: usize, noise: f64, seed: u64) -> Record {
         let mut draw = Draw(seed);
         let past = |x: &[f64], p: &[f64], first: usize| -> f64 {
             p.iter()

@@ -134,9 +134,9 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         return Ok(());
     }
     hoid::io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
-    let mut said = format!("{} runs in {}\n", manifest.runs.len(), path.display());
+    let mut message = format!("{} runs in {}\n", manifest.runs.len(), path.display());
     if !others.is_empty() {
-        said.push_str(&format!(
+        message.push_str(&format!(
             "Files that do not match {:?}: {}; the first is {}\n",
             args.pattern,
             others.len(),
@@ -147,14 +147,14 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         let place = [one.table.as_str(), one.key].join(" ");
         let place = place.trim();
         let colon = if place.is_empty() { "" } else { ": " };
-        said.push_str(&format!("- {place}{colon}{}\n", one.words));
+        message.push_str(&format!("- {place}{colon}{}\n", one.words));
     }
-    said.push_str(&format!(
+    message.push_str(&format!(
         "Check {}, then: hoid group {} --out results\n",
         path.display(),
         path.display()
     ));
-    output::show(&said)
+    output::show(&message)
 }
 
 fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError> {

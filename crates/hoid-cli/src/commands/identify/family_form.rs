@@ -12,9 +12,9 @@ use hoid::report::{numbers, sentence_of_operator, undetermined};
 use crate::{error::CliError, text};
 
 /// The delay for an error that is linear between its samples is printed in addition to tau_e only if the two delays
-/// differ by at least this number of standard errors of tau_e; `LEAST_HALF_S` is the smallest such difference in s.
-const STRAIGHT_ERRORS: f64 = 2.0;
-const LEAST_HALF_S: f64 = 0.007;
+/// differ by at least this number of standard errors of tau_e; `MIN_HALF_S` is the smallest such difference in s.
+const MIN_DIFFERENCE_ERRORS: f64 = 2.0;
+const MIN_HALF_S: f64 = 0.007;
 
 /// Frequencies in rad/s at which the product of the response to the target and the response of the controlled element
 /// is printed.
@@ -68,7 +68,7 @@ impl FamilyReport<'_> {
             page.push_str(&parameters(&of.parameters, &gain));
             page.push('\n');
         }
-        page.push_str(&self.between_samples());
+        page.push_str(&self.intersample_sentence());
         page.push_str(&self.channels(&gain, verbose));
         if let Some(element) = self.element {
             let here = fit.loop_measures(0, element);
@@ -115,7 +115,7 @@ impl FamilyReport<'_> {
                     page.push_str(&format!("Response to {name} ({role}): {}\n", of.operator.form()));
                     page.push_str(&parameters(&of.parameters, gain));
                     page.push('\n');
-                    page.push_str(&self.with_element(channel));
+                    page.push_str(&self.element_sentence(channel));
                 }
             }
             if verbose {
@@ -136,7 +136,7 @@ impl FamilyReport<'_> {
     /// Returns a sentence with the product of the response to the target and the response of the controlled element;
     /// empty unless both are known. The product is one if the response to the target alone makes the output follow the
     /// target.
-    fn with_element(&self, channel: &ChannelFit) -> String {
+    fn element_sentence(&self, channel: &ChannelFit) -> String {
         let Some(element) = self.element.filter(|_| channel.role == ChannelRole::Feedforward) else {
             return String::new();
         };
@@ -170,7 +170,7 @@ impl FamilyReport<'_> {
 
     /// Returns a sentence on the behaviour of the error between its samples for which tau_e is valid, with the delay
     /// for the other behaviour if the two delays differ noticeably; empty if they do not.
-    fn between_samples(&self) -> String {
+    fn intersample_sentence(&self) -> String {
         let fit = self.fit;
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
         let Some((tau, straight)) = named.zip(fit.delay_if_linear_s(0)) else {
@@ -180,7 +180,7 @@ impl FamilyReport<'_> {
             };
         };
         let half = straight - tau.value;
-        if half < LEAST_HALF_S || half < STRAIGHT_ERRORS * tau.standard_error.unwrap_or(f64::INFINITY) {
+        if half < MIN_HALF_S || half < MIN_DIFFERENCE_ERRORS * tau.standard_error.unwrap_or(f64::INFINITY) {
             return String::new();
         }
         format!(
@@ -247,12 +247,12 @@ impl FamilyReport<'_> {
             .collect();
         let mut rows = text::table(&heads);
         for (k, here) in fit.operator(0).parameters.iter().enumerate() {
-            let beside = others.iter().filter_map(|(_, of)| of.get(k));
-            let beside = beside.map(|(_, there)| with_error(there.value, there.standard_error));
+            let other_values = others.iter().filter_map(|(_, of)| of.get(k));
+            let other_values = other_values.map(|(_, there)| with_error(there.value, there.standard_error));
             rows.add_row(
                 [named(here, &gain), with_error(here.value, here.standard_error)]
                     .into_iter()
-                    .chain(beside),
+                    .chain(other_values),
             );
         }
         let mut page = format!("\n{rows}\n");

@@ -12,7 +12,7 @@ pub const LONGEST_GAP_S: f64 = 10.0;
 /// back.
 const SET_BACK_LINES: usize = 10;
 /// Number of samples by which the grid may be ahead of the times before this is reported.
-const LARGEST_LEAD: f64 = 2.0;
+const MAX_LEAD_SAMPLES: f64 = 2.0;
 
 /// Number of lines over which the rate of the times is checked.
 const RATE_LINES: usize = 128;
@@ -36,7 +36,7 @@ pub struct Clock {
     /// Position of the last sample on the grid, and its time.
     last: Option<(f64, f64)>,
     /// Time of the last line that was not later than the last accepted line, and the number of such lines in succession.
-    behind: Option<(f64, usize)>,
+    late: Option<(f64, usize)>,
     too_fast: bool,
     /// Differences of successive times, collected for the next check of the rate, s.
     steps: Vec<f64>,
@@ -47,7 +47,7 @@ impl Clock {
         Self {
             sample_time_s,
             last: None,
-            behind: None,
+            late: None,
             too_fast: false,
             steps: Vec::with_capacity(RATE_LINES),
         }
@@ -65,22 +65,22 @@ impl Clock {
             return next;
         };
         if t <= last_s {
-            let row = match self.behind {
+            let row = match self.late {
                 Some((before, n)) if t > before => n + 1,
                 _ => 1,
             };
-            self.behind = Some((t, row));
+            self.late = Some((t, row));
             if row < SET_BACK_LINES {
                 return Arrival::Behind { last_s };
             }
-            self.behind = None;
+            self.late = None;
             self.last = Some((t, t));
             return Arrival::Sample {
                 missing: row - 1,
                 left_out: false,
             };
         }
-        self.behind = None;
+        self.late = None;
         let steps = ((t - place) / ts).round().max(1.0);
         let most = (LONGEST_GAP_S / ts).floor();
         if steps - 1.0 > most {
@@ -92,7 +92,7 @@ impl Clock {
         }
         let expected = place + steps * ts;
         self.steps.push(t - last_s);
-        self.too_fast |= expected - t > LARGEST_LEAD * ts;
+        self.too_fast |= expected - t > MAX_LEAD_SAMPLES * ts;
         self.last = Some((expected + GAIN * (t - expected), t));
         Arrival::Sample {
             missing: steps as usize - 1,
@@ -115,8 +115,8 @@ impl Clock {
         (is_off(median) && is_off(mean)).then_some(1.0 / median)
     }
 
-    /// True, once, after the grid has run ahead of the times by more than [`LARGEST_LEAD`] samples, because the times
-    /// advance by less than the sample time per line.
+    /// True, once, after the grid has run ahead of the times by more than [`MAX_LEAD_SAMPLES`] samples, because the
+    /// times advance by less than the sample time per line.
     pub fn too_fast(&mut self) -> bool {
         std::mem::take(&mut self.too_fast)
     }
@@ -129,12 +129,12 @@ mod tests {
     fn missing(clock: &mut Clock, t: f64) -> usize {
         match clock.take(t) {
             Arrival::Sample { missing, .. } => missing,
-            behind => panic!("{t}: {behind:?}"),
+            late => panic!("{t}: {late:?}"),
         }
     }
 
     #[test]
-    fn jitter_and_drift_make_no_gaps_and_gaps_are_counted() {
+    fn gaps_are_counted_despite_jitter_and_drift() {
         let mut clock = Clock::new(0.01);
         for k in 0..20_000 {
             let k = f64::from(k);
@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_behind_are_dropped_until_the_clock_is_believed() {
+    fn late_lines_are_dropped_until_the_clock_is_accepted() {
         let mut clock = Clock::new(0.01);
         missing(&mut clock, 1.0);
         for t in [1.0, 0.5, 0.4, 1.0] {
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn another_rate_is_told_from_gaps_and_rounding() {
+    fn other_rates_are_distinguished_from_gaps() {
         let rates = |t: &dyn Fn(f64) -> f64| -> Vec<f64> {
             let mut clock = Clock::new(0.01);
             let take = |k: u32| {
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_come_too_fast_are_noticed() {
+    fn too_fast_lines_are_detected() {
         let mut clock = Clock::new(0.01);
         for k in 0..200 {
             assert_eq!(missing(&mut clock, 0.005 * f64::from(k)), 0);

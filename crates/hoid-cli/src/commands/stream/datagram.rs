@@ -89,8 +89,8 @@ impl SampleDatagram {
     /// Converts the sample to the form read from a line; an invalid value is NaN.
     pub fn read(&self, sample_time: SampleTime, largest: f64) -> StreamSample {
         let sound = |v: f64| v.abs() <= largest;
-        let told = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));
-        let faults: Vec<String> = [told("e", self.e), told("u", self.u)].into_iter().flatten().collect();
+        let fault = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));
+        let faults: Vec<String> = [fault("e", self.e), fault("u", self.u)].into_iter().flatten().collect();
         let value = |v: f64| if sound(v) { v } else { f64::NAN };
         StreamSample {
             t: Some(if self.t.is_finite() {
@@ -175,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn samples_come_as_structs_and_as_text() {
+    fn samples_are_read_as_structs_and_as_text() {
         let read = |bytes: &[u8]| match Datagram::of(bytes) {
             Datagram::Sample(sample) => sample.read(SampleTime::HUNDREDTH, 1e6),
             other => panic!("{other:?}"),

@@ -10,9 +10,9 @@ use serde_json::{Map, Value};
 use crate::error::CliError;
 
 /// Maximum length of a line in bytes. The rest of a longer line is skipped, so the use of memory is bounded.
-const LONGEST: usize = 1 << 16;
+const MAX_LINE_BYTES: usize = 1 << 16;
 /// Maximum number of characters of an invalid cell shown in messages.
-const SHOWN: usize = 24;
+const MAX_CELL_CHARS: usize = 24;
 
 /// Reader of lines of bounded length.
 pub struct Lines<R> {
@@ -44,7 +44,7 @@ impl<R: BufRead> Lines<R> {
             }
             let end = chunk.iter().position(|b| *b == b'\n');
             let part = &chunk[..end.unwrap_or(chunk.len())];
-            let room = LONGEST - self.bytes.len();
+            let room = MAX_LINE_BYTES - self.bytes.len();
             self.bytes.extend_from_slice(&part[..part.len().min(room)]);
             let used = end.map_or(chunk.len(), |e| e + 1);
             let ended = end.is_some() || chunk.is_empty();
@@ -54,10 +54,10 @@ impl<R: BufRead> Lines<R> {
                 break;
             }
         }
-        Ok(Some(if self.bytes.len() < LONGEST {
+        Ok(Some(if self.bytes.len() < MAX_LINE_BYTES {
             Ok(String::from_utf8_lossy(&self.bytes).into_owned())
         } else {
-            Err(format!("the line is longer than {LONGEST} bytes"))
+            Err(format!("the line is longer than {MAX_LINE_BYTES} bytes"))
         }))
     }
 }
@@ -343,8 +343,12 @@ pub fn is_object(text: &str) -> bool {
 
 /// Returns a text in quotation marks, shortened to a readable length.
 fn shown(text: &str) -> String {
-    let cut: String = text.chars().take(SHOWN).collect();
-    let rest = if text.chars().count() > SHOWN { "..." } else { "" };
+    let cut: String = text.chars().take(MAX_CELL_CHARS).collect();
+    let rest = if text.chars().count() > MAX_CELL_CHARS {
+        "..."
+    } else {
+        ""
+    };
     format!("\"{}{rest}\"", cut.escape_debug())
 }
 
@@ -373,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn objects_by_the_names_of_the_channels() {
+    fn json_objects_are_read_by_channel_name() {
         let read = sample(
             &mut default_columns(),
             r#"{"t": 2, "e": 0.5, "u": -1e0, "f_t": 7, "button": [1]}"#,
@@ -401,7 +405,7 @@ mod tests {
             ("{\"e\": 1e999, \"u\": 1}", "not a JSON object"),
         ] {
             match default_columns().read(line).unwrap() {
-                ParsedLine::Unreadable(said) => assert!(said.contains(reason), "{line}: {said}"),
+                ParsedLine::Unreadable(fault) => assert!(fault.contains(reason), "{line}: {fault}"),
                 other => panic!("{line}: {other:?}"),
             }
         }
@@ -409,7 +413,7 @@ mod tests {
     }
 
     #[test]
-    fn columns_by_position_and_by_header() {
+    fn columns_are_read_by_position_or_header() {
         for (line, t, reference) in [
             ("0.5,-1", None, None),
             ("2 ; 0.5; -1", Some(2.0), None),
@@ -437,7 +441,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_told_and_end_nothing() {
+    fn faults_are_reported_and_reading_continues() {
         let mut columns = default_columns();
         for unreadable in ["garbage", "\u{0}\u{1}", ",", "1,2,3,4,5"] {
             assert!(
@@ -464,8 +468,8 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_any_length_and_end() {
-        let mut text = vec![b'x'; 3 * LONGEST];
+    fn lines_of_any_length_and_ending_are_read() {
+        let mut text = vec![b'x'; 3 * MAX_LINE_BYTES];
         text.extend_from_slice(b"\na,b\r\n\n\xff\xfe\nlast");
         let mut lines = Lines::new(io::BufReader::with_capacity(100, text.as_slice()));
         assert!(lines.next().unwrap().unwrap().is_err());

@@ -8,11 +8,11 @@ use std::{
 use crate::{args::UdpPlaces, error::CliError};
 
 /// Maximum size of a datagram, bytes.
-const LARGEST: usize = 1 << 16;
+const MAX_DATAGRAM_BYTES: usize = 1 << 16;
 
 /// Returns a buffer for a datagram.
 pub fn datagram_buffer() -> Vec<u8> {
-    vec![0; LARGEST]
+    vec![0; MAX_DATAGRAM_BYTES]
 }
 
 /// A socket that receives samples, and the address to which answers are sent.

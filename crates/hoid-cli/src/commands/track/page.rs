@@ -98,7 +98,7 @@ fn covariance(tracked: &Tracked) -> String {
 }
 
 /// Returns the rows that are printed, evenly spaced over the rows in which the estimate is updated.
-fn picked_rows(tracked: &Tracked) -> Vec<usize> {
+fn printed_rows(tracked: &Tracked) -> Vec<usize> {
     let Some(last) = tracked.trace.len().checked_sub(1) else {
         return Vec::new();
     };
@@ -133,7 +133,7 @@ fn rows_shown(tracked: &Tracked) -> String {
         header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
     }
     let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).into_time_series();
-    for row in picked_rows(tracked) {
+    for row in printed_rows(tracked) {
         let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
         if with_operator {
             let of = |name| value_of(&tracked.operators[row], name);
@@ -183,7 +183,7 @@ fn further_response(tracked: &Tracked) -> String {
             .flat_map(|omega| [format!("dB at {omega} rad/s"), format!("deg at {omega} rad/s")]),
     );
     let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).into_time_series();
-    for row in picked_rows(tracked) {
+    for row in printed_rows(tracked) {
         let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
         for omega in at {
             let found = trace.further_response(row, *omega);

@@ -67,7 +67,7 @@ pub fn signal(child: &Child, name: &str) {
 }
 
 /// Returns the remaining messages of a program, which must end successfully.
-pub fn last_words(child: &mut Child, said: &mut BufReader<ChildStderr>) -> String {
+pub fn remaining_output(child: &mut Child, said: &mut BufReader<ChildStderr>) -> String {
     let mut words = String::new();
     said.read_to_string(&mut words).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(0), "{words}");

@@ -14,12 +14,12 @@ use std::{
 };
 
 use super::{
-    Draw, Summary, last_words, sample,
+    Draw, Summary, remaining_output, sample,
     udp::{Stream, as_struct},
 };
 
 /// Timeout of an answer.
-const SILENCE: Duration = Duration::from_secs(5);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Number of samples sent, and latencies of the answered samples.
 pub struct Tally {
@@ -45,10 +45,10 @@ impl Tally {
 
 /// Calls a function at each time k/rate.
 pub fn paced(rate_hz: usize, n: usize, mut call: impl FnMut(usize)) {
-    let begin = Instant::now();
+    let start_time = Instant::now();
     for k in 0..n {
         let due = Duration::from_secs_f64(k as f64 / rate_hz as f64);
-        thread::sleep(due.saturating_sub(begin.elapsed()));
+        thread::sleep(due.saturating_sub(start_time.elapsed()));
         call(k);
     }
 }
@@ -76,7 +76,7 @@ pub fn over_udp(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw) -> Ta
 
 /// Receives up to n answers until a timeout; returns their sequence numbers and arrival times.
 pub fn received(socket: &UdpSocket, n: usize) -> Vec<(u32, Instant)> {
-    socket.set_read_timeout(Some(SILENCE)).unwrap();
+    socket.set_read_timeout(Some(ANSWER_TIMEOUT)).unwrap();
     let mut all = Vec::with_capacity(n);
     let mut bytes = [0; 256];
     while all.len() < n {
@@ -99,7 +99,7 @@ pub fn over_pipes(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw, pau
         .unwrap();
     let mut input = child.stdin.take().unwrap();
     let output = BufReader::new(child.stdout.take().unwrap());
-    let mut said = BufReader::new(child.stderr.take().unwrap());
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
     let receiver = thread::spawn(move || {
         let mut all = Vec::with_capacity(n);
         for line in output.lines() {
@@ -124,6 +124,6 @@ pub fn over_pipes(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw, pau
     Tally {
         sent: n,
         trips: received.into_iter().zip(sent).map(|(at, sent)| at - sent).collect(),
-        summary: Summary::of(&last_words(&mut child, &mut said)),
+        summary: Summary::of(&remaining_output(&mut child, &mut stderr)),
     }
 }

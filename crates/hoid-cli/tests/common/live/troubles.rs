@@ -37,8 +37,8 @@ pub fn all(program: &Path, pause: Duration, hostile: usize, draw: &mut Draw) -> 
         reader_of_pipe_stops(program, pause, draw),
         reader_of_udp_stops(program, pause, draw),
         stream_stops(program, pause, draw),
-        sender_begins_again(program, draw),
-        stream_begins_again(program, draw),
+        sender_restarts(program, draw),
+        stream_restarts(program, draw),
         clock_jumps(program, draw),
         hostile_datagrams(program, hostile, draw),
     ]
@@ -60,7 +60,7 @@ pub fn reader_of_pipe_stops(program: &Path, pause: Duration, draw: &mut Draw) ->
 
 /// Sends further samples until one of them is answered; returns the total number of samples, and of
 /// answers received meanwhile.
-fn until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)) -> (usize, usize) {
+fn send_until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)) -> (usize, usize) {
     let (mut sent, mut answered) = (sent, 0);
     stream
         .socket
@@ -93,7 +93,7 @@ pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> 
     };
     let n = (pause.as_secs_f64() * RATE as f64) as usize;
     paced(RATE, n, &mut send);
-    let (sent, answered) = until_answered(&stream, n, send);
+    let (sent, answered) = send_until_answered(&stream, n, send);
     let outcome = outcome("the reader of UDP stops", sent, answered, stream);
     let summary = outcome.summary;
     assert_eq!((summary.samples, summary.dropped), (sent, 0));
@@ -114,7 +114,7 @@ pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome
     let n = (pause.as_secs_f64() * RATE as f64) as usize;
     paced(RATE, n, |k| send(k + 1));
     signal(&stream.child, "-CONT");
-    let (sent, answered) = until_answered(&stream, n + 1, send);
+    let (sent, answered) = send_until_answered(&stream, n + 1, send);
     let outcome = outcome("the stream stays constant", sent, answered + 1, stream);
     let summary = outcome.summary;
     assert_eq!((summary.samples, summary.dropped), (sent, 0));
@@ -123,7 +123,7 @@ pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome
 }
 
 /// A sender that restarts its sequence at zero is accepted after ten samples.
-pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
+pub fn sender_restarts(program: &Path, draw: &mut Draw) -> Outcome {
     let mut stream = Stream::new(program, SLOW, &[]);
     let ask = |stream: &Stream, draw: &mut Draw| {
         for k in 0..200 {
@@ -146,7 +146,7 @@ pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
 }
 
 /// A stream that was killed and restarted answers from its first sample on; samples sent in the meantime are lost.
-pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
+pub fn stream_restarts(program: &Path, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let datagram = |k: u32, draw: &mut Draw| {
         let (e, u) = sample(f64::from(k) / SLOW as f64, draw);
@@ -198,7 +198,7 @@ pub fn hostile_datagrams(program: &Path, hostile: usize, draw: &mut Draw) -> Out
     let stream = Stream::new(program, SLOW, &[]);
     let mut sent = 0;
     for k in 0..hostile {
-        stream.send(&no_sample(draw));
+        stream.send(&invalid_datagram(draw));
         if k % 8 == 7 {
             let (e, u) = sample(f64::from(sent) / SLOW as f64, draw);
             stream.send(&as_struct(sent, f64::NAN, e, u));
@@ -212,7 +212,7 @@ pub fn hostile_datagrams(program: &Path, hostile: usize, draw: &mut Draw) -> Out
     outcome
 }
 
-fn no_sample(draw: &mut Draw) -> Vec<u8> {
+fn invalid_datagram(draw: &mut Draw) -> Vec<u8> {
     let length = 1 + draw.below(300);
     let any: Vec<u8> = (0..length).map(|_| draw.bits() as u8).collect();
     let text: String = any.iter().map(|byte| char::from(b'a' + byte % 26)).collect();

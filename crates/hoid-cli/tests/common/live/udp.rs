@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use super::{last_words, signal};
+use super::{remaining_output, signal};
 
 /// Timeout, much longer than the latency of an answer.
 pub const PATIENCE: Duration = Duration::from_secs(60);
@@ -88,7 +88,7 @@ impl Stream {
     /// Interrupts the stream and returns its messages.
     pub fn end(mut self) -> String {
         signal(&self.child, "-INT");
-        last_words(&mut self.child, &mut self.said)
+        remaining_output(&mut self.child, &mut self.said)
     }
 
     /// Kills the stream; returns its port and the socket.

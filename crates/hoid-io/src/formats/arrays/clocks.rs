@@ -15,16 +15,16 @@ pub(super) struct Aligned {
     pub(super) note: String,
 }
 
-/// Interpolates the column `column_path` to the times of the stream with the path `beside`.
+/// Interpolates the column `column_path` to the times of the stream with the path `neighbour`.
 pub(super) fn aligned(
     column_paths: &[ColumnPath],
     column_path: &ColumnPath,
-    beside: &str,
+    neighbour: &str,
     file: &str,
 ) -> Result<Aligned, IoError> {
     let (from, to) = (
         times(column_paths, &column_path.parent, file)?,
-        times(column_paths, beside, file)?,
+        times(column_paths, neighbour, file)?,
     );
     let values = column_path.numbers().map(Numbers::values).unwrap_or_default();
     let (Some(first), Some(last)) = (from.first(), from.last()) else {
@@ -52,7 +52,7 @@ pub(super) fn aligned(
     let mut note = format!(
         "{} is interpolated linearly from {from_hz:.3} Hz to the {to_hz:.3} Hz of {}, where both have samples",
         shown(&column_path.path),
-        shown(beside)
+        shown(neighbour)
     );
     if from_hz > 1.5 * to_hz {
         note.push_str("; no low-pass filter was applied");
@@ -107,7 +107,7 @@ mod tests {
     use crate::formats::arrays::contents::{Entry, Indexing, Value};
 
     #[test]
-    fn other_times() {
+    fn signals_are_interpolated_to_another_clock() {
         let entry = |parent: &str, name: &str, values: &[f64]| {
             Entry::field(parent, name, Value::Array(Array::vector(Numbers::from_f64(values))))
         };

@@ -10,7 +10,7 @@ use crate::IoError;
 use crate::wording::shown;
 
 /// A matrix with more channels than this counts as an image.
-const MOST_LINES: usize = 256;
+const MAX_LINES: usize = 256;
 
 /// One column of a file, with its path.
 #[derive(Debug, Clone)]
@@ -124,7 +124,7 @@ impl Entry {
                 match sides.as_slice() {
                     [] | [_] => one(Holds::Numbers(array.numbers.clone())),
                     [..] if sides.contains(&0) => one(Holds::Numbers(array.numbers.clone())),
-                    [rows, columns] if array.dims.len() == 2 && *rows.min(columns) <= MOST_LINES => {
+                    [rows, columns] if array.dims.len() == 2 && *rows.min(columns) <= MAX_LINES => {
                         let count = *rows.min(columns);
                         let along_first = rows >= columns;
                         let name = |k: usize| match (indexing, along_first) {
@@ -171,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_of_matrices() {
+    fn matrices_are_split_into_columns() {
         let found = matrix(&[3, 2], true, Indexing::Python);
         assert_eq!(
             found,
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn parents() {
+    fn parent_of_a_path() {
         assert_eq!(parent("e"), "");
         assert_eq!(parent("data.run(3).e"), "data.run(3)");
         assert_eq!(parent("run(3).x(:,2)"), "run(3)");

@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_type_in_both_orders() {
+    fn all_types_are_read_in_both_byte_orders() {
         let check = |kind, little: &[u8], expected: f64| {
             let found = Numbers::new(little.to_vec(), kind, false).values();
             assert_eq!(found, [expected], "{kind:?}");
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_and_fields() {
+    fn strided_lines_and_fields_are_extracted() {
         let numbers = Numbers::from_f64(&[0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         assert_eq!(numbers.line(1, 3, 2).values(), [1.0, 4.0]);
         assert_eq!(numbers.line(1, 3, 9).values(), [1.0, 4.0]);

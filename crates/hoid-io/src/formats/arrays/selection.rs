@@ -24,7 +24,7 @@ pub(crate) const TIMES: [&str; 2] = ["t", "time"];
 pub(crate) const MOMENTS: &str = "s from the first";
 
 /// Maximum number of columns of a record; further columns are omitted.
-const MOST_COLUMNS: usize = 1024;
+const MAX_COLUMNS: usize = 1024;
 
 /// The arrays of a file as the source of the rows of a table, for messages.
 struct ArraySource<'a> {
@@ -68,15 +68,15 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
         used.extend(terms);
     }
     let mut notes = contents.notes;
-    let beside = (used.last())
+    let neighbour = (used.last())
         .and_then(|at| named.columns.get(*at))
         .map_or("", |(_, column_path)| column_path.parent.as_str());
     let mut columns: Vec<(String, &ColumnPath, Numbers)> = Vec::new();
     let mut shared = None;
     for (name, column_path) in used.iter().filter_map(|at| named.columns.get(*at)) {
         let mut numbers = column_path.numbers().ok_or_else(|| column_path.refused(file))?.clone();
-        if contents.own_clocks && column_path.parent != beside {
-            let aligned = clocks::aligned(&column_paths, column_path, beside, file)?;
+        if contents.own_clocks && column_path.parent != neighbour {
+            let aligned = clocks::aligned(&column_paths, column_path, neighbour, file)?;
             notes.push(aligned.note);
             numbers = aligned.numbers;
             shared = Some(common(shared, aligned.rows));
@@ -99,7 +99,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
         return Err(IoError::NoRows { file: file.to_owned() });
     }
     if !columns.iter().any(|(name, ..)| name == "t")
-        && let Some(time) = time_beside(&column_paths, beside, rows)
+        && let Some(time) = time_of_same_group(&column_paths, neighbour, rows)
     {
         if time.name() != "t" {
             notes.push(format!("{} is taken as t", shown(&time.path)));
@@ -107,8 +107,11 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
         columns.extend(time.numbers().map(|numbers| (String::from("t"), time, numbers.clone())));
     }
     let mut left_out = Vec::new();
-    for column_path in column_paths.iter().filter(|column_path| column_path.parent == beside) {
-        if columns.len() == MOST_COLUMNS {
+    for column_path in column_paths
+        .iter()
+        .filter(|column_path| column_path.parent == neighbour)
+    {
+        if columns.len() == MAX_COLUMNS {
             left_out.push(column_path.path.as_str());
             continue;
         }
@@ -249,8 +252,8 @@ fn ends<'a>(column_paths: &'a [ColumnPath], name: &str) -> Vec<&'a ColumnPath> {
 }
 
 /// Returns the time column with `rows` values in the structure of the output or in the nearest enclosing structure.
-fn time_beside<'a>(column_paths: &'a [ColumnPath], beside: &str, rows: usize) -> Option<&'a ColumnPath> {
-    let mut place = beside;
+fn time_of_same_group<'a>(column_paths: &'a [ColumnPath], neighbour: &str, rows: usize) -> Option<&'a ColumnPath> {
+    let mut place = neighbour;
     loop {
         let time = |name: &&str| {
             let is_time = |column_path: &&ColumnPath| column_path.parent == place && column_path.name() == *name;

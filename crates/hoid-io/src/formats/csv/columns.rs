@@ -3,7 +3,9 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use super::text::{comments, escape_formula, is_aside, place, reader, row_start, separator, text, unescape_formula};
+use super::text::{
+    comments, escape_formula, is_comment_or_blank, place, reader, row_start, separator, text, unescape_formula,
+};
 use crate::IoError;
 use crate::formats::format::RowWriter;
 use crate::results::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};
@@ -87,7 +89,7 @@ impl CsvColumns {
 /// Reads the columns from the bytes of a CSV file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
     let text = text(bytes, file)?;
-    let mut lines = text.lines().filter(|line| !is_aside(line));
+    let mut lines = text.lines().filter(|line| !is_comment_or_blank(line));
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };
@@ -203,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn kinds_of_columns() {
+    fn column_kinds_are_inferred() {
         use ColumnKind::{Real, Text, Whole};
         let text = "a,b,c,d,e,f\n1,1,1,,01,x\n18446744073709551615,1.0,,,2,1\n";
         assert_eq!(kinds(text), [Whole, Real, Real, Real, Real, Text]);
@@ -213,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_says_so() {
+    fn invalid_tables_are_errors() {
         let message = |text: &str| read(text.as_bytes(), "run.csv").unwrap_err().to_string();
         assert!(message("# only\n").contains("is empty"));
         assert!(message("1,2\n3,4\n").contains("line 1: the first line holds numbers"));

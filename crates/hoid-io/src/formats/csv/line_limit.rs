@@ -10,9 +10,9 @@ use std::path::Path;
 use crate::IoError;
 
 /// Maximum length of a line in bytes.
-pub(super) const LONGEST: usize = 32 << 20;
+pub(super) const MAX_LINE_BYTES: usize = 32 << 20;
 /// Number of bytes that are read and examined at a time.
-const PART: usize = 1 << 20;
+const READ_BYTES: usize = 1 << 20;
 
 /// Length of the line that is being read.
 #[derive(Debug, Default)]
@@ -32,16 +32,16 @@ impl LineLimit {
     /// Examines the next bytes.
     ///
     /// # Errors
-    /// [`IoError::LongLine`] for a line longer than [`LONGEST`].
+    /// [`IoError::LongLine`] for a line longer than [`MAX_LINE_BYTES`].
     pub(in crate::formats) fn add(&mut self, bytes: &[u8], file: &str) -> Result<(), IoError> {
         let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
-        for part in bytes.chunks(PART) {
+        for part in bytes.chunks(READ_BYTES) {
             let first = part.iter().position(is_end).unwrap_or(part.len());
-            if self.at.saturating_add(first).saturating_sub(self.line) > LONGEST {
+            if self.at.saturating_add(first).saturating_sub(self.line) > MAX_LINE_BYTES {
                 return Err(IoError::LongLine {
                     file: file.to_owned(),
                     byte: self.line,
-                    most_mb: LONGEST >> 20,
+                    most_mb: MAX_LINE_BYTES >> 20,
                 });
             }
             if let Some(last) = part.iter().rposition(is_end) {
@@ -71,7 +71,7 @@ pub(in crate::formats) fn whole_text(path: &Path, file: &str) -> Result<Vec<u8>,
     loop {
         let from = bytes.len();
         let read = (&mut opened)
-            .take(PART as u64)
+            .take(READ_BYTES as u64)
             .read_to_end(&mut bytes)
             .map_err(unreadable)?;
         if read == 0 {
@@ -87,7 +87,7 @@ mod tests {
 
     #[test]
     fn lines_up_to_the_limit_are_read() {
-        let line = vec![b'1'; LONGEST];
+        let line = vec![b'1'; MAX_LINE_BYTES];
         for end in [&b"\n"[..], b"\r", b"\r\n"] {
             let mut limit = LineLimit::default();
             for _ in 0..2 {
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_whole_text_without_line_ends_is_refused() {
+    fn text_without_line_ends_is_refused() {
         let file = tempfile::Builder::new().suffix(".csv").tempfile().unwrap();
         std::fs::write(file.path(), "t,\"e\"\n0,1\n").unwrap();
         assert_eq!(whole_text(file.path(), "run.csv").unwrap(), b"t,\"e\"\n0,1\n");

@@ -11,8 +11,8 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::foreign::made_plain;
-use super::line_limit::{LONGEST, LineLimit};
+use super::foreign::converted_to_plain_csv;
+use super::line_limit::{LineLimit, MAX_LINE_BYTES};
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::span_end::SpanEnd;
 use super::table::{Parsed, nth_row, parsed};
@@ -23,10 +23,11 @@ use crate::time::{is_time, is_time_unit, may_be_time};
 use crate::wording::shown;
 
 /// Minimum size, in bytes, of a file that is read block by block.
-const LONG: u64 = 16 << 20;
+const MIN_LONG_FILE_BYTES: u64 = 16 << 20;
 /// Number of bytes read to obtain the header and the first rows.
 const HEAD: usize = 256 << 10;
-/// Size of the first block in bytes; each further block is twice as long as the previous block, up to [`LONGEST`].
+/// Size of the first block in bytes; each further block is twice as long as the previous block, up to
+/// [`MAX_LINE_BYTES`].
 const BLOCK: usize = 1 << 20;
 /// Number of positions in the unread part of a file at which the time is probed.
 const PROBES: u32 = 64;
@@ -38,7 +39,7 @@ const PROBE: usize = 64 << 10;
 /// # Errors
 /// [`IoError::Unreadable`]; [`IoError::LongLine`].
 pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> Result<Option<Table<'a>>, IoError> {
-    of_length(path, file, options, LONG)
+    of_length(path, file, options, MIN_LONG_FILE_BYTES)
 }
 
 /// Reads the table of a text of at least `long` bytes.
@@ -163,7 +164,7 @@ impl Text {
         }
         // If the head is rewritten, the rest of the text may need the same changes.
         let found = bytes.clone();
-        if !made_plain(&mut bytes).is_empty() || bytes != found {
+        if !converted_to_plain_csv(&mut bytes).is_empty() || bytes != found {
             return Ok(None);
         }
         self.file.seek(SeekFrom::Start(self.at as u64))?;
@@ -196,7 +197,7 @@ impl Text {
                 source,
             })?;
             self.at = self.at.saturating_add(read);
-            self.next = self.next.saturating_mul(2).min(LONGEST);
+            self.next = self.next.saturating_mul(2).min(MAX_LINE_BYTES);
             limit.add(self.buffer.get(from..).unwrap_or_default(), file)?;
             let mut new = self.buffer.iter().enumerate().skip(from);
             let line = new.rfind(|(_, byte)| matches!(byte, b'\n' | b'\r'));
@@ -265,7 +266,7 @@ impl LongSource<'_> {
         // The bytes read end at the next row with a known position, or a fixed length after the start of the last row.
         let end = self
             .starts
-            .before(row.saturating_add(RowStarts::KEPT))
+            .before(row.saturating_add(RowStarts::KEPT_ROW_INTERVAL))
             .map_or(self.starts.last()?.saturating_add(PROBE), |next| next.0);
         let mut bytes = Vec::new();
         file.take(end.saturating_sub(from) as u64)
@@ -333,7 +334,7 @@ mod tests {
         text
     }
 
-    fn wanting(columns: &[&str], to_s: Option<f64>) -> ReadOptions {
+    fn options_for(columns: &[&str], to_s: Option<f64>) -> ReadOptions {
         ReadOptions {
             columns: Some(columns.iter().map(|name| (*name).to_owned()).collect()),
             span_s: (None, to_s),
@@ -342,10 +343,10 @@ mod tests {
     }
 
     #[test]
-    fn columns_and_places_are_those_of_the_whole_text() {
+    fn long_reader_matches_the_whole_text_reader() {
         let text = text(60_000, 60_000);
         let file = file(&text);
-        let options = wanting(&["n"], None);
+        let options = options_for(&["n"], None);
         let found = of_length(file.path(), "run.csv", &options, 0).unwrap().unwrap();
         let whole = parse(text.as_bytes(), "run.csv").unwrap();
         assert_eq!((found.names(), found.rows), (vec!["t", "e", "u", "n"], 60_000));
@@ -369,7 +370,7 @@ mod tests {
                 .unwrap()
                 .is_none()
         );
-        let missing = wanting(&["z"], None);
+        let missing = options_for(&["z"], None);
         assert!(of_length(file.path(), "run.csv", &missing, 0).unwrap().is_none());
         let last = text.rfind(",go,").unwrap();
         let quoted = format!("{},\"go\",{}", &text[..last], &text[last + 4..]);
@@ -397,7 +398,7 @@ mod tests {
 
     /// A recorder that was stopped by a full disk or a power cut may leave any number of zero bytes.
     #[test]
-    fn a_line_without_end_is_an_error() {
+    fn endless_line_is_an_error() {
         let rows = "1,2\n".repeat(100_000);
         let file = file(&format!("t,e\n{rows}"));
         let mut whole = File::options().write(true).open(file.path()).unwrap();
@@ -414,7 +415,7 @@ mod tests {
     /// The size of a sparse file may require more memory for its rows than any computer has.
     #[cfg(target_os = "linux")]
     #[test]
-    fn a_file_of_holes_is_left_to_the_reader_of_whole_texts() {
+    fn sparse_file_is_left_to_the_whole_text_reader() {
         let rows = "1,2\n".repeat(100_000);
         let file = file(&format!("t,e\n{rows}x,\"y\"\n"));
         let mut whole = File::options().write(true).open(file.path()).unwrap();
@@ -427,7 +428,7 @@ mod tests {
     }
 
     #[test]
-    fn reading_ends_after_the_span_unless_the_time_starts_again() {
+    fn reading_stops_after_the_span_unless_time_restarts() {
         let rows = |text: &str, options: &ReadOptions| {
             let table = of_length(file(text).path(), "run.csv", options, 0).unwrap().unwrap();
             (
@@ -435,24 +436,24 @@ mod tests {
                 table.columns[0].values.iter().filter(|t| **t < 10.0).count(),
             )
         };
-        let (first, in_span) = rows(&text(200_000, 200_000), &wanting(&[], Some(10.0)));
+        let (first, in_span) = rows(&text(200_000, 200_000), &options_for(&[], Some(10.0)));
         assert!((1000..60_000).contains(&first), "{first}");
         assert_eq!(in_span, 1000);
-        assert_eq!(rows(&text(200_000, 200_000), &wanting(&[], None)).0, 200_000);
+        assert_eq!(rows(&text(200_000, 200_000), &options_for(&[], None)).0, 200_000);
         // In trials of 1000 s, each trial contains the requested span, so the whole file is read.
         assert_eq!(
-            rows(&text(200_000, 100_000), &wanting(&[], Some(10.0))),
+            rows(&text(200_000, 100_000), &options_for(&[], Some(10.0))),
             (200_000, 2000)
         );
         // The span also ends the reading if samples are counted, or if the time is in another unit.
         let counted = ReadOptions {
             sampling_hz: Some(100.0),
-            ..wanting(&[], Some(10.0))
+            ..options_for(&[], Some(10.0))
         };
         assert!(rows(&text(200_000, 200_000), &counted).0 < 60_000);
         let ms = text(200_000, 200_000).replacen("\nt,", "\ntime_ms,", 1);
-        let whole = rows(&ms, &wanting(&[], Some(10.0)));
+        let whole = rows(&ms, &options_for(&[], Some(10.0)));
         assert_eq!(whole.0, 200_000, "2000 ms are not 10 s");
-        assert!(rows(&ms, &wanting(&[], Some(0.01))).0 < 60_000);
+        assert!(rows(&ms, &options_for(&[], Some(0.01))).0 < 60_000);
     }
 }

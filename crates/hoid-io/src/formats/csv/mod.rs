@@ -49,7 +49,7 @@ pub(super) const TSV: Format = Format {
 
 const READING: Reading = Reading::Table {
     record: |bytes, file| {
-        let notes = foreign::made_plain(bytes);
+        let notes = foreign::converted_to_plain_csv(bytes);
         let mut table = table::parse(bytes, file)?;
         table.notes.extend(notes);
         Ok(table)

@@ -15,13 +15,14 @@ use crate::table::Precision;
 
 /// Size, in bytes, of a part that one thread reads: large enough to justify a thread, and small compared with the
 /// columns.
-const PART: usize = 4 << 20;
+const PART_BYTES: usize = 4 << 20;
 /// Size in bytes of the first part, which is read without a thread; it contains a row that is not plain if such rows
 /// are frequent.
-const FIRST: usize = 64 << 10;
+const FIRST_PART_BYTES: usize = 64 << 10;
 /// Maximum number of threads.
 const THREADS: usize = 8;
-/// Positions of rows in the text of a table: of every [`KEPT`](RowStarts::KEPT)-th row and of the last row.
+/// Positions of rows in the text of a table: of every [`KEPT_ROW_INTERVAL`](RowStarts::KEPT_ROW_INTERVAL)-th row and of
+/// the last row.
 #[derive(Debug, Default)]
 pub(super) struct RowStarts {
     kept: Vec<usize>,
@@ -31,11 +32,11 @@ pub(super) struct RowStarts {
 
 impl RowStarts {
     /// Interval between rows whose position is kept.
-    pub(super) const KEPT: usize = 1024;
+    pub(super) const KEPT_ROW_INTERVAL: usize = 1024;
 
     /// Adds the position of the next row.
     pub(super) fn push(&mut self, start: usize) {
-        if self.rows.is_multiple_of(Self::KEPT) {
+        if self.rows.is_multiple_of(Self::KEPT_ROW_INTERVAL) {
             self.kept.push(start);
         }
         self.rows = self.rows.saturating_add(1);
@@ -54,7 +55,10 @@ impl RowStarts {
 
     /// Returns the kept position of the nearest row at or before `row`, and the number of rows from that row to `row`.
     pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
-        Some((*self.kept.get(row / Self::KEPT)?, row % Self::KEPT))
+        Some((
+            *self.kept.get(row / Self::KEPT_ROW_INTERVAL)?,
+            row % Self::KEPT_ROW_INTERVAL,
+        ))
     }
 }
 
@@ -86,7 +90,7 @@ pub(super) struct Layout<'a> {
 pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take: impl FnMut(Plain)) -> usize {
     let threads = thread::available_parallelism().map_or(1, |n| n.get().min(THREADS));
     let mut at = from;
-    let first = from..end_of_part(bytes, from, FIRST);
+    let first = from..end_of_part(bytes, from, FIRST_PART_BYTES);
     if !first.is_empty() {
         let run = run(bytes, first.clone(), layout);
         at = run.end;
@@ -99,7 +103,7 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
         let mut parts: Vec<Range<usize>> = Vec::with_capacity(threads);
         let mut start = at;
         while parts.len() < threads && start < bytes.len() {
-            let end = end_of_part(bytes, start, PART);
+            let end = end_of_part(bytes, start, PART_BYTES);
             parts.push(start..end);
             start = end;
         }
@@ -132,8 +136,8 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
 
 /// Returns the end of the part that starts at `start`, which is after the first line end beyond `length` bytes.
 fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
-    let mut behind = bytes.iter().enumerate().skip(start.saturating_add(length));
-    let line = behind.find(|(_, byte)| **byte == b'\n');
+    let mut remaining = bytes.iter().enumerate().skip(start.saturating_add(length));
+    let line = remaining.find(|(_, byte)| **byte == b'\n');
     line.map_or(bytes.len(), |(at, _)| at.saturating_add(1))
 }
 
@@ -167,13 +171,13 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     found.starts.reserve(rows);
     let mut row = vec![f64::NAN; columns];
     let mut printed: Vec<&[u8]> = vec![b""; columns];
-    while let [first, behind @ ..] = rest {
+    while let [first, remaining @ ..] = rest {
         // Blank lines are not rows.
         if matches!(first, b'\n' | b'\r') {
-            rest = behind;
+            rest = remaining;
             continue;
         }
-        let Some(behind) = plain_row(rest, layout, &mut row, &mut printed) else {
+        let Some(remaining) = plain_row(rest, layout, &mut row, &mut printed) else {
             break;
         };
         found.starts.push(at(rest));
@@ -190,7 +194,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
                 precision.add_bytes(printed);
             }
         }
-        rest = behind;
+        rest = remaining;
     }
     found.end = at(rest);
     found
@@ -227,7 +231,7 @@ fn plain_row<'a>(
             rest = rest.get(length..)?;
         }
         match rest {
-            [byte, behind @ ..] if *byte == layout.separator && column < last => rest = behind,
+            [byte, remaining @ ..] if *byte == layout.separator && column < last => rest = remaining,
             [b'\n' | b'\r', ..] | [] if column == last => {}
             _ => return None,
         }
@@ -237,8 +241,8 @@ fn plain_row<'a>(
 }
 
 fn without_blanks(mut rest: &[u8]) -> &[u8] {
-    while let [b' ', behind @ ..] = rest {
-        rest = behind;
+    while let [b' ', remaining @ ..] = rest {
+        rest = remaining;
     }
     rest
 }

@@ -61,7 +61,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_come_back_bit_for_bit() {
+    fn numbers_round_trip_bit_for_bit() {
         for value in [
             0.0,
             -0.0,

@@ -19,7 +19,7 @@ use std::ops::Range;
 use super::foreign::mismatch;
 use super::plain::{Layout, RowStarts, plain_rows};
 use super::text::{
-    comments, has_decimal_commas, is_aside, is_unit, open_line, place, reader, row_start, separator, text,
+    comments, has_decimal_commas, is_comment_or_blank, is_unit, open_line, place, reader, row_start, separator, text,
     unescape_formula,
 };
 use crate::IoError;
@@ -122,7 +122,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
 
 /// Reads the columns of a text.
 pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
-    let mut lines = text.lines().filter(|line| !is_aside(line));
+    let mut lines = text.lines().filter(|line| !is_comment_or_blank(line));
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };
@@ -209,7 +209,7 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
 }
 
 /// Number of rows that the full CSV reader reads before the fast reader is tried again.
-const WHOLE: usize = 256;
+const FULL_READER_ROWS: usize = 256;
 
 /// Reader that adds the rows of a text to the columns of a table.
 struct Rows<'a> {
@@ -255,12 +255,12 @@ impl Rows<'_> {
         })
     }
 
-    /// Reads at most [`WHOLE`] rows starting at position `from` with the full CSV reader; returns the position of the
-    /// next row.
+    /// Reads at most [`FULL_READER_ROWS`] rows starting at position `from` with the full CSV reader; returns the
+    /// position of the next row.
     fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
         let mut reader = reader(self.bytes.get(from..).unwrap_or_default(), self.separator);
         let mut record = csv::ByteRecord::new();
-        for _ in 0..WHOLE {
+        for _ in 0..FULL_READER_ROWS {
             if !matches!(reader.read_byte_record(&mut record), Ok(true)) {
                 return Ok(self.bytes.len());
             }
@@ -315,10 +315,10 @@ impl Rows<'_> {
 }
 
 /// Number of lines whose last cells are compared with the last number of the file.
-const COMPARED: usize = 8;
+const COMPARED_LINES: usize = 8;
 
 /// Detects a truncated last number and returns a note; `None` unless the last line has no line end, its last cell is at
-/// least two characters shorter than the last cell of each of the [`COMPARED`] lines before, and these all have a
+/// least two characters shorter than the last cell of each of the [`COMPARED_LINES`] lines before, and these all have a
 /// decimal point.
 fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
     let last_cell = |row: usize| {
@@ -331,7 +331,7 @@ fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
                 .trim(),
         )
     };
-    let compared = last.checked_sub(COMPARED)?;
+    let compared = last.checked_sub(COMPARED_LINES)?;
     let cut = last_cell(last)?;
     let length = cut.len().saturating_add(1);
     let is_longer = |row: usize| last_cell(row).is_some_and(|cell| cell.contains('.') && cell.len() > length);
@@ -425,7 +425,7 @@ mod tests {
     }
 
     #[test]
-    fn separators_comments_blank_lines_mark_and_line_ends() {
+    fn equivalent_notations_give_the_same_table() {
         for text in [
             "t,e,u\n0,1,2\n1,3,4\n",
             "t;e;u\n0;1;2\n1;3;4",
@@ -447,7 +447,7 @@ mod tests {
     /// The full CSV reader reads quoted cells; without quotes, the fast reader reads rows of numbers in several parts.
     /// Both readers give the same bits, texts, precision and positions.
     #[test]
-    fn plain_rows_are_those_of_whole_csv() {
+    fn fast_reader_matches_the_full_csv_reader() {
         let mut state = 7_u64;
         let mut draw = |below: u64| {
             state = state
@@ -496,7 +496,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_counted_as_an_editor_counts_them() {
+    fn line_numbers_match_a_text_editor() {
         let text = "# one\r\n\r\nt,e,u\r\n0,1,2\r\n# five\r\n\r\n1,x,4\r\n";
         let table = parse(text.as_bytes(), "run.csv").unwrap();
         assert_eq!(table.source.place(0), "line 4");
@@ -508,7 +508,7 @@ mod tests {
     }
 
     #[test]
-    fn units_and_sample_time() {
+    fn units_and_sample_time_are_read_from_comments() {
         let text = "# units: t s, e deg, K_e deg/deg, stick x mV per deg, q -\n# sample_time: 0.0125 s\nt,e,K_e,stick,stick x\n0,1,2,3,4\n";
         let table = parse(text.as_bytes(), "run.csv").unwrap();
         let units: Vec<&str> = table.columns.iter().map(|c| c.unit.as_str()).collect();
@@ -520,7 +520,7 @@ mod tests {
     }
 
     #[test]
-    fn units_in_names() {
+    fn units_are_read_from_column_names() {
         let header = "t,Fehler [deg],Knüppel (V),x(1),x[2],[deg],y (left hand),z (°/s)";
         let text = format!("{header}\n0,1,2,3,4,5,6,7\n");
         let table = parse(text.as_bytes(), "run.csv").unwrap();
@@ -529,7 +529,7 @@ mod tests {
     }
 
     #[test]
-    fn moments_are_s_from_the_first() {
+    fn moments_become_seconds_from_the_first() {
         let values = |cells: &str| {
             let text = format!("t,e\n{cells}");
             let table = parse(text.as_bytes(), "run.csv").unwrap();
@@ -550,7 +550,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cut_file_is_named_as_cut() {
+    fn cut_file_is_reported() {
         let rows: String = (0..20).map(|k| format!("{k}.00,0.12{k:02},-0.5{k:02}1\n")).collect();
         let text = format!("t,e,u\n{rows}");
         let notes = |text: &str| parse(text.as_bytes(), "run.csv").unwrap().notes;
@@ -578,7 +578,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_table_says_so() {
+    fn invalid_tables_are_errors() {
         assert!(message(b"").contains("run.csv is empty"));
         assert!(message(b"\n# only\n  \n").contains("is empty"));
         assert!(message(b"t,e,u\n").contains("no samples"));

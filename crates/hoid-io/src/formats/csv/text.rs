@@ -62,7 +62,7 @@ pub(crate) fn reader(bytes: &[u8], separator: u8) -> csv::Reader<&[u8]> {
         .from_reader(bytes)
 }
 
-pub(crate) fn is_aside(line: &str) -> bool {
+pub(crate) fn is_comment_or_blank(line: &str) -> bool {
     line.trim().is_empty() || line.starts_with('#')
 }
 
@@ -105,7 +105,7 @@ pub(crate) fn has_decimal_commas(text: &str, separator: u8) -> bool {
     if quoted
         && !text
             .lines()
-            .filter(|line| !is_aside(line))
+            .filter(|line| !is_comment_or_blank(line))
             .nth(1)
             .is_some_and(|row| row.contains('"'))
     {
@@ -135,7 +135,7 @@ fn may_be_thousands(cell: &str) -> bool {
 
 /// Returns the comment lines above the header without the leading `#`.
 pub(crate) fn comments(text: &str) -> impl Iterator<Item = &str> {
-    let lines = text.lines().take_while(|line| is_aside(line));
+    let lines = text.lines().take_while(|line| is_comment_or_blank(line));
     lines.filter_map(|line| line.strip_prefix('#'))
 }
 
@@ -144,10 +144,10 @@ pub(crate) fn row_start(bytes: &[u8], at: usize) -> usize {
     let mut rest = bytes.get(at..).unwrap_or_default();
     loop {
         rest = match rest {
-            [b'\n' | b'\r', behind @ ..] => behind,
-            [b'#', behind @ ..] => {
-                let end = behind.iter().position(|b| *b == b'\n');
-                end.and_then(|end| behind.get(end..)).unwrap_or_default()
+            [b'\n' | b'\r', rest @ ..] => rest,
+            [b'#', rest @ ..] => {
+                let end = rest.iter().position(|b| *b == b'\n');
+                end.and_then(|end| rest.get(end..)).unwrap_or_default()
             }
             _ => return bytes.len().saturating_sub(rest.len()),
         }
@@ -166,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_a_spreadsheet_would_run_is_text_and_comes_back() {
+    fn formula_cells_are_escaped_and_round_trip() {
         for (cell, written) in [
             ("=1+1", "'=1+1"),
             ("+cmd|' /C calc'!A0", "'+cmd|' /C calc'!A0"),
@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_that_lack_their_end() {
+    fn unterminated_last_line_is_located() {
         for (text, at) in [
             ("", Some(0)),
             ("a", Some(0)),

@@ -88,7 +88,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_variables() {
+    fn variable_names_are_valid_and_unique() {
         let found = variables(&[
             "e",
             "K e",

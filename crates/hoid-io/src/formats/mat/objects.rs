@@ -21,16 +21,16 @@ mod tests {
     use super::object;
 
     #[test]
-    fn a_class_that_holds_signals_has_a_line() {
+    fn classes_with_signals_have_an_export_command() {
         for class in ["timetable", "table", "timeseries"] {
-            let said = object(class);
-            assert!(said.contains(class) && said.contains("save run.mat"), "{said}");
+            let message = object(class);
+            assert!(message.contains(class) && message.contains("save run.mat"), "{message}");
         }
         assert!(object("thing").contains("class thing"));
     }
 
     #[test]
-    fn the_name_of_a_class_moves_no_terminal() {
+    fn control_characters_in_class_names_are_escaped() {
         assert_eq!(
             object("ti\0\u{1b}[31m"),
             format!("{} ti\\0\\u{{1b}}[31m", super::OBJECT)

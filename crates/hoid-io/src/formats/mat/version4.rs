@@ -13,13 +13,13 @@ pub(super) fn read(bytes: &[u8], budget: &mut Budget, file: &str) -> Result<Vec<
     let mut rest = bytes;
     let mut entries = Vec::new();
     while !rest.is_empty() {
-        let (entry, behind) = variable(rest).map_err(|found| IoError::Damaged {
+        let (entry, remaining) = variable(rest).map_err(|found| IoError::Damaged {
             file: file.to_owned(),
             found: format!("variable {}: {found}", entries.len().saturating_add(1)),
         })?;
-        budget.take(rest.len().saturating_sub(behind.len()) as u64, file)?;
+        budget.take(rest.len().saturating_sub(remaining.len()) as u64, file)?;
         entries.push(entry);
-        rest = behind;
+        rest = remaining;
     }
     Ok(entries)
 }

@@ -8,7 +8,7 @@ use super::elements::{Elements, HEADER, data};
 use super::objects::object;
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
-use crate::formats::budget::{Budget, MOST_NESTED};
+use crate::formats::budget::{Budget, MAX_NESTING};
 use crate::wording::{short_error, shown};
 
 const CELL: u32 = 1;
@@ -160,8 +160,8 @@ impl Reader<'_> {
         let dims: Vec<usize> = parts.u32s(dims).iter().map(|side| *side as usize).collect();
         let count = dims.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));
         let count = count.ok_or_else(|| format!("an array of {}", shown(&format!("{dims:?}"))))?;
-        if dims.len() > MOST_NESTED {
-            return Err(format!("an array of {} dimensions, expected at most {MOST_NESTED}", dims.len()).into());
+        if dims.len() > MAX_NESTING {
+            return Err(format!("an array of {} dimensions, expected at most {MAX_NESTING}", dims.len()).into());
         }
         let name = name(parts.next()?.bytes)?;
         // An element without a name is not a variable: MATLAB stores the parts of objects in such elements.
@@ -187,9 +187,9 @@ impl Reader<'_> {
                 let texts = texts(&mut parts, &dims, count)?;
                 self.push(place, place.path, Value::Texts(texts))
             }
-            SPARSE => self.unread(place, "a sparse matrix"),
-            FUNCTION => self.unread(place, "a function"),
-            DOUBLE..=UINT64 if flags & COMPLEX != 0 => self.unread(place, "complex numbers"),
+            SPARSE => self.add_unreadable(place, "a sparse matrix"),
+            FUNCTION => self.add_unreadable(place, "a function"),
+            DOUBLE..=UINT64 if flags & COMPLEX != 0 => self.add_unreadable(place, "complex numbers"),
             DOUBLE..=UINT64 => {
                 let numbers = self.numbers(&mut parts, class, count)?;
                 let array = Array {
@@ -234,7 +234,7 @@ impl Reader<'_> {
 
     /// Reads one or more structures with the same fields.
     fn structure(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
-        let depth = deeper(place)?;
+        let depth = next_depth(place)?;
         let length = parts.of(data::INT32, "the length of the names of fields")?;
         let length = parts.u32s(length).first().map_or(0, |length| *length as usize);
         let names = parts.next()?.bytes;
@@ -266,7 +266,7 @@ impl Reader<'_> {
 
     /// Reads a cell array, in which each cell has its own path; if all cells hold text, they form one column.
     fn cell(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
-        let depth = deeper(place)?;
+        let depth = next_depth(place)?;
         let before = self.entries.len();
         for at in 0..count {
             let matrix = parts.of(data::MATRIX, "a cell")?;
@@ -294,7 +294,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn unread(&mut self, place: VariablePath<'_>, what: &str) -> Result<(), Stop> {
+    fn add_unreadable(&mut self, place: VariablePath<'_>, what: &str) -> Result<(), Stop> {
         self.push(place, place.path, Value::Unread(what.to_owned()))
     }
 
@@ -308,9 +308,9 @@ impl Reader<'_> {
     }
 }
 
-fn deeper(place: VariablePath<'_>) -> Result<usize, Stop> {
-    if place.depth == MOST_NESTED {
-        return Err(format!("structures nested more than {MOST_NESTED} deep").into());
+fn next_depth(place: VariablePath<'_>) -> Result<usize, Stop> {
+    if place.depth == MAX_NESTING {
+        return Err(format!("structures nested more than {MAX_NESTING} deep").into());
     }
     Ok(place.depth.saturating_add(1))
 }

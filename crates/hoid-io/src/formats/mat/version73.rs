@@ -10,14 +10,14 @@ use hdf5_pure::{AttrValue, DType, Dataset, Datatype, Error, File, Group, H5Eleme
 use super::{objects::object, records};
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Indexing, Kind, Numbers, Value};
-use crate::formats::budget::{Budget, MOST_NESTED};
+use crate::formats::budget::{Budget, MAX_NESTING};
 use crate::formats::guarded::guarded;
 use crate::wording::short_error;
 
 /// Memory in bytes charged for each visit to a group or dataset, because links may be circular.
-const VISIT: u64 = 1 << 13;
+const VISIT_BYTES: u64 = 1 << 13;
 /// Maximum number of elements of an array of structures, or of a cell array, that is converted to columns.
-const MOST_REFERENCES: u64 = 1 << 16;
+const MAX_REFERENCES: u64 = 1 << 16;
 
 /// Reads the variables of a file; `indexing` determines whether dimensions are in the order of MATLAB or numpy.
 pub(super) fn read(bytes: Vec<u8>, file: &str, indexing: Indexing) -> Result<Vec<Entry>, IoError> {
@@ -69,11 +69,11 @@ impl Reader<'_> {
 
     /// Reads a group, which is a structure or the root of the file.
     fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), IoError> {
-        self.budget.take(VISIT, self.file)?;
-        if depth > MOST_NESTED {
+        self.budget.take(VISIT_BYTES, self.file)?;
+        if depth > MAX_NESTING {
             return Err(IoError::Damaged {
                 file: self.file.to_owned(),
-                found: format!("structures nested more than {MOST_NESTED} deep"),
+                found: format!("structures nested more than {MAX_NESTING} deep"),
             });
         }
         let inside = |name: &str| {
@@ -100,7 +100,7 @@ impl Reader<'_> {
     /// Reads a dataset. For a dataset in an array of structures, `parent` is the element of the array, and `path`
     /// starts with it.
     fn dataset(&mut self, dataset: &Dataset, parent: &str, path: &str, depth: usize) -> Result<(), IoError> {
-        self.budget.take(VISIT, self.file)?;
+        self.budget.take(VISIT_BYTES, self.file)?;
         let error = |reader: &Self, error: Error| reader.damaged(path, &error);
         let attributes = dataset.attrs().map_err(|e| error(self, e))?;
         let class = match attributes.get("MATLAB_class") {
@@ -133,7 +133,7 @@ impl Reader<'_> {
             return self.push(parent, path, Value::Unread(String::from("an array that is too large")));
         };
         if matches!(kind, DType::ObjectReference) {
-            if count > MOST_REFERENCES {
+            if count > MAX_REFERENCES {
                 return self.push(parent, path, Value::Unread(format!("{count} references")));
             }
             return self.references(dataset, class == "cell", (parent, path), depth);
@@ -195,10 +195,10 @@ impl Reader<'_> {
         (parent, path): (&str, &str),
         depth: usize,
     ) -> Result<(), IoError> {
-        if depth == MOST_NESTED {
+        if depth == MAX_NESTING {
             return Err(IoError::Damaged {
                 file: self.file.to_owned(),
-                found: format!("structures nested more than {MOST_NESTED} deep"),
+                found: format!("structures nested more than {MAX_NESTING} deep"),
             });
         }
         let objects = match dataset.dereference() {

@@ -30,7 +30,7 @@ enum Literal {
 }
 
 /// Maximum nesting of sequences; a shape in a field in a list needs three levels.
-const DEEPEST: usize = 6;
+const MAX_NESTING: usize = 6;
 
 /// Parses the header text, which lies between the length and the data.
 pub(super) fn parse(text: &str) -> Option<Header> {
@@ -128,7 +128,7 @@ impl Reader<'_> {
                 self.token(first)?;
                 let mut items = Vec::new();
                 while self.token(end).is_none() {
-                    if depth == DEEPEST {
+                    if depth == MAX_NESTING {
                         return None;
                     }
                     items.push(self.literal(depth.saturating_add(1))?);
@@ -169,7 +169,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headers_of_numpy() {
+    fn numpy_headers_are_parsed() {
         let plain = parse("{'descr': '<f8', 'fortran_order': False, 'shape': (3, 2), }  \n").unwrap();
         assert_eq!(
             plain,
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_seen() {
+    fn damaged_headers_are_refused() {
         for text in [
             "",
             "{",
@@ -219,7 +219,7 @@ mod tests {
     }
 
     #[test]
-    fn texts_come_back() {
+    fn quoted_text_round_trip() {
         for text in ["e", "a'b", "a\\b", "\u{e9}"] {
             assert_eq!(Reader { rest: &quoted(text) }.text().as_deref(), Some(text));
         }

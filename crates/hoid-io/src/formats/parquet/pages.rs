@@ -22,7 +22,7 @@ use flate2::read::MultiGzDecoder;
 use parquet::basic::Compression;
 
 /// Maximum nesting of structures in a header; the format needs three levels.
-const MOST_NESTED: usize = 8;
+const MAX_NESTING: usize = 8;
 /// Types of the compact protocol.
 const STOP: u8 = 0;
 const TRUE: u8 = 1;
@@ -84,7 +84,7 @@ impl PageHeader {
 
     /// Reads the fields of a structure; `inside` is the number of the field of the header that holds it.
     fn structure(&mut self, bytes: &mut &[u8], inside: Option<i64>, depth: usize) -> Option<()> {
-        if depth > MOST_NESTED {
+        if depth > MAX_NESTING {
             return None;
         }
         let mut field = 0_i64;
@@ -111,7 +111,7 @@ impl PageHeader {
                     Some(if depth == 0 { field } else { -1 }),
                     depth.saturating_add(1),
                 )?,
-                other => self.pass_over(bytes, other, depth.saturating_add(1))?,
+                other => self.skip_field(bytes, other, depth.saturating_add(1))?,
             }
         }
     }
@@ -132,7 +132,7 @@ impl PageHeader {
     }
 
     /// Skips a value that does not affect the decompressed size.
-    fn pass_over(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
+    fn skip_field(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
         match kind {
             TRUE | FALSE | BYTE => drop(byte(bytes)?),
             4..=6 => drop(zigzag(bytes)?),
@@ -164,12 +164,12 @@ impl PageHeader {
 
     fn each(&mut self, bytes: &mut &[u8], count: u64, kinds: &[u8], depth: usize) -> Option<()> {
         // Each element of a list takes at least one byte.
-        if depth > MOST_NESTED || count > bytes.len() as u64 {
+        if depth > MAX_NESTING || count > bytes.len() as u64 {
             return None;
         }
         for _ in 0..count {
             for kind in kinds {
-                self.pass_over(bytes, *kind, depth.saturating_add(1))?;
+                self.skip_field(bytes, *kind, depth.saturating_add(1))?;
             }
         }
         Some(())
@@ -242,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
+    fn page_sizes_are_read_and_checked_for_gzip() {
         let honest = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(decompressed_size(&honest, GZIP(), 100), Some(800));
         // The second page follows the last value and is not examined.
@@ -257,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_that_are_cut_or_make_no_sense_are_none() {
+    fn invalid_page_headers_are_none() {
         let whole = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(decompressed_size(&[], GZIP(), 100), Some(0));
         for cut in 1..whole.len() {

@@ -28,7 +28,7 @@ use crate::wording::{short_error, shown, start_of};
 /// Magic bytes at the start and the end of a file.
 const MAGIC: &[u8; 4] = b"PAR1";
 /// Maximum number of rows (a month at 100 samples/s); files with more rows are refused before they exhaust the memory.
-const MOST_ROWS: usize = 1 << 28;
+const MAX_ROWS: usize = 1 << 28;
 const TIME: &str = "a date or time";
 /// Number of ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
@@ -37,7 +37,7 @@ const MILLI: i64 = 1_000_000;
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
 /// Number of values read at a time.
-const PART: usize = 1 << 16;
+const VALUES_PER_READ: usize = 1 << 16;
 
 /// Reads the columns from the bytes of a file.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
@@ -81,10 +81,10 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     let footer = reader.metadata().file_metadata();
     let count = |rows: i64| usize::try_from(rows).map_err(|_| damaged(format!("it states {rows} rows")));
     let rows = count(footer.num_rows())?;
-    if rows > MOST_ROWS {
+    if rows > MAX_ROWS {
         return Err(IoError::Unsupported {
             file: file.to_owned(),
-            found: format!("it holds {rows} rows, more than {MOST_ROWS}"),
+            found: format!("it holds {rows} rows, more than {MAX_ROWS}"),
             remedy: "write it in parts",
         });
     }
@@ -207,7 +207,7 @@ impl ColumnPath<'_> {
             }
             (_, C::DECIMAL) => Data::Unread("decimal numbers of variable length or more than 16 bytes"),
             (Type::FIXED_LEN_BYTE_ARRAY, _) if logical == Some(&LogicalType::Float16) => {
-                Data::Real(self.values::<FixedLenByteArrayType, _>(|value| half(value.data()))?)
+                Data::Real(self.values::<FixedLenByteArrayType, _>(|value| f16_to_f64(value.data()))?)
             }
             (Type::BYTE_ARRAY, C::UTF8 | C::ENUM | C::JSON) => {
                 Data::Text(self.values::<ByteArrayType, _>(|value| String::from_utf8_lossy(value.data()).into_owned())?)
@@ -253,7 +253,7 @@ impl ColumnPath<'_> {
         while values.len() < end {
             levels.clear();
             stored.clear();
-            let wanted = PART.min(end.saturating_sub(values.len()));
+            let wanted = VALUES_PER_READ.min(end.saturating_sub(values.len()));
             let (rows, ..) = reader.read_records(wanted, Some(&mut levels), None, &mut stored)?;
             if rows != wanted {
                 let missing = end.saturating_sub(values.len()).saturating_sub(rows);
@@ -262,7 +262,7 @@ impl ColumnPath<'_> {
             let first = values.len();
             if defined == 0 {
                 values.extend(stored.iter().map(of));
-                self.weigh(values.get(first..).unwrap_or_default())?;
+                self.reserve_for_values(values.get(first..).unwrap_or_default())?;
                 continue;
             }
             let mut stored = stored.iter();
@@ -273,13 +273,13 @@ impl ColumnPath<'_> {
                 }
                 values.push(value.map_or_else(V::default, of));
             }
-            self.weigh(values.get(first..).unwrap_or_default())?;
+            self.reserve_for_values(values.get(first..).unwrap_or_default())?;
         }
         Ok(())
     }
 
     /// Reserves the memory that the values own outside their vector.
-    fn weigh<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
+    fn reserve_for_values<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
         let bytes = values.iter().map(Weight::bytes).sum();
         let taken = self.budget.take(bytes, self.file);
         taken.map_err(|error| ParquetError::External(Box::new(error)))
@@ -354,7 +354,7 @@ fn refused(what: &str) -> ParquetError {
 }
 
 /// Converts an IEEE 754 binary16 number, little-endian.
-fn half(bytes: &[u8]) -> f64 {
+fn f16_to_f64(bytes: &[u8]) -> f64 {
     <[u8; 2]>::try_from(bytes).map_or(f64::NAN, |bytes| f16::from_le_bytes(bytes).to_f64())
 }
 
@@ -370,7 +370,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn integers_in_bytes() {
+    fn big_endian_integers_are_decoded() {
         assert_eq!(signed(&[]), 0);
         assert_eq!(signed(&[0xff, 0xfe]), -2);
         assert_eq!(signed(&[0x01, 0x00]), 256);

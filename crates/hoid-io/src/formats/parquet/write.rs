@@ -36,7 +36,7 @@ impl RowWriter for Writer {
     /// Writes a row group.
     fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()> {
         self.append(columns)?;
-        self.hand_over(file)
+        self.write_buffered(file)
     }
 
     fn finish(self: Box<Self>, file: &mut dyn Write) -> io::Result<()> {
@@ -65,7 +65,7 @@ impl Writer {
         let schema = Type::group_type_builder("schema").with_fields(fields?).build()?;
         let inner = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties))?;
         let mut writer = Self { inner };
-        writer.hand_over(file)?;
+        writer.write_buffered(file)?;
         Ok(writer)
     }
 
@@ -94,7 +94,7 @@ impl Writer {
         Ok(())
     }
 
-    fn hand_over(&mut self, file: &mut dyn Write) -> io::Result<()> {
+    fn write_buffered(&mut self, file: &mut dyn Write) -> io::Result<()> {
         self.inner.flush()?;
         file.write_all(&mem::take(self.inner.inner_mut()))
     }

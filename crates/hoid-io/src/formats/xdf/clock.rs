@@ -35,7 +35,7 @@ const LOST_SAMPLES: f64 = 4.0;
 /// Number of samples on each side of a step from whose medians the lateness is computed.
 const SAMPLES_PER_SIDE: usize = 25;
 /// Relative deviation of the sampling rate from the nominal rate above which the deviation is reported.
-const OFF: f64 = 0.02;
+const MAX_RATE_DEVIATION: f64 = 0.02;
 
 /// Returns the times of the samples, s.
 pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
@@ -56,7 +56,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
         ),
     };
     let nominal_hz = stream.header.nominal_hz;
-    if nominal_hz <= 0.0 || stream.header.can_drop {
+    if nominal_hz <= 0.0 || stream.header.may_drop_samples {
         notes.push(format!(
             "stream {name}: {resets}; its time stamps are kept, because they are not evenly spaced"
         ));
@@ -64,7 +64,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     }
     let longest = BREAK_S.max(BREAK_SAMPLES * stream.nominal_step_s());
     let (parts, effective_hz) = straighten(&mut times, longest, stream.nominal_step_s());
-    if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > OFF) {
+    if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > MAX_RATE_DEVIATION) {
         notes.push(format!(
             "stream {name}: the time stamps give {hz:.4} Hz, but the stated rate is {nominal_hz} Hz: samples are lost at \
              regular intervals, or the stated rate is wrong"
@@ -239,7 +239,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_through_offsets_with_one_that_is_off() {
+    fn clock_fit_is_robust_to_an_outlier() {
         let mut offsets: Vec<(f64, f64)> = (0..40)
             .map(|k| (1e5 + 5.0 * f64::from(k), 3.0 - 1e-4 * 5.0 * f64::from(k)))
             .collect();
@@ -262,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn a_clock_that_is_set_anew() {
+    fn clock_resets_are_found() {
         let mut offsets: Vec<(f64, f64)> = (0..10).map(|k| (5.0 * f64::from(k), 1.0)).collect();
         offsets.extend((0..10).map(|k| (5.0 * f64::from(k), 100.0)));
         assert_eq!(resets(&offsets), [0..10, 10..20]);
@@ -273,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn jitter_and_breaks() {
+    fn breaks_are_kept_and_jitter_is_removed() {
         let mut times: Vec<f64> = (0..100)
             .map(|k| 0.01 * f64::from(k) + if k >= 60 { 3.0 } else { 0.0 } + 1e-4 * f64::from(k % 2))
             .collect();
@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn lost_samples_are_a_break_and_late_ones_are_not() {
+    fn lost_samples_are_a_break_but_late_samples_are_not() {
         // 12 s at 100 Hz with network jitter, of which 0.2 to 4 s are lost.
         for lost in [20_u32, 100, 200, 400] {
             let mut times: Vec<f64> = (0..1200)

@@ -6,7 +6,7 @@ use roxmltree::{Document, Node};
 use crate::wording::short_error;
 
 /// Maximum number of channels of a stream; a larger number counts as damage.
-const MOST_CHANNELS: usize = 1 << 12;
+const MAX_CHANNELS: usize = 1 << 12;
 
 /// Properties of a stream, which the file gives before the samples.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,7 +20,7 @@ pub(super) struct Header {
     /// Label and unit of each channel, if stated.
     pub(super) labels: Vec<(String, String)>,
     /// True if the stream drops samples instead of delaying them; its time stamps are then kept.
-    pub(super) can_drop: bool,
+    pub(super) may_drop_samples: bool,
 }
 
 /// Parses the header in the bytes of a chunk.
@@ -40,8 +40,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
             .map_err(|_| format!("its {name} is \"{}\", expected a number", short_error(&text)))
     };
     let count = number("channel_count", needed("channel_count")?)?;
-    if !(0.0..=MOST_CHANNELS as f64).contains(&count) {
-        return Err(format!("it has {count} channels, expected at most {MOST_CHANNELS}"));
+    if !(0.0..=MAX_CHANNELS as f64).contains(&count) {
+        return Err(format!("it has {count} channels, expected at most {MAX_CHANNELS}"));
     }
     let nominal_hz = number("nominal_srate", needed("nominal_srate")?)?;
     if !(nominal_hz >= 0.0 && nominal_hz.is_finite()) {
@@ -64,10 +64,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
         nominal_hz,
         format: needed("channel_format")?,
         labels: labels
-            .take(MOST_CHANNELS)
+            .take(MAX_CHANNELS)
             .map(|node| (inner(node, "label"), inner(node, "unit")))
             .collect(),
-        can_drop: drop.is_some_and(|node| inner(node, "can_drop_samples").trim().eq_ignore_ascii_case("true")),
+        may_drop_samples: drop.is_some_and(|node| inner(node, "can_drop_samples").trim().eq_ignore_ascii_case("true")),
     })
 }
 
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn headers() {
+    fn stream_headers_are_parsed() {
         let text = "<?xml version='1.0'?><info><name>A &lt; B</name><channel_count>2</channel_count><nominal_srate>100.5</nominal_srate>\
             <channel_format>float32</channel_format><desc><channels><channel><label>x</label><unit>N</unit></channel><channel/></channels></desc></info>";
         let header = parse(text.as_bytes()).unwrap();

@@ -159,7 +159,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_times_of_pyxdf() {
+    fn times_match_pyxdf() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf");
         let streams = chunks::streams(&std::fs::read(folder.join("tracking.xdf")).unwrap())
             .unwrap()
@@ -210,7 +210,7 @@ mod tests {
     }
 
     #[test]
-    fn footers_are_held_against_what_is_there() {
+    fn footers_are_checked_against_the_data() {
         let times: Vec<f64> = (0..1000).map(|k| 50.0 + 0.01 * f64::from(k)).collect();
         let footer = |first: f64, last: f64, count: u32| {
             format!(
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_lost_second_is_a_gap_at_the_stated_rate() {
+    fn lost_samples_are_reported_at_the_nominal_rate() {
         let times: Vec<f64> = (0..1200)
             .filter(|k| !(300..430).contains(k) && !(900..960).contains(k))
             .map(|k| 0.01 * f64::from(k))
@@ -265,7 +265,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_is_read_up_to_there_and_said() {
+    fn truncated_file_is_read_up_to_the_cut() {
         let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf/tracking.xdf");
         let bytes = std::fs::read(file).unwrap();
         let whole = read(&bytes, "a.xdf").unwrap();

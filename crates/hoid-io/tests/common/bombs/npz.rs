@@ -83,19 +83,19 @@ pub fn member(name: &str, head: &str, megabytes: usize) -> Member {
 pub fn archive(members: &[Member]) -> Vec<u8> {
     let (mut file, mut directory) = (Vec::new(), Vec::new());
     for of in members {
-        let mut told = vec![20, 0, 0, 0, 8, 0, 0, 0, 0x21, 0];
+        let mut local_header = vec![20, 0, 0, 0, 8, 0, 0, 0, 0x21, 0];
         for number in [of.sum, of.packed.len() as u32, of.length] {
-            told.extend(number.to_le_bytes());
+            local_header.extend(number.to_le_bytes());
         }
-        told.extend((of.name.len() as u16).to_le_bytes());
-        told.extend([0, 0]);
+        local_header.extend((of.name.len() as u16).to_le_bytes());
+        local_header.extend([0, 0]);
         directory.extend(b"PK\x01\x02\x14\x00");
-        directory.extend(&told);
+        directory.extend(&local_header);
         directory.extend([0; 10]);
         directory.extend((file.len() as u32).to_le_bytes());
         directory.extend(of.name.as_bytes());
         file.extend(b"PK\x03\x04");
-        file.extend(&told);
+        file.extend(&local_header);
         file.extend(of.name.as_bytes());
         file.extend(&of.packed);
     }

@@ -197,9 +197,16 @@ pub fn page(of: &Page) -> Vec<u8> {
         .set_column_metadata(vec![chunk])
         .build()
         .unwrap();
-    let told = metadata.file_metadata();
-    let told = FileMetaData::new(told.version(), rows, None, None, told.schema_descr_ptr(), None);
-    let metadata = parquet::file::metadata::ParquetMetaData::new(told, vec![group]);
+    let file_metadata = metadata.file_metadata();
+    let file_metadata = FileMetaData::new(
+        file_metadata.version(),
+        rows,
+        None,
+        None,
+        file_metadata.schema_descr_ptr(),
+        None,
+    );
+    let metadata = parquet::file::metadata::ParquetMetaData::new(file_metadata, vec![group]);
     let mut file = [b"PAR1".as_slice(), &page].concat();
     ParquetMetaDataWriter::new(&mut file, &metadata).finish().unwrap();
     file

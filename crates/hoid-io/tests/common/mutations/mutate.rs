@@ -4,9 +4,9 @@
 use super::{draw::Draw, originals::Original};
 
 /// Maximum length of a mutated file.
-const LONGEST: usize = 1 << 18;
+const MAX_FILE_BYTES: usize = 1 << 18;
 /// Maximum number of mutations of a case.
-const MOST: usize = 8;
+const MAX_MUTATIONS: usize = 8;
 
 /// Integers at which counts, sizes and sums overflow.
 const EDGES: [u64; 20] = [
@@ -54,7 +54,10 @@ const NUMBERS: [&str; 16] = [
 /// The bytes of a damaged file.
 pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8> {
     // Most cases have one mutation: with many mutations, only the first checks are reached.
-    let count = 1 + draw.below(MOST).min(draw.below(MOST)).min(draw.below(MOST));
+    let count = 1 + draw
+        .below(MAX_MUTATIONS)
+        .min(draw.below(MAX_MUTATIONS))
+        .min(draw.below(MAX_MUTATIONS));
     if let Some(inside) = original.inside.as_ref().filter(|_| draw.below(3) > 0) {
         let mut inside = inside.clone();
         let mut from = other.inside.clone();
@@ -168,7 +171,7 @@ fn part(length: usize, draw: &mut Draw) -> (usize, usize) {
 }
 
 fn insert(bytes: &mut Vec<u8>, at: usize, what: &[u8]) {
-    let room = LONGEST.saturating_sub(bytes.len());
+    let room = MAX_FILE_BYTES.saturating_sub(bytes.len());
     let what = &what[..what.len().min(room)];
     let at = at.min(bytes.len());
     bytes.splice(at..at, what.iter().copied());

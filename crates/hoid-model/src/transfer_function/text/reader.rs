@@ -6,7 +6,7 @@ use super::{coefficients::EXAMPLES, ratio::Ratio};
 /// rounding.
 const HIGHEST_DEGREE: usize = 50;
 /// Largest depth of nested parentheses.
-const DEEPEST: usize = 50;
+const MAX_DEPTH: usize = 50;
 
 /// Parser with the remaining characters and the current depth of parentheses.
 pub(super) struct Reader {
@@ -39,13 +39,13 @@ impl Reader {
         self.signs.get(self.at).copied()
     }
 
-    fn takes(&mut self, wanted: char) -> bool {
+    fn accept(&mut self, wanted: char) -> bool {
         let found = self.next() == Some(wanted);
         self.at += usize::from(found);
         found
     }
 
-    fn refuse<T>(&mut self, expected: &str) -> Result<T, String> {
+    fn expected_error<T>(&mut self, expected: &str) -> Result<T, String> {
         let found = match self.next() {
             Some(sign) => format!("{sign:?}"),
             None => "the end".to_owned(),
@@ -63,16 +63,16 @@ impl Reader {
         let all = self.sum()?;
         match self.next() {
             None => Ok(all),
-            Some(')') => self.refuse("a '(' before this ')'"),
-            Some('=' | 'z' | 'p' | 'x') => self.refuse("an expression in s only"),
-            Some(_) => self.refuse("a number, s, a parenthesis, or one of + - * / ^"),
+            Some(')') => self.expected_error("a '(' before this ')'"),
+            Some('=' | 'z' | 'p' | 'x') => self.expected_error("an expression in s only"),
+            Some(_) => self.expected_error("a number, s, a parenthesis, or one of + - * / ^"),
         }
     }
 
     fn sum(&mut self) -> Result<Ratio, String> {
         let mut sum = self.product()?;
         loop {
-            let begin = self.at;
+            let start = self.at;
             let sign = match self.next() {
                 Some('+') => 1.0,
                 Some('-') => -1.0,
@@ -81,10 +81,10 @@ impl Reader {
             self.at += 1;
             let term = self.product()?;
             let Some(total) = sum.plus(&term, sign) else {
-                self.at = begin;
-                return self.refuse("one delay, as a factor of the whole function: 5exp(-0.1s)/(s+1)");
+                self.at = start;
+                return self.expected_error("one delay, as a factor of the whole function: 5exp(-0.1s)/(s+1)");
             };
-            sum = self.checked(total, begin)?;
+            sum = self.checked(total, start)?;
         }
     }
 
@@ -92,7 +92,7 @@ impl Reader {
         let mut product = self.factor()?;
         let mut divided = false;
         loop {
-            let begin = self.at;
+            let start = self.at;
             match self.next() {
                 Some('*') => {
                     self.at += 1;
@@ -110,12 +110,12 @@ impl Reader {
                     }
                     product = product.times(&by.inverse());
                 }
-                Some(sign) if is_of_number(sign) => {
-                    return self.refuse("'^' or '*' before a number: s^2 or s*2");
+                Some(sign) if may_be_in_number(sign) => {
+                    return self.expected_error("'^' or '*' before a number: s^2 or s*2");
                 }
                 Some('s' | '(' | 'e') => {
                     if divided {
-                        return self.refuse(
+                        return self.expected_error(
                             "'*' or parentheses, because this may or may not be part of the divisor: 1/(s(s+6)) \
                              divides by both factors, 1/s*(s+6) by s only",
                         );
@@ -124,16 +124,16 @@ impl Reader {
                 }
                 _ => return Ok(product),
             }
-            product = self.checked(product, begin)?;
+            product = self.checked(product, start)?;
         }
     }
 
     fn factor(&mut self) -> Result<Ratio, String> {
         let mut sign = 1.0;
         loop {
-            if self.takes('-') {
+            if self.accept('-') {
                 sign = -sign;
-            } else if !self.takes('+') {
+            } else if !self.accept('+') {
                 break;
             }
         }
@@ -142,12 +142,12 @@ impl Reader {
 
     fn power(&mut self) -> Result<Ratio, String> {
         let base = self.atom()?;
-        if !self.takes('^') {
+        if !self.accept('^') {
             return Ok(base);
         }
         self.next();
-        let begin = self.at;
-        let negative = self.takes('-');
+        let start = self.at;
+        let negative = self.accept('-');
         self.next();
         let from = self.at;
         while self.signs.get(self.at).is_some_and(char::is_ascii_digit) {
@@ -158,16 +158,16 @@ impl Reader {
         let whole = digits.parse::<usize>().ok().filter(|n| *n <= HIGHEST_DEGREE);
         let fraction = self.signs.get(self.at).is_some_and(|sign| *sign == '.');
         let Some(n) = whole.filter(|_| !fraction) else {
-            self.at = begin;
-            return self.refuse(&expected);
+            self.at = start;
+            return self.expected_error(&expected);
         };
         if negative && base.is_zero() {
-            return Err(format!("it divides by zero at character {}; {EXAMPLES}", begin + 1));
+            return Err(format!("it divides by zero at character {}; {EXAMPLES}", start + 1));
         }
         let base = if negative { base.inverse() } else { base };
         let mut power = Ratio::of(&[1.0]);
         for _ in 0..n {
-            power = self.checked(power.times(&base), begin)?;
+            power = self.checked(power.times(&base), start)?;
         }
         Ok(power)
     }
@@ -180,8 +180,8 @@ impl Reader {
             }
             Some('(') => self.parentheses(),
             Some('e') => self.delay(),
-            Some(sign) if is_of_number(sign) => self.number(),
-            _ => self.refuse("a number, s or '('"),
+            Some(sign) if may_be_in_number(sign) => self.number(),
+            _ => self.expected_error("a number, s or '('"),
         }
     }
 
@@ -189,14 +189,14 @@ impl Reader {
         let opened = self.at + 1;
         self.at += 1;
         self.depth += 1;
-        if self.depth > DEEPEST {
+        if self.depth > MAX_DEPTH {
             return Err(format!(
-                "more than {DEEPEST} parentheses are nested at character {opened}; {EXAMPLES}"
+                "more than {MAX_DEPTH} parentheses are nested at character {opened}; {EXAMPLES}"
             ));
         }
         let inside = self.sum()?;
-        if !self.takes(')') {
-            return self.refuse(&format!("')' for the '(' at character {opened}"));
+        if !self.accept(')') {
+            return self.expected_error(&format!("')' for the '(' at character {opened}"));
         }
         self.depth -= 1;
         Ok(inside)
@@ -205,13 +205,13 @@ impl Reader {
     /// Parses `exp(-0.1s)` or `e^(-0.1s)`.
     fn delay(&mut self) -> Result<Ratio, String> {
         const EXPECTED: &str = "exp(-0.1s), a delay in s";
-        let begin = self.at;
-        let rest = &self.signs[begin..];
+        let start = self.at;
+        let rest = &self.signs[start..];
         let length = if rest.starts_with(&['e', 'x', 'p']) { 3 } else { 1 };
         self.at += length;
-        if (length == 1 && !self.takes('^')) || self.next() != Some('(') {
-            self.at = begin;
-            return self.refuse(EXPECTED);
+        if (length == 1 && !self.accept('^')) || self.next() != Some('(') {
+            self.at = start;
+            return self.expected_error(EXPECTED);
         }
         let exponent = self.parentheses()?;
         let slope = match (exponent.num.as_slice(), exponent.den.as_slice()) {
@@ -219,8 +219,8 @@ impl Reader {
             _ => None,
         };
         let Some(slope) = slope.filter(|v| v.is_finite()) else {
-            self.at = begin;
-            return self.refuse(EXPECTED);
+            self.at = start;
+            return self.expected_error(EXPECTED);
         };
         Ok(Ratio {
             delay_s: -slope,
@@ -229,10 +229,10 @@ impl Reader {
     }
 
     fn number(&mut self) -> Result<Ratio, String> {
-        let begin = self.at;
+        let start = self.at;
         let signs = &self.signs;
         let digits = |from: usize| signs[from..].iter().take_while(|sign| sign.is_ascii_digit()).count();
-        let mut end = begin + digits(begin);
+        let mut end = start + digits(start);
         if signs.get(end) == Some(&'.') {
             end += 1 + digits(end + 1);
         }
@@ -244,13 +244,13 @@ impl Reader {
                 end += 1 + sign + exponent;
             }
         }
-        let text: String = signs[begin..end].iter().collect();
+        let text: String = signs[start..end].iter().collect();
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => {
                 self.at = end;
                 Ok(Ratio::of(&[value]))
             }
-            _ => self.refuse("a finite number"),
+            _ => self.expected_error("a finite number"),
         }
     }
 
@@ -258,16 +258,16 @@ impl Reader {
     fn checked(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
         if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
             self.at = at;
-            return self.refuse(&format!("a degree of at most {HIGHEST_DEGREE}"));
+            return self.expected_error(&format!("a degree of at most {HIGHEST_DEGREE}"));
         }
         if ratio.num.iter().chain(&ratio.den).any(|c| !c.is_finite()) {
             self.at = at;
-            return self.refuse("coefficients within the range of floating point");
+            return self.expected_error("coefficients within the range of floating point");
         }
         Ok(ratio)
     }
 }
 
-fn is_of_number(sign: char) -> bool {
+fn may_be_in_number(sign: char) -> bool {
     sign.is_ascii_digit() || sign == '.'
 }

@@ -9,7 +9,7 @@ fn reason(text: &str) -> String {
 }
 
 #[test]
-fn one_element_in_all_notations() {
+fn all_notations_give_the_same_element() {
     let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
     for text in [
         "90/1,6,0",
@@ -41,7 +41,7 @@ fn one_element_in_all_notations() {
 }
 
 #[test]
-fn an_expression_is_what_it_evaluates_to() {
+fn expressions_match_direct_evaluation() {
     let s = num_complex::Complex64::new(0.0, 1.7);
     let delay = (-0.1 * s).exp();
     for (text, expected) in [
@@ -66,7 +66,7 @@ fn an_expression_is_what_it_evaluates_to() {
 }
 
 #[test]
-fn what_is_shown_reads_back_the_same() {
+fn display_text_round_trip() {
     for text in [
         "90/1,6,0",
         "1/s",
@@ -93,7 +93,7 @@ fn what_is_shown_reads_back_the_same() {
 }
 
 #[test]
-fn what_is_wrong_is_named_with_its_place() {
+fn errors_name_their_position() {
     for (text, expected) in [
         ("", "it is empty"),
         ("  ", "it is empty"),

@@ -201,7 +201,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn comments_stand_above_what_they_speak_of() {
+    fn evidence_is_written_as_comments_above_its_key() {
         let text = "name = \"x\"\n\n[read]\ninput = \"e\"\noutput = \"u\"\n\n[conditions.a]\nexcitation = \"d\"\n";
         let evidence = [
             Evidence::new("[read]", "input", "by its name"),
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_written_as_keys() {
+    fn names_are_quoted_as_keys_if_needed() {
         assert_eq!(key_of("so-2"), "so-2");
         assert_eq!(key_of("so 2"), "\"so 2\"");
         assert_eq!(key_of(""), "\"\"");

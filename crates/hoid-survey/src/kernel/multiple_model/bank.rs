@@ -31,7 +31,7 @@ pub struct Bank<const M: usize> {
     hypotheses: [Option<Hypothesis>; M],
     samples: u64,
     /// Number of samples until the next birth.
-    until_birth: u32,
+    samples_until_birth: u32,
     births: u32,
     /// First sample at which hypotheses of a change of omega_nm and zeta_nm may be created.
     neuromuscular_from: u64,
@@ -45,7 +45,7 @@ impl<const M: usize> State for Bank<M> {
         }
         let rest: &mut [&mut dyn State] = &mut [
             &mut self.samples,
-            &mut self.until_birth,
+            &mut self.samples_until_birth,
             &mut self.births,
             &mut self.neuromuscular_from,
             &mut self.detector,
@@ -69,11 +69,11 @@ pub struct Mixture {
 const NEIGHBOURS: usize = 3;
 /// Smallest probability of a hypothesis relative to the likeliest hypothesis, so that no hypothesis is lost
 /// permanently.
-const LEAST_PROBABILITY: f64 = 1e-12;
+const MIN_PROBABILITY: f64 = 1e-12;
 
 impl<const M: usize> Bank<M> {
     fn bounded(&mut self) {
-        self.until_birth = self.until_birth.clamp(1, self.prior.birth_interval.max(1));
+        self.samples_until_birth = self.samples_until_birth.clamp(1, self.prior.birth_interval.max(1));
         for h in self.hypotheses.iter_mut().flatten() {
             h.born = h.born.min(self.samples);
             h.extra_delay = h.extra_delay.min(self.prior.delay.count.saturating_sub(1));
@@ -97,7 +97,7 @@ impl<const M: usize> Bank<M> {
         let mut bank = Self {
             hypotheses,
             samples: 0,
-            until_birth: prior.birth_interval,
+            samples_until_birth: prior.birth_interval,
             births: 0,
             neuromuscular_from: 0,
             detector: ChangeDetector::default(),
@@ -159,17 +159,17 @@ impl<const M: usize> Bank<M> {
             }
             self.normalise();
         }
-        self.until_birth -= 1;
-        if self.until_birth == 0 {
-            self.until_birth = self.prior.birth_interval;
+        self.samples_until_birth -= 1;
+        if self.samples_until_birth == 0 {
+            self.samples_until_birth = self.prior.birth_interval;
             self.drift();
-            self.give_birth();
+            self.create_hypotheses();
         }
         innovation
     }
 
     /// Creates the hypotheses that are due at this birth.
-    fn give_birth(&mut self) {
+    fn create_hypotheses(&mut self) {
         self.births = self.births.wrapping_add(1);
         let probability = self.prior.hazard * f64::from(self.prior.birth_interval);
         self.spawn_changed(probability, false);
@@ -190,7 +190,7 @@ impl<const M: usize> Bank<M> {
     }
 
     /// Scales the probabilities to a sum of one. Probabilities that are too small or not finite are replaced by
-    /// [`LEAST_PROBABILITY`].
+    /// [`MIN_PROBABILITY`].
     fn normalise(&mut self) {
         let mut most = 0.0;
         for h in self.hypotheses.iter().flatten() {
@@ -201,7 +201,7 @@ impl<const M: usize> Bank<M> {
         let (scale, mut sum) = (1.0 / most, 0.0);
         for h in self.hypotheses.iter_mut().flatten() {
             let p = h.probability * scale;
-            h.probability = if p > LEAST_PROBABILITY { p } else { LEAST_PROBABILITY };
+            h.probability = if p > MIN_PROBABILITY { p } else { MIN_PROBABILITY };
             sum += h.probability;
         }
         let scale = 1.0 / sum;

@@ -57,7 +57,7 @@ pub(crate) fn exp(x: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_short_functions_are_libm_s() {
+    fn short_functions_agree_with_libm() {
         for i in 0..4000 {
             let x = f64::from(i) * 1e-3;
             assert!((super::log1p(x) - libm::log1p(x)).abs() <= 4e-16 * libm::log1p(x));

@@ -5,7 +5,7 @@
 
 use super::{
     bank::Bank,
-    hypothesis::{self, Hypothesis, LARGEST},
+    hypothesis::{self, Hypothesis, OVERFLOW_LIMIT},
     prior::ChangePrior,
     response::{Response, Signals},
     signal_ring::{DelayedSignals, SignalRing},
@@ -78,7 +78,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let signals = self.response.step(x);
         let (y, r) = self.whitened(u, &signals);
-        let finite = y.abs() < LARGEST && r.iter().all(|r| r.abs() < LARGEST);
+        let finite = y.abs() < OVERFLOW_LIMIT && r.iter().all(|r| r.abs() < OVERFLOW_LIMIT);
         self.ring.push(if finite { r } else { [0.0; 6] });
         let sample = finite.then_some((y, self.ring.newest()));
         let innovation = self.bank.update(sample, self.response.point());
@@ -137,7 +137,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
 
     /// Stores a sample in the histories, and at regular intervals moves the linearisation point toward the estimate.
     fn store(&mut self, u: f64, signals: Signals) {
-        if !(u.abs() < LARGEST && signals.iter().all(|s| s.abs() < LARGEST)) {
+        if !(u.abs() < OVERFLOW_LIMIT && signals.iter().all(|s| s.abs() < OVERFLOW_LIMIT)) {
             self.response.reset();
             self.u = [0.0; D];
             self.past = [[0.0; 6]; D];

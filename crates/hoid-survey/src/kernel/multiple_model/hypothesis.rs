@@ -23,13 +23,13 @@ use super::{
 use hoid_core::{innovation_variance::InnovationVariance, state::State, ud_covariance::UdCovariance};
 
 /// Limit of variances and signals beyond which their products would overflow.
-pub(super) const LARGEST: f64 = 1e60;
+pub(super) const OVERFLOW_LIMIT: f64 = 1e60;
 /// Largest ratio of a squared innovation to its variance that enters sigma^2.
 const LARGEST_SQUARE: f64 = 9.0;
 /// Largest relative distance of omega_nm and zeta_nm from the linearisation point for which the linearisation is valid.
 const LARGEST_DISTANCE: f64 = 0.5;
 /// Smallest innovation variance relative to the initial value, for spans without any signal.
-const LEAST_VARIANCE: f64 = 1e-9;
+const MIN_VARIANCE: f64 = 1e-9;
 
 /// One hypothesis: a Kalman filter of the operator's parameters since its birth.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -141,7 +141,7 @@ impl Hypothesis {
             neuromuscular_changed: false,
             extra_delay: 0,
             before: Snapshot::default(),
-            least_variance: LEAST_VARIANCE * innovation_variance.variance(),
+            least_variance: MIN_VARIANCE * innovation_variance.variance(),
         };
         first.before = first.snapshot();
         Some(first)
@@ -155,7 +155,7 @@ impl Hypothesis {
         let variance = self.innovation_variance.variance().max(self.least_variance);
         let (f, v) = self.covariance.projections(&psi);
         let total = variance + f[0] * v[0] + f[1] * v[1] + f[2] * v[2] + f[3] * v[3];
-        if !(total > 0.0 && total < LARGEST) {
+        if !(total > 0.0 && total < OVERFLOW_LIMIT) {
             return (eps, 1.0);
         }
         let deviation = libm::sqrt(total);

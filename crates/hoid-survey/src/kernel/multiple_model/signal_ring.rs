@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn signals_of_a_delay_are_those_of_so_many_samples_ago() {
+    fn delayed_signals_are_past_samples() {
         let mut ring = SignalRing::new([[7.0; 6]; 3]);
         for k in 0..8 {
             ring.push([f64::from(k); 6]);

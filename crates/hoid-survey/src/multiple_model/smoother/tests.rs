@@ -24,7 +24,7 @@ fn side(eta: [f64; OPERATOR], scale: f64, weight: f64) -> Side {
 }
 
 #[test]
-fn a_product_is_that_of_the_information_form() {
+fn product_matches_the_information_form() {
     let (f, b) = (
         side([1.0, 2.0, 3.0, 4.0], 0.5, 0.4),
         side([1.5, 1.0, 3.5, 4.2], 2.0, 0.6),
@@ -45,7 +45,7 @@ fn a_product_is_that_of_the_information_form() {
 }
 
 #[test]
-fn a_past_and_a_future_that_contradict_each_other_are_not_joined() {
+fn contradictory_past_and_future_are_not_joined() {
     let old = side([1.0; OPERATOR], 0.01, 0.9);
     let (same, other) = (side([1.0; OPERATOR], 0.01, 0.5), side([9.0; OPERATOR], 0.01, 0.5));
     let joined = join(&[old], &[same, other]);
@@ -87,7 +87,7 @@ fn run(condition: Condition) -> Record {
 }
 
 #[test]
-fn without_a_change_all_rows_say_nearly_the_same() {
+fn without_a_change_all_rows_nearly_agree() {
     let trace = track(&run(Condition::C1), &options(), 256).unwrap();
     let rows: Vec<_> = (0..trace.len()).map(|row| trace.operator(row).unwrap()).collect();
     let last = rows[rows.len() / 2];
@@ -102,7 +102,7 @@ fn without_a_change_all_rows_say_nearly_the_same() {
 }
 
 #[test]
-fn a_record_with_faults_and_one_that_is_too_short() {
+fn faults_have_little_effect_and_short_records_are_refused() {
     let record = run(Condition::C4);
     let (mut e, mut u) = (record.input().to_vec(), record.output().to_vec());
     let clean = track(&record, &options(), 512).unwrap();

@@ -48,7 +48,7 @@ fn gain(theta: &[f64]) -> f64 {
 }
 
 #[test]
-fn in_a_closed_loop_the_bias_is_small() {
+fn bias_is_small_in_a_closed_loop() {
     let held = Scenario::condition(Condition::C1).initial.operator;
     let held = held.discretise(SampleTime::HUNDREDTH).unwrap().held;
     let truth = [held.b0, held.b1, held.f1, held.f2];
@@ -93,7 +93,7 @@ fn in_a_closed_loop_the_bias_is_small() {
 }
 
 #[test]
-fn it_follows_the_change_of_the_reference_task() {
+fn change_of_the_reference_task_is_tracked() {
     let lambda = 1.0 - 1.0 / 256.0;
     for external in [true, false] {
         let mut errors = Vec::new();

@@ -3,7 +3,7 @@
 use hoid_model::scenario::{Condition, Scenario};
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
-use super::of_runs::{middle, of, subjects};
+use super::of_runs::{mean_and_median, of, subjects};
 use crate::{
     experiment::{
         EvaluatedRun,
@@ -147,7 +147,7 @@ fn over_time(
     let courses = || own.iter().map(|run| &run.outcome.courses[method]);
     let longest = courses().max_by_key(|course| course.times_s.len());
     let times_s = longest.map_or(Vec::new(), |course| course.times_s.clone());
-    let at = |row: usize| middle(courses().map(|course| shown.of_course(course, row)));
+    let at = |row: usize| mean_and_median(courses().map(|course| shown.of_course(course, row)));
     let both: Vec<[f64; 2]> = (0..times_s.len()).map(at).collect();
     for (t, [mean, median]) in times_s.iter().zip(&both) {
         data.row(&[name, RECURSIONS[method], subject], &[*t, *mean, *median]);
@@ -176,7 +176,7 @@ fn batch(
     };
     let mut curves = Vec::new();
     for (span, (from_s, to_s)) in first.outcome.spans_s.into_iter().enumerate() {
-        let fitted = middle(own.iter().map(|run| shown.of_state(&run.outcome.batch[method][span])));
+        let fitted = mean_and_median(own.iter().map(|run| shown.of_state(&run.outcome.batch[method][span])));
         for t in [from_s, to_s] {
             data.row(&[name, BATCH[method], subject], &[t, fitted[0], fitted[1]]);
         }
@@ -209,7 +209,7 @@ fn truth(shown: Shown, own: &[&EvaluatedRun], condition: Condition) -> Option<Tr
     if states.is_empty() {
         return None;
     }
-    let [first, last] = [0, 1].map(|end| middle(states.iter().map(|state| shown.of_state(&state[end])))[0]);
+    let [first, last] = [0, 1].map(|end| mean_and_median(states.iter().map(|state| shown.of_state(&state[end])))[0]);
     let schedule = Scenario::condition(condition).schedule;
     let times_s: Vec<f64> = (0..=512).map(|k| 81.92 * f64::from(k) / 512.0).collect();
     let share = |t: &f64| match (schedule.change_s(), schedule.rate_per_s()) {

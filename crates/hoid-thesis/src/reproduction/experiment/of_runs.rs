@@ -25,7 +25,7 @@ pub(super) fn subjects<'a>(runs: &'a [EvaluatedRun], condition: &str) -> Vec<&'a
 }
 
 /// Mean and median of the finite values.
-pub(super) fn middle(values: impl Iterator<Item = f64>) -> [f64; 2] {
+pub(super) fn mean_and_median(values: impl Iterator<Item = f64>) -> [f64; 2] {
     let finite: Vec<f64> = values.filter(|value| value.is_finite()).collect();
     if finite.is_empty() {
         return [f64::NAN; 2];

@@ -1,6 +1,6 @@
 //! Table 3 of the text, and the operators before and after the change.
 
-use super::of_runs::{middle, of, subjects};
+use super::of_runs::{mean_and_median, of, subjects};
 use crate::{
     experiment::{EvaluatedRun, procedure::RunOutcome},
     reproduction::{
@@ -76,7 +76,7 @@ pub(super) fn operators(item: &Item, runs: &[EvaluatedRun], conditions: &[String
                     let determined = of_runs.iter().filter(|of| of[0].is_finite()).count();
                     let share = determined as f64 / of_runs.len() as f64;
                     let [k_e, t_l, k_e_dot, omega, zeta] =
-                        [0, 1, 2, 3, 4].map(|i| middle(of_runs.iter().map(|of| of[i]))[1]);
+                        [0, 1, 2, 3, 4].map(|i| mean_and_median(of_runs.iter().map(|of| of[i]))[1]);
                     data.row(
                         &[condition, subject, estimator, name],
                         &[own.len() as f64, share, k_e, t_l, k_e_dot, omega, zeta],
@@ -96,5 +96,5 @@ fn at_the_end(outcome: &RunOutcome, method: usize, span: usize) -> [f64; 5] {
         .filter(|(t, _)| (0.5 * (from_s + to_s)..to_s).contains(*t))
         .map(|(_, state)| &state.operator)
         .collect();
-    [0, 1, 2, 3, 4].map(|i| middle(within.iter().map(|operator| operator[i]))[1])
+    [0, 1, 2, 3, 4].map(|i| mean_and_median(within.iter().map(|operator| operator[i]))[1])
 }

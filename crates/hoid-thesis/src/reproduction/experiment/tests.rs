@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use super::{of_runs::middle, *};
+use super::{of_runs::mean_and_median, *};
 use crate::experiment::{
     RunKey,
     procedure::{RecursiveTrace, RunOutcome, State, Truth},
@@ -50,7 +50,7 @@ fn column(made: &ItemOutput, name: &str) -> Vec<f64> {
 }
 
 #[test]
-fn figures_show_the_average_and_the_median_of_the_runs() {
+fn figures_show_average_and_median_of_the_runs() {
     let runs = [run("1", 3, 1.0), run("1", 4, 2.0), run("1", 5, 6.0), run("2", 3, 1.0)];
     for rows in [&DISCRETE[..], &OPERATOR, &VARIANCES] {
         let made = figures::draw(&item(), &runs, ("C4", Condition::C4), rows);
@@ -63,14 +63,14 @@ fn figures_show_the_average_and_the_median_of_the_runs() {
         let mean = column(&made, "mean");
         assert!((mean[0] - expected).abs() < 1e-12, "{mean:?}");
     }
-    assert_eq!(middle([1.0, f64::NAN, 2.0, 6.0].into_iter()), [3.0, 2.0]);
-    assert!(middle([f64::NAN].into_iter())[0].is_nan());
+    assert_eq!(mean_and_median([1.0, f64::NAN, 2.0, 6.0].into_iter()), [3.0, 2.0]);
+    assert!(mean_and_median([f64::NAN].into_iter())[0].is_nan());
     let made = tables::delays(&item(), &runs, &["C4".to_owned()]);
     assert_eq!((column(&made, "nk_true")[0], column(&made, "nk_BJ")[0]), (29.0, 29.0));
 }
 
 #[test]
-fn recorded_people_have_no_truth_and_may_have_runs_of_different_lengths() {
+fn recorded_runs_may_differ_in_length_and_have_no_truth() {
     let mut runs = [run("anna", 3, 1.0), run("anna", 4, 2.0)];
     for run in &mut runs {
         run.outcome.truth = None;
@@ -102,7 +102,7 @@ fn recorded_people_have_no_truth_and_may_have_runs_of_different_lengths() {
 }
 
 #[test]
-fn figures_have_the_numbers_of_the_text_and_the_names_of_other_conditions() {
+fn figures_are_named_by_number_and_condition() {
     let names: Vec<String> = items().into_iter().map(|item| item.name).collect();
     for i in 1..=18 {
         assert!(names.contains(&format!("I.{i}")));

@@ -20,13 +20,13 @@ pub type Truth = Vec<(String, f64)>;
 
 /// Kind of operator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Who {
+pub enum OperatorKind {
     C1,
     C2,
     Person,
 }
 
-impl Who {
+impl OperatorKind {
     pub const ALL: [Self; 3] = [Self::C1, Self::C2, Self::Person];
 
     pub fn name(self) -> &'static str {
@@ -41,7 +41,7 @@ impl Who {
 /// Runs of one operator, and one run of another operator for the fault that requires it.
 #[derive(Debug, Clone)]
 pub struct Base {
-    pub who: Who,
+    pub who: OperatorKind,
     /// Kind of run: `C1`, or `person, pulsed`.
     pub label: String,
     pub form: Form,
@@ -62,14 +62,14 @@ impl Base {
 ///
 /// # Errors
 /// The errors of the simulation.
-pub fn base(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
+pub fn base(who: OperatorKind, seed: u64, case: u64) -> Result<Base, SimError> {
     match who {
-        Who::C1 | Who::C2 => of_text(who, seed, case),
-        Who::Person => of_person(seed, case),
+        OperatorKind::C1 | OperatorKind::C2 => of_text(who, seed, case),
+        OperatorKind::Person => of_person(seed, case),
     }
 }
 
-fn of_text(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
+fn of_text(who: OperatorKind, seed: u64, case: u64) -> Result<Base, SimError> {
     let run = |condition: Condition, replication: u64| -> Result<(Table, Truth), SimError> {
         let scenario = Scenario::condition(condition);
         let streams = RunSeed {
@@ -91,7 +91,7 @@ fn of_text(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
         Ok((Table::of(&record, false), truth))
     };
     let (first, other) = match who {
-        Who::C2 => (Condition::C2, Condition::C1),
+        OperatorKind::C2 => (Condition::C2, Condition::C1),
         _ => (Condition::C1, Condition::C2),
     };
     let (table, truth) = run(first, 1)?;
@@ -134,7 +134,7 @@ fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
         .map(|run| Ok(Table::of(&person.run(run)?.record, with_disturbance)))
         .collect::<Result<Vec<_>, SimError>>()?;
     Ok(Base {
-        who: Who::Person,
+        who: OperatorKind::Person,
         label: format!("person, {kind}"),
         form,
         runs,

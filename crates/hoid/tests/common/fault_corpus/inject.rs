@@ -3,7 +3,7 @@
 use hoid::prelude::RunSeed;
 
 use super::{
-    kinds::{Fault, FaultPosition, On, WHOLE, What},
+    kinds::{Change, Channels, Fault, FaultPosition, WHOLE},
     table::{Table, spread},
 };
 
@@ -52,51 +52,51 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     let mut rows = (at, n);
     let mut stays = false;
     match fault.kind.what {
-        What::Nothing => rows = (0, 0),
-        What::Spike => {
+        Change::Nothing => rows = (0, 0),
+        Change::Spike => {
             rows = (at, at + 1);
-            each(&mut table, on, rows, |x, k, e| {
+            change_each(&mut table, on, rows, |x, k, e| {
                 x + sign(1 + k as u64) * size * if e { of_e } else { of_u }
             });
         }
-        What::Burst => {
+        Change::Burst => {
             rows = (at, until(size as usize));
-            each(&mut table, on, rows, |x, k, e| {
+            change_each(&mut table, on, rows, |x, k, e| {
                 x + sign(1 + 2 * k as u64 + u64::from(e)) * 10.0 * if e { of_e } else { of_u }
             });
         }
-        What::Missing => {
+        Change::Missing => {
             rows = (at, until(size as usize));
-            each(&mut table, on, rows, |_, _, _| f64::NAN);
+            change_each(&mut table, on, rows, |_, _, _| f64::NAN);
         }
-        What::Wrap => {
+        Change::Wrap => {
             rows = (at, until(seconds));
-            each(&mut table, on, rows, |x, _, _| x + 360.0);
+            change_each(&mut table, on, rows, |x, _, _| x + 360.0);
         }
-        What::Step | What::Offset => {
-            stays = fault.kind.what == What::Step;
+        Change::Step | Change::Offset => {
+            stays = fault.kind.what == Change::Step;
             let by = sign(1) * size / 100.0;
-            each(&mut table, on, rows, |x, _, e| x + by * if e { of_e } else { of_u });
+            change_each(&mut table, on, rows, |x, _, e| x + by * if e { of_e } else { of_u });
         }
-        What::Drift => {
+        Change::Drift => {
             let by = sign(1) * size / n as f64;
-            each(&mut table, on, rows, |x, k, e| {
+            change_each(&mut table, on, rows, |x, k, e| {
                 x + by * k as f64 * if e { of_e } else { of_u }
             });
         }
-        What::Frozen => {
+        Change::Frozen => {
             rows = (at, until(seconds));
             let (e, u) = (clean.e[at], clean.u[at]);
-            each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
+            change_each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
         }
-        What::Idle | What::IdleNoisy => {
+        Change::Idle | Change::IdleNoisy => {
             // The position is before, inside or after the run.
             let at = match fault.place {
                 FaultPosition::Start => 0,
                 FaultPosition::End => n,
                 FaultPosition::Middle | FaultPosition::Whole => at,
             };
-            let small = if fault.kind.what == What::Idle { 0.0 } else { 1e-3 };
+            let small = if fault.kind.what == Change::Idle { 0.0 } else { 1e-3 };
             let length = samples(size);
             for (i, column) in table.columns_mut().enumerate() {
                 let noise = RunSeed {
@@ -116,40 +116,40 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
                 rows: (at, at),
             };
         }
-        What::Dropout => {
+        Change::Dropout => {
             rows = (at, until(seconds));
-            each(&mut table, on, rows, |_, _, _| 0.0);
+            change_each(&mut table, on, rows, |_, _, _| 0.0);
         }
-        What::Scaled | What::ScaledLong => {
+        Change::Scaled | Change::ScaledLong => {
             let length = match fault.kind.what {
-                What::Scaled => samples(10.0),
+                Change::Scaled => samples(10.0),
                 _ => samples(50.0).min(2 * n / 5),
             };
             rows = (at, until(length));
-            each(&mut table, on, rows, |x, _, _| x * size);
+            change_each(&mut table, on, rows, |x, _, _| x * size);
         }
-        What::Milliseconds => table.t.iter_mut().for_each(|t| *t *= size),
-        What::Swapped => {
+        Change::Milliseconds => table.t.iter_mut().for_each(|t| *t *= size),
+        Change::Swapped => {
             rows = (at, until(seconds));
             table.e[at..rows.1].swap_with_slice(&mut table.u[at..rows.1]);
         }
-        What::Flipped => {
+        Change::Flipped => {
             rows = (at, until(seconds));
-            each(&mut table, on, rows, |x, _, _| -x);
+            change_each(&mut table, on, rows, |x, _, _| -x);
         }
-        What::Saturated => each(&mut table, on, rows, |x, _, e| {
+        Change::Saturated => change_each(&mut table, on, rows, |x, _, e| {
             let most = size * if e { of_e } else { of_u };
             x.clamp(-most, most)
         }),
-        What::Quantised => each(&mut table, on, rows, |x, _, e| {
+        Change::Quantised => change_each(&mut table, on, rows, |x, _, e| {
             let step = size * if e { of_e } else { of_u };
             (x / step).round() * step
         }),
-        What::Lost | What::Duplicated => {
+        Change::Lost | Change::Duplicated => {
             stays = true;
             rows = (at, until(seconds));
             for column in table.columns_mut() {
-                if fault.kind.what == What::Lost {
+                if fault.kind.what == Change::Lost {
                     column.drain(at..rows.1);
                 } else {
                     let again = column[at..rows.1].to_vec();
@@ -158,14 +158,14 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
             }
             table.renumber();
         }
-        What::Late => {
+        Change::Late => {
             stays = true;
             let by = size as usize;
             for k in at..n {
                 table.u[k] = clean.u[if k < at + by { at } else { k - by }];
             }
         }
-        What::Short => {
+        Change::Short => {
             rows = (size as usize, n);
             for column in table.columns_mut() {
                 column.truncate(rows.0);
@@ -178,7 +178,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
                 rows,
             };
         }
-        What::SecondOperator => {
+        Change::SecondOperator => {
             stays = true;
             let third = 2 * n / 3;
             rows = (third, n);
@@ -197,7 +197,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
 
 /// Changes the values of the channels in some rows: `change` receives a value, its row, and true if the value belongs
 /// to e.
-fn each(table: &mut Table, on: On, rows: (usize, usize), change: impl Fn(f64, usize, bool) -> f64) {
+fn change_each(table: &mut Table, on: Channels, rows: (usize, usize), change: impl Fn(f64, usize, bool) -> f64) {
     for k in rows.0..rows.1 {
         if on.e() {
             table.e[k] = change(table.e[k], k, true);

@@ -5,9 +5,9 @@
 //! standard error, is not judged.
 //!
 //! A trace is wrong if it is wrong at its last row or [`LATER_S`] after the fault. Its recovery time is the time from
-//! the end of the fault to the last row in which a parameter differs by more than [`NEAR_ERRORS`] of its standard
+//! the end of the fault to the last row in which a parameter differs by more than [`MAX_NEAR_ERRORS`] of its standard
 //! errors and by more than [`NEAR_SHARE`] of its true value. Its lasting error is the largest error that it had for
-//! [`LASTING_S`] without interruption.
+//! [`MIN_LASTING_S`] without interruption.
 
 use serde_json::Value;
 
@@ -19,11 +19,11 @@ pub const WRONG: f64 = 4.0;
 pub const NEAR_S: f64 = 1.0;
 /// Time after the fault at which a trace is examined again, s.
 pub const LATER_S: f64 = 20.0;
-const NEAR_ERRORS: f64 = 2.5;
+const MAX_NEAR_ERRORS: f64 = 2.5;
 const NEAR_SHARE: f64 = 0.1;
-const LASTING_S: f64 = 5.0;
+const MIN_LASTING_S: f64 = 5.0;
 /// Findings that only report faults of the recording.
-const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
+const FAULT_FINDINGS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
 
 /// Known properties of a case.
 #[derive(Debug, Clone)]
@@ -107,26 +107,26 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
         _ => &known.truth,
     };
     let worst_at = |row: &Row| worst_of(&row.claims, truth_at(row.t));
-    let behind = known.span_s.map_or(0.0, |(_, to)| to);
+    let span_end = known.span_s.map_or(0.0, |(_, to)| to);
     let later = rows
         .iter()
-        .find(|row| known.span_s.is_some() && row.t >= behind + LATER_S);
+        .find(|row| known.span_s.is_some() && row.t >= span_end + LATER_S);
     let looked_at = [rows.last(), later].into_iter().flatten();
     let worst = looked_at.filter_map(worst_at).max_by(|a, b| a.1.total_cmp(&b.1));
-    let begun = known.span_s.map_or(0.0, |(from, _)| from);
+    let span_start = known.span_s.map_or(0.0, |(from, _)| from);
     let errors: Vec<(f64, f64)> = rows
         .iter()
-        .filter(|row| row.t >= begun)
+        .filter(|row| row.t >= span_start)
         .map(|row| (row.t, worst_at(row).map_or(0.0, |(_, z)| z)))
         .collect();
     let recovery_s = known.span_s.and_then(|_| {
-        let after: Vec<&Row> = rows.iter().filter(|row| row.t >= behind).collect();
+        let after: Vec<&Row> = rows.iter().filter(|row| row.t >= span_end).collect();
         let far = |row: &&&Row| !is_near(&row.claims, truth_at(row.t));
         let last = after.last()?.t;
         // A trace that ends with the fault, or soon after it, has no recovery time.
-        (last - behind > 1.0).then(|| match after.iter().rfind(far) {
+        (last - span_end > 1.0).then(|| match after.iter().rfind(far) {
             Some(row) if row.t >= last => f64::INFINITY,
-            Some(row) => row.t - behind,
+            Some(row) => row.t - span_end,
             None => 0.0,
         })
     });
@@ -159,7 +159,7 @@ fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
     };
     CaseOutcome {
         level: verdict["level"].as_str().unwrap_or("none").to_owned(),
-        of_faults: kinds.iter().any(|kind| OF_FAULTS.contains(&kind.as_str())),
+        of_faults: kinds.iter().any(|kind| FAULT_FINDINGS.contains(&kind.as_str())),
         kinds,
         told: faults.len(),
         placed: faults.iter().filter(of_file).any(meets),
@@ -199,20 +199,20 @@ fn is_near(claims: &[Claim], truth: &Truth) -> bool {
     let near = |(name, value, error): &Claim| {
         truth.iter().find(|(known, _)| known == name).is_none_or(|(_, own)| {
             let off = (value - own).abs();
-            off <= NEAR_ERRORS * error || off <= NEAR_SHARE * own.abs()
+            off <= MAX_NEAR_ERRORS * error || off <= NEAR_SHARE * own.abs()
         })
     };
     !claims.is_empty() && claims.iter().all(near)
 }
 
-/// Returns the largest error that lasted for [`LASTING_S`], from pairs of time and error.
+/// Returns the largest error that lasted for [`MIN_LASTING_S`], from pairs of time and error.
 fn lasting(errors: &[(f64, f64)]) -> Option<f64> {
     let (first, last) = (errors.first()?.0, errors.last()?.0);
-    if last - first < LASTING_S {
+    if last - first < MIN_LASTING_S {
         return None;
     }
     let step = (last - first) / (errors.len() - 1) as f64;
-    let rows = ((LASTING_S / step).round() as usize).max(1);
+    let rows = ((MIN_LASTING_S / step).round() as usize).max(1);
     let least = |window: &[(f64, f64)]| window.iter().map(|(_, z)| *z).fold(f64::INFINITY, f64::min);
     errors.windows(rows).map(least).max_by(f64::total_cmp)
 }

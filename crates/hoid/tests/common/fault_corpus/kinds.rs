@@ -2,13 +2,13 @@
 
 /// Channel of a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum On {
+pub enum Channels {
     E,
     U,
     Both,
 }
 
-impl On {
+impl Channels {
     pub fn e(self) -> bool {
         self != Self::U
     }
@@ -20,7 +20,7 @@ impl On {
 
 /// Kind of change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum What {
+pub enum Change {
     /// Nothing: a clean run.
     Nothing,
     /// One sample deviates; size in standard deviations of its channel.
@@ -74,8 +74,8 @@ pub enum What {
 /// A kind of fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kind {
-    pub what: What,
-    pub on: On,
+    pub what: Change,
+    pub on: Channels,
 }
 
 /// Position in the record.
@@ -99,83 +99,83 @@ pub struct Fault {
     pub place: FaultPosition,
 }
 
-const CHANNELS: &[On] = &[On::E, On::U, On::Both];
-const EACH: &[On] = &[On::E, On::U];
-const TOGETHER: &[On] = &[On::Both];
-const ONE: &[On] = &[On::U];
+const CHANNELS: &[Channels] = &[Channels::E, Channels::U, Channels::Both];
+const E_OR_U: &[Channels] = &[Channels::E, Channels::U];
+const BOTH: &[Channels] = &[Channels::Both];
+const ONLY_U: &[Channels] = &[Channels::U];
 const PLACES: &[FaultPosition] = &[FaultPosition::Start, FaultPosition::Middle, FaultPosition::End];
-const ALL: &[FaultPosition] = &[FaultPosition::Whole];
+const FULL: &[FaultPosition] = &[FaultPosition::Whole];
 /// The whole record.
 pub const WHOLE: f64 = f64::INFINITY;
 
 /// An entry for each kind: name, unit of its size, channels, sizes, places.
 type Line = (
-    What,
+    Change,
     &'static str,
     &'static str,
-    &'static [On],
+    &'static [Channels],
     &'static [f64],
     &'static [FaultPosition],
 );
 
 const LINES: [Line; 23] = [
     (
-        What::Spike,
+        Change::Spike,
         "spike",
         "sigma",
         CHANNELS,
         &[5.0, 10.0, 30.0, 100.0, 1000.0],
         PLACES,
     ),
-    (What::Burst, "burst", "samples", CHANNELS, &[2.0, 5.0, 10.0], PLACES),
+    (Change::Burst, "burst", "samples", CHANNELS, &[2.0, 5.0, 10.0], PLACES),
     (
-        What::Missing,
+        Change::Missing,
         "missing",
         "samples",
         CHANNELS,
         &[1.0, 10.0, 100.0],
         PLACES,
     ),
-    (What::Wrap, "wrap", "s", EACH, &[0.1, 2.0, WHOLE], PLACES),
-    (What::Step, "step", "%", EACH, &[2.0, 10.0, 50.0, 200.0], PLACES),
-    (What::Offset, "offset", "%", EACH, &[3.0, 10.0, 50.0], ALL),
-    (What::Drift, "drift", "sigma", EACH, &[0.2, 1.0, 5.0], ALL),
-    (What::Frozen, "frozen", "s", CHANNELS, &[0.1, 1.0, 10.0], PLACES),
-    (What::Idle, "idle", "s", TOGETHER, &[5.0, 15.0, 30.0], PLACES),
+    (Change::Wrap, "wrap", "s", E_OR_U, &[0.1, 2.0, WHOLE], PLACES),
+    (Change::Step, "step", "%", E_OR_U, &[2.0, 10.0, 50.0, 200.0], PLACES),
+    (Change::Offset, "offset", "%", E_OR_U, &[3.0, 10.0, 50.0], FULL),
+    (Change::Drift, "drift", "sigma", E_OR_U, &[0.2, 1.0, 5.0], FULL),
+    (Change::Frozen, "frozen", "s", CHANNELS, &[0.1, 1.0, 10.0], PLACES),
+    (Change::Idle, "idle", "s", BOTH, &[5.0, 15.0, 30.0], PLACES),
     (
-        What::IdleNoisy,
+        Change::IdleNoisy,
         "idle with noise",
         "s",
-        TOGETHER,
+        BOTH,
         &[5.0, 15.0, 30.0],
         PLACES,
     ),
-    (What::Dropout, "dropout", "s", CHANNELS, &[0.05, 0.5, 5.0], PLACES),
-    (What::Scaled, "scaled for 10 s", "times", TOGETHER, &[10.0, 1e6], PLACES),
+    (Change::Dropout, "dropout", "s", CHANNELS, &[0.05, 0.5, 5.0], PLACES),
+    (Change::Scaled, "scaled for 10 s", "times", BOTH, &[10.0, 1e6], PLACES),
     (
-        What::ScaledLong,
+        Change::ScaledLong,
         "scaled for 50 s",
         "times",
-        TOGETHER,
+        BOTH,
         &[10.0, 1e6],
         &[FaultPosition::Start, FaultPosition::Middle],
     ),
-    (What::Milliseconds, "t in ms", "", TOGETHER, &[1000.0], ALL),
-    (What::Swapped, "swapped", "s", TOGETHER, &[10.0, 30.0, WHOLE], PLACES),
-    (What::Flipped, "flipped", "s", EACH, &[1.0, 10.0, WHOLE], PLACES),
-    (What::Saturated, "saturated", "sigma", EACH, &[2.0, 1.0, 0.5], ALL),
-    (What::Quantised, "quantised", "sigma", EACH, &[0.05, 0.3, 1.0], ALL),
-    (What::Lost, "lost", "s", TOGETHER, &[0.1, 1.0, 4.0], PLACES),
-    (What::Duplicated, "duplicated", "s", TOGETHER, &[0.1, 1.0], PLACES),
-    (What::Late, "late", "samples", ONE, &[1.0, 5.0, 20.0], PLACES),
-    (What::Short, "short", "samples", TOGETHER, &[60.0, 200.0, 500.0], ALL),
-    (What::SecondOperator, "second operator", "", TOGETHER, &[1.0], ALL),
+    (Change::Milliseconds, "t in ms", "", BOTH, &[1000.0], FULL),
+    (Change::Swapped, "swapped", "s", BOTH, &[10.0, 30.0, WHOLE], PLACES),
+    (Change::Flipped, "flipped", "s", E_OR_U, &[1.0, 10.0, WHOLE], PLACES),
+    (Change::Saturated, "saturated", "sigma", E_OR_U, &[2.0, 1.0, 0.5], FULL),
+    (Change::Quantised, "quantised", "sigma", E_OR_U, &[0.05, 0.3, 1.0], FULL),
+    (Change::Lost, "lost", "s", BOTH, &[0.1, 1.0, 4.0], PLACES),
+    (Change::Duplicated, "duplicated", "s", BOTH, &[0.1, 1.0], PLACES),
+    (Change::Late, "late", "samples", ONLY_U, &[1.0, 5.0, 20.0], PLACES),
+    (Change::Short, "short", "samples", BOTH, &[60.0, 200.0, 500.0], FULL),
+    (Change::SecondOperator, "second operator", "", BOTH, &[1.0], FULL),
 ];
 
 impl Kind {
     pub const NOTHING: Self = Self {
-        what: What::Nothing,
-        on: On::Both,
+        what: Change::Nothing,
+        on: Channels::Both,
     };
 
     /// Name in the tables: `spike, e`.
@@ -185,9 +185,9 @@ impl Kind {
         };
         match self.on {
             _ if channels.len() == 1 => (*name).to_owned(),
-            On::E => format!("{name} e"),
-            On::U => format!("{name} u"),
-            On::Both => format!("{name} both"),
+            Channels::E => format!("{name} e"),
+            Channels::U => format!("{name} u"),
+            Channels::Both => format!("{name} both"),
         }
     }
 }
@@ -207,7 +207,7 @@ impl Fault {
             .map_or("", |line| line.2);
         match self.size {
             _ if unit.is_empty() => String::new(),
-            WHOLE if self.kind.what == What::Wrap => "to the end".to_owned(),
+            WHOLE if self.kind.what == Change::Wrap => "to the end".to_owned(),
             WHOLE => "whole".to_owned(),
             size => format!("{size} {unit}"),
         }
@@ -221,8 +221,8 @@ pub fn faults() -> Vec<Fault> {
         for &on in channels {
             for &size in sizes {
                 // A fault of the whole record has no position, but a wrap has a start.
-                let places = if size == WHOLE && what != What::Wrap {
-                    ALL
+                let places = if size == WHOLE && what != Change::Wrap {
+                    FULL
                 } else {
                     places
                 };

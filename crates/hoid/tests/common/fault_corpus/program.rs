@@ -10,16 +10,16 @@ use std::{
 use serde_json::Value;
 
 use super::{
-    bases::{Base, Who, base},
+    bases::{Base, OperatorKind, base},
     inject::inject,
     judge::{self, CaseOutcome, CaseTruth, Row},
-    kinds::{Fault, What},
+    kinds::{Change, Fault},
 };
 
 /// Time limit of a run of the program, s.
 const LONGEST_S: u64 = 120;
 /// Number of samples per row of a trace.
-const EVERY: &str = "10";
+const SAMPLES_PER_ROW: &str = "10";
 
 /// Method by which a record is evaluated, with default options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,9 +67,9 @@ impl Way {
     pub fn of(base: &Base) -> &'static [Self] {
         const LEAD: [Way; 4] = [Way::GreyBox, Way::Adaptive, Way::MultipleModel, Way::Physical];
         match (base.who, base.form) {
-            (Who::C1 | Who::C2, _) => &Self::ALL,
-            (Who::Person, hoid::model::Form::Lead) => &LEAD,
-            (Who::Person, _) => &LEAD[..1],
+            (OperatorKind::C1 | OperatorKind::C2, _) => &Self::ALL,
+            (OperatorKind::Person, hoid::model::Form::Lead) => &LEAD,
+            (OperatorKind::Person, _) => &LEAD[..1],
         }
     }
 }
@@ -79,7 +79,7 @@ impl Way {
 pub struct Outcome {
     pub case: u64,
     pub fault: Fault,
-    pub who: Who,
+    pub who: OperatorKind,
     pub label: String,
     pub way: Way,
     pub seconds: f64,
@@ -97,7 +97,7 @@ pub fn outcomes(
     seed: u64,
     case: u64,
     fault: Fault,
-    who: Who,
+    who: OperatorKind,
     ways: &[Way],
 ) -> Result<Vec<Outcome>, String> {
     let base = base(who, seed, case).map_err(|e| e.to_string())?;
@@ -105,11 +105,11 @@ pub fn outcomes(
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     let (files, known) = write(&base, &fault, &folder, seed, case)?;
     let evaluated = |way: &Way| {
-        let begun = Instant::now();
+        let start_time = Instant::now();
         let found = run(program, *way, &base, &files, &known, &folder)?;
         let (judged, refusal) = match found {
             Ok(judged) => (judged, None),
-            Err(said) => (CaseOutcome::refused(), Some(said)),
+            Err(message) => (CaseOutcome::refused(), Some(message)),
         };
         Ok(Outcome {
             case,
@@ -117,7 +117,7 @@ pub fn outcomes(
             who,
             label: base.label.clone(),
             way: *way,
-            seconds: begun.elapsed().as_secs_f64(),
+            seconds: start_time.elapsed().as_secs_f64(),
             judged,
             refusal,
         })
@@ -143,8 +143,8 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
     }
     let known = CaseTruth {
         truth: base.truth.clone(),
-        then: (fault.kind.what == What::SecondOperator).then(|| base.second_truth.clone()),
-        span_s: (fault.kind.what != What::Nothing).then_some((injected.from_s, injected.to_s)),
+        then: (fault.kind.what == Change::SecondOperator).then(|| base.second_truth.clone()),
+        span_s: (fault.kind.what != Change::Nothing).then_some((injected.from_s, injected.to_s)),
         file: "faulty.csv".to_owned(),
         sample_time: injected.table.h,
     };
@@ -169,13 +169,13 @@ fn run(
         _ => command
             .arg("track")
             .args(files.last())
-            .args(["--method", way.name(), "--every", EVERY, "--out"])
+            .args(["--method", way.name(), "--every", SAMPLES_PER_ROW, "--out"])
             .arg(&trace),
     };
     command.arg("--json");
-    let (said, printed) = finished(&mut command, folder)?;
+    let (message, printed) = finished(&mut command, folder)?;
     let Ok(json) = serde_json::from_str::<Value>(&printed) else {
-        return Ok(Err(said));
+        return Ok(Err(message));
     };
     if !way.tracks() {
         return Ok(Ok(judge::of_fit(&json, known)));
@@ -195,12 +195,12 @@ fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), St
     let mut child = command
         .spawn()
         .map_err(|e| format!("{}: {e}", command.get_program().display()))?;
-    let begun = Instant::now();
+    let start_time = Instant::now();
     let status = loop {
         if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
             break status;
         }
-        if begun.elapsed() > Duration::from_secs(LONGEST_S) {
+        if start_time.elapsed() > Duration::from_secs(LONGEST_S) {
             child.kill().map_err(|e| e.to_string())?;
             child.wait().map_err(|e| e.to_string())?;
             return Ok((format!("took longer than {LONGEST_S} s"), String::new()));
@@ -209,9 +209,9 @@ fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), St
     };
     let read = |path: &Path| fs::read(path).map_err(|e| format!("{}: {e}", path.display()));
     let text = |bytes: Vec<u8>| String::from_utf8_lossy(&bytes).into_owned();
-    let (said, printed) = (text(read(&errors)?), text(read(&output)?));
-    let said = format!("{status}: {}", said.trim());
-    Ok((said, if status.success() { printed } else { String::new() }))
+    let (message, printed) = (text(read(&errors)?), text(read(&output)?));
+    let message = format!("{status}: {}", message.trim());
+    Ok((message, if status.success() { printed } else { String::new() }))
 }
 
 /// Returns the rows of a trace file: the time, and each column for which a column with the suffix `_se` exists.

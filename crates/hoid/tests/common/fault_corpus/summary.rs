@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::{
-    bases::Who,
-    kinds::{Kind, What},
+    bases::OperatorKind,
+    kinds::{Change, Kind},
     program::{Outcome, Way},
 };
 
@@ -77,7 +77,7 @@ pub fn by_way(all: &[Outcome]) -> String {
         );
     };
     for (runs, of_people) in [("C1, C2", false), ("people", true)] {
-        let such = |o: &&Outcome| (o.who == Who::Person) == of_people;
+        let such = |o: &&Outcome| (o.who == OperatorKind::Person) == of_people;
         for way in Way::ALL {
             let n = Numbers::of(all.iter().filter(such).filter(|o| o.way == way));
             // Not all methods are used for people.
@@ -195,7 +195,7 @@ pub fn to_csv(all: &[Outcome]) -> String {
     let mut text = "case,kind,size,place,run,method,wrong,flagged,silent,level,kinds,of_faults,told,placed,worst,errors,recovery_s,lasting,seconds,refusal\n".to_owned();
     for o in all {
         let j = &o.judged;
-        let place = if o.fault.kind.what == What::Nothing {
+        let place = if o.fault.kind.what == Change::Nothing {
             String::new()
         } else {
             format!("{:?}", o.fault.place).to_lowercase()

@@ -104,14 +104,14 @@ pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outc
         if variant.form_given {
             estimator.forms = vec![true_form];
         }
-        let begun = Instant::now();
+        let start_time = Instant::now();
         let fit = estimator.fit(&records);
         Outcome {
             person: number,
             cell,
             variant,
             true_form,
-            seconds: begun.elapsed().as_secs_f64(),
+            seconds: start_time.elapsed().as_secs_f64(),
             found: fit.map(|fit| found(&fit, &person, cell)).map_err(|e| e.to_string()),
         }
     };

@@ -13,7 +13,7 @@ use hoid::{
 pub const BETWEEN_RUNS: f64 = 0.06;
 const RUNS: [usize; 4] = [1, 2, 5, 10];
 /// Largest number of draws of the gain of a run before its loop counts as unstable.
-const MOST_DRAWS: usize = 50;
+const MAX_DRAWS: usize = 50;
 
 /// Parameters that differ between the runs of a person.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -91,7 +91,7 @@ fn run_with_gain(person: &Person, run: u64) -> Result<Record, SimError> {
         seed: !streams.seed,
         ..streams
     }
-    .white_noise(MOST_DRAWS);
+    .white_noise(MAX_DRAWS);
     let mut refusal = None;
     for z in deviates {
         let operator = &person.state.operator;
@@ -112,6 +112,6 @@ fn run_with_gain(person: &Person, run: u64) -> Result<Record, SimError> {
     Err(refusal.unwrap_or(SimError::NoAcceptablePerson {
         form: person.state.operator.form().to_string(),
         plant: person.plant.to_string(),
-        draws: MOST_DRAWS,
+        draws: MAX_DRAWS,
     }))
 }

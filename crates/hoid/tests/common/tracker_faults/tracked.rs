@@ -11,9 +11,9 @@ use super::faults::Fault;
 /// Length of the start span, s.
 const START_S: f64 = 30.72;
 /// Number of samples between two comparisons of the estimate.
-const EVERY: usize = 20;
+const COMPARISON_INTERVAL: usize = 20;
 /// Number of consecutive comparisons that span more than a second.
-const LASTING: usize = 6;
+const LASTING_COMPARISONS: usize = 6;
 
 /// A run of one person that lasts some minutes.
 pub struct Run {
@@ -77,7 +77,7 @@ fn estimate(tracker: &Tracker) -> Option<Estimate> {
 /// The tracker over the run without a fault.
 pub struct Reference {
     options: TrackOptions,
-    /// Estimates at every [`EVERY`]-th sample.
+    /// Estimates at every [`COMPARISON_INTERVAL`]-th sample.
     estimates: Vec<Option<Estimate>>,
     innovation: f64,
     pub held: u64,
@@ -145,25 +145,25 @@ impl Reference {
             told |= t.event().is_some() && k + 1 >= at;
         });
         let (mut shift, mut last_far) = (0.0_f64, None);
-        let mut lately = [[0.0; 4]; LASTING];
+        let mut lately = [[0.0; 4]; LASTING_COMPARISONS];
         for (n, found) in estimates.iter().enumerate() {
-            let k = (n + 1) * EVERY - 1;
+            let k = (n + 1) * COMPARISON_INTERVAL - 1;
             if k < end {
                 continue;
             }
             let clean = k
                 .checked_sub(inserted)
-                .and_then(|k| self.estimates[(k + 1) / EVERY - 1]);
+                .and_then(|k| self.estimates[(k + 1) / COMPARISON_INTERVAL - 1]);
             let Some(clean) = clean else { continue };
             let mut far = found.is_none();
             lately.rotate_left(1);
-            lately[LASTING - 1] = [f64::INFINITY; 4];
+            lately[LASTING_COMPARISONS - 1] = [f64::INFINITY; 4];
             for (i, (a, b)) in found.iter().flatten().zip(&clean).enumerate() {
                 let distance = (a[0] - b[0]).abs();
                 if k as f64 >= end as f64 + per_second {
-                    lately[LASTING - 1][i] = distance / b[1];
+                    lately[LASTING_COMPARISONS - 1][i] = distance / b[1];
                 } else {
-                    lately[LASTING - 1][i] = 0.0;
+                    lately[LASTING_COMPARISONS - 1][i] = 0.0;
                 }
                 shift = shift.max(lately.iter().map(|of| of[i]).fold(f64::INFINITY, f64::min));
                 far |= distance.is_nan() || distance > 2.0 * a[1].max(b[1]);
@@ -175,7 +175,7 @@ impl Reference {
         let recovered = match last_far {
             None => Some(0.0),
             Some(n) if n + 1 == estimates.len() => None,
-            Some(n) => Some(((n + 2) * EVERY - end) as f64 / per_second),
+            Some(n) => Some(((n + 2) * COMPARISON_INTERVAL - end) as f64 / per_second),
         };
         let counts = tracker.counts();
         Effect {
@@ -197,7 +197,7 @@ fn over(
     each: &mut dyn FnMut(usize, &Tracker),
 ) -> Vec<Option<Estimate>> {
     let start = run.start.len();
-    let mut all = Vec::with_capacity(e.len() / EVERY);
+    let mut all = Vec::with_capacity(e.len() / COMPARISON_INTERVAL);
     for k in 0..e.len() {
         let sample = Sample {
             e: e[k],
@@ -206,7 +206,7 @@ fn over(
         };
         tracker.update(sample, k >= start);
         each(k, tracker);
-        if (k + 1) % EVERY == 0 {
+        if (k + 1) % COMPARISON_INTERVAL == 0 {
             all.push(estimate(tracker));
         }
     }

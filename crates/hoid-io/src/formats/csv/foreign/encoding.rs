@@ -5,7 +5,7 @@
 const LATIN: &[u8] = b"\x91\x92\x93\x94\x96\x97\xa0\xb0\xb2\xb3\xb5\xb7\xc4\xc9\xd6\xdc\xdf\xe0\xe1\xe2\xe4\xe5\xe7\xe8\xe9\xea\xed\xf1\xf3\xf4\xf6\xf8\xfa\xfc";
 
 /// Number of bytes at the start of a file from which UTF-16 without a byte order mark is recognised.
-const START: usize = 256;
+const UTF16_PROBE_BYTES: usize = 256;
 
 /// Decodes the bytes as UTF-8 in place and makes every line end a line feed, with or without a carriage return; returns
 /// a description of another encoding.
@@ -47,7 +47,7 @@ fn without_end(bytes: &mut Vec<u8>) -> Option<String> {
 /// Decodes UTF-16 text, which is recognised by its byte order mark, or by zeros in every second byte of its start;
 /// `None` for other text.
 fn utf16(bytes: &[u8]) -> Option<String> {
-    let start = bytes.get(..START.min(bytes.len()))?;
+    let start = bytes.get(..UTF16_PROBE_BYTES.min(bytes.len()))?;
     let (pairs_of_start, _) = start.as_chunks();
     let all = |test: fn(&[u8; 2]) -> bool| pairs_of_start.len() > 1 && pairs_of_start.iter().all(test);
     let (unit, rest): (fn([u8; 2]) -> u16, _) = match bytes {
@@ -84,10 +84,10 @@ fn end_with_line_feeds(bytes: &mut [u8]) {
     while let Some(at) = rest.iter().position(|byte| *byte == b'\r') {
         let (_, from) = rest.split_at_mut(at);
         rest = match from {
-            [_, b'\n', behind @ ..] => behind,
-            [end, behind @ ..] => {
+            [_, b'\n', rest @ ..] => rest,
+            [end, rest @ ..] => {
                 *end = b'\n';
-                behind
+                rest
             }
             [] => return,
         };
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn encodings() {
+    fn encodings_are_detected() {
         let text = "t\te\n0\t1\n";
         for order in [u16::to_le_bytes as fn(u16) -> [u8; 2], u16::to_be_bytes] {
             let bytes: Vec<u8> = text.encode_utf16().flat_map(order).collect();
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_of_texts() {
+    fn trailing_zero_and_control_bytes_are_removed() {
         let text = String::from("t,e\n0,1\n");
         assert_eq!(decoded(b"t,e\n0,1\n\0\0\0"), (text.clone(), true));
         assert_eq!(decoded(b"t,e\n0,1\n\x1a"), (text, false));
@@ -140,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn line_ends() {
+    fn line_endings_are_normalised() {
         for (text, found) in [
             ("t,e\r0,1\r", "t,e\n0,1\n"),
             ("t,e\r\n0,1\r\n", "t,e\r\n0,1\r\n"),

@@ -9,14 +9,14 @@ use std::borrow::Cow;
 use super::lines::{Mark, filled, is_missing, is_number, is_row, is_value, unquoted};
 use super::names::{Extra, Names, names_of, unmarked};
 use super::units;
-use crate::formats::csv::text::is_aside;
+use crate::formats::csv::text::is_comment_or_blank;
 use crate::wording::shown;
 
 /// Number of lines with equally many numbers that are required at the start of a table, unless it has fewer lines.
 const ROWS: usize = 3;
 
 /// Comments that hoid itself writes above a table, and that are not headers.
-const OWN: [&str; 3] = ["units:", "roles:", "sample_time:"];
+const OWN_COMMENTS: [&str; 3] = ["units:", "roles:", "sample_time:"];
 
 /// Structure of the start of a table. Lines are counted from 0.
 #[derive(Debug)]
@@ -31,7 +31,7 @@ pub(super) struct Layout<'a> {
     /// Line of the first row.
     row: usize,
     /// Lines above the header that are neither blank nor comments.
-    above: Vec<usize>,
+    lines_above: Vec<usize>,
 }
 
 /// A header that does not name the cells below it with certainty.
@@ -83,12 +83,12 @@ impl<'a> Layout<'a> {
             let values = |cell: &&str| is_value(cell) || is_missing(cell);
             let are_values = rows.iter().flatten().all(values);
             let (before, _) = filled.split_at_checked(at)?;
-            let found =
-                Self::below(before, mark, &rows, row).or_else(|| Self::commented(text, before, mark, &rows, row));
+            let found = Self::with_header_before(before, mark, &rows, row)
+                .or_else(|| Self::commented(text, before, mark, &rows, row));
             // A line of numbers above the header is a sample, which must not be omitted.
             let is_sample = |(at, line): &(usize, &str)| {
                 let cells = mark.cells(line);
-                found.as_ref().is_some_and(|layout| layout.above.contains(at))
+                found.as_ref().is_some_and(|layout| layout.lines_above.contains(at))
                     && cells.len() > 1
                     && cells.iter().all(|cell| is_value(cell))
             };
@@ -104,10 +104,10 @@ impl<'a> Layout<'a> {
     }
 
     /// Returns the structure with a header among the lines `before` the first row.
-    fn below(before: &[(usize, &'a str)], mark: Mark, rows: &[Vec<&str>], row: usize) -> Option<Self> {
-        let ((at, line), above) = before.split_last()?;
+    fn with_header_before(before: &[(usize, &'a str)], mark: Mark, rows: &[Vec<&str>], row: usize) -> Option<Self> {
+        let ((at, line), lines_above) = before.split_last()?;
         let of_units = || -> Option<Self> {
-            let ((header, names_line), above) = above.split_last()?;
+            let ((header, names_line), lines_above) = lines_above.split_last()?;
             let names = names_of(names_line, mark, rows)?;
             let mut cells = mark.cells(unmarked(line, mark));
             if names.extra == Extra::NameInHeader {
@@ -121,7 +121,7 @@ impl<'a> Layout<'a> {
                 is_comment: false,
                 units: Some((*at, comment)),
                 row,
-                above: above.iter().map(|(at, _)| *at).collect(),
+                lines_above: lines_above.iter().map(|(at, _)| *at).collect(),
             })
         };
         if let Some(layout) = of_units() {
@@ -135,13 +135,13 @@ impl<'a> Layout<'a> {
             let same = cells.len() == names.names.len() && filled(&cells) >= filled(&names.names);
             mark != Mark::Blanks && same && !cells.iter().any(|cell| is_value(cell))
         };
-        (!above.iter().any(is_rival)).then(|| Self {
+        (!lines_above.iter().any(is_rival)).then(|| Self {
             mark,
             header: *at,
             is_comment: false,
             units: None,
             row,
-            above: above.iter().map(|(at, _)| *at).collect(),
+            lines_above: lines_above.iter().map(|(at, _)| *at).collect(),
             names,
         })
     }
@@ -157,7 +157,7 @@ impl<'a> Layout<'a> {
         let lines = text.lines().enumerate().take(row);
         let (header, line) = lines.filter(|(_, line)| !line.trim().is_empty()).last()?;
         let words = line.strip_prefix('#')?.trim_start_matches('#').trim();
-        if OWN.iter().any(|own| words.starts_with(own)) {
+        if OWN_COMMENTS.iter().any(|own| words.starts_with(own)) {
             return None;
         }
         let own = names_of(words, mark, rows).or_else(|| names_of_other(words, rows));
@@ -169,7 +169,7 @@ impl<'a> Layout<'a> {
             is_comment: true,
             units: None,
             row,
-            above: before.iter().map(|(at, _)| *at).collect(),
+            lines_above: before.iter().map(|(at, _)| *at).collect(),
         })
     }
 
@@ -183,8 +183,11 @@ impl<'a> Layout<'a> {
         if self.mark == Mark::Blanks {
             notes.push(String::from("the columns are separated by blanks"));
         }
-        if !self.above.is_empty() {
-            notes.push(format!("lines above the header are left out: {}", self.above.len()));
+        if !self.lines_above.is_empty() {
+            notes.push(format!(
+                "lines above the header are left out: {}",
+                self.lines_above.len()
+            ));
         }
         if self.is_comment {
             notes.push(String::from("the comment above the first row is taken as the header"));
@@ -210,12 +213,14 @@ impl<'a> Layout<'a> {
             let (line, end) = line.strip_suffix('\r').map_or((line, end), |line| (line, "\r\n"));
             let is_repeated = |line: &str| !self.is_comment && Some(line.trim_end()) == found;
             let line: Cow<'_, str> = match &self.units {
-                Some((below, comment)) if at == self.header && at < *below => Cow::Owned(format!("# {comment}")),
-                Some((below, _)) if at == *below => Cow::Borrowed(&*header),
+                Some((with_header_before, comment)) if at == self.header && at < *with_header_before => {
+                    Cow::Owned(format!("# {comment}"))
+                }
+                Some((with_header_before, _)) if at == *with_header_before => Cow::Borrowed(&*header),
                 None if at == self.header => Cow::Borrowed(&*header),
-                _ if self.above.contains(&at) => Cow::Owned(format!("#{line}")),
+                _ if self.lines_above.contains(&at) => Cow::Owned(format!("#{line}")),
                 _ if at < self.row && is_blank(line) => Cow::Borrowed(""),
-                _ if at < self.row || is_aside(line) => Cow::Borrowed(line),
+                _ if at < self.row || is_comment_or_blank(line) => Cow::Borrowed(line),
                 _ if is_repeated(line) => Cow::Owned(format!("#{line}")),
                 _ => self.row_of(line),
             };
@@ -232,8 +237,8 @@ impl<'a> Layout<'a> {
         let lines = text.match_indices(header).skip(1);
         let is_line = |(at, found): &(usize, &str)| {
             let before = text.get(..*at).is_some_and(|before| before.ends_with('\n'));
-            let behind = text.get(at.saturating_add(found.len())..).unwrap_or_default();
-            before && (behind.trim_start_matches([' ', '\t', '\r']).starts_with('\n') || behind.trim().is_empty())
+            let rest = text.get(at.saturating_add(found.len())..).unwrap_or_default();
+            before && (rest.trim_start_matches([' ', '\t', '\r']).starts_with('\n') || rest.trim().is_empty())
         };
         let count = lines.filter(is_line).count();
         (count > 0).then(|| format!("repeated lines of the header are left out: {count}"))
@@ -307,7 +312,7 @@ pub(in crate::formats::csv) fn mismatch(text: &str) -> Option<Mismatch> {
     let (mark, at, rows, are_values) = found.min_by_key(|(_, at, _, are_values)| (*at, !*are_values))?;
     let (row, _) = filled.get(at)?;
     let numbers: Vec<&str> = rows.first()?.iter().map(|cell| unquoted(cell)).collect();
-    let header = at.checked_sub(1).and_then(|above| filled.get(above));
+    let header = at.checked_sub(1).and_then(|lines_above| filled.get(lines_above));
     let (line, header) = header.copied().unwrap_or((*row, ""));
     let words = mark.cells(header);
     let words = if header.is_empty() { 0 } else { words.len() };

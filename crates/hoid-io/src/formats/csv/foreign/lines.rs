@@ -1,6 +1,6 @@
 //! Cells of a line before the separator of a table is known.
 
-use super::super::text::is_aside;
+use super::super::text::is_comment_or_blank;
 use crate::table::{Cell, with_decimal_point};
 use crate::time::is_clock_time;
 
@@ -69,7 +69,7 @@ pub(super) fn is_row(cells: &[&str]) -> bool {
 /// Returns the lines at the start of a text that are neither blank nor comments, with their indices.
 pub(super) fn filled(text: &str) -> Vec<(usize, &str)> {
     let lines = text.lines().take(LINES).enumerate();
-    lines.filter(|(_, line)| !is_aside(line)).collect()
+    lines.filter(|(_, line)| !is_comment_or_blank(line)).collect()
 }
 
 #[cfg(test)]
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_and_rows() {
+    fn lines_are_split_into_cells() {
         assert_eq!(Mark::Char(',').cells("a,\"b,c\",,"), ["a", "\"b,c\"", "", ""]);
         assert_eq!(Mark::Blanks.cells("  a \"b c\"\td "), ["a", "\"b c\"", "d"]);
         assert_eq!(Mark::Blanks.cells(""), [""; 0]);

@@ -25,7 +25,7 @@ pub(super) use layout::mismatch;
 use layout::Layout;
 
 /// Rewrites the bytes of a table as plain CSV; returns a description of each change.
-pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
+pub(super) fn converted_to_plain_csv(bytes: &mut Vec<u8>) -> Vec<String> {
     let mut notes = Vec::from_iter(encoding::decode(bytes));
     let Ok(text) = std::str::from_utf8(bytes) else {
         return notes;
@@ -84,16 +84,16 @@ mod tests {
 
     fn plain(text: &str) -> (String, usize) {
         let mut bytes = text.as_bytes().to_vec();
-        let notes = made_plain(&mut bytes);
+        let notes = converted_to_plain_csv(&mut bytes);
         (String::from_utf8_lossy(&bytes).into_owned(), notes.len())
     }
 
-    fn same(text: &str) {
+    fn assert_unchanged(text: &str) {
         assert_eq!(plain(text), (text.to_owned(), 0), "{text:?}");
     }
 
     #[test]
-    fn lines_above_the_header() {
+    fn lines_above_the_header_become_comments() {
         let text = "Name;Session 4\nDate;05.03.2024\n\nRate;50 Hz\nt;e;u\n0,00;1;2\n";
         let found = "#Name;Session 4\n#Date;05.03.2024\n\n#Rate;50 Hz\nt;e;u\n0,00;1;2\n";
         assert_eq!(plain(text), (found.to_owned(), 1));
@@ -119,12 +119,12 @@ mod tests {
             "t,e,u\n0,1\n1,2,3\n2,3,4\n3,4,5\n",
             "\"t\",\"e\"\n\"0,02\",\"0,81\"\n\"0,04\",\"0,82\"\n",
         ] {
-            same(text);
+            assert_unchanged(text);
         }
     }
 
     #[test]
-    fn cells_between_blanks() {
+    fn blanks_as_separators_become_tabs() {
         for (text, found) in [
             ("  t   e\n 0.0  1\n 0.1 -2\n", "t\te\n0.0\t1\n0.1\t-2\n"),
             ("% t e\n0.0 1\n0.1 -2\n", "t\te\n0.0\t1\n0.1\t-2\n"),
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn headers_in_comments() {
+    fn commented_headers_are_recognised() {
         for (text, found) in [
             ("# t e u\n0 1 2\n1 3 4\n", "t\te\tu\n0\t1\t2\n1\t3\t4\n"),
             ("# made by x\n#t,e,u\n0,1,2\n", "# made by x\nt,e,u\n0,1,2\n"),
@@ -152,12 +152,12 @@ mod tests {
             "# a\nt,e\n#x,y\n0,1\n",
             "#\n0,1\n",
         ] {
-            same(text);
+            assert_unchanged(text);
         }
     }
 
     #[test]
-    fn units_below_the_header() {
+    fn units_below_the_header_become_a_comment() {
         let with_units = "# units: t s, e deg, u V\nt,e,u\n0,1,2\n";
         for text in ["t,e,u\ns,deg,V\n0,1,2\n", "\u{feff}t,e,u\n[s],(deg),\"V\"\n0,1,2\n"] {
             assert_eq!(plain(text), (with_units.to_owned(), 1));
@@ -170,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_without_a_name() {
+    fn cells_without_a_name_are_handled() {
         for (text, found) in [
             ("t,e\n0,1,\n0.1,2,\n", "t,e\n0,1\n0.1,2\n"),
             (
@@ -185,14 +185,14 @@ mod tests {
     }
 
     #[test]
-    fn text_below_a_table_and_mixed_line_ends() {
+    fn text_below_a_table_is_removed() {
         let rows = "t,e\n0,1\n1,2\n2,3\n";
         assert_eq!(plain(&format!("{rows}\nEnd of run\n")), (rows.to_owned(), 1));
         assert_eq!(plain("Run 3\rt,e\r0,1\r").0, "#Run 3\nt,e\n0,1\n");
     }
 
     #[test]
-    fn starts_of_tables() {
+    fn tables_are_recognised_by_their_first_lines() {
         let utf16: Vec<u8> = "t;e\n0;1\n0,1;2".encode_utf16().flat_map(u16::to_le_bytes).collect();
         for table in [&b"t e\n0 1\n"[..], b"x\n# y\n0,1\n", b"|t|e|\n|0|1|\n", b"0,1", &utf16] {
             assert!(is_table(table), "{table:?}");

@@ -58,7 +58,9 @@ pub(super) fn names_of<'a>(header: &'a str, mark: Mark, rows: &[Vec<&str>]) -> O
         if mark != Mark::Blanks && rows.iter().all(ends_empty) {
             return named(words, Extra::SeparatorInRows);
         }
-        return counts_up(rows).then(|| named(words, Extra::RowNumbers)).flatten();
+        return is_row_number_column(rows)
+            .then(|| named(words, Extra::RowNumbers))
+            .flatten();
     }
     let (last, names) = words.split_last()?;
     let is_idle = matches!(unquoted(last).to_lowercase().as_str(), "" | "comment" | "comments");
@@ -68,7 +70,7 @@ pub(super) fn names_of<'a>(header: &'a str, mark: Mark, rows: &[Vec<&str>]) -> O
 }
 
 /// True if the first cells of the rows are consecutive whole numbers from 0 or 1.
-fn counts_up(rows: &[Vec<&str>]) -> bool {
+fn is_row_number_column(rows: &[Vec<&str>]) -> bool {
     let numbers = rows.iter().map(|row| unquoted(row.first()?).parse::<usize>().ok());
     let from = |first: usize| numbers.clone().eq((first..).map(Some).take(rows.len()));
     rows.len() > 1 && (from(0) || from(1))
@@ -117,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn words_between_blanks() {
+    fn blank_separated_headers_are_split() {
         let rows = ["0.0 1 2", "0.1 3 4"];
         for (header, names) in [
             ("t e u", ["t", "e", "u"]),
@@ -157,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_without_names() {
+    fn extra_cells_are_matched_to_the_header() {
         let comma = Mark::Char(',');
         let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let rows = ["0,5,", "1,6,"];

@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use super::super::text::is_aside;
+use super::super::text::is_comment_or_blank;
 use super::lines::{LINES, is_row};
 
 /// Number of lines with bars that are examined.
@@ -11,11 +11,14 @@ const EXAMINED: usize = 4;
 
 /// Replaces the bars of a table by tabs; the rule below the header becomes a comment. `None` for other text.
 pub(super) fn with_tabs(text: &str) -> Option<String> {
-    let lines = || text.lines().filter(|line| !is_aside(line) && line.contains('|'));
+    let lines = || {
+        text.lines()
+            .filter(|line| !is_comment_or_blank(line) && line.contains('|'))
+    };
     let first: Vec<&str> = text
         .lines()
         .take(LINES)
-        .filter(|line| line.contains('|') && !is_aside(line) && !is_rule(line))
+        .filter(|line| line.contains('|') && !is_comment_or_blank(line) && !is_rule(line))
         .take(EXAMINED)
         .collect();
     let bars = |line: &str| line.matches('|').count();
@@ -42,7 +45,7 @@ pub(super) fn with_tabs(text: &str) -> Option<String> {
         let line = |line: &str| -> String {
             let (line, end) = line.strip_suffix('\n').map_or((line, ""), |line| (line, "\n"));
             let line: Cow<'_, str> = match line {
-                line if is_aside(line) || !line.contains('|') => Cow::Borrowed(line),
+                line if is_comment_or_blank(line) || !line.contains('|') => Cow::Borrowed(line),
                 line if is_rule(line) => Cow::Owned(format!("#{}", line.trim_end())),
                 line => Cow::Owned(inside(line)),
             };
@@ -65,7 +68,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tables_with_bars() {
+    fn tables_with_bars_are_converted() {
         let found = "t\te, deg\tu\n0\t1\t2\n1\t\t4\n";
         for text in [
             "t|e, deg|u\n0|1|2\n1||4\n",
@@ -82,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn other_text_with_bars() {
+    fn other_text_with_bars_is_no_table() {
         for text in [
             "",
             "|",

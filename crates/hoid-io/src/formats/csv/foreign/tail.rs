@@ -1,13 +1,13 @@
 //! Lines of words below a table, such as `End of recording` or `Mean,0.1,0.2`.
 
-use super::super::text::{is_aside, open_line};
+use super::super::text::{is_comment_or_blank, open_line};
 use super::lines::{Mark, is_missing, is_value, unquoted};
 use crate::wording::shown;
 
 /// Largest number of lines of words below a table.
-const MOST: usize = 60;
+const MAX_LINES_BELOW: usize = 60;
 /// Number of rows above the words with which their first cells are compared.
-const COMPARED: usize = 3;
+const COMPARED_ROWS: usize = 3;
 
 /// Returns the position at which words below a table start, and a note; `None` if the table ends with a row.
 ///
@@ -23,19 +23,22 @@ pub(super) fn words_below(text: &str, mark: Mark) -> Option<(usize, String)> {
         !is_value(first) && !is_missing(first) && unquoted(first).chars().any(char::is_alphabetic)
     };
     let mut lines = text.split_inclusive('\n').rev().peekable();
-    while let Some(line) = lines.next_if(|line| is_aside(line) || starts_with_text(line)) {
+    while let Some(line) = lines.next_if(|line| is_comment_or_blank(line) || starts_with_text(line)) {
         end = end.saturating_sub(line.len());
-        if !is_aside(line) {
+        if !is_comment_or_blank(line) {
             found.push(line);
         }
-        if found.len() > MOST {
+        if found.len() > MAX_LINES_BELOW {
             return None;
         }
     }
-    let rows: Vec<&str> = lines.filter(|line| !is_aside(line)).take(COMPARED).collect();
+    let rows: Vec<&str> = lines
+        .filter(|line| !is_comment_or_blank(line))
+        .take(COMPARED_ROWS)
+        .collect();
     let first = found.last()?;
     let is_open = open_line(text).is_some() && found.len() == 1 && mark.cells(first).len() > 1;
-    (rows.len() == COMPARED && rows.iter().all(|row| starts_with_value(row)) && !is_open).then(|| {
+    (rows.len() == COMPARED_ROWS && rows.iter().all(|row| starts_with_value(row)) && !is_open).then(|| {
         let note = format!(
             "lines of words below the table are left out: {}, the first of which is \"{}\"",
             found.len(),
@@ -50,7 +53,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_below_a_table() {
+    fn words_below_a_table_are_found() {
         let rows = "t,e\n0,1\n1,2\n2,3\n";
         for words in [
             "Mean,2\n",
@@ -68,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_kept() {
+    fn table_rows_are_never_taken_as_words() {
         for text in [
             "",
             "t,e\n",
@@ -83,7 +86,7 @@ mod tests {
         ] {
             assert_eq!(words_below(text, Mark::Char(',')), None, "{text:?}");
         }
-        let many = format!("t,e\n0,1\n1,2\n2,3\n{}", "word\n".repeat(MOST + 1));
+        let many = format!("t,e\n0,1\n1,2\n2,3\n{}", "word\n".repeat(MAX_LINES_BELOW + 1));
         assert_eq!(words_below(&many, Mark::Char(',')), None);
     }
 }

@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lines_of_units() {
+    fn unit_lines_become_a_comment() {
         let names = ["t", "\"e\"", "u"];
         for (cells, units) in [
             (["s", "deg", "V"], Some("units: t s, e deg, u V")),

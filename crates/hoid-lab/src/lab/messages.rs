@@ -14,7 +14,7 @@ use crate::{
 
 impl Shared {
     /// Sends a message to the pages selected by `wants`.
-    pub(super) fn tell(&self, message: &ToPage<'_>, wants: impl Fn(u64, &Page) -> bool) {
+    pub(super) fn send_to_pages(&self, message: &ToPage<'_>, wants: impl Fn(u64, &Page) -> bool) {
         // Every message can be serialised as JSON.
         let Ok(text) = serde_json::to_string(message) else {
             return;
@@ -27,9 +27,9 @@ impl Shared {
         }
     }
 
-    pub(super) fn tell_live(&self, number: usize, line: &LiveLine) {
+    pub(super) fn send_live(&self, number: usize, line: &LiveLine) {
         let person = self.config.live == LiveFor::During;
-        self.tell(&ToPage::Live { number, line }, |_, page| match page.role {
+        self.send_to_pages(&ToPage::Live { number, line }, |_, page| match page.role {
             Some(Role::Experimenter) => true,
             Some(Role::Person) => person,
             None => false,
@@ -50,14 +50,14 @@ impl Shared {
             .collect()
     }
 
-    pub(super) fn tell_state(&self) {
+    pub(super) fn send_state(&self) {
         let state = self.state();
         let session = state.session.as_ref();
         let facts = session.map(|session| &session.facts);
         let next = session.and_then(Session::next);
         let run = |place: usize| facts.and_then(|facts| facts.run(place));
         let done = match (&self.mode, session) {
-            (Mode::Replay(_), Some(session)) => judged_again(session),
+            (Mode::Replay(_), Some(session)) => reverified_runs(session),
             (_, Some(session)) => session.done.clone(),
             _ => Vec::new(),
         };
@@ -85,18 +85,18 @@ impl Shared {
             next,
             condition: next.and_then(run).map(|(_, condition)| condition.clone()),
             training: next.and_then(run).is_some_and(|(plan, _)| plan.training),
-            running: state.run.as_ref().map(|run| run.begun.number),
+            running: state.run.as_ref().map(|run| run.run_start.number),
             reporting: state.reporting,
             reports: state.pages.links(),
             calibration: state.calibration.as_ref().map(Calibration::rows).unwrap_or_default(),
         };
         drop(state);
-        self.tell(&ToPage::State(Box::new(message)), |_, page| page.role.is_some());
+        self.send_to_pages(&ToPage::State(Box::new(message)), |_, page| page.role.is_some());
     }
 }
 
 /// Returns the runs that have ended, each with a new verdict on the current state of its files.
-fn judged_again(session: &Session) -> Vec<Done> {
+fn reverified_runs(session: &Session) -> Vec<Done> {
     let again = |done: &Done| {
         let checked = check(&session.stem(&done.condition, done.number));
         let (verdict, reasons) = match &checked {
