@@ -67,7 +67,7 @@ def lines(command: list[Any], run: Run, size: tuple[int, str]) -> Told:
 
 def rust(run: Run, tools: Tools) -> Told:
     path = tools.example("place")
-    return lines([path], run, (tools.shipped(path), "program that has it"))
+    return lines([path], run, (tools.shipped(path), "a program that includes the crate"))
 
 
 def compiled(compiler: list[str], run: Run, tools: Tools) -> Told:

@@ -14,7 +14,7 @@ from .told import Compared, Missing, Place, Run, Told, expected
 from .tools import Tools, output
 
 HEAD = """\
-| place | its digits | a sample | median | 99.9 % | shipped |
+| interface | digits | one sample is | median | 99.9 % | size |
 |---|---|---|---:|---:|---:|"""
 
 
@@ -38,11 +38,7 @@ def tables(tools: Tools) -> str:
     version = output([tools.binary, "--version"]).strip()
     day = datetime.datetime.now(datetime.timezone.utc).strftime("%-d %B %Y")
     of = tools.binary.parent.name
-    profile = (
-        "built as it is shipped"
-        if of == "shipped"
-        else "built as for the tests, with their checks"
-    )
+    profile = "release build" if of == "shipped" else "test build, with checks"
     where = f"{version}, {day}, {profile}, on {machine()}."
     return "\n".join([HEAD, *rows(), "", where])
 
