@@ -67,7 +67,7 @@ impl From<&QualityIssue> for FoundFault {
 
 impl Account {
     /// Returns all faults and problems found in the recording.
-    pub fn found(&self) -> Vec<FoundFault> {
+    pub fn found_faults(&self) -> Vec<FoundFault> {
         let faults = self.faults.iter().map(FoundFault::from);
         faults.chain(self.quality_issues.iter().map(FoundFault::from)).collect()
     }

@@ -61,7 +61,7 @@ impl Level {
     }
 
     /// Removes the remaining level, which a fit with the level as an unknown has estimated in addition to the means.
-    pub(crate) fn refined(
+    pub(crate) fn remove_remaining_level(
         &mut self,
         data: &mut Recordings,
         of: impl Fn(&Record) -> Result<Option<f64>, IdentError>,

@@ -100,7 +100,7 @@ impl SecondOrder {
 
     /// Filters four samples.
     #[inline(always)]
-    pub fn four(&mut self, [x0, x1, x2, x3]: [f64; 4]) -> [f64; 4] {
+    pub fn filter_four(&mut self, [x0, x1, x2, x3]: [f64; 4]) -> [f64; 4] {
         let Self { h, g, y1, y2 } = *self;
         // The input terms come first, so only the last two sums wait for the previous block.
         let y = [
@@ -127,7 +127,7 @@ fn divide_by_second_order(d1: f64, d2: f64, x: &[f64], y: &mut [f64]) {
     let (x_blocks, x_rest) = x.as_chunks::<4>();
     let (y_blocks, y_rest) = y.as_chunks_mut::<4>();
     for (y, x) in y_blocks.iter_mut().zip(x_blocks) {
-        *y = filter.four(*x);
+        *y = filter.filter_four(*x);
     }
     for (y, x) in y_rest.iter_mut().zip(x_rest) {
         *y = filter.one(*x);
@@ -137,7 +137,7 @@ fn divide_by_second_order(d1: f64, d2: f64, x: &[f64], y: &mut [f64]) {
 fn divide_by_second_order_in_place(mut filter: SecondOrder, x: &mut [f64]) {
     let (blocks, rest) = x.as_chunks_mut::<4>();
     for block in blocks {
-        *block = filter.four(*block);
+        *block = filter.filter_four(*block);
     }
     for value in rest {
         *value = filter.one(*value);

@@ -29,7 +29,7 @@ pub(crate) fn sum(bytes: &[u8]) -> u64 {
     bytes.iter().fold(BASIS, next)
 }
 
-pub(crate) fn packed(magic: [u8; 8], description: &Value, bytes: &[u8]) -> Vec<u8> {
+pub(crate) fn pack(magic: [u8; 8], description: &Value, bytes: &[u8]) -> Vec<u8> {
     let description = description.to_string();
     let mut all = magic.to_vec();
     all.extend_from_slice(&(description.len() as u64).to_le_bytes());
@@ -41,7 +41,7 @@ pub(crate) fn packed(magic: [u8; 8], description: &Value, bytes: &[u8]) -> Vec<u
 }
 
 /// Returns the description and the data of packed bytes.
-pub(crate) fn opened(magic: [u8; 8], all: &[u8]) -> Result<(Value, &[u8]), Closed> {
+pub(crate) fn unpack(magic: [u8; 8], all: &[u8]) -> Result<(Value, &[u8]), Closed> {
     let rest = all.strip_prefix(&magic).ok_or(Closed::Other)?;
     let of = || {
         let (body, stated) = all.split_last_chunk::<8>()?;

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::{
     options::TrackerRequest,
-    packed::{Closed, as_bytes, as_numbers, opened, packed},
+    packed::{Closed, as_bytes, as_numbers, pack, unpack},
     session::Session,
     status::{Failure, HOID_BAD_STATE},
 };
@@ -28,14 +28,14 @@ impl Session {
             "fit": asked.fit,
             "orders": orders,
         });
-        packed(MAGIC, &description, &as_bytes(&numbers))
+        pack(MAGIC, &description, &as_bytes(&numbers))
     }
 
     /// Restores a tracker from the bytes of [`Session::saved`].
     pub fn restored(bytes: &[u8]) -> Result<Self, Failure> {
         let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
         let damaged = || wrong("the bytes were changed or truncated since they were saved");
-        let (description, numbers) = opened(MAGIC, bytes).map_err(|closed| match closed {
+        let (description, numbers) = unpack(MAGIC, bytes).map_err(|closed| match closed {
             Closed::Other => wrong("the bytes are not a tracker that this version of hoid has saved"),
             Closed::Damaged => damaged(),
         })?;

@@ -138,7 +138,7 @@ impl OrderRanges {
     ///
     /// # Errors
     /// [`IdentError::EmptyRange`] if a range is empty, [`IdentError::BadOption`] for more than [`MAX_CANDIDATES`].
-    pub fn candidates(&self) -> Result<usize, IdentError> {
+    pub fn candidate_count(&self) -> Result<usize, IdentError> {
         if let Some((name, range)) = self.named().into_iter().find(|(_, r)| r.is_empty()) {
             return Err(IdentError::EmptyRange {
                 range: format!("{name}={}..{}", range.start(), range.end()),
@@ -163,7 +163,7 @@ impl OrderRanges {
     /// # Errors
     /// Same as [`OrderRanges::candidates`].
     pub fn combinations(&self) -> Result<Vec<Orders>, IdentError> {
-        self.candidates()?;
+        self.candidate_count()?;
         let mut all = vec![Orders::default()];
         let mut vary = |range: &RangeInclusive<usize>, set: fn(&mut Orders, usize)| {
             all = all
@@ -534,7 +534,7 @@ mod tests {
             assert!(message.contains("at most 100000"), "{message}");
         }
         let most = OrderRanges { nk: 1..=100_000, ..one };
-        assert_eq!(most.candidates(), Ok(100_000));
+        assert_eq!(most.candidate_count(), Ok(100_000));
     }
 
     #[test]

@@ -30,14 +30,14 @@ const OTHER_MINIMUM_DIFFERENCE: f64 = 50.0;
 
 fn operator(form: Form, random: &mut Uniform) -> FamilyOperator {
     let of = |coordinate: &Coordinate| match coordinate {
-        Coordinate::Gain => random.log_between(0.1, 10.0),
+        Coordinate::Gain => random.log_uniform(0.1, 10.0),
         Coordinate::Lead => random.between(0.1, 2.0),
-        Coordinate::LagRate => 1.0 / random.log_between(0.2, 5.0),
+        Coordinate::LagRate => 1.0 / random.log_uniform(0.2, 5.0),
         Coordinate::Linear => random.between(0.5, 1.5),
         Coordinate::Quadratic => random.between(0.05, 0.4),
         Coordinate::Droop => random.between(0.1, 0.6),
-        Coordinate::LogOmega => random.log_between(6.0, 18.0).ln(),
-        Coordinate::LogZeta => random.log_between(0.12, 0.8).ln(),
+        Coordinate::LogOmega => random.log_uniform(6.0, 18.0).ln(),
+        Coordinate::LogZeta => random.log_uniform(0.12, 0.8).ln(),
         Coordinate::Delay => random.between(0.1, 0.5),
     };
     let coordinates: Vec<f64> = form.coordinates(true).iter().map(of).collect();

@@ -12,7 +12,7 @@ type Of<'py> = (usize, Bound<'py, PyDict>);
 /// Returns the faults in recordings, each with the index of the given record.
 pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Of<'py>>> {
     let all = data.origins.iter().zip(&data.accounts);
-    all.flat_map(|(origin, account)| account.found().into_iter().map(|found| (*origin, found)))
+    all.flat_map(|(origin, account)| account.found_faults().into_iter().map(|found| (*origin, found)))
         .map(|(origin, found)| Ok((origin, parts_of(py, found)?)))
         .collect()
 }

@@ -187,7 +187,7 @@ pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, cs
 }
 
 /// Path of the index page, number of tables and figures, and counts of the claims by outcome.
-type Reproduced = (PathBuf, usize, Option<[usize; 5]>);
+type ReproductionParts = (PathBuf, usize, Option<[usize; 5]>);
 
 /// Reproduces the tables, figures and claims of the thesis; `None` after an interrupt.
 #[pyfunction]
@@ -200,7 +200,7 @@ pub fn reproduce(
     jobs: Option<usize>,
     recordings: Option<PathBuf>,
     progress: Option<Bound<'_, PyAny>>,
-) -> Outcome<Option<Reproduced>> {
+) -> Outcome<Option<ReproductionParts>> {
     let wanted = Reproduction {
         only,
         replications,

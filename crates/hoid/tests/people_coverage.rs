@@ -30,7 +30,7 @@ fn sample(people: std::ops::Range<u64>, variant: Variant) -> Vec<Outcome> {
 
 #[test]
 fn intervals_cover_the_truth_of_virtual_people() {
-    // People 0 to 5 have one or two runs, which is short enough for a test.
+    // People 0 to 5 have only one or two runs each, so the test is short.
     let all = sample(0..6, given(true));
     let of: Vec<&Outcome> = all.iter().collect();
     let each = QUANTITIES.map(|name| coverage(&of_quantity(&of, name)));

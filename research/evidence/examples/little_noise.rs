@@ -34,9 +34,9 @@ const OMEGA_RAD_S: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
 
 fn operator(form: Form, random: &mut Uniform) -> Result<FamilyOperator, Box<dyn Error>> {
     let of = |coordinate: &Coordinate| match coordinate {
-        Coordinate::Gain => random.log_between(0.1, 10.0),
-        Coordinate::Lead => random.log_between(0.1, 2.0),
-        Coordinate::LagRate => 1.0 / random.log_between(0.2, 5.0),
+        Coordinate::Gain => random.log_uniform(0.1, 10.0),
+        Coordinate::Lead => random.log_uniform(0.1, 2.0),
+        Coordinate::LagRate => 1.0 / random.log_uniform(0.2, 5.0),
         Coordinate::Linear => random.between(0.5, 1.5),
         Coordinate::Quadratic => random.between(0.05, 0.4),
         Coordinate::Droop => random.between(0.1, 0.6),

@@ -67,7 +67,7 @@ impl Polynomials {
         };
         let default = default_operator_ranges(self.template.structure, sample_time);
         let ranges = default.with(&orders).map_err(options)?;
-        ranges.candidates().map_err(options)?;
+        ranges.candidate_count().map_err(options)?;
         Ok(ranges)
     }
 
@@ -191,7 +191,7 @@ impl BatchEstimator for Polynomials {
             fit = instrumental.fit(records)?;
         }
         if estimator.level {
-            level.refined(data, |record| fit.constant_of(record))?;
+            level.remove_remaining_level(data, |record| fit.constant_of(record))?;
         }
         let records = &data.records;
         let mut verdict = fit.verdict(records, choice.as_ref())?;

@@ -239,7 +239,7 @@ pub fn named(name: &str, e: &Estimate) -> Value {
     json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// Returns files, sampling and processing of the records.
+/// Returns the file, the sampling and the processing of each record as JSON.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Value {
     let record = |((file, r), account): ((&String, &Record), &Account)| {
         let mut one = json!({
@@ -276,7 +276,7 @@ pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
 /// Returns all faults of the records and all problems of their files, one object each.
 pub fn faults(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
-    all.flat_map(|(file, account)| account.found().into_iter().map(move |found| fault(file, &found)))
+    all.flat_map(|(file, account)| account.found_faults().into_iter().map(move |found| fault(file, &found)))
         .collect()
 }
 

@@ -180,7 +180,7 @@ impl Mixture {
         let moments = &early.with(late);
         let (blocks, seconds) = (self.blocks, moments.samples * scales.sample_time);
         let newborn = |h: &Hypothesis| h.born > 0 && h.born + 1 == blocks;
-        let parents = self.best_of_classes().map(|best| best.map(|i| self.hypotheses[i]));
+        let parents = self.likeliest_per_class().map(|best| best.map(|i| self.hypotheses[i]));
         let mut left = [BlockResidual::ZERO; HYPOTHESES];
         let (mut common, mut best) = (f64::INFINITY, self.mean);
         for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
@@ -284,7 +284,7 @@ impl Mixture {
     }
 
     /// Index of the likeliest hypothesis of each class.
-    fn best_of_classes(&self) -> [Option<usize>; CLASSES] {
+    fn likeliest_per_class(&self) -> [Option<usize>; CLASSES] {
         core::array::from_fn(|class| self.likeliest(|h| h.class == class))
     }
 
@@ -348,7 +348,7 @@ impl Mixture {
             self.count += 1;
             return Some(self.count - 1);
         }
-        let best = self.best_of_classes();
+        let best = self.likeliest_per_class();
         let old = |i: &usize| self.blocks >= self.hypotheses[*i].born + prior.protected_blocks;
         (0..HYPOTHESES)
             .filter(|i| old(i) && !best.contains(&Some(*i)))

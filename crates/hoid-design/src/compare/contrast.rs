@@ -358,6 +358,6 @@ mod tests {
         let group = group(&[("P", "a", 1.0, 0.1), ("P", "b", 1.0, 0.1)]);
         let factor = Factor::conditions();
         let error = Resolved::of(&factor, Some(Variation::Between), &group).unwrap_err();
-        assert!(error.to_string().contains("P is in a and b"), "{error}");
+        assert!(error.to_string().contains("P has the levels a and b"), "{error}");
     }
 }

@@ -22,9 +22,6 @@ use serde_json::Value;
 
 use super::{CommonForm, CompareError, Observation, Quantity, common_form::common_form};
 
-/// Smallest number of runs of a cell for its variation from run to run.
-const MIN_RUNS: usize = 3;
-
 /// A value with its standard error, the share of the prior in it, and the number of runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EstimatedValue {
@@ -241,22 +238,6 @@ impl GroupEstimates {
             .collect()
     }
 
-    /// Returns the standard deviation of the crossover frequency of one person from run to run, relative to its mean, and
-    /// the number of people; `None` if no person has the crossover of three runs in one condition.
-    ///
-    /// The variance of a cell is the sample variance of its runs minus the mean squared standard error of a run. The
-    /// cells are pooled with their degrees of freedom.
-    pub(crate) fn run_to_run(&self) -> Option<(f64, usize)> {
-        let of_cell = |cell: &Cell| {
-            let runs = self.of_runs(cell, &Quantity::Crossover);
-            runs.into_iter().map(|(_, o)| o).collect::<Vec<Observation>>()
-        };
-        let enough = |cell: &&Cell| of_cell(cell).len() >= MIN_RUNS;
-        let people = distinct(self.cells.iter().filter(enough).map(|cell| &cell.subject));
-        let cells: Vec<Vec<Observation>> = self.cells.iter().filter(enough).map(of_cell).collect();
-        Some((variation(&cells)?, people.len()))
-    }
-
     fn response(&self, cell: &Cell, run: Option<&str>, quantity: &Quantity) -> Option<f64> {
         let at = |omega| {
             self.runs
@@ -427,19 +408,6 @@ fn over_runs(values: &[f64]) -> EstimatedValue {
     known(mean(values), Some(error).filter(|e| e.is_finite()), values.len())
 }
 
-/// Returns the relative standard deviation within cells that the standard errors do not explain; `None` without cells.
-fn variation(cells: &[Vec<Observation>]) -> Option<f64> {
-    let (mut sum, mut degrees) = (0.0, 0.0);
-    for cell in cells {
-        let values: Vec<f64> = cell.iter().map(|o| o.value).collect();
-        let of_errors = mean(&cell.iter().map(|o| o.variance).collect::<Vec<_>>());
-        let of_cell = values.len() as f64 - 1.0;
-        sum += of_cell * (sample_variance(&values) - of_errors) / mean(&values).powi(2);
-        degrees += of_cell;
-    }
-    (degrees > 0.0).then(|| (sum / degrees).max(0.0).sqrt())
-}
-
 /// Merges the cells of the individual runs of a person in one condition into a single cell.
 fn merged(cells: Vec<Cell>) -> Vec<Cell> {
     let mut all: Vec<Vec<Cell>> = Vec::new();
@@ -471,7 +439,7 @@ fn merged(cells: Vec<Cell>) -> Vec<Cell> {
     all.into_iter().map(one).collect()
 }
 
-fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
+pub(super) fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
     let mut all: Vec<String> = Vec::new();
     for name in names {
         if !all.contains(name) {
@@ -524,31 +492,6 @@ pub(super) mod tests {
         assert!(of("R", "K_e").unwrap_err().ends_with("too short"));
         assert!(of("Q", "rms_e").is_err() && of("Q", "gain_db@1").is_err() && !group.has_runs());
         assert!(GroupEstimates::of_json(&json!({"kind": "operator"})).is_err());
-    }
-
-    /// 40 cells of five runs with a variation of 15 % and errors of 10 %. The variance of the estimated variance is
-    /// `2 (.15^2 + .1^2)^2/160`, so the standard deviation is found within 7.7 % (one standard error).
-    #[test]
-    fn variation_from_run_to_run_excludes_the_errors_of_the_estimates() {
-        use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-        use rand_distr::{Distribution, StandardNormal};
-        let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
-        let mut cell = |k: usize, of_person: f64| -> Vec<Observation> {
-            let crossover = 2.0 + 0.1 * k as f64;
-            let one = |_| Observation {
-                value: crossover * (1.0 + of_person * normal() + 0.1 * normal()),
-                variance: (0.1 * crossover).powi(2),
-            };
-            (0..5).map(one).collect()
-        };
-        let varied: Vec<Vec<Observation>> = (0..40).map(|k| cell(k, 0.15)).collect();
-        let steady: Vec<Vec<Observation>> = (0..40).map(|k| cell(k, 0.0)).collect();
-        let found = variation(&varied).unwrap();
-        assert!((found / 0.15 - 1.0).abs() < 0.2, "{found}");
-        assert!(variation(&steady).unwrap() < 0.05);
-        assert_eq!(variation(&[]), None);
-        assert_eq!(group(&[("A", "x", 2.0, 0.1), ("B", "x", 2.2, 0.1)]).run_to_run(), None);
     }
 
     #[test]

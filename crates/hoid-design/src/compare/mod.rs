@@ -10,7 +10,7 @@
 //! | [`EffectSize`] | d_z and Hedges' g, with intervals |
 //! | [`bayes_factor`] | evidence for a difference against no difference |
 //! | [`holm`] | adjustment of the p-values of several tests |
-//! | [`GroupEstimates`] | estimates for each person of a group, from its directory or its JSON |
+//! | [`GroupEstimates`] | estimates for each person of a group, from its directory or its JSON; `run_to_run`: their variation between runs |
 //! | [`Quantity`] | quantities to compare |
 //! | [`Factor`] | variables in which conditions or people differ; `contrast`: weights of the conditions |
 //! | [`CommonForm`] | form in which the parameters of all people are compared; `recordings`: analysis of recordings in this form |
@@ -31,6 +31,7 @@ mod learning;
 mod meta_regression;
 mod quantity;
 mod recordings;
+mod run_to_run;
 mod sentence;
 
 pub use adjust::holm;

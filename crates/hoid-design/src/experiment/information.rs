@@ -166,7 +166,8 @@ impl<'a> Loop<'a> {
         ]
     }
 
-    /// Computes the expected errors for a forcing function over `length_s` seconds of whole periods.
+    /// Computes the expected errors for a forcing function. `length_s` is the total duration of all runs, in whole
+    /// periods.
     pub fn expected(&self, forcing: &Forcing, length_s: f64) -> Result<Expected, DesignError> {
         if !(length_s.is_finite() && length_s > 0.0) {
             return Err(DesignError::OutOfRange {

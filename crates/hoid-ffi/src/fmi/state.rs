@@ -19,7 +19,7 @@ use super::{
     model::Model,
     values::{Done, VariableValues},
 };
-use crate::packed::{opened, packed};
+use crate::packed::{pack, unpack};
 
 const MAGIC: [u8; 8] = *b"hoidfmu\x01";
 
@@ -46,13 +46,13 @@ impl Instance {
             "values": values,
             "model": self.model.is_some().then_some(extra_numbers),
         });
-        packed(MAGIC, &description, &bytes)
+        pack(MAGIC, &description, &bytes)
     }
 
     /// Restores a state of this unit. If this fails, the instance does not change.
     fn restore(&mut self, bytes: &[u8]) -> Done {
         let wrong = || "the state is not from this unit, or was changed or truncated since it was saved".to_owned();
-        let (description, bytes) = opened(MAGIC, bytes).map_err(|_| wrong())?;
+        let (description, bytes) = unpack(MAGIC, bytes).map_err(|_| wrong())?;
         if description["unit"] != json!(self.token) {
             return Err(wrong());
         }
@@ -243,7 +243,7 @@ macro_rules! states {
             let read = |_: &mut Instance| {
                 // SAFETY: guaranteed by the FMI standard.
                 let bytes = unsafe { list(bytes, size) }?;
-                opened(MAGIC, bytes)
+                unpack(MAGIC, bytes)
                     .map_err(|_| "the bytes are not a state, or were changed or truncated".to_owned())?;
                 // SAFETY: guaranteed by the FMI standard.
                 unsafe { into_handle(bytes.to_vec(), state) }

@@ -259,7 +259,7 @@ fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
                 h.resize(to, 0.0);
                 let (blocks, rest) = h[from..].as_chunks_mut::<4>();
                 for block in blocks {
-                    *block = second.four([std::mem::take(&mut impulse), 0.0, 0.0, 0.0]);
+                    *block = second.filter_four([std::mem::take(&mut impulse), 0.0, 0.0, 0.0]);
                 }
                 for value in rest {
                     *value = second.one(std::mem::take(&mut impulse));

@@ -11,7 +11,7 @@ pub(super) fn divide_and_whiten([f1, f2]: [f64; 2], d1: f64, x: &[f64], y: &mut 
     let (x_blocks, x_rest) = x.as_chunks::<4>();
     let (y_blocks, y_rest) = y.as_chunks_mut::<4>();
     for (y, x) in y_blocks.iter_mut().zip(x_blocks) {
-        let s = filter.four(*x);
+        let s = filter.filter_four(*x);
         *y = [s[0] + d1 * before, s[1] + d1 * s[0], s[2] + d1 * s[1], s[3] + d1 * s[2]];
         before = s[3];
     }

@@ -23,9 +23,9 @@ const MIN_COEFFICIENTS: usize = 4;
 pub(super) const MAX_GAINS: usize = 60;
 /// Innovation variance relative to the power of u below which the record may be free of noise.
 const NEARLY_NOISE_FREE: f64 = 1e-3;
-/// Ratio of the innovation variances of two models that is too large to result only from different degrees of freedom
-/// and first samples.
-const SAFETY_FACTOR: f64 = 4.0;
+/// Smallest ratio of the innovation variance to the power of rounding errors at which the residuals are noise. The margin
+/// allows for different degrees of freedom and first samples.
+const MIN_NOISE_TO_ROUNDING: f64 = 4.0;
 /// Lowest and highest order of A in the exact ARX model of an operator: the neuromuscular system and up to two lags.
 const OWN_ORDERS: (usize, usize) = (2, 4);
 /// Number of B coefficients minus the order of A in the exact ARX model of an operator: one for the fractional part of
@@ -97,7 +97,7 @@ impl ArxResponse {
         }
         // If there is noise, models that use only a subset of the regressors of the high-order model are skipped, since
         // their innovation variance cannot be smaller.
-        let is_noise = high.innovations > SAFETY_FACTOR * ROUNDING_POWER;
+        let is_noise = high.innovations > MIN_NOISE_TO_ROUNDING * ROUNDING_POWER;
         let contained = |orders: &Orders| {
             let last = |orders: &Orders| orders.nk + orders.nb;
             orders.na <= of_high.na && orders.nk >= of_high.nk && last(orders) <= last(&of_high)

@@ -17,7 +17,7 @@ const DAMPING: (f64, f64) = (0.02, 5.0);
 /// Lowest neuromuscular frequency, rad/s; a lower frequency would not describe a muscle.
 const LOWEST_FREQUENCY: f64 = 2.0;
 /// Largest omega_nm relative to the Nyquist frequency pi/Ts.
-const HIGHEST_FREQUENCY: f64 = 0.95;
+const MAX_NYQUIST_SHARE: f64 = 0.95;
 
 /// Returns the lower and upper bound of each coordinate.
 pub(crate) fn limits(
@@ -26,7 +26,7 @@ pub(crate) fn limits(
     delay_range_s: (f64, f64),
     sample_time: SampleTime,
 ) -> Vec<(f64, f64)> {
-    let highest = HIGHEST_FREQUENCY * sample_time.nyquist_rad_s();
+    let highest = MAX_NYQUIST_SHARE * sample_time.nyquist_rad_s();
     let of = |coordinate: &Coordinate| match coordinate {
         Coordinate::Gain | Coordinate::Linear | Coordinate::Quadratic => (f64::NEG_INFINITY, f64::INFINITY),
         Coordinate::Lead => (0.0, LONGEST_LEAD_S),

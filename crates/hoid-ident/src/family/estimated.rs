@@ -221,8 +221,8 @@ pub(super) fn operator_of(
     })
 }
 
-/// Returns the average over the forms of the parameters with the same name and meaning: K of a form with a lag is the
-/// gain at zero frequency, far below the band, and K of another form the gain in the band. K is not determined if forms
+/// Returns the average of a parameter over the forms in which it has the same name and meaning: K of a form with a lag is
+/// the gain at zero frequency, far below the band, and K of another form is the gain in the band. K is not determined if forms
 /// with the other meaning are likely.
 fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
     let lags = weighed.first()?.form.has_lag();

@@ -81,7 +81,8 @@ impl Parameter {
         }
     }
 
-    /// Returns the weighted mean over forms of a parameter, given in each form with the best form first.
+    /// Returns the weighted mean of a parameter over the forms. `each` contains form, weight and parameter, the best form
+    /// first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
         // A parameter at a bound has no error and is omitted from the mean, but not from the interval.

@@ -32,7 +32,7 @@ use super::{
 use crate::IdentError;
 
 /// Significance level of the tests against chance.
-const LEVEL: f64 = 0.05;
+const SIGNIFICANCE_LEVEL: f64 = 0.05;
 /// Share of the power of the excitation outside its lines above which the cause cannot be rounding in the file.
 const LEAKAGE: f64 = 1e-4;
 const MUCH_LEAKAGE: f64 = 1e-2;
@@ -52,7 +52,7 @@ pub(super) struct DiagnosticInputs<'a> {
 
 /// Returns the squared coherence that one in twenty sets of n unrelated runs exceeds; `None` for one run.
 pub fn chance_coherence(n: usize) -> Option<f64> {
-    (n > 1).then(|| 1.0 - LEVEL.powf(1.0 / (n as f64 - 1.0)))
+    (n > 1).then(|| 1.0 - SIGNIFICANCE_LEVEL.powf(1.0 / (n as f64 - 1.0)))
 }
 
 /// Returns the probability that the coherences of n unrelated runs, combined over all lines, are at least as large as
@@ -138,7 +138,7 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     let lines = &found.function.lines;
     let coherences: Vec<f64> = lines.iter().filter_map(|line| line.coherence).collect();
     let by_chance = probability_by_chance(&coherences, n)?;
-    if by_chance > LEVEL {
+    if by_chance > SIGNIFICANCE_LEVEL {
         return Some(Finding::undetermined(
             "unrelated",
             format!(

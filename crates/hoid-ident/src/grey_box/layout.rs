@@ -33,7 +33,7 @@ const ZETA_LIMITS: (f64, f64) = (1e-4, 20.0);
 /// Bounds of T_n in samples: below the lower bound the remnant is white noise, above the upper bound it is a drift.
 const TIME_CONSTANT_LIMITS: (f64, f64) = (0.1, 1e4);
 /// Largest omega_nm as a share of pi/Ts.
-const HIGHEST_FREQUENCY: f64 = 0.999;
+const MAX_NYQUIST_SHARE: f64 = 0.999;
 
 /// Coordinate that describes the lead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -161,7 +161,7 @@ impl Layout {
     ) -> Result<(f64, f64), IdentError> {
         let ts = self.sample_time.s();
         let widest = match slot {
-            2 => (1e-3, HIGHEST_FREQUENCY * self.sample_time.nyquist_rad_s()),
+            2 => (1e-3, MAX_NYQUIST_SHARE * self.sample_time.nyquist_rad_s()),
             3 => ZETA_LIMITS,
             DELAY => (0.0, f64::INFINITY),
             TIME_CONSTANT => (TIME_CONSTANT_LIMITS.0 * ts, TIME_CONSTANT_LIMITS.1 * ts),

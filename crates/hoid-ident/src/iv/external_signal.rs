@@ -40,7 +40,7 @@ const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];
 /// Number of filters, if the records are long enough.
 const FILTERS: usize = 24;
 /// Minimum number of samples for each filter.
-const SAMPLES_EACH: usize = 10;
+const MIN_SAMPLES_PER_FILTER: usize = 10;
 /// Number of blocks; the input in each block is computed with weights from the other blocks.
 const BLOCKS: usize = 4;
 /// Ridge factor in the equations for the weights, needed if the output of a filter is concentrated in one block. The
@@ -149,7 +149,7 @@ fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> 
 /// largest share of the targets.
 fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let target = targets.concat();
-    let filters = FILTERS.min(target.len() / SAMPLES_EACH).max(1);
+    let filters = FILTERS.min(target.len() / MIN_SAMPLES_PER_FILTER).max(1);
     let mut best = (-1.0, Vec::new());
     for time_constant in TIME_CONSTANTS {
         let (basis, _) = orthonormal(&laguerre(driving, (-1.0 / time_constant).exp(), filters));

@@ -45,7 +45,7 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
         ..settings.clone()
     };
     let simulated = prediction_focus::fit(&of_system, records, first)?;
-    let held = hold(simulated.model(), &o);
+    let held = fixed_coefficients(simulated.model(), &o);
     let of_noise = FitSettings {
         start: None,
         constraints: of_noise_model(&settings.constraints).chain(held).collect(),
@@ -93,7 +93,7 @@ fn of_noise_model<T: Copy>(named: &BTreeMap<String, T>) -> impl Iterator<Item = 
 }
 
 /// Returns constraints that fix the coefficients of the system at their values.
-fn hold(system: &PolynomialModel, orders: &Orders) -> Vec<(String, Constraint)> {
+fn fixed_coefficients(system: &PolynomialModel, orders: &Orders) -> Vec<(String, Constraint)> {
     let pole = if orders.na > 0 { 'a' } else { 'f' };
     let poles = (1..).zip(system.f()).map(|(i, f)| (format!("{pole}{i}"), *f));
     let gains = (0..).zip(system.b()).map(|(i, b)| (format!("b{i}"), *b));

@@ -12,7 +12,7 @@ const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
 /// Admissible range of T_I, s: a shorter lag is equivalent to no lag, a longer lag to an integration.
 const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
 /// Largest omega_nm as a share of pi/Ts.
-const HIGHEST_FREQUENCY: f64 = 0.999;
+const MAX_NYQUIST_SHARE: f64 = 0.999;
 /// Share of the time span at each end in which t_M is not searched by default: so short a part of a record does not
 /// determine two gains.
 const END_SHARE: f64 = 0.05;
@@ -103,7 +103,7 @@ fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Ra
         }
         Element::Constant(coordinate @ (Coordinate::LogOmega | Coordinate::LogZeta)) => {
             let widest = if coordinate == Coordinate::LogOmega {
-                (1e-3, HIGHEST_FREQUENCY * std::f64::consts::PI / frame.ts_s)
+                (1e-3, MAX_NYQUIST_SHARE * std::f64::consts::PI / frame.ts_s)
             } else {
                 ZETA_LIMITS
             };

@@ -44,7 +44,7 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
         return;
     }
     let rows = signals.rows();
-    gaps(signals, grid, found);
+    check_gaps(signals, grid, found);
     let unit = rounding(t, signals.precision).min(ts);
     let jitter = grid.jitter(t);
     if let Some((rms, worst, row)) = jitter.filter(|(_, worst, _)| *worst > (JITTER * ts).max(unit * (1.0 + 1e-6))) {
@@ -68,12 +68,12 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
         });
     }
     let rms = jitter.map_or(0.0, |(rms, ..)| rms).max(unit / 12_f64.sqrt());
-    rate(signals, grid, rms, unit, found);
-    drift(signals, grid, rms, unit, found);
-    second_clocks(signals, grid, found);
+    check_rate(signals, grid, rms, unit, found);
+    check_drift(signals, grid, rms, unit, found);
+    check_second_clocks(signals, grid, found);
 }
 
-fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+fn check_gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let places: Vec<RowSpan> = grid
         .gaps()
         .map(|(before, after, missing)| RowSpan {
@@ -108,7 +108,7 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
 }
 
 /// Compares the sampling rate with the given rate or, if no rate is given, with the nearest common rate.
-fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
+fn check_rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let (ts, n) = (grid.sample_time_s, grid.rows.len() as f64);
     // Uncertainty of the slope from jitter, and from rounding of the first and the last time.
     let uncertain = 5.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 5.0) / ts;
@@ -159,7 +159,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
 }
 
 /// Compares the sample time in the last third of the record with that in the first third.
-fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
+fn check_drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     let third = grid.rows.len() / 3;
     if third < 100 {
@@ -195,7 +195,7 @@ fn drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Ve
 }
 
 /// Compares the rates of the other time columns, which are in s, ms, us or ns, with the rate of the time.
-fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+fn check_second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     for clock in &signals.clocks {
         let pairs: Vec<(f64, f64)> = grid

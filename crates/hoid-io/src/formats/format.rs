@@ -122,5 +122,5 @@ pub(super) fn with_time_and_selection<'a>(
         Some(_) => table,
         None => topics::joined(table, options),
     };
-    trials::of_table(table, options.trial.as_ref())
+    trials::select_trial(table, options.trial.as_ref())
 }

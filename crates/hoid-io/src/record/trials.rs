@@ -24,7 +24,7 @@ const MIN_TRIAL_ROWS: usize = 8;
 type Parts = Vec<(String, Range<usize>)>;
 
 /// Returns the requested trial of a table, or the table itself if it contains a single trial.
-pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Result<Table<'a>, IoError> {
+pub(crate) fn select_trial<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Result<Table<'a>, IoError> {
     let file = || table.source.file().to_owned();
     let (by, parts) = match choice {
         Some(choice) => (choice.column.clone(), parts_by(&table, choice)?),

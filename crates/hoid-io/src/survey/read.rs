@@ -23,7 +23,7 @@ pub(super) fn of_table(mut table: Table<'_>) -> (Vec<RawColumn>, Vec<String>) {
     table.notes.extend(commas);
     let unusable = unusable(&table);
     table.notes.extend(unusable);
-    if rows > 1 && table.is_row_without_numbers(0) {
+    if rows > 1 && table.row_has_no_numbers(0) {
         let place = table.source.place(0);
         table.notes.push(format!("{place}: {UNITS_ROW}"));
     }
@@ -64,7 +64,7 @@ fn unusable(table: &Table<'_>) -> Vec<String> {
         let numbers = column.values.iter().any(|value| value.is_finite());
         let row = (0..table.rows)
             .find(|row| table.value(at, *row).is_infinite() || column.texts.binary_search(row).is_ok())
-            .filter(|row| numbers && !(*row == 0 && table.is_row_without_numbers(0)))?;
+            .filter(|row| numbers && !(*row == 0 && table.row_has_no_numbers(0)))?;
         let comma = has_decimal_comma(&table.source.cell(row, at));
         (!comma).then(|| table.bad_value(at, row, 0..table.rows).to_string())
     };

@@ -108,7 +108,7 @@ impl Table<'_> {
     }
 
     /// True if no column has a number in a row, as in a row of units.
-    pub(crate) fn is_row_without_numbers(&self, row: usize) -> bool {
+    pub(crate) fn row_has_no_numbers(&self, row: usize) -> bool {
         let has_none = |column: &Column| column.values.get(row).is_none_or(|value| value.is_nan());
         self.columns.iter().all(has_none)
     }
@@ -133,7 +133,7 @@ impl Table<'_> {
             } else if is_moment(&found) {
                 "the column mixes numbers with dates or clock times: write it in one format, or give --fs HZ if the \
                  samples are evenly spaced"
-            } else if row == 0 && self.rows > 1 && self.is_row_without_numbers(row) {
+            } else if row == 0 && self.rows > 1 && self.row_has_no_numbers(row) {
                 UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {
                 "the file is truncated in the middle of this line, the last one: copy or record the file again, or \

@@ -7,7 +7,7 @@ use crate::{
     calibrate::Calibration,
     config::LiveFor,
     live::LiveLine,
-    session::{Done, Session},
+    session::{FinishedRun, Session},
     verify::check,
     wire::{Role, State, ToPage},
 };
@@ -96,14 +96,14 @@ impl Shared {
 }
 
 /// Returns the runs that have ended, each with a new verdict on the current state of its files.
-fn reverified_runs(session: &Session) -> Vec<Done> {
-    let again = |done: &Done| {
+fn reverified_runs(session: &Session) -> Vec<FinishedRun> {
+    let again = |done: &FinishedRun| {
         let checked = check(&session.stem(&done.condition, done.number));
         let (verdict, reasons) = match &checked {
             Ok(checked) => (checked.word(), checked.reasons()),
             Err(error) => ("unverified", error.to_string()),
         };
-        Done {
+        FinishedRun {
             verdict: verdict.to_owned(),
             reasons,
             ..done.clone()

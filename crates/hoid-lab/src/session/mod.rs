@@ -37,4 +37,4 @@ pub use folder::{Stem, session_folder};
 pub use log::{Batch, Event, Frame, RunLog};
 pub use logged::Logged;
 pub use run_start::{Ended, RunEnd, RunStart, digest};
-pub use state::{Done, Session, SessionPlan};
+pub use state::{FinishedRun, Session, SessionPlan};

@@ -89,7 +89,7 @@ impl SessionPlan {
 
 /// A run that has ended, as a line of `runs.csv`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Done {
+pub struct FinishedRun {
     /// Number of the run.
     pub number: usize,
     /// Index of the run in the plan.
@@ -122,7 +122,7 @@ pub struct Session {
     /// Contents of `lab.toml`.
     pub facts: SessionPlan,
     /// Runs that have ended, in the order in which they were recorded.
-    pub done: Vec<Done>,
+    pub done: Vec<FinishedRun>,
 }
 
 impl Session {
@@ -264,7 +264,7 @@ impl Session {
     /// Appends a run that has ended to `runs.csv`.
     fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
         let run_start = RunStart::read(stem)?;
-        let done = Done {
+        let done = FinishedRun {
             number: run_start.number,
             planned: run_start.planned,
             condition: run_start.condition.name.clone(),
@@ -286,7 +286,7 @@ impl Session {
             .text()
             .split_once("_task-")
             .and_then(|(_, rest)| rest.rsplit_once("_run-"));
-        self.append_to_log(Done {
+        self.append_to_log(FinishedRun {
             number,
             // No plan contains this index.
             planned: u32::MAX as usize,
@@ -303,7 +303,7 @@ impl Session {
     }
 
     /// Appends a line to `runs.csv`, completely or not at all, after the last complete line.
-    fn append_to_log(&mut self, done: Done) -> Result<(), LabError> {
+    fn append_to_log(&mut self, done: FinishedRun) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
             whole_lines(&hoid_io::read_bytes(&path)?).len()
@@ -382,7 +382,7 @@ fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
     Ok(others)
 }
 
-fn read_runs(path: &Path) -> Result<Vec<Done>, LabError> {
+fn read_runs(path: &Path) -> Result<Vec<FinishedRun>, LabError> {
     if !path.exists() {
         return Ok(Vec::new());
     }

@@ -14,8 +14,8 @@
 //! **Scan.** The scan starts from a logarithmic grid. A step of the grid is halved if the phase changes by more than
 //! 0.5 rad over it, as computed from the phases and from the slopes of the phase at both ends (the phases alone would
 //! not show a whole turn within the step). The phase is therefore followed even with a long delay. Each crossing, found
-//! by a change of sign, is refined by bisection to rounding. Two crossings that are closer together than the grid
-//! (because the curve nearly touches the limit) are not detected.
+//! by a change of sign, is refined by bisection to rounding. Two crossings between neighbouring grid points
+//! (the curve only just crosses the limit and returns) are not detected.
 //!
 //! **Stability.** With `L = N e^{-s tau} / D`, the closed loop is stable if `F(s) = D + N e^{-s tau}` has no zero in
 //! the closed right half plane. `F/(s + a)^n`, where n is the degree of D, is analytic there and, if L is strictly

@@ -297,7 +297,7 @@ impl FamilyOperator {
                 (Some(i), Some(Coordinate::LagRate)) => gradient[i] = -1.0 / (x[i] * x[i]),
                 (Some(i), Some(Coordinate::LogOmega | Coordinate::LogZeta)) => gradient[i] = parameter.value,
                 (Some(i), _) => gradient[i] = 1.0,
-                // The parameter is a product of coordinates: K = (K/T_I)/(1/T_I), or K_e_dot = K_e T_L.
+                // The parameter is a quotient or a product of coordinates: K = (K/T_I)/(1/T_I), or K_e_dot = K_e T_L.
                 (None, _) => match (place(Coordinate::LagRate), place(Coordinate::Lead)) {
                     (Some(i), _) => {
                         gradient[0] = 1.0 / x[i];

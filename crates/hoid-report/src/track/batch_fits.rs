@@ -45,8 +45,8 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
     Ok(((from, to), estimator.fit(&[record.span(from, to)?])?))
 }
 
-/// The default batch fits for comparison with a trace: the start fit, and, unless the method needs no start fit, a fit
-/// to the last third of the record. The second element is the error of the fit to the last third, if that fit fails.
+/// Returns the default batch fits for comparison with a trace: the start fit and, if the method needs one, a fit to the
+/// last third of the record. The second element is the error of the fit to the last third, if that fit fails.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
     if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)

@@ -208,8 +208,8 @@ mod tests {
         scenario
     }
 
-    /// For the error of a run from its run-in on, the control of the operator is bit-identical to the control of the
-    /// run.
+    /// Driven by the recorded error of a run, including the run-in, the operator reproduces the control of that run bit
+    /// for bit.
     #[test]
     fn operator_run_reproduces_the_control_of_the_simulator() {
         let integrating = state(Form::Lag, false, &[1.5, 0.0, 0.1437], [&[1.0], &[1.0]]);

@@ -91,7 +91,8 @@ fn run_of(runs: &[&RunEntry], recording: &str) -> String {
     runs.iter().find_map(of).unwrap_or_else(|| recording.to_owned())
 }
 
-/// Writes parameters, innovation variance, VAF and response of a fit to a whole aligned record.
+/// Writes the rows of a fit to a whole aligned record: parameters, innovation variance, VAF, response, crossover and
+/// phase margin.
 pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, fit: &FamilyFit, record: &Record) {
     let of = fit.operator(0);
     for parameter in of.parameters.iter().filter(|p| p.value.is_finite()) {

@@ -15,7 +15,7 @@ use super::{
 use crate::columns::Rows;
 
 /// Suffix of the column by which a further input is recognised.
-const ROLE: &str = "_role";
+const ROLE_SUFFIX: &str = "_role";
 /// The delay of a response to a further input.
 const DELAY: (&str, &str) = ("tau_f", "s");
 
@@ -72,7 +72,7 @@ impl PersonChannel {
 
     pub(super) fn write(&self, rows: &mut Rows) {
         let column = |end: &str| format!("{}_{end}", self.name);
-        rows.text(&format!("{}{ROLE}", self.name), self.role.name());
+        rows.text(&format!("{}{ROLE_SUFFIX}", self.name), self.role.name());
         rows.text(&column("form"), self.form.map_or("", Form::name));
         rows.real(&column("preview_s"), self.preview_s);
         rows.real(&column("p_value"), self.p_value);
@@ -83,13 +83,13 @@ impl PersonChannel {
 
     /// Reads the responses to all further inputs from a row of the table.
     pub(super) fn read(table: &OutputTable, row: usize) -> Vec<Self> {
-        let names = (table.columns.iter()).filter_map(|column| column.name.strip_suffix(ROLE));
+        let names = (table.columns.iter()).filter_map(|column| column.name.strip_suffix(ROLE_SUFFIX));
         let of = |name: &str| {
             let text = |end: &str| texts(table, &format!("{name}{end}")).get(row).cloned();
             let number = |end: &str| numbers(table, &format!("{name}{end}")).get(row).copied();
             Some(Self {
                 name: name.to_owned(),
-                role: text(ROLE)?.parse().ok()?,
+                role: text(ROLE_SUFFIX)?.parse().ok()?,
                 preview_s: number("_preview_s").unwrap_or(0.0),
                 p_value: number("_p_value").unwrap_or(f64::NAN),
                 form: text("_form").and_then(|form| form.parse().ok()),
@@ -112,7 +112,7 @@ pub(super) fn columns<'a>(channels: impl Iterator<Item = &'a PersonChannel> + Cl
         }
     }
     for name in names {
-        of_text.extend([format!("{name}{ROLE}"), format!("{name}_form")]);
+        of_text.extend([format!("{name}{ROLE_SUFFIX}"), format!("{name}_form")]);
         real.extend([format!("{name}_preview_s"), format!("{name}_p_value")]);
         let own = channels.clone().filter(|channel| channel.name == name);
         for (parameter, _) in parameters() {

@@ -19,7 +19,7 @@ const FAMILY: &str = "family";
 
 /// Options of the registry that a plan does not use: either a plan has its own typed keys for them, or they do not
 /// apply to single runs.
-const NOT_PLAN_KEYS: [&str; 10] = [
+const EXCLUDED_OPTIONS: [&str; 10] = [
     "noise",
     "change",
     "orders",
@@ -41,7 +41,7 @@ pub(super) fn methods() -> Vec<MethodSpec> {
         };
         of_method(name, false)?;
         let mut settings = spec.settings;
-        settings.retain(|setting| !NOT_PLAN_KEYS.contains(&setting.name));
+        settings.retain(|setting| !EXCLUDED_OPTIONS.contains(&setting.name));
         Some(MethodSpec { name, settings, ..spec })
     };
     estimators().into_iter().filter_map(in_plan).collect()

@@ -99,7 +99,7 @@ impl Filters {
     pub fn correct(&mut self, u: f64, moves: bool) -> [f64; 2] {
         let c = self.output();
         let innovation = u - (&c * &self.x)[0];
-        // The second term keeps the variance above zero, because u has no measurement noise.
+        // u has no measurement noise, so the second term is needed to keep the variance above zero.
         let variance = (&c * &self.p * c.transpose())[0] + 1e-9 * self.innovation_variance;
         let gain = &self.p * c.transpose() / variance;
         let h = self.prediction_gradient();

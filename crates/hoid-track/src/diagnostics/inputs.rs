@@ -3,8 +3,9 @@
 //! Rows at distances of at least [`APART_S`] are compared in pairs. With the difference d of a response at a frequency
 //! and the sum C of the covariances of its real and imaginary parts, `T = d' C^-1 d` (A. Wald, 1943) exceeds x with
 //! probability `exp(-x/2)` if nothing changes and the errors of the rows are independent. Rows within the memory of the
-//! recursion have similar errors, so the test then finds less than it could. The largest T of an input, over pairs and
-//! frequencies, has at most the probability of one comparison times their number (Bonferroni). While the recursion
+//! recursion have similar errors, so the test then finds less than it could. The probability that the
+//! largest T of an input, over all pairs and frequencies, exceeds a limit is at most that of one comparison times the
+//! number of comparisons (Bonferroni). While the recursion
 //! follows a change of one response, the other may deviate for a few seconds. The T of a pair is therefore the smallest
 //! T of the pair and of the pairs with neighbouring rows: a change must last.
 

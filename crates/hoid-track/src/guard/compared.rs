@@ -1,5 +1,5 @@
-//! Schedule of the comparison between the estimate and the start model. In every round of [`ROUND_BLOCKS`] blocks only
-//! the first [`COMPARED_BLOCKS`] are compared, which keeps the cost low; after something unusual, all of the next
+//! Schedule of the comparison between the estimate and the start model. To keep the cost low, only the first
+//! [`COMPARED_BLOCKS`] of every [`ROUND_BLOCKS`] blocks are compared; after an unusual block, all of the next
 //! [`SUSPECT_BLOCKS`] blocks are compared. In a round, the first [`SETTLING_BLOCKS`] blocks do not count, because the
 //! filters of the start model start at rest.
 
@@ -17,7 +17,7 @@ use hoid_core::{
 const ROUND_BLOCKS: u32 = 44;
 const COMPARED_BLOCKS: u32 = 11;
 const SETTLING_BLOCKS: u32 = 3;
-/// Number of blocks that are compared after something unusual.
+/// Number of blocks that are compared after an unusual block.
 const SUSPECT_BLOCKS: u32 = 30;
 
 /// The start model with its delay line, and its place in the round.
@@ -55,7 +55,7 @@ impl Reference {
         (self.over, self.compared) = (0, SUSPECT_BLOCKS);
     }
 
-    /// Takes note of something unusual: the current block does not count, and the next blocks are compared.
+    /// Marks the current block as unusual: it does not count, and the next blocks are compared.
     pub fn suspect(&mut self) {
         if self.over >= self.compared {
             self.start();

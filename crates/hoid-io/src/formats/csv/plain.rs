@@ -212,7 +212,7 @@ fn plain_row<'a>(
     let mut empty = true;
     for (column, ((value, printed), wanted)) in row.iter_mut().zip(printed).zip(layout.wanted).enumerate() {
         if *wanted {
-            rest = without_blanks(rest);
+            rest = skip_spaces(rest);
             *value = f64::NAN;
             if matches!(rest, [b'0'..=b'9' | b'-' | b'+' | b'.', ..]) {
                 let (number, length) = fast_float2::parse_partial::<f64, _>(rest).ok()?;
@@ -221,7 +221,7 @@ fn plain_row<'a>(
                 }
                 *value = number;
                 (*printed, rest) = rest.split_at_checked(length)?;
-                rest = without_blanks(rest);
+                rest = skip_spaces(rest);
                 empty = false;
             }
         } else {
@@ -240,7 +240,7 @@ fn plain_row<'a>(
     (!empty).then_some(rest)
 }
 
-fn without_blanks(mut rest: &[u8]) -> &[u8] {
+fn skip_spaces(mut rest: &[u8]) -> &[u8] {
     while let [b' ', remaining @ ..] = rest {
         rest = remaining;
     }

@@ -61,7 +61,7 @@ pub enum Change {
     Quantised,
     /// Rows are missing for some seconds, but the time is counted without a gap.
     Lost,
-    /// Rows are duplicated for some seconds, with the time continuing.
+    /// Some seconds of rows are repeated, and the time is renumbered without a gap.
     Duplicated,
     /// u is delayed by some samples from here on.
     Late,

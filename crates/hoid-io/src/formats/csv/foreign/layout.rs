@@ -69,7 +69,8 @@ impl<'a> Layout<'a> {
     pub(super) fn of(text: &'a str) -> Option<Self> {
         let filled = filled(text);
         let found = Mark::ALL.iter().filter_map(|mark| Self::with(text, &filled, *mark));
-        // The first table is used; among separators that fit the same lines, the one whose cells are all numbers.
+        // The layout whose table starts first is used. If several separators find the same first row, one that gives
+        // only numeric cells is preferred.
         found
             .min_by_key(|(layout, are_values)| (layout.row, !*are_values))
             .map(|(layout, _)| layout)
