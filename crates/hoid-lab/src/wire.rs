@@ -9,7 +9,7 @@ use crate::{
     config::{Condition, LiveFor},
     live::LiveLine,
     plant::InputMap,
-    session::{Batch, Done},
+    session::{Batch, FinishedRun},
     task::Phase,
     verify::Measures,
 };
@@ -87,7 +87,10 @@ pub enum ToPage<'a> {
         operator: Option<&'a SimulatedOperator>,
     },
     /// Verdict on a run.
-    Verdict { done: &'a Done, measures: &'a Measures },
+    Verdict {
+        done: &'a FinishedRun,
+        measures: &'a Measures,
+    },
     /// Live estimate during a run.
     Live { number: usize, line: &'a LiveLine },
     /// A request is refused; `elsewhere` is true if the session continues in another window.
@@ -114,7 +117,7 @@ pub struct State {
     /// Names of the sessions that can be resumed.
     pub open: Vec<String>,
     /// Runs that have ended.
-    pub done: Vec<Done>,
+    pub done: Vec<FinishedRun>,
     /// Names of the conditions of all planned runs; `next` is the index of the next run.
     pub planned: Vec<String>,
     /// Index of the next run in `planned`.
