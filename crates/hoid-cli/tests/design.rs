@@ -126,6 +126,19 @@ fn difference_gives_the_number_of_people() {
         assert!(at.join("design").join(name).exists(), "{name}");
     }
     assert!(fs::read_to_string(at.join("figure.svg")).unwrap().contains("rad/s"));
+    // The table has the errors for the person, with the variation from run to run.
+    let table = fs::read_to_string(at.join("design/design.csv")).unwrap();
+    assert!(
+        table.contains("quantity,value,standard_error_person,low,high"),
+        "{table}"
+    );
+    let crossover = &object["open_loop"]["crossover_rad_s"];
+    let [own, person] = ["standard_error", "standard_error_person"].map(|key| crossover[key].as_f64().unwrap());
+    let (value, runs) = (crossover["value"].as_f64().unwrap(), object["runs"].as_f64().unwrap());
+    assert!(
+        (person - own.hypot(0.13 * value / runs.sqrt())).abs() < 1e-9 * person,
+        "{object}"
+    );
     // The table of lines can be used as a forcing function, like the scenario.
     let against = |file: &str| {
         let all = [&arguments[..5], &["--json", "--against", file]].concat();
@@ -330,6 +343,23 @@ fn spread_of_a_difference_comes_from_the_people() {
     assert!(
         (spread(&bound) - 0.05).abs() < 1e-12 && of(&bound).starts_with("at most"),
         "{bound}"
+    );
+    // The JSON of a group has no single runs.
+    let (code, message) = bad(
+        at,
+        &["design", "--controlled-element", "4/s", "--run-to-run", "group.json"],
+    );
+    assert!(
+        code == 2 && message.contains("crossover of three runs"),
+        "{code} {message}"
+    );
+    let given = json(
+        at,
+        &["design", "--controlled-element", "4/s", "--run-to-run", ".2", "--json"],
+    );
+    assert_eq!(
+        (&given["run_to_run"], &given["run_to_run_source"]),
+        (&0.2.into(), &"as given".into())
     );
     // The crossover is not a parameter of a population.
     let all = ["design", "--controlled-element", "4/s", "--difference", "crossover=10%"];

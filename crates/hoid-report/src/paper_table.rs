@@ -190,29 +190,34 @@ fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
         .filter(|kind| *kind == "trace")
         .and(object.get("last"));
     let of = last.and_then(Value::as_object).unwrap_or(object);
+    // An experiment is planned for the error that a person's variation from run to run leaves.
+    let is_design = object.get("kind").is_some_and(|kind| kind == "design");
+    let error = if is_design {
+        "standard_error_person"
+    } else {
+        "standard_error"
+    };
+    let row = |name: &str, p: &Value| row(name, p, error, verdict);
     let mut rows: Vec<Row> = Vec::new();
     for p in at(of, "parameters").as_array().into_iter().flatten() {
-        rows.push(row(p["name"].as_str().unwrap_or_default(), p, verdict));
+        rows.push(row(p["name"].as_str().unwrap_or_default(), p));
     }
     let known = |rows: &[Row], name: &str| rows.iter().any(|row| row.quantity == name);
     for (name, p) in at(of, "operator").as_object().into_iter().flatten() {
         if p["value"].is_number() && !known(&rows, name) && object.get("form").is_none() {
-            rows.push(row(name, p, verdict));
+            rows.push(row(name, p));
         }
     }
     for (name, p) in at(of, "open_loop").as_object().into_iter().flatten() {
         if p["value"].is_number() {
-            rows.push(row(name, p, verdict));
+            rows.push(row(name, p));
         }
     }
     let pairs = |of: &dyn Fn(&Row) -> f64| rows.iter().map(|row| [of(row), row.error]).collect();
     let texts = |of: &dyn Fn(&Row) -> &String| Cells::Text(rows.iter().map(|row| of(row).clone()).collect());
     vec![
         column("quantity", texts(&|row| &row.quantity)),
-        column(
-            "value",
-            Cells::Estimate(pairs(&|row| row.value), "standard_error".to_owned()),
-        ),
+        column("value", Cells::Estimate(pairs(&|row| row.value), error.to_owned())),
         column("low", Cells::End(pairs(&|row| row.interval[0]))),
         column("high", Cells::End(pairs(&|row| row.interval[1]))),
         column("unit", texts(&|row| &row.unit)),
@@ -220,8 +225,8 @@ fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     ]
 }
 
-fn row(name: &str, p: &Value, verdict: &Value) -> Row {
-    let (value, error) = (number(&p["value"]), number(&p["standard_error"]));
+fn row(name: &str, p: &Value, error: &str, verdict: &Value) -> Row {
+    let (value, error) = (number(&p["value"]), number(&p[error]));
     let interval = match p["interval"].as_array().map(Vec::as_slice) {
         Some([low, high]) => [number(low), number(high)],
         _ => [value - Z_95 * error, value + Z_95 * error],
