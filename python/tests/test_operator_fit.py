@@ -165,9 +165,8 @@ def test_options(runs: list[pyhoid.Record]) -> None:
         one, form="lead-lag", neuromuscular=False, excitation="none", nd=2, delay=(0.1, 0.4)
     )
     assert "omega_nm" not in without.parameters and 0.1 <= without.parameters.tau_e.value <= 0.4
-    # An excitation that was named and is missing is reported to be missed.
-    missed = pyhoid.identify_operator(one, excitation="nothing", **FEW)
-    assert missed.lines is None and missed.no_lines
+    with pytest.raises(pyhoid.OptionError, match="excitation .* found nothing; expected one of e, u"):
+        pyhoid.identify_operator(one, excitation="nothing", **FEW)
 
 
 def test_a_gain_for_each_run(runs: list[pyhoid.Record]) -> None:

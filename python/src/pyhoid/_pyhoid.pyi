@@ -512,7 +512,8 @@ def design(
     limits: tuple[float | None, float | None],
     against: str | None,
     difference: str | None,
-    statistics: tuple[float, float, str | None, float],
+    run_to_run: str | None,
+    statistics: tuple[float, float, str | None],
     display: str,
     seed: int,
 ) -> str: ...
