@@ -161,7 +161,7 @@ impl OrderRanges {
     /// Returns all combinations, with the delay varying fastest.
     ///
     /// # Errors
-    /// Same as [`OrderRanges::candidates`].
+    /// Same as [`OrderRanges::candidate_count`].
     pub fn combinations(&self) -> Result<Vec<Orders>, IdentError> {
         self.candidate_count()?;
         let mut all = vec![Orders::default()];
