@@ -192,8 +192,7 @@ mod tests {
         let designed = Designing::default().run(&task, &[Enters::Target]).unwrap();
         let text = super::super::expected(&task, &reference(), 81.92).unwrap();
         let sum = |of: &Expected| -> f64 {
-            let parameters = of.quantities.iter().skip(2);
-            parameters
+            of.parameters()
                 .map(|q| (q.estimate.standard_error.unwrap() / q.estimate.value).powi(2))
                 .sum()
         };

@@ -25,6 +25,7 @@ use serde_json::{Map, Value, json};
 use super::{
     DesignError, Expected, People, SpreadSource,
     power::{MAX_PEOPLE, people_needed, power},
+    spread::between_people,
     wanted::named_number,
 };
 
@@ -155,8 +156,7 @@ impl DifferenceRequest {
             self.sought.size
         };
         let name = self.sought.name.as_str();
-        let between =
-            SpreadSource::between_people(self.between_people.as_ref(), people, (name, found.size), BETWEEN_PEOPLE)?;
+        let between = between_people(self.between_people.as_ref(), people, (name, found.size), BETWEEN_PEOPLE)?;
         let mut plan = DifferencePlan {
             request: self.clone(),
             size,

@@ -87,6 +87,12 @@ impl Expected {
         })
     }
 
+    /// Returns the parameters of the person, without crossover and margin.
+    pub fn parameters(&self) -> impl Iterator<Item = &ExpectedQuantity> {
+        let is_parameter = |q: &&ExpectedQuantity| !matches!(q.name, "crossover" | "phase_margin");
+        self.quantities.iter().filter(is_parameter)
+    }
+
     /// Returns the names of all quantities.
     pub fn names(&self) -> Vec<&'static str> {
         self.quantities.iter().map(|q| q.name).collect()

@@ -277,7 +277,7 @@ fn worst<'a>(people: &'a [NamedExpected], wanted: &[RequestedQuantity]) -> Optio
     let of = |person: &NamedExpected| -> f64 {
         let e = &person.expected;
         if wanted.is_empty() {
-            let parameters = e.quantities.iter().skip(2).map(|q| q.name);
+            let parameters = e.parameters().map(|q| q.name);
             let relative = parameters
                 .filter(|name| !has_absolute_error(name))
                 .filter_map(|name| e.error(name));

@@ -71,68 +71,60 @@ pub(super) struct Spread {
     pub source: String,
 }
 
-impl SpreadSource {
-    /// Returns the standard deviation, over people, of a difference in the quantity with this name and value. If no
-    /// source is given, it comes from the people of the design if they provide it; otherwise it is the default fraction
-    /// of the value.
-    ///
-    /// # Errors
-    /// [`DesignError::NoSpread`] if a file does not provide a spread.
-    pub(super) fn between_people(
-        given: Option<&Self>,
-        people: &People,
-        (name, value): (&str, f64),
-        default: f64,
-    ) -> Result<Spread, DesignError> {
-        let path = match given {
-            Some(Self::Part(part)) => {
-                return Ok(Spread {
-                    value: part * value,
-                    source: "as given".to_owned(),
-                });
-            }
-            Some(Self::File(path)) => return of_file(path, (name, value)),
-            None => people.path(),
-        };
-        let known = path.and_then(|path| of_file(path, (name, value)).ok());
-        Ok(known.unwrap_or_else(|| Spread {
-            value: default * value,
-            source: "a default".to_owned(),
-        }))
+/// Returns a given fraction of `unit`, or what `read` finds in the given file. If nothing is given, `read` is tried on the
+/// people of the design, and otherwise the result is the default fraction.
+fn resolved(
+    given: Option<&SpreadSource>,
+    people: &People,
+    (default, unit): (f64, f64),
+    read: impl Fn(&Path) -> Result<Spread, DesignError>,
+) -> Result<Spread, DesignError> {
+    let part = |part: f64, source: &str| Spread {
+        value: part * unit,
+        source: source.to_owned(),
+    };
+    match given {
+        Some(SpreadSource::Part(given)) => Ok(part(*given, "as given")),
+        Some(SpreadSource::File(path)) => read(path),
+        None => {
+            let known = people.path().and_then(|path| read(path).ok());
+            Ok(known.unwrap_or_else(|| part(default, "a default")))
+        }
     }
 }
 
-/// Reads the variation of people from run to run from the result of a group, for which `given` is a directory or file,
-/// or else `people`. If people do not provide it, it is the default.
+/// Returns the standard deviation, over people, of a difference in the quantity with this name and value.
 ///
 /// # Errors
-/// [`DesignError::NoSpread`] if `given` does not provide it.
+/// [`DesignError::NoSpread`] if a given file does not provide it.
+pub(super) fn between_people(
+    given: Option<&SpreadSource>,
+    people: &People,
+    (name, value): (&str, f64),
+    default: f64,
+) -> Result<Spread, DesignError> {
+    resolved(given, people, (default, value), |path| of_file(path, (name, value)))
+}
+
+/// Returns the relative standard deviation of one person from run to run.
+///
+/// # Errors
+/// [`DesignError::NoRunToRun`] if a given directory does not provide it.
 pub(super) fn run_to_run(given: Option<&SpreadSource>, people: &People, default: f64) -> Result<Spread, DesignError> {
-    let of_group = |path: &Path| {
-        let group = GroupEstimates::read(path).map_err(|error| error.to_string())?;
-        let (value, people) = group
-            .run_to_run()
-            .ok_or("no person has the crossover of three runs in one condition")?;
-        let source = format!("of {people} people in {}", path.display());
-        Ok(Spread { value, source })
-    };
-    match given {
-        Some(SpreadSource::Part(value)) => Ok(Spread {
-            value: *value,
-            source: "as given".to_owned(),
-        }),
-        Some(SpreadSource::File(path)) => of_group(path).map_err(|reason: String| DesignError::NoRunToRun {
+    resolved(given, people, (default, 1.0), |path| {
+        let none = |reason: String| DesignError::NoRunToRun {
             path: path.display().to_string(),
             reason,
-        }),
-        None => {
-            let known = people.path().and_then(|path| of_group(path).ok());
-            Ok(known.unwrap_or_else(|| Spread {
-                value: default,
-                source: "a default".to_owned(),
-            }))
-        }
-    }
+        };
+        let group = GroupEstimates::read(path).map_err(|error| none(error.to_string()))?;
+        let (value, people) = group
+            .run_to_run()
+            .ok_or_else(|| none("no person has the crossover of three runs in one condition".to_owned()))?;
+        Ok(Spread {
+            value,
+            source: format!("of {people} people in {}", path.display()),
+        })
+    })
 }
 
 fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignError> {
