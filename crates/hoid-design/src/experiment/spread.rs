@@ -12,7 +12,7 @@
 //! rho is one half or more. A population of one condition does not determine rho.
 //!
 //! The variation from run to run comes from a number, or from the crossover frequencies of the runs in the result of a
-//! group ([`GroupEstimates::run_to_run`]). It applies to all quantities: the prior of a fit reduces the scatter of other
+//! group ([`GroupEstimates::run_to_run`]), as an upper bound. It applies to all quantities: the prior of a fit reduces the scatter of other
 //! parameters.
 
 use std::{
