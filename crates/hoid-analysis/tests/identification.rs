@@ -44,7 +44,7 @@ fn quick() -> Identification {
     Identification {
         estimator: FamilyEstimator {
             forms: vec![Form::Lead],
-            nd: 0..=4,
+            nd: Some(0..=4),
             ..FamilyEstimator::default()
         },
         ..Identification::default()

@@ -46,7 +46,7 @@ where
 fn quick() -> FamilyEstimator {
     FamilyEstimator {
         forms: vec![Form::Lead, Form::Gain],
-        nd: 0..=4,
+        nd: Some(0..=4),
         ..FamilyEstimator::default()
     }
 }

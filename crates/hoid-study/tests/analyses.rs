@@ -149,7 +149,7 @@ fn rows_match_single_run_analyses() {
         ..Identification::of(FamilyEstimator {
             forms: vec![hoid_model::Form::Lead],
             nc: 0..=1,
-            nd: 1..=1,
+            nd: Some(1..=1),
             delay_range_s: (0.1, 0.5),
             ..operator
         })

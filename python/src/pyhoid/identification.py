@@ -112,7 +112,7 @@ def identify(
         Orders. A pair is a range to be searched, both ends included. nb counts b0, b1, ...
         Orders of ``"bj"`` that are omitted are searched: nk from 0.05 to 0.6 s, nd from 1 to 4. For
         ``"operator"``, nc and nd are the orders of the noise model, selected by Akaike's criterion; the
-        default range of nd is 0 to 24, or 0 to 8 if nc is not 0.
+        default range of nd is 0 to 0.5 s (at least 24), or 0 to 8 if nc is not 0.
     method : {{"pem", "iv4", "sriv", "rivbj"}}
         Prediction error method (Ljung 1999), or instrumental variables: iv4 for arx, sriv for oe,
         rivbj for bj (Young 2011).

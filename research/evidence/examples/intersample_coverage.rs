@@ -98,7 +98,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let (record, lead_s) = record(&truth, (rate_hz, is_held), &mut random)?;
                 let estimator = FamilyEstimator {
                     forms: vec![Form::Lead],
-                    nd: 0..=8,
+                    nd: Some(0..=8),
                     ..FamilyEstimator::default()
                 };
                 let mut fit = estimator.fit(&[record])?;

@@ -17,7 +17,7 @@
 //! be a difference of numbers that are larger by the inverse of `1 - pole`, and `psi' psi` would lose all digits. The
 //! response to the level does not decay, so its basis vector is as long as the record.
 
-use hoid_core::filter::{SecondOrder, divide_in_place};
+use hoid_core::filter::{divide_from, divide_in_place};
 
 use crate::{
     criterion::stationary_noise::StationaryNoise,
@@ -249,29 +249,14 @@ fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
     let mut h = vec![0.0; order];
     h.reserve(longest.min(4096));
     let mut largest = 1.0_f64;
-    let mut second = SecondOrder::new(d.first().copied().unwrap_or(0.0), d.get(1).copied().unwrap_or(0.0));
-    let mut impulse = 1.0;
     while h.len() < order + longest {
         let from = h.len();
         let to = (from + BLOCK).min(order + longest);
-        match order {
-            2 => {
-                h.resize(to, 0.0);
-                let (blocks, rest) = h[from..].as_chunks_mut::<4>();
-                for block in blocks {
-                    *block = second.filter_four([std::mem::take(&mut impulse), 0.0, 0.0, 0.0]);
-                }
-                for value in rest {
-                    *value = second.one(std::mem::take(&mut impulse));
-                }
-            }
-            _ => {
-                for t in from..to {
-                    let past: f64 = d.iter().enumerate().map(|(i, di)| di * h[t - 1 - i]).sum();
-                    h.push(f64::from(u8::from(t == order)) - past);
-                }
-            }
+        h.resize(to, 0.0);
+        if from == order {
+            h[from] = 1.0;
         }
+        divide_from(d, &mut h, from);
         let size = h[from..].iter().fold(0.0_f64, |m, y| m.max(y.abs()));
         largest = largest.max(size);
         if size < 1e-16 * largest {

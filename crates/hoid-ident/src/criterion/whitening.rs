@@ -1,6 +1,7 @@
 //! The whitening filter D/C, applied from rest or continued from previous samples.
 
 use hoid_core::filter::{SecondOrder, divide_from};
+use hoid_lanes::{FourLaneTask, FourLanes, with_four_lanes};
 
 use crate::linalg::least_squares::add_scaled;
 
@@ -52,28 +53,68 @@ pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: us
     divide_from(c, y, from);
 }
 
-/// Computes `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on. Each pass adds four lags, so y is read and
-/// written only once for them.
+/// Computes `y(t) += sum_i d_i x(t - first_lag - i)` from index `from` on. Each pass adds eight or four lags, so y is
+/// read and written only once for them.
 fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) {
-    let (fours, rest) = d.as_chunks::<4>();
+    let (eights, rest) = d.as_chunks::<8>();
+    let (fours, rest) = rest.as_chunks::<4>();
     let mut lag = first_lag;
+    for d in eights {
+        add_several(d, lag, x, y, from);
+        lag += d.len();
+    }
     for d in fours {
-        // The lags are added one by one up to the sample at which all four lags are inside x.
-        let whole = from.max(lag + 3).min(y.len());
-        for (i, &di) in d.iter().enumerate() {
-            add_lag(di, lag + i, x, &mut y[..whole], from);
-        }
-        if whole < y.len() {
-            let before = |i: usize| &x[whole - lag - i..];
-            let earlier = before(0).iter().zip(before(1)).zip(before(2)).zip(before(3));
-            for (y, (((x0, x1), x2), x3)) in y[whole..].iter_mut().zip(earlier) {
-                *y = (((*y + d[0] * x0) + d[1] * x1) + d[2] * x2) + d[3] * x3;
-            }
-        }
-        lag += 4;
+        add_several(d, lag, x, y, from);
+        lag += d.len();
     }
     for (i, &di) in rest.iter().enumerate() {
         add_lag(di, lag + i, x, y, from);
+    }
+}
+
+/// Computes `y(t) += sum_i d_i x(t - lag - i)` from index `from` on, in one pass.
+fn add_several<const N: usize>(d: &[f64; N], lag: usize, x: &[f64], y: &mut [f64], from: usize) {
+    // The lags are added one by one up to the sample at which all of them are inside x.
+    let whole = from.max(lag + N - 1).min(y.len());
+    for (i, &di) in d.iter().enumerate() {
+        add_lag(di, lag + i, x, &mut y[..whole], from);
+    }
+    if whole < y.len() {
+        let earlier = std::array::from_fn(|i| &x[whole - lag - i..]);
+        let y = &mut y[whole..];
+        with_four_lanes(AddLags { d, earlier, y });
+    }
+}
+
+/// Adds N lags to y, in the order of the lags; `earlier` holds x delayed by each lag.
+struct AddLags<'a, const N: usize> {
+    d: &'a [f64; N],
+    earlier: [&'a [f64]; N],
+    y: &'a mut [f64],
+}
+
+impl<const N: usize> FourLaneTask for AddLags<'_, N> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<F: FourLanes>(self, zero: F) {
+        let Self { d, earlier, y } = self;
+        let factors = d.map(|d| zero.splat(d));
+        let (blocks, rest) = y.as_chunks_mut::<4>();
+        let n = blocks.len();
+        let columns = earlier.map(|x| &x.as_chunks::<4>().0[..n]);
+        for (t, y) in blocks.iter_mut().enumerate() {
+            let mut sum = zero.load(y);
+            for i in 0..N {
+                sum = sum + factors[i] * zero.load(&columns[i][t]);
+            }
+            *y = sum.to_array();
+        }
+        for (t, y) in rest.iter_mut().enumerate() {
+            for i in 0..N {
+                *y += d[i] * earlier[i][4 * n + t];
+            }
+        }
     }
 }
 
@@ -90,19 +131,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn adding_four_lags_at_once_equals_adding_each_lag() {
+    fn adding_several_lags_at_once_equals_adding_each_lag() {
         let signal = |n: usize, k: f64| (0..n).map(|t| (k * t as f64).sin()).collect::<Vec<f64>>();
         for n in [1, 3, 5, 6, 40] {
             let x = signal(n, 0.7);
-            for lags in 0..12 {
+            for lags in 0..22 {
                 let d = signal(lags, 1.3);
                 for (first_lag, from) in [(1, 0), (2, 1), (2, 7), (1, 30)] {
-                    let (mut fours, mut ones) = (signal(n, 0.2), signal(n, 0.2));
-                    add_lags(&d, first_lag, &x, &mut fours, from);
+                    let (mut several, mut ones) = (signal(n, 0.2), signal(n, 0.2));
+                    add_lags(&d, first_lag, &x, &mut several, from);
                     for (i, &di) in d.iter().enumerate() {
                         add_lag(di, first_lag + i, &x, &mut ones, from);
                     }
-                    assert_eq!(fours, ones, "{n} {lags} {first_lag} {from}");
+                    assert_eq!(several, ones, "{n} {lags} {first_lag} {from}");
                 }
             }
         }

@@ -63,7 +63,7 @@ pub fn response_to(
     let again = FamilyEstimator {
         forms: vec![fit.form],
         nc: nc..=nc,
-        nd: nd..=nd,
+        nd: Some(nd..=nd),
         intersample: fit.intersample,
         ..estimator.clone()
     };

@@ -161,7 +161,7 @@ pub fn of_family(
     let again = FamilyEstimator {
         forms: vec![fit.form],
         nc: nc..=nc,
-        nd: nd..=nd,
+        nd: Some(nd..=nd),
         excitation: None,
         intersample: fit.intersample,
         channels: fit.channels_in_use(),

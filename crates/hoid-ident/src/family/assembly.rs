@@ -13,7 +13,7 @@ use super::{
     channel::{ChannelFit, SeenChannel},
     channel_lines::{AtChannelLines, InForm, have_separate_lines},
     channels::with_responses,
-    choice::FormFigures,
+    choice::{FormFigures, evidence_for},
     covariances::response_errors,
     diagnostics::{DiagnosticInputs, LARGEST_RESPONSE_ERROR, findings},
     estimated::{Errors, Estimated, in_form, operator_of},
@@ -130,9 +130,10 @@ impl<'a> Chosen<'_, 'a> {
             }
         }
         let forms = self.with_weights_of(&mut weighed);
+        let dc_gain_share = evidence_for(&forms, |form| form.has_lag() == layout.form.has_lag());
         let mut operators = Vec::with_capacity(separate);
         for record in 0..separate {
-            operators.push(operator_of(found, &errors, &weighed, record)?);
+            operators.push(operator_of(found, &errors, (&weighed, dc_gain_share), record)?);
         }
         let free_model = match noise_free {
             None => free_model(fit, workspace),
@@ -165,6 +166,7 @@ impl<'a> Chosen<'_, 'a> {
             response_error: response_errors(&operators[0].operator, operators[0].covariance.as_deref())
                 .and_then(|errors| errors.into_iter().min_by(f64::total_cmp)),
             weighed: &weighed,
+            dc_gain_share,
         }));
         let noise = &found.eta()[layout.noise_offset()..];
         Ok(FamilyFit {

@@ -67,6 +67,20 @@ pub(super) fn weights(criteria: &[Option<f64>], best: usize) -> Vec<f64> {
     weights.iter().map(|w| w / total).collect()
 }
 
+/// Returns the Akaike weight of the forms that satisfy a condition, among all forms with a criterion. Unlike the weight in
+/// averages, it includes forms that the data do not reject but whose parameters they do not determine.
+pub(super) fn evidence_for(figures: &[FormFigures], is_meant: impl Fn(Form) -> bool) -> f64 {
+    let known = || figures.iter().filter_map(|of| Some((of.form, of.criterion?)));
+    let least = known().map(|(_, c)| c).fold(f64::INFINITY, f64::min);
+    let weight = |(_, c): (Form, f64)| (0.5 * (least - c)).exp();
+    let total: f64 = known().map(weight).sum();
+    if total > 0.0 {
+        known().filter(|(form, _)| is_meant(*form)).map(weight).sum::<f64>() / total
+    } else {
+        1.0
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -15,7 +15,10 @@ use crate::{
     IdentError,
     criterion::Workspace,
     grey_box::{objective::PhysicalCriterion, parametrisation::Parametrisation},
-    linalg::least_squares::dot,
+    linalg::{
+        least_squares::dot,
+        products::{Lagged, gram},
+    },
 };
 
 /// Minimum number of records for which each record is a cluster.
@@ -81,21 +84,19 @@ impl Clusters {
             };
             for block in 0..wanted {
                 let span = block * n / wanted..(block + 1) * n / wanted;
-                let part: Vec<&[f64]> = psi.iter().map(|column| &column[span.clone()]).collect();
-                let q = part.len();
-                let scores: Vec<f64> = part.iter().map(|c| dot(c, &residuals[span.clone()])).collect();
-                let mut gram = vec![0.0; q * q];
-                for i in 0..q {
-                    for j in 0..=i {
-                        gram[i * q + j] = dot(part[i], part[j]);
-                        gram[j * q + i] = gram[i * q + j];
-                    }
-                }
+                // Products of the columns of psi and, in the last row, of the residuals with these columns.
+                let all = psi.iter().chain([&residuals]).map(|column| Lagged {
+                    values: &column[span.clone()],
+                    is_shift_of_previous: false,
+                });
+                let products = gram(&all.collect::<Vec<_>>());
+                let q = psi.len();
+                let row = |k: usize| &products[k * (q + 1)..][..q];
                 // Chain rule: psi_eta = psi_theta dtheta/deta, added to the elements of eta that the record depends on.
                 let (mut g, mut big) = (vec![0.0; p], vec![0.0; p * p]);
                 for (column, &place) in mapped.columns.iter().zip(positions) {
-                    g[place] += dot(column, &scores);
-                    let product: Vec<f64> = (0..q).map(|k| dot(&gram[k * q..(k + 1) * q], column)).collect();
+                    g[place] += dot(column, row(q));
+                    let product: Vec<f64> = (0..q).map(|k| dot(row(k), column)).collect();
                     for (other, &at) in mapped.columns.iter().zip(positions) {
                         big[place * p + at] += dot(other, &product);
                     }

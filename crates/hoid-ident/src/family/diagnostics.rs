@@ -10,7 +10,7 @@ use super::{
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
     line_fit::LineFit,
-    parameter::{Parameter, min_weight},
+    parameter::{DC_GAIN, Parameter, min_weight},
     prior::OperatorPrior,
     result::{FreeModel, WeighedForm},
 };
@@ -64,6 +64,8 @@ pub(super) struct DiagnosticInputs<'a> {
     pub apart: bool,
     /// The forms that the data do not reject, the best one first.
     pub weighed: &'a [WeighedForm],
+    /// Evidence for the forms in which K has the same meaning as in the best form.
+    pub dc_gain_share: f64,
 }
 
 /// Returns all findings.
@@ -180,7 +182,7 @@ struct FormParameters<'a> {
 
 impl<'a> FormParameters<'a> {
     /// Returns these parameters, grouped by the forms that have them.
-    fn all(parameters: &'a [Parameter], weighed: &[WeighedForm]) -> Vec<Self> {
+    fn all(parameters: &'a [Parameter], weighed: &[WeighedForm], dc_gain_share: f64) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         let is_undetermined = |p: &&Parameter| !p.determined && p.interval.is_some_and(|(low, high)| low * high > 0.0);
         for parameter in parameters.iter().filter(is_undetermined).filter(|p| !at_bound(p)) {
@@ -188,9 +190,12 @@ impl<'a> FormParameters<'a> {
                 [] => weighed.first().map(|best| best.form).into_iter().collect(),
                 several => several.to_vec(),
             };
-            let weight = (weighed.iter().filter(|of| forms.contains(&of.form)))
-                .map(|of| of.weight)
-                .sum();
+            let weight = match parameter.name.as_str() {
+                DC_GAIN => dc_gain_share,
+                _ => (weighed.iter().filter(|of| forms.contains(&of.form)))
+                    .map(|of| of.weight)
+                    .sum(),
+            };
             if forms.is_empty() || weight > min_weight(&parameter.name) {
                 continue;
             }
@@ -223,7 +228,7 @@ impl<'a> FormParameters<'a> {
 }
 
 fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
-    let form_parameters = FormParameters::all(judged.parameters, judged.weighed);
+    let form_parameters = FormParameters::all(judged.parameters, judged.weighed, judged.dc_gain_share);
     let is_explained = |parameter: &Parameter| {
         form_parameters
             .iter()
@@ -412,7 +417,7 @@ mod tests {
             // This parameter is undetermined for another reason; the forms that have it are more likely than not.
             parameter("tau_e", &[Form::Lead, Form::Lag]),
         ];
-        let messages: Vec<String> = FormParameters::all(&all, &weighed)
+        let messages: Vec<String> = FormParameters::all(&all, &weighed, 1.0)
             .iter()
             .map(|of| of.finding().message)
             .collect();

@@ -168,7 +168,7 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
 pub(super) fn operator_of(
     fit: &PredictionFit<'_>,
     errors: &Errors,
-    weighed: &[WeighedForm],
+    (weighed, dc_gain_share): (&[WeighedForm], f64),
     record: usize,
 ) -> Result<OperatorOfRecord, IdentError> {
     let Estimated {
@@ -178,7 +178,7 @@ pub(super) fn operator_of(
         parameters,
     } = Estimated::of(fit, errors, record)?;
     let parameters: Vec<Parameter> = (parameters.into_iter())
-        .map(|own| averaged(&own, weighed, record, fit.clusters.parts.len()).unwrap_or(own))
+        .map(|own| averaged(&own, (weighed, dc_gain_share), record, fit.clusters.parts.len()).unwrap_or(own))
         .collect();
     let layout = fit.layout();
     let p = fit.parameters();
@@ -222,20 +222,25 @@ pub(super) fn operator_of(
 }
 
 /// Returns the average of a parameter over the forms in which it has the same name and meaning: K of a form with a lag is
-/// the gain at zero frequency, far below the band, and K of another form is the gain in the band. K is not determined if forms
-/// with the other meaning are likely.
-fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
+/// the gain at zero frequency, far below the band, and K of another form is the gain in the band. K is not determined if
+/// forms with the other meaning are likely; `dc_gain_share` is the evidence for the forms with the meaning of the best
+/// form.
+fn averaged(
+    own: &Parameter,
+    (weighed, dc_gain_share): (&[WeighedForm], f64),
+    record: usize,
+    clusters: usize,
+) -> Option<Parameter> {
     let lags = weighed.first()?.form.has_lag();
-    let is_other = |form: &&WeighedForm| own.name == DC_GAIN && form.form.has_lag() != lags;
-    let other: f64 = weighed.iter().filter(is_other).map(|form| form.weight).sum();
-    let alike = weighed.iter().filter(|form| !is_other(form));
+    let is_dc_gain = own.name == DC_GAIN;
+    let alike = weighed.iter().filter(|form| !is_dc_gain || form.form.has_lag() == lags);
     let each = alike.filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();
         Some((form.form, form.weight, all.find(|p| p.name == own.name)?))
     });
     let found = Parameter::averaged(&each.collect::<Vec<_>>(), clusters)?;
     Some(Parameter {
-        determined: found.determined && other <= 1.0 - min_weight(DC_GAIN),
+        determined: found.determined && (!is_dc_gain || dc_gain_share > min_weight(DC_GAIN)),
         ..found
     })
 }

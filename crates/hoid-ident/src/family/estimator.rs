@@ -80,7 +80,8 @@ impl FamilyEstimator {
         records: &[Record],
         describing: Option<Result<DescribingFunction, IdentError>>,
     ) -> Result<FamilyFit, IdentError> {
-        let (records, seen) = self.prepared(records)?;
+        let own = self.with_nd_for(records);
+        let (records, seen) = own.prepared(records)?;
         // With further inputs, the ratio of u to e at a line depends on several responses.
         let (describing, no_lines) = match describing.filter(|_| seen.is_empty()) {
             None => (None, None),
@@ -96,14 +97,14 @@ impl FamilyEstimator {
             channel_lines,
             in_form,
             no_lines: why,
-        } = self.prepare(&records, &seen, describing.as_ref(), &mut workspace)?;
+        } = own.prepare(&records, &seen, describing.as_ref(), &mut workspace)?;
         let no_lines = no_lines.or(why);
-        let at_lines = (channel_lines.as_ref()).map(|lines| self.at_lines(lines, &prediction));
+        let at_lines = (channel_lines.as_ref()).map(|lines| own.at_lines(lines, &prediction));
         let count = starts.len();
         let mut tried: Vec<Tried<'_>> = Vec::with_capacity(count);
         for start in starts {
             progress::step("forms", tried.len(), count);
-            let fit = self.best_of(&prediction, &start, noise, &mut workspace);
+            let fit = own.best_of(&prediction, &start, noise, &mut workspace);
             tried.push(Tried {
                 form: start.form,
                 lines: start.lines,
@@ -111,7 +112,7 @@ impl FamilyEstimator {
             });
         }
         progress::step("forms", count, count);
-        let Comparison { best, figures } = Comparison::of(&tried, &prediction, *self.nd.end(), &mut workspace);
+        let Comparison { best, figures } = Comparison::of(&tried, &prediction, *own.nd().end(), &mut workspace);
         let Some(best) = best else {
             return Err(tried
                 .into_iter()
@@ -144,12 +145,12 @@ impl FamilyEstimator {
             prediction: &prediction,
             channels,
             records: &records,
-            excitation: self.excitation.as_deref(),
+            excitation: own.excitation.as_deref(),
             run_to_run: match prediction.noise_free() {
-                None => self.run_to_run,
+                None => own.run_to_run,
                 Some(_) => 0.0,
             },
-            highest_order: *self.nd.end(),
+            highest_order: *own.nd().end(),
         };
         chosen.result(&mut workspace)
     }
@@ -163,7 +164,7 @@ impl FamilyEstimator {
         let asked = [channel.clone()];
         let with_channel = Self {
             channels: vec![channel],
-            ..self.clone()
+            ..self.with_nd_for(records)
         };
         let (records, seen) = with_channel.prepared(records)?;
         let mut workspace = Workspace::of_thread();
@@ -207,7 +208,7 @@ impl FamilyEstimator {
         let mut prediction = self.prediction(self.intersample, records, &forms)?;
         if self.initial_state != InitialState::Zero && !seen.is_empty() {
             let sampling = (prediction.sample_time, prediction.intersample);
-            let of_channels = seen.first_regressed_sample(self.neuromuscular, sampling) + self.nd.end();
+            let of_channels = seen.first_regressed_sample(self.neuromuscular, sampling) + self.nd().end();
             prediction.first = prediction.first.max(of_channels);
         }
         self.check(records, prediction.first)?;
@@ -264,7 +265,7 @@ impl FamilyEstimator {
                 starts.iter_mut().for_each(|start| start.lines = None);
                 no_lines = lines.map(|_| TOO_LITTLE_NOISE.to_owned());
                 prediction = found;
-                prediction.noise_free().map(|_| (*self.nc.start(), *self.nd.start()))
+                prediction.noise_free().map(|_| (*self.nc.start(), *self.nd().start()))
             }
             None => None,
         };
@@ -333,7 +334,7 @@ impl FamilyEstimator {
         let delay_range_s = (low.max(shortest), high.max(shortest));
         let first = Prediction::first_residual(
             &forms.iter().map(|form| (*form, self.neuromuscular)).collect::<Vec<_>>(),
-            (*self.nc.end(), *self.nd.end()),
+            (*self.nc.end(), *self.nd().end()),
             delay_range_s,
             self.initial_state,
             (sample_time, intersample),
@@ -439,17 +440,17 @@ impl FamilyEstimator {
             );
         }
         let most = HIGHEST_NOISE_ORDER;
-        for (name, range) in [("nc", &self.nc), ("nd", &self.nd)] {
+        for (name, range) in [("nc", &self.nc), ("nd", &self.nd())] {
             if range.is_empty() || *range.end() > most {
                 let found = format!("{}..{}", range.start(), range.end());
                 return refuse(
                     &format!("the noise order {name}"),
                     found,
-                    "LO..HI within 0..24, LO <= HI",
+                    &format!("LO..HI within 0..{most}, LO <= HI"),
                 );
             }
         }
-        let pairs = self.nc.clone().count() * self.nd.clone().count();
+        let pairs = self.nc.clone().count() * self.nd().count();
         if *self.nc.end() > 0 && pairs > MAX_NOISE_PAIRS {
             return refuse(
                 "the noise orders",
@@ -459,7 +460,7 @@ impl FamilyEstimator {
         }
         let orders = hoid_model::Orders {
             nb: 4,
-            nd: *self.nd.end(),
+            nd: *self.nd().end(),
             nf: 3,
             nk: 1,
             ..hoid_model::Orders::default()
@@ -469,7 +470,7 @@ impl FamilyEstimator {
                 Structure::BoxJenkins,
                 &orders,
                 record,
-                first + 2 * (*self.nd.end() + 10),
+                first + 2 * (*self.nd().end() + 10),
             )?;
         }
         Ok(())
@@ -486,8 +487,9 @@ impl FamilyEstimator {
         let mut best: Option<PredictionFit<'a>> = None;
         let mut refusal = IdentError::NoFiniteLoss;
         for coordinates in &start.coordinates {
-            match prediction.fit((start.form, self.neuromuscular), noise, coordinates, workspace) {
-                Ok(fit) if best.as_ref().is_none_or(|known| fit.objective() < known.objective()) => best = Some(fit),
+            let known = best.as_ref().map_or(f64::INFINITY, PredictionFit::objective);
+            match prediction.fit_below(known, (start.form, self.neuromuscular), noise, coordinates, workspace) {
+                Ok(Some(fit)) if fit.objective() < known => best = Some(fit),
                 Ok(_) => {}
                 Err(error) => refusal = error,
             }

@@ -7,7 +7,11 @@
 //! autoregression of any order, and the bias of the operator depends on how well the noise model predicts (R. Shibata,
 //! *Annals of Statistics* 8 (1980) 147-164).
 
-use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
+use crate::linalg::{
+    gram::Gram,
+    least_squares::solve_symmetric,
+    products::{Lagged, gram},
+};
 
 /// Largest modulus of a root of C in a starting value.
 const LARGEST_ROOT: f64 = 0.999;
@@ -41,9 +45,13 @@ impl NoiseProducts {
     pub fn new(series: &[Vec<f64>], highest: usize) -> Self {
         let mut products = Gram::new(highest + 1);
         let mut count = 0;
-        for v in series {
-            count += v.len().saturating_sub(highest);
-            (highest..v.len()).for_each(|t| products.add(|i| v[t - i]));
+        for v in series.iter().filter(|v| v.len() > highest) {
+            count += v.len() - highest;
+            let lagged = (0..=highest).map(|lag| Lagged {
+                values: &v[highest - lag..v.len() - lag],
+                is_shift_of_previous: lag > 0,
+            });
+            products.add_all(&gram(&lagged.collect::<Vec<_>>()));
         }
         Self {
             highest,

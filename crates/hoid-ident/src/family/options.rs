@@ -1,7 +1,9 @@
 //! Options of the estimator of a person's operator: the fields of [`FamilyEstimator`], and the names under which text
 //! input sets them. Each option is defined only here.
 
-use hoid_model::{Detrend, Form, operator_family::Coordinate};
+use std::ops::RangeInclusive;
+
+use hoid_model::{Detrend, Form, Record, operator_family::Coordinate};
 
 use super::{channel::SeenChannel, intersample::Intersample, prior::OperatorPrior};
 use crate::{
@@ -12,8 +14,16 @@ use crate::{
     shared_options as shared,
 };
 
-/// Highest order of the noise model.
-pub const HIGHEST_NOISE_ORDER: usize = 24;
+/// Highest order of the noise model: half a second at the highest rate that is not decimated.
+pub const HIGHEST_NOISE_ORDER: usize = 100;
+/// Time in s that the noise model spans at the highest order of the default search. In a closed loop the noise model
+/// must span the time in which the operator responds, or it biases the operator ([`super::sensitivity`]).
+const NOISE_SPAN_S: f64 = 0.5;
+/// Highest order of the default search at low rates, and for few samples.
+const LEAST_HIGHEST_ND: usize = 24;
+/// Number of samples for each order above [`LEAST_HIGHEST_ND`] in the default search: Akaike's criterion takes too high
+/// an order if the number of coefficients is not small compared with the number of samples.
+const SAMPLES_PER_ORDER: usize = 40;
 /// Highest nd that is searched by default if nc is above zero: an ARMA model needs few coefficients.
 const HIGHEST_ND_WITH_NC: usize = 8;
 
@@ -32,9 +42,9 @@ pub struct FamilyEstimator {
     /// Intersample behaviour of the error. Default [`Intersample::Auto`].
     pub intersample: Intersample,
     /// Candidate orders nc of the noise model. Default 0.
-    pub nc: std::ops::RangeInclusive<usize>,
-    /// Candidate orders nd of the noise model. Default 0 to 24.
-    pub nd: std::ops::RangeInclusive<usize>,
+    pub nc: RangeInclusive<usize>,
+    /// Candidate orders nd of the noise model; if `None`, from 0 to half a second, at least 24. Default `None`.
+    pub nd: Option<RangeInclusive<usize>>,
     /// Further inputs that the person sees or feels, as channels of the records. Default none.
     pub channels: Vec<SeenChannel>,
     /// Channel of the recorded disturbance or target, which supplies the lines and the instrument.
@@ -64,7 +74,7 @@ impl Default for FamilyEstimator {
             delay_range_s: (0.02, 0.8),
             intersample: Intersample::Auto,
             nc: 0..=0,
-            nd: 0..=HIGHEST_NOISE_ORDER,
+            nd: None,
             channels: Vec::new(),
             excitation: None,
             period_s: None,
@@ -81,8 +91,29 @@ impl Default for FamilyEstimator {
 }
 
 impl FamilyEstimator {
+    /// Returns the estimator with the candidate orders nd for these records.
+    pub(super) fn with_nd_for(&self, records: &[Record]) -> Self {
+        let samples: usize = records.iter().map(Record::len).sum();
+        let of_span = records
+            .first()
+            .map_or(0, |record| (NOISE_SPAN_S / record.sample_time().s()).round() as usize);
+        let highest = of_span
+            .min(samples / SAMPLES_PER_ORDER)
+            .clamp(LEAST_HIGHEST_ND, HIGHEST_NOISE_ORDER);
+        let nd = self.nd.clone().unwrap_or(0..=highest);
+        Self {
+            nd: Some(nd),
+            ..self.clone()
+        }
+    }
+
+    /// Candidate orders nd; of an estimator without them, those of few samples.
+    pub(super) fn nd(&self) -> RangeInclusive<usize> {
+        self.nd.clone().unwrap_or(0..=LEAST_HIGHEST_ND)
+    }
+
     /// Sets the orders nc and nd of the noise model. If nc is not given it is zero. If nd is not given it is searched
-    /// up to 24, or up to 8 if nc is above zero.
+    /// up to half a second, or up to 8 if nc is above zero.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for the name of any other order, and for an order above [`HIGHEST_NOISE_ORDER`].
@@ -103,11 +134,8 @@ impl FamilyEstimator {
             }
         }
         let nc = named.get("nc").cloned().unwrap_or(0..=0);
-        let highest = match *nc.end() {
-            0 => HIGHEST_NOISE_ORDER,
-            _ => HIGHEST_ND_WITH_NC,
-        };
-        let nd = named.get("nd").cloned().unwrap_or(0..=highest);
+        let of_arma = (*nc.end() > 0).then_some(0..=HIGHEST_ND_WITH_NC);
+        let nd = named.get("nd").cloned().or(of_arma);
         Ok(Self { nc, nd, ..self })
     }
 }
@@ -131,7 +159,7 @@ impl BatchOptions for FamilyEstimator {
             shared::prior("population", |how: &mut Self| &mut how.prior)
                 .printed("prior", |how, _| Some(how.prior.to_string())),
             BatchOption::new(
-                shared::orders("nc=0,nd=0..24 (noise model)"),
+                shared::orders("nc=0, nd up to 0.5 s (noise model)"),
                 |how: &mut Self, option, text| {
                     let mut named: NamedOrders = option.read(text)?;
                     if *how.nc.end() > 0 {
@@ -142,8 +170,12 @@ impl BatchOptions for FamilyEstimator {
                 },
             )
             .printed("noise orders", |how, _| {
-                let (nc, nd) = (shared::range_words(&how.nc), shared::range_words(&how.nd));
-                Some(format!("nc={nc}, nd={nd}, by AIC"))
+                let nc = shared::range_words(&how.nc);
+                let nd = match &how.nd {
+                    Some(nd) => format!("nd={}", shared::range_words(nd)),
+                    None => format!("nd up to {NOISE_SPAN_S} s"),
+                };
+                Some(format!("nc={nc}, {nd}, by AIC"))
             }),
             shared::delay_range(
                 default.delay_range_s,

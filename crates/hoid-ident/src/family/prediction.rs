@@ -40,6 +40,8 @@ pub(super) const ROUNDING_POWER: f64 = 1e-8;
 pub(super) const EQUAL_POWER: f64 = 1e-18;
 /// Maximum number of rounds in which the weight kappa sigma^2 of the prior is updated.
 const ROUNDS: usize = 3;
+/// Number of steps after which a search from a further start ends if its objective is above the known one.
+const FIRST_STEPS: usize = 30;
 /// Relative change of the weight of the prior below which no further round is needed.
 const CONVERGED: f64 = 0.05;
 
@@ -142,6 +144,24 @@ impl<'a> Prediction<'a> {
         start: &[f64],
         workspace: &mut Workspace,
     ) -> Result<PredictionFit<'a>, IdentError> {
+        let found = self.fit_below(f64::INFINITY, form, noise, start, workspace)?;
+        found.ok_or(IdentError::NoFiniteLoss)
+    }
+
+    /// Like [`Prediction::fit`], but returns `None` if the objective remains above `known`, the objective of a fit of the
+    /// same form from another start. The first steps decide: later rounds give the prior more weight, which increases
+    /// the objective.
+    ///
+    /// # Errors
+    /// Same as [`Prediction::fit`].
+    pub fn fit_below(
+        &self,
+        known: f64,
+        form: (Form, bool),
+        noise: NoiseOrders,
+        start: &[f64],
+        workspace: &mut Workspace,
+    ) -> Result<Option<PredictionFit<'a>>, IdentError> {
         let series = self.unexplained(form, start, workspace)?;
         let products = NoiseProducts::new(&series, noise.1);
         let start_of_noise = match products.fit_up_to(noise.1) {
@@ -163,6 +183,19 @@ impl<'a> Prediction<'a> {
         let mut found = None;
         for round in 0..ROUNDS {
             criterion.penalty = unit.iter().map(|p| p.weighted(weight)).collect();
+            if round == 0 && known.is_finite() {
+                let first_steps = SearchOptions {
+                    max_iterations: FIRST_STEPS.min(self.search.max_iterations),
+                    ..self.search
+                };
+                let reached = criterion
+                    .search(eta, &first_steps, None, workspace)
+                    .ok_or(IdentError::NoFiniteLoss)?;
+                if reached.at.sum_of_squares > known {
+                    return Ok(None);
+                }
+                eta = reached.theta;
+            }
             let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
@@ -179,7 +212,7 @@ impl<'a> Prediction<'a> {
             }
             weight = next;
         }
-        found.ok_or(IdentError::NoFiniteLoss)
+        Ok(found)
     }
 
     /// Repeats the search with another noise model, starting from the operator of a fit and with the same weight of the

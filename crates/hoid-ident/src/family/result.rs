@@ -350,7 +350,7 @@ mod tests {
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let estimator = FamilyEstimator {
             forms: vec![Form::Lead],
-            nd: 1..=1,
+            nd: Some(1..=1),
             ..FamilyEstimator::default()
         };
         let fit = estimator.fit(&[record]).unwrap();

@@ -4,8 +4,8 @@
 //! error and to the part of the spectrum of e that is due to the remnant (L. Ljung, *System Identification*, 1999,
 //! section 13.4). The scatter between runs does not show this bias, since all runs share it. The remnant of people is
 //! not an autoregression of any order. To estimate the bias, the same form is fitted with other noise models:
-//! autoregressions of a quarter, half and all of the highest order, and an ARMA model with the orders (4, 5) of a
-//! sampled sum of a drift, a broad-band signal and a resonance. Each difference from such a fit is treated as a bias,
+//! autoregressions of half and all of the highest order, and an ARMA model with the orders (4, 5) of a sampled sum of a
+//! drift, a broad-band signal and a resonance. Each difference from such a fit is treated as a bias,
 //! and its square is added to the covariance. If there is a fit at the lines, the difference from this fit is used
 //! instead. For coordinates that the prior determines in the fit at the lines, the other noise models are used as well.
 //! The differences from them then enlarge the errors of single elements only, since the lines determine the response in
@@ -15,11 +15,12 @@
 //! replace, so the parameters differ by more than their errors. If the records do not show the behaviour, the fit with
 //! the other one counts in the same way.
 //!
-//! **Without lines** the differences do not show the whole bias: above the band of the forcing function, e consists
-//! mainly of remnant, and all noise models share most of the bias. The squared differences are therefore multiplied by
-//! 1.5, and the neuromuscular system has an additional variance. Both numbers, and the largest prior share with lines,
-//! were chosen for 160 virtual people and confirmed for 160 others; the page *Error bars of people* reports the
-//! coverage for a third set.
+//! **Without lines** the differences show the bias only if the noise models span the time in which the operator
+//! responds, so the highest order spans half a second ([`super::options`]): with at most 24 samples, 0.24 s at 100 Hz,
+//! all noise models shared most of the bias. They still share the bias at low frequencies and above the band of the
+//! forcing function, where e consists mainly of remnant. The squared differences are therefore multiplied by 1.5, and
+//! the neuromuscular system has an additional variance. Both numbers, and the largest prior share with lines, were
+//! chosen for 160 virtual people and confirmed for 160 others; the page *Error bars of people* reports the coverage.
 
 use hoid_model::operator_family::Coordinate;
 
@@ -57,7 +58,7 @@ pub(super) fn rivals(
     }
     let layout = fit.layout();
     let own: NoiseOrders = (layout.nc, layout.nd);
-    let mut orders: Vec<NoiseOrders> = vec![(0, highest / 4), (0, highest / 2), (0, highest), ARMA_ORDERS];
+    let mut orders: Vec<NoiseOrders> = vec![(0, highest / 2), (0, highest), ARMA_ORDERS];
     orders.retain(|&(nc, nd)| (nc, nd) != own && nd > 0 && nd <= highest && nc <= highest);
     orders.dedup();
     let elements = layout.noise_offset();

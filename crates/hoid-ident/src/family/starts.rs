@@ -161,7 +161,7 @@ impl FamilyEstimator {
         starts: &[Start],
         workspace: &mut Workspace,
     ) -> Result<NoiseOrders, IdentError> {
-        let highest = *self.nd.end();
+        let highest = *self.nd().end();
         let mut left: Vec<(Form, &Vec<f64>, NoiseProducts)> = Vec::new();
         for &Start {
             form, ref coordinates, ..
@@ -187,14 +187,14 @@ impl FamilyEstimator {
             .ok_or(IdentError::NoFiniteLoss)?;
         let (form, start, products) = left.swap_remove(least);
         let autoregression = products
-            .best_order(self.nd.clone(), Penalty::Akaike)
+            .best_order(self.nd(), Penalty::Akaike)
             .ok_or(IdentError::NoFiniteLoss)?;
         if *self.nc.end() == 0 {
             return Ok((0, autoregression));
         }
         let mut least: Option<(f64, NoiseOrders)> = None;
         for nc in self.nc.clone() {
-            for nd in self.nd.clone() {
+            for nd in self.nd() {
                 let Ok(fit) = prediction.fit((form, self.neuromuscular), (nc, nd), start, workspace) else {
                     continue;
                 };

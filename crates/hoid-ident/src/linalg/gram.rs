@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use super::least_squares::add_scaled;
+
 /// The sum `sum x x'` over rows x; only its lower triangle is stored.
 pub(crate) struct Gram {
     size: usize,
@@ -25,6 +27,11 @@ impl Gram {
                 *sum += x * row(j);
             }
         }
+    }
+
+    /// Adds the products over many rows, a symmetric matrix by rows.
+    pub fn add_all(&mut self, products: &[f64]) {
+        add_scaled(&mut self.sums, 1.0, products);
     }
 
     /// Returns the sum of the products of two columns.
