@@ -62,7 +62,7 @@ def test_a_bayes_factor_is_that_of_the_unweighted_test(group_results: Path) -> N
 def test_mistakes_are_told(group_results: Path, tmp_path: Path) -> None:
     with pytest.raises(pyhoid.OptionError, match="expected crossover"):
         pyhoid.compare(group_results, of="speed")
-    with pytest.raises(pyhoid.OptionError, match="the conditions are fo, so"):
+    with pytest.raises(pyhoid.OptionError, match="the conditions fo, so"):
         pyhoid.compare(group_results, factor="display")
     with pytest.raises(pyhoid.OptionError):
         pyhoid.compare(group_results, adjust="bonferroni")  # type: ignore[arg-type]

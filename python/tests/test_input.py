@@ -99,7 +99,7 @@ def test_what_is_wrong_is_said(e: Any, message: str) -> None:
         ({"nk": range(5, 20, 2)}, "step 1"),
         ({"structure": "grey-box", "nk": 29}, 'nk applies only to method="pem"'),
         ({"instruments": "f_t"}, "instruments applies only to method"),
-        ({"method": "iv4", "structure": "bj"}, "fits the structure arx"),
+        ({"method": "iv4", "structure": "bj"}, "fits only the structure arx"),
         ({"start": {"f1": 1.0}, "nk": 29, "nd": 1}, "start lacks"),
         ({"start": {"f1": 1.0}}, "single model"),
         ({"fix": {"d1": "x"}}, "d1: a number"),

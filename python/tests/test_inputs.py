@@ -44,7 +44,7 @@ def test_one_input_is_doubtful_where_the_target_is_seen(runs: list[pyhoid.Record
 @pytest.mark.parametrize(
     ("inputs", "roles", "words"),
     [
-        (["q"], None, "the first is the error"),
+        (["q"], None, "expected the error first"),
         (["e"], {"e": "motion"}, "e is the feedback"),
         (["e"], {"f_t": "motion"}, "not one of the inputs"),
         (["e", "nothing"], None, "no channel nothing"),

@@ -63,7 +63,7 @@ def test_a_plan_says_what_it_holds() -> None:
     assert "bias" in pyhoid.plans() and pyhoid.plan("bias").title == pyhoid.plans()["bias"]
     with pytest.raises(pyhoid.OptionError, match="line"):
         pyhoid.plan(PLAN.replace("seed = 5", "seed = five"))
-    with pytest.raises(pyhoid.OptionError, match="no plan is named"):
+    with pytest.raises(pyhoid.OptionError, match="no file or plan is named"):
         pyhoid.plan("nonsense")
 
 

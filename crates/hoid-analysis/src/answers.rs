@@ -54,7 +54,7 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
         known().find(|known| *known == name).map(str::to_owned).ok_or_else(|| {
             let expected = known().collect::<Vec<_>>().join(", ");
             AnalysisError::Options {
-                reason: format!("for: there is no answer {name:?}; expected one of {expected}"),
+                reason: format!("for: there is no quantity {name:?}; expected one of {expected}"),
             }
         })
     };
@@ -75,7 +75,7 @@ pub fn with_answers(verdict: Verdict, answers: &[Answered], asked: &[String]) ->
     } else {
         let wanted = asked.iter().filter_map(|name| match of(name) {
             Some(answer) => answer.open.clone(),
-            None => Some(undetermined(format!("{name} is not one of the answers of this result"))),
+            None => Some(undetermined(format!("this result does not contain {name}"))),
         });
         wanted.collect()
     };
@@ -113,7 +113,7 @@ fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
     (0..2).map(move |k| {
         let why = match measures[k] {
             None => Some(format!(
-                "{} is not determined: the gain of the loop does not cross 1 from above",
+                "{} is not determined: the loop gain does not cross 1 from above",
                 words[k]
             )),
             Some((value, interval)) => {
@@ -121,8 +121,8 @@ fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
                 let wide = value.standard_error.is_none_or(|s| s > LARGEST_ERRORS[k] * scale);
                 let zero = k == 0 && interval.is_some_and(|(low, _)| low <= 0.0);
                 (wide || zero).then(|| match interval {
-                    Some((low, high)) => format!("{} is not determined: 95 % from {low:.2} to {high:.2}", words[k]),
-                    None => format!("{} is not determined: it has no error bar", words[k]),
+                    Some((low, high)) => format!("{} is not determined: 95 % interval {low:.2} to {high:.2}", words[k]),
+                    None => format!("{} is not determined: it has no standard error", words[k]),
                 })
             }
         };

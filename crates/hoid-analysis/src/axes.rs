@@ -54,8 +54,8 @@ impl FromStr for AxisPair {
                 excitation: rest.first().map(|&name| name.to_owned()),
             }),
             _ => Err(format!(
-                "found {text:?}, expected error and control of an axis, such as ex,ux, optionally with its excitation, \
-                 such as ex,ux,rx"
+                "found {text:?}, expected the error and control of an axis, such as ex,ux, optionally followed by its \
+                 excitation, such as ex,ux,rx"
             )),
         }
     }
@@ -132,13 +132,13 @@ pub fn axes(identification: &Identification, mut all: Vec<(AxisPair, Recordings)
 pub fn check_axes(identification: &Identification, pairs: &[AxisPair]) -> Result<(), AnalysisError> {
     let refuse = |reason: String| Err(AnalysisError::Options { reason });
     if pairs.len() < 2 {
-        return refuse("pair: found one axis, expected two or more; for one axis give input and output".to_owned());
+        return refuse("pair: found one axis, expected two or more; for one axis, use input and output".to_owned());
     }
     for (k, pair) in pairs.iter().enumerate() {
         let shares = |other: &&AxisPair| other.input == pair.input || other.output == pair.output;
         if let Some(twice) = pairs[..k].iter().find(shares) {
             return refuse(format!(
-                "pair: {},{} and {},{} share a column; each axis has its own error and control",
+                "pair: {},{} and {},{} share a column; give each axis its own error and control",
                 twice.input, twice.output, pair.input, pair.output
             ));
         }
@@ -190,7 +190,7 @@ fn coupling(
 /// separated.
 fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Option<f64>) -> Result<(), String> {
     let (Some(own), Some(of_other)) = (&pair.excitation, &other.excitation) else {
-        return Err("the excitation is not given for both axes; give it as in ex,ux,rx".to_owned());
+        return Err("the excitation is not given for both axes; add it to each pair, as in ex,ux,rx".to_owned());
     };
     let search = LineSearch {
         period_s,

@@ -75,7 +75,7 @@ impl Describing {
             None => vec![Setting::new("decimate", self.rate.to_string()).given(self.rate != Decimation::default())],
         };
         if late_samples != 0.0 {
-            let words = format!("{late_samples} samples, as a phase");
+            let words = format!("{late_samples} samples, corrected as a phase shift");
             list.push(Setting::new("offset of the output", words).given(true));
         }
         let is_default = self.faults == FaultHandling::default();

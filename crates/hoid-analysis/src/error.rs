@@ -28,10 +28,11 @@ pub enum AnalysisError {
     OtherColumns(Box<OtherColumns>),
     /// A column that is missing in one file but exists in another.
     #[error(
-        "{file} has no column {missing}, but {other} has it: each file is taken as a separate recording. If they are \
-         parts of one recording, join them by time, in Python with pandas.merge(pandas.read_csv(\"{file}\"), \
-         pandas.read_csv(\"{other}\"), on=\"t\", how=\"outer\").sort_values(\"t\").to_csv(\"joined.csv\", \
-         index=False), and read joined.csv with --sparse e=linear,u=linear --resample"
+        "{file} has no column {missing}, but {other} does. Each file is read as a separate recording. If the files \
+         are parts of one recording, join them by time, for example in Python with \
+         pandas.merge(pandas.read_csv(\"{file}\"), pandas.read_csv(\"{other}\"), on=\"t\", \
+         how=\"outer\").sort_values(\"t\").to_csv(\"joined.csv\", index=False), and read joined.csv with --sparse \
+         e=linear,u=linear --resample"
     )]
     InAnotherFile {
         /// Name of the file without the column.
@@ -42,7 +43,9 @@ pub enum AnalysisError {
         other: String,
     },
     /// An offset for a channel that does not exist.
-    #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u represent input and output")]
+    #[error(
+        "--offset: there is no channel {name:?}; the record has {known}; e and u can also be used for the input and output"
+    )]
     NoSuchChannel {
         /// The requested name.
         name: String,
@@ -57,7 +60,7 @@ pub enum AnalysisError {
     },
     /// A text that is not a result.
     #[error(
-        "this is not a result of a fit: {found}; expected the output of to_json of this version, or of identify --json"
+        "this is not a result of a fit: {found}; expected the output of identify --json, or of to_json in this version"
     )]
     NotAResult {
         /// Description of the contents found.

@@ -107,6 +107,6 @@ impl Recordings {
 impl Setting {
     /// Returns the setting that reports an estimated level.
     pub(crate) fn level() -> Self {
-        Self::new("level", "one constant of u per record, estimated")
+        Self::new("level", "one constant in u per record, estimated")
     }
 }

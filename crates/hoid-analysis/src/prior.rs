@@ -31,7 +31,7 @@ pub fn prior_of_text(text: &str) -> Result<OperatorPrior, AnalysisError> {
     let prior = OperatorPrior::of_parameters(parameters.map(|p| (p.name.as_str(), p.estimate, p.determined)), source)?;
     if prior.entries().is_empty() {
         return Err(refuse(format!(
-            "{source}: none of its parameters is determined and has an error"
+            "{source}: no parameter is determined and has a standard error"
         )));
     }
     Ok(prior)

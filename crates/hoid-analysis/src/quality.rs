@@ -55,8 +55,8 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         all.push(Finding::note(
             RESTING,
             format!(
-                "{output} rests at {} in {:.0} % of the samples, {} times, as if the stick had a dead zone or were \
-                 moved in pulses; the operator is the linear part of the response",
+                "{output} rests at {} for {:.0} % of the samples, on {} occasions, as if the stick had a dead zone or \
+                 were moved in pulses; the operator describes only the linear part of the response",
                 rest.value,
                 100.0 * rest.share,
                 rest.visits
@@ -117,7 +117,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
             all.push(Finding::doubt(
                 "held",
                 format!(
-                    "{channel} is held for up to {longest_s:.2} s: changes in between are not in the recording; \
+                    "{channel} is held for up to {longest_s:.2} s: changes during this time were not recorded; \
                      shorten the span with --from and --to"
                 ),
             ));

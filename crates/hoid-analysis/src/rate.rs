@@ -60,7 +60,7 @@ pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples
     let hz = (1e4 / sample_time.s()).round() / 1e4;
     kept.then(|| {
         format!(
-            "{hz} Hz is kept, since orders and delays are in samples here; --decimate {factor} brings it near 100 Hz"
+            "{hz} Hz is kept because orders and delays are in samples; use --decimate {factor} for a rate near 100 Hz"
         )
     })
 }

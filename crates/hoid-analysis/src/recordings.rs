@@ -141,9 +141,9 @@ impl Recordings {
         Some(Finding::doubt(
             "displayed",
             format!(
-                "{received} {name} ({role}), but the model lacks this input: the response to the \
-                 error, crossover and margins are not those of the person; use hoid identify --input {error} --input \
-                 {name} --role {name}={role}"
+                "{received} {name} ({role}), but the model lacks this input: the response to the error, the crossover \
+                 and the margins do not describe the person; use hoid identify --input {error} --input {name} --role \
+                 {name}={role}"
             ),
         ))
     }

@@ -186,7 +186,7 @@ impl Request {
             let own = method.structure();
             if typed.is_some() && polynomial != Some(own) {
                 return Err(options(format!(
-                    "method {method} fits the structure {}; drop the structure, or use the method pem",
+                    "method {method} fits only the structure {}; drop the structure, or use method pem",
                     own.name()
                 )));
             }
@@ -245,14 +245,14 @@ impl Request {
             (true, Some("arma" | "remnant")) => Err(AnalysisError::Option {
                 name: "noise",
                 reason: format!(
-                    "found {}; an operator that changes allows only the noise ar",
+                    "found {}; an operator that changes allows only noise ar",
                     noise.unwrap_or_default()
                 ),
             }),
             (true, _) => Ok(CHANGE),
             (false, Some("remnant")) => Ok(REMNANT),
             (false, None) if of_remnant => {
-                notes.push("the options require the operator with noise remnant, which is used".to_owned());
+                notes.push("the options require an operator with noise remnant, so this model is used".to_owned());
                 Ok(REMNANT)
             }
             _ => Ok(OPERATOR),

@@ -147,7 +147,7 @@ pub fn roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, Analysi
             .map_err(|why| options(format!("role: found {part:?}; expected {why}")))?;
         let Some(place) = further.iter().position(|name| *name == named.name) else {
             return Err(options(format!(
-                "role: {} is not one of the further inputs {}; name it as an input first",
+                "role: {} is not one of the further inputs {}; add it as an input first",
                 named.name,
                 further.join(", ")
             )));
@@ -188,7 +188,7 @@ impl SeveralInputsResult {
             ));
         }
         if fit.covariance().is_none() {
-            let message = "the data do not determine a combination of coefficients: there are no error bars";
+            let message = "the data leave a combination of coefficients undetermined: there are no error bars";
             findings.push(Finding::undetermined("singular", message));
         }
         for (name, _) in &model.inputs {
@@ -204,7 +204,7 @@ impl SeveralInputsResult {
             if gains.clone().count() > 0 && gains.clone().all(|(_, e)| open(&e)) {
                 findings.push(Finding::doubt(
                     "undetermined-input",
-                    format!("no coefficient of {name} differs from zero by two standard errors: the response to it is not determined"),
+                    format!("no coefficient of {name} differs from zero by two standard errors: the response to {name} is not determined"),
                 ));
             }
         }

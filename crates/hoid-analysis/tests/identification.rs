@@ -210,7 +210,7 @@ fn offsets_are_converted_to_lag_samples() {
     let wrong = late_samples(&record, &of("y", Offset::Samples(1.0))).unwrap_err();
     assert_eq!(
         wrong.to_string(),
-        "--offset: there is no channel \"y\"; the record has e, u, and e and u represent input and output"
+        "--offset: there is no channel \"y\"; the record has e, u; e and u can also be used for the input and output"
     );
     let mut reading = Reading::default();
     reading.preparation.offset = of("u", Offset::Samples(1.0));

@@ -26,10 +26,11 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
     let nk = match args.nk.as_slice() {
         [] => None,
         [one] => Some(one),
-        _ => {
-            return Err(CliError::Usage(
-                "--nk has several numbers, and there is one input".to_owned(),
-            ));
+        several => {
+            return Err(CliError::Usage(format!(
+                "--nk: found {} numbers, but there is one input; give one number",
+                several.len()
+            )));
         }
     };
     let delay = DelayRange::given(nk, args.delay);
@@ -43,12 +44,12 @@ fn two_input_request(args: &TrackArgs) -> Result<TrackRequest, CliError> {
     let samples = |delay: &DelayRange| match delay {
         DelayRange::Samples(range) if range.start() == range.end() => Ok(range.start().to_string()),
         other => Err(CliError::Usage(format!(
-            "--nk: found {other}; a model with two inputs takes one number of samples for each"
+            "--nk: found {other}; give one number of samples for each of the two inputs, such as 29,12"
         ))),
     };
     if typed.delay.is_some() {
         return Err(CliError::Usage(
-            "--delay applies to one input; use --nk, such as 29,12".to_owned(),
+            "--delay applies only to models with one input; use --nk, such as --nk 29,12".to_owned(),
         ));
     }
     let nk = typed.nk.iter().map(samples).collect::<Result<Vec<_>, _>>()?.join(",");

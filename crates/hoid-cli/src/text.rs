@@ -89,7 +89,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     if !verbose && records.len() > shown {
         let alike = !accounts[0].steps.is_empty() && accounts.iter().all(quiet);
         text.push_str(&format!(
-            "{} records in total, up to {}{}\n",
+            "{} records in total; the last is {}{}\n",
             records.len(),
             files[files.len() - 1],
             if alike { ", all prepared the same way" } else { "" }
@@ -337,7 +337,7 @@ pub fn crossings(all: &Crossings) -> String {
     if all.gain.len() > 1 {
         let each = (all.gain.iter()).map(|c| format!("{:.4} rad/s ({:.1} deg)", c.omega_rad_s, c.margin));
         line.push_str(&format!(
-            "The gain is one at {} frequencies, each with its phase margin: {}.\n",
+            "The gain is one at {} frequencies (phase margins in parentheses): {}.\n",
             all.gain.len(),
             each.collect::<Vec<_>>().join(", ")
         ));
@@ -453,7 +453,7 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     for (seen, sentence) in [
         (
             coloured,
-            "Not white: use a richer noise model (larger nd or nc), which in a closed loop also reduces the bias.\n",
+            "Not white: use a richer noise model (larger nd or nc); in a closed loop, this also reduces the bias.\n",
         ),
         (
             missed,

@@ -151,8 +151,8 @@ fn invalid_pairs_are_refused() {
     fs::write(at.path().join("two.csv"), "t,ex,ux,ey,uy\n0,1,1,1,1\n").unwrap();
     for (pairs, wanted) in [
         (&["--pair", "ex,ux"][..], "one axis"),
-        (&["--pair", "ex"], "expected error and control"),
-        (&["--pair", "ex,ux,rx,q"], "expected error and control"),
+        (&["--pair", "ex"], "expected the error and control"),
+        (&["--pair", "ex,ux,rx,q"], "expected the error and control"),
         (&["--pair", "ex,ux", "--pair", "ex,uy"], "share a column"),
         (
             &["--pair", "ex,ux", "--pair", "ey,uy", "--input", "ex"],
@@ -160,7 +160,7 @@ fn invalid_pairs_are_refused() {
         ),
         (
             &["--pair", "ex,ux", "--pair", "ey,uy", "--figure", "x.svg"],
-            "applies to one axis",
+            "requires a single axis",
         ),
         (
             &["--pair", "ex,ux", "--pair", "ey,uy", "--structure", "bj"],

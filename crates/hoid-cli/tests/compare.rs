@@ -39,7 +39,7 @@ fn conditions_are_compared() {
     let output_text = good(at, &["compare", "results.json", "--of", "crossover", "-v"]);
     assert!(output_text.starts_with("Verdict: doubtful"), "{output_text}");
     assert!(
-        output_text.contains("without P11 in so: it has no crossover"),
+        output_text.contains("P11 in so is left out: it has no crossover"),
         "{output_text}"
     );
     let sentence =
@@ -94,8 +94,8 @@ fn mistakes_are_explained_with_a_remedy() {
     let at = directory.path();
     for (arguments, code, word) in [
         (&["--of", "speed"][..], 2, "expected crossover"),
-        (&["--of", "rms_e"], 2, "name the directory"),
-        (&["--factor", "display"], 2, "the conditions are fo, so"),
+        (&["--of", "rms_e"], 2, "give the directory"),
+        (&["--factor", "display"], 2, "the conditions fo, so"),
         (&["--between"], 2, "varies within people"),
         (&["--within", "--between"], 2, "cannot be used with"),
     ] {
@@ -114,7 +114,7 @@ fn mistakes_are_explained_with_a_remedy() {
     // No person has a margin, so nothing is determined, and the message reports this.
     let output = hoid(at, &["compare", "results.json", "--of", "phase_margin"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8(output.stdout).unwrap().contains("without P03 in fo"));
+    assert!(String::from_utf8(output.stdout).unwrap().contains("P03 in fo is left out"));
 }
 
 /// People have different forms with the two elements, so their parameters are compared in a common form.
@@ -130,7 +130,7 @@ fn recordings_are_compared_in_a_common_form() {
     let object: serde_json::Value = serde_json::from_str(&printed).unwrap();
     let form = object["verdict"]["notes"].to_string();
     assert!(
-        form.contains("parameters are compared in the form lead-lag for all"),
+        form.contains("the parameters of all people are compared in the form lead-lag"),
         "{form}"
     );
     let compared_of = |quantity: &str| {

@@ -350,7 +350,7 @@ fn spread_of_a_difference_comes_from_the_people() {
         &["design", "--controlled-element", "4/s", "--run-to-run", "group.json"],
     );
     assert!(
-        code == 2 && message.contains("crossover of three runs"),
+        code == 2 && message.contains("crossover from three runs"),
         "{code} {message}"
     );
     let given = json(
@@ -365,7 +365,7 @@ fn spread_of_a_difference_comes_from_the_people() {
     let all = ["design", "--controlled-element", "4/s", "--difference", "crossover=10%"];
     let (code, message) = bad(at, &[&all[..], &["--between-people", "population.json"]].concat());
     assert!(
-        code == 2 && message.contains("no spread between people of crossover"),
+        code == 2 && message.contains("no spread of crossover between people"),
         "{code} {message}"
     );
 }
@@ -386,7 +386,7 @@ fn mistakes_are_explained_with_a_remedy() {
         (
             &["--display", "pursuit", "--against", "reference"],
             2,
-            "no lines of a disturbance",
+            "no lines for a disturbance",
         ),
         (&["--lines", "60", "--spacing", "9"], 2, "--spacing"),
         (

@@ -29,7 +29,7 @@ fn decimal_comma_is_explained_by_every_command() {
     let info = good(d, &["info", "comma.csv"]);
     assert!(info.contains("decimal point instead of a comma"), "{info}");
     assert!(
-        info.contains("column e, line 2: \"1,5\" is text, 2 of 2 cells"),
+        info.contains("column e, line 2: \"1,5\" is text (2 of 2 cells)"),
         "{info}"
     );
     let (_, message) = bad(d, &["identify", "comma.csv"]);

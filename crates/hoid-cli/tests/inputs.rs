@@ -148,7 +148,7 @@ fn invalid_inputs_are_refused_with_a_remedy() {
         (&["identify", run, "--role", "f_t=sight"], "feedforward"),
         (
             &["identify", run, "--input", "e", "--role", "f_t=feedback"],
-            "the feedback is the first --input",
+            "the first --input is the feedback",
         ),
         (
             &["identify", run, "--structure", "bj", "--role", "f_t=feedforward"],
@@ -225,7 +225,7 @@ fn polynomials_with_two_inputs_are_identified() {
         (&["--stable"], "--stable does not apply"),
         (&["--role", "y=output"], "y is not one of the further inputs f_t"),
         (&["--role", "f_t=feedforward:0.25"], "neither a preview nor a form"),
-        (&["--role", "f_t=feedback"], "the feedback is the first --input"),
+        (&["--role", "f_t=feedback"], "the first --input is the feedback"),
         (&["--figure", "x.svg"], "one input"),
     ] {
         let call = [
@@ -364,7 +364,7 @@ fn recursion_tracks_both_responses() {
     assert!(!kinds(&found).contains(&"displayed".to_owned()));
 
     for (options, words) in [
-        (&["--method", "rpem"][..], "give nk of each in samples"),
+        (&["--method", "rpem"][..], "give nk for each in samples"),
         (&["--method", "adaptive", "--nk", "14,1"], "rls or rpem"),
         (&["--method", "rpem", "--nk", "14,1,3"], "3 numbers for 2 inputs"),
         (&["--method", "rpem", "--nk", "0.2s,0.1s"], "one number of samples"),

@@ -420,7 +420,7 @@ fn stream_without_samples_exits_with_one() {
     let (status, _, said) = stream.end();
     assert_eq!(status.code(), Some(1), "{said}");
     assert!(
-        said.contains("no line of the stream was a sample (5 lines dropped)"),
+        said.contains("no line of the stream contained a sample (5 lines dropped)"),
         "{said}"
     );
 }

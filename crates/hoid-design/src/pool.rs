@@ -109,7 +109,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
             continue;
         }
         if form.is_none() && !FORM_INDEPENDENT_NAMES.contains(&name) {
-            let why = "the forms of people differ; name a form under [analysis] in group.toml".to_owned();
+            let why = "the forms of the people differ; set form under [analysis] in group.toml".to_owned();
             found.left_out.push((name.to_owned(), why));
             continue;
         }

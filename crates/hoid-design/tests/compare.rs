@@ -100,13 +100,13 @@ fn missing_results_are_reported() {
     assert!(
         reasons
             .iter()
-            .any(|r| r.starts_with("without P03 in so: it has no crossover")),
+            .any(|r| r.starts_with("P03 in so is left out: it has no crossover")),
         "{reasons:?}"
     );
     assert!(
         reasons
             .iter()
-            .any(|r| r.starts_with("without P11 in so: there is no run")),
+            .any(|r| r.starts_with("P11 in so is left out: there is no run")),
         "{reasons:?}"
     );
     assert!(
@@ -227,7 +227,7 @@ fn error_messages_contain_advice() {
         ..Comparing::default()
     });
     assert!(
-        from_runs.contains("gain at 2 rad/s") && from_runs.contains("name the directory"),
+        from_runs.contains("gain at 2 rad/s") && from_runs.contains("give the directory"),
         "{from_runs}"
     );
     let factors = vec!["display".parse().unwrap()];

@@ -31,7 +31,7 @@ fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
     if !pointer.is_aligned() {
         return Err(Failure::new(
             HOID_BAD_POINTER,
-            format!("{what} is not aligned: it must be aligned for its type"),
+            format!("{what} is not aligned for its type"),
         ));
     }
     Ok(())

@@ -84,7 +84,7 @@ fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) 
         };
         if fit.is_some() {
             return Err(Failure::option(
-                "prior is given twice, as a fit and by the options; drop one",
+                "prior is given twice, as a fit and in the options; remove one",
             ));
         }
         if other.is_some() {
@@ -141,7 +141,7 @@ fn taken<T>(
 }
 
 fn choice<T: NamedChoice>(value: &Value) -> Result<T, String> {
-    let name = value.as_str().ok_or("its name as a text")?;
+    let name = value.as_str().ok_or("its name as text")?;
     T::of_name(name).map_err(|error| error.to_string())
 }
 
@@ -160,7 +160,7 @@ fn numbers(value: &Value) -> Result<Vec<f64>, String> {
 }
 
 fn element(value: &Value) -> Result<ContinuousTransferFunction, String> {
-    let expected = "a text such as \"90/(s(s+6))\", or a pair of coefficients in descending powers of s";
+    let expected = "text such as \"90/(s(s+6))\", or a pair of coefficients in descending powers of s";
     match value {
         Value::String(text) => text.parse().map_err(|error| format!("{expected} ({error})")),
         Value::Array(pair) if pair.len() == 2 => {
@@ -195,7 +195,7 @@ fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
     match ends {
         Some((low, high)) if low <= high => Ok(low..=high),
         _ => Err(format!(
-            "a whole number up to {most}, or a pair of them, the smaller first"
+            "a whole number up to {most}, or two such numbers, the smaller first"
         )),
     }
 }

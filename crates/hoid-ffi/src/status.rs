@@ -97,8 +97,8 @@ pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus 
 pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("a fault without text");
-    format!("an internal error of hoid, please report it: {words}")
+        .unwrap_or("it gave no message");
+    format!("an internal error of hoid; please report it: {words}")
 }
 
 fn remember(text: &str) {

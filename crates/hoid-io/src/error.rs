@@ -81,7 +81,7 @@ pub enum IoError {
         directory: String,
     },
     /// A directory where a file is expected.
-    #[error("{file} is a directory, expected a file; name the file in it")]
+    #[error("{file} is a directory, expected a file; give the path of a file in it")]
     Directory {
         /// Name of the directory.
         file: String,
@@ -144,7 +144,7 @@ pub enum IoError {
     /// A text in which a line has no end.
     #[error(
         "{file}: no line ends within {most_mb} MB after byte {byte}, expected one line per sample; copy or record the \
-         file again, or remove what follows this byte"
+         file again, or remove everything after this byte"
     )]
     LongLine {
         /// Name of the file.
@@ -157,7 +157,7 @@ pub enum IoError {
     /// A header whose words cannot be assigned to the cells below it.
     #[error(
         "{file}, {place}: the header has {}, expected {} as in the rows below it; write one name for each column in \
-         this line, names of several words in quotation marks or joined (Roll_error)",
+         this line, and put names of several words in quotation marks or join them (Roll_error)",
         counted(*words, "word"),
         counted(*cells, "name")
     )]
@@ -174,7 +174,7 @@ pub enum IoError {
     /// A table with too many columns.
     #[error(
         "{file} has {found} columns, expected at most {most}; save only the columns that are needed, or look for \
-         missing line ends"
+         missing line endings"
     )]
     TooManyColumns {
         /// Name of the file.
@@ -213,7 +213,7 @@ pub enum IoError {
     },
     /// A truncated last line.
     #[error(
-        "{file} is truncated in {place}, the last one: {found} of {expected} values; copy or record the file again, or \
+        "{file} is truncated in {place}, the last line: {found} of {expected} values; copy or record the file again, or \
          remove that line"
     )]
     CutRow {
@@ -390,9 +390,9 @@ pub enum IoError {
     },
     /// A time that is constant or runs backwards.
     #[error(
-        "{file}, {place}: t = {found} s after {previous} s, expected increasing time; drop rows that were written \
-         twice with --drop-repeated, use --trial t if the time restarts with each trial, write t with more decimals, \
-         or give --fs HZ in place of t"
+        "{file}, {place}: t = {found} s follows t = {previous} s, expected increasing time; drop rows that were \
+         written twice with --drop-repeated, use --trial t if the time restarts with each trial, write t with more \
+         decimals, or give --fs HZ in place of t"
     )]
     NotIncreasing {
         /// Name of the file.
@@ -547,7 +547,7 @@ pub enum IoError {
         file: String,
     },
     /// A name that matches several arrays.
-    #[error("{file}: \"{asked}\" may be any of {found}; give the full path with --input and --output")]
+    #[error("{file}: \"{asked}\" matches {found}; give the full path with --input and --output")]
     AmbiguousColumn {
         /// Name of the file.
         file: String,

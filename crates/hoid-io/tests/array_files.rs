@@ -245,7 +245,7 @@ fn matlab_objects_are_refused_with_an_export_command() {
 fn names_are_searched_in_nested_structures() {
     let message = refused("mat/octave_struct.mat", "e", "u");
     assert!(
-        message.contains("\"e\" may be any of data.run(1).e, data.run(2).e"),
+        message.contains("\"e\" matches data.run(1).e, data.run(2).e"),
         "{message}"
     );
     close(

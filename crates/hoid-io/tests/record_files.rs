@@ -248,10 +248,7 @@ fn lines_around_a_table_do_not_change_the_record() {
     let expected = desk.read(&plain, &defaults()).unwrap().record;
     let again = format!("t,e,u\n{}\nt,e,u\n{}\n", rows[..10].join("\n"), rows[10..].join("\n"));
     for (text, note) in [
-        (
-            format!("{plain}Mean,14.5,-14.5\n"),
-            "the first of which is \"Mean,14.5,-14.5\"",
-        ),
+        (format!("{plain}Mean,14.5,-14.5\n"), "the first is \"Mean,14.5,-14.5\""),
         (
             format!("{plain}\nEnd of run\nOperator 3\n"),
             "below the table are left out: 2",
@@ -455,9 +452,9 @@ fn errors_name_line_column_and_remedy() {
     says("t,e,u\n0,1,2\n", &["1 sample, expected at least 2", "--fs HZ"]);
     says(
         "t,e,u\n0,1,2\n1,1,2\n1,1,2\n2,1,2\n",
-        &["line 4: t = 1 s after 1 s, expected increasing time"],
+        &["line 4: t = 1 s follows t = 1 s, expected increasing time"],
     );
-    says("t,e,u\n0,1,2\n2,1,2\n1,1,2\n", &["line 4: t = 1 s after 2 s"]);
+    says("t,e,u\n0,1,2\n2,1,2\n1,1,2\n", &["line 4: t = 1 s follows t = 2 s"]);
     says(
         "t,e,u\n0.0,1,2\n0.1,1,2\n0.2,1,2\n0.6,1,2\n0.7,1,2\n0.8,1,2\n0.9,1,2\n",
         &[

@@ -69,7 +69,7 @@ fn sparse_values_are_held() {
     );
     let text = read.steps[0].to_string();
     assert!(
-        text.starts_with("column e: 10 values of its own, 18 rows between them filled with the last value"),
+        text.starts_with("column e: 10 values recorded, 18 rows between them filled with the last value"),
         "{text}"
     );
 }
@@ -208,7 +208,7 @@ fn invalid_sparse_options_are_refused() {
         &[("e", Sparse::Hold), ("u", Sparse::Hold)],
     );
     assert!(
-        apart.contains("no row lies between the first and the last value of every column of e, u"),
+        apart.contains("the columns e, u have no rows in common between their first and last values"),
         "{apart}"
     );
     assert!(

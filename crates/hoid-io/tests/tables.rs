@@ -400,7 +400,7 @@ fn missing_parquet_values_are_located() {
     let still = write(ColumnValues::Whole(vec![0, 1, 1]), vec![0.0; 3])
         .unwrap_err()
         .to_string();
-    assert!(still.contains("row 3: t = 1 s after 1 s"), "{still}");
+    assert!(still.contains("row 3: t = 1 s follows t = 1 s"), "{still}");
     assert!(matches!(write(t(0), Vec::new()), Err(IoError::NoRows { .. })));
 }
 

@@ -168,7 +168,7 @@ fn given_sampling_rate_wins_over_t() {
     );
     let clock = desk.read("t,e,u\n12:00:01,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
     assert_eq!(clock.record.time_s(1), 0.5);
-    assert_eq!(clock.notes[0], "t is in s from its first time");
+    assert_eq!(clock.notes[0], "t is in s from its first time stamp");
     let none = desk.read("t,e,u\nx,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
     assert!(
         none.notes[0].contains("t is not a number in line 2"),
@@ -261,8 +261,8 @@ fn two_topics_are_read_where_both_have_values() {
         read.notes,
         [
             "1 row at the start and 0 at the end left out: --fill has no value to bridge to there (columns: e, u)",
-            "column e lacks many values, as if logged at its own times: --fill interpolates linearly, --sparse e=hold \
-             holds the last value"
+            "column e has many missing values, as if logged at its own times: --fill interpolates linearly; --sparse \
+             e=hold holds the last value"
         ]
     );
     // The topics have separate clocks at 50 and 40 Hz without a common time stamp; the grid is that of the faster
@@ -421,10 +421,13 @@ fn serial_days_are_recognised() {
     // One unit of seven decimals is 8.64 ms.
     let read = in_days("Time", 0.02, 7);
     assert_eq!(read.record.sample_time().s(), 0.02);
-    assert_eq!(read.notes, ["Time is taken as t, in s from its first time, from days"]);
+    assert_eq!(
+        read.notes,
+        ["Time is taken as t, in s from its first time stamp, from days"]
+    );
     assert_eq!(
         in_days("t", 0.02, 10).notes,
-        ["t is in s from its first time, from days"]
+        ["t is in s from its first time stamp, from days"]
     );
     let seconds = record_with("Time", |k| format!("{:.2}", 45_321.5 + 0.02 * k as f64), None).unwrap();
     assert_eq!(

@@ -214,10 +214,10 @@ impl Default for Condition {
 const DEFAULT_METHOD: &str = "adaptive";
 
 /// Default consent text.
-const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \
-hand was, what was on the screen and when, under a made-up name, on this computer only. It stores no name, no picture \
-and no sound. You may stop at any time with the Escape key or by closing the window; the stored data can be deleted \
-with their folder. Do not take part if moving patterns make you unwell.";
+const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores the \
+movements of your hand and of the display, with their times, under a made-up name, on this computer only. It stores no \
+real name, no picture and no sound. You may stop at any time with the Escape key or by closing the window; to delete \
+the stored data, delete their folder. Do not take part if moving patterns make you unwell.";
 
 impl Default for Config {
     /// Returns a configuration with a single run of about two minutes for trying out the lab.
@@ -386,7 +386,7 @@ impl Condition {
         }
         if course.has_lines() == [false, false] {
             return wrong(
-                "without a target and a disturbance the person would have nothing to do; give at least one of them"
+                "there is no target and no disturbance, so the person would have nothing to do; give at least one"
                     .to_owned(),
             );
         }

@@ -22,22 +22,22 @@ sub-P01/ses-01/             one session of one person, \
   lab.copy.toml             a copy, in case lab.toml is damaged
   runs.csv             \
                       each run that ended: verified, or unverified and why
-  ..._run.json              the task of a \
-                      run and its settings, written before it started
+  ..._run.json              the task and \
+                      the settings of a run, written before the run starts
   ..._forcing.parquet       target and \
                       disturbance at each tick of 1 ms
   ..._ticks.csv             u (hand) and e (error) at each \
                       tick
   ..._events.csv            input events: the tick that used them, their own time stamp, \
                       when the page
-                            received them (ms from tick 0), what the device \
+                            received them (ms from tick 0), and what the device \
                       reported
   ..._frames.csv            frames: their time, when they were drawn (ms from tick 0), \
                       the tick and the
                             error that they show
   ..._live.csv              \
                       the estimate during the run
-  ..._end.json              how the run ended, SHA-256 of \
+  ..._end.json              how the run ended; SHA-256 of \
                       ticks, events and frames
   ..._beh.parquet           the run at 100 Hz: t, e, u, f_t (target), d \
                       (disturbance), y (output),

@@ -146,7 +146,8 @@ fn task_of(run_start: &RunStart, task: &Task) -> Option<Finding> {
         ))
     };
     let Ok(made) = Task::new(&run_start.condition, run_start.cell, run_start.replication) else {
-        return wrong("the task cannot be built from its condition: it");
+        let words = "the task cannot be built from its condition".to_owned();
+        return Some(Finding::doubt("lab-task", words));
     };
     let near = |a: &[f64], b: &[f64]| {
         let size = b.iter().fold(1e-300, |m: f64, v| m.max(v.abs()));
@@ -256,7 +257,7 @@ fn frames_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
         if !(0.0..=limit).contains(&age) {
             return wrong(
                 number,
-                format!("was drawn {age:.1} ms from its own time stamp, expected at most {limit} ms"),
+                format!("was drawn {age:.1} ms away from its time stamp, expected at most {limit} ms"),
             );
         }
         last = frame.drawn_ms;
@@ -279,10 +280,7 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
         .map(|(_, (_, name))| name)
         .collect();
     Ok((!changed.is_empty()).then(|| {
-        let words = format!(
-            "the file of {} was changed after the end of the run",
-            changed.join(" and that of ")
-        );
+        let words = format!("files changed after the end of the run: {}", changed.join(", "));
         Finding::doubt("lab-changed", words)
     }))
 }
@@ -297,7 +295,8 @@ fn input_findings(run_start: &RunStart, ended: &Ended) -> Vec<Finding> {
         notes.push(Finding::note("lab-simulated", words));
     }
     if run_start.clock != "browser" {
-        notes.push(Finding::note("lab-clock", format!("the time was {}", run_start.clock)));
+        let words = format!("the clock was {}, not the browser's", run_start.clock);
+        notes.push(Finding::note("lab-clock", words));
     }
     notes
 }

@@ -369,7 +369,7 @@ fn inconsistent_files_give_findings_or_errors() {
     value["phases"][0]["a"] = serde_json::json!([]);
     fs::write(&json, value.to_string()).unwrap();
     let message = check(&stem).unwrap().reasons();
-    assert!(message.contains("do not fit each other"), "{message}");
+    assert!(message.contains("inconsistent sizes"), "{message}");
     // With a preview of eleven days, no memory of this length is allocated.
     let mut value: serde_json::Value = serde_json::from_str(&run_start).unwrap();
     value["condition"]["preview_s"] = serde_json::json!(1e6);
@@ -388,7 +388,7 @@ fn inconsistent_files_give_findings_or_errors() {
     assert_eq!(Session::open(&session.folder).unwrap().facts, session.facts);
     fs::write(session.folder.join("lab.copy.toml"), other).unwrap();
     let message = Session::open(&session.folder).unwrap_err().to_string();
-    assert!(message.contains("condition 9 of 1"), "{message}");
+    assert!(message.contains("condition index 9, expected below 1"), "{message}");
 }
 
 /// `--replay` only reads and does not write.

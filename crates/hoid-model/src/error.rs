@@ -59,7 +59,7 @@ pub enum ModelError {
         label: String,
     },
     /// A channel name that is already taken.
-    #[error("channel {name} exists already; give each channel its own name")]
+    #[error("channel {name} already exists; give each channel its own name")]
     DuplicateChannel {
         /// Name of the channel.
         name: String,
@@ -93,7 +93,7 @@ pub enum ModelError {
         expected: &'static str,
     },
     /// A time span without samples of the record.
-    #[error("the span {from_s} to {to_s} s holds no samples: the record covers {start_s} to {end_s} s")]
+    #[error("the span {from_s} to {to_s} s contains no samples: the record covers {start_s} to {end_s} s")]
     EmptySpan {
         /// Start of the span, s.
         from_s: f64,
@@ -125,7 +125,7 @@ pub enum ModelError {
     NotConvertible(#[from] NotConvertible),
     /// A noise level that cannot be reached with any remnant gain.
     #[error(
-        "noise level P_n = {demanded} = var(n)/var(u) cannot be reached with remnant order {order}: the largest \
+        "the noise level P_n = var(n)/var(u) = {demanded} cannot be reached with remnant order {order}: the largest \
          reachable level is {largest:.4}; request a lower level or use the definition var(u_n)/var(u)"
     )]
     UnreachableNoiseLevel {
@@ -171,7 +171,7 @@ pub enum NotConvertible {
     },
     /// The square `omega_nm^2` would not be positive.
     #[error(
-        "the continuous denominator s^2 + {a1:.4} s + {a2:.3e} has no positive omega_nm^2: the poles are real and lie on both sides of (or at) the origin of s"
+        "the continuous-time denominator s^2 + {a1:.4} s + {a2:.3e} gives no positive omega_nm^2: the poles are real, and lie on both sides of the origin of the s-plane or at it"
     )]
     NoNaturalFrequency {
         /// Coefficient of s in the continuous denominator.
@@ -183,7 +183,7 @@ pub enum NotConvertible {
     #[error("the gain K_e is zero (b0 + b1 = 0), so the lead time T_L = K_e_dot / K_e does not exist")]
     ZeroGain,
     /// Polynomial orders that differ from those of the operator model.
-    #[error("the operator model has two coefficients in B and two poles, found nb = {nb} and {poles} poles")]
+    #[error("the operator model needs two coefficients in B and two poles, found nb = {nb} and {poles} poles")]
     OtherOrders {
         /// Number of coefficients of B.
         nb: usize,
@@ -191,7 +191,7 @@ pub enum NotConvertible {
         poles: usize,
     },
     /// The poles of the system are divided between A and F.
-    #[error("the operator model has its two poles in A or in F, found na = {na} and nf = {nf}")]
+    #[error("the operator model needs its two poles either in A or in F, found na = {na} and nf = {nf}")]
     PolesInBoth {
         /// Number of coefficients of A.
         na: usize,
@@ -202,7 +202,7 @@ pub enum NotConvertible {
     #[error("nk = 0: a zero-order hold delays by at least one sample, so tau_e = (nk - 1) Ts would be negative")]
     NoDelay,
     /// A coefficient that is not a finite number.
-    #[error("the coefficient {name} is {value}")]
+    #[error("the coefficient {name} is {value}, expected a finite number")]
     NotFinite {
         /// Name of the coefficient.
         name: String,
@@ -210,7 +210,7 @@ pub enum NotConvertible {
         value: f64,
     },
     /// A noise polynomial that does not correspond to a remnant filter.
-    #[error("the noise model has no remnant filter of order {order}: {reason}")]
+    #[error("the noise model does not correspond to a remnant filter of order {order}: {reason}")]
     NotARemnantFilter {
         /// Order m of the noise polynomial.
         order: usize,

@@ -149,7 +149,8 @@ impl fmt::Display for Fault {
             FaultKind::TimeUnit => write!(f, "the sample time of {size} s is too long for a recording of a person")?,
             FaultKind::Exchanged => {
                 f.write_str(
-                    "input and output seem exchanged: the output responds immediately, and the input responds late",
+                    "input and output seem to be exchanged: the output responds immediately, and the input responds \
+                     late",
                 )?;
             }
             FaultKind::Sign => f.write_str("the output responds to the input with the wrong sign")?,

@@ -145,7 +145,7 @@ impl Feedforward {
     /// # Errors
     /// [`ModelError`], which names the quantity.
     pub fn check(&self, schedule: &Schedule, sample_time: SampleTime) -> Result<[(usize, f64); 2], ModelError> {
-        let quantity = "displayed future of the target in s";
+        let quantity = "preview of the target in s";
         let wrong = |expected| {
             Err(ModelError::OutOfRange {
                 quantity,
@@ -173,8 +173,8 @@ impl Feedforward {
         if self.last.is_some() && *schedule == Schedule::Constant {
             return Err(ModelError::Operator {
                 reason:
-                    "the response to the target changes, but nothing else does; expected a scenario with a change, \
-                         or one value of each parameter"
+                    "the response to the target changes, but nothing else does; expected a scenario with a change, or \
+                     a single value for each parameter"
                         .to_owned(),
             });
         }

@@ -385,8 +385,8 @@ impl Scenario {
                 if self.forcing.sinusoids().is_empty() {
                     return Err(ModelError::Operator {
                         reason:
-                            "the person responds to a target, but the target is at rest; expected sinusoids of the \
-                                 target, or no response to it"
+                            "the person responds to a target, but the target is at rest; expected a target with \
+                             sinusoids, or no response to the target"
                                 .to_owned(),
                     });
                 }

@@ -184,7 +184,7 @@ pub fn describing_function<'py>(
     let averaging = match (names::word("averaging", averaging, &words)?, reference) {
         (0, _) => Averaging::Ratios,
         (1, Some(channel)) => Averaging::Reference { channel },
-        (1, None) => return Err(bad_option("averaging=\"reference\" needs reference, a channel")),
+        (1, None) => return Err(bad_option("averaging=\"reference\" needs a channel as reference")),
         _ => Averaging::SameExcitation,
     };
     let realisation = [("record", Realisation::Record), ("period", Realisation::Period)]

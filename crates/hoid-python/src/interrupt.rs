@@ -111,7 +111,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
             }
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(bad_option(
-                    "the work ended without a result; this is an error in hoid, please report it",
+                    "the work ended without a result because of an error in hoid; please report it",
                 ));
             }
         }

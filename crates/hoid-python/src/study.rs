@@ -53,7 +53,7 @@ impl PyPlan {
                 None => {
                     let known: Vec<&str> = named_plans().map(|p| p.name).collect();
                     return Err(bad_option(format!(
-                        "no file and no plan is named {name}; the plans are {}",
+                        "no file or plan is named {name}; the plans are {}",
                         known.join(", ")
                     )));
                 }

@@ -49,7 +49,7 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
         ..CurveGrid::default()
     };
     let title = format!(
-        "the forcing function, and the response of {} with the expected errors of {} of {} s",
+        "the forcing function, and the response of {} with the errors expected from {} of {} s",
         design.person,
         counted(design.runs, "run"),
         design.length_s
@@ -77,7 +77,7 @@ fn responses(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [C
             kind: LineKind::Points,
             bars: points.iter().map(ends).collect(),
             ..curve(
-                "one line alone, bars 95 %",
+                "single line, bars 95 %",
                 0,
                 at.iter().map(|l| l.line.omega_rad_s).collect(),
                 values(&points),

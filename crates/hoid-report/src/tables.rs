@@ -214,11 +214,12 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
         InitialState::Estimate if s == 0 => {
             "conditional on the first samples of each record; no initial states are needed".to_owned()
         }
-        InitialState::Estimate => format!("estimated with the parameters, {s} in all"),
+        InitialState::Estimate => format!("estimated with the parameters, {s} in total"),
         InitialState::Backcast if s == 0 => "backcast: the noise was stationary before each record".to_owned(),
         InitialState::Backcast => {
             format!(
-                "backcast: the noise was stationary before each record; {s} states of the input's response estimated"
+                "backcast: the noise was stationary before each record; {s} states of the response to the input were \
+                 estimated"
             )
         }
     };
@@ -237,8 +238,8 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
         (
             "innovation variance",
             format!(
-                "\u{3c3}\u{b2} = {} {}, the sum of squared residuals over n - p - s = {n} - {p} - {s} = {divisor} \
-                 (residuals, parameters, initial states)",
+                "\u{3c3}\u{b2} = {} {}, the sum of squared residuals divided by n - p - s = {n} - {p} - {s} = \
+                 {divisor} (residuals, parameters, initial states)",
                 plain(fit.innovation_variance()),
                 squared(&unit)
             ),
@@ -246,7 +247,7 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
         (
             "loss",
             format!(
-                "V = {} {}, the same sum over n = {n}",
+                "V = {} {}, the same sum divided by n = {n}",
                 plain(fit.loss()),
                 squared(&unit)
             ),

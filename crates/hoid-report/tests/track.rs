@@ -224,7 +224,7 @@ fn non_operator_orders_show_only_coefficients() {
     let trace = track(&record, &options, 1).unwrap();
     let html = report(&record, vec![section("small", &trace, &[])]).to_html().unwrap();
     check_page(&html);
-    assert!(html.contains("8192 from 0.00 s on: the operator model has two coefficients in B and two poles"));
+    assert!(html.contains("8192 from 0.00 s on: the operator model needs two coefficients in B and two poles"));
     assert!(html.contains("(small: 7192 of 7192)"));
     assert!(figure(&html, "coefficients").contains("b<tspan"));
 }
@@ -251,7 +251,7 @@ fn short_records_and_averages_are_reported() {
     check_page(&html);
     // In a record shorter than 10 s, errors are computed over the whole record.
     assert!(html.contains("with <i>t</i> &ge; 0 s"));
-    assert!(html.contains("101 rows, behind by 0.5 s"));
+    assert!(html.contains("101 rows, delayed by 0.5 s"));
     assert!(html.contains("nothing at the end of [-3, -1] s: the trace starts later"));
     // A trace with a single row.
     let one = track(&record, &options, 800).unwrap();
@@ -270,7 +270,7 @@ fn tracked_delay_is_shown() {
         .unwrap();
     check_page(&html);
     assert_eq!(figure(&html, "operator").matches("rotate(-90").count(), 6);
-    assert!(html.contains("tau_e tracked in 0.2 to 0.4 s"));
+    assert!(html.contains("tau_e tracked from 0.2 to 0.4 s"));
 }
 
 #[test]

@@ -12,7 +12,7 @@ pub enum SimError {
     Model(#[from] ModelError),
     /// The closed loop is unstable and has overflowed.
     #[error(
-        "the loop diverges: {signal} is not finite at t = {time_s:.2} s; check gains, delay and controlled element of {scenario}"
+        "the loop diverges: {signal} is not finite at t = {time_s:.2} s; check the gains, the delay and the controlled element of {scenario}"
     )]
     Diverged {
         /// Name of the signal that is not finite.

@@ -199,7 +199,7 @@ fn invalid_target_displays_are_refused() {
     };
     assert!(refused(&|s| s.forcing = ForcingFunction::default()).contains("target is at rest"));
     let preview = |s: &mut Scenario| s.feedforward.as_mut().unwrap().preview_s = 0.255;
-    assert!(refused(&preview).contains("displayed future"));
+    assert!(refused(&preview).contains("preview of the target"));
     let bare = FamilyOperator::new(Form::Gain, false, &[1.0, 0.1]).unwrap();
     assert!(refused(&|s| s.feedforward = Some(Feedforward::new(bare.clone(), 0.0))).contains("neuromuscular"));
     let changing = Feedforward::of_text("gain:1..2", Some((11.25, 0.35))).unwrap();

@@ -184,7 +184,7 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
         }
         let other_shard = (found.shard != manifest.shard && !found.complete).then(|| {
             let of = |shard: Option<Shard>| shard.map_or("the whole study".to_owned(), |s| format!("shard {s}"));
-            format!("{} there, {} here", of(found.shard), of(manifest.shard))
+            format!("it is {}, but this run is {}", of(found.shard), of(manifest.shard))
         });
         if let Some(reason) = found.differs(manifest).or(other_shard) {
             return Err(StudyError::OtherStudy {

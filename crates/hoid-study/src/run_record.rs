@@ -93,6 +93,6 @@ impl RunRecord {
         pairs
             .into_iter()
             .find(|(_, a, b)| a != b)
-            .map(|(name, a, b)| format!("{name} {a} there, {b} here"))
+            .map(|(name, a, b)| format!("its {name} is {a}, but this run has {b}"))
     }
 }

@@ -214,8 +214,8 @@ impl Live {
         let mut of_stage = numbers;
         if let Some(decimator) = &mut self.decimator {
             let wrong = || IdentError::BadStart {
-                reason: "the saved tracker has another rate, or was changed or truncated after it was saved; save it \
-                         again"
+                reason: "the saved tracker has a different rate, or was changed or truncated after it was saved; save \
+                         it again"
                     .to_owned(),
             };
             let (length, all) = opened(numbers).and_then(<[f64]>::split_last).ok_or_else(wrong)?;

@@ -218,7 +218,7 @@ impl TrackOptions {
         if setup.track_delay_s.is_some() {
             return refused(
                 format!("{} and track_delay", further.channel),
-                "one of them: with a further input the delays are fixed",
+                "no track_delay: with a further input the delays are fixed",
             );
         }
         if self.method.is_guarded() {
@@ -262,7 +262,7 @@ impl TrackOptions {
         {
             return Err(bad(
                 "windup_guard",
-                "a guard with window or gradient forgetting, in which no P grows".to_owned(),
+                "window or gradient forgetting, in which P does not grow".to_owned(),
                 "forgetting = exponential, random-walk, variable or directional; or omit windup_guard",
             ));
         }

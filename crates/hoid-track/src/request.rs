@@ -127,8 +127,8 @@ impl TrackRequest {
                 option: "the orders of a model with two inputs".to_owned(),
                 found: format!("{} combinations of orders", combinations.len()),
                 expected: format!(
-                    "one number for each order and the delay of each input in samples: the search for orders fits \
-                     models with one input, without {}",
+                    "one number for each order, and one delay in samples for each input: the order search fits only \
+                     models with one input, and so ignores {}",
                     further.channel
                 ),
             });

@@ -48,7 +48,7 @@ pub(crate) fn check_sample_time(sample_time: SampleTime) -> Result<(), IdentErro
             option: "the sample time of a tracker".to_owned(),
             found: format!("{ts:e} s"),
             expected: format!(
-                "at least {SHORTEST_SAMPLE_TIME_S:e} s; a person needs some thousands of samples per second at most, so \
+                "at least {SHORTEST_SAMPLE_TIME_S:e} s; a few thousand samples per second are enough for a person, so \
                  check the unit of the time, or decimate"
             ),
         });
@@ -110,7 +110,7 @@ impl StartState {
         let names = coefficient_names(&setup.orders, setup.further.as_ref());
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
             return Err(IdentError::BadStart {
-                reason: format!("found {theta:?}; expected finite values of {}", names.join(", ")),
+                reason: format!("found {theta:?}; expected one finite value for each of {}", names.join(", ")),
             });
         }
         let values = if setup.is_physical {
@@ -445,7 +445,7 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
     for (name, limits) in PHYSICAL_NAMES[..operator].iter().zip(&limits) {
         let Some(place) = value(name) else {
             return Err(IdentError::BadStart {
-                reason: format!("the grey box has no {name}"),
+                reason: format!("the grey-box fit has no {name}"),
             });
         };
         eta.push(within(parameters[place].1.value, *limits));

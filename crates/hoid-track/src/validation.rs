@@ -120,7 +120,7 @@ fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), I
         return Err(bad(
             "the validation of a trace",
             "a tracked delay".to_owned(),
-            "a method with a given delay, without track_delay",
+            "a method with a fixed delay, without track_delay",
         ));
     }
     Ok(())

@@ -171,7 +171,7 @@ fn change_of_one_response_leaves_the_other_unchanged() {
         assert_eq!(value(&trace, row(20.0), "b0[r]").0, value(&trace, row(10.0), "b0[r]").0);
         let record = record(seed, 0.02, true);
         let named = note(&trace, &record);
-        changed += usize::from(named.contains("response to r changed") && named.contains("that to e is found"));
+        changed += usize::from(named.contains("response to r changed") && named.contains("response to e was found"));
         // Without a change no input is named.
         let steady = self::record(seed + 100, 0.02, false);
         let trace = track(&steady, &box_jenkins(), 20).unwrap();

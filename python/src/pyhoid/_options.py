@@ -64,11 +64,11 @@ def roles(
     names = list(inputs) if inputs is not None else [error, *(name for name in named if name != error)]
     if isinstance(inputs, str) or not names or names[0] not in (error, "e"):
         raise OptionError(
-            f"inputs: the first is the error, found {inputs!r}, expected [{error!r}, ...]"
-            " (name another column when the record is read)"
+            f"inputs is {inputs!r}, expected the error first: [{error!r}, ...]"
+            " (choose another column as the error when you read the record)"
         )
     if named.pop(names[0], "feedback") != "feedback":
-        raise OptionError(f"roles: {names[0]} is the feedback")
+        raise OptionError(f"roles: {names[0]} is the feedback and has no other role")
     unknown = sorted(set(named) - set(names[1:]))
     if unknown:
         raise OptionError(f"roles: {unknown[0]} is not one of the inputs {names}")
@@ -172,7 +172,7 @@ def text(name: str, value: Any) -> str | None:
         return repr(float(cast(Any, value)))
     except (TypeError, ValueError):
         raise OptionError(
-            f"{name} is {value!r}, expected a number, a text, a pair, or values by name"
+            f"{name} is {value!r}, expected a number, text, a pair, or values by name"
         ) from None
 
 

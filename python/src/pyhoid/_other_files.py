@@ -33,12 +33,12 @@ def _unpacked(path: Path, place: Path) -> Path:
                 written += len(block)
                 if written > _MOST_BYTES:
                     raise FormatError(
-                        f"{path} unpacks to more than {_MOST_BYTES >> 20} MB, expected a recording;"
-                        " unpack it and take a part of it"
+                        f"{path} unpacks to more than {_MOST_BYTES >> 20} MB, too large for a"
+                        " recording; unpack it and use a part of it"
                     )
                 text.write(block)
     except (EOFError, gzip.BadGzipFile) as error:
-        raise FormatError(f"{path} is truncated or damaged: {error}; pack it again") from error
+        raise FormatError(f"{path} is truncated or damaged: {error}; compress it again") from error
     return made
 
 
@@ -53,7 +53,7 @@ def _arrow(path: Path, place: Path) -> Path:
         import polars
     except ModuleNotFoundError:
         raise FormatError(
-            f"{path}: Arrow and Feather are read by polars, which is not installed:"
+            f"{path}: reading Arrow or Feather needs polars, which is not installed:"
             " pip install polars"
         ) from None
     try:
@@ -70,7 +70,7 @@ def _excel(path: Path, place: Path) -> Path:
         table = pandas.read_excel(path)
     except ImportError as error:
         raise FormatError(
-            f"{path}: Excel is read by pandas and a package of its format ({error});"
+            f"{path}: reading Excel needs pandas and a package for this format ({error});"
             " install them, or save the sheet as CSV"
         ) from None
     except Exception as error:

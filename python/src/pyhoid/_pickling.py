@@ -62,7 +62,7 @@ class Recalled:
         if self._made is None:
             if self._call is None:
                 raise DataError(
-                    "the start fit of a tracker from a pickle has only its numbers:"
+                    "the start fit of an unpickled tracker has only its numbers, not its record:"
                     " fit the record again with identify"
                 )
             made = self._call.native()

@@ -110,4 +110,4 @@ def _person(prior: Any) -> tuple[str | None, tuple[str, str] | None]:
     except OSError as error:
         raise OptionError(f"prior {path}: {error.strerror or error}") from None
     except UnicodeDecodeError:
-        raise FormatError(f"prior {path}: it is not UTF-8 text") from None
+        raise FormatError(f"prior {path} is not UTF-8 text") from None

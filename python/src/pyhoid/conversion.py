@@ -99,7 +99,7 @@ def convert(
     elif f is not None and b is not None:
         found = _pyhoid.convert_discrete(_two(f, "F"), _two(b, "B"), nk, sample_time)
     else:
-        raise OptionError("give f and b, or operator")
+        raise OptionError("give either f and b, or operator")
     discrete = found["discrete"]
     return Conversion(
         f=_two(discrete["f"], "F"),

@@ -208,7 +208,7 @@ class Fit(Model, Result):
             For a fit without records, such as the start of a `Tracker`.
         """
         if not self.records and self._native.state() is not None:
-            raise DataError("the fit has no records to be judged on; a fit from identify has records")
+            raise DataError("the fit has no records to judge it on; use a fit from identify")
         if self._verdict is None:
             self._verdict = Verdict(*self._native.verdict(list(self.records)))
         return self._verdict
@@ -323,9 +323,7 @@ class Fit(Model, Result):
         >>> page = fit.report("out")
         """
         if not self.records:
-            raise DataError(
-                "the fit has no records for the page to show; a fit from identify has records"
-            )
+            raise DataError("the fit has no records for the page to show; use a fit from identify")
         labels = [record.label or "(unnamed)" for record in self.records]
         what = labels[0] if len(labels) == 1 else f"{len(labels)} records"
         element = None

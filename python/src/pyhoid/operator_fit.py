@@ -327,7 +327,7 @@ class OperatorFit(Model, Result):
         """
         if not self.records:
             raise DataError(
-                "the result has no records for the page to show; a result of identify has records"
+                "the result has no records for the page to show; use a result of identify"
             )
         return Path(self._native.report(list(self.records), Path(directory), title=title))
 
@@ -419,8 +419,8 @@ class OperatorFit(Model, Result):
         prior = ", ".join(f"{name} = {c:g}:{s:g}" for name, (c, s) in self.prior.items())
         rate = said(self.records)
         return (f"{rate}\n" if rate else "") + (
-            f"Errors from the scatter of {self.errors['clusters']} {self.errors['kind']}: variances"
-            f" {self.errors['inflation']:.2f} times those of white residuals\n"
+            f"Standard errors from the scatter of {self.errors['clusters']} {self.errors['kind']}: variances"
+            f" {self.errors['inflation']:.2f} times as large as for white residuals\n"
             f"Loss {_text.number(self.loss)}; {self.termination['reason']} after"
             f" {self.termination['iterations']} steps\n"
             f"Prior: {prior or 'none'}"

@@ -271,7 +271,7 @@ class Record:
                 steps = np.diff(times)
                 raise DataError(
                     f"the sampling is uneven: row {row} comes {steps[max(row, 1) - 1]:g} s after the"
-                    f" row before, expected {float(np.median(steps)):g} s;"
+                    f" previous row, expected {float(np.median(steps)):g} s;"
                     " write the table to a file and read it with resample=True, or give sample_time"
                 )
         if times is not None:

@@ -62,8 +62,8 @@ def track(
 ) -> Trace:
     """Track a model and the operator's parameters over a record, sample by sample.
 
-    Without options this is ``"adaptive"``, which estimates gains in a basis common to people. It needs no
-    start fit, gives its first estimate after one second, and is intended for recorded people. If the form
+    Without options this is ``"adaptive"``, which estimates gains in a basis common to all people. It needs
+    no start fit, gives its first estimate after one second, and is intended for recorded people. If the form
     and the delay of the operator are known, ``"multiple-model"`` is more precise.
 
     Parameters

@@ -133,7 +133,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     let focus = "Purpose of the model: one-step prediction, or simulation from the input alone";
     let start = "Start of the search: all coefficients, such as f1=-1.9,f2=.92,b0=.04,...";
     let guess = "Prior values and weights of coefficients: f1=-1.9:0.5 adds 0.5 (f1 + 1.9)^2 to the loss";
-    let robust = "Huber loss instead of squares: linear beyond X standard deviations; 1.345 if X is not given";
+    let robust = "Huber loss instead of squares, linear beyond X standard deviations (1.345 if X is omitted)";
     let stable = "Accept only models that are stable from e to u (C and F are always stable)";
     let mut all = vec![
         BatchOption::new(
@@ -214,7 +214,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
 fn by_instruments() -> Vec<BatchOption<Polynomials>> {
     let help = "Instruments: a channel independent of the noise, or `simulated` from the input (for an open loop)";
     let setting =
-        Setting::new("instruments", Kind::Channel, help).default("f_t where all records have it, else simulated");
+        Setting::new("instruments", Kind::Channel, help).default("f_t if all records have it, else simulated");
     vec![BatchOption::new(setting, |how: &mut Polynomials, _, text| {
         how.instruments = Some(Instruments::of_text(text));
         Ok(())

@@ -57,7 +57,7 @@ impl Polynomials {
             }
             if !(0.0 <= low && low <= high && high.is_finite()) {
                 return Err(AnalysisError::Options {
-                    reason: format!("delay is {low} to {high} s, expected 0 s or more, the shorter delay first"),
+                    reason: format!("delay is {low} to {high} s; expected 0 s or more, with the shorter delay first"),
                 });
             }
             orders.insert("nk".to_owned(), sample_time.nk(low)..=sample_time.nk(high));

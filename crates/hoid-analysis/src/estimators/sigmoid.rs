@@ -23,7 +23,7 @@ impl BatchEstimator for SigmoidChange {
     fn specs() -> Vec<MethodSpec> {
         vec![MethodSpec {
             name: CHANGE,
-            help: "the operator's gains change once, along a sigmoid; any form",
+            help: "an operator of any form whose gains change once, along a sigmoid",
             source: "Zaal 2016; the thesis, section II",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),

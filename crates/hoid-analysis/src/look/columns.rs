@@ -58,7 +58,7 @@ impl Roles {
             (_, Some(name), _) => Role::new(name, "the tracking error, by name", true),
             (_, _, Some((r, y))) => Role::new(
                 format!("{r}-{y}"),
-                format!("no column is called e: target {r} minus output {y}"),
+                format!("no column is named e: target {r} minus output {y}"),
                 targets.len() == 1 && outputs.len() == 1,
             ),
             _ => Role::new(

@@ -25,8 +25,8 @@ pub(super) fn of_control(
 ) -> Result<Lag, String> {
     let Some(found) = recorded_element(std::slice::from_ref(record), element, excitation) else {
         return Err(
-            "e does not follow from u through one controlled element: a target or a disturbance was not recorded, the \
-             record is short, or the element changes"
+            "no single controlled element explains e from u: a target or a disturbance was not recorded, the record \
+             is short, or the element changes"
                 .to_owned(),
         );
     };
@@ -42,8 +42,8 @@ pub(super) fn of_control(
         samples,
         seconds: samples * ts_s,
         words: format!(
-            "e follows from u through the controlled element with the control {} late; {:.2} % \
-             of the power is unexplained",
+            "e follows from u through the controlled element if the control is {} late; {:.2} % of the power is \
+             unexplained",
             counted(samples, "sample"),
             100.0 * found.unexplained
         ),

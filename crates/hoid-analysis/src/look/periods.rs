@@ -63,10 +63,10 @@ pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, St
     let found = candidates.iter().find_map(|channel| in_channel(record, channel, known));
     found.ok_or_else(|| {
         if candidates.is_empty() {
-            return "there is no column other than error and control".to_owned();
+            return "there are no columns other than the error and the control".to_owned();
         }
         format!(
-            "no column among {} has its power in lines over whole periods; name one with --excitation and its span with --from and --to",
+            "no column among {} has its power in spectral lines over whole periods; select a column with --excitation, and a span with --from and --to",
             candidates.join(", ")
         )
     })

@@ -26,7 +26,7 @@ pub fn two_inputs(
     let options = |reason: String| AnalysisError::Options { reason };
     let [_, further] = inputs else {
         return Err(options(format!(
-            "found {} inputs; a recursion tracks the responses to two at most, the error first",
+            "found {} inputs; a recursive method tracks the responses to at most two, with the error first",
             inputs.len()
         )));
     };
@@ -37,8 +37,8 @@ pub fn two_inputs(
     }
     if nk.is_none() && !orders.split(',').any(|part| part.trim().starts_with("nk=")) {
         return Err(options(
-            "the delays are missing: with two inputs give nk of each in samples, such as 29,12; hoid identify with the \
-             same inputs reports the delays"
+            "the delays are missing: with two inputs, give nk for each in samples, such as 29,12; hoid identify with \
+             the same inputs reports the delays"
                 .to_owned(),
         ));
     }

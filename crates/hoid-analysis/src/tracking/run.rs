@@ -171,20 +171,20 @@ impl Tracking {
         let method = &plan.options().method;
         if validated && plan.options().further.is_some() {
             return Err(options(
-                "--validate predicts the second run from one input; drop it, or track with one input".to_owned(),
+                "--validate works with only one input; drop --validate, or track with one input".to_owned(),
             ));
         }
         if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {
             return Err(options(
-                "--start-span is the span of the start fit, and --start gives the start itself; drop one of the \
-                 two"
+                "--start-span sets the span of the start fit, but --start replaces this fit; drop one of these \
+                 options"
                 .to_owned(),
             ));
         }
         if self.start_span_s.is_some() && method.starts_itself() {
             return Err(options(format!(
-                "--start-span is the span of a start fit, and {method} has none; drop --start-span, or use --method \
-                 physical"
+                "--start-span sets the span of a start fit, but {method} has no start fit; drop --start-span, or use \
+                 --method physical"
             )));
         }
         let end = record.time_s(record.len());
@@ -204,7 +204,8 @@ impl Tracking {
         let row = every as f64 * record.sample_time().s();
         if !(length >= 0.0 && length <= record.len() as f64 * record.sample_time().s()) {
             return Err(options(format!(
-                "--moving-average {length}: expected a length in s up to that of the record"
+                "--moving-average {length}: expected 0 s to the length of the record, {:.4} s",
+                record.len() as f64 * record.sample_time().s()
             )));
         }
         Ok((length / row).round().max(1.0) as usize)

@@ -59,7 +59,7 @@ pub fn settings_of_recursion(
     if let Some(element) = &options.controlled_element {
         list.push(Setting::new("controlled element", element.to_string()).given(true));
     }
-    let fault = format!("not a finite number, or beyond {}", options.largest);
+    let fault = format!("not a finite number, or larger than {}", options.largest);
     list.push(Setting::new("fault", fault).given(options.largest != TrackOptions::LARGEST));
     list
 }
@@ -92,7 +92,7 @@ impl OwnSettings<'_> {
         match self.covariance {
             Some(Covariance::Chosen(file, choice)) => {
                 let words = format!(
-                    "the one of {} values whose trace explains most of {file} from {:.2} to {:.2} s, VAF {:.2} %",
+                    "the best of {} values: its trace explains most of {file} from {:.2} to {:.2} s, VAF {:.2} %",
                     choice.candidates.len(),
                     choice.span_s.0,
                     choice.span_s.1,
@@ -119,7 +119,7 @@ impl OwnSettings<'_> {
             list.push(Setting::new("idle head", words));
         }
         if options.method.smooths() {
-            list.push(Setting::new("estimate", "two-sided, of the whole record"));
+            list.push(Setting::new("estimate", "two-sided, from the whole record"));
         } else {
             let words = format!("{:.2} s", trace.updated_from_s());
             list.push(Setting::new("estimate moves from", words).given(self.update_given));

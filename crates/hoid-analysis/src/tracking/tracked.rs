@@ -165,7 +165,7 @@ impl Tracked {
                 ),
                 NotConvertible::NoNaturalFrequency { .. } => (
                     "frequency",
-                    "the continuous denominator has no positive omega_nm^2".to_owned(),
+                    "the continuous-time denominator gives no positive omega_nm^2".to_owned(),
                 ),
                 other => ("other", other.to_string()),
             };

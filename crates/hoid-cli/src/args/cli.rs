@@ -19,8 +19,8 @@ use super::{
 
 /// Human-operator identification: estimates how a person controls a machine.
 ///
-/// Estimates gain, lead, delay, neuromuscular dynamics and remnant from the tracking error e and the control output u,
-/// with standard errors, and gives a verdict on the reliability of the result.
+/// Estimates gain, lead, delay, neuromuscular dynamics and remnant, with standard errors, from the tracking error e and
+/// the control output u, and gives a verdict on the reliability of the result.
 #[derive(Debug, Parser)]
 #[command(name = "hoid", version, max_term_width = 110)]
 pub struct Cli {
@@ -81,13 +81,13 @@ pub enum Command {
     Group(Box<GroupArgs>),
     /// Test differences between conditions or people
     ///
-    /// Combines the results of `hoid group` over people and estimates differences, each with an interval, a test, an
+    /// Combines the results of `hoid group` across people and estimates differences, each with an interval, a test, an
     /// effect size and a summary sentence.
     Compare(CompareArgs),
     /// Design the most informative forcing function for a person
     ///
-    /// From approximate values for the person and the controlled element, computes the frequencies, amplitudes and
-    /// phases of a forcing function, and the standard errors to expect from a number of runs.
+    /// Computes the frequencies, amplitudes and phases of a forcing function from approximate values for the person and
+    /// the controlled element, and predicts the standard errors for a number of runs.
     Design(DesignArgs),
     /// Simulate a virtual experiment for `hoid group`
     ///

@@ -17,14 +17,14 @@ pub struct CompareArgs {
     /// and their interactions [default: factor condition, with each condition as a level]
     #[arg(long, value_name = "FACTOR")]
     pub factor: Vec<Factor>,
-    /// The factor varies within people: each person is in all levels [default: found from the group]
+    /// The factor varies within people: each person is at all levels [default: detected]
     #[arg(long, conflicts_with = "between")]
     pub within: bool,
-    /// The factor varies between people: each person is in one level
+    /// The factor varies between people: each person is at one level
     #[arg(long)]
     pub between: bool,
     /// Quantities to compare, comma-separated: crossover, phase_margin, tau_e, gain_db@W and phase_deg@W at W rad/s,
-    /// rms_e, rms_u, parameters such as K, T_L (recordings are then analysed in one form, chosen on the evidence of all
+    /// rms_e, rms_u, parameters such as K, T_L (recordings are then fitted with one form, chosen on the data of all
     /// people), or parameters of the response to a further input, such as tau_f[f_t] [default:
     /// crossover,phase_margin,tau_e]
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
@@ -35,12 +35,12 @@ pub struct CompareArgs {
     /// Adjustment for multiple tests
     #[arg(long, value_name = "METHOD", default_value = "holm", value_parser = choice_of(&Adjustment::ALL))]
     pub adjust: Adjustment,
-    /// Estimate of the variance between people: kept away from zero (penalised), or restricted likelihood (reml), whose
-    /// intervals are too short for few people
+    /// Estimator of the variance between people: penalised (kept away from zero) or reml (restricted likelihood;
+    /// intervals too short with few people)
     #[arg(long, value_name = "METHOD", default_value = "penalised", value_parser = choice_of(&Weights::ALL))]
     pub weights: Weights,
     /// Directory for all results: comparison.json, differences.csv, .md and .tex, people.svg, sentences.txt, and the
-    /// analysis of recordings, which is not repeated next time
+    /// analysis of recordings, which the next run reuses
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Threads for the analysis of recordings [default: one per core]

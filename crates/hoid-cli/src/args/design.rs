@@ -14,16 +14,16 @@ use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::Sho
 pub struct DesignArgs {
     /// People to design for: population (people in general, adapted to the controlled element), a family scenario
     /// (.toml), a fit (`hoid identify --json`), or a group (directory of `hoid group --out`, its JSON or
-    /// population.json). For several people, reports the errors of the typical and the worst
+    /// population.json). For several people, reports errors of the typical and worst person
     #[arg(long, value_name = "population|FILE|DIR", default_value = "population")]
     pub people: People,
-    /// Condition to use, for a group with several
+    /// Condition to use if the group has several
     #[arg(long, value_name = "NAME")]
     pub condition: Option<String>,
     /// Form of the population's operator [default: the form that people use with the element]
     #[arg(long, value_name = "FORM", value_parser = choice_of(&Form::OF_ERROR))]
     pub form: Option<Form>,
-    /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario or group]
+    /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 [default: from the scenario or group]
     #[arg(long, value_name = "TF")]
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// Required standard errors: crossover=3%,tau_e=5%,phase_margin=2 (deg), tau_f=0.02 (s) [default: all parameters
@@ -45,9 +45,8 @@ pub struct DesignArgs {
     /// Number of runs [default: the number needed for --for, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
-    /// Run-to-run standard deviation of one person, as a fraction of the quantity (for phase margin: of the gain that
-    /// causes it), or a directory of `hoid group` whose runs determine it [default: from --people if available, else
-    /// .13]
+    /// Run-to-run standard deviation of a person, as a fraction of the quantity (for phase margin: of the gain), or a
+    /// `hoid group` directory from whose runs it is estimated [default: from --people if available, else .13]
     #[arg(long, value_name = "PART|DIR")]
     pub run_to_run: Option<SpreadSource>,
     /// Lines per forcing function
@@ -59,8 +58,8 @@ pub struct DesignArgs {
     /// Lowest and highest frequency of the lines, rad/s
     #[arg(long, value_name = "LO..HI", default_value = "0.2..18", value_parser = parse_span)]
     pub band: (f64, f64),
-    /// Largest amplitude of a line above the crossover, relative to the mean amplitude below it; with larger ones,
-    /// people lower their crossover
+    /// Largest amplitude of a line above the crossover, relative to the mean below it; larger amplitudes make people
+    /// lower their crossover
     #[arg(long, value_name = "PART", default_value_t = 0.2)]
     pub shelf: f64,
     /// Largest rms of the error; with neither this nor --max-u, the forcing function has rms 1
@@ -74,7 +73,7 @@ pub struct DesignArgs {
     #[arg(long, value_name = "FORCING.toml|.csv|reference")]
     pub against: Option<Against>,
     /// Difference to detect between two conditions, with each person in both: crossover=.5 (rad/s), phase_margin=5
-    /// (deg), tau_e=10% (of tau_e). Reports the number of people needed, and of runs per condition
+    /// (deg), tau_e=10% (of tau_e). Reports how many people, and runs per condition, are needed
     #[arg(long, value_name = "NAME=SIZE")]
     pub difference: Option<TargetDifference>,
     /// Power: probability of detecting the difference
@@ -93,7 +92,7 @@ pub struct DesignArgs {
     /// error and target
     #[arg(long, value_name = "NAME", default_value = "compensatory", value_parser = choice_of(&Display::ALL))]
     pub display: Display,
-    /// Seed of the phase search: the same seed repeats the design, another seed changes only the phases
+    /// Seed of the phase search: the same seed repeats the design; another changes only the phases
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Directory for the design: design.json, scenario.toml, lab.toml, forcing.csv, design.csv and .md, design.svg,

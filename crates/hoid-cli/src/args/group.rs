@@ -29,7 +29,7 @@ pub struct GroupRunArgs {
     /// Manifest (TOML), or a directory with group.toml
     #[arg(value_name = "DIR|MANIFEST", required = true)]
     pub manifest: Option<PathBuf>,
-    /// Directory for tables, report and parts; created if missing
+    /// Directory for the results; created if missing
     #[arg(long, value_name = "DIR", required = true)]
     pub out: Option<PathBuf>,
     /// Threads [default: one per core]
@@ -92,8 +92,8 @@ pub struct SimulateGroupArgs {
     /// Number of subjects
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub subjects: u64,
-    /// Simulate realistic people, drawn from the operator family, instead of subjects near the thesis; uses the
-    /// elements of --plants and columns t, e, u, d, y
+    /// Simulate realistic people from the operator family instead of variants of the thesis operator; uses the elements
+    /// of --plants and columns t, e, u, d, y
     #[arg(long, conflicts_with_all = ["conditions", "between_subjects", "remnant_order", "noise_level"])]
     pub people: bool,
     #[command(flatten)]

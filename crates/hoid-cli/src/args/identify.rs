@@ -37,16 +37,16 @@ pub struct IdentifyArgs {
     pub records: Vec<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
-    /// Error and control of an axis, such as ex,ux, or also its recorded excitation, such as ex,ux,rx. Repeat for each
-    /// axis: each has its own operator, and coupling between axes is tested
+    /// Error and control columns of an axis (ex,ux), optionally with its excitation (ex,ux,rx). Repeat for each axis;
+    /// each has its own operator, and coupling between axes is tested
     #[arg(long, value_name = "INPUT,OUTPUT[,EXCITATION]", conflicts_with_all = ["input", "output"], allow_hyphen_values = true)]
     pub pair: Vec<AxisPair>,
     #[command(flatten)]
     pub mask: MaskArgs,
     #[command(flatten)]
     pub faults: FaultArgs,
-    /// Model to fit: operator (human operator) or a polynomial structure [default: operator, the structure of --method,
-    /// or bj with options only for polynomials, such as --nk]
+    /// Model to fit: operator (human operator) or a polynomial structure [default: operator; with --method, its
+    /// structure; with polynomial options such as --nk, bj]
     #[arg(long, value_name = "NAME", value_parser = structures(), ignore_case = true)]
     pub structure: Option<String>,
     /// Fitting method for polynomials: pem (prediction error), or instrumental variables (iv4 for arx, sriv for oe,

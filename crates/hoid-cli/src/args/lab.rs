@@ -6,8 +6,7 @@ use clap::Args;
 
 #[derive(Debug, Args)]
 pub struct LabArgs {
-    /// Folder of the experiment: one folder per session, and the manifest for `hoid group`. Unfinished sessions can be
-    /// resumed
+    /// Experiment folder: one folder per session, and the manifest for `hoid group`. Unfinished sessions can be resumed
     #[arg(long, value_name = "DIR", default_value = "hoid-lab")]
     pub out: PathBuf,
     /// Experiment in TOML: conditions, order, consent, limits [default: a two-minute trial with 4/s]
@@ -22,7 +21,7 @@ pub struct LabArgs {
     /// Verify and replay the session in this folder, such as hoid-lab/sub-P01/ses-01
     #[arg(long, value_name = "DIR", conflicts_with_all = ["config", "calibrate"])]
     pub replay: Option<PathBuf>,
-    /// Measure the delay added by page, frames and events, with a simulated operator
+    /// With a simulated operator, measure the delay added by page, frames and events
     #[arg(long, conflicts_with = "config")]
     pub calibrate: bool,
 }

@@ -48,7 +48,7 @@ pub struct ReadArgs {
     /// those rows. May be repeated
     #[arg(long, value_name = "COLUMN=hold|linear|drop", value_parser = parse_sparse, value_delimiter = ',', allow_hyphen_values = true)]
     pub sparse: Vec<(String, Sparse)>,
-    /// Further columns to keep, such as f_t,r, or none; saves time and memory for long CSV files [default: all]
+    /// Other columns to keep, such as f_t,r, or none, to save time and memory on long files [default: all]
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
     #[command(flatten)]
@@ -90,7 +90,7 @@ pub struct PrepareArgs {
     /// Drop duplicate rows (time included)
     #[arg(long)]
     pub drop_repeated: bool,
-    /// Scale a channel by a factor (u=12.5), also with its new unit (u=12.5:deg), or convert its unit (e=rad:deg)
+    /// Scale a channel by a factor (u=12.5; with its new unit: u=12.5:deg), or convert its unit (e=rad:deg)
     ///
     /// A channel is a column, or e for the input and u for the output. May be repeated.
     #[arg(long, value_name = "CHANNEL=FACTOR", value_parser = parse_scale, allow_hyphen_values = true)]
@@ -143,9 +143,8 @@ pub struct MaskArgs {
 /// Treatment of faults of a recording.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct FaultArgs {
-    /// Treatment of recording faults (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge those up to
-    /// 0.1 s and cut the record at longer ones (bridge), cut at all (cut), only report them (report), or do not search
-    /// (keep)
+    /// Treatment of recording faults (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge (faults up to
+    /// 0.1 s; cut the record at longer ones), cut (at every fault), report (change nothing), or keep (do not search)
     #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_of(&FaultHandling::ALL))]
     pub faults: FaultHandling,
 }

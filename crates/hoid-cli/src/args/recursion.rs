@@ -141,7 +141,7 @@ pub struct StreamArgs {
     #[arg(long, value_name = "NAME", default_value = "u")]
     pub output: String,
     /// Use UDP datagrams instead of standard input and output: a line of text, a JSON object such as {"t": 0.01, "e":
-    /// 0.5, "u": -1}, or a C struct, answered in the same format (text: JSON). Ports on 127.0.0.1, or addresses and
+    /// 0.5, "u": -1}, or a C struct, answered in the same format (text in JSON). Ports on 127.0.0.1, or addresses and
     /// ports, such as 0.0.0.0:5005:192.168.1.7:5006
     #[arg(long, value_name = "IN:OUT")]
     pub udp: Option<UdpPlaces>,

@@ -82,7 +82,7 @@ fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Resu
         match analysed(manifest, path, place, &options) {
             // This command has no --resume: with --out, runs already analysed are kept; otherwise they are removed.
             Err(CliError::Stopped(_)) => Err(CliError::Stopped(
-                "the comparison was stopped; with --out, the same command resumes and keeps the runs already analysed"
+                "the comparison was stopped; if --out was given, run the same command again to resume it"
                     .to_owned(),
             )),
             outcome => outcome.map(|_| ()),
@@ -123,7 +123,7 @@ fn page(found: &Comparison, verbose: bool) -> String {
         differences(found, verbose)
     );
     page.push_str(
-        "Mean over people ± standard error; people are weighted by their errors and the variance between them; \
+        "Mean over people ± standard error, weighted by the error of each person and the variance between people; \
          Hartung-Knapp 95 % intervals.\n",
     );
     if !found.learning.is_empty() {

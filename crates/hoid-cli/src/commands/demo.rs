@@ -112,7 +112,7 @@ fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
         rows.add_row(row);
     }
     format!(
-        "The whole run, sample by sample from {} s on: RMS relative error\n{rows}\n\n",
+        "The whole run, tracked sample by sample: RMS relative error from {} s on\n{rows}\n\n",
         SPANS[0].2
     )
 }

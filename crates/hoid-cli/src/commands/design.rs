@@ -98,8 +98,7 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
         Some(lab) => write("lab.toml", &lab)?,
         None => output::notice(
             "",
-            "lab.toml was not written: a run in the lab lasts a whole number of hundredths of a second; choose \
-             --length accordingly"
+            "lab.toml was not written: a run in the lab must last a multiple of 0.01 s; change --length"
                 .to_owned(),
         ),
     }
@@ -134,16 +133,16 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
     }
     if let Some(seen) = &found.task.feedforward {
         page.push_str(&format!(
-            "The response to the target ({}, preview {} s) has the parameters ..._f; target and disturbance have their \
-             own lines.\n",
+            "The parameters ..._f describe the response to the target ({}, preview {} s); target and disturbance have \
+             separate lines.\n",
             seen.operator.form(),
             seen.preview_s
         ));
     }
     page.push_str(&format!(
         "\nThe forcing function, crest factor {:.2}\n{}\n\
-         The error of the runs follows from the information in these lines. The error for the person also contains their \
-         variation of {} % from run to run ({}).\n",
+         The error of the runs follows from the information in these lines. The error for the person also includes a \
+         run-to-run variation of {} % ({}).\n",
         found.crest_factor,
         lines(found),
         text::significant(100.0 * found.run_to_run),
@@ -214,7 +213,7 @@ fn sizes(found: &ExperimentDesign) -> String {
         let (e, u) = of(&o.expected);
         format!(" (with {}: {e}, {u})", o.name)
     });
-    format!("rms of e {e}, of u {u}{other}.\n")
+    format!("Expected rms: e {e}, u {u}{other}.\n")
 }
 
 /// Returns a sentence with the number of runs needed to reach the accepted errors of the requested quantities.
@@ -265,8 +264,8 @@ fn difference(plan: &DifferencePlan) -> String {
     }
     format!(
         "\nDetecting a difference in {size} between two conditions requires {answer} (power {}, alpha {}).\n{rows}\n\
-         Power of the paired t test of n people. Standard deviations of a person's difference: {} between people ({}), {} \
-         from run to run, {} from the expected error of a run.\n",
+         Power of a paired t test with n people. Standard deviations of a person's difference: {} between people ({}), \
+         {} from run to run, {} from the expected error of a run.\n",
         plan.request.power,
         plan.request.alpha,
         text::significant(plan.between_people),

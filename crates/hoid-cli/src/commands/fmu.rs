@@ -100,8 +100,8 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
     };
     if seen {
         return Err(CliError::Usage(format!(
-            "{source} has [feedforward] or [motion], but the input of the unit is the error alone; remove this table, or \
-             add the response outside the unit"
+            "{source} has [feedforward] or [motion], but the only input of the unit is the error; remove this table, \
+             or add the response outside the unit"
         )));
     }
     let step_s = match scenario {

@@ -5,7 +5,7 @@ use crate::{args::LabArgs, error::CliError};
 #[cfg(not(feature = "lab"))]
 pub fn run(_: &LabArgs) -> Result<(), CliError> {
     Err(CliError::Usage(
-        "this program was built without the laboratory; build one with it: cargo install --path crates/hoid-cli --features lab"
+        "this program was built without the lab; build it with the lab: cargo install --path crates/hoid-cli --features lab"
             .to_owned(),
     ))
 }

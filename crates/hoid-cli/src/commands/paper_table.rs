@@ -15,7 +15,7 @@ pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     PaperTable::check(path).map_err(|_| {
         let endings = writable_endings();
         CliError::Usage(format!(
-            "--table {}: tables are written as .tex, .md, {endings}",
+            "--table {}: expected a file name that ends in .tex, .md, {endings}",
             path.display()
         ))
     })

@@ -60,7 +60,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     })?;
     let Some(found) = found else {
         return Err(CliError::Stopped(format!(
-            "the reproduction was stopped; completed parts are in {}; the same command resumes it",
+            "the reproduction was stopped; completed parts are in {}; run the same command again to resume it",
             args.out.display()
         )));
     };

@@ -120,9 +120,9 @@ fn words(summary: &OutputTable) -> String {
         Some(more) => format!("and {}\n", counted(more, "more row")),
     };
     format!(
-        "{table}\n{more}Relative bias in %: median over the fits that give an operator (of all), and its Monte Carlo \
-         error. The table summary has the other parameters and their spread. hoid study check lists the cells by \
-         number.\n"
+        "{table}\n{more}Fits: number that give an operator, of all fits. Relative bias in %: median over these fits \
+         and its Monte Carlo error. The table summary has the other parameters and their spread. hoid study check \
+         lists the cells by number.\n"
     )
 }
 

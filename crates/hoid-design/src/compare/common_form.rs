@@ -54,7 +54,7 @@ impl CommonForm {
         Finding::note(
             "common-form",
             format!(
-                "parameters are compared in the form {} for all people, the form with the most evidence over {} fits (the sum of its criteria is {:.1} above that of the best form of each fit: {best})",
+                "the parameters of all people are compared in the form {}, which has the most evidence over {} fits (its criteria sum to {:.1} more than those of the best form of each fit: {best})",
                 self.form.name(),
                 self.cells,
                 self.criterion,

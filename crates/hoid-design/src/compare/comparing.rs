@@ -309,7 +309,7 @@ impl Work<'_> {
             self.findings.push(Finding::doubt(
                 "prior-weighs",
                 format!(
-                    "{quantity} comes mostly from the prior ({}), which is the same for all people and shrinks their differences towards zero; write prior = \"none\" under [analysis] in group.toml to leave it out",
+                    "{quantity} is determined mostly by the prior ({}), which is the same for all people and shrinks the differences between them towards zero; to omit the prior, write prior = \"none\" under [analysis] in group.toml",
                     prior.join(", ")
                 ),
             ));
@@ -430,7 +430,7 @@ impl Work<'_> {
             self.findings.push(Finding::doubt(
                 "few-people",
                 format!(
-                    "{name}: {} people leave one degree of freedom, so the interval carries little information; record more people",
+                    "{name}: {} people leave only one degree of freedom, so the interval carries little information; record more people",
                     people.len()
                 ),
             ));
@@ -520,14 +520,14 @@ fn known_of(e: &PersonEstimate) -> EstimatedValue {
 fn missing(result: &Comparison) -> Vec<Finding> {
     let mut all: Vec<(String, Vec<String>)> = Vec::new();
     for out in &result.left_out {
-        let name = format!("{} in {}: {}", out.subject, out.condition, out.reason);
+        let name = format!("{} in {} is left out: {}", out.subject, out.condition, out.reason);
         match all.iter_mut().find(|(known, _)| *known == name) {
             Some((_, of)) => of.push(out.quantity.to_string()),
             None => all.push((name, vec![out.quantity.to_string()])),
         }
     }
     let one =
-        |(name, of): (String, Vec<String>)| Finding::doubt("left-out", format!("without {name} ({})", of.join(", ")));
+        |(name, of): (String, Vec<String>)| Finding::doubt("left-out", format!("{name} ({})", of.join(", ")));
     all.into_iter().map(one).collect()
 }
 
@@ -548,7 +548,7 @@ fn doubtful(group: &GroupEstimates, result: &Comparison) -> Option<Finding> {
         Finding::note(
             "person-doubtful",
             format!(
-                "the operator of {} is doubtful, but is included in the comparison",
+                "the fit of {} is doubtful but is included in the comparison",
                 names.join(", ")
             ),
         )

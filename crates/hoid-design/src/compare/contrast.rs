@@ -68,7 +68,7 @@ impl Resolved {
             conditions.iter().map(own).collect()
         } else {
             return Err(bad(format!(
-                "its levels are not known; the conditions are {}, the people {}",
+                "its levels are not known; the group has the conditions {} and the people {}",
                 conditions.join(", "),
                 subjects.join(", ")
             )));
@@ -85,7 +85,8 @@ impl Resolved {
         let pool = if of_people { &subjects } else { &conditions };
         if let Some(other) = all.iter().find(|member| !pool.contains(member)) {
             return Err(bad(format!(
-                "{other} is neither a condition nor a person of this group: the conditions are {}, the people {}",
+                "{other} is neither a condition nor a person of this group, which has the conditions {} and the \
+                 people {}",
                 conditions.join(", "),
                 subjects.join(", ")
             )));
@@ -103,13 +104,13 @@ impl Resolved {
             (Some(Variation::Between), Some(subject)) => {
                 let both = resolved.levels_of(subject, group);
                 return Err(bad(format!(
-                    "{subject} has the levels {}: the factor varies within people",
+                    "{subject} appears at the levels {}: the factor varies within people",
                     both.join(" and ")
                 )));
             }
             (Some(Variation::Within), None) => {
                 return Err(bad(
-                    "no person is in two levels: the factor varies between people".to_owned()
+                    "no person appears at two levels: the factor varies between people".to_owned()
                 ));
             }
             (_, Some(_)) => Variation::Within,
@@ -159,7 +160,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
     if let [_, second, ..] = between[..] {
         return Err(CompareError::Factor {
             name: second.name.clone(),
-            reason: "it is a second factor between people: compare one at a time".to_owned(),
+            reason: "it is a second factor between people: compare one factor at a time".to_owned(),
         });
     }
     let within: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Within).collect();
@@ -344,7 +345,7 @@ mod tests {
         for (factors, word) in [
             (&["display"][..], "levels are not known"),
             (&["x:a;z"], "z is neither a condition"),
-            (&["who:one=P;two=Q", "else:1=P;2=Q"], "compare one at a time"),
+            (&["who:one=P;two=Q", "else:1=P;2=Q"], "compare one factor at a time"),
         ] {
             let error = of(&people, factors).unwrap_err().to_string();
             assert!(error.contains(word), "{error}");
@@ -358,6 +359,6 @@ mod tests {
         let group = group(&[("P", "a", 1.0, 0.1), ("P", "b", 1.0, 0.1)]);
         let factor = Factor::conditions();
         let error = Resolved::of(&factor, Some(Variation::Between), &group).unwrap_err();
-        assert!(error.to_string().contains("P has the levels a and b"), "{error}");
+        assert!(error.to_string().contains("P appears at the levels a and b"), "{error}");
     }
 }

@@ -9,7 +9,7 @@ use thiserror::Error;
 pub enum CompareError {
     /// There are not more people than coefficients.
     #[error(
-        "{found} people or runs with an estimate, expected at least {expected}: record more, or compare fewer levels"
+        "{found} people or runs have an estimate, expected at least {expected}: record more, or compare fewer levels"
     )]
     TooFew {
         /// Number of people or runs.
@@ -18,13 +18,13 @@ pub enum CompareError {
         expected: usize,
     },
     /// A value or a standard error is not finite.
-    #[error("an estimate is not finite, or a standard error is negative or not finite: leave that person out")]
+    #[error("an estimate is not finite, or a standard error is negative or not finite: leave this person out")]
     NotFinite,
     /// Columns are linearly dependent.
     #[error("the covariates cannot be distinguished (one is constant, or a sum of other covariates): leave one out")]
     Collinear,
     /// All values are equal, so the error of a mean cannot be estimated.
-    #[error("all estimates are equal: there is no scatter to test a difference against; give each run only once")]
+    #[error("all estimates are equal, so there is no scatter with which to test a difference; give each run only once")]
     NoScatter,
     /// The requested quantity does not exist.
     #[error(
@@ -46,7 +46,7 @@ pub enum CompareError {
     },
     /// The path does not hold the result of a group.
     #[error(
-        "{place} holds no result of a group ({reason}); expected recordings with their manifest group.toml, a directory that `hoid group DIR --out` wrote, or the output of `hoid group --json`"
+        "{place} does not contain the result of a group ({reason}); expected recordings with their manifest group.toml, a directory that `hoid group DIR --out` wrote, or the output of `hoid group --json`"
     )]
     NoGroup {
         /// Path that was given.
@@ -55,7 +55,7 @@ pub enum CompareError {
         reason: String,
     },
     /// The JSON of a group does not contain a quantity.
-    #[error("{what} is not in the JSON of a group: name the directory that `hoid group DIR --out` wrote")]
+    #[error("the JSON of a group does not contain {what}: give the directory that `hoid group DIR --out` wrote")]
     NotInJson {
         /// The requested quantity.
         what: String,

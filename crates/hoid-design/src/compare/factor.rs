@@ -99,7 +99,7 @@ impl FromStr for Factor {
         let mut known = Vec::new();
         for member in factor.levels.iter().flat_map(|level| &level.members) {
             if known.contains(&member) {
-                return Err(bad(format!("{member} is in two levels, or twice in one")));
+                return Err(bad(format!("{member} is listed at two levels, or twice at one level")));
             }
             known.push(member);
         }

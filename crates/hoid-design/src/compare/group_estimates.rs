@@ -99,7 +99,7 @@ impl GroupEstimates {
         let manifest = Manifest::read(&path)?;
         if !place.join("people.parquet").exists() {
             return Err(none(
-                "there is no table people: the group is not finished; continue with `hoid group --resume`".to_owned(),
+                "the table people is missing: the group is unfinished; continue with `hoid group --resume`".to_owned(),
             ));
         }
         let summary = GroupSummary::read(&manifest, place)?;
@@ -117,7 +117,7 @@ impl GroupEstimates {
         let people = object["people"].as_array().ok_or("it has no people")?;
         let cells: Vec<Cell> = people.iter().map(Cell::of_json).collect();
         if cells.iter().any(|cell| cell.subject.is_empty()) {
-            return Err("one of its people has no subject".to_owned());
+            return Err("an entry of people has no subject".to_owned());
         }
         Ok(Self {
             name: object["group"].as_str().unwrap_or("group").to_owned(),
@@ -175,7 +175,7 @@ impl GroupEstimates {
         let of_runs = || {
             let all: Vec<f64> = self.of_runs(cell, quantity).into_iter().map(|(_, o)| o.value).collect();
             if all.is_empty() {
-                return Err(format!("no run has its {}", quantity.words()));
+                return Err(format!("no run has the {}", quantity.words()));
             }
             Ok(over_runs(&all))
         };
@@ -200,7 +200,7 @@ impl GroupEstimates {
             .filter(|k| k.value.is_finite() || !k.determined)
             .ok_or_else(|| match quantity {
                 Quantity::Crossover | Quantity::PhaseMargin => format!(
-                    "it has no {}: its condition names no controlled element, or the loop gain does not cross 1",
+                    "it has no {}: the condition has no controlled element, or the loop gain does not cross 1",
                     quantity.words()
                 ),
                 Quantity::OfInput { parameter, input } => match cell.inputs.get(input) {

@@ -74,7 +74,7 @@ impl Practice {
         match meta_regression(&observations, &x, Weights::default()) {
             Ok(found) => Ok([found.coefficients[0], found.coefficients[1]]),
             Err(CompareError::TooFew { found, .. }) => Err(format!(
-                "estimates from {found} of the runs, expected at least 3 for learning"
+                "{found} runs have an estimate, expected at least 3 for learning"
             )),
             Err(error) => Err(format!("its runs: {error}")),
         }

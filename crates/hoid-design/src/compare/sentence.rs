@@ -47,7 +47,7 @@ pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
             )
         }
         (None, false) => {
-            format!("no difference in {what} was found, {to} - {from} {signed} (95 % {signed_ends}, {test})")
+            format!("no difference in {what} was found: {to} - {from} is {signed} (95 % {signed_ends}, {test})")
         }
         (None, true) if difference.variation == Variation::Within => {
             let verb = if falls { "fell" } else { "rose" };

@@ -24,12 +24,12 @@ pub enum DesignError {
     },
     /// The loop has no crossover.
     #[error(
-        "the loop gain does not cross 1 from above between 0.01 and 100 rad/s: give the person another gain, or other units of the element"
+        "the loop gain does not cross 1 from above between 0.01 and 100 rad/s: change the gain of the person, or the units of the controlled element"
     )]
     NoCrossover,
     /// The lines do not determine the parameters of the person.
     #[error(
-        "{lines} lines do not determine {coordinates} parameters: add lines, each of which gives two numbers, and spread them over the frequencies at which the person responds"
+        "{lines} lines do not determine {coordinates} parameters, because each line gives two numbers: add lines, and spread them over the frequencies at which the person responds"
     )]
     NotIdentifiable {
         /// Number of lines.
@@ -39,9 +39,9 @@ pub enum DesignError {
     },
     /// The band has no room for the lines.
     #[error(
-        "the band has room for only {found} of the {asked} lines, which must be {spacing} multiples of the fundamental \
-         apart and no harmonics of each other: give fewer lines (--lines), a wider band (--band), a longer run \
-         (--length), or a smaller spacing (--spacing)"
+        "the band has room for only {found} of the {asked} lines, which must be {spacing} multiples of the \
+         fundamental apart and not harmonics of each other: give fewer lines (--lines), a wider band (--band), a \
+         longer run (--length), or a smaller spacing (--spacing)"
     )]
     NoRoom {
         /// Number of lines requested.
@@ -83,7 +83,7 @@ pub enum DesignError {
     },
     /// A forcing function for comparison lacks lines that the design has.
     #[error(
-        "{name} has no lines of a {missing}; expected a scenario with lines for each forcing function of the design: [target], [disturbance], or both for a display that shows the target"
+        "{name} has no lines for a {missing}; expected a scenario with lines for each forcing function of the design: [target], [disturbance], or both for a display that shows the target"
     )]
     OneForcing {
         /// Name of the forcing function.
@@ -92,7 +92,7 @@ pub enum DesignError {
         missing: Enters,
     },
     /// A form is given although the people already have a form.
-    #[error("the form {form} was given, but {people} has its own; leave the form out, or design for the population")]
+    #[error("the form {form} was given, but {people} has its own; omit the form, or design for the population")]
     FormOfPeople {
         /// Source of the people.
         people: String,
@@ -101,7 +101,7 @@ pub enum DesignError {
     },
     /// The form has no typical values.
     #[error(
-        "no typical values are known for the form {form}: expected gain, lead, lead2, lag, lead-lag or lead2-lag, or a person of that form from a file"
+        "no typical values are known for the form {form}: expected gain, lead, lead2, lag, lead-lag or lead2-lag, or a file with a person of that form"
     )]
     NoTypicalPerson {
         /// The form given.
@@ -109,7 +109,7 @@ pub enum DesignError {
     },
     /// The typical person cannot control this element.
     #[error(
-        "with {element}, no gain of the form {form} gives a stable loop with a phase margin of 15 deg and a crossover of .3 to 5 rad/s: give another form, or a person who controls it (a scenario or a fit)"
+        "with {element}, no gain of the form {form} gives a stable loop with a phase margin of 15 deg and a crossover of .3 to 5 rad/s: choose another form, or give a person who can control it (a scenario or a fit)"
     )]
     NotControlled {
         /// The controlled element.
@@ -119,7 +119,7 @@ pub enum DesignError {
     },
     /// The source does not contain people.
     #[error(
-        "{place} holds no people to design for ({reason}); expected population, a scenario, a fit (identify --json), a directory that `hoid group DIR --out` wrote, or its population.json"
+        "{place} does not contain people to design for ({reason}); expected population, a scenario, a fit (identify --json), a directory that `hoid group DIR --out` wrote, or its population.json"
     )]
     NoPeople {
         /// Source of the people.
@@ -128,7 +128,9 @@ pub enum DesignError {
         reason: String,
     },
     /// The given condition is not one of the group, or no condition is given although the group has several.
-    #[error("the group has several conditions, and the given one is {found}: choose one of {expected} (--condition)")]
+    #[error(
+        "the group has several conditions, but the given condition is {found}: choose one of {expected} (--condition)"
+    )]
     Condition {
         /// The condition given.
         found: String,
@@ -137,7 +139,7 @@ pub enum DesignError {
     },
     /// The file does not provide the standard deviation, over people, of a difference.
     #[error(
-        "{path} has no spread between people of {name} ({reason}); expected a comparison that contains it (`hoid \
+        "{path} contains no spread of {name} between people ({reason}); expected a comparison that contains it (`hoid \
          compare --of {name} --json`), the result of a group with several conditions, a population.json, or a number, \
          such as 0.1"
     )]
@@ -151,8 +153,8 @@ pub enum DesignError {
     },
     /// The file does not provide the variation of people from run to run.
     #[error(
-        "{path} has no variation from run to run ({reason}); expected the directory of `hoid group` with three or more \
-         runs per person and condition, or a number, such as 0.13"
+        "{path} contains no variation from run to run ({reason}); expected the directory of `hoid group` with three \
+         or more runs per person and condition, or a number, such as 0.13"
     )]
     NoRunToRun {
         /// Path of the file.
@@ -161,13 +163,15 @@ pub enum DesignError {
         reason: String,
     },
     /// The scenario is one of the thesis, which has no operator of the family.
-    #[error("{path} is a scenario of the thesis; write one with the key form, such as form = \"lead\"")]
+    #[error("{path} is a scenario of the thesis; give one with the key form, such as form = \"lead\"")]
     OtherScenario {
         /// Path of the scenario.
         path: String,
     },
     /// The table contains no lines.
-    #[error("{path} holds no forcing function: its columns are {found}, expected omega_rad_s, amplitude and phase_rad")]
+    #[error(
+        "{path} contains no forcing function: its columns are {found}, expected omega_rad_s, amplitude and phase_rad"
+    )]
     NoLines {
         /// Path of the table.
         path: String,

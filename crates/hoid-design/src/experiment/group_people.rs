@@ -94,7 +94,7 @@ pub(super) fn of_population(object: &Value, path: &Path, given: &Given<'_>) -> R
     if !missing.is_empty() {
         let names = missing.join(", ");
         let reason = format!(
-            "{names} could not be pooled; name the directory of the group, which has the operators of each person"
+            "{names} could not be pooled; give the directory of the group, which contains the operator of each person"
         );
         return Err(none(path, reason));
     }

@@ -119,7 +119,7 @@ pub(super) fn run_to_run(given: Option<&SpreadSource>, people: &People, default:
         let group = GroupEstimates::read(path).map_err(|error| none(error.to_string()))?;
         let (value, people) = group
             .run_to_run()
-            .ok_or_else(|| none("no person has the crossover of three runs in one condition".to_owned()))?;
+            .ok_or_else(|| none("no person has a crossover from three runs in one condition".to_owned()))?;
         Ok(Spread {
             value,
             source: format!("of {people} people in {}", path.display()),
@@ -141,7 +141,7 @@ fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignErro
         let text = hoid_io::read_settings(path)?;
         let object: Value = serde_json::from_str(&text).map_err(|error| none(format!("it is not JSON: {error}")))?;
         if object["kind"] == "population" {
-            let spread = in_population(&object, name).ok_or_else(|| none("it has no such parameter".to_owned()))?;
+            let spread = in_population(&object, name).ok_or_else(|| none("it lacks this parameter".to_owned()))?;
             return Ok(Spread {
                 value: spread * value,
                 source: format!("at most the spread between people within one condition, from {shown}"),
@@ -174,7 +174,7 @@ fn of_comparison(found: &Comparison, quantity: &Quantity, shown: &str) -> Result
     let Some(people) = all.iter().map(|(_, people)| *people).max() else {
         let known: Vec<String> = found.quantities().iter().map(ToString::to_string).collect();
         return Err(format!(
-            "it has differences within people only for {}",
+            "it contains differences within people only for {}",
             known.join(", ")
         ));
     };

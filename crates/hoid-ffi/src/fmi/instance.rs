@@ -48,7 +48,7 @@ impl Instance {
     pub fn new(token: &str, resources: Option<&Path>) -> Done<Self> {
         let kind = (FmuKind::ALL.into_iter().find(|kind| kind.token() == token)).ok_or_else(|| {
             format!(
-                "the description is for {token:?}, the library for {}; build the unit again with hoid fmu",
+                "the model description is for {token:?}, but the library is for {}; build the unit again with hoid fmu",
                 FmuKind::ALL.map(FmuKind::token).join(" and ")
             )
         })?;
@@ -123,7 +123,7 @@ impl Instance {
     /// Returns the error message for a variable whose type differs from that of the called function.
     pub fn other_type(&self, reference: u32) -> String {
         let name = self.variable(reference).map_or("?", |variable| variable.name);
-        format!("{name} is of another type")
+        format!("{name} does not have the type of the called function")
     }
 
     /// Sets a parameter (only before the start) or an input.
@@ -190,8 +190,8 @@ impl Instance {
         let ts = model.sample_time_s();
         if !(step_s > 0.0 && step_s <= ts * (1.0 + TIME_TOLERANCE)) {
             return Err(format!(
-                "the step is {step_s} s and the sample time {ts} s: samples would be lost; use the sample time or a \
-                 fraction of it as the step"
+                "the step is {step_s} s, but the sample time is {ts} s, so samples would be lost; use the sample time \
+                 or a fraction of it as the step"
             ));
         }
         if !(t_s >= self.end_s - TIME_TOLERANCE * ts && t_s.is_finite()) {

@@ -143,7 +143,7 @@ impl TrackerModel {
         let fit = settings.fit.as_deref().filter(|_| of_unit);
         if of_unit && fit.is_none() {
             return Err(
-                "prior is the fit of the unit, which has none; build it with hoid fmu --prior FILE.json".to_owned(),
+                "prior is \"fit\", but the unit contains no fit; build it with hoid fmu --prior FILE.json".to_owned(),
             );
         }
         let options = Value::Object(options).to_string();

@@ -37,8 +37,8 @@ impl Fit {
             all.push(Finding::note(
                 "no-noise",
                 format!(
-                    "the data contain no noise: the model fits u to within {:.0e} of its size; error bars only \
-                     reflect the rounding of the data",
+                    "the data contain no noise: the model fits u to within {:.0e} of its size; the error bars reflect \
+                     only the rounding of the data",
                     share.sqrt()
                 ),
             ));

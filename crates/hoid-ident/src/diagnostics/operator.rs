@@ -65,8 +65,8 @@ fn negative_lead(negative: &[String]) -> Option<Finding> {
             "negative-lead",
             format!(
                 "{} {verb} below zero by two standard errors of K_e and of K_e_dot: a gain and a lead do not describe \
-                 this person, who may have a lag; only the response is valid; use --structure operator to find the \
-                 form",
+                 this person, whose response may contain a lag; only the response is valid; use --structure operator \
+                 to find the form",
                 negative.join(", ")
             ),
         )
@@ -90,7 +90,7 @@ pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
 pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: SampleTime) -> Option<Finding> {
     let nyquist = PI / sample_time.s();
     let what = if omega_nm_rad_s > nyquist {
-        format!("omega_nm = {omega_nm_rad_s:.0} rad/s lies above the Nyquist frequency {nyquist:.0} rad/s")
+        format!("omega_nm = {omega_nm_rad_s:.0} rad/s lies above the Nyquist frequency, {nyquist:.0} rad/s")
     } else if zeta_nm > LARGEST_DAMPING {
         format!("zeta_nm = {zeta_nm:.1} is above {LARGEST_DAMPING}")
     } else {
@@ -99,7 +99,7 @@ pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: Sam
     Some(Finding::doubt(
         "neuromuscular-lag",
         format!(
-            "{what}: the two poles have become a lag and carry no information about the neuromuscular system; use the \
+            "{what}: the two poles describe a lag and carry no information about the neuromuscular system; use the \
              grey box or the operator family, or a model of another order"
         ),
     ))

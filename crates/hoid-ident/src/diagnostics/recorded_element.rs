@@ -76,7 +76,7 @@ impl RecordedElement {
             true => format!(" with u recorded {:.0} ms late", -late),
             false => String::new(),
         };
-        let loop_lost = "crossover and phase margin are not those of the recorded loop";
+        let loop_lost = "the crossover and the phase margin do not apply to the recorded loop";
         let message = match (self.is_given(), beyond.is_empty()) {
             (true, true) => return None,
             (true, false) => format!("the recorded element is {given}{beyond}: {loop_lost}"),

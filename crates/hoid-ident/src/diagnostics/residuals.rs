@@ -118,7 +118,7 @@ impl ResidualMeasures {
             Finding::doubt(
                 "structure",
                 format!(
-                    "the residuals have a correlation of {:.2} with past errors: the operator misses part of the \
+                    "the residuals have a correlation of {:.2} with past values of e: the operator misses part of the \
                      response",
                     self.cross_correlation
                 ),

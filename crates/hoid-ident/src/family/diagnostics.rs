@@ -104,8 +104,8 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
         all.push(Finding::note(
             "no-noise",
             format!(
-                "the data contain no noise: the operator fits u to within {:.0e} of its size, as happens with a \
-                 simulation but not with a person; error bars only reflect the rounding of the data",
+                "the data contain no noise: the operator fits u to within {:.0e} of its size, which happens in a \
+                 simulation but not with a person; the error bars reflect only the rounding of the data",
                 share.sqrt()
             ),
         ));
@@ -122,8 +122,8 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
         all.push(Finding::note(
             "clustered-errors",
             format!(
-                "error bars are computed from the scatter between {what}, and are up to {ratio:.1} times those of the \
-                 model, which assumes white residuals and a person who does not change"
+                "error bars are computed from the scatter between {what}, and are up to {ratio:.1} times as large as \
+                 those from the model, which assumes white residuals and a person who does not change"
             ),
         ));
     }
@@ -285,7 +285,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
-                "zeta_nm = {:.1}: the neuromuscular poles have become lags and carry no information about the \
+                "zeta_nm = {:.1}: the neuromuscular poles describe lags and carry no information about the \
                  neuromuscular system; choose a form with a lag, or --neuromuscular no",
                 zeta.value
             ),

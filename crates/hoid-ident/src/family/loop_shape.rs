@@ -158,8 +158,8 @@ impl LoopShape {
             Finding::doubt(
                 "unstable-loop",
                 format!(
-                    "the loop with this controlled element is not stable ({at}), but the record of an unstable loop \
-                     would not stay bounded: {remedy}"
+                    "the loop with this controlled element is not stable ({at}), but a record of an unstable loop \
+                     would not remain bounded: {remedy}"
                 ),
             )
         })

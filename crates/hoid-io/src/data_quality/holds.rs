@@ -48,7 +48,7 @@ pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut
         let what = if kind == QualityIssueKind::Repeated {
             "duplicated, including the time"
         } else {
-            "not later than the row before, with other values"
+            "not later than the previous row, with different values"
         };
         found.push(QualityIssue {
             kind,

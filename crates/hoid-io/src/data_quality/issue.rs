@@ -63,7 +63,7 @@ impl QualityIssueKind {
                 "interpolate with --resample if t is right, or replace t by the sampling frequency with --fs"
             }
             Self::Stalled => "exclude the rows with --mask stalled or --from and --to",
-            Self::Saturated => "exclude the rows with --mask saturated; a bias remains, see the page on record files",
+            Self::Saturated => "exclude the rows with --mask saturated; a bias remains (see the page on record files)",
             Self::Quantised => "none needed; quantisation adds noise of variance step^2 / 12",
             Self::Constant => "choose another column",
         }

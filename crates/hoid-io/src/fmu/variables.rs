@@ -102,7 +102,7 @@ fn tracker() -> Vec<FmuVariable> {
             "prior",
             "",
             text("population"),
-            "population, none, names with values, or the file of a fit",
+            "population, none, NAME=CENTRE:SPREAD pairs, or the file of a fit",
         ),
         parameter(
             "controlled_element",
@@ -125,7 +125,7 @@ fn tracker() -> Vec<FmuVariable> {
         [("K_e", "", "gain"), ("K_e_se", "", "standard error of K_e")],
         [("T_L", "s", "lead time"), ("T_L_se", "s", "standard error of T_L")],
         [
-            ("K_e_dot", "s", "gain of the rate"),
+            ("K_e_dot", "s", "gain on the error rate"),
             ("K_e_dot_se", "s", "standard error of K_e_dot"),
         ],
         [

@@ -59,7 +59,7 @@ pub(crate) enum Writing {
     Rows(RowsStart),
     /// Each column is written as one array preceded by its length: all rows must be known before writing.
     Columns(ColumnsWriter),
-    /// Files are only read; the text describes the format, such as "hoid only reads this format of recorders".
+    /// Files are only read; the text describes the format, such as "hoid only reads this format".
     ReadOnly(&'static str),
 }
 

@@ -123,7 +123,7 @@ fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs:
 /// Returns the directory of a file that will be written.
 pub(super) fn directory_of(place: &Path) -> io::Result<PathBuf> {
     if place.file_name().is_none() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
     }
     Ok(match place.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),

@@ -64,7 +64,7 @@ impl RecordParts {
                 return Err(self.error(
                     step,
                     format!("there is no channel \"{name}\""),
-                    format!("one of {}, or e and u for input and output", list(&names)),
+                    format!("one of {}, or e for the input and u for the output", list(&names)),
                 ));
             };
             if found.iter().any(|(known, _)| *known == channel) {

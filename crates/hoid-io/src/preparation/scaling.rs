@@ -126,7 +126,7 @@ impl FromStr for Scaling {
             return Err(refused(
                 text,
                 &format!(
-                    "a factor (12.5), a factor and a unit (12.5:deg), or two units (rad:deg) out of {}",
+                    "a factor (12.5), a factor and a unit (12.5:deg), or two units (rad:deg); known units: {}",
                     names.join(", ")
                 ),
             ));
@@ -135,7 +135,7 @@ impl FromStr for Scaling {
             return Err(refused(
                 text,
                 &format!(
-                    "two units of the same kind, but {} is a unit of {} and {} of {}",
+                    "two units of the same kind, but {} is a unit of {} and {} is a unit of {}",
                     from.0, from.1, to.0, to.1
                 ),
             ));
@@ -169,7 +169,7 @@ impl RecordParts {
                 return Err(self.error(
                     STEP,
                     format!("{name} is in {known} according to its file, but declared to be in {unit}"),
-                    format!("the unit of the file; --scale {name}={known}:{unit} changes it"),
+                    format!("the unit of the file; convert it with --scale {name}={known}:{unit}"),
                 ));
             }
             unit.clone_into(&mut self.channels[channel].unit);

@@ -193,7 +193,7 @@ impl fmt::Display for Step {
             } => {
                 write!(
                     f,
-                    "column {channel}: {} of its own, {} between them ",
+                    "column {channel}: {} recorded, {} between them ",
                     counted(*own, "value"),
                     counted(*rows, "row")
                 )?;
@@ -274,8 +274,8 @@ impl fmt::Display for Step {
             } if *input_lead_s > 0.0 => write!(
                 f,
                 "{} Hz, filtered and decimated by {} to {} Hz: a linear-phase filter of {taps} samples on all \
-                 channels, pass band to {} Hz, {stop_db} dB from {} Hz; each sample of the input is taken in the \
-                 middle of its hold, {} s later, so that the delay is the same as at the old rate",
+                 channels, pass band to {} Hz, {stop_db} dB from {} Hz; each input sample is taken in the middle \
+                 of its hold, {} s later, to keep the delay of the old rate",
                 decimal(*from_hz),
                 decimal(*factor),
                 decimal(*to_hz),

@@ -107,7 +107,7 @@ fn scaling_changes_values_and_units() {
     let unknown = scaled("q", Scaling::by(2.0, None).unwrap());
     assert_eq!(
         message(&unknown, 5),
-        "run: scale: there is no channel \"q\", expected one of r-y, stick, or e and u for input and output"
+        "run: scale: there is no channel \"q\", expected one of r-y, stick, or e for the input and u for the output"
     );
     let twice = with(|p| {
         for name in ["e", "r-y"] {

@@ -96,7 +96,10 @@ fn read_trial(
         return Err(refuse(kind.name().to_owned(), &format!("one or more of {names}")));
     }
     if preparation.run_in_s != 0.0 {
-        return Err(refuse("a run-in".to_owned(), "a span that starts after it (--from)"));
+        return Err(refuse(
+            "a run-in".to_owned(),
+            "a span that starts after the run-in (--from)",
+        ));
     }
     if !(shortest_s >= 0.0 && shortest_s.is_finite()) {
         return Err(refuse(
@@ -157,7 +160,7 @@ fn read_trial(
             let names: Vec<&str> = mask.iter().map(|kind| kind.name()).collect();
             return Err(refuse(
                 format!("no segment of {shortest_s} s without {} rows", names.join(" or ")),
-                "a shorter --shortest, or fewer kinds",
+                "a smaller --shortest, or fewer kinds in --mask",
             ));
         }
     }

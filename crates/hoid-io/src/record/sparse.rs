@@ -71,7 +71,7 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
         let named = columns.iter().filter_map(|(at, _)| table.columns.get(*at));
         let names: Vec<&str> = named.map(|column| column.name.as_str()).collect();
         let found = format!(
-            "no row lies between the first and the last value of every column of {}",
+            "the columns {} have no rows in common between their first and last values",
             list(&names)
         );
         return Err(refused(&table, found, "columns that were logged at the same time"));
@@ -115,7 +115,7 @@ fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Spars
     for (name, how) in &options.sparse {
         let found = match (names.iter().position(|known| known == name), name.as_str()) {
             (Some(_), "t") => {
-                let expected = "a column of values: rows without a time cannot be placed";
+                let expected = "a column other than t, because every row needs a time";
                 return Err(refused(table, "t is the time".to_owned(), expected));
             }
             (Some(at), _) => vec![at],
@@ -125,7 +125,7 @@ fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Spars
         };
         if found.is_empty() {
             let found = format!("there is no column \"{}\"", named(name));
-            let expected = format!("one of {}, or e and u for input and output", list(&names));
+            let expected = format!("one of {}, or e for the input and u for the output", list(&names));
             return Err(refused(table, found, &expected));
         }
         for column in found {

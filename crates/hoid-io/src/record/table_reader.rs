@@ -139,8 +139,8 @@ impl TableReader<'_> {
         })?;
         if bridged.values > 0 && lacks && self.signals.contains(&column) {
             self.table.notes.push(format!(
-                "column {} lacks many values, as if logged at its own times: --fill interpolates linearly, {} holds the \
-                 last value",
+                "column {} has many missing values, as if logged at its own times: --fill interpolates linearly; {} \
+                 holds the last value",
                 named(&source.name),
                 sparse_option(&source.name)
             ));

@@ -70,7 +70,7 @@ impl ScenarioChanges {
         scenario.remnant.strength =
             (strength.changed(self.noise_level, self.noise_definition)).ok_or_else(|| ScenarioChangeError {
                 option: "noise_definition",
-                reason: "needs a noise level: the scenario gives the gain K_n itself".to_owned(),
+                reason: "needs a noise level, but the scenario gives the gain K_n instead".to_owned(),
             })?;
         if let Some(text) = &self.feedforward {
             let of = scenario.initial.operator;
@@ -88,10 +88,10 @@ impl ScenarioChanges {
     /// Refuses the options of remnant and disturbance, because the scenario file of an operator of the family defines
     /// both.
     fn of_family(&self, mut scenario: FamilyScenario) -> Result<FamilyScenario, ScenarioChangeError> {
-        let remnant = "is for the remnant of the thesis; in a scenario with a form, the tables [[remnant]] specify the \
-                       remnant";
-        let disturbance = "is for the conditions of the thesis; in a scenario with a form, the table [disturbance] \
-                           specifies the disturbance";
+        let remnant = "applies only to the remnant of the thesis; in a scenario with a form, specify the remnant in \
+                       [[remnant]] tables";
+        let disturbance = "applies only to the conditions of the thesis; in a scenario with a form, specify the \
+                           disturbance in the [disturbance] table";
         for (option, is_given, reason) in [
             ("remnant_order", self.remnant_order.is_some(), remnant),
             ("noise_level", self.noise_level.is_some(), remnant),

@@ -237,7 +237,7 @@ impl Source<'_> {
     ) -> Result<ForcingFunction, ScenarioFileError> {
         if tables.len() > MAX_LINES {
             return Err(self.keys(&format!(
-                "there are {} tables [[{name}]], expected at most {MAX_LINES}",
+                "there are {} [[{name}]] tables, expected at most {MAX_LINES}",
                 tables.len()
             )));
         }

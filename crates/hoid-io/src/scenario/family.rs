@@ -71,7 +71,7 @@ impl Source<'_> {
         }
         if let Some(table) = file.feedforward {
             if scenario.target.function.sinusoids().is_empty() {
-                return Err(self.keys("[feedforward] is given, but no displayed [target]: add [target]"));
+                return Err(self.keys("[feedforward] is given, but there is no displayed target: add [target]"));
             }
             let muscles = scenario.initial.operator.neuromuscular();
             scenario.feedforward = Some(self.feedforward(&table, muscles, sample_time)?);
@@ -370,7 +370,7 @@ impl Source<'_> {
             .chain(coefficients)
             .find(|v| !Limits::GAIN.hold(*v))
         {
-            return refuse(format!("it has {value}, expected {}", Limits::GAIN));
+            return refuse(format!("one of its values is {value}, expected {}", Limits::GAIN));
         }
         let strength = match (given.share, given.gain) {
             (Some(share), None) if given.gain_last.is_none() => PartStrength::Share(share),
@@ -379,7 +379,7 @@ impl Source<'_> {
                 last: given.gain_last.unwrap_or(initial),
             },
             _ => {
-                return refuse("give share (of the variance of u) or gain, and gain_last only with gain".to_owned());
+                return refuse("give share (of the variance of u) or gain; give gain_last only with gain".to_owned());
             }
         };
         let mut used = Vec::new();
@@ -416,11 +416,11 @@ impl Source<'_> {
             ("coefficients", given.coefficients.is_some()),
         ] {
             if is_there && !used.contains(&key) {
-                return refuse(format!("its shape does not use {key}; it takes {takes}"));
+                return refuse(format!("its shape takes {takes}; remove {key}"));
             }
         }
         let Some(shape) = shape else {
-            return refuse(format!("it lacks a key of its shape, which takes {takes}"));
+            return refuse(format!("a key of its shape is missing; the shape takes {takes}"));
         };
         let requires = |owner: &str, is_there: bool, others: bool| {
             if others && !is_there {

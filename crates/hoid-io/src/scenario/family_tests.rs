@@ -98,7 +98,7 @@ fn invalid_files_are_refused_with_a_remedy() {
         (with("1/1,0", "1e13/s"), "controlled_element is 10000000000000"),
         (
             with("1/1,0", "exp(-0.1s)/s"),
-            "the delay of a task belongs to the operator",
+            "add this delay to that of the operator",
         ),
         (with("controlled_element = \"1/1,0\"\n", ""), "lacks controlled_element"),
         (with("form", "sample_time_s = 0\nform"), "line 1: sample_time_s is 0"),
@@ -115,7 +115,7 @@ fn invalid_files_are_refused_with_a_remedy() {
         ),
         (
             more("[[remnant]]\nshape = \"white\"\nshare = 0.1\nzeta = 0.2"),
-            "does not use zeta",
+            "remove zeta",
         ),
         (more("[[remnant]]\nshape = \"white\""), "give share"),
         (
@@ -133,7 +133,7 @@ fn invalid_files_are_refused_with_a_remedy() {
     }
     // Studies accept only the operator of the thesis.
     let message = parse_scenario(SHORT, "x.toml", "x").unwrap_err().to_string();
-    assert!(message.contains("key form"), "{message}");
+    assert!(message.contains("`form` key"), "{message}");
     assert!(matches!(
         parse_any_scenario("condition = \"C1\"", "x.toml", "x"),
         Ok(AnyScenario::Reference(_))
@@ -160,7 +160,7 @@ fn displayed_target_is_read() {
         ("form = \"derivative\"", "form = \"bent\"", "form of the operator"),
         ("K_d_s = 0.7", "K = 0.7", "K_d_s"),
         ("interleaved = \"even\"", "interleaved = \"some\"", "even"),
-        ("[target]\ninterleaved = \"even\"", "", "no displayed [target]"),
+        ("[target]\ninterleaved = \"even\"", "", "no displayed target"),
     ] {
         let error = parse(&PURSUIT.replace(from, to)).unwrap_err().to_string();
         assert!(error.contains(expected), "{to}: {error}");

@@ -78,8 +78,8 @@ fn text_of(path: &Path) -> Result<(String, String, String), ScenarioFileError> {
 pub fn parse_scenario(text: &str, path: &str, name: &str) -> Result<Scenario, ScenarioFileError> {
     if has_form(text) {
         return Err(Source { text, path }.keys(
-            "the key form describes an operator of the family, which `hoid simulate --scenario` can simulate but a study \
-             cannot use; remove form to use the operator K_e (T_L s + 1)",
+            "the `form` key describes an operator of the family, which `hoid simulate --scenario` can simulate but a \
+             study cannot use; remove `form` to use the operator K_e (T_L s + 1)",
         ));
     }
     let file: File = toml::from_str(text).map_err(|error| syntax(text, path, &error))?;

@@ -51,7 +51,7 @@ fn decimal_commas(table: &Table<'_>) -> Vec<String> {
         has_decimal_comma(&cell).then(|| {
             let (name, place) = (named(&column.name), table.source.place(row));
             let (count, rows) = (column.texts.len(), table.rows);
-            format!("column {name}, {place}: \"{cell}\" is text, {count} of {rows} cells in all; {DECIMAL_COMMA}")
+            format!("column {name}, {place}: \"{cell}\" is text ({count} of {rows} cells); {DECIMAL_COMMA}")
         })
     };
     table.columns.iter().enumerate().filter_map(first_text).collect()

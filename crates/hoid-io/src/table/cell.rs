@@ -72,7 +72,7 @@ impl Cell {
 
 /// Remedy for cells for which [`has_decimal_comma`] is true.
 pub(crate) const DECIMAL_COMMA: &str =
-    "write the numbers with a decimal point instead of a comma, and without separators of thousands";
+    "write the numbers with a decimal point instead of a comma, and without thousands separators";
 
 /// True if a text cell would be a number with a decimal point instead of its comma.
 pub(crate) fn has_decimal_comma(cell: &str) -> bool {

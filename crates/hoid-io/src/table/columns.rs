@@ -136,8 +136,7 @@ impl Table<'_> {
             } else if row == 0 && self.rows > 1 && self.row_has_no_numbers(row) {
                 UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {
-                "the file is truncated in the middle of this line, the last one: copy or record the file again, or \
-                 remove that line"
+                "the file ends in the middle of this line: copy or record the file again, or remove this line"
             } else {
                 "correct the cell, empty it and bridge it with --fill, or choose another column"
             };

@@ -95,7 +95,7 @@ impl FromStr for TimeChoice {
                 None if unit.starts_with([')', ',', ']']) => (text, None),
                 None => {
                     return Err(refuse(
-                        "expected the time column, and after a colon its unit: s, ms, us, ns, min, h, days, iso or sec+nanosec",
+                        "expected the time column, optionally followed by a colon and its unit: s, ms, us, ns, min, h, days, iso or sec+nanosec",
                     ));
                 }
             },

@@ -355,7 +355,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
         Unit::Iso => {
             time.moments = false;
             let taken = if was_t { "" } else { "taken as t, " };
-            format!("{name} is {taken}in s from its first time")
+            format!("{name} is {taken}in s from its first time stamp")
         }
         Unit::SecondsAndNanoseconds => {
             let (other, ns) = nanoseconds.unwrap_or_default();
@@ -365,7 +365,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             }
             time.precision = Precision::default();
             format!(
-                "{name} and {} are taken as t, in s from their first time",
+                "{name} and {} are taken as t, in s from their first time stamp",
                 named(&other)
             )
         }
@@ -381,8 +381,8 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
                 time.precision = time.precision.limited((-digit_s.log10()).floor() as i32);
             }
             let taken = match (was_t, is_date) {
-                (true, _) => "is in s from its first time",
-                (false, true) => "is taken as t, in s from its first time",
+                (true, _) => "is in s from its first time stamp",
+                (false, true) => "is taken as t, in s from its first time stamp",
                 (false, false) => "is taken as t",
             };
             format!("{name} {taken}, from {unit}")

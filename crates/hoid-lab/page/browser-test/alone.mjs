@@ -54,7 +54,7 @@ try {
   await page.evaluate(operator, { injected: true });
   await heading("Done. Thank you.");
   await page.getByText("this page cannot recompute the run").first().waitFor();
-  await page.getByText("You, as the program sees you").waitFor();
+  await page.getByText("The estimate of your behaviour").waitFor();
   await page.waitForTimeout(500);
   await picture("done");
 

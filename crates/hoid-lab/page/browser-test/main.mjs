@@ -138,7 +138,7 @@ const steps = {
     await page.evaluate(operator, { injected: true });
     await heading(page, /^Score/);
     await page.getByText("verified", { exact: true }).waitFor();
-    await page.getByText("You, as the program sees you").waitFor();
+    await page.getByText("The estimate of your behaviour").waitFor();
     await picture(page, "result");
     const run = await runOf(page, server.address, 1);
     assert.equal(run.verdict, "verified", run.reasons);

@@ -95,7 +95,7 @@ class Alone implements Wire {
       URL.revokeObjectURL(link.href);
     };
     const saves = this.runs.map((going) => button(`Save run ${going.number}`, () => save(going), { class: "quiet" }));
-    return h("div", {}, h("p", { class: "soft" }, "A run as a table of t, e, u, f_t and d, for hoid identify, track and describe:"), ...saves);
+    return h("div", {}, h("p", { class: "soft" }, "Save a run as a table of t, e, u, f_t and d for hoid identify, track and describe:"), ...saves);
   }
 
   private hear(message: FromPage): void {

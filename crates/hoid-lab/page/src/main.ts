@@ -231,10 +231,10 @@ function ready(): void {
   show(
     "",
     h("h1", {}, `Run ${(next ?? 0) + 1} of ${planned.length}${training ? " (training)" : ""}`),
-    last?.how === "interrupted" && h("p", { class: "box" }, "The last run was interrupted. It is repeated."),
+    last?.how === "interrupted" && h("p", { class: "box" }, "The last run was interrupted and will be repeated."),
     h("p", {}, condition.text),
     h("p", {}, DISPLAYS[condition.display]),
-    h("p", { class: "soft" }, h("kbd", {}, "Space"), " starts, ", h("kbd", {}, "Esc"), " ends a run early. A countdown of three seconds comes first. Keep this window in front."),
+    h("p", { class: "soft" }, h("kbd", {}, "Space"), " starts the run, and ", h("kbd", {}, "Esc"), " ends it early. A countdown of three seconds comes first. Keep this window in front."),
     startButton("Start"),
     button("How I steer", setUp, { class: "quiet" }),
   );
@@ -285,11 +285,11 @@ async function estimate(number: number): Promise<void> {
   const run = await wire.data(number);
   const last = run?.live[run.live.length - 1];
   if (!place || !run || !last) return;
-  const shown = run.condition.display === "compensatory" ? "" : "The display shows the target: this is the response to the error alone. The report of hoid identify shows both responses.";
+  const shown = run.condition.display === "compensatory" ? "" : "The display shows the target, but this estimate covers only the response to the error. The report of hoid identify shows both responses.";
   const cell = (name: string, told: [number | null, number | null], unit: string, none = "–") =>
     h("div", {}, name, h("b", {}, told[0] === null ? none : `${digits(told[0])} ${unit}`), told[1] === null ? "" : `± ${digits(told[1])}`);
   place.replaceChildren(
-    h("h2", {}, "You, as the program sees you"),
+    h("h2", {}, "The estimate of your behaviour"),
     h(
       "div",
       { class: "numbers" },
@@ -327,7 +327,7 @@ function finished(): void {
     h("h1", {}, s.calibrate ? "Calibrated" : "Done. Thank you."),
     ...(s.calibration.length > 0
       ? [h("table", {}, ...s.calibration.map(([name, value]) => h("tr", {}, h("th", { scope: "row" }, name), h("td", {}, value)))),
-         h("p", { class: "soft" }, "This latency is part of every delay identified here. Screen and device add a latency that only a light sensor can measure.")]
+         h("p", { class: "soft" }, "This latency is part of every delay identified here. The screen and the input device add more latency, which only a light sensor can measure.")]
       : []),
     runsTable(s.done),
     h("div", { id: "person" }),
@@ -348,7 +348,7 @@ function experimenter(): void {
   show(
     "wide",
     h("h1", {}, `${s.name}: ${s.session ?? "no session yet"}`),
-    h("p", { id: "status", "aria-live": "polite" }, s.running ? `Run ${s.running} is in progress.` : s.phase === "finished" ? "The session is done." : `${s.done.length} runs ended, ${s.planned.length} planned.`),
+    h("p", { id: "status", "aria-live": "polite" }, s.running ? `Run ${s.running} is in progress.` : s.phase === "finished" ? "The session is done." : `Runs: ${s.done.length} ended, ${s.planned.length} planned.`),
     h("p", { id: "waiting", class: "soft" }),
     plotsCanvas,
     s.done.length > 0 && runsTable(s.done),

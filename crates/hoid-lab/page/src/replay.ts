@@ -18,7 +18,7 @@ export function play(run: RunData | null, place: HTMLElement, judged: string): v
   const curves = h("canvas", { class: "plots", role: "img", "aria-label": "The estimate over time" });
   const slider = h("input", { type: "range", min: "0", max: String(run.e.length - 1), step: "1", value: "0", "aria-label": "Time" });
   const speed = h("select", { "aria-label": "Speed" });
-  for (const factor of ["1", "2", "5", "10"]) speed.append(h("option", { value: factor, selected: factor === "2" }, `${factor} times as fast`));
+  for (const factor of ["1", "2", "5", "10"]) speed.append(h("option", { value: factor, selected: factor === "2" }, `Speed × ${factor}`));
   const clock = h("p", { class: "soft" });
   const toggle = button("Pause", () => {
     going = !going;

@@ -135,7 +135,7 @@ impl RunStart {
         let order = self.phases.first().map(|phase| phase.plant.order());
         let fits = |phase: &Phase| phase.plant.is_valid() && Some(phase.plant.order()) == order;
         if order.is_none() || !self.phases.iter().all(fits) {
-            let reason = "the matrices of its controlled element do not fit each other; the file was changed after \
+            let reason = "the matrices of its controlled element have inconsistent sizes; the file was changed after \
                           hoid lab wrote it";
             return Err(LabError::damaged(&stem.file("run.json"), reason));
         }

@@ -72,7 +72,8 @@ impl SessionPlan {
         let conditions = facts.config.condition.len();
         if let Some(wrong) = facts.plan.iter().find(|run| run.condition >= conditions) {
             let reason = format!(
-                "the plan names condition {} of {conditions}; the file was changed after hoid lab wrote it",
+                "a run has condition index {}, expected below {conditions}; the file was changed after hoid lab \
+                 wrote it",
                 wrong.condition
             );
             return Err(LabError::damaged(path, reason));

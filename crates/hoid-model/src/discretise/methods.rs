@@ -46,7 +46,7 @@ pub fn discretise(
         return Err(ModelError::OutOfRange {
             quantity: "delay tau in s",
             found: h.delay_s(),
-            expected: "at most a million samples; check the units of delay and sample time",
+            expected: "at most a million samples; check the units of the delay and the sample time",
         });
     }
     let held = matches!(method, Method::ZeroOrderHold | Method::FirstOrderHold);
@@ -57,8 +57,8 @@ pub fn discretise(
             return Err(ModelError::OutOfRange {
                 quantity: "delay tau in s",
                 found: h.delay_s(),
-                expected: "a whole number of samples for this method: round it, change the sample time, or use the zero-order \
-                           or first-order hold, which take any delay",
+                expected: "a whole number of samples for this method: round it, change the sample time, or use the \
+                           zero-order or first-order hold, which accept any delay",
             });
         }
     };

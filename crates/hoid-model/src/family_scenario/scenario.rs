@@ -119,7 +119,7 @@ impl FamilyScenario {
         for state in [&self.initial, &self.last] {
             let delay = state.controlled_element.delay_s();
             if delay != 0.0 {
-                let expected = "no delay: the delay of a task belongs to the operator";
+                let expected = "zero; add this delay to that of the operator";
                 return Err(wrong("delay of the controlled element in s", delay, expected));
             }
         }

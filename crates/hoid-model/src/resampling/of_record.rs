@@ -39,7 +39,7 @@ impl Record {
             let half = Decimated::by(factor, self.sample_time(), usize::MAX).map(|(_, kernel, _)| kernel.half());
             return Err(refuse(
                 format!(
-                    "{n} samples for a filter that reaches {} to each side",
+                    "{n} samples for a filter that extends {} samples to each side",
                     half.map_or_else(|| "too many".to_owned(), |half| half.to_string())
                 ),
                 "a longer record, or a smaller factor; use decimate off to keep the rate".to_owned(),

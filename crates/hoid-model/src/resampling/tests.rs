@@ -118,7 +118,7 @@ fn records_that_cannot_be_decimated_are_refused() {
     for n in [1, 10, half] {
         let error = Decimation::Auto.of(short(n)).unwrap_err();
         let expected = format!(
-            "decimation of run: found {n} samples for a filter that reaches {half} to each side, expected a longer record"
+            "decimation of run: found {n} samples for a filter that extends {half} samples to each side, expected a longer record"
         );
         assert!(error.to_string().starts_with(&expected), "{error}");
         assert!(Decimation::Off.of(short(n)).is_ok());

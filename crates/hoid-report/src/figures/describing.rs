@@ -209,7 +209,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         let ends = models.iter().flat_map(|m| m.omega_rad_s.iter()).chain(&omega);
         let (low, high) = ends.fold((f64::INFINITY, 0.0_f64), |(l, h), w| (l.min(*w), h.max(*w)));
         let level = Curve {
-            name: "unrelated runs stay below (95 %)".to_owned(),
+            name: "95 % limit for unrelated runs".to_owned(),
             kind: LineKind::Truth,
             shade: Shade::of_method(0),
             x: vec![low, high],

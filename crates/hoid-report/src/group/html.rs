@@ -45,6 +45,6 @@ impl GroupReport<'_> {
             return Vec::new();
         }
         let all = self.manifest.runs.len();
-        vec![format!("Left out: {left_out} of {all} runs, marked counts = false.")]
+        vec![format!("Runs left out (counts = false): {left_out} of {all}.")]
     }
 }

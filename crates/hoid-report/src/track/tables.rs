@@ -28,7 +28,7 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
         let options = trace.options();
         let model = match options.method.track_delay_s() {
             Some((from, to)) => format!(
-                "{}({}), tau_e tracked in {} to {} s",
+                "{}({}), tau_e tracked from {} to {} s",
                 options.structure.label(),
                 options.orders,
                 plain(from),
@@ -38,7 +38,7 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
         };
         let average = match trace.averaged() {
             1 => DASH.to_owned(),
-            n => format!("{n} rows, behind by {} s", plain(trace.averaging_delay_s())),
+            n => format!("{n} rows, delayed by {} s", plain(trace.averaging_delay_s())),
         };
         context! {
             name => t.section.name.clone(), method => options.method.name(), model, average,

@@ -68,9 +68,9 @@ impl Calibration {
         }
         if sum[0] == 0.0 && shares > 0.0 {
             return Err(ModelError::OutOfRange {
-                quantity: "variance of u without the parts of the remnant that are defined as a share of this variance",
+                quantity: "variance of u without the remnant parts that are given as a share of this variance",
                 found: 0.0,
-                expected: "more than zero: give a target, a disturbance or the gain of a part",
+                expected: "more than zero: give a target, a disturbance or a remnant part with a gain",
             });
         }
         let variance = sum[0] / (1.0 - shares);

@@ -87,7 +87,7 @@ impl HeldLoop {
         };
         if held.return_difference().abs() < MIN_RETURN_DIFFERENCE {
             return Err(ModelError::UnstableLoop {
-                reason: "the direct parts of operator and controlled element cancel within a sample".to_owned(),
+                reason: "operator and controlled element form an algebraic loop that has no solution".to_owned(),
             });
         }
         Ok(held)

@@ -130,7 +130,7 @@ impl Population {
         self.remnant_share.check("remnant share of the population", 0.0)?;
         self.followed.check("followed fraction of the target", 0.0)?;
         for (quantity, found, most) in [
-            ("chance of an infinite T_I", self.integrates, 1.0),
+            ("probability of an infinite T_I", self.integrates, 1.0),
             ("remnant share of the population", self.remnant_share.high, 0.9),
             ("offset of the population in rms", self.offset, 1e3),
             ("walk of the stick in rms per root second", self.walk_per_root_s, 1e3),
@@ -139,7 +139,7 @@ impl Population {
                 return Err(ModelError::OutOfRange {
                     quantity,
                     found,
-                    expected: "zero or more; a chance up to 1, a share up to 0.9",
+                    expected: "zero or more; a probability up to 1, a share up to 0.9",
                 });
             }
         }

@@ -17,7 +17,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "\"A large relative bias is obtained for m0 = 1\" by ARX.",
         place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
-        measure: "Magnitude of the median bias of a1, a2, b0 and b1 over the noise levels, C1, n_k* = 29.",
+        measure: "Magnitude of the median bias of a1, a2, b0 and b1 at each noise level, C1, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(large_at_first_order),
     },
@@ -26,7 +26,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "For m0 >= 2 the ARX \"estimation error in b0 and b1 is still around 50 % in most cases\".",
         place: "V.A.1, Fig. 5",
-        measure: "Magnitude of the median bias of b0 and b1 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29; its sign is shown next to it.",
+        measure: "Magnitude of the median bias of b0 and b1 for m0 = 2 to 4 at each noise level, C1, n_k* = 29; the bias of b0 at P_n = 0.1 is also shown with its sign.",
         plans: PLANS,
         source: Source::Data(b_around_fifty),
     },
@@ -35,7 +35,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "For m0 >= 2 \"ARX bias is diminished to acceptable values\", except for b0 and b1.",
         place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
-        measure: "Magnitude of the median bias of a1 and a2 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29.",
+        measure: "Magnitude of the median bias of a1 and a2 for m0 = 2 to 4 at each noise level, C1, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(acceptable_a),
     },
@@ -44,7 +44,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "\"Changes in model time delay (x-axis) produce a linear trend in computed relative bias\" of ARX.",
         place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
-        measure: "R^2 of the straight line through the median biases over n_k* = 25 to 30, by coefficient, m0 and noise level, C1.",
+        measure: "R^2 of a straight line fitted to the median biases at n_k* = 25 to 30, by coefficient, m0 and noise level, C1.",
         plans: PLANS,
         source: Source::Data(linear_in_delay),
     },
@@ -53,7 +53,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "ARX biases \"do not oscillate around zero and no optimal results are found for actual HO time delay\".",
         place: "6.1.1, Fig. C.1",
-        measure: "Magnitude of the median bias at n_k* = 29 less the smallest of the other delays, percentage points, by coefficient, C1.",
+        measure: "Magnitude of the median bias at n_k* = 29 minus the smallest magnitude at any other delay, percentage points, by coefficient, C1.",
         plans: PLANS,
         source: Source::Data(no_optimum),
     },
@@ -62,7 +62,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "\"ARX estimators provide poles at lower frequencies when smaller n_k* are chosen, and vice versa.\"",
         place: "V.A.1; 6.1.1, Figs. D.1 to D.4",
-        measure: "Median of the paired change of omega_nm from n_k* = 29 to the others, % of the true value, m0 = 2 to 4, C1.",
+        measure: "Median paired change in omega_nm from n_k* = 29 to each other delay, % of the true value, m0 = 2 to 4, C1.",
         plans: PLANS,
         source: Source::Data(lead_and_lag),
     },
@@ -71,8 +71,8 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "\"Increments in noise level give as a result a greater bias in general\" of ARX.",
         place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
-        measure: "Growth of the magnitude of the median bias from P_n = 0.1 to 0.2 and from 0.2 to 0.3, \
-                  percentage points, by coefficient, C1, n_k* = 29.",
+        measure: "Increase in the magnitude of the median bias from P_n = 0.1 to 0.2 and from 0.2 to 0.3, percentage \
+                  points, by coefficient, C1, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(more_noise),
     },
@@ -99,7 +99,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "In C2 \"K_e and T_L present a greater bias when compared to the results for C1, while estimations of omega_nm and zeta_nm are slightly improved\" (ARX).",
         place: "6.1.1, Figs. C.2, C.10",
-        measure: "Magnitude of the median bias in C2 less that in C1, percentage points, m0 = 2 to 4, n_k* = 29.",
+        measure: "Magnitude of the median bias in C2 minus that in C1, percentage points, m0 = 2 to 4, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(second_condition),
     },
@@ -108,7 +108,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "\"For higher remnant orders in simulation data, the location of poles moves\" to lower frequencies (ARX).",
         place: "V.A.2, Fig. 10; 6.1.1, Figs. D.1 to D.4",
-        measure: "Median bias of omega_nm at m0 = 3 less that at 2, and at 4 less that at 3, percentage points, C1 and C2, n_k* = 29.",
+        measure: "Median bias of omega_nm at m0 = 3 minus that at m0 = 2, and at m0 = 4 minus that at m0 = 3, percentage points, C1 and C2, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(poles_by_order),
     },
@@ -117,7 +117,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "\"The zero is located at lower frequencies for higher noise levels in ARX results.\"",
         place: "V.A.2, Fig. 10",
-        measure: "Growth of the median T_L (the zero is at 1 / T_L) from one noise level to the next, % of the true value, m0 = 2 to 4, C1.",
+        measure: "Increase in the median T_L (the zero is at 1 / T_L) from one noise level to the next, % of the true value, m0 = 2 to 4, C1.",
         plans: PLANS,
         source: Source::Data(zero_by_noise),
     },
@@ -126,7 +126,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "\"The correct location of poles is completely missed when a first-order remnant filter is simulated\" (ARX).",
         place: "6.1.1, Figs. D.1, 10",
-        measure: "Share of fits whose poles do not convert into omega_nm and zeta_nm, or have omega_nm wrong by more than 25 %, m0 = 1, C1 and C2.",
+        measure: "Share of fits whose poles do not convert to omega_nm and zeta_nm, or whose omega_nm is wrong by more than 25 %, m0 = 1, C1 and C2.",
         plans: PLANS,
         source: Source::Data(poles_missed),
     },
@@ -156,7 +156,7 @@ fn biases(
 
 fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|median bias| beyond 25 %");
+    let mut part = Part::new("|median bias| above 25 %");
     biases(
         study,
         &settings(&["C1"], &[1], &LEVELS),
@@ -211,7 +211,7 @@ fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut parts = Vec::new();
     for (orders, label) in [(&ORDERS[..1], "m0 = 1"), (&ORDERS[1..], "m0 >= 2")] {
-        let mut part = Part::new(&format!("R^2 over n_k* at least 0.9, {label}"));
+        let mut part = Part::new(&format!("R^2 of a straight line over n_k*, at least 0.9, {label}"));
         for at in settings(&["C1"], orders, &LEVELS) {
             for name in DISCRETE {
                 let queries = DELAYS.map(|nk| at.arx(&bias_of(name), nk));
@@ -226,7 +226,7 @@ fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn no_optimum(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|median bias| at 29 less the smallest at another delay above 0");
+    let mut part = Part::new("|median bias| at n_k* = 29 minus the smallest at another delay, above 0");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let queries = DELAYS.map(|nk| at.arx(&bias_of(name), nk));
@@ -247,8 +247,8 @@ fn no_optimum(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut lower = Part::new("omega_nm at smaller n_k* lower than at 29");
-    let mut higher = Part::new("omega_nm at n_k* = 30 higher than at 29");
+    let mut lower = Part::new("omega_nm at n_k* < 29 lower than at n_k* = 29");
+    let mut higher = Part::new("omega_nm at n_k* = 30 higher than at n_k* = 29");
     for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         let omega = |nk| at.arx("bias_omega_nm", nk);
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
@@ -265,7 +265,7 @@ fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn more_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("growth of |median bias| above 0");
+    let mut part = Part::new("increase in |median bias|, above 0");
     for at in settings(&["C1"], &ORDERS, &LEVELS[..2]) {
         let more = Setting {
             level: if at.level < 0.15 { 0.2 } else { 0.3 },
@@ -297,7 +297,7 @@ fn only_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let cells = settings(&["C1"], &HIGHER_ORDERS, &LEVELS);
     let mut gain = Part::new("|median bias| of K_e within 5 %");
     biases(study, &cells, &["K_e"], &mut gain, CLOSE_BIAS, false)?;
-    let mut others = Part::new("|median bias| of T_L, omega_nm, zeta_nm beyond 5 %");
+    let mut others = Part::new("|median bias| of T_L, omega_nm, zeta_nm above 5 %");
     biases(
         study,
         &cells,
@@ -315,8 +315,8 @@ pub(super) fn conditions(
     size: &dyn Fn(Setting, &str) -> Result<Value, String>,
     orders: &[usize],
 ) -> Result<Vec<Part>, String> {
-    let mut worse = Part::new("K_e and T_L: bias in C2 less that in C1 above 0");
-    let mut better = Part::new("omega_nm and zeta_nm: bias in C2 less that in C1 below 0");
+    let mut worse = Part::new("K_e and T_L: |bias| in C2 minus that in C1, above 0");
+    let mut better = Part::new("omega_nm and zeta_nm: |bias| in C2 minus that in C1, below 0");
     for at in settings(&["C1"], orders, &LEVELS) {
         let change = |name: &str| {
             let [first, second] = ["C1", "C2"].map(|condition| size(Setting { condition, ..at }, &bias_of(name)));
@@ -342,7 +342,7 @@ fn second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn poles_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("change of the median bias of omega_nm from each m0 to the next, below 0");
+    let mut part = Part::new("change in the median bias of omega_nm from each m0 to the next, below 0");
     for at in settings(&["C1", "C2"], &HIGHER_ORDERS[1..], &LEVELS) {
         let [lower, higher] =
             [at.m0 - 1, at.m0].map(|m0| study.median(&Setting { m0, ..at }.arx("bias_omega_nm", TRUE_DELAY)));
@@ -359,7 +359,7 @@ fn poles_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn zero_by_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("growth of the median T_L with the noise level above 0.1 %");
+    let mut part = Part::new("increase in the median T_L from each noise level to the next, above 0.1 %");
     for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS[..2]) {
         let more = Setting {
             level: if at.level < 0.15 { 0.2 } else { 0.3 },
@@ -373,7 +373,7 @@ fn zero_by_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn poles_missed(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("share of fits without the poles above 0.9");
+    let mut part = Part::new("share of fits that miss the poles, above 0.9");
     for at in settings(&["C1", "C2"], &[1], &LEVELS) {
         let omega = study.sample(&at.arx("bias_omega_nm", TRUE_DELAY))?;
         let missed: Vec<f64> = omega

@@ -21,7 +21,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"The remnant filter order no longer meaningfully affects the bias and accuracy in BJ estimation.\"",
         place: "V.A.1, Fig. 6; VIII; 6.1.2",
-        measure: "Median bias at m0 = 2 to 4 less that at m0 = 1, BJ(m* = m0), C1 and C2, n_k* = 29, percentage \
+        measure: "Median bias at m0 = 2 to 4 minus that at m0 = 1, BJ(m* = m0), C1 and C2, n_k* = 29, percentage \
                   points, by coefficient and noise level.",
         plans: PLANS,
         source: Source::Data(all_orders),
@@ -40,7 +40,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "BJ: \"results fluctuate around the bias of the remnant-free case at each model time delay\".",
         place: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
-        measure: "Median bias less that at P_n = 0, BJ(m* = m0), C1, n_k* = 25 to 30, percentage points, by coefficient, m0 and noise level.",
+        measure: "Median bias minus that at P_n = 0, BJ(m* = m0), C1, n_k* = 25 to 30, percentage points, by coefficient, m0 and noise level.",
         plans: PLANS,
         source: Source::Data(around_noise_free),
     },
@@ -49,7 +49,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"The BJ estimator creates lag or lead depending on the assumed model time delay, hence, a linear trend is also found.\"",
         place: "V.A.1, Fig. 6",
-        measure: "R^2 of the straight line through the median biases over n_k* = 25 to 30, BJ(m* = m0), by coefficient, m0 and noise level, C1.",
+        measure: "R^2 of a straight line fitted to the median biases at n_k* = 25 to 30, BJ(m* = m0), by coefficient, m0 and noise level, C1.",
         plans: PLANS,
         source: Source::Data(linear_in_delay),
     },
@@ -58,7 +58,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"BJ poles are placed at lower frequencies for smaller model time delays to create additional lag, and vice versa.\"",
         place: "6.1.2, Figs. D.5 to D.8",
-        measure: "Median of the paired change of omega_nm from n_k* = 29 to the others, % of the true value, BJ(m* = m0), C1.",
+        measure: "Median paired change in omega_nm from n_k* = 29 to each other delay, % of the true value, BJ(m* = m0), C1.",
         plans: PLANS,
         source: Source::Data(lead_and_lag),
     },
@@ -76,7 +76,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "Remnant-free: \"a remnant order equal to 2 produces the highest deviations\" of BJ.",
         place: "6.1.2, Figs. D.5 to D.8",
-        measure: "response_error of BJ(m* = 2) less the largest of the other orders without remnant, C1, n_k* = 25 to 28 and 30, %.",
+        measure: "response_error of BJ(m* = 2) minus the largest of the other orders, without remnant, C1, n_k* = 25 to 28 and 30, %.",
         plans: PLANS,
         source: Source::Data(second_order_worst),
     },
@@ -85,7 +85,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "Remnant time constant T_n at orders above 1: \"relative biases around 100 % are obtained\".",
         place: "6.1.2, Fig. C.5",
-        measure: "Magnitude of the median bias of T_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval next to it.",
+        measure: "Magnitude of the median bias of T_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; the bias with exact retrieval is also shown.",
         plans: PLANS,
         source: Source::Data(remnant_time_constant),
     },
@@ -94,7 +94,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"The estimation of the remnant gain also presents important errors for m-th orders greater than 1.\"",
         place: "6.1.2, Fig. C.5",
-        measure: "Magnitude of the median bias of K_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; of the exact retrieval next to it.",
+        measure: "Magnitude of the median bias of K_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; the bias with exact retrieval is also shown.",
         plans: PLANS,
         source: Source::Data(remnant_gain),
     },
@@ -103,7 +103,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "In C2 \"K_e and T_L associated with the HO zero present a less precise estimation, while the neuromuscular dynamics are better captured\" (BJ).",
         place: "6.1.2, Figs. C.4, C.12",
-        measure: "Median |bias| in C2 less that in C1, percentage points, BJ(m* = m0), n_k* = 29, by m0 and noise level.",
+        measure: "Median |bias| in C2 minus that in C1, percentage points, BJ(m* = m0), n_k* = 29, by m0 and noise level.",
         plans: PLANS,
         source: Source::Data(second_condition),
     },
@@ -111,7 +111,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn all_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|difference of the median bias from that at m0 = 1| within 5 points");
+    let mut part = Part::new("|median bias minus that at m0 = 1| within 5 points");
     for at in settings(&["C1", "C2"], &HIGHER_ORDERS, &LEVELS) {
         for name in DISCRETE {
             let first = study.median(&Setting { m0: 1, ..at }.bj(&bias_of(name), 1, TRUE_DELAY))?;
@@ -141,7 +141,7 @@ fn around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut parts = Vec::new();
     for (is_true, label) in [(true, "n_k* = 29"), (false, "other n_k*")] {
-        let mut part = Part::new(&format!("|median bias less that at P_n = 0| within 5 points, {label}"));
+        let mut part = Part::new(&format!("|median bias minus that at P_n = 0| within 5 points, {label}"));
         for at in settings(&["C1"], &ORDERS, &LEVELS) {
             for nk in DELAYS.into_iter().filter(|nk| (*nk == TRUE_DELAY) == is_true) {
                 for name in DISCRETE {
@@ -158,7 +158,7 @@ fn around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("R^2 over n_k* at least 0.9");
+    let mut part = Part::new("R^2 of a straight line over n_k*, at least 0.9");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let queries = DELAYS.map(|nk| at.bj(&bias_of(name), at.m0, nk));
@@ -171,8 +171,8 @@ fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut lower = Part::new("omega_nm at smaller n_k* lower than at 29");
-    let mut higher = Part::new("omega_nm at n_k* = 30 higher than at 29");
+    let mut lower = Part::new("omega_nm at n_k* < 29 lower than at n_k* = 29");
+    let mut higher = Part::new("omega_nm at n_k* = 30 higher than at n_k* = 29");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         let omega = |nk| at.bj("bias_omega_nm", at.m0, nk);
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
@@ -202,7 +202,7 @@ fn almost_exact(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("response_error of m* = 2 less the largest of the others above 0");
+    let mut part = Part::new("response_error of m* = 2 minus the largest of the others, above 0");
     for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
         let queries = ORDERS.map(|m| WITHOUT_REMNANT.bj("response_error", m, nk));
         let found = study.of(&queries, &|s| {
@@ -251,7 +251,7 @@ fn remnant_time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 }
 
 fn remnant_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
-    let part = Part::new("|median bias| of K_n beyond 25 %");
+    let part = Part::new("|median bias| of K_n above 25 %");
     remnant(evidence, "K_n", part, &|part, label, found| {
         part.above(label, found, LARGE_BIAS)
     })

@@ -18,7 +18,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"The important bias found in first-order remnant order simulations is now highly reduced\" by BJ.",
         place: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
-        measure: "Median |bias| of BJ(m* = 1) over that of ARX, m0 = 1, C1, n_k* = 29, by coefficient and noise level.",
+        measure: "Median |bias| of BJ(m* = 1) divided by that of ARX, m0 = 1, C1, n_k* = 29, by coefficient and noise level.",
         plans: PLANS,
         source: Source::Data(reduced_at_first_order),
     },
@@ -27,7 +27,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"BJ offers a 5000 % more accurate estimation when the remnant order is m* = 1.\"",
         place: "VII",
-        measure: "Median |bias| of ARX over that of BJ(m* = 1), m0 = 1, C1, n_k* = 29: around 50 times.",
+        measure: "Median |bias| of ARX divided by that of BJ(m* = 1), m0 = 1, C1, n_k* = 29: around 50.",
         plans: PLANS,
         source: Source::Data(fifty_times),
     },
@@ -36,8 +36,8 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"BJ presents more robustness than ARX when facing high noise levels.\"",
         place: "VIII; Conclusions of Part II",
-        measure: "Change of the median bias from P_n = 0.1 to 0.3: its magnitude for BJ(m* = m0) less that for \
-                  ARX, C1, n_k* = 29, percentage points.",
+        measure: "Magnitude of the change in the median bias from P_n = 0.1 to 0.3: BJ(m* = m0) minus ARX, C1, n_k* = \
+                  29, percentage points.",
         plans: PLANS,
         source: Source::Data(more_robust),
     },
@@ -55,7 +55,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "Except for the remnant-free case, \"the BJ model always outperforms the ARX one, both in magnitude and phase estimation\".",
         place: "6.1.2, Figs. D.9, D.18",
-        measure: "Median of the paired difference of response_error, the root mean square of |H - H0| / |H0| at the lines of the forcing function, BJ(m* = m0) less ARX, C1 and C2, n_k* = 29, %.",
+        measure: "Median paired difference in response_error (the root mean square of |H - H0| / |H0| at the lines of the forcing function), BJ(m* = m0) minus ARX, C1 and C2, n_k* = 29, %.",
         plans: PLANS,
         source: Source::Data(outperforms),
     },
@@ -64,7 +64,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"In remnant-free cases, BJ models present higher deviations than ARX models\" at wrong delays.",
         place: "6.1.2, Figs. D.5 to D.8",
-        measure: "response_error of BJ(m*) minus that of ARX without remnant, n_k* = 25 to 28 and 30, C1, m* = 1 to 4, %.",
+        measure: "response_error of BJ(m*) minus that of ARX, without remnant, n_k* = 25 to 28 and 30, C1, m* = 1 to 4, %.",
         plans: PLANS,
         source: Source::Data(worse_without_remnant),
     },
@@ -72,7 +72,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn reduced_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("median |bias| of BJ over that of ARX below 0.25");
+    let mut part = Part::new("median |bias| of BJ divided by that of ARX, below 0.25");
     for at in settings(&["C1"], &[1], &LEVELS) {
         for name in DISCRETE {
             let queries = [at.bj(&bias_of(name), 1, TRUE_DELAY), at.arx(&bias_of(name), TRUE_DELAY)];
@@ -88,7 +88,7 @@ fn reduced_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> 
 
 fn fifty_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("median |bias| of ARX over that of BJ from 25 to 75");
+    let mut part = Part::new("median |bias| of ARX divided by that of BJ, from 25 to 75");
     for at in settings(&["C1"], &[1], &LEVELS) {
         for name in DISCRETE {
             let queries = [at.bj(&bias_of(name), 1, TRUE_DELAY), at.arx(&bias_of(name), TRUE_DELAY)];
@@ -104,7 +104,7 @@ fn fifty_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn more_robust(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|change| of BJ minus that of ARX below 0");
+    let mut part = Part::new("|change| of BJ minus that of ARX, below 0");
     for at in settings(&["C1"], &ORDERS, &[0.1]) {
         let noisy = Setting { level: 0.3, ..at };
         for name in DISCRETE {
@@ -126,7 +126,7 @@ fn more_robust(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn half_the_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("reduction of the median |bias| from 25 to 75 %");
+    let mut part = Part::new("reduction in the median |bias|, from 25 to 75 %");
     for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         for name in DISCRETE {
             let queries = [
@@ -144,7 +144,7 @@ fn half_the_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn outperforms(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("response_error of BJ minus that of ARX below 0");
+    let mut part = Part::new("response_error of BJ minus that of ARX, below 0");
     for at in settings(&["C1", "C2"], &ORDERS, &LEVELS) {
         let pair = [
             at.bj("response_error", at.m0, TRUE_DELAY),
@@ -157,7 +157,7 @@ fn outperforms(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn worse_without_remnant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("response_error of BJ minus that of ARX above 0");
+    let mut part = Part::new("response_error of BJ minus that of ARX, above 0");
     for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
         let arx = study.median(&WITHOUT_REMNANT.arx("response_error", nk))?;
         for m in ORDERS {

@@ -75,7 +75,7 @@ impl<'a> Study<'a> {
         let name = &self.results.plan.name;
         match self.results.count(query) {
             1 => {}
-            n => return Err(format!("the study {name} has {n} estimators of {query}, expected one")),
+            n => return Err(format!("the study {name} has {n} estimators that match {query}, expected one")),
         }
         if !self.results.has_quantity(query) {
             return Err(format!("the study {name} has no column for {query}"));
@@ -86,7 +86,7 @@ impl<'a> Study<'a> {
     /// True parameters after the change in the first cell that a query selects.
     pub fn truth(&self, query: &Query) -> Result<TrueState, String> {
         let cells = self.results.cells(query);
-        let cell = cells.first().ok_or_else(|| format!("no cell has {query}"))?;
+        let cell = cells.first().ok_or_else(|| format!("no cell matches {query}"))?;
         Ok(cell.truth()[1])
     }
 
@@ -198,7 +198,7 @@ impl<'a> Study<'a> {
             return Ok(NO_VALUE);
         };
         let Some(midpoint_s) = cell.resolved.scenario().schedule.change_s() else {
-            return Err(format!("nothing changes in {query}"));
+            return Err(format!("the controlled element does not change in {query}"));
         };
         let end = traces.times_s.last().copied().unwrap_or(midpoint_s);
         let level = |from_s: f64, to_s: f64| {
@@ -229,7 +229,7 @@ impl<'a> Study<'a> {
     fn trace(&self, query: &Query, parameter: &str) -> Result<(&'a TraceSummary, [f64; 2]), String> {
         let missing = || {
             format!(
-                "the study {} has no traces of {parameter} of one {query}",
+                "the study {} has no traces of {parameter} for {query}",
                 self.results.plan.name
             )
         };

@@ -24,7 +24,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "Recursive BJ is expected to \"Diminish the huge bias encountered in recursive ARX results for a first-order remnant filter\".",
         place: PLACE,
-        measure: "Magnitude of the bias of the median trace over the last 30.72 s, RPEM less RLS, m0 = 1, C3 to C6, by coefficient and noise level, percentage points.",
+        measure: "Magnitude of the bias of the median trace over the last 30.72 s, RPEM minus RLS, m0 = 1, C3 to C6, by coefficient and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(diminished),
     },
@@ -33,7 +33,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "... to \"Solve the instabilities in T_L online estimation when the controlled element acts as a second-order integrator\".",
         place: PLACE,
-        measure: "Share of runs in which T_L has an RMS error beyond 100 % or no value, RPEM over RLS, C2, by m0: below 1/4.",
+        measure: "Share of runs in which T_L has an RMS error above 100 % or no value, RPEM divided by RLS, C2, by m0: below 1/4.",
         plans: PLANS,
         source: Source::Data(t_l_stable),
     },
@@ -42,7 +42,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "... to \"Improve the stability of the transitions between estimations from controlled elements with first- to second-order integrator dynamics\".",
         place: PLACE,
-        measure: "Mean interquartile range over runs of the trace in the 10.24 s after t_M, RPEM less RLS, C3 and C4, K_e, T_L and K_e_dot, by m0 and noise level, percentage points.",
+        measure: "Interquartile range of the trace over the runs, averaged over the 10.24 s after t_M, RPEM minus RLS, C3 and C4, K_e, T_L and K_e_dot, by m0 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(transitions),
     },
@@ -59,8 +59,8 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "expect-depends-on-start",
         theme: Theme::Recursive,
         statement: "... to \"Be quite dependent on the initial conditions of the discrete-time parameters\".",
-        place: "6.2.2; V.B makes it \"independent of initial conditions set by the user\"",
-        measure: "RPEM from the starts of Table 6.1 less RPEM from the batch fit of the first 30.72 s, C4, P_n = .1, by start, m0 and operator parameter: |median paired difference of the RMS error| and |difference of the bias over the last 30.72 s|, beyond 5 points.",
+        place: "6.2.2; V.B calls it \"independent of initial conditions set by the user\"",
+        measure: "RPEM started from Table 6.1 minus RPEM started from the batch fit of the first 30.72 s, C4, P_n = 0.1, by start, m0 and operator parameter: |median paired difference in RMS error| and |difference in bias over the last 30.72 s|, above 5 points.",
         plans: &["recursive-starts"],
         source: Source::Data(depends_on_start),
     },
@@ -68,7 +68,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn diminished(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("|bias| of RPEM minus that of RLS below 0");
+    let mut part = Part::new("|bias| of RPEM minus that of RLS, below 0");
     for at in settings(&["C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
         for name in DISCRETE {
             let rls = study.trace_bias(&at.rls(""), name)?.abs();
@@ -88,7 +88,7 @@ fn failed_share(errors: &[Vec<f64>]) -> f64 {
 
 fn t_l_stable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("share of runs with an RMS error of T_L beyond 100 %, RPEM over RLS, below 1/4");
+    let mut part = Part::new("share of runs with an RMS error of T_L above 100 %: RPEM divided by RLS below 1/4");
     for m0 in ORDERS {
         let at = settings(&["C2"], &[m0], &RECURSIVE_LEVELS);
         let of = |one: fn(Setting) -> Query| at.iter().map(|at| one(*at)).collect::<Vec<_>>();
@@ -113,7 +113,7 @@ fn transitions(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for name in GAINS {
         let mut part = Part::new(&format!(
-            "{name}: interquartile range of RPEM minus that of RLS below 0"
+            "{name}: interquartile range of RPEM minus that of RLS, below 0"
         ));
         for at in settings(&["C3", "C4"], &ORDERS, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_range(&query, name, TRANSITION_S));
@@ -147,8 +147,8 @@ fn low_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn depends_on_start(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-starts")?;
-    let mut whole = Part::new("|difference of the RMS error from 10 s on| beyond 5 points");
-    let mut last = Part::new("|difference of the bias over the last 30.72 s| beyond 5 points");
+    let mut whole = Part::new("|difference in RMS error from 10 s on| above 5 points");
+    let mut last = Part::new("|difference in bias over the last 30.72 s| above 5 points");
     for at in settings(&["C4"], &ORDERS, &LEVELS[..1]) {
         for start in STARTS {
             for name in OPERATOR {

@@ -19,7 +19,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::InitialConditions,
         statement: "\"The medians of relative bias differences are null or close to zero\" for all starts.",
         place: "6.1.4, Figs. F.1 to F.8",
-        measure: "Median of the paired difference of the bias from that of the base start, percentage points, all starts, coefficients, n_k* = 26 to 30, m0 and noise levels.",
+        measure: "Median paired difference in bias from the base start, percentage points, for all starts, coefficients, orders m0, noise levels and n_k* = 26 to 30.",
         plans: PLANS,
         source: Source::Data(medians),
     },
@@ -28,7 +28,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::InitialConditions,
         statement: "\"Several particular simulations can lead to considerable differences with respect to the base case.\"",
         place: "6.1.4, Figs. F.1 to F.8",
-        measure: "Share of fits whose b0 differs by more than 25 % of the true value from that of the base start, over all cells, by start: more than 1 in 1000.",
+        measure: "Share of fits whose b0 differs from that of the base start by more than 25 % of the true value, over all cells, by start: more than 1 in 1000.",
         plans: PLANS,
         source: Source::Data(single_runs),
     },
@@ -37,7 +37,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::InitialConditions,
         statement: "\"The BJ model optimization is more sensitive to high initial deviations for the poles than for the zero location.\"",
         place: "6.1.4, Figs. F.1 to F.8; Conclusions of Part II",
-        measure: "Mean |difference| of the bias of b0 and b1 from that of the base start: IC1 and IC2 (a changed) less IC3 and IC6 (b changed), at least 0.1 percentage points.",
+        measure: "Mean |difference in bias| of b0 and b1 from the base start: IC1 and IC2 (a changed) minus IC3 and IC6 (b changed), at least 0.1 percentage points.",
         plans: PLANS,
         source: Source::Data(poles_matter),
     },
@@ -46,7 +46,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::InitialConditions,
         statement: "IC3, closest to the reference: \"relative bias results are even improved when compared to the base case\".",
         place: "6.1.4, Fig. F.3",
-        measure: "Mean of the paired difference of |bias|, IC3 less base, at least 0.1 percentage points smaller, n_k* = 29, by coefficient, m0 and noise level.",
+        measure: "Mean paired difference in |bias|, IC3 minus base start, below -0.1 percentage points, n_k* = 29, by coefficient, m0 and noise level.",
         plans: PLANS,
         source: Source::Data(third_improves),
     },
@@ -55,7 +55,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::InitialConditions,
         statement: "\"Initial conditions with high deviations from real values may lead to convergence failure.\"",
         place: "VII; 6.1.4",
-        measure: "Share of searches that do not converge, or end at a loss more than 1 % above that of the base start, n_k* = 29, over all cells with remnant, by start, IC1 to IC8 and three with high deviations (as f1 = .5, f2 = .3, b0 = b1 = 1, d1 = .5): more than 1 in 100.",
+        measure: "Share of searches that do not converge, or end at a loss more than 1 % above that of the base start, n_k* = 29, over all cells with remnant, by start (IC1 to IC8, and three with high deviations, such as f1 = .5, f2 = .3, b0 = b1 = 1, d1 = .5): more than 1 in 100.",
         plans: PLANS,
         source: Source::Data(convergence),
     },
@@ -64,7 +64,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::InitialConditions,
         statement: "Convergence failure is \"quite relevant regarding PEM initialization by a prior OLS estimation\", which may be highly biased.",
         place: "VII",
-        measure: "Share of PEM fits from OLS that fail, do not converge or have a1 off by more than 25 %, m0 = 1, C1 to C6 and all noise levels, first and last 30.72 s: more than 1 in 100. The search here takes zero initial states first, then estimates them.",
+        measure: "Share of PEM fits from OLS that fail, do not converge or have an error of a1 above 25 %, m0 = 1, C1 to C6 and all noise levels, first and last 30.72 s: more than 1 in 100. The search here first assumes zero initial states, then estimates them.",
         plans: &["recursive"],
         source: Source::Data(from_ols),
     },
@@ -106,7 +106,7 @@ fn medians(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn single_runs(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("initial-conditions")?;
-    let mut part = Part::new("share of differences beyond 25 points above 0.001");
+    let mut part = Part::new("share of differences larger than 25 points, above 0.001");
     for start in STARTS {
         let mut beyond = Vec::new();
         for at in settings(&["C1"], &ORDERS, &LEVELS) {
@@ -127,7 +127,7 @@ fn mean_size(values: &[f64]) -> f64 {
 
 fn poles_matter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("initial-conditions")?;
-    let mut part = Part::new("mean |difference| from starts with other a less that with other b above 0.1 points");
+    let mut part = Part::new("mean |difference| for starts with a changed minus that with b changed, above 0.1 points");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for nk in IC_DELAYS {
             for name in ["b0", "b1"] {
@@ -146,7 +146,7 @@ fn poles_matter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn third_improves(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("initial-conditions")?;
-    let mut part = Part::new("mean difference of |bias|, IC3 less base, below -0.1 points");
+    let mut part = Part::new("mean difference in |bias|, IC3 minus base start, below -0.1 points");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let of = |start| fit(at, &bias_of(name), 29, start);
@@ -159,11 +159,11 @@ fn third_improves(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn convergence(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("initial-conditions")?;
-    let mut near = Part::new("IC1 to IC8: share of searches that fail above 0.01");
+    let mut near = Part::new("IC1 to IC8: share of failed searches above 0.01");
     for start in STARTS {
         near.above(start.to_owned(), failures(study, "BJ", start)?, 0.01);
     }
-    let mut far = Part::new("high deviations: share of searches that fail above 0.01");
+    let mut far = Part::new("high deviations: share of failed searches above 0.01");
     for start in FAR_STARTS {
         far.above(start.to_owned(), failures(study, "BJ far", start)?, 0.01);
     }
@@ -194,7 +194,7 @@ fn failures(study: Study<'_>, name: &str, start: &str) -> Result<Value, String> 
 
 fn from_ols(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("share of fits from OLS that go wrong above 0.01");
+    let mut part = Part::new("share of failed fits from OLS above 0.01");
     for name in ["PEM first", "PEM last"] {
         let mut wrong = Vec::new();
         for at in settings(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {

@@ -14,7 +14,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Noise,
         statement: "\"The average obtained noise level only presents small deviations with respect to the demanded ones.\"",
         place: "A.4, Fig. A.1",
-        measure: "Magnitude of the mean obtained level, (var u - var u0) / var u, less the demanded one, C1, m0 = 1 to 4, 18 levels: within 0.02.",
+        measure: "Mean obtained level, (var u - var u0) / var u, minus the demanded level, in magnitude, C1, m0 = 1 to 4, 18 levels: within 0.02.",
         plans: &["noise-level"],
         source: Source::Data(mean_level),
     },
@@ -32,7 +32,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Noise,
         statement: "The remnant time constant \"does not have much effect on the estimation accuracy\".",
         place: "VII; 6 (\"low relevance\")",
-        measure: "Median bias at T_n = 0.2 s less that at 0.06 s, C1 and C2, n_k* = 29, BJ(m* = 1) and ARX at m0 = 2 to 4, percentage points.",
+        measure: "Median bias at T_n = 0.2 s minus that at 0.06 s, C1 and C2, n_k* = 29, BJ(m* = 1), and ARX at m0 = 2 to 4, percentage points.",
         plans: &["remnant-time-constant"],
         source: Source::Data(time_constant),
     },
@@ -41,7 +41,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Noise,
         statement: "Decimation with a Pade delay: \"the BJ algorithm performance does not have to necessarily diminish in this case\".",
         place: "Conclusions of Part II; VII",
-        measure: "Median of the paired difference of response_error, BJ with Pade of order 1 to 3 at Ts = 0.02 to 0.08 s less BJ at 0.01 s, C1, m0 = 1 and 2: within 5 points.",
+        measure: "Median paired difference in response_error, BJ with a Pade delay of order 1 to 3 at Ts = 0.02 to 0.08 s minus BJ at 0.01 s, C1, m0 = 1 and 2: within 5 points.",
         plans: &["decimation"],
         source: Source::Data(pade),
     },
@@ -49,7 +49,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn mean_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("noise-level")?;
-    let mut part = Part::new("|mean obtained less demanded level| within 0.02");
+    let mut part = Part::new("|mean obtained minus demanded level| within 0.02");
     for at in settings(&["C1"], &ORDERS, &specified_levels()) {
         let mut found = study.mean(&at.query("noise_level_obtained"))?;
         found.value -= at.level;
@@ -79,7 +79,7 @@ fn time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("remnant-time-constant")?;
     let mut parts = Vec::new();
     for (name, orders) in [("BJ", &ORDERS[..]), ("ARX", &HIGHER_ORDERS[..])] {
-        let mut part = Part::new(&format!("{name}: |change of the median bias| within 5 points"));
+        let mut part = Part::new(&format!("{name}: |change in the median bias| within 5 points"));
         for at in settings(&["C1", "C2"], orders, &[0.1, 0.3]) {
             for coefficient in DISCRETE {
                 let quantity = bias_of(&if name == "BJ" {
@@ -101,7 +101,7 @@ fn pade(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut parts = Vec::new();
     for order in 1..=3 {
         let mut part = Part::new(&format!(
-            "Pade of order {order}: response_error less that at 0.01 s within 5 points"
+            "Pade of order {order}: response_error minus that at 0.01 s, within 5 points"
         ));
         for m0 in [1, 2] {
             let fit = |name: &str, decimate| {

@@ -24,7 +24,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"When simulations with m0 >= 2 are conducted, the bias in ARX estimations is reduced by almost 10 times.\"",
         place: "V.B, Fig. 12",
-        measure: "Bias of the median trace over the last 30.72 s at m0 = 1 over that at m0 = 2 to 4, RLS, C4, coefficients; and median RMS error of omega_nm and zeta_nm likewise.",
+        measure: "Bias of the median trace over the last 30.72 s at m0 = 1 divided by that at m0 = 2 to 4, RLS, C4, for the coefficients; the same ratio of the median RMS error for omega_nm and zeta_nm.",
         plans: &["recursive"],
         source: Source::Data(ten_times),
     },
@@ -42,7 +42,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "Batch-fitting results \"also represent the real functioning of RLS and RPEM algorithms in recursive estimation\".",
         place: "V.B, Figs. 11, 12",
-        measure: "Bias of the median trace over the last 30.72 s less the median bias of the batch fit of that span, C4, percentage points, by coefficient, m0, noise level.",
+        measure: "Bias of the median trace over the last 30.72 s minus the median bias of the batch fit of that span, C4, percentage points, by coefficient, m0 and noise level.",
         plans: &["recursive"],
         source: Source::Data(like_batch),
     },
@@ -51,7 +51,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "m0 = 1: \"condition a2 > 0 is not fulfilled at multiple occasions\", with \"important divergences in the computation of T_L\".",
         place: "6.2.1, Figs. G.1, G.5",
-        measure: "Median share of the trace that does not convert at m0 = 1 and at m0 = 2 to 4, RLS with matrix, C3.",
+        measure: "Median share of the trace that does not convert to an operator at m0 = 1 and at m0 = 2 to 4, RLS with matrix, C3.",
         plans: &["recursive-arx"],
         source: Source::Data(violates),
     },
@@ -60,7 +60,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"Nonetheless the estimation of the HO gain is always accurate\" (recursive ARX).",
         place: "6.2.1, Figs. G.5 to G.8",
-        measure: "Magnitude of the bias of the median trace of K_e over the last 30.72 s, RLS with matrix, C3, m0 = 2 to 4; at m0 = 1, where models do not convert, of the static gain at the end.",
+        measure: "Magnitude of the bias of the median trace of K_e over the last 30.72 s, RLS with matrix, C3, m0 = 2 to 4; at m0 = 1, where models do not convert to an operator, the bias of the static gain at the end.",
         plans: &["recursive-arx"],
         source: Source::Data(gain),
     },
@@ -69,7 +69,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"When the simulation remnant order is increased, the bias is heavily reduced\" (recursive ARX).",
         place: "6.2.1, Figs. G.1 to G.4",
-        measure: "Bias of the median trace over the last 30.72 s at m0 = 2 to 4 over that at m0 = 1, RLS with matrix, C3, by coefficient.",
+        measure: "Bias of the median trace over the last 30.72 s at m0 = 2 to 4 divided by that at m0 = 1, RLS with matrix, C3, by coefficient.",
         plans: &["recursive-arx"],
         source: Source::Data(heavily_reduced),
     },
@@ -78,7 +78,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"An increment in noise level clearly produces a bigger error in b0 and b1 parameters\" (recursive ARX).",
         place: "6.2.1, Figs. G.1 to G.4",
-        measure: "Growth of the magnitude of the bias of the median trace over the last 30.72 s from one noise level to the next, m0 = 2 to 4, C3, percentage points.",
+        measure: "Increase in the magnitude of the bias of the median trace over the last 30.72 s from one noise level to the next, m0 = 2 to 4, C3, percentage points.",
         plans: &["recursive-arx"],
         source: Source::Data(more_noise),
     },
@@ -86,7 +86,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut arx = Part::new("RLS: |bias of the median trace| beyond 25 %");
+    let mut arx = Part::new("RLS: |bias of the median trace| above 25 %");
     let mut bj = Part::new("RPEM: |bias of the median trace| within 5 %");
     for at in settings(&["C4"], &[1], &RECURSIVE_LEVELS) {
         for name in DISCRETE {
@@ -103,8 +103,8 @@ fn large_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn ten_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut discrete = Part::new("coefficients: bias at m0 = 1 over that at higher m0 from 5 to 15");
-    let mut nms = Part::new("omega_nm and zeta_nm: RMS error at m0 = 1 over that at higher m0 from 5 to 15");
+    let mut discrete = Part::new("coefficients: bias at m0 = 1 divided by that at higher m0, from 5 to 15");
+    let mut nms = Part::new("omega_nm and zeta_nm: RMS error at m0 = 1 divided by that at higher m0, from 5 to 15");
     for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         let first = Setting { m0: 1, ..at };
         for name in DISCRETE {
@@ -121,7 +121,7 @@ fn ten_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn persistent(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("|bias of the median trace| beyond 5 %");
+    let mut part = Part::new("|bias of the median trace| above 5 %");
     for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         for name in NMS {
             part.above(at.label(name), study.trace_bias(&at.rls(""), name)?.abs(), CLOSE_BIAS);
@@ -132,8 +132,8 @@ fn persistent(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn like_batch(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut arx = Part::new("|RLS less OLS| within 5 points");
-    let mut bj = Part::new("|RPEM less PEM| within 5 points");
+    let mut arx = Part::new("|RLS minus OLS| within 5 points");
+    let mut bj = Part::new("|RPEM minus PEM| within 5 points");
     for at in settings(&["C4"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
         for name in DISCRETE {
             let with_f_name = with_f(name);
@@ -156,8 +156,8 @@ fn like_batch(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn violates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
-    let mut first = Part::new("m0 = 1: share that does not convert above 0.25");
-    let mut others = Part::new("m0 >= 2: share that does not convert below 0.01");
+    let mut first = Part::new("m0 = 1: share of the trace that does not convert, above 0.25");
+    let mut others = Part::new("m0 >= 2: share of the trace that does not convert, below 0.01");
     for at in settings(&["C3"], &[1, 2, 3, 4], &LEVELS) {
         let found = study.median(&at.rls("share_not_convertible"))?;
         match at.m0 {
@@ -191,7 +191,7 @@ fn gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn heavily_reduced(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
-    let mut part = Part::new("|bias| at higher m0 over that at m0 = 1 below 0.25");
+    let mut part = Part::new("|bias| at higher m0 divided by that at m0 = 1, below 0.25");
     for at in settings(&["C3"], &HIGHER_ORDERS, &LEVELS) {
         for name in DISCRETE {
             let [reference, found] = [Setting { m0: 1, ..at }, at].map(|at| study.trace_bias(&at.rls(""), name));
@@ -203,7 +203,7 @@ fn heavily_reduced(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn more_noise(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive-arx")?;
-    let mut part = Part::new("growth of |bias| with the noise level above 0");
+    let mut part = Part::new("increase in |bias| from each noise level to the next, above 0");
     for at in settings(&["C3"], &HIGHER_ORDERS, &LEVELS[..2]) {
         let more = Setting {
             level: if at.level < 0.15 { 0.2 } else { 0.3 },

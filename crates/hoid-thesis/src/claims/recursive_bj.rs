@@ -20,7 +20,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "For m0 >= 2 RLS \"still shows a considerable bias with respect to BJ outcome\".",
         place: "V.B, Fig. 11",
-        measure: "Magnitude of the bias of the median trace over the last 30.72 s, RLS less RPEM, C4, by coefficient, m0 and noise level, percentage points.",
+        measure: "Magnitude of the bias of the median trace over the last 30.72 s, RLS minus RPEM, C4, by coefficient, m0 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(less_bias),
     },
@@ -29,7 +29,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"ARX converges to its final estimation 5 times faster\"; \"the BJ structure needs 500 % more time to process\".",
         place: "V.B; VII; VIII, Figs. 11, 12",
-        measure: "Settling time (90 % of its own step) of the median trace of RPEM over that of RLS, C4, by parameter, m0 and noise level: from 2.5 to 7.5.",
+        measure: "Settling time (to 90 % of its own step) of the median trace of RPEM divided by that of RLS, C4, by parameter, m0 and noise level: from 2.5 to 7.5.",
         plans: PLANS,
         source: Source::Data(five_times),
     },
@@ -38,7 +38,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"The RPEM algorithm denotes a slower adaptation capacity.\"",
         place: "V.B, Figs. 11, 12",
-        measure: "Settling time (90 % of its own step) of the median trace, RPEM less RLS, C4, by parameter, m0 and noise level, s.",
+        measure: "Settling time (to 90 % of its own step) of the median trace, RPEM minus RLS, C4, by parameter, m0 and noise level, s.",
         plans: PLANS,
         source: Source::Data(slower),
     },
@@ -47,7 +47,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "RPEM \"may turn into divergence problems due to excessive oscillations in some cases\".",
         place: "V.B",
-        measure: "Share of runs of RPEM with a coefficient beyond 10 or not a number, and with an RMS error of T_L beyond 100 %, C1 to C6, all m0 and noise levels: more than 1 in 1000.",
+        measure: "Share of RPEM runs in which a coefficient exceeds 10 or is not a number, and share in which the RMS error of T_L exceeds 100 %, C1 to C6, all m0 and noise levels: more than 1 in 1000.",
         plans: PLANS,
         source: Source::Data(diverges),
     },
@@ -56,7 +56,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "For m0 >= 2 \"ARX offers more stable, precise results than BJ in K_e, T_L and K_e_dot, while the BJ model provides a more adequate outcome in NMS parameters\".",
         place: "V.B, Fig. 12; VII",
-        measure: "Median of the paired difference of the RMS error of the trace, RPEM less RLS, C4, m0 = 2 to 4, by parameter and noise level.",
+        measure: "Median paired difference in the RMS error of the trace, RPEM minus RLS, C4, m0 = 2 to 4, by parameter and noise level.",
         plans: PLANS,
         source: Source::Data(better_gain),
     },
@@ -65,7 +65,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"Except for a first-order remnant, the RLS algorithm usually captures the HO gain and zero with 0-5 % less bias.\"",
         place: "VIII",
-        measure: "100 (1 - RLS / RPEM) of the magnitude of the bias of the median trace of K_e and T_L over the last 30.72 s, C4, m0 = 2 to 4: from 0 to 5 %; median RMS error of the trace likewise.",
+        measure: "100 (1 - RLS / RPEM) for the magnitude of the bias of the median trace of K_e and T_L over the last 30.72 s, C4, m0 = 2 to 4: from 0 to 5 %; the same for the median RMS error of the trace.",
         plans: PLANS,
         source: Source::Data(zero_to_five),
     },
@@ -74,7 +74,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"BJ is able to approximate the real Neuro-Muscular (NMS) dynamics with 25 % less error.\"",
         place: "VIII",
-        measure: "100 (1 - RPEM / RLS) of the magnitude of the bias of the median trace of omega_nm and zeta_nm over the last 30.72 s, C4, m0 = 2 to 4: from 12.5 to 37.5 %; median RMS error of the trace likewise.",
+        measure: "100 (1 - RPEM / RLS) for the magnitude of the bias of the median trace of omega_nm and zeta_nm over the last 30.72 s, C4, m0 = 2 to 4: from 12.5 to 37.5 %; the same for the median RMS error of the trace.",
         plans: PLANS,
         source: Source::Data(nms_error),
     },
@@ -83,7 +83,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"When a m0 = 1 simulation is conducted, the BJ model clearly outperforms ARX.\"",
         place: "VIII; 6.2.2",
-        measure: "Median of the paired difference of the RMS error of the trace, RPEM less RLS, m0 = 1, C1 to C6, all parameters and noise levels.",
+        measure: "Median paired difference in the RMS error of the trace, RPEM minus RLS, m0 = 1, C1 to C6, all parameters and noise levels.",
         plans: PLANS,
         source: Source::Data(first_order),
     },
@@ -92,7 +92,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"Great oscillations are given in T_L estimations from BJ structures\" (recursive).",
         place: "V.B, Fig. 12; VII",
-        measure: "Median RMS error of T_L less the larger of K_e and K_e_dot, RPEM, C4, m0 = 2 to 4, by noise level, percentage points.",
+        measure: "Median RMS error of T_L minus the larger of the errors of K_e and K_e_dot, RPEM, C4, m0 = 2 to 4, by noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(oscillates),
     },
@@ -101,8 +101,8 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"An additional error is produced when m0 = 2 in BJ estimations since coupling can occur in poles.\"",
         place: "V.B, Fig. 12",
-        measure: "Median RMS error of the trace at m0 = 2 less the larger of m0 = 3 and 4, RPEM, C4, by \
-                  parameter and noise level, percentage points.",
+        measure: "Median RMS error of the trace at m0 = 2 minus the larger of the errors at m0 = 3 and 4, RPEM, C4, \
+                  by parameter and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(coupling),
     },
@@ -120,7 +120,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "RPEM has \"strong oscillations that are given in state s2\".",
         place: "VII",
-        measure: "Median RMS error of K_e and T_L in C2 less that in C1, RPEM, by m0 and noise level, percentage points.",
+        measure: "Median RMS error of K_e and T_L in C2 minus that in C1, RPEM, by m0 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(second_state),
     },
@@ -129,7 +129,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::Recursive,
         statement: "\"RPEM could be implemented with a forgetting matrix ... diminishing the persistent bias\" in NMS coefficients.",
         place: "VII",
-        measure: "Median of the paired difference of the RMS error of omega_nm and zeta_nm, RPEM with matrix less RPEM with factor, C3 to C6, P_n = 0.1.",
+        measure: "Median paired difference in the RMS error of omega_nm and zeta_nm, RPEM with a forgetting matrix minus RPEM with a factor, C3 to C6, P_n = 0.1.",
         plans: &["forgetting"],
         source: Source::Data(matrix),
     },
@@ -137,7 +137,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 fn less_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("|bias| of RLS minus that of RPEM above 0");
+    let mut part = Part::new("|bias| of RLS minus that of RPEM, above 0");
     for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         for name in DISCRETE {
             let rls = study.trace_bias(&at.rls(""), name)?.abs();
@@ -152,7 +152,7 @@ fn five_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut parts = Vec::new();
     for name in GAINS {
-        let mut part = Part::new(&format!("settling time of {name}, RPEM over RLS, from 2.5 to 7.5"));
+        let mut part = Part::new(&format!("settling time of {name}, RPEM divided by RLS, from 2.5 to 7.5"));
         for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
             let (rls, rpem) = (rls?, rpem?);
@@ -171,7 +171,7 @@ fn slower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut parts = Vec::new();
     for name in GAINS {
-        let mut part = Part::new(&format!("settling time of {name}, RPEM less RLS, above 0 s"));
+        let mut part = Part::new(&format!("settling time of {name}, RPEM minus RLS, above 0 s"));
         for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
             part.above(at.label(""), rpem?.minus(rls?), 0.0);
@@ -189,7 +189,7 @@ fn diverges(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         study.share(&Query::of("diverged").name("RPEM"))?,
         1e-3,
     );
-    let mut oscillates = Part::new("share of runs with an RMS error of T_L beyond 100 % above 0.001");
+    let mut oscillates = Part::new("share of runs with an RMS error of T_L above 100 %: more than 0.001");
     let mut beyond = Vec::new();
     for at in settings(&["C1", "C2", "C3", "C4", "C5", "C6"], &ORDERS, &RECURSIVE_LEVELS) {
         let errors = study.sample(&at.rpem("rms_T_L"))?;
@@ -217,8 +217,8 @@ fn less_rms(study: Study<'_>, one: Query, other: Query) -> Result<Value, String>
 
 fn better_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut gains = Part::new("K_e, T_L, K_e_dot: RMS error of RPEM minus that of RLS above 0");
-    let mut nms = Part::new("omega_nm, zeta_nm: RMS error of RPEM minus that of RLS below 0");
+    let mut gains = Part::new("K_e, T_L, K_e_dot: RMS error of RPEM minus that of RLS, above 0");
+    let mut nms = Part::new("omega_nm, zeta_nm: RMS error of RPEM minus that of RLS, below 0");
     for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         for name in GAINS {
             gains.above(at.label(name), rms(study, at, name)?, 0.0);
@@ -264,7 +264,7 @@ fn first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut parts = Vec::new();
     for (names, label) in [(&GAINS[..], "K_e, T_L, K_e_dot"), (&NMS[..], "omega_nm, zeta_nm")] {
-        let mut part = Part::new(&format!("{label}: RMS error of RPEM minus that of RLS below 0"));
+        let mut part = Part::new(&format!("{label}: RMS error of RPEM minus that of RLS, below 0"));
         for at in settings(&["C1", "C2", "C3", "C4", "C5", "C6"], &[1], &RECURSIVE_LEVELS) {
             for name in names {
                 part.below(at.label(name), rms(study, at, name)?, 0.0);
@@ -277,7 +277,7 @@ fn first_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn oscillates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("RMS error of T_L less the larger of K_e and K_e_dot above 0");
+    let mut part = Part::new("RMS error of T_L minus the larger of those of K_e and K_e_dot, above 0");
     for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
         let queries = ["rms_T_L", "rms_K_e", "rms_K_e_dot"].map(|quantity| at.rpem(quantity));
         part.above(
@@ -291,7 +291,7 @@ fn oscillates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn coupling(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("RMS error at m0 = 2 less the larger of m0 = 3 and 4 above 0");
+    let mut part = Part::new("RMS error at m0 = 2 minus the larger of those at m0 = 3 and 4, above 0");
     for at in settings(&["C4"], &[2], &RECURSIVE_LEVELS) {
         for name in GAINS.into_iter().chain(NMS) {
             let queries = HIGHER_ORDERS.map(|m0| Setting { m0, ..at }.rpem(&format!("rms_{name}")));
@@ -320,7 +320,7 @@ fn tracks(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn second_state(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
-    let mut part = Part::new("RMS error in C2 less that in C1 above 0");
+    let mut part = Part::new("RMS error in C2 minus that in C1, above 0");
     for at in settings(&["C1"], &[1, 2, 3, 4], &RECURSIVE_LEVELS) {
         for name in ["K_e", "T_L"] {
             let quantity = format!("rms_{name}");
@@ -334,7 +334,7 @@ fn second_state(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn matrix(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("forgetting")?;
-    let mut part = Part::new("RMS error with matrix less that with factor below 0");
+    let mut part = Part::new("RMS error with the matrix minus that with the factor, below 0");
     for at in settings(&["C3", "C4", "C5", "C6"], &[1, 2, 3, 4], &[0.1]) {
         for name in NMS {
             let quantity = format!("rms_{name}");

@@ -35,7 +35,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "VAF: \"No significant differences are found between BJ and ARX for cases with a time delay close to n_k* = 29\".",
         place: "V.A.2, Fig. 8",
-        measure: "Magnitude of the mean of the paired difference of VAF, BJ less ARX, C1, m0 = 3, n_k* = 28 to 30, m* = 1 to 4.",
+        measure: "Magnitude of the mean paired difference in VAF, BJ minus ARX, C1, m0 = 3, n_k* = 28 to 30, m* = 1 to 4.",
         plans: PLANS,
         source: Source::Data(vaf_of_arx),
     },
@@ -44,7 +44,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "There are \"limitations in the VAF metric to find the actual n_k\".",
         place: "Conclusions of Part II; 6.1.3",
-        measure: "Share of records in which BJ(m* = 1) has its largest VAF at n_k* = 29 of 25 to 30, C1 and C2, by m0 and noise level: below 0.9.",
+        measure: "Share of records in which the VAF of BJ(m* = 1) over n_k* = 25 to 30 is largest at 29, C1 and C2, by m0 and noise level: below 0.9.",
         plans: PLANS,
         source: Source::Data(vaf_and_delay),
     },
@@ -53,7 +53,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "\"The use of a fixed model remnant order m* = 1 does not change the bias obtained by BJ.\"",
         place: "V.A.2, Fig. 9; VIII; 6.1.3, Figs. C.6, C.14",
-        measure: "Median of the paired difference of the bias, m* = 1 minus m* = m0, m0 = 2 to 4, C1 and C2, n_k* = 29, percentage points.",
+        measure: "Median paired difference in bias, m* = 1 minus m* = m0, m0 = 2 to 4, C1 and C2, n_k* = 29, percentage points.",
         plans: PLANS,
         source: Source::Data(same_bias),
     },
@@ -62,7 +62,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "With m* = 1 \"the bias in m0 = 4 is even slightly diminished\".",
         place: "V.A.2, Fig. 9",
-        measure: "Magnitude of the median bias of b0 and b1, m* = 1 minus m* = 4, m0 = 4, C1, n_k* = 29, by noise level: at least 0.1 percentage points smaller.",
+        measure: "Magnitude of the median bias of b0 and b1, m* = 1 minus m* = 4, m0 = 4, C1, n_k* = 29, by noise level: below -0.1 percentage points.",
         plans: PLANS,
         source: Source::Data(better_at_fourth),
     },
@@ -71,7 +71,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "m* = 1 \"could imply a small decrease in accuracy estimation for high simulation remnant orders\".",
         place: "6.1.3",
-        measure: "Median of the paired difference of response_error, m* = 1 minus m* = m0, mean over the noise levels, m0 = 3 and 4, C1 and C2, n_k* = 29: at least 0.1 percentage points.",
+        measure: "Median paired difference in response_error, m* = 1 minus m* = m0, averaged over the noise levels, m0 = 3 and 4, C1 and C2, n_k* = 29: at least 0.1 percentage points.",
         plans: PLANS,
         source: Source::Data(loss_at_high_orders),
     },
@@ -80,16 +80,16 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "With m* = 1 \"the interquartile range may increase slightly\".",
         place: "6.1.3, Figs. C.6, C.14",
-        measure: "Interquartile range of the bias with m* = 1 over that with m* = m0, mean over the noise levels, m0 = 2 to 4, C1 and C2, n_k* = 29: from 1 to 1.5.",
+        measure: "Interquartile range of the bias with m* = 1 divided by that with m* = m0, averaged over the noise levels, m0 = 2 to 4, C1 and C2, n_k* = 29: from 1 to 1.5.",
         plans: PLANS,
         source: Source::Data(wider_boxes),
     },
     Claim {
         id: "m1-gain-and-zero-by-delay",
         theme: Theme::RemnantOrder,
-        statement: "With m* = 1 NMS values are very similar, \"bias in K_e and T_L become noticeably higher when the model time delay differs from the simulation one\".",
+        statement: "With m* = 1 the NMS values are very similar, but the \"bias in K_e and T_L become noticeably higher when the model time delay differs from the simulation one\".",
         place: "6.1.3, Figs. C.7, C.15",
-        measure: "Median |bias| with m* = 1 less that with m* = m0 at n_k* = 25 to 28 and 30, m0 = 2 to 4, C1: growth for K_e, T_L; within 5 points for NMS.",
+        measure: "Median |bias| with m* = 1 minus that with m* = m0 at n_k* = 25 to 28 and 30, m0 = 2 to 4, C1: above 0 for K_e and T_L; within 5 points for the NMS parameters.",
         plans: PLANS,
         source: Source::Data(by_delay),
     },
@@ -107,7 +107,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "\"The time delay is a more determinant factor than the remnant order in terms of relative bias reduction.\"",
         place: "6.1.3, Figs. E.2, E.4, E.6, E.8",
-        measure: "Spread of the median |bias| over n_k* (m* = m0) less that over m* (n_k* = 29), C1, by coefficient, m0 and noise level, percentage points.",
+        measure: "Spread of the median |bias| over n_k* (m* = m0) minus that over m* (n_k* = 29), C1, by coefficient, m0 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(delay_over_order),
     },
@@ -116,7 +116,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "Only at m0 = 1 a \"model remnant order that matches the simulation one reduces the bias significantly\".",
         place: "6.1.3, Fig. E.2",
-        measure: "Median |bias| with m* = m0 over the mean of the other orders, n_k* = 29, C1, by coefficient and noise level: below 1/2 at m0 = 1, above at m0 = 2 to 4.",
+        measure: "Median |bias| with m* = m0 divided by the mean for the other orders, n_k* = 29, C1, by coefficient and noise level: below 1/2 at m0 = 1, above 1/2 at m0 = 2 to 4.",
         plans: PLANS,
         source: Source::Data(match_matters),
     },
@@ -125,7 +125,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::RemnantOrder,
         statement: "Innovation variance and d1: \"the time delay becomes irrelevant in terms of bias reduction, while the remnant order is fundamental\".",
         place: "6.1.3, Figs. E.2, E.4, E.6, E.8",
-        measure: "Spread of the medians over m* (n_k* = 29) over that over n_k* (m* = m0), C1, by m0 and noise level: above 1.",
+        measure: "Spread of the medians over m* (n_k* = 29) divided by that over n_k* (m* = m0), C1, by m0 and noise level: above 1.",
         plans: PLANS,
         source: Source::Data(order_over_delay),
     },
@@ -156,7 +156,7 @@ fn vaf_same(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn vaf_and_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("share of records with the largest VAF at n_k* = 29 below 0.9");
+    let mut part = Part::new("share of records with the largest VAF at n_k* = 29, below 0.9");
     for at in settings(&["C1", "C2"], &ORDERS, &LEVELS) {
         let queries = DELAYS.map(|nk| at.bj("vaf", 1, nk));
         let found = study.of(&queries, &|s| {
@@ -181,7 +181,7 @@ fn mean(values: &[f64]) -> f64 {
 
 fn vaf_lower(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("VAF of m* = 4 minus that of m* = 1 below -0.1 points");
+    let mut part = Part::new("VAF of m* = 4 minus that of m* = 1, below -0.1 points");
     for at in settings(&["C1", "C2"], &[1], &LEVELS) {
         for nk in DELAYS {
             let queries = [at.bj("vaf", 4, nk), at.bj("vaf", 1, nk)];
@@ -209,7 +209,7 @@ fn vaf_of_arx(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn same_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|paired difference of the bias, m* = 1 minus m* = m0| within 5 points");
+    let mut part = Part::new("|paired difference in bias, m* = 1 minus m* = m0| within 5 points");
     for at in settings(&["C1", "C2"], &HIGHER_ORDERS, &LEVELS) {
         for name in DISCRETE {
             let fit = |m| at.bj(&bias_of(name), m, TRUE_DELAY);
@@ -225,7 +225,7 @@ fn same_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn better_at_fourth(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("|median bias| with m* = 1 less that with m* = 4 below -0.1 points");
+    let mut part = Part::new("|median bias| with m* = 1 minus that with m* = 4, below -0.1 points");
     for at in settings(&["C1"], &[4], &LEVELS) {
         for name in ["b0", "b1"] {
             let queries = [1, 4].map(|m| at.bj(&bias_of(name), m, TRUE_DELAY));
@@ -241,7 +241,7 @@ fn better_at_fourth(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn loss_at_high_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("response_error with m* = 1 less that with m* = m0, mean over P_n, above 0.1 points");
+    let mut part = Part::new("response_error with m* = 1 minus that with m* = m0, averaged over P_n, above 0.1 points");
     for at in settings(&["C1", "C2"], &[3, 4], &[0.1]) {
         let mut levels = Vec::new();
         for level in LEVELS {
@@ -259,7 +259,8 @@ fn loss_at_high_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn wider_boxes(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("interquartile range with m* = 1 over that with m* = m0, mean over P_n, from 1 to 1.5");
+    let mut part =
+        Part::new("interquartile range with m* = 1 divided by that with m* = m0, averaged over P_n, from 1 to 1.5");
     for at in settings(&["C1", "C2"], &HIGHER_ORDERS, &[0.1]) {
         for name in DISCRETE {
             let fits =
@@ -278,8 +279,8 @@ fn wider_boxes(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn by_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut higher = Part::new("K_e and T_L: growth of the median |bias| with m* = 1 above 0");
-    let mut same = Part::new("omega_nm and zeta_nm: |change of the median |bias| with m* = 1| within 5 points");
+    let mut higher = Part::new("K_e and T_L: increase in the median |bias| with m* = 1, above 0");
+    let mut same = Part::new("omega_nm and zeta_nm: |change in the median |bias| with m* = 1| within 5 points");
     for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
             let change = |name: &str| {
@@ -305,7 +306,7 @@ fn remnant_wrong(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut parts = Vec::new();
     for name in ["T_n", "K_n"] {
-        let mut part = Part::new(&format!("|median bias| of {name} beyond 25 %"));
+        let mut part = Part::new(&format!("|median bias| of {name} above 25 %"));
         for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
             let found = study.median(&at.bj(&format!("bias_{name}_backward_euler"), 1, TRUE_DELAY))?;
             part.above(at.label(""), found.abs(), LARGE_BIAS);
@@ -326,7 +327,7 @@ fn over_delays_and_orders(at: Setting, quantity: &str) -> Vec<hoid_study::Query>
 
 fn delay_over_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut part = Part::new("spread over n_k* less that over m* above 0");
+    let mut part = Part::new("spread over n_k* minus that over m*, above 0");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let found = study.of(&over_delays_and_orders(at, &bias_of(name)), &|s| {
@@ -341,8 +342,8 @@ fn delay_over_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn match_matters(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut first = Part::new("m0 = 1: median |bias| with m* = 1 over that of the others below 1/2");
-    let mut others = Part::new("m0 >= 2: median |bias| with m* = m0 over that of the others above 1/2");
+    let mut first = Part::new("m0 = 1: median |bias| with m* = 1 divided by that of the others, below 1/2");
+    let mut others = Part::new("m0 >= 2: median |bias| with m* = m0 divided by that of the others, above 1/2");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for name in DISCRETE {
             let queries = ORDERS.map(|m| at.bj(&bias_of(name), m, TRUE_DELAY));
@@ -367,7 +368,7 @@ fn order_over_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut parts = Vec::new();
     for name in ["innovation_variance", "d1"] {
-        let mut part = Part::new(&format!("{name}: spread over m* over that over n_k* above 1"));
+        let mut part = Part::new(&format!("{name}: spread over m* divided by that over n_k*, above 1"));
         for at in settings(&["C1"], &ORDERS, &LEVELS) {
             let found = study.of(&over_delays_and_orders(at, name), &|s| {
                 let (delays, orders) = s.split_at(DELAYS.len());

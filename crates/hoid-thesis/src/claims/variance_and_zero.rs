@@ -25,7 +25,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "\"The modified remnant noise variance\" presents an \"important deviation with respect to the reference value as well, which increases for higher remnant orders\".",
         place: "6.1.2, Fig. C.5",
-        measure: "Magnitude of the median bias of the innovation variance against eq. B.12, BJ(m* = m0), C1, n_k* = 29: at m0 = 2 to 4, and its growth from one order to the next, m0 = 1 to 4.",
+        measure: "Magnitude of the median bias of the innovation variance relative to eq. B.12, BJ(m* = m0), C1, n_k* = 29: at m0 = 2 to 4, and its increase from each order to the next, m0 = 1 to 4.",
         plans: PLANS,
         source: Source::Data(variance_by_order),
     },
@@ -34,7 +34,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "C2: \"the results in the modified noise variance (and the remnant gain in consequence) have improved, although the variability of the obtained biases is much higher\".",
         place: "6.1.2, Fig. C.13",
-        measure: "Innovation variance (against eq. B.12) and K_n (backward Euler), BJ(m* = m0), n_k* = 29, by m0 and noise level: |median bias| in C2 less that in C1; interquartile range in C2 over that in C1, at least 1.5.",
+        measure: "Innovation variance (relative to eq. B.12) and K_n (backward Euler), BJ(m* = m0), n_k* = 29, by m0 and noise level: |median bias| in C2 minus that in C1; interquartile range in C2 divided by that in C1, at least 1.5.",
         plans: PLANS,
         source: Source::Data(remnant_in_second),
     },
@@ -43,7 +43,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "BJ biases can be \"considerable for b0 and b1 in scenarios with model time delays far from the reference one, but those ones are a bit smaller than in the ARX case\".",
         place: "6.1.2, Fig. C.3",
-        measure: "Magnitude of the median bias of b0 and b1, BJ(m* = m0), C1, n_k* = 25 and 26, by m0 and noise level; the same minus that of ARX, m0 = 1 to 4.",
+        measure: "Magnitude of the median bias of b0 and b1, BJ(m* = m0), C1, n_k* = 25 and 26, by m0 and noise level; the same minus the magnitude for ARX, m0 = 1 to 4.",
         plans: PLANS,
         source: Source::Data(wrong_delay),
     },
@@ -52,7 +52,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "C2, BJ: \"Similar to the ARX case, the placement of the zero is estimated less accurately than for simulation condition C1\".",
         place: "6.1.1, 6.1.2, Figs. D.10 to D.17",
-        measure: "Median magnitude of the relative error of the zero 1/T_L in C2 less that in C1, percentage points, n_k* = 29, by noise level: BJ(m* = m0), m0 = 1 to 4, and ARX, m0 = 2 to 4.",
+        measure: "Median magnitude of the relative error of the zero 1/T_L in C2 minus that in C1, percentage points, n_k* = 29, by noise level: BJ(m* = m0), m0 = 1 to 4, and ARX, m0 = 2 to 4.",
         plans: PLANS,
         source: Source::Data(zero_in_second),
     },
@@ -61,7 +61,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchBj,
         statement: "Bode plots: \"the effect of correct zeros estimation is especially noticeable for condition C2\".",
         place: "Conclusions of Part II, Figs. D.9, D.18",
-        measure: "Median magnitude of the relative error of the zero 1/T_L, ARX less BJ(m* = m0), in C2 less the same in C1, percentage points, n_k* = 29, m0 = 2 to 4, by noise level.",
+        measure: "Median magnitude of the relative error of the zero 1/T_L, ARX minus BJ(m* = m0), in C2 minus the same difference in C1, percentage points, n_k* = 29, m0 = 2 to 4, by noise level.",
         plans: PLANS,
         source: Source::Data(zero_matters),
     },
@@ -73,7 +73,7 @@ fn backward_euler_variance(study: Study<'_>, at: Setting) -> Result<f64, String>
     const TS_S: f64 = 0.01;
     const T_N_S: f64 = 0.06;
     let k_n = study.truth(&at.bj("loss", at.m0, TRUE_DELAY))?.k_n;
-    let m = i32::try_from(at.m0).map_err(|_| format!("m0 = {} is not the order of a remnant", at.m0))?;
+    let m = i32::try_from(at.m0).map_err(|_| format!("m0 = {} is not a valid order of the remnant", at.m0))?;
     Ok((k_n * (TS_S / (T_N_S + TS_S)).powi(m)).powi(2))
 }
 
@@ -90,8 +90,8 @@ fn variance(study: Study<'_>, at: Setting, figure: fn(&[f64]) -> f64) -> Result<
 
 fn variance_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut important = Part::new("|median bias| of the innovation variance beyond 25 %, m0 >= 2");
-    let mut growth = Part::new("|median bias| of the innovation variance less that at the order below, above 0");
+    let mut important = Part::new("|median bias| of the innovation variance above 25 %, m0 >= 2");
+    let mut growth = Part::new("|median bias| of the innovation variance minus that at the next lower m0, above 0");
     for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         let found = variance(study, at, med)?;
         let below = variance(study, Setting { m0: at.m0 - 1, ..at }, med)?;
@@ -100,12 +100,12 @@ fn variance_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     }
     for at in settings(&["C1"], &ORDERS, &[0.1]) {
         important.show(
-            format!("median bias at {}, against eq. B.12, %", at.label("")),
+            format!("median bias at {}, relative to eq. B.12, %", at.label("")),
             variance(study, at, med)?,
         );
         let exact = study.median(&at.bj(&bias_of("innovation_variance"), at.m0, TRUE_DELAY))?;
         important.show(
-            format!("median bias at {}, against the remnant held exactly, %", at.label("")),
+            format!("median bias at {}, relative to the exactly held remnant, %", at.label("")),
             exact,
         );
     }
@@ -123,9 +123,9 @@ fn remnant_in_second(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let measured: [(&str, Figure<'_>); 2] = [("innovation variance", &of_variance), ("K_n", &gain)];
     let mut parts = Vec::new();
     for (name, of) in measured {
-        let mut better = Part::new(&format!("{name}: |median bias| in C2 less that in C1 below 0"));
+        let mut better = Part::new(&format!("{name}: |median bias| in C2 minus that in C1, below 0"));
         let mut wider = Part::new(&format!(
-            "{name}: interquartile range of the bias in C2 over that in C1 above 1.5"
+            "{name}: interquartile range of the bias in C2 divided by that in C1, above 1.5"
         ));
         for at in settings(&["C1"], &ORDERS, &LEVELS) {
             let second = Setting { condition: "C2", ..at };
@@ -140,8 +140,8 @@ fn remnant_in_second(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    let mut large = Part::new("BJ: |median bias| of b0 and b1 beyond 25 %");
-    let mut smaller = Part::new("|median bias| of b0 and b1, BJ less ARX, below 0");
+    let mut large = Part::new("BJ: |median bias| of b0 and b1 above 25 %");
+    let mut smaller = Part::new("|median bias| of b0 and b1, BJ minus ARX, below 0");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         for nk in FAR_DELAYS {
             for name in ["b0", "b1"] {
@@ -179,11 +179,11 @@ fn zero_in_second(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let bj = |at: Setting| vec![at.bj("bias_T_L", at.m0, TRUE_DELAY)];
     let arx = |at: Setting| vec![at.arx("bias_T_L", TRUE_DELAY)];
-    let mut of_bj = Part::new("BJ: |error of the zero| in C2 less that in C1 above 0");
+    let mut of_bj = Part::new("BJ: |error of the zero| in C2 minus that in C1, above 0");
     for at in settings(&["C1"], &ORDERS, &LEVELS) {
         of_bj.above(at.label(""), zero_change(study, &bj, at)?, 0.0);
     }
-    let mut of_arx = Part::new("ARX: |error of the zero| in C2 less that in C1 above 0");
+    let mut of_arx = Part::new("ARX: |error of the zero| in C2 minus that in C1, above 0");
     for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         of_arx.above(at.label(""), zero_change(study, &arx, at)?, 0.0);
     }
@@ -193,7 +193,7 @@ fn zero_in_second(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 fn zero_matters(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let both = |at: Setting| vec![at.arx("bias_T_L", TRUE_DELAY), at.bj("bias_T_L", at.m0, TRUE_DELAY)];
-    let mut part = Part::new("|error of the zero|, ARX less BJ, in C2 less that in C1 above 0");
+    let mut part = Part::new("|error of the zero|, ARX minus BJ, in C2 minus that in C1, above 0");
     for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
         part.above(at.label(""), zero_change(study, &both, at)?, 0.0);
     }

@@ -102,11 +102,12 @@ impl Task<'_> {
             return Err(unsuited(
                 "the input",
                 "zero throughout".to_owned(),
-                "an error that varies",
+                "an input that varies",
             ));
         }
         if let Some(k) = self.at.iter().find(|k| **k >= e.len()) {
-            return Err(unsuited("a requested sample", k.to_string(), "a sample of the record"));
+            let expected = format!("a number below {}", e.len());
+            return Err(unsuited("the index of a requested sample", k.to_string(), &expected));
         }
         Ok((e, u))
     }

@@ -63,7 +63,7 @@ impl Comparator for FourierCoefficients {
             name: NAME,
             help: "Fourier coefficients at the lines, in a moving window",
             source: "van Paassen and Mulder 1998",
-            extra_information: "the lines of the forcing function; half a window of data after each time",
+            extra_information: "the lines of the forcing function, and half a window of data after each time",
         }
     }
 

@@ -211,9 +211,9 @@ impl Comparator for GeneticSigmoid {
     fn about(&self) -> About {
         About {
             name: NAME,
-            help: "maximum likelihood of gains that follow a sigmoid, from a genetic search",
+            help: "maximum-likelihood fit of gains that follow a sigmoid, by a genetic search",
             source: "Zaal et al. 2009; Zaal and Sweet 2011",
-            extra_information: "the assumption of one change, a sigmoid; the whole record (not the delay)",
+            extra_information: "the assumption of a single sigmoid change, and the whole record (but not the delay)",
         }
     }
 

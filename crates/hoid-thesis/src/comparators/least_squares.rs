@@ -48,9 +48,9 @@ impl NormalEquations {
         let factor: Option<Cholesky<f64, Dyn>> = (&self.gram + prior).cholesky();
         let singular = || ThesisError::Unsuited {
             method,
-            quantity: "the matrix of its normal equations".to_owned(),
+            quantity: "the matrix of the normal equations".to_owned(),
             found: "singular".to_owned(),
-            expected: "an input that excites all its regressors".to_owned(),
+            expected: "an input that excites all regressors".to_owned(),
         };
         let theta = factor.ok_or_else(singular)?.solve(&self.moments);
         if theta.iter().all(|x| x.is_finite()) {

@@ -171,7 +171,7 @@ impl Comparator for LpvSubspace {
             name: NAME,
             help: "predictor-based subspace identification of an LPV model",
             source: "van Wingerden and Verhaegen 2009; Duarte et al. 2017",
-            extra_information: "the time and the rate of the change of the controlled element; the whole record",
+            extra_information: "the time and rate of the change of the controlled element, and the whole record",
         }
     }
 

@@ -66,17 +66,17 @@ pub fn not_tracked(name: &str) -> Option<String> {
         // model may have.
         "" => (
             "does not track recordings",
-            "with more coefficients than the 64 of a tracked model; for up to 64 use --method rls --structure fir"
+            "it has more coefficients than the 64 of a tracked model; for up to 64, use --method rls --structure fir"
                 .to_owned(),
         ),
         extra_information => (
             "is not a recursion over a recording",
-            format!("which needs {extra_information}"),
+            format!("it needs {extra_information}"),
         ),
     };
     Some(format!(
-        "{name} {what}: {help} ({source}), {why}. It is available only for simulated runs: cargo run --release -p \
-         hoid-evidence --example survey_methods. For recordings, use the methods of hoid track --methods, or hoid \
+        "{name} {what} ({help}; {source}): {why}. It is available only for simulated runs: cargo run --release -p \
+         hoid-evidence --example survey_methods. For recordings, use a method listed by hoid track --methods, or hoid \
          describe for the response at the lines of an excitation"
     ))
 }

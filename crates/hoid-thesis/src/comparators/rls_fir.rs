@@ -98,7 +98,7 @@ impl Comparator for RlsFir {
     fn about(&self) -> About {
         About {
             name: NAME,
-            help: "regularised recursive least squares of a finite impulse response, as a frequency response",
+            help: "regularised recursive least squares for a finite impulse response",
             source: "Olivari et al. 2016",
             extra_information: "",
         }

@@ -43,7 +43,7 @@ impl Comparator for RpemByVaf {
     fn about(&self) -> About {
         About {
             name: NAME,
-            help: "recursive prediction-error method, its covariance updated by the VAF of a validation set",
+            help: "recursive prediction-error method with a covariance update from the VAF of a validation set",
             source: "the thesis, section VII",
             extra_information: "a second run of the same person in the same task",
         }
@@ -59,7 +59,7 @@ impl Comparator for RpemByVaf {
         };
         let validation = task.validation.ok_or_else(|| unsuited("missing".to_owned()))?;
         if validation.len() != e.len() || validation.input().len() != e.len() {
-            return Err(unsuited(format!("of {} samples", validation.len())));
+            return Err(unsuited(format!("a run of {} samples", validation.len())));
         }
         let structure = Structure::BoxJenkins;
         let orders = structure.operator_orders(task.nk);

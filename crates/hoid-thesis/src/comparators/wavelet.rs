@@ -54,7 +54,7 @@ impl Comparator for WaveletRatio {
             name: NAME,
             help: "ratio of the wavelet transforms of u and e at the lines",
             source: "Thompson et al. 2004",
-            extra_information: "the lines of the forcing function; as much data after each time as before it",
+            extra_information: "the lines of the forcing function, and as much data after each time as before it",
         }
     }
 

@@ -154,10 +154,10 @@ fn best_delay(span: &Record, structure: Structure, (first, last): (usize, usize)
         (Some((_, fit)), _) => Ok(fit),
         (None, Some(error)) => Err(error.into()),
         (None, None) => Err(ThesisError::Unsuited {
-            method: "the search of the delay",
-            quantity: "its range".to_owned(),
+            method: "the delay search",
+            quantity: "the range".to_owned(),
             found: format!("{first} to {last}"),
-            expected: "a first delay no longer than the last".to_owned(),
+            expected: "a first delay that is not longer than the last".to_owned(),
         }),
     }
 }

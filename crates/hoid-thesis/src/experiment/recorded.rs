@@ -51,7 +51,7 @@ impl RecordedPeople {
             let reasons: Vec<String> = left_out.iter().map(|(name, why)| format!("{name}: {why}")).collect();
             return Err(ThesisError::Recordings {
                 place: path.display().to_string(),
-                reason: format!("no condition corresponds to one of the thesis; {}", reasons.join("; ")),
+                reason: format!("no condition corresponds to a condition of the thesis; {}", reasons.join("; ")),
             });
         }
         let count = ExperimentPlan::parse(EXPERIMENT)?.evaluated as usize;
@@ -114,7 +114,7 @@ impl Experiment for RecordedPeople {
         let entry = self.evaluated.iter().find(|entry| key_of(entry) == *key);
         let entry = entry.ok_or_else(|| ThesisError::Recordings {
             place: self.manifest.name.clone(),
-            reason: format!("there is no run {} of {} in {}", key.run, key.subject, key.condition),
+            reason: format!("there is no run {} of {} in condition {}", key.run, key.subject, key.condition),
         })?;
         let read = RecordedRun::read(&self.manifest, &self.base, entry)?;
         let start_s = read.record.time_s(0);
@@ -181,8 +181,8 @@ fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, St
 fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
     let unknown = |what: &str| {
         format!(
-            "{what}: set controlled_element in [conditions.{name}], and changes_to, change_s and change_per_s where it \
-             changes, or name the condition C1 to C6 as in the thesis"
+            "{what}: set controlled_element in [conditions.{name}], with changes_to, change_s and change_per_s if it \
+             changes, or give the condition its name in the thesis (C1 to C6)"
         )
     };
     let Some(before) = &facts.controlled_element else {
@@ -208,8 +208,8 @@ fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
         (true, false, false) => Ok(Condition::C5),
         (true, false, true) => Ok(Condition::C6),
         (same, _, _) => Err(format!(
-            "its controlled element changes from {before} to {after}, both like a {} integrator; in the thesis \
-             it changes from a single to a double one, or back",
+            "its controlled element changes from {before} to {after}, and both resemble a {} integrator; in the \
+             thesis it changes between a single and a double integrator",
             if same { "double" } else { "single" }
         )),
     }
@@ -257,7 +257,7 @@ mod tests {
         let unknown = of_text("slow", &ConditionSettings::default()).unwrap_err();
         assert!(unknown.contains("[conditions.slow]"), "{unknown}");
         let same = of_text("C3", &facts(s1, Some("80/(s(s+5))"), None)).unwrap_err();
-        assert!(same.contains("both like a single integrator"), "{same}");
+        assert!(same.contains("both resemble a single integrator"), "{same}");
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub(super) fn items() -> Vec<Item> {
             all.push(Item::of_study(
                 format!("H.{}-average", 2 * i + k + 1),
                 format!("Average and median of recursive estimates, {what} parameters, condition {condition}, P_n = {LEVEL}"),
-                "Average (dark) over the runs at each time, as in the text, and median (light). The average is cut where it exceeds the range of the ordinate.",
+                "Average over the runs at each time (dark), as in the thesis, and median (light). The average is clipped where it exceeds the range of the vertical axis.",
                 "recursive",
                 move |item, results| make(item, results, condition, rows),
             ));

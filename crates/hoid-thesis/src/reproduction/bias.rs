@@ -134,17 +134,18 @@ pub(super) fn items() -> Vec<Item> {
 }
 
 fn item(name: &str, condition: &'static str, model: Model, parameters: Parameters) -> Item {
-    let mut caption = "Relative bias by delay nk* and noise level P_n, remnant orders m0 = 1 to 4. Boxes: quartiles; whiskers: the last run within 1.5 \
-         interquartile ranges; triangles count runs beyond the panel; a cross marks where no run gives a value. Without remnant all runs are the \
-         same: one line. True nk = 29."
+    let mut caption = "Relative bias by delay nk* and noise level P_n, remnant orders m0 = 1 to 4. Boxes: quartiles; \
+                       whiskers: the last run within 1.5 interquartile ranges; triangles: number of runs outside the \
+                       panel; cross: no run gives a value. Without remnant all runs are identical and give a single \
+                       line. True nk = 29."
     .to_owned();
     if parameters == Parameters::Remnant {
         caption.push_str(
-            " T_n and K_n by the backward Euler form of the text (B.14, B.16); d1 and the innovation variance against those of the exactly held filter.",
+            " T_n and K_n use the backward Euler form of the thesis (B.14, B.16); d1 and the innovation variance are compared with those of the exactly held filter.",
         );
         if model == Model::First {
             caption
-                .push_str(" For m0 >= 2 the ordinates of the last three are linear up to 10 % and logarithmic beyond.");
+                .push_str(" For m0 >= 2 the vertical axes of the last three are linear to 10 % and logarithmic above.");
         }
     }
     Item::of_study(

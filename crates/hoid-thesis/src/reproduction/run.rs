@@ -188,7 +188,7 @@ pub fn reproduce(
     ];
     if wanted.recordings.is_none() && wanted.replications < NamedPlan::REPLICATIONS {
         index.notes.push(format!(
-            "A quick look: with {} replications instead of {}, many claims remain undecided.",
+            "With only {} of {} replications, many claims remain undecided.",
             wanted.replications,
             NamedPlan::REPLICATIONS
         ));

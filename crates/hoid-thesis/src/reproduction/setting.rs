@@ -33,7 +33,7 @@ pub(super) fn items() -> Vec<Item> {
         table(
             "table-2",
             "Controlled element, operator and held operator in states s1 and s2 (also Tables 4.2 and 4.3)",
-            "Computed from the stated parameters at 100 Hz. The text prints crossover 1.5 and 2.8 rad/s and phase margins 77.0 and 22.7 deg.",
+            "Computed from the stated parameters at 100 Hz. The thesis gives crossovers of 1.5 and 2.8 rad/s and phase margins of 77.0 and 22.7 deg.",
             states_table,
         ),
         table(
@@ -64,8 +64,8 @@ pub(super) fn items() -> Vec<Item> {
         ),
         Item::of_study(
             "A.1",
-            "Obtained against demanded noise level, condition C1",
-            "Mean over the runs of (var u - var u0) / var u where u0 is from the run without remnant (A.4); band: one standard deviation to each side; dashed: the demand.",
+            "Obtained and demanded noise level, condition C1",
+            "Mean over the runs of (var u - var u0) / var u where u0 is the control in the run without remnant (A.4); band: plus and minus one standard deviation; dashed: the demanded level.",
             "noise-level",
             noise_level,
         ),

@@ -17,9 +17,9 @@ pub(super) fn items() -> Vec<Item> {
                 format!(
                     "Bias from start IC{start} minus that from the base start, Box-Jenkins with m* = m0, condition C1"
                 ),
-                "Deviation of the relative bias of each run from that of the same run searched from the base of Table \
-                 6.1, in percentage points. A line at zero: both searches found the same minimum, except for the \
-                 tolerance of the search. The largest deviation of its runs is given above each panel.",
+                "Relative bias of each run from this start minus that from the base start of Table 6.1, in percentage \
+                 points. A line at zero means that both searches found the same minimum within the search tolerance. \
+                 The largest difference is given above each panel.",
                 "initial-conditions",
                 move |item, results| make(item, results, start),
             )

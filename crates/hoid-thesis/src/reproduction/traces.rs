@@ -32,10 +32,10 @@ type Curves = (usize, &'static str, &'static [(&'static str, f64, f64)]);
 const RLS: Curves = (0, "RLS", &[("OLS first", 0.0, 30.72), ("OLS last", 51.2, 81.92)]);
 const RPEM: Curves = (1, "RPEM", &[("PEM first", 0.0, 30.72), ("PEM last", 51.2, 81.92)]);
 
-const CAPTION: &str = "Median over the runs at each time: the text averages, but one run in which K_e nearly vanishes \
-                       would dominate the average of T_L. Dots in colour: batch fits of [0, 30.72] and [51.20, 81.92] \
-                       s; black dashes: the simulated operator. The range of a panel is set by the values from 15 s \
-                       on; values of the start beyond it are cut.";
+const CAPTION: &str = "Median over the runs at each time. The thesis shows averages, but one run in which K_e nearly \
+                       vanishes would dominate the average of T_L. Coloured dots: batch fits to [0, 30.72] and \
+                       [51.20, 81.92] s; black dashes: the simulated operator. The values from 15 s on set the range \
+                       of a panel; earlier values beyond it are clipped.";
 
 pub(super) fn items() -> Vec<Item> {
     let mut all = vec![
@@ -65,7 +65,7 @@ pub(super) fn items() -> Vec<Item> {
                 format!("G.{}", first + m0 - 1),
                 format!("RLS with a forgetting matrix, {what}, condition C3, m0 = {m0}"),
                 "Median over the runs at each time, by noise level; infinite memory for a1 and a2, 256 samples for b0 \
-                 and b1. Dashed: the simulated operator. The range of a panel is set by the values from 15 s on.",
+                 and b1. Dashed: the simulated operator. The values from 15 s on set the range of a panel.",
                 "recursive-arx",
                 move |item, results| {
                     let levels = [0.0, 0.1, 0.2, 0.3];

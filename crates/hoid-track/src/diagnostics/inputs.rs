@@ -45,11 +45,13 @@ impl Trace {
             |found: Option<ChangeOfResponse>| found.filter(|f| f.p_value < SIGNIFICANCE_LEVEL).map(|f| f.in_words());
         let message = match (named(own), named(of_further)) {
             (Some(own), Some(further)) => {
-                format!("both responses changed: that to e {own}; that to {channel} {further}")
+                format!("the response to e changed {own}; the response to {channel} also changed, {further}")
             }
-            (Some(own), None) => format!("the response to e changed {own}; no change of that to {channel} is found"),
+            (Some(own), None) => {
+                format!("the response to e changed {own}; no change of the response to {channel} was found")
+            }
             (None, Some(further)) => {
-                format!("the response to {channel} changed {further}; no change of that to e is found")
+                format!("the response to {channel} changed {further}; no change of the response to e was found")
             }
             (None, None) => return None,
         };

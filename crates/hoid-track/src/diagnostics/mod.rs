@@ -151,7 +151,7 @@ impl Trace {
             Finding::note(
                 "supposed",
                 format!(
-                    "{} at the end: not determined by the record; the value is that of the prior, or one of several \
+                    "{} at the end: not determined by the record; the value comes from the prior, or is one of several \
                      that predict u equally well",
                     open.join(", ")
                 ),

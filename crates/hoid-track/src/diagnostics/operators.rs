@@ -76,8 +76,8 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
-                "in {:.0} % of the rows the two poles are a lag and carry no information about the neuromuscular system (omega_nm near \
-                 or above the Nyquist frequency, or zeta_nm above 3)",
+                "in {:.0} % of the rows the two poles represent a lag and carry no information about the neuromuscular \
+                 system (omega_nm near or above the Nyquist frequency, or zeta_nm above 3)",
                 100.0 * implausible
             ),
         ));
@@ -126,7 +126,7 @@ fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
             format!(
                 "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain \
                  and a lead do not describe this person, who may have a lag; K_e, T_L and K_e_dot are then not \
-                 parameters of the person, only the response is valid (hoid identify finds the form)",
+                 parameters of the person, and only the response is valid; use hoid identify to find the form",
                 100.0 * negative
             ),
         )
@@ -167,8 +167,8 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
         Finding::note(
             "undetermined-parameter",
             format!(
-                "in {} of the rows the gain differs from zero by two standard errors and the lead does not: the person \
-                 responds as a gain, and T_L and K_e_dot are not parameters of the person",
+                "in {} of the rows the gain differs from zero by two standard errors, but the lead does not: the \
+                 person responds as a pure gain, and T_L and K_e_dot are not parameters of the person",
                 percent(no_lead)
             ),
         )

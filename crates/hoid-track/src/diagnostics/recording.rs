@@ -2,7 +2,7 @@
 //! last row with the last few seconds.
 
 use hoid_ident::diagnostics::{has_negative_lead, is_undetermined, operator_step};
-use hoid_model::{Finding, Record};
+use hoid_model::{Finding, Record, numbers::counted};
 
 use crate::{
     guard::{GuardAction, GuardChoice, GuardKind, TrackFault},
@@ -48,7 +48,11 @@ impl Trace {
         }
         let steps = of(&|f| f.kind == GuardKind::Step);
         if !steps.is_empty() {
-            let words = format!("{} lasting jumps, used as recorded ({})", steps.len(), named(&steps));
+            let words = format!(
+                "{}, used as recorded ({})",
+                counted(steps.len(), "lasting jump"),
+                named(&steps)
+            );
             all.push(Finding::note("steps-in-signals", words));
         }
         let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step));
@@ -56,8 +60,8 @@ impl Trace {
             all.push(Finding::doubt(
                 "hostile-span",
                 format!(
-                    "the estimate stays constant in {} spans in which e and u are not tracking ({})",
-                    spans.len(),
+                    "the estimate stays constant in {} in which e and u show no tracking ({})",
+                    counted(spans.len(), "span"),
                     named(&spans)
                 ),
             ));
@@ -66,7 +70,7 @@ impl Trace {
         if !again.is_empty() {
             all.push(Finding::doubt(
                 "restarted",
-                format!("the estimate was restarted after {} of them", again.len()),
+                format!("the estimate was restarted after {}", counted(again.len(), "fault")),
             ));
         }
         all
@@ -87,8 +91,8 @@ impl Trace {
             Finding::doubt(
                 "learnt-at-rest",
                 format!(
-                    "neither e nor u moves from {from:.2} to {to:.2} s and the estimate is updated there: its error \
-                     bars shrink without information; keep the default guard, which keeps the estimate constant"
+                    "neither e nor u moves from {from:.2} to {to:.2} s, but the estimate is updated there, and its \
+                     error bars shrink without information; use the default guard, which keeps the estimate constant"
                 ),
             )
         })
@@ -137,9 +141,8 @@ impl Trace {
                 let p_value = step.p_value(own.unwrap_or(0.0), grid);
                 if p_value < P_VALUE_LIMIT && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
                     let words = format!(
-                        "the last {length:.0} s require a {name} that differs from the last row by {}: the person \
-                         changed in a way that the estimate does not follow, or the estimate has not recovered; \
-                         restart it there",
+                        "in the last {length:.0} s the data require a {name} that differs from the last row by {}: the \
+                         estimate does not follow a change of the person, or has not recovered; restart it there",
                         step.by
                     );
                     worst = Some((p_value, words));
@@ -169,8 +172,8 @@ impl Trace {
             Finding::doubt(
                 "many-changes",
                 format!(
-                    "{changes} changes are declared in {length:.0} s: people rarely change so often, but a remnant \
-                     that grows with the error, filled gaps and steps of a sensor are common; look at e and u there"
+                    "{changes} changes are declared in {length:.0} s: people rarely change so often; more common \
+                     causes are a remnant that grows with the error, filled gaps and sensor steps; check e and u there"
                 ),
             )
         })

@@ -159,8 +159,8 @@ impl Trace {
         Some(Finding::doubt(
             "no-answer",
             format!(
-                "e does not respond to u, as it does in a loop (the latest u explains {:.1} % of the innovations of \
-                 e): check whether u and e are from the same run",
+                "e does not respond to u as it would in a closed loop (the latest u explains {:.1} % of the \
+                 innovations of e): check whether u and e are from the same run",
                 100.0 * found.share
             ),
         ))

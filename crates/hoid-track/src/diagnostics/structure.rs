@@ -29,9 +29,9 @@ impl Trace {
             Finding::doubt(
                 "structure",
                 format!(
-                    "structure missed: past errors explain more of u than the final operator does, with any gains and \
-                     corrections (p = {:.1e}, {:.1} % of the innovations); its parameters are those of the nearest \
-                     person that the method can represent",
+                    "structure missed: past errors explain more of u than the final operator can with any gains and \
+                     corrections (p = {:.1e}, {:.1} % of the innovations); the estimate is the nearest operator that \
+                     the method can represent",
                     found.p_value,
                     100.0 * found.share
                 ),

@@ -35,8 +35,7 @@ impl Value for GuardChoice {
 settings! {
     /// Option of a guard, which prevents samples and spans that cannot come from tracking from changing the estimate.
     pub struct GuardOptions {
-        /// Guard: hold back outliers of e and u, exclude spans that no tracking produces, and restart the estimate
-        /// after them
+        /// Guard: hold back outliers of e and u, exclude spans without tracking, and restart the estimate after them
         #[setting(default("yes"))]
         pub guard: Option<GuardChoice> = None,
     }

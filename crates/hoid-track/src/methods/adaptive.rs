@@ -46,13 +46,13 @@ use crate::{
 settings! {
     /// Options of the recursion with gains in a basis for people.
     pub struct AdaptiveOptions {
-        /// Accepted false alarms per hour (a lower number detects fewer changes, and later)
+        /// Accepted false alarms per hour (lower: fewer changes are detected, and later)
         #[setting(unit("1/h"), bounds(Bounds::PositiveFinite))]
         pub false_alarms: f64 = 1.0,
         /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive), default("8"))]
         pub limit: Option<f64> = None,
-        /// Length of the record that is read repeatedly (0: each sample is read once, as on a microcontroller)
+        /// Length of past data that are replayed (0: each sample is used once, as on a microcontroller)
         #[setting(unit("s"), bounds(Bounds::NonNegative))]
         pub replay: f64 = defaults::REPLAYED_S,
         /// Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD for omega_nm, zeta_nm, tau_e, T_I
@@ -70,7 +70,7 @@ impl RecursiveMethod for AdaptiveOptions {
     fn about(&self) -> About {
         About {
             name: "adaptive",
-            help: "gains in a basis common to people, with its own noise model; needs no start fit",
+            help: "gains in a basis common to all people, with its own noise model; needs no start fit",
             source: "McRuer and Jex 1967; Magill 1965; Chow 1960; White 1980; the book, page The default tracker",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],

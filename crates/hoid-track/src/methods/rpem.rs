@@ -20,8 +20,8 @@ use crate::{
 settings! {
     /// Options of the recursive prediction-error method.
     pub struct RpemOptions {
-        /// Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
-        /// comparison), or pseudo-linear (without filters: extended least squares)
+        /// Filters for psi: gradient (D/(C F) as one filter), cascade (1/F, then D/C; for comparison), or pseudo-linear
+        /// (none: extended least squares)
         pub regressor: Regressor = Regressor::Gradient,
     }
     groups {
@@ -66,7 +66,7 @@ impl RecursiveMethod for RpemOptions {
         match setup.track_delay_s {
             Some(_) if !setup.structure.has_input() => Err(bad(
                 "the range of the delay",
-                format!("with {}, which has no input", setup.structure),
+                format!("a range with the structure {}, which has no input", setup.structure),
                 "a structure with an input, such as bj",
             )),
             _ => Ok(()),

@@ -80,7 +80,7 @@ impl Shown<'_> {
             format!("{scaled} %")
         };
         page.push_str(&format!(
-            "Remnant: {} of the power of the output at non-excited frequencies, {} including its part at the lines \
+            "Remnant: {} of the output power lies at non-excited frequencies; with the remnant at the lines, {} \
              (P_n).\n",
             percent(&function.off_line_share),
             percent(&function.noise_ratio),

@@ -232,7 +232,8 @@ fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Re
     if figures.is_empty() {
         output::notice(
             "",
-            "no figure: it would show describing functions, but no condition in the manifest names its excitation"
+            "no figure was written: it would show describing functions, but no condition in the manifest names its \
+             excitation; add excitation to [conditions.NAME]"
                 .to_owned(),
         );
     }

@@ -89,7 +89,8 @@ pub fn page(populations: &[Population], files: &[PathBuf]) -> String {
     }
     let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
     format!(
-        "\nEach person pooled with all others (without the prior of the fits)\n{rows}\n{left_out}Written: {}.\n",
+        "\nEstimates of each person, pooled with all others (without the prior of the fits)\n{rows}\n\
+         {left_out}Written: {}.\n",
         names.join(", ")
     )
 }

@@ -20,7 +20,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     ];
     if let Some((_, option)) = others.into_iter().find(|(given, _)| *given) {
         return Err(CliError::Usage(format!(
-            "{option} applies to one axis; drop --pair and give --input and --output"
+            "{option} requires a single axis; replace --pair with --input and --output"
         )));
     }
     check_axes(&identification, &args.pair).map_err(CliError::of_options)?;

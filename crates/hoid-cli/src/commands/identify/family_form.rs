@@ -162,7 +162,7 @@ impl FamilyReport<'_> {
         };
         let all: Vec<String> = points.iter().map(one).collect();
         format!(
-            "F·M of {} (1 and 0 deg if the target is followed without error): {}.\n",
+            "F·M of {} (gain 1 and phase 0 deg for perfect following of the target): {}.\n",
             channel.name,
             all.join(", ")
         )
@@ -184,8 +184,8 @@ impl FamilyReport<'_> {
             return String::new();
         }
         format!(
-            "tau_e applies to an error that is held for a sample; for an error logged from a faster or continuous \
-             signal, tau_e is {} s (--intersample foh).\n",
+            "tau_e applies to an error that is held between its samples; for an error logged from a faster or \
+             continuous signal, tau_e is {} s (--intersample foh).\n",
             text::significant(straight)
         )
     }
@@ -220,7 +220,8 @@ impl FamilyReport<'_> {
         match all.as_slice() {
             [] => String::new(),
             all => format!(
-                "These errors apply to {runs}. For the person, whose gain varies by about a further {:.0} %: {}.\n",
+                "These errors apply to {runs}. With a run-to-run variation of the gain of about {:.0} %, the errors \
+                 for the person are: {}.\n",
                 100.0 * fit.run_to_run,
                 all.join(", ")
             ),
@@ -288,8 +289,8 @@ impl FamilyReport<'_> {
                 )
             });
             page.push_str(&format!(
-                "Agreement over {} coordinates that the data determine: {}; together {}.\n",
-                agreement.rows.len(),
+                "Agreement of the methods over {} that the data determine: {}; all together {}.\n",
+                numbers::counted(agreement.rows.len(), "coordinate"),
                 pairs.collect::<Vec<_>>().join(", "),
                 text::p_value(agreement.p_value)
             ));
@@ -302,7 +303,8 @@ impl FamilyReport<'_> {
         let mut page = String::from("\n");
         if let Some(free) = &fit.free_model {
             page.push_str(&format!(
-                "Box-Jenkins of the same orders: loss {} against {}, likelihood ratio {:.1} with {} degrees of freedom ({}).\n",
+                "Box-Jenkins model of the same orders: loss {} (operator: {}), likelihood ratio {:.1} with {} degrees \
+                 of freedom ({}).\n",
                 numbers::plain(free.loss),
                 numbers::plain(fit.loss),
                 free.likelihood_ratio,
@@ -315,14 +317,14 @@ impl FamilyReport<'_> {
             ClusterKind::Blocks => format!("{} blocks of the records", fit.clusters),
         };
         page.push_str(&format!(
-            "Errors from the scatter of {clusters}: variances {:.2} times those of white residuals. Student's 95 % \
-             intervals.\n",
+            "Standard errors from the scatter of {clusters}: variances {:.2} times as large as for white residuals. \
+             Student's 95 % intervals.\n",
             fit.inflation
         ));
         let quality = self.identified.quality()?;
         page.push_str(&format!(
-            "VAF prediction {:.2} %; simulation {:.2} %, which carries little information about people: an operator with a lag integrates offset and \
-             drift of e{}.\n",
+            "VAF prediction {:.2} %, simulation {:.2} %. The simulation VAF carries little information about people, \
+             because an operator with a lag integrates offset and drift of e{}.\n",
             quality.vaf_prediction,
             quality.vaf_simulation,
             fit.coherent_share.map_or(String::new(), |share| format!(

@@ -49,7 +49,7 @@ pub fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError
             Some((name, FEEDBACK)) if name == first => {}
             Some((name, FEEDBACK)) => {
                 return Err(CliError::Usage(format!(
-                    "--role {name}={FEEDBACK}: the feedback is the first --input, {first}; name {name} first"
+                    "--role {name}={FEEDBACK}: the first --input is the feedback, but it is {first}; give {name} first"
                 )));
             }
             _ => roles.push(role.to_owned()),

@@ -24,7 +24,7 @@ pub fn structure(args: &IdentifyArgs) -> Option<Structure> {
 pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
     if let Some((name, _)) = args.options.given().find(|(name, _)| !OPTIONS.contains(name)) {
         return Err(CliError::Usage(format!(
-            "--{} does not apply to polynomials with several inputs: they take --orders, --nk and --role",
+            "--{} does not apply to polynomials with several inputs; drop it, and use only --orders, --nk and --role",
             name.replace('_', "-")
         )));
     }
@@ -36,7 +36,7 @@ pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
         (args.trace.is_some(), "--trace"),
     ];
     if let Some((_, option)) = others.into_iter().find(|(given, _)| *given) {
-        return Err(CliError::Usage(format!("{option} applies to a model with one input")));
+        return Err(CliError::Usage(format!("{option} applies only to models with one input")));
     }
     let text = |name: &str| args.options.text(name);
     let model = several_inputs(

@@ -146,8 +146,7 @@ impl SigmoidReport<'_> {
         page.push_str(&interval("G", "1/s", fit.rate_interval()));
         let c = fit.comparison();
         page.push_str(&format!(
-        "Compared with the operator that does not change: 2 ln of the likelihood ratio {:.1} for {} more parameters, \
-         BIC {} by {:.1}.\n",
+        "Compared with a constant operator: 2 ln(likelihood ratio) = {:.1} for {} more parameters, BIC {} by {:.1}.\n",
         c.likelihood_ratio,
         c.extra_parameters,
         if c.bic_difference > 0.0 { "lower" } else { "higher" },
@@ -187,8 +186,8 @@ impl SigmoidReport<'_> {
             }
             if coloured {
                 page.push_str(
-                    "The residuals are not white: too small a noise model can look like a change; try --orders nd=2 or \
-                 more.\n",
+                    "The residuals are not white, and too small a noise model can cause an apparent change; try \
+                     --orders nd=2 or more.\n",
                 );
             }
         }

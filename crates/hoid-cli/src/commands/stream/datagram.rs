@@ -56,7 +56,7 @@ impl<'b> Datagram<'b> {
             return match rest.first_chunk::<{ SAMPLE - 4 }>() {
                 Some(all) if rest.len() == SAMPLE - 4 => Self::Sample(SampleDatagram::of(all)),
                 _ => Self::Unreadable(format!(
-                    "a datagram of {} bytes that starts like a sample; a sample has {SAMPLE} bytes",
+                    "the datagram starts like a sample, but has {} bytes; expected {SAMPLE}",
                     bytes.len()
                 )),
             };
@@ -64,7 +64,7 @@ impl<'b> Datagram<'b> {
         match std::str::from_utf8(bytes) {
             Ok(text) => Self::Lines(text),
             Err(_) => Self::Unreadable(format!(
-                "a datagram of {} bytes that is neither a sample nor text",
+                "the datagram of {} bytes is neither a sample nor text",
                 bytes.len()
             )),
         }

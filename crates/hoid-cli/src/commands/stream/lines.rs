@@ -180,7 +180,7 @@ impl Columns {
         let e = of(&self.input).filter(|_| self.with_input);
         match of(&self.output) {
             Some(u) if e.is_some() || !self.with_input => self.sample(of("t"), e, u, of("f_t")),
-            _ => ParsedLine::Unreadable(format!("an object without {}: {}", self.names(), shown(line))),
+            _ => ParsedLine::Unreadable(format!("the JSON object has no {}: {}", self.names(), shown(line))),
         }
     }
 

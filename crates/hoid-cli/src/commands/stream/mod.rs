@@ -39,8 +39,8 @@ const INTERRUPT_WAIT: Duration = Duration::from_secs(1);
 pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     if args.lsl_in.is_some() || args.lsl_out.is_some() {
         return Err(CliError::Usage(
-            "--lsl-in, --lsl-out: this program does not include liblsl; LabStreamingLayer streams are tracked in \
-             Python, with pyhoid.lsl.stream(IN, OUT, pyhoid.Tracker(sample_time=0.01)) (pip install \"pyhoid[lsl]\")"
+            "--lsl-in, --lsl-out: this program does not include liblsl; track LabStreamingLayer streams in Python, \
+             with pyhoid.lsl.stream(IN, OUT, pyhoid.Tracker(sample_time=0.01)) (pip install \"pyhoid[lsl]\")"
                 .to_owned(),
         ));
     }
@@ -49,13 +49,13 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let decimation = args.rate.of(asked.counts_samples());
     if asked.method.smooths() {
         return Err(CliError::Usage(
-            "--smooth is for hoid track: a stream has no future samples".to_owned(),
+            "--smooth applies only to hoid track, because a stream has no future samples".to_owned(),
         ));
     }
     if args.warm_up.is_some() && asked.method.starts_itself() {
         return Err(CliError::Usage(format!(
-            "--warm-up is for a start fit, but {} has none and estimates from the first sample; drop --warm-up, or \
-             choose --method physical",
+            "--warm-up applies only to methods with a start fit, but {} estimates from the first sample; drop \
+             --warm-up, or choose --method physical",
             asked.method
         )));
     }

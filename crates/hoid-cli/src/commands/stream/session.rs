@@ -90,7 +90,7 @@ impl Session {
         }
         let mut settings = settings_of_recursion(&self.asked, self.live.plan(), options, choice);
         if let Some(done) = self.live.decimated() {
-            settings.push(Setting::new("rate", format!("{done}, {:.3} s behind", done.lag_s)));
+            settings.push(Setting::new("rate", format!("{done}, delayed by {:.3} s", done.lag_s)));
         }
         if self.scale != (1.0, 1.0) {
             let (e, u) = self.scale;
@@ -228,14 +228,14 @@ impl Session {
         };
         if let Some(hz) = other.filter(|_| self.rate.is_none()) {
             let words = format!(
-                "up to t = {t} s, t gives a sampling rate of {hz:.4} Hz, but --fs is {fs} Hz: delay, lead and \
-                 frequency of the estimate are scaled accordingly; give the rate of t with --fs, or correct t"
+                "up to t = {t} s, t gives a sampling rate of {hz:.4} Hz, but --fs is {fs} Hz: the estimated delay, \
+                 lead and frequency are wrong by this ratio; set --fs to the rate of t, or correct t"
             );
             warn(&words);
             self.rate = Some(Finding::doubt("sampling-rate", words));
         } else if hurried {
             warn(&format!(
-                "at t = {t} s the lines run ahead of --fs {fs}: t advances by less than {} s per line",
+                "at t = {t} s, t advances by less than the {} s per line that --fs {fs} implies; correct --fs or t",
                 self.sample_time.s()
             ));
         }
@@ -314,8 +314,8 @@ impl Session {
         let c = self.counts;
         if c.samples == 0 && c.dropped > 0 {
             return Err(CliError::NotDetermined(format!(
-                "no line of the stream was a sample ({} dropped); expected e,u or t,e,u with decimal points, or a JSON \
-                 object; the output lines contain the errors",
+                "no line of the stream contained a sample ({} dropped); expected e,u or t,e,u with decimal points, or \
+                 a JSON object; the output lines contain the errors",
                 counted(c.dropped, "line")
             )));
         }

@@ -29,7 +29,7 @@ pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<Strin
             .map(|(name, e)| format!("{name} {:.1} %", 100.0 * e))
             .collect();
         page.push_str(&format!(
-            "RMS relative error against the truth in the record, from {:.2} s on: {}.\n",
+            "RMS relative error, compared with the true values in the record, from {:.2} s on: {}.\n",
             tracked.trace.times_s()[tracked.first_moved_row()],
             each.join(", ")
         ));
@@ -49,7 +49,7 @@ pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<Strin
     ));
     match out {
         Some(out) => page.push_str(&format!("Trace: {out}\n")),
-        None => page.push_str("Every row with its standard errors: --out TRACE.csv\n"),
+        None => page.push_str("To write every row with its standard errors, use --out TRACE.csv\n"),
     }
     if verbose {
         page.push_str(&details(tracked)?);
@@ -154,7 +154,7 @@ fn rows_shown(tracked: &Tracked) -> String {
         rows.add_row(cells);
     }
     let open = match bracketed {
-        true => "In brackets: not determined by the data so far.\n",
+        true => "In parentheses: not determined by the data so far.\n",
         false => "",
     };
     format!(
@@ -216,7 +216,7 @@ fn open_loop(tracked: &Tracked) -> String {
     };
     if let Some(reason) = reason {
         words.push_str(&format!(
-            "{rows} of {} rows have no crossover; most often {}.\n",
+            "{rows} of {} rows have no crossover; mostly because {}.\n",
             tracked.trace.len(),
             reason.words()
         ));
@@ -240,7 +240,7 @@ fn changes(tracked: &Tracked) -> String {
             "Change at {:.2} s, declared at {t:.2} s: {}; log odds {:.1}.\n",
             t - c.seconds_ago,
             if changed.is_empty() {
-                "no single quantity by two standard errors".to_owned()
+                "no single quantity changed by two standard errors".to_owned()
             } else {
                 changed.join(", ")
             },

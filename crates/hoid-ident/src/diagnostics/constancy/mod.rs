@@ -87,8 +87,8 @@ impl Constancy<'_> {
         Some(Finding::doubt(
             "stretch",
             format!(
-                "the fit depends on the stretch from {:.0} s to {to}{record}: without it the estimate differs in {} \
-                 standard errors; look at the recording there",
+                "the fit depends on the stretch from {:.0} s to {to}{record}: leaving it out changes {} standard \
+                 errors; look at the recording there",
                 time(found.from),
                 moves.join(", ")
             ),

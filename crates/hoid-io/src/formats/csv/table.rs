@@ -337,8 +337,8 @@ fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
     let is_longer = |row: usize| last_cell(row).is_some_and(|cell| cell.contains('.') && cell.len() > length);
     (compared..last).all(is_longer).then(|| {
         format!(
-            "the last line of the file has no line end, and its last number ({}) is shorter than those above it: it \
-             may be truncated; exclude that line with --to",
+            "the last line of the file has no line ending, and its last number ({}) is shorter than those above: the \
+             line may be truncated; exclude it with --to",
             shown(cut)
         )
     })
@@ -564,7 +564,7 @@ mod tests {
         );
         let found = message(&text.as_bytes()[..text.len() - 9]);
         assert!(
-            found.contains("run.csv is truncated in line 21, the last one: 2 of 3 values"),
+            found.contains("run.csv is truncated in line 21, the last line: 2 of 3 values"),
             "{found}"
         );
         // A short row in the middle of a file is not reported as truncation.
@@ -572,7 +572,7 @@ mod tests {
         let table = parse(b"t,e,u\n0,1,2\n1,2,-", "run.csv").unwrap();
         let error = table.bad_value(2, 1, 0..2).to_string();
         assert!(
-            error.contains("line 3") && error.contains("truncated in the middle"),
+            error.contains("line 3") && error.contains("ends in the middle"),
             "{error}"
         );
     }

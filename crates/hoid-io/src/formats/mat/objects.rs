@@ -13,7 +13,7 @@ pub(super) fn object(class: &str) -> String {
         "string" => return format!("{OBJECT} string (in MATLAB, char(x) is text)"),
         _ => return format!("{OBJECT} {}", shown(class)),
     };
-    format!("{OBJECT} {class} (in MATLAB, with x for its name: {line} save run.mat t e u)")
+    format!("{OBJECT} {class} (in MATLAB, if it is named x: {line} save run.mat t e u)")
 }
 
 #[cfg(test)]

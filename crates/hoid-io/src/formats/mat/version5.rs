@@ -235,14 +235,14 @@ impl Reader<'_> {
     /// Reads one or more structures with the same fields.
     fn structure(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
         let depth = next_depth(place)?;
-        let length = parts.of(data::INT32, "the length of the names of fields")?;
+        let length = parts.of(data::INT32, "the length of the field names")?;
         let length = parts.u32s(length).first().map_or(0, |length| *length as usize);
         let names = parts.next()?.bytes;
         if names.is_empty() || count == 0 {
             return Ok(());
         }
         if length == 0 || !names.len().is_multiple_of(length) {
-            return Err(format!("names of fields of {length} bytes in {} bytes", names.len()).into());
+            return Err(format!("field names of {length} bytes each in {} bytes", names.len()).into());
         }
         let names: Vec<String> = names.chunks(length).map(name).collect::<Result<_, _>>()?;
         for at in 0..count {

@@ -158,7 +158,7 @@ impl Reader<'_> {
             DType::U32 => self.array::<u32>(dataset, path, Kind::U32, dims)?,
             DType::U64 => self.array::<u64>(dataset, path, Kind::U64, dims)?,
             DType::String => Value::Texts(dataset.read_string().map_err(|e| error(self, e))?),
-            DType::VariableLengthString => Value::Unread(String::from("texts of variable length")),
+            DType::VariableLengthString => Value::Unread(String::from("text of variable length")),
             DType::Compound(fields) if matches!(fields.as_slice(), [(name, _), _] if name == "real") => {
                 Value::Unread(String::from("complex numbers"))
             }

@@ -26,6 +26,6 @@ pub(super) const NPY: Format = Format {
     name: "NPY",
     extensions: &["npy"],
     reading: Reading::Arrays(single::read),
-    writing: Writing::ReadOnly("hoid only reads this format, a single array without names"),
+    writing: Writing::ReadOnly("hoid only reads this format, which holds one unnamed array"),
     record: None,
 };

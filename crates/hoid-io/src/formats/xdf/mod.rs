@@ -21,6 +21,6 @@ pub(super) const XDF: Format = Format {
     name: "XDF",
     extensions: &["xdf"],
     reading: Reading::Arrays(|bytes, file| streams::read(&bytes, file)),
-    writing: Writing::ReadOnly("hoid only reads this format of recorders"),
+    writing: Writing::ReadOnly("hoid only reads this format"),
     record: None,
 };

@@ -44,7 +44,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         })?;
         if let Some(why) = &stream.unread_footer {
             notes.push(format!(
-                "stream {}: {why}; its {} samples are read, but it is not known whether samples are missing",
+                "stream {}: {why}; its {} samples are read, but others may be missing",
                 shown(&stream.header.name),
                 stream.stamps.len()
             ));

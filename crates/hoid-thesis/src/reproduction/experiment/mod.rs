@@ -84,7 +84,7 @@ fn notes(found: &Evaluation) -> Result<Vec<String>, ThesisError> {
     match (found.runs.first(), found.failed.first()) {
         (None, Some(first)) => Err(ThesisError::Recordings {
             place: NAME.to_owned(),
-            reason: format!("none of {} runs can be evaluated; {}", found.failed.len(), note(first)),
+            reason: format!("none of the {} runs can be evaluated; first failure: {}", found.failed.len(), note(first)),
         }),
         _ => Ok(found.failed.iter().map(note).collect()),
     }
@@ -101,7 +101,7 @@ pub(super) fn items() -> Vec<Item> {
         (
             "table-3".to_owned(),
             "Model parameters n_k* and T_n* used in each run and model structure (virtual people)".to_owned(),
-            "Mean of the values of the best fits of [0, 30.72] and [51.20, 81.92] s, condition C4; the true n_k of the subject alongside.",
+            "Mean of the values from the best fits to [0, 30.72] and [51.20, 81.92] s, condition C4, with the true n_k of the subject.",
         ),
         |item, runs| tables::delays(item, runs, &["C4".to_owned()]),
     )];
@@ -109,16 +109,16 @@ pub(super) fn items() -> Vec<Item> {
         &runs,
         "virtual people",
         "Three virtual subjects, mean (dark) and median (light) over the last five of seven runs at each time; the \
-         text shows the mean. Dashed in colour: batch fits of [0, 30.72] and [51.20, 81.92] s, the mean; dashed black: \
-         the simulated operator, the mean over the runs.",
+         thesis shows the mean. Dashed in colour: mean of the batch fits to [0, 30.72] and [51.20, 81.92] s; dashed \
+         black: mean of the simulated operator over the runs.",
     ));
     all.into_iter().map(|item| item.sharing(&shared)).collect()
 }
 
 /// Items for recorded people.
 pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
-    const DELAYS: &str = "Mean of the values of the best fits of the first and the last three eighths of a run; \
-                          the value of each alongside.";
+    const DELAYS: &str = "Mean of the values from the best fits to the first and last three eighths of a run, with \
+                          the value from each fit.";
     let name = people.name().to_owned();
     let runs = Runs::new(people);
     let shared = runs.shared("The experiment with recorded people");
@@ -147,9 +147,9 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
         (
             "operators".to_owned(),
             format!("Operators before and after ({name})"),
-            "Median over the runs of a person. OLS and PEM: batch fits of the first and the last three eighths; RLS and \
-             RPEM: median over the second half of each. determined: share of the runs whose model converts to an \
-             operator.",
+            "Median over the runs of a person. OLS and PEM: batch fits to the first and last three eighths; RLS and \
+             RPEM: median over the second half of each of these spans. determined: share of the runs whose model \
+             converts to an operator.",
         ),
         move |item, runs| tables::operators(item, runs, &conditions),
     ));
@@ -157,9 +157,9 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
         &runs,
         &name,
         "Recorded people, mean (dark) and median (light) over the last five runs of each person at each time; the \
-         text shows the mean. Thick dots: batch fits of the first and the last three eighths of a run, the mean; \
-         vertical dots: the change of the controlled element. Outliers beyond the range of an ordinate are cut; the \
-         data contain them.",
+         thesis shows the mean. Thick dots: mean of the batch fits to the first and last three eighths of a run; \
+         dotted vertical line: the change of the controlled element. Outliers beyond the range of a vertical axis are \
+         clipped, but the data file contains them.",
     ));
     all.into_iter().map(|item| item.sharing(&shared)).collect()
 }
@@ -211,7 +211,7 @@ fn named(number: &str, what: &str, condition: &ExperimentCondition, people: &str
     let suffix: String = name.chars().map(in_a_file_name).collect();
     (
         format!("{number}-{suffix}"),
-        format!("{what}, condition {name}, in the text {of_text} ({people})"),
+        format!("{what}, condition {name}, {of_text} in the thesis ({people})"),
     )
 }
 

@@ -15,8 +15,8 @@ pub(super) fn items() -> Vec<Item> {
     vec![Item::of_study(
         "decimation",
         "Error of the frequency response by sample time, condition C1, P_n = 0.1",
-        "Median over the runs of the relative error of the response over the lines of the forcing function; bars: quartiles. Every k-th sample of runs at \
-             100 Hz; the delay is 0.28 s.",
+        "Median over the runs of the relative error of the response at the lines of the forcing function; bars: \
+         quartiles. The fits use every k-th sample of runs at 100 Hz; the delay is 0.28 s.",
         "decimation",
         decimation,
     )]

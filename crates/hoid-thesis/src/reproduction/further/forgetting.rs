@@ -13,7 +13,7 @@ pub(super) fn items() -> Vec<Item> {
     vec![Item::of_study(
         "forgetting",
         "Forgetting factor against forgetting matrix, P_n = 0.1",
-        "Root mean square of the relative error of each run from 10 s on. Light: one factor for all, 256 samples; dark: a matrix that forgets b alone.",
+        "Root mean square of the relative error of each run from 10 s on. Light: one factor for all parameters, 256 samples; dark: a matrix that forgets only b.",
         "forgetting",
         forgetting,
     )]

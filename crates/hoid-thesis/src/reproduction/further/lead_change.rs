@@ -14,9 +14,10 @@ use super::{
 pub(super) fn items() -> Vec<Item> {
     vec![Item::of_study(
         "lead-change",
-        "How well a change of T_L by 20 % shows within 5 s",
-        "Distance between the medians of T_L at 45.9 and 40.6 s in units of their spread (interquartile range / 1.349, mean of both); the change is at 40.96 s. At 2.5 (dashed), a threshold \
-             with 5 % false alarms finds 80 % of the changes.",
+        "Detectability of a 20 % change in T_L within 5 s",
+        "Distance between the medians of T_L at 45.9 and 40.6 s in units of their spread (interquartile range / \
+         1.349, mean of both); the change is at 40.96 s. At 2.5 (dashed), a threshold with 5 % false alarms detects \
+         80 % of the changes.",
         "lead-change",
         lead_change,
     )]

@@ -134,8 +134,8 @@ pub(super) fn initial_estimate(
         return Err(unsupported_fit(
             fit,
             &format!(
-                "the response of the form {} is {:.0} % off the nearest operator of the basis; identify with a form \
-                 that has a lag, such as --form lead-lag",
+                "the response of the form {} differs by {:.0} % from the nearest operator of the basis; identify the \
+                 person with a form that has a lag, such as --form lead-lag",
                 fit.operator.form(),
                 100.0 * misfit
             ),

@@ -16,7 +16,7 @@ pub(super) fn decode(bytes: &mut Vec<u8>) -> Option<String> {
         note = Some(String::from("the text is in UTF-16"));
     } else if std::str::from_utf8(bytes).is_err() && is_latin(bytes) {
         *bytes = bytes.iter().map(|byte| latin(*byte)).collect::<String>().into_bytes();
-        note = Some(String::from("the text is taken as Latin 1"));
+        note = Some(String::from("the text is read as Latin 1"));
     }
     let cut = without_end(bytes);
     end_with_line_feeds(bytes);
@@ -35,7 +35,7 @@ fn without_end(bytes: &mut Vec<u8>) -> Option<String> {
     if zeros > 0 && is_text {
         bytes.truncate(kept);
         return Some(format!(
-            "zero bytes at the end of the file are left out: {zeros}; the recording may be incomplete"
+            "null bytes at the end of the file are left out: {zeros}; the recording may be incomplete"
         ));
     }
     if bytes.ends_with(b"\x1a") {

@@ -194,7 +194,7 @@ impl<'a> Layout<'a> {
             notes.push(String::from("the comment above the first row is taken as the header"));
         }
         if self.names.extra == Extra::RowNumbers {
-            notes.push(String::from("the rows start with their numbers, which are left out"));
+            notes.push(String::from("the rows start with row numbers, which are left out"));
         }
         let header = self.header();
         let found = text.lines().nth(self.header).map(str::trim_end);

@@ -40,7 +40,7 @@ pub(super) fn words_below(text: &str, mark: Mark) -> Option<(usize, String)> {
     let is_open = open_line(text).is_some() && found.len() == 1 && mark.cells(first).len() > 1;
     (rows.len() == COMPARED_ROWS && rows.iter().all(|row| starts_with_value(row)) && !is_open).then(|| {
         let note = format!(
-            "lines of words below the table are left out: {}, the first of which is \"{}\"",
+            "lines of text below the table are left out: {}; the first is \"{}\"",
             found.len(),
             shown(first)
         );
