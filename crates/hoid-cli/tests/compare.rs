@@ -114,7 +114,11 @@ fn mistakes_are_explained_with_a_remedy() {
     // No person has a margin, so nothing is determined, and the message reports this.
     let output = hoid(at, &["compare", "results.json", "--of", "phase_margin"]);
     assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8(output.stdout).unwrap().contains("P03 in fo is left out"));
+    assert!(
+        String::from_utf8(output.stdout)
+            .unwrap()
+            .contains("P03 in fo is left out")
+    );
 }
 
 /// People have different forms with the two elements, so their parameters are compared in a common form.

@@ -384,10 +384,9 @@ impl Scenario {
                 seen.check(&self.schedule, self.sample_time)?;
                 if self.forcing.sinusoids().is_empty() {
                     return Err(ModelError::Operator {
-                        reason:
-                            "the person responds to a target, but the target is at rest; expected a target with \
+                        reason: "the person responds to a target, but the target is at rest; expected a target with \
                              sinusoids, or no response to the target"
-                                .to_owned(),
+                            .to_owned(),
                     });
                 }
             }

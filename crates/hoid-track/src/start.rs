@@ -110,7 +110,10 @@ impl StartState {
         let names = coefficient_names(&setup.orders, setup.further.as_ref());
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
             return Err(IdentError::BadStart {
-                reason: format!("found {theta:?}; expected one finite value for each of {}", names.join(", ")),
+                reason: format!(
+                    "found {theta:?}; expected one finite value for each of {}",
+                    names.join(", ")
+                ),
             });
         }
         let values = if setup.is_physical {

@@ -178,7 +178,7 @@ impl Tracking {
             return Err(options(
                 "--start-span sets the span of the start fit, but --start replaces this fit; drop one of these \
                  options"
-                .to_owned(),
+                    .to_owned(),
             ));
         }
         if self.start_span_s.is_some() && method.starts_itself() {

@@ -82,8 +82,7 @@ fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Resu
         match analysed(manifest, path, place, &options) {
             // This command has no --resume: with --out, runs already analysed are kept; otherwise they are removed.
             Err(CliError::Stopped(_)) => Err(CliError::Stopped(
-                "the comparison was stopped; if --out was given, run the same command again to resume it"
-                    .to_owned(),
+                "the comparison was stopped; if --out was given, run the same command again to resume it".to_owned(),
             )),
             outcome => outcome.map(|_| ()),
         }

@@ -98,8 +98,7 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
         Some(lab) => write("lab.toml", &lab)?,
         None => output::notice(
             "",
-            "lab.toml was not written: a run in the lab must last a multiple of 0.01 s; change --length"
-                .to_owned(),
+            "lab.toml was not written: a run in the lab must last a multiple of 0.01 s; change --length".to_owned(),
         ),
     }
     write("forcing.csv", &found.forcing_csv())?;

@@ -17,8 +17,8 @@ pub fn check(path: &Path) -> Result<(), CliError> {
 
 fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
     let refused = |why: &str| CliError::Usage(format!("--figure {}: {why}", path.display()));
-    let format = FigureFormat::of(path)
-        .ok_or_else(|| refused("expected a file name that ends in .svg, .pdf or .png"))?;
+    let format =
+        FigureFormat::of(path).ok_or_else(|| refused("expected a file name that ends in .svg, .pdf or .png"))?;
     if !format.is_built() {
         return Err(refused(
             "this build of hoid cannot write PDF or PNG; choose a file name that ends in .svg, or build hoid with \

@@ -526,8 +526,7 @@ fn missing(result: &Comparison) -> Vec<Finding> {
             None => all.push((name, vec![out.quantity.to_string()])),
         }
     }
-    let one =
-        |(name, of): (String, Vec<String>)| Finding::doubt("left-out", format!("{name} ({})", of.join(", ")));
+    let one = |(name, of): (String, Vec<String>)| Finding::doubt("left-out", format!("{name} ({})", of.join(", ")));
     all.into_iter().map(one).collect()
 }
 

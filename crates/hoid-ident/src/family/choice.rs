@@ -106,6 +106,30 @@ mod tests {
         assert_eq!(weigh(&[None, Some(5.0)]), Some((1, vec![0.0, 1.0])));
     }
 
+    /// A form without a weight in averages counts as evidence.
+    #[test]
+    fn evidence_includes_forms_with_undetermined_parameters() {
+        let figures = |form, criterion, weight| FormFigures {
+            form,
+            loss: Some(1.0),
+            criterion,
+            weight,
+            held_out: None,
+            chi_squared: None,
+            degrees_of_freedom: None,
+            converged: true,
+        };
+        let all = [
+            figures(Form::LeadDroop, Some(10.0), 1.0),
+            figures(Form::LeadLag, Some(12.0), 0.0),
+            figures(Form::Gain, None, 0.0),
+        ];
+        let without_lag = evidence_for(&all, |form| !form.has_lag());
+        assert!((without_lag - 1.0 / (1.0 + (-1.0_f64).exp())).abs() < 1e-12);
+        assert_eq!(evidence_for(&all[..1], |form| !form.has_lag()), 1.0);
+        assert_eq!(evidence_for(&[], |_| false), 1.0);
+    }
+
     #[test]
     fn number_of_weighed_forms_is_limited() {
         let (_, weights) = weigh(&[Some(1.0); 8]).unwrap();

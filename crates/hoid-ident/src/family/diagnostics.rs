@@ -424,5 +424,10 @@ mod tests {
         assert_eq!(messages.len(), 2);
         assert!(messages[0].contains("K_e, K_e_dot; the intervals apply only if the form is lead (weight 0.45)"));
         assert!(messages[1].contains("T_L; the intervals apply only if the form is lead or lead-lag (weight 0.49)"));
+        // Forms in which K is another gain have evidence but no weight.
+        let gain = [parameter("K", &[Form::Lead, Form::LeadLag, Form::Lag])];
+        assert!(FormParameters::all(&gain, &weighed, 1.0).is_empty());
+        let found = FormParameters::all(&gain, &weighed, 0.8);
+        assert!(found[0].finding().message.contains("(weight 0.80)"));
     }
 }

@@ -428,7 +428,7 @@ mod tests {
     fn estimator() -> FamilyEstimator {
         FamilyEstimator {
             forms: vec![Form::Lead],
-            nd: NOISE_ORDER..=NOISE_ORDER,
+            nd: Some(NOISE_ORDER..=NOISE_ORDER),
             excitation: Some("d".to_owned()),
             ..FamilyEstimator::default()
         }

@@ -179,7 +179,7 @@ mod tests {
             let estimator = FamilyEstimator {
                 forms: vec![Form::Lead],
                 excitation: excitation.map(str::to_owned),
-                nd: nd..=nd,
+                nd: Some(nd..=nd),
                 prior: OperatorPrior::none(),
                 ..FamilyEstimator::default()
             };

@@ -262,3 +262,32 @@ fn run_to_run(default: f64) -> Setting {
         .default(&default.to_string())
         .bounds(Bounds::AtLeast(0.0))
 }
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::{Channel, SampleTime};
+
+    use super::*;
+
+    #[test]
+    fn default_noise_order_spans_half_a_second() {
+        let highest = |rate_hz: f64, seconds: f64, own: Option<RangeInclusive<usize>>| {
+            let n = (rate_hz * seconds) as usize;
+            let channel = |name: &str| Channel::new(name, "", vec![0.0; n]);
+            let record = Record::new(SampleTime::new(1.0 / rate_hz).unwrap(), channel("e"), channel("u")).unwrap();
+            let estimator = FamilyEstimator {
+                nd: own,
+                ..FamilyEstimator::default()
+            };
+            *estimator.with_nd_for(&[record]).nd().end()
+        };
+        assert_eq!(
+            [20.0, 60.0, 100.0, 200.0].map(|rate| highest(rate, 80.0, None)),
+            [24, 30, 50, 100]
+        );
+        // Few samples, and a range of the user.
+        assert_eq!((highest(100.0, 12.0, None), highest(100.0, 4.0, None)), (30, 24));
+        assert_eq!(highest(100.0, 80.0, Some(1..=3)), 3);
+    }
+}

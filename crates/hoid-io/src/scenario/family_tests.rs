@@ -96,10 +96,7 @@ fn invalid_files_are_refused_with_a_remedy() {
         (with("1/1,0", "one"), "line 9: initial.controlled_element is one"),
         (with("1/1,0", "90/s(s+6)"), "at character 5 there is '('"),
         (with("1/1,0", "1e13/s"), "controlled_element is 10000000000000"),
-        (
-            with("1/1,0", "exp(-0.1s)/s"),
-            "add this delay to that of the operator",
-        ),
+        (with("1/1,0", "exp(-0.1s)/s"), "add this delay to that of the operator"),
         (with("controlled_element = \"1/1,0\"\n", ""), "lacks controlled_element"),
         (with("form", "sample_time_s = 0\nform"), "line 1: sample_time_s is 0"),
         (

@@ -75,7 +75,11 @@ impl<'a> Study<'a> {
         let name = &self.results.plan.name;
         match self.results.count(query) {
             1 => {}
-            n => return Err(format!("the study {name} has {n} estimators that match {query}, expected one")),
+            n => {
+                return Err(format!(
+                    "the study {name} has {n} estimators that match {query}, expected one"
+                ));
+            }
         }
         if !self.results.has_quantity(query) {
             return Err(format!("the study {name} has no column for {query}"));

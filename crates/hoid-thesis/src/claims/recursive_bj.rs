@@ -152,7 +152,9 @@ fn five_times(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("recursive")?;
     let mut parts = Vec::new();
     for name in GAINS {
-        let mut part = Part::new(&format!("settling time of {name}, RPEM divided by RLS, from 2.5 to 7.5"));
+        let mut part = Part::new(&format!(
+            "settling time of {name}, RPEM divided by RLS, from 2.5 to 7.5"
+        ));
         for at in settings(&["C4"], &HIGHER_ORDERS, &RECURSIVE_LEVELS) {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.settling(&query, name));
             let (rls, rpem) = (rls?, rpem?);

@@ -105,7 +105,10 @@ fn variance_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         );
         let exact = study.median(&at.bj(&bias_of("innovation_variance"), at.m0, TRUE_DELAY))?;
         important.show(
-            format!("median bias at {}, relative to the exactly held remnant, %", at.label("")),
+            format!(
+                "median bias at {}, relative to the exactly held remnant, %",
+                at.label("")
+            ),
             exact,
         );
     }

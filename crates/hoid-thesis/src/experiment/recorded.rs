@@ -51,7 +51,10 @@ impl RecordedPeople {
             let reasons: Vec<String> = left_out.iter().map(|(name, why)| format!("{name}: {why}")).collect();
             return Err(ThesisError::Recordings {
                 place: path.display().to_string(),
-                reason: format!("no condition corresponds to a condition of the thesis; {}", reasons.join("; ")),
+                reason: format!(
+                    "no condition corresponds to a condition of the thesis; {}",
+                    reasons.join("; ")
+                ),
             });
         }
         let count = ExperimentPlan::parse(EXPERIMENT)?.evaluated as usize;
@@ -114,7 +117,10 @@ impl Experiment for RecordedPeople {
         let entry = self.evaluated.iter().find(|entry| key_of(entry) == *key);
         let entry = entry.ok_or_else(|| ThesisError::Recordings {
             place: self.manifest.name.clone(),
-            reason: format!("there is no run {} of {} in condition {}", key.run, key.subject, key.condition),
+            reason: format!(
+                "there is no run {} of {} in condition {}",
+                key.run, key.subject, key.condition
+            ),
         })?;
         let read = RecordedRun::read(&self.manifest, &self.base, entry)?;
         let start_s = read.record.time_s(0);

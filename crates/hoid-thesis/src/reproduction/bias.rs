@@ -138,7 +138,7 @@ fn item(name: &str, condition: &'static str, model: Model, parameters: Parameter
                        whiskers: the last run within 1.5 interquartile ranges; triangles: number of runs outside the \
                        panel; cross: no run gives a value. Without remnant all runs are identical and give a single \
                        line. True nk = 29."
-    .to_owned();
+        .to_owned();
     if parameters == Parameters::Remnant {
         caption.push_str(
             " T_n and K_n use the backward Euler form of the thesis (B.14, B.16); d1 and the innovation variance are compared with those of the exactly held filter.",

@@ -36,7 +36,9 @@ pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
         (args.trace.is_some(), "--trace"),
     ];
     if let Some((_, option)) = others.into_iter().find(|(given, _)| *given) {
-        return Err(CliError::Usage(format!("{option} applies only to models with one input")));
+        return Err(CliError::Usage(format!(
+            "{option} applies only to models with one input"
+        )));
     }
     let text = |name: &str| args.options.text(name);
     let model = several_inputs(

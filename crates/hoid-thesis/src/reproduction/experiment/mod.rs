@@ -84,7 +84,11 @@ fn notes(found: &Evaluation) -> Result<Vec<String>, ThesisError> {
     match (found.runs.first(), found.failed.first()) {
         (None, Some(first)) => Err(ThesisError::Recordings {
             place: NAME.to_owned(),
-            reason: format!("none of the {} runs can be evaluated; first failure: {}", found.failed.len(), note(first)),
+            reason: format!(
+                "none of the {} runs can be evaluated; first failure: {}",
+                found.failed.len(),
+                note(first)
+            ),
         }),
         _ => Ok(found.failed.iter().map(note).collect()),
     }
