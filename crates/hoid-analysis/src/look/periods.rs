@@ -4,9 +4,12 @@
 //! Over a whole number of periods `T` the power of a periodic signal lies in the bins of its discrete Fourier transform
 //! at the frequencies `n / T`, and in no others; over any other span it leaks into all bins. The spans between whole
 //! seconds are tried, the longest first, until nearly all the power lies in single bins ([`Excitation::found_in`]).
+//! A period need not be a number of whole seconds, so the length of this span is then varied by samples until the
+//! leakage is smallest. Without this step, a span of 82.01 s for a period of 81.92 s has two additional lines, at which
+//! the ratio of u to e is not the response of the person.
 
 use hoid_ident::frequency::{COMMON_EXCITATIONS, Excitation, LineSearch};
-use hoid_model::Record;
+use hoid_model::{Complex64, Record};
 use hoid_numerics::statistics::variance;
 
 use super::options::LookOptions;
@@ -19,6 +22,8 @@ const MAX_CUT_SHARE: f64 = 0.4;
 const MIN_LINES: usize = 3;
 /// Largest ratio of two leaked fractions of the power that are treated as equal.
 const MAX_LEAK_RATIO: f64 = 3.0;
+/// First step in which the length of a span is varied, s.
+const COARSE_STEP_S: f64 = 0.01;
 /// Fraction of the power outside the lines that may be due to rounding to about five digits.
 const ROUNDING: f64 = 1e-9;
 
@@ -79,7 +84,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
     let all = spans(record, known);
     let longest = all.iter().position(|span| lines_in(record, channel, *span).is_some())?;
     let least_s = all[longest].1 - all[longest].0 - 1.0;
-    let near: Vec<((f64, f64), Excitation, f64)> = all[longest..]
+    let near: Vec<Found> = all[longest..]
         .iter()
         .take_while(|(from_s, to_s)| to_s - from_s > least_s)
         .filter_map(|span| lines_in(record, channel, *span).map(|(excitation, leak)| (*span, excitation, leak)))
@@ -87,7 +92,8 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
     let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
     // Of spans with equal leakage the first one, which is the longest, is chosen.
     let limit = MAX_LEAK_RATIO * least.max(ROUNDING);
-    let ((from_s, to_s), excitation, _) = near.into_iter().find(|(.., leak)| *leak <= limit)?;
+    let chosen = near.into_iter().find(|(.., leak)| *leak <= limit)?;
+    let ((from_s, to_s), excitation, _) = refined(record, channel, chosen, known);
     let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
     let words = format!(
         "{channel} has {} lines from {:.3} to {:.3} rad/s, harmonics of {period_s:.4} s, over {from_s:.3} to {to_s:.3} s",
@@ -104,6 +110,46 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
     })
 }
 
+/// A span with its lines and its leakage.
+type Found = ((f64, f64), Excitation, f64);
+
+/// Varies the length of a span by up to a second, first in steps of a hundredth of a second and then by samples, and
+/// returns the span with the least leakage. The span keeps its end, or its start if the user gave that one.
+fn refined(record: &Record, channel: &str, found: Found, known: &LookOptions) -> Found {
+    let ts = record.sample_time().s();
+    let is_given = (known.from_s.is_some(), known.to_s.is_some());
+    if found.2 <= ROUNDING || is_given == (true, true) {
+        return found;
+    }
+    let (start_s, end_s) = (record.time_s(0), record.time_s(record.len()));
+    let least_of = |best: Found, step: i64, steps: i64| {
+        let (from_s, to_s) = best.0;
+        let moved = |k: i64| {
+            let by_s = (k * step) as f64 * ts;
+            if is_given.0 {
+                (from_s, to_s + by_s)
+            } else {
+                (from_s - by_s, to_s)
+            }
+        };
+        let spans = (-steps..=steps).map(moved);
+        let inside = spans.filter(|(from, to)| *from >= start_s - 0.5 * ts && *to <= end_s + 0.5 * ts);
+        let all = inside.filter_map(|span| lines_in(record, channel, span).map(|(lines, leak)| (span, lines, leak)));
+        all.fold(best, |best, other| if other.2 < best.2 { other } else { best })
+    };
+    let leak = found.2;
+    let coarse = ((COARSE_STEP_S / ts).round() as i64).max(1);
+    let steps = (1.0 / (coarse as f64 * ts)).floor() as i64;
+    let best = least_of(found.clone(), coarse, steps);
+    let best = if coarse > 1 { least_of(best, 1, coarse) } else { best };
+    // A small gain is due to noise in the channel.
+    if MAX_LEAK_RATIO * best.2.max(ROUNDING) < leak {
+        best
+    } else {
+        found
+    }
+}
+
 /// Returns the lines of a channel over a span if they contain nearly all of its power, and the fraction of the power
 /// outside them.
 fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
@@ -116,13 +162,15 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
     let n = values.len() as f64;
     let power = variance(values);
     let of_line = |omega: &f64| -> f64 {
-        let step = omega * span.sample_time().s();
-        let at = |k: usize| (step * k as f64).sin_cos();
-        let (sin, cos) = values.iter().enumerate().fold((0.0, 0.0), |(sin, cos), (k, v)| {
-            let (s, c) = at(k);
-            (sin + v * s, cos + v * c)
-        });
-        2.0 * (sin * sin + cos * cos) / (n * n)
+        // The phasor turns by one step from sample to sample, which is much faster than a sine of each phase.
+        let turn = Complex64::from_polar(1.0, omega * span.sample_time().s());
+        let mut phasor = Complex64::new(1.0, 0.0);
+        let mut sum = Complex64::new(0.0, 0.0);
+        for v in values {
+            sum += *v * phasor;
+            phasor *= turn;
+        }
+        2.0 * sum.norm_sqr() / (n * n)
     };
     let of_lines: f64 = excitation.omega_rad_s().iter().map(of_line).sum();
     Some((excitation, (1.0 - of_lines / power).max(0.0)))
@@ -156,7 +204,7 @@ fn spans(record: &Record, known: &LookOptions) -> Vec<(f64, f64)> {
 mod tests {
     use std::f64::consts::TAU;
 
-    use hoid_model::{Channel, SampleTime};
+    use hoid_model::{Channel, SampleTime, forcing::ForcingFunction};
 
     use super::*;
 
@@ -204,6 +252,33 @@ mod tests {
             assert_eq!((found.span_s, found.period_s), (exact.span_s, exact.period_s));
         }
         assert_eq!(exact.span_s, (3.0, 23.0));
+    }
+
+    /// The thesis's period of 8192 samples, in a record that starts and ends elsewhere.
+    #[test]
+    fn period_of_a_fraction_of_a_second_is_found() {
+        let ts = SampleTime::HUNDREDTH;
+        let target = ForcingFunction::reference().samples(0.0, ts, 9001);
+        let noise = |k: usize| ((k * 7919 % 1013) as f64 / 1013.0) - 0.5;
+        let channel = |name: &str, f: &dyn Fn(usize) -> f64| Channel::new(name, "", (0..9001).map(f).collect());
+        let record = Record::new(ts, channel("e", &noise), channel("u", &|k| noise(k + 3))).unwrap();
+        for measured in [0.0, 1e-3] {
+            let r = channel("r", &|k| target[k] + measured * noise(k + 11));
+            let record = record.clone().with_channel(r).unwrap();
+            let found = search(&record, &LookOptions::default()).ok().unwrap();
+            assert!((found.period_s - 81.92).abs() < 0.015, "{} {measured}", found.period_s);
+            assert_eq!(found.excitation.harmonics(), [3, 5, 8, 13, 22, 34, 53, 86, 139, 229]);
+            let from_8 = LookOptions {
+                from_s: Some(8.0),
+                ..LookOptions::default()
+            };
+            let found = search(&record, &from_8).ok().unwrap();
+            assert!(
+                found.span_s.0 == 8.0 && (found.period_s - 81.92).abs() < 0.015,
+                "{:?}",
+                found.span_s
+            );
+        }
     }
 
     #[test]
