@@ -83,7 +83,7 @@ def test_recordings_are_analysed_first(tmp_path: Path) -> None:
         runs, of=["crossover", "T_L"], directory=kept, progress=lambda done, total: seen.append((done, total))
     )
     assert [d["quantity"] for d in found.differences] == ["crossover", "T_L"]
-    assert any("for all" in note for note in found.verdict.notes) and seen[-1][0] == seen[-1][1]
+    assert any("of all people" in note for note in found.verdict.notes) and seen[-1][0] == seen[-1][1]
     # What was analysed is compared again without the recordings.
     again = pyhoid.compare(kept / "group", of="crossover")
     assert again.differences[0]["value"] == found.differences[0]["value"]

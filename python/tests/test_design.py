@@ -86,5 +86,5 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
         pyhoid.design(controlled_element="4/s", lines=60, spacing=9)
     with pytest.raises(pyhoid.FileMissingError):
         pyhoid.design(tmp_path / "nothing.toml")
-    with pytest.raises(pyhoid.FormatError, match="no people"):
+    with pytest.raises(pyhoid.FormatError, match="does not contain people"):
         pyhoid.design(tmp_path)

@@ -185,7 +185,7 @@ def test_what_cannot_be(runs: list[pyhoid.Record], tmp_path: Path) -> None:
         ({"prior": {"omega_nm": 10.0}}, "centre, spread"),
         ({"prior": {"omega_nm": (-1.0, 0.3)}}, "positive"),
         ({"individual": ["gain"]}, "expected K, T_L"),
-        ({"nd": (3, 199)}, "0..100"),
+        ({"nd": (3, 99)}, "0..64"),
         ({"run_to_run": -1.0}, "0 or more"),
     ]:
         with pytest.raises(pyhoid.OptionError, match=word):

@@ -7,8 +7,9 @@ use hoid_model::{Decimation, SampleTime};
 use crate::{AnalysisError, recordings::Recordings};
 
 impl Recordings {
-    /// Decimates the recordings and adds this step to their accounts. An estimator whose orders are numbers of samples
-    /// is decimated only by a given factor. Nothing is decimated if the user gave a sampling frequency for reading.
+    /// Decimates the recordings and adds this step to their accounts. For an estimator whose orders are numbers of
+    /// samples, the recordings are decimated only if the user gave a factor. Nothing is decimated if the user gave a
+    /// sampling frequency for reading.
     ///
     /// # Errors
     /// The errors of decimation.

@@ -245,7 +245,7 @@ impl Request {
             (true, Some("arma" | "remnant")) => Err(AnalysisError::Option {
                 name: "noise",
                 reason: format!(
-                    "found {}; an operator that changes allows only noise ar",
+                    "found {}; for an operator that changes, only ar is possible",
                     noise.unwrap_or_default()
                 ),
             }),

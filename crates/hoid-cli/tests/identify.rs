@@ -574,7 +574,7 @@ fn parameters_of_an_uncertain_form_are_conditional() {
     good(d, &["simulate", "--condition", "C1", "--seed", "5", "--out", "c1.csv"]);
     let out = good(d, &["identify", "c1.csv", "--excitation", "none"]);
     let note = "not determined, because other forms are likely too: K_e, K_e_dot; the intervals apply only if the form \
-                is lead (weight 0.49): use --form lead to report them";
+                is lead (weight 0.32): use --form lead to report them";
     assert!(out.contains(note), "{out}");
     assert!(
         !out.contains("K_e is not determined, but") && !out.contains("not determined by the data"),

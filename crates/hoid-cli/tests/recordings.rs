@@ -286,7 +286,7 @@ fn two_files_at_two_rates_can_be_joined() {
     assert_eq!(code, 1);
     for part in [
         "no column \"u\"",
-        "but stick.csv has",
+        "but stick.csv does",
         "pandas.read_csv(\"eye.csv\")",
         "how=\"outer\"",
     ] {

@@ -319,5 +319,5 @@ fn reproduction_draws_the_requested_items() {
     good(at, &arguments);
     assert!(read() == before, "drawn again from the study that is there");
     let (_, message) = bad(at, &["reproduce", "--only", "A.1", "--replications", "3", "--out", "r"]);
-    assert!(message.contains("replications 2 there, 3 here"), "{message}");
+    assert!(message.contains("replications is 2, but this run has 3"), "{message}");
 }

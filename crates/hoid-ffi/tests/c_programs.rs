@@ -24,7 +24,7 @@ fn built(name: &str, with: &str, options: &[&str]) -> Option<(TempDir, PathBuf)>
     Some((folder, program))
 }
 
-/// Returns value and standard error of each estimate; NaN if there is none.
+/// Returns the value and the standard error of each estimate; NaN where there is none.
 fn numbers(estimates: &[Option<Estimate>]) -> Vec<f64> {
     let pair = |e: &Option<Estimate>| {
         let value = e.map_or(f64::NAN, |e| e.value);

@@ -1,6 +1,6 @@
 //! Contribution of a searched delay to the error bars of a fit.
 //!
-//! A searched nk is estimated from the data like theta, and theta depends on it. The residual also has a derivative
+//! An nk that is searched for is estimated from the data, as theta is, and theta depends on it. The residual also has a derivative
 //! with respect to the delay tau. With the filtered response of the model `x = (D/C) w = sum_j b_j psi_bj`, this
 //! derivative is computed by central differences, `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`. With `G = psi' psi`
 //! the estimate of theta depends on the delay with the slope

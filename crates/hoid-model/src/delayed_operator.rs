@@ -167,7 +167,7 @@ fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime)
         return Err(ModelError::OutOfRange {
             quantity: "delay tau_e in s",
             found: tau,
-            expected: "a time within the requested sample",
+            expected: "a delay between the given number of whole samples and one sample more",
         });
     }
     // If delta equals 0 or one sample up to rounding, it is set to that value.

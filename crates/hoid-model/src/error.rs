@@ -171,7 +171,7 @@ pub enum NotConvertible {
     },
     /// The square `omega_nm^2` would not be positive.
     #[error(
-        "the continuous-time denominator s^2 + {a1:.4} s + {a2:.3e} gives no positive omega_nm^2: the poles are real, and lie on both sides of the origin of the s-plane or at it"
+        "the continuous-time denominator s^2 + {a1:.4} s + {a2:.3e} gives no positive omega_nm^2: the poles are real, and they have opposite signs or at least one is zero"
     )]
     NoNaturalFrequency {
         /// Coefficient of s in the continuous denominator.

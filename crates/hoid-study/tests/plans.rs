@@ -167,7 +167,7 @@ fn options_of_an_operator_are_checked() {
             18,
             "only the orders nc and nd of the noise",
         ),
-        ("method = \"operator\"\norders.nd = 101", 18, "within 0..100"),
+        ("method = \"operator\"\norders.nd = 65", 18, "within 0..64"),
         ("method = \"operator\"\norders.nd = \"4..1\"", 18, "as \"0..8\""),
         ("method = \"operator\"\nprior = \"fit.json\"", 18, "is a file"),
         ("method = \"operator\"\nprior = \"omega:2\"", 18, "NAME=CENTRE:SPREAD"),

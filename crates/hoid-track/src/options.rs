@@ -230,7 +230,7 @@ impl TrackOptions {
         further.batch_model(self.structure, &self.orders, self.search).check()
     }
 
-    /// Checks method, structure, orders and options against each other.
+    /// Checks that the method, the structure, the orders and the options are compatible.
     ///
     /// # Errors
     /// [`IdentError`], which describes the problem.

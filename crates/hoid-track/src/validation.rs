@@ -9,7 +9,7 @@
 //!
 //! `VAF = max(0, 1 - sum (u - w)^2/sum u^2) 100 %`,
 //!
-//! and from a grid of `P_0 = p I` the p is chosen whose trace explains most of the second run. An estimate that follows
+//! The initial covariance is `P_0 = p I`, with the p of a grid whose trace explains most of the second run. An estimate that follows
 //! the remnant of the first run explains less of the second run, which has another remnant; an estimate that changes
 //! too slowly explains less after a change of the person. The runs are aligned at their first samples, so changes of
 //! the task must occur at the same time in both runs.

@@ -102,12 +102,12 @@ class MethodSettings(TypedDict, total=False):
     # For gradient: step size. For rls, rpem, physical.
     rate: float | None
 
-    # Guard: hold back outliers of e and u, exclude spans that no tracking produces, and restart
-    # the estimate after them. For rls, rpem, physical, multiple-model, adaptive.
+    # Guard: hold back outliers of e and u, exclude spans without tracking, and restart the
+    # estimate after them. For rls, rpem, physical, multiple-model, adaptive.
     guard: Literal["yes", "no"] | None
 
-    # Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
-    # comparison), or pseudo-linear (without filters: extended least squares). For rpem.
+    # Filters for psi: gradient (D/(C F) as one filter), cascade (1/F, then D/C; for
+    # comparison), or pseudo-linear (none: extended least squares). For rpem.
     regressor: Literal["gradient", "cascade", "pseudo-linear"] | None
 
     # Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical, fused.
@@ -137,11 +137,11 @@ class MethodSettings(TypedDict, total=False):
     # run from both ends). For multiple-model.
     smooth: bool | None
 
-    # Accepted false alarms per hour (a lower number detects fewer changes, and later). For
+    # Accepted false alarms per hour (lower: fewer changes are detected, and later). For
     # adaptive.
     false_alarms: float | None
 
-    # Length of the record that is read repeatedly (0: each sample is read once, as on a
+    # Length of past data that are replayed (0: each sample is used once, as on a
     # microcontroller). For adaptive.
     replay: float | None
 
@@ -289,8 +289,8 @@ class BatchSettings(TypedDict, total=False):
     # For pem.
     coefficient_prior: Mapping[str, tuple[float, float]] | None
 
-    # Huber loss instead of squares: linear beyond X standard deviations; 1.345 if X is not
-    # given. For pem.
+    # Huber loss instead of squares, linear beyond X standard deviations (1.345 if X is
+    # omitted). For pem.
     robust: float | bool | None
 
     # Accept only models that are stable from e to u (C and F are always stable). For pem.
@@ -309,8 +309,8 @@ METHODS = """``"rls"``: recursive least squares;
         ``"rriv"``: recursive refined instrumental variable;
         ``"multiple-model"``: a bank of hypotheses about when the person changed, which sets its
         own memory and reports changes;
-        ``"adaptive"``: gains in a basis common to people, with its own noise model; needs no
-        start fit;
+        ``"adaptive"``: gains in a basis common to all people, with its own noise model; needs
+        no start fit;
         ``"fused"``: least squares for B with the poles of rpem, for comparison;
         ``"ekf"``: extended Kalman filter of state and parameters, for comparison;
         ``"ukf"``: unscented Kalman filter of state and parameters, for comparison;
@@ -347,11 +347,11 @@ SETTINGS = """covariance : float
         rate : float
             For gradient: step size. For rls, rpem, physical.
         guard : Literal['yes', 'no']
-            Guard: hold back outliers of e and u, exclude spans that no tracking produces, and
-            restart the estimate after them. For rls, rpem, physical, multiple-model, adaptive.
+            Guard: hold back outliers of e and u, exclude spans without tracking, and restart
+            the estimate after them. For rls, rpem, physical, multiple-model, adaptive.
         regressor : Literal['gradient', 'cascade', 'pseudo-linear']
-            Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
-            comparison), or pseudo-linear (without filters: extended least squares). For rpem.
+            Filters for psi: gradient (D/(C F) as one filter), cascade (1/F, then D/C; for
+            comparison), or pseudo-linear (none: extended least squares). For rpem.
         stable : Literal['predictor', 'noise']
             Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical,
             fused.
@@ -373,10 +373,10 @@ SETTINGS = """covariance : float
             Smooth a recorded run: use the whole run for each estimate, not only the past
             (hypotheses run from both ends). For multiple-model.
         false_alarms : float
-            Accepted false alarms per hour (a lower number detects fewer changes, and later).
-            For adaptive.
+            Accepted false alarms per hour (lower: fewer changes are detected, and later). For
+            adaptive.
         replay : float
-            Length of the record that is read repeatedly (0: each sample is read once, as on a
+            Length of past data that are replayed (0: each sample is used once, as on a
             microcontroller). For adaptive.
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
             Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD for omega_nm,
@@ -477,8 +477,8 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Prior values and weights of coefficients: f1=-1.9:0.5 adds 0.5 (f1 + 1.9)^2 to the
             loss. For pem.
         robust : float | bool
-            Huber loss instead of squares: linear beyond X standard deviations; 1.345 if X is
-            not given. For pem.
+            Huber loss instead of squares, linear beyond X standard deviations (1.345 if X is
+            omitted). For pem.
         stable : bool
             Accept only models that are stable from e to u (C and F are always stable). For pem.
         instruments : str

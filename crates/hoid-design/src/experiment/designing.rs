@@ -90,7 +90,7 @@ impl Designing {
             return Err(DesignError::OutOfRange {
                 quantity: "highest frequency of the lines in whole periods of the forcing function",
                 found: largest,
-                expected: "more than the lowest (1 or more), and less than 100000",
+                expected: "more than that of the lowest line, which is at least 1, and less than 100000",
             });
         }
         let (least, largest) = (least as u32, largest as u32);

@@ -114,7 +114,7 @@ impl<'s> FurtherInputs<'s> {
             if left == 0 {
                 return refuse(
                     format!("{} samples of {}", record.len(), record.label()),
-                    "more samples than the preview",
+                    "a record longer than the preview",
                 );
             }
             for ((channel, &lead), values) in all.iter().zip(&leads).zip(&mut values) {

@@ -3,7 +3,7 @@
 
 use std::ops::RangeInclusive;
 
-use hoid_model::{Detrend, Form, Record, operator_family::Coordinate};
+use hoid_model::{Detrend, Form, MAX_ORDER, Record, operator_family::Coordinate};
 
 use super::{channel::SeenChannel, intersample::Intersample, prior::OperatorPrior};
 use crate::{
@@ -14,8 +14,8 @@ use crate::{
     shared_options as shared,
 };
 
-/// Highest order of the noise model: half a second at the highest rate that is not decimated.
-pub const HIGHEST_NOISE_ORDER: usize = 100;
+/// Highest order of the noise model.
+pub const HIGHEST_NOISE_ORDER: usize = MAX_ORDER;
 /// Time in s that the noise model spans at the highest order of the default search. In a closed loop the noise model
 /// must span the time in which the operator responds, or it biases the operator ([`super::sensitivity`]).
 const NOISE_SPAN_S: f64 = 0.5;
@@ -284,7 +284,7 @@ mod tests {
         };
         assert_eq!(
             [20.0, 60.0, 100.0, 200.0].map(|rate| highest(rate, 80.0, None)),
-            [24, 30, 50, 100]
+            [24, 30, 50, 64]
         );
         // Few samples, and a range of the user.
         assert_eq!((highest(100.0, 12.0, None), highest(100.0, 4.0, None)), (30, 24));

@@ -48,7 +48,7 @@ pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut
         let what = if kind == QualityIssueKind::Repeated {
             "duplicated, including the time"
         } else {
-            "not later than the previous row, with different values"
+            "not later than the previous row, although their values differ"
         };
         found.push(QualityIssue {
             kind,

@@ -253,7 +253,7 @@ impl Plan {
         let blocks: u128 = self.cells.iter().map(blocks).sum();
         if blocks > MAX_BLOCKS {
             return Err(format!(
-                "the plan has {blocks} blocks, expected at most {MAX_BLOCKS}: increase block or split the plan"
+                "the plan has {blocks} blocks, expected at most {MAX_BLOCKS}: increase `block` or split the plan"
             ));
         }
         Ok(())

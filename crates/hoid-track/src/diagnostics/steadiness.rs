@@ -29,7 +29,7 @@ const SETTLING_S: f64 = 3.0;
 /// if e responds to u. The share is above one half in closed loops, and below 0.03 if e and u are from two runs with
 /// the same forcing function.
 const MIN_RESPONSE_SHARE: f64 = 0.05;
-/// Time before and after a declared change that is excluded from the stretches, s.
+/// Time excluded from the stretches before and after a declared change, s.
 const EXCLUDED_S: f64 = 5.0;
 
 /// Signals and terms of a basis.

@@ -1,7 +1,7 @@
-//! The recursion with gains in a basis for people ([`hoid_core::adaptive`]), with the interface of a recursion and with
-//! defaults for people, in seconds.
+//! The adaptive recursion ([`hoid_core::adaptive`]) as a method with the common interface of the recursions. Its
+//! defaults are for people and in seconds.
 //!
-//! The method needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::default`]). The
+//! The method needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::defaults`]). The
 //! initial delay follows from nk (0.2 s if nothing is specified), plus half a sample for an error that is held.
 //!
 //! **Prior knowledge of the person** before the first sample is selected by the option `prior`: the default, almost

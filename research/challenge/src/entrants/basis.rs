@@ -146,7 +146,7 @@ fn regressors(task: &Task) -> Vec<Plain> {
             });
         }
         for i in 0..steps {
-            // Position of the error tau before the middle of the step.
+            // Position, in samples, of the error at the time tau_e before the middle of the step.
             let place = count as f64 + (i as f64 + 0.5) / steps as f64 - NOMINAL.tau_e_s / ts;
             let v = if place < 0.0 { 0.0 } else { errors[place as usize] };
             state.advance(&denominator, [v; 3], h);

@@ -35,7 +35,7 @@ pub fn run(args: &GroupArgs) -> Result<(), CliError> {
         (Some(GroupCommand::Init(init)), _, _) => write_manifest(init),
         (None, Some(manifest), Some(out)) => analyse(manifest, out, &args.run),
         _ => Err(CliError::Usage(
-            "give a manifest or directory and --out, or use `hoid group init DIR`".to_owned(),
+            "give --out and a manifest or a directory, or use `hoid group init DIR`".to_owned(),
         )),
     }
 }

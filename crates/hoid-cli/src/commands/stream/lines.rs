@@ -180,7 +180,11 @@ impl Columns {
         let e = of(&self.input).filter(|_| self.with_input);
         match of(&self.output) {
             Some(u) if e.is_some() || !self.with_input => self.sample(of("t"), e, u, of("f_t")),
-            _ => ParsedLine::Unreadable(format!("the JSON object has no {}: {}", self.names(), shown(line))),
+            _ => ParsedLine::Unreadable(format!(
+                "the JSON object does not have both {}: {}",
+                self.names(),
+                shown(line)
+            )),
         }
     }
 
@@ -399,8 +403,8 @@ mod tests {
         assert_eq!(sample(&mut alone, r#"{"e": 4, "u": 1}"#).e, 0.0);
         for (line, reason) in [
             ("{", "not a JSON object"),
-            ("{\"t\": 1}", "without e and u"),
-            ("{\"u\": 1}", "without e and u"),
+            ("{\"t\": 1}", "does not have both e and u"),
+            ("{\"u\": 1}", "does not have both e and u"),
             ("{\"t\": null, \"e\": 1, \"u\": 1}", "t is missing"),
             ("{\"e\": 1e999, \"u\": 1}", "not a JSON object"),
         ] {
