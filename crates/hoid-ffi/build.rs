@@ -5,11 +5,11 @@
 use std::env;
 
 /// Stack size in bytes.
-const STACK: u32 = 4 << 20;
+const STACK_SIZE: u32 = 4 << 20;
 
 fn main() {
     println!("cargo:rerun-if-changed=build.rs");
     if env::var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "wasm32") {
-        println!("cargo:rustc-link-arg-cdylib=-zstack-size={STACK}");
+        println!("cargo:rustc-link-arg-cdylib=-zstack-size={STACK_SIZE}");
     }
 }

@@ -39,7 +39,7 @@ impl Background {
     }
 
     /// Waits for the end of the task and prints its output.
-    pub fn end(mut self) -> Result<(), String> {
+    pub fn wait(mut self) -> Result<(), String> {
         let name = self.name;
         let status = self.child.wait().map_err(|e| format!("cargo xtask {name}: {e}"))?;
         print!("{}", fs::read_to_string(&self.output_file).unwrap_or_default());

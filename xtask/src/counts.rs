@@ -9,13 +9,13 @@ pub struct Counts {
 }
 
 impl Counts {
-    pub fn join(&mut self, other: &Self) {
+    pub fn merge(&mut self, other: &Self) {
         self.passed += other.passed;
         self.failed += other.failed;
         self.ignored += other.ignored;
     }
 
-    pub fn verdict(&self) -> Result<(), String> {
+    pub fn to_result(&self) -> Result<(), String> {
         match self.failed {
             0 => Ok(()),
             failed => Err(format!("{failed} tests failed")),

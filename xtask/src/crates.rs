@@ -11,7 +11,7 @@ use serde_json::Value;
 use crate::process::{cargo_command, output};
 
 /// Licences compatible with the distribution of hoid under `MIT OR Apache-2.0`.
-const ALLOWED: [&str; 11] = [
+const ALLOWED_LICENCES: [&str; 11] = [
     "0BSD",
     "Apache-2.0",
     "Apache-2.0 WITH LLVM-exception",
@@ -26,7 +26,7 @@ const ALLOWED: [&str; 11] = [
 ];
 
 /// Unwanted crates with reasons. A `*` at the end or the start of a name matches all names with that prefix or suffix.
-const BANNED: [(&str, &str); 16] = [
+const BANNED_CRATES: [(&str, &str); 16] = [
     (
         "*-sys",
         "it links a library that is not Rust: hoid builds with cargo alone, everywhere",
@@ -47,7 +47,7 @@ const BANNED: [(&str, &str); 16] = [
     ("ansi_term", "it is not maintained"),
     ("lazy_static", "use std::sync::OnceLock or LazyLock"),
 ];
-/// Crates of [`BANNED`] that are tolerated, with reasons.
+/// Crates of [`BANNED_CRATES`] that are tolerated, with reasons.
 const TOLERATED_CRATES: [(&str, &str); 5] = [
     ("core-foundation-sys", "the system of macOS"),
     ("js-sys", "the browser, which hoid is not built for"),
@@ -60,7 +60,7 @@ const TOLERATED_CRATES: [(&str, &str); 5] = [
 ];
 
 /// Crates that are permitted in several versions: number of versions, and the reason.
-const SEVERAL: [(&str, usize, &str); 9] = [
+const CRATES_WITH_SEVERAL_VERSIONS: [(&str, usize, &str); 9] = [
     ("bitflags", 2, "png, of resvg: feature pdf-png"),
     ("getrandom", 3, "const-random and ahash, of parquet"),
     (
@@ -91,9 +91,9 @@ pub fn check() -> Result<(), String> {
         return Err(String::from("cargo metadata names no packages"));
     }
     let mut wrong = Vec::new();
-    wrong.extend(packages.iter().filter_map(licence_of));
-    wrong.extend(packages.iter().filter_map(ban_of));
-    wrong.extend(several(&packages));
+    wrong.extend(packages.iter().filter_map(licence_problem));
+    wrong.extend(packages.iter().filter_map(ban_reason));
+    wrong.extend(version_problems(&packages));
     let mut tree = cargo_command();
     tree.args(["tree", "--locked", "-p", "hoid-cli", "-e", "normal", "--prefix", "none"])
         .args(["--target", "x86_64-unknown-linux-gnu", "--format", "{p}"]);
@@ -141,7 +141,7 @@ fn packages(metadata: &Value) -> Vec<Package> {
 }
 
 /// Returns the problem with the origin or the licence of a crate; `None` if there is none.
-fn licence_of(package: &Package) -> Option<String> {
+fn licence_problem(package: &Package) -> Option<String> {
     let Package {
         name, version, source, ..
     } = package;
@@ -153,45 +153,45 @@ fn licence_of(package: &Package) -> Option<String> {
             "{name} {version} states no licence by name: take another crate"
         ));
     };
-    match allows(licence) {
+    match is_permitted_licence(licence) {
         Some(true) => None,
         Some(false) => Some(format!(
             "{name} {version} is under {licence}, expected {}: take another crate",
-            ALLOWED.join(", ")
+            ALLOWED_LICENCES.join(", ")
         )),
         None => Some(format!("{name} {version}: {licence:?} is not a licence expression")),
     }
 }
 
 /// True if a licence expression permits the distribution of the crate; `None` if it cannot be parsed.
-fn allows(expression: &str) -> Option<bool> {
+fn is_permitted_licence(expression: &str) -> Option<bool> {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();
     let mut rest = words.as_slice();
-    let allowed = either(&mut rest)?;
+    let allowed = parse_or(&mut rest)?;
     rest.is_empty().then_some(allowed)
 }
 
-fn either(rest: &mut &[&str]) -> Option<bool> {
-    let mut allowed = both(rest)?;
-    while take(rest, "OR") {
-        allowed |= both(rest)?;
+fn parse_or(rest: &mut &[&str]) -> Option<bool> {
+    let mut allowed = parse_and(rest)?;
+    while consume(rest, "OR") {
+        allowed |= parse_and(rest)?;
     }
     Some(allowed)
 }
 
-fn both(rest: &mut &[&str]) -> Option<bool> {
-    let mut allowed = one(rest)?;
-    while take(rest, "AND") {
-        allowed &= one(rest)?;
+fn parse_and(rest: &mut &[&str]) -> Option<bool> {
+    let mut allowed = parse_term(rest)?;
+    while consume(rest, "AND") {
+        allowed &= parse_term(rest)?;
     }
     Some(allowed)
 }
 
-fn one(rest: &mut &[&str]) -> Option<bool> {
-    if take(rest, "(") {
-        let allowed = either(rest)?;
-        return take(rest, ")").then_some(allowed);
+fn parse_term(rest: &mut &[&str]) -> Option<bool> {
+    if consume(rest, "(") {
+        let allowed = parse_or(rest)?;
+        return consume(rest, ")").then_some(allowed);
     }
     let (name, behind) = rest.split_first()?;
     if ["OR", "AND", "WITH", ")"].contains(name) {
@@ -199,15 +199,15 @@ fn one(rest: &mut &[&str]) -> Option<bool> {
     }
     *rest = behind;
     let mut licence = (*name).to_owned();
-    if take(rest, "WITH") {
+    if consume(rest, "WITH") {
         let (exception, behind) = rest.split_first()?;
         *rest = behind;
         licence = format!("{licence} WITH {exception}");
     }
-    Some(ALLOWED.contains(&licence.as_str()))
+    Some(ALLOWED_LICENCES.contains(&licence.as_str()))
 }
 
-fn take(rest: &mut &[&str], word: &str) -> bool {
+fn consume(rest: &mut &[&str], word: &str) -> bool {
     match rest.split_first() {
         Some((first, behind)) if *first == word => {
             *rest = behind;
@@ -218,7 +218,7 @@ fn take(rest: &mut &[&str], word: &str) -> bool {
 }
 
 /// Returns the reason why a crate is unwanted; `None` if it is not.
-fn ban_of(package: &Package) -> Option<String> {
+fn ban_reason(package: &Package) -> Option<String> {
     let name = package.name.as_str();
     if TOLERATED_CRATES.iter().any(|(known, _)| *known == name) {
         return None;
@@ -233,18 +233,18 @@ fn ban_of(package: &Package) -> Option<String> {
         }
         _ => name == pattern,
     };
-    let (_, why) = BANNED.iter().find(|(pattern, _)| matches(pattern))?;
+    let (_, why) = BANNED_CRATES.iter().find(|(pattern, _)| matches(pattern))?;
     Some(format!("{name} {} is banned: {why}", package.version))
 }
 
-/// Returns the crates with more versions than permitted, and outdated entries of [`SEVERAL`].
-fn several(packages: &[Package]) -> Vec<String> {
+/// Returns the crates with more versions than permitted, and outdated entries of [`CRATES_WITH_SEVERAL_VERSIONS`].
+fn version_problems(packages: &[Package]) -> Vec<String> {
     let mut versions: BTreeMap<&str, BTreeSet<&str>> = BTreeMap::new();
     for package in packages {
         versions.entry(&package.name).or_default().insert(&package.version);
     }
     let stated = |name: &str| {
-        SEVERAL
+        CRATES_WITH_SEVERAL_VERSIONS
             .iter()
             .find(|(known, ..)| *known == name)
             .map_or(1, |(_, n, _)| *n)
@@ -262,7 +262,7 @@ fn several(packages: &[Package]) -> Vec<String> {
             )
         })
         .collect();
-    wrong.extend(SEVERAL.iter().filter_map(|(name, n, _)| {
+    wrong.extend(CRATES_WITH_SEVERAL_VERSIONS.iter().filter_map(|(name, n, _)| {
         let found = versions.get(name).map_or(0, BTreeSet::len);
         (found < *n).then(|| format!("{name} is present in {found} versions, but SEVERAL has {n}: lower it"))
     }));
@@ -300,35 +300,35 @@ mod tests {
             ("(MIT", None),
             ("MIT Apache-2.0", None),
         ] {
-            assert_eq!(allows(expression), expected, "{expression}");
+            assert_eq!(is_permitted_licence(expression), expected, "{expression}");
         }
-        assert!(licence_of(&package("a", "1.0.0", None)).is_some_and(|said| said.contains("states no licence")));
+        assert!(licence_problem(&package("a", "1.0.0", None)).is_some_and(|said| said.contains("states no licence")));
         let mut foreign = package("a", "1.0.0", Some("MIT"));
-        assert_eq!(licence_of(&foreign), None);
+        assert_eq!(licence_problem(&foreign), None);
         foreign.source = "git+https://example.org/a".into();
-        assert!(licence_of(&foreign).is_some_and(|said| said.contains("expected crates.io")));
+        assert!(licence_problem(&foreign).is_some_and(|said| said.contains("expected crates.io")));
     }
 
     #[test]
     fn banned_crates_and_their_families_are_found() {
         for name in ["openssl-sys", "openssl", "arrow", "arrow-array", "lazy_static"] {
-            assert!(ban_of(&package(name, "1.0.0", None)).is_some(), "{name}");
+            assert!(ban_reason(&package(name, "1.0.0", None)).is_some(), "{name}");
         }
         for name in ["arrowhead", "sysinfo", "hdf5-pure", "linux-raw-sys"] {
-            assert_eq!(ban_of(&package(name, "1.0.0", None)), None, "{name}");
+            assert_eq!(ban_reason(&package(name, "1.0.0", None)), None, "{name}");
         }
     }
 
     #[test]
     fn second_version_must_be_declared() {
         let two = [package("a", "1.0.0", None), package("a", "2.0.0", None)];
-        let said = several(&two);
+        let said = version_problems(&two);
         assert!(
             said.iter()
                 .any(|said| said.contains("a is present in 2 versions (1.0.0, 2.0.0)")),
             "{said:?}"
         );
-        let stale = several(&two[..1]);
-        assert_eq!(stale.len(), SEVERAL.len(), "{stale:?}");
+        let stale = version_problems(&two[..1]);
+        assert_eq!(stale.len(), CRATES_WITH_SEVERAL_VERSIONS.len(), "{stale:?}");
     }
 }

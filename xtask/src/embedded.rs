@@ -9,13 +9,13 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::process::{AS_TESTS, cargo, installed_targets, output, target_directory};
+use crate::process::{TEST_BUILD_ARGUMENTS, cargo, installed_targets, output, target_directory};
 
-/// Target that is built and run; `RISC_V` is only built.
-pub const CORTEX: &str = "thumbv7em-none-eabihf";
-const RISC_V: &str = "riscv32imac-unknown-none-elf";
+/// Target that is built and run; `RISC_V_TARGET` is only built.
+pub const CORTEX_TARGET: &str = "thumbv7em-none-eabihf";
+const RISC_V_TARGET: &str = "riscv32imac-unknown-none-elf";
 /// Default length of the run under QEMU, s; QEMU runs at a fiftieth of the host's speed.
-const SHORT_S: usize = 15;
+const DEFAULT_RUN_S: usize = 15;
 const RATE_HZ: usize = 100;
 
 /// Builds and runs the kernel and compares the results; `--all` runs the whole 82 s under QEMU as well.
@@ -26,7 +26,7 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
         _ => return Err("usage: cargo xtask embedded [--all]".to_owned()),
     };
     let installed = installed_targets();
-    for target in [CORTEX, RISC_V] {
+    for target in [CORTEX_TARGET, RISC_V_TARGET] {
         if !installed.iter().any(|one| one == target) {
             println!("skipped: hoid on {target} (rustup target add {target})");
             continue;
@@ -36,19 +36,23 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
     let target = target_directory();
     let directory = target.join("embedded");
     fs::create_dir_all(&directory).map_err(|e| format!("{}: {e}", directory.display()))?;
-    let track = tracked(&target, &directory)?;
-    let host = output(Command::new(target.join("debug").join(name("hoid-embedded"))).current_dir(&directory))?;
-    compared("the host", &host, &track)?;
+    let track = track_run(&target, &directory)?;
+    let host =
+        output(Command::new(target.join("debug").join(executable_name("hoid-embedded"))).current_dir(&directory))?;
+    check_trace("the host", &host, &track)?;
 
-    if !installed.iter().any(|one| one == CORTEX) {
+    if !installed.iter().any(|one| one == CORTEX_TARGET) {
         return Ok(());
     }
-    cargo(&["build", "--release", "-p", "hoid-embedded", "--target", CORTEX], &[])?;
-    let program = target.join(CORTEX).join("release/hoid-embedded");
+    cargo(
+        &["build", "--release", "-p", "hoid-embedded", "--target", CORTEX_TARGET],
+        &[],
+    )?;
+    let program = target.join(CORTEX_TARGET).join("release/hoid-embedded");
     let emulator = "qemu-system-arm";
     let there = Command::new(emulator).arg("--version").stdout(Stdio::null()).status();
     if !there.is_ok_and(|status| status.success()) {
-        println!("skipped: hoid on {CORTEX} under QEMU (apt-get install {emulator})");
+        println!("skipped: hoid on {CORTEX_TARGET} under QEMU (apt-get install {emulator})");
         return Ok(());
     }
     if !all {
@@ -67,7 +71,7 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
             .arg(&program)
             .current_dir(&directory),
     )?;
-    compared(CORTEX, &board, &track)?;
+    check_trace(CORTEX_TARGET, &board, &track)?;
     if let Ok(size) = output(Command::new("size").arg(&program)) {
         print!("{size}");
     }
@@ -75,10 +79,10 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
 }
 
 /// Returns the trace of `hoid track` for a run of C4, and writes its e and u to `run.csv`.
-fn tracked(target: &Path, directory: &Path) -> Result<String, String> {
-    cargo(&AS_TESTS, &[])?;
+fn track_run(target: &Path, directory: &Path) -> Result<String, String> {
+    cargo(&TEST_BUILD_ARGUMENTS, &[])?;
     let hoid = || {
-        let mut command = Command::new(target.join("debug").join(name("hoid")));
+        let mut command = Command::new(target.join("debug").join(executable_name("hoid")));
         command.current_dir(directory).stdout(Stdio::null());
         command
     };
@@ -104,13 +108,13 @@ fn tracked(target: &Path, directory: &Path) -> Result<String, String> {
     read("trace.csv")
 }
 
-/// Shortens a file of samples to the first [`SHORT_S`] seconds.
+/// Shortens a file of samples to the first [`DEFAULT_RUN_S`] seconds.
 fn shorten(file: &Path) -> Result<(), String> {
     let said = |e: std::io::Error| format!("{}: {e}", file.display());
     let text = fs::read_to_string(file).map_err(said)?;
     let kept: String = text
         .lines()
-        .take(SHORT_S * RATE_HZ)
+        .take(DEFAULT_RUN_S * RATE_HZ)
         .map(|line| format!("{line}\n"))
         .collect();
     fs::write(file, kept).map_err(said)
@@ -136,7 +140,7 @@ fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
 }
 
 /// Checks that each output line equals a row of the trace to the last digit.
-fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
+fn check_trace(place: &str, told: &str, track: &str) -> Result<(), String> {
     let table: Vec<&str> = told.lines().filter(|line| !line.starts_with('#')).collect();
     let names: Vec<&str> = table.first().copied().unwrap_or_default().split(',').collect();
     let rows = columns(track, &names)?;
@@ -148,9 +152,9 @@ fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
             return Err(format!("{place}: {line}\nhoid track: {}", row.join(",")));
         }
     }
-    if table.len() < SHORT_S {
+    if table.len() < DEFAULT_RUN_S {
         return Err(format!(
-            "{place} printed only {} lines, expected at least {SHORT_S}",
+            "{place} printed only {} lines, expected at least {DEFAULT_RUN_S}",
             table.len()
         ));
     }
@@ -161,6 +165,6 @@ fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
     Ok(())
 }
 
-fn name(program: &str) -> String {
+fn executable_name(program: &str) -> String {
     format!("{program}{}", env::consts::EXE_SUFFIX)
 }

@@ -16,7 +16,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::process::{AS_TESTS, SHIPPED, cargo, output, run};
+use crate::process::{SHIPPED_PROFILE, TEST_BUILD_ARGUMENTS, cargo, output, run};
 
 /// System libraries that a program linked with the static library needs.
 const SYSTEM_LIBRARIES: &str = if cfg!(target_os = "linux") {
@@ -42,35 +42,38 @@ pub fn ffi(arguments: &[String]) -> Result<(), String> {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let target = target_directory();
     match words.as_slice() {
-        [] => build(SHIPPED, &target.join("ffi")),
+        [] => build(SHIPPED_PROFILE, &target.join("ffi")),
         ["--dev"] => build("dev", &target.join("ffi")),
-        ["--out", out] => build(SHIPPED, Path::new(out)),
+        ["--out", out] => build(SHIPPED_PROFILE, Path::new(out)),
         ["--dev", "--out", out] => build("dev", Path::new(out)),
-        ["--header"] => header(),
+        ["--header"] => generate_header(),
         ["--check"] => {
             let out = target.join("ffi-check");
             build("dev", &out)?;
-            found_by_pkg_config(&out)?;
-            found_by_cmake(&out)
+            check_pkg_config(&out)?;
+            check_cmake(&out)
         }
         _ => Err(USAGE.to_owned()),
     }
 }
 
-fn root() -> PathBuf {
+fn repository_root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-fn source() -> PathBuf {
-    root().join("crates").join("hoid-ffi")
+fn crate_folder() -> PathBuf {
+    repository_root().join("crates").join("hoid-ffi")
 }
 
 fn target_directory() -> PathBuf {
-    env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), |named| root().join(named))
+    env::var_os("CARGO_TARGET_DIR").map_or_else(
+        || repository_root().join("target"),
+        |named| repository_root().join(named),
+    )
 }
 
 /// Generates the header from the sources.
-fn header() -> Result<(), String> {
+fn generate_header() -> Result<(), String> {
     run(Command::new("cbindgen")
         .args([
             "--quiet",
@@ -80,13 +83,13 @@ fn header() -> Result<(), String> {
             "include/hoid.h",
             ".",
         ])
-        .current_dir(source()))
+        .current_dir(crate_folder()))
     .map_err(|e| format!("{e}\ncbindgen makes the header; install it with: cargo install cbindgen --locked"))
 }
 
 fn build(profile: &str, out: &Path) -> Result<(), String> {
     if profile == "dev" {
-        cargo(&AS_TESTS, &[])?;
+        cargo(&TEST_BUILD_ARGUMENTS, &[])?;
     } else {
         cargo(&["build", "--profile", profile, "-p", "hoid-ffi"], &[])?;
     }
@@ -95,26 +98,26 @@ fn build(profile: &str, out: &Path) -> Result<(), String> {
     let _ = fs::remove_dir_all(out);
     let write = |place: &str, text: String| {
         let path = out.join(place);
-        make(&path)?;
+        create_parent_folder(&path)?;
         fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))
     };
-    copy(&source().join("include/hoid.h"), &out.join("include/hoid.h"))?;
-    for (from, to) in libraries() {
-        copy(&built.join(from), &out.join("lib").join(to))?;
+    copy_file(&crate_folder().join("include/hoid.h"), &out.join("include/hoid.h"))?;
+    for (from, to) in library_names() {
+        copy_file(&built.join(from), &out.join("lib").join(to))?;
     }
-    write("lib/pkgconfig/hoid.pc", pkg_config(version))?;
-    write("lib/cmake/hoid/hoid-config.cmake", cmake())?;
-    write("lib/cmake/hoid/hoid-config-version.cmake", cmake_version(version))?;
+    write("lib/pkgconfig/hoid.pc", pkg_config_file(version))?;
+    write("lib/cmake/hoid/hoid-config.cmake", cmake_config())?;
+    write("lib/cmake/hoid/hoid-config-version.cmake", cmake_version_file(version))?;
     for example in EXAMPLES {
         let to = out.join("share/hoid/examples").join(example);
-        copy(&source().join("examples").join(example), &to)?;
+        copy_file(&crate_folder().join("examples").join(example), &to)?;
     }
     println!("{}", out.display());
     Ok(())
 }
 
 /// Returns the file names of the libraries as built and as installed.
-fn libraries() -> Vec<(&'static str, &'static str)> {
+fn library_names() -> Vec<(&'static str, &'static str)> {
     if cfg!(windows) {
         vec![
             ("hoid_ffi.dll", "hoid.dll"),
@@ -128,18 +131,18 @@ fn libraries() -> Vec<(&'static str, &'static str)> {
     }
 }
 
-fn make(file: &Path) -> Result<(), String> {
+fn create_parent_folder(file: &Path) -> Result<(), String> {
     let folder = file.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder).map_err(|e| format!("{}: {e}", folder.display()))
 }
 
-fn copy(from: &Path, to: &Path) -> Result<(), String> {
-    make(to)?;
+fn copy_file(from: &Path, to: &Path) -> Result<(), String> {
+    create_parent_folder(to)?;
     fs::copy(from, to).map_err(|e| format!("{} to {}: {e}", from.display(), to.display()))?;
     Ok(())
 }
 
-fn pkg_config(version: &str) -> String {
+fn pkg_config_file(version: &str) -> String {
     format!(
         "prefix=${{pcfiledir}}/../..\n\
          libdir=${{prefix}}/lib\n\
@@ -155,7 +158,7 @@ fn pkg_config(version: &str) -> String {
 }
 
 /// Returns the CMake configuration with the targets `hoid::hoid` (shared) and `hoid::static`.
-fn cmake() -> String {
+fn cmake_config() -> String {
     let [shared, fixed] = if cfg!(windows) {
         ["hoid.dll", "hoid.lib"]
     } else if cfg!(target_os = "macos") {
@@ -187,7 +190,7 @@ fn cmake() -> String {
 
 /// Returns the CMake version file. A version satisfies requests for older versions with the same major version (with
 /// the same minor version if the major version is 0).
-fn cmake_version(version: &str) -> String {
+fn cmake_version_file(version: &str) -> String {
     let mut parts = version.split('.');
     let same = match (parts.next(), parts.next()) {
         (Some("0"), Some(minor)) => format!("0.{minor}"),
@@ -206,7 +209,7 @@ fn cmake_version(version: &str) -> String {
     )
 }
 
-fn is_here(program: &str) -> bool {
+fn is_installed(program: &str) -> bool {
     let mut command = Command::new(program);
     command.arg("--version").stdout(Stdio::null()).stderr(Stdio::null());
     let there = command.status().is_ok_and(|status| status.success());
@@ -217,7 +220,7 @@ fn is_here(program: &str) -> bool {
 }
 
 /// Runs a built example on three samples and checks the number of output lines.
-fn tried(program: &Path, libraries: &Path) -> Result<(), String> {
+fn check_example(program: &Path, libraries: &Path) -> Result<(), String> {
     let shown = program.display();
     let input = program.with_extension("txt");
     fs::write(&input, "0.1,0.2\n0.2,0.1\n0.3,0.2\n").map_err(|e| format!("{}: {e}", input.display()))?;
@@ -236,8 +239,8 @@ fn tried(program: &Path, libraries: &Path) -> Result<(), String> {
 }
 
 /// Builds the C example with pkg-config, once with the shared and once with the static library.
-fn found_by_pkg_config(out: &Path) -> Result<(), String> {
-    if !(is_here("pkg-config") && is_here("cc")) {
+fn check_pkg_config(out: &Path) -> Result<(), String> {
+    if !(is_installed("pkg-config") && is_installed("cc")) {
         return Ok(());
     }
     let says = |options: &[&str]| {
@@ -250,14 +253,14 @@ fn found_by_pkg_config(out: &Path) -> Result<(), String> {
         )?;
         Ok::<Vec<String>, String>(told.split_whitespace().map(str::to_owned).collect())
     };
-    let example = source().join("examples/tracker.c");
+    let example = crate_folder().join("examples/tracker.c");
     let shared = out.join("tracker-shared");
     run(Command::new("cc")
         .arg(&example)
         .args(says(&["--cflags", "--libs"])?)
         .arg("-o")
         .arg(&shared))?;
-    tried(&shared, &out.join("lib"))?;
+    check_example(&shared, &out.join("lib"))?;
     let alone = out.join("tracker-static");
     run(Command::new("cc")
         .arg(&example)
@@ -266,12 +269,12 @@ fn found_by_pkg_config(out: &Path) -> Result<(), String> {
         .args(SYSTEM_LIBRARIES.split_whitespace())
         .arg("-o")
         .arg(&alone))?;
-    tried(&alone, Path::new(""))
+    check_example(&alone, Path::new(""))
 }
 
 /// Builds the examples with CMake.
-fn found_by_cmake(out: &Path) -> Result<(), String> {
-    if !is_here("cmake") {
+fn check_cmake(out: &Path) -> Result<(), String> {
+    if !is_installed("cmake") {
         return Ok(());
     }
     let build = out.join("examples-build");
@@ -283,7 +286,7 @@ fn found_by_cmake(out: &Path) -> Result<(), String> {
         .arg(format!("-DCMAKE_PREFIX_PATH={}", out.display())))?;
     run(Command::new("cmake").arg("--build").arg(&build))?;
     for program in ["tracker", "tracker_cpp"] {
-        tried(&build.join(program), &out.join("lib"))?;
+        check_example(&build.join(program), &out.join("lib"))?;
     }
     Ok(())
 }

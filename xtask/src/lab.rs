@@ -11,8 +11,8 @@ use std::{
 };
 
 use crate::{
-    process::{AS_TESTS, SHIPPED, cargo, output, run, target_directory},
-    processors::webassembly,
+    process::{SHIPPED_PROFILE, TEST_BUILD_ARGUMENTS, cargo, output, run, target_directory},
+    processors::build_webassembly,
 };
 
 /// The studies that run in a browser in real time: their names and their scripts in `browser-test`.
@@ -20,20 +20,20 @@ pub const STUDIES: [(&str, &str); 2] = [("lab-hour", "hour.mjs"), ("lab-real", "
 
 /// Checks the built page, tests it in a browser, and finally runs it for a minute in real time.
 pub fn lab() -> Result<(), String> {
-    if !npm_is_there()? {
+    if !install_npm_packages()? {
         return Ok(());
     }
-    run(&mut npm(&["run", "check"]))?;
-    run(&mut npm(&["run", "build", "--", "--check"]))?;
-    in_browser("dev", "main.mjs", &[])?;
-    if let Some(path) = page_alone("dev", None, &built("of-tests.html"))? {
-        in_browser("dev", "alone.mjs", &[path.to_string_lossy().into_owned()])?;
+    run(&mut npm_command(&["run", "check"]))?;
+    run(&mut npm_command(&["run", "build", "--", "--check"]))?;
+    run_in_browser("dev", "main.mjs", &[])?;
+    if let Some(path) = build_page("dev", None, &page_path("of-tests.html"))? {
+        run_in_browser("dev", "alone.mjs", &[path.to_string_lossy().into_owned()])?;
     }
-    in_browser("dev", "hour.mjs", &["1".to_owned()])
+    run_in_browser("dev", "hour.mjs", &["1".to_owned()])
 }
 
 /// Builds the page without a server, as one file with an experiment and the tracker.
-pub fn alone(arguments: &[String]) -> Result<(), String> {
+pub fn lab_page(arguments: &[String]) -> Result<(), String> {
     let (mut config, mut out) = (None, None);
     let mut rest = arguments.iter();
     while let Some(option) = rest.next() {
@@ -45,9 +45,9 @@ pub fn alone(arguments: &[String]) -> Result<(), String> {
         let named = rest.next().ok_or_else(|| format!("{option} needs a file"))?;
         *place = Some(absolute(named).map_err(|error| format!("{named}: {error}"))?);
     }
-    let out = out.unwrap_or_else(|| built("hoid-lab.html"));
-    if npm_is_there()?
-        && let Some(path) = page_alone(SHIPPED, config.as_deref(), &out)?
+    let out = out.unwrap_or_else(|| page_path("hoid-lab.html"));
+    if install_npm_packages()?
+        && let Some(path) = build_page(SHIPPED_PROFILE, config.as_deref(), &out)?
     {
         let path = fs::canonicalize(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let size = fs::metadata(&path).map_or(0, |data| data.len());
@@ -58,52 +58,58 @@ pub fn alone(arguments: &[String]) -> Result<(), String> {
 
 /// Builds the page without a server, with the kernel in a given profile, and returns its path; `None` if the
 /// WebAssembly target is not installed.
-fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option<PathBuf>, String> {
-    let Some(kernel) = webassembly(profile)? else {
+fn build_page(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option<PathBuf>, String> {
+    let Some(kernel) = build_webassembly(profile)? else {
         return Ok(None);
     };
     // The features are those of the tests, so nothing is compiled again.
     cargo(&["build", "--workspace", "--example", "tables"], &[])?;
     let program = target_directory().join("debug/examples");
     let told = output(Command::new(program.join(format!("tables{}", env::consts::EXE_SUFFIX))).args(config))?;
-    let tables = built("experiment.json");
-    fs::create_dir_all(built("")).map_err(|error| format!("{}: {error}", built("").display()))?;
+    let tables = page_path("experiment.json");
+    fs::create_dir_all(page_path("")).map_err(|error| format!("{}: {error}", page_path("").display()))?;
     fs::write(&tables, told).map_err(|error| format!("{}: {error}", tables.display()))?;
     run(Command::new("node")
         .args(["build.mjs", "--alone"])
         .args([&kernel, &tables, out])
-        .current_dir(page()))?;
+        .current_dir(page_folder()))?;
     Ok(Some(out.to_owned()))
 }
 
 /// Returns the path of a file in the folder of the built page.
-fn built(name: &str) -> PathBuf {
+fn page_path(name: &str) -> PathBuf {
     let folder = target_directory().join("lab-page");
     absolute(folder.join(name)).unwrap_or_else(|_| folder.join(name))
 }
 
 /// Runs one of the browser studies with its arguments.
 pub fn study(script: &str, arguments: &[String]) -> Result<(), String> {
-    if npm_is_there()? {
-        in_browser("release", script, arguments)?;
+    if install_npm_packages()? {
+        run_in_browser("release", script, arguments)?;
     }
     Ok(())
 }
 
 /// Installs the tools for building and testing the page. If npm is missing, prints a message and returns false.
-fn npm_is_there() -> Result<bool, String> {
-    let there = npm(&["--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
+fn install_npm_packages() -> Result<bool, String> {
+    let there = npm_command(&["--version"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .status();
     if !there.is_ok_and(|status| status.success()) {
         println!("skipped: checking the page of hoid lab requires npm (apt-get install npm)");
         return Ok(false);
     }
-    run(&mut npm(&["ci", "--no-fund", "--no-audit"]))?;
+    run(&mut npm_command(&["ci", "--no-fund", "--no-audit"]))?;
     Ok(true)
 }
 
-fn in_browser(profile: &str, script: &str, arguments: &[String]) -> Result<(), String> {
+fn run_in_browser(profile: &str, script: &str, arguments: &[String]) -> Result<(), String> {
     if profile == "dev" {
-        cargo(&[&AS_TESTS[..], &["--features", "hoid-cli/lab"]].concat(), &[])?;
+        cargo(
+            &[&TEST_BUILD_ARGUMENTS[..], &["--features", "hoid-cli/lab"]].concat(),
+            &[],
+        )?;
     } else {
         cargo(
             &["build", "--profile", profile, "-p", "hoid-cli", "--features", "lab"],
@@ -112,23 +118,23 @@ fn in_browser(profile: &str, script: &str, arguments: &[String]) -> Result<(), S
     }
     run(Command::new("node")
         .arg(Path::new("browser-test").join(script))
-        .arg(program(if profile == "dev" { "debug" } else { profile }))
+        .arg(program_path(if profile == "dev" { "debug" } else { profile }))
         .args(arguments)
-        .current_dir(page()))
+        .current_dir(page_folder()))
 }
 
-fn page() -> PathBuf {
+fn page_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/hoid-lab/page")
 }
 
-fn npm(arguments: &[&str]) -> Command {
+fn npm_command(arguments: &[&str]) -> Command {
     let mut command = Command::new(if cfg!(windows) { "npm.cmd" } else { "npm" });
-    command.args(arguments).current_dir(page());
+    command.args(arguments).current_dir(page_folder());
     command
 }
 
 /// Returns the path of the built program `hoid`.
-fn program(folder: &str) -> PathBuf {
+fn program_path(folder: &str) -> PathBuf {
     target_directory()
         .join(folder)
         .join(format!("hoid{}", env::consts::EXE_SUFFIX))

@@ -42,7 +42,7 @@ use std::{
 
 use background::Background;
 use counts::Counts;
-use process::{SHIPPED, cargo, cargo_command, each_line, run};
+use process::{SHIPPED_PROFILE, cargo, cargo_command, run, run_by_line};
 
 const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | words [--book] | book | lab | lab-page [OPTION...] | embedded [--all] | ffi [OPTION...] | miri [ARGUMENT...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
@@ -50,9 +50,9 @@ fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
     let outcome = match arguments.next().as_deref() {
         Some("test") => test(&arguments.collect::<Vec<_>>()),
-        Some("python") => python::test(&arguments.collect::<Vec<_>>()).and_then(|counts| counts.verdict()),
-        Some(python::REQUIRE) => python::require(),
-        Some(python::BUILD) => python::build(),
+        Some("python") => python::test(&arguments.collect::<Vec<_>>()).and_then(|counts| counts.to_result()),
+        Some(python::REQUIRE_TASK) => python::create_test_environment(),
+        Some(python::BUILD_TASK) => python::build(),
         Some("check") => check(),
         Some("crates") => crates::check(),
         Some("words") if arguments.next().as_deref() == Some("--book") => words::check_book(),
@@ -60,12 +60,12 @@ fn main() -> ExitCode {
         Some("book") => book(),
         Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
         Some("lab") => lab::lab(),
-        Some("lab-page") => lab::alone(&arguments.collect::<Vec<_>>()),
+        Some("lab-page") => lab::lab_page(&arguments.collect::<Vec<_>>()),
         Some("embedded") => embedded::embedded(&arguments.collect::<Vec<_>>()),
         Some("ffi") => ffi::ffi(&arguments.collect::<Vec<_>>()),
         Some("miri") => miri::miri(&arguments.collect::<Vec<_>>()),
         Some("places") => places::places(&arguments.collect::<Vec<_>>()),
-        Some("slow") => slow(&arguments.collect::<Vec<_>>()),
+        Some("slow") => run_slow_study(&arguments.collect::<Vec<_>>()),
         _ => Err(USAGE.to_owned()),
     };
     match outcome {
@@ -85,23 +85,23 @@ fn test(arguments: &[String]) -> Result<(), String> {
     let shown = format!("{command:?}");
     let mut total = Counts::default();
     let status = if arguments.is_empty() {
-        let required = Background::spawn(python::REQUIRE)?;
+        let required = Background::spawn(python::REQUIRE_TASK)?;
         cargo(&["test", "--workspace", "--no-run"], &[])?;
-        let mut required = Some(required.end());
+        let mut required = Some(required.wait());
         let mut built = Ok(None);
-        let status = each_line(&mut command, |line| {
+        let status = run_by_line(&mut command, |line| {
             // The build must not start before the first test runs: until then the two cargo processes would block each
             // other.
             if let Some(required) = required.take() {
-                built = required.and_then(|()| Background::spawn(python::BUILD).map(Some));
+                built = required.and_then(|()| Background::spawn(python::BUILD_TASK).map(Some));
             }
             total.add(line);
         })?;
-        built?.map_or(Ok(()), Background::end)?;
-        total.join(&python::pytest(&[])?);
+        built?.map_or(Ok(()), Background::wait)?;
+        total.merge(&python::pytest(&[])?);
         status
     } else {
-        each_line(&mut command, |line| total.add(line))?
+        run_by_line(&mut command, |line| total.add(line))?
     };
     println!(
         "\n{} passed, {} failed, {} skipped",
@@ -110,11 +110,11 @@ fn test(arguments: &[String]) -> Result<(), String> {
     if !status.success() {
         return Err(format!("failed ({status}): {shown}"));
     }
-    total.verdict()
+    total.to_result()
 }
 
 /// A study that takes too long for a test.
-struct Slow {
+struct SlowStudy {
     name: &'static str,
     package: &'static str,
     example: &'static str,
@@ -124,8 +124,8 @@ struct Slow {
     profile: &'static str,
 }
 
-const fn slow_of(name: &'static str, package: &'static str, example: &'static str) -> Slow {
-    Slow {
+const fn slow_study(name: &'static str, package: &'static str, example: &'static str) -> SlowStudy {
+    SlowStudy {
         name,
         package,
         example,
@@ -134,51 +134,51 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 19] = [
-    slow_of("people-coverage", "hoid", "people_coverage"),
-    Slow {
+const SLOW_STUDIES: [SlowStudy; 19] = [
+    slow_study("people-coverage", "hoid", "people_coverage"),
+    SlowStudy {
         program: Some("hoid-cli"),
-        ..slow_of("faults", "hoid", "faults")
+        ..slow_study("faults", "hoid", "faults")
     },
-    slow_of("faults-clean", "hoid-evidence", "faults_clean"),
-    slow_of("little-noise", "hoid-evidence", "little_noise"),
-    slow_of("intersample-coverage", "hoid-evidence", "intersample_coverage"),
-    slow_of("inputs-coverage", "hoid-evidence", "inputs_coverage"),
-    slow_of("design-errors", "hoid-design", "design_errors"),
-    slow_of("tracker-faults", "hoid", "tracker_faults"),
-    Slow {
+    slow_study("faults-clean", "hoid-evidence", "faults_clean"),
+    slow_study("little-noise", "hoid-evidence", "little_noise"),
+    slow_study("intersample-coverage", "hoid-evidence", "intersample_coverage"),
+    slow_study("inputs-coverage", "hoid-evidence", "inputs_coverage"),
+    slow_study("design-errors", "hoid-design", "design_errors"),
+    slow_study("tracker-faults", "hoid", "tracker_faults"),
+    SlowStudy {
         profile: "dev",
-        ..slow_of("mutations", "hoid-io", "mutations")
+        ..slow_study("mutations", "hoid-io", "mutations")
     },
-    slow_of("bombs", "hoid-io", "bombs"),
-    slow_of("long-csv", "hoid-io", "long_csv"),
-    slow_of("step-time", "hoid-core", "step_time"),
-    Slow {
+    slow_study("bombs", "hoid-io", "bombs"),
+    slow_study("long-csv", "hoid-io", "long_csv"),
+    slow_study("step-time", "hoid-core", "step_time"),
+    SlowStudy {
         profile: "dev",
-        ..slow_of("hostile", "hoid-lab", "hostile")
+        ..slow_study("hostile", "hoid-lab", "hostile")
     },
-    Slow {
+    SlowStudy {
         program: Some("hoid-cli"),
-        ..slow_of("kills", "hoid-cli", "kills")
+        ..slow_study("kills", "hoid-cli", "kills")
     },
-    Slow {
+    SlowStudy {
         program: Some("hoid-cli"),
-        ..slow_of("full-disks", "hoid-cli", "full_disks")
+        ..slow_study("full-disks", "hoid-cli", "full_disks")
     },
-    Slow {
+    SlowStudy {
         program: Some("hoid-cli"),
-        profile: SHIPPED,
-        ..slow_of("latency", "hoid-cli", "latency")
+        profile: SHIPPED_PROFILE,
+        ..slow_study("latency", "hoid-cli", "latency")
     },
-    slow_of("lab", "hoid-lab", "lab"),
-    slow_of("challenge", "hoid-challenge", "challenge"),
-    slow_of("challenge-people", "hoid-challenge", "challenge_people"),
+    slow_study("lab", "hoid-lab", "lab"),
+    slow_study("challenge", "hoid-challenge", "challenge"),
+    slow_study("challenge-people", "hoid-challenge", "challenge_people"),
 ];
 
 /// Runs one of the slow studies with its arguments.
-fn slow(arguments: &[String]) -> Result<(), String> {
+fn run_slow_study(arguments: &[String]) -> Result<(), String> {
     let names = || {
-        let all = SLOW.iter().map(|slow| slow.name);
+        let all = SLOW_STUDIES.iter().map(|slow| slow.name);
         all.chain(lab::STUDIES.map(|(name, _)| name))
             .collect::<Vec<_>>()
             .join(", ")
@@ -189,7 +189,7 @@ fn slow(arguments: &[String]) -> Result<(), String> {
     if let Some((_, script)) = lab::STUDIES.iter().find(|(study, _)| study == name) {
         return lab::study(script, rest);
     }
-    let slow = (SLOW.iter())
+    let slow = (SLOW_STUDIES.iter())
         .find(|slow| slow.name == name)
         .ok_or_else(|| format!("no study is called {name}, expected one of {}", names()))?;
     if let Some(program) = slow.program {

@@ -10,14 +10,14 @@ use crate::process::{output, run};
 
 /// Target that Miri interprets: on x86-64 the mathematical functions are written in assembly, which Miri cannot
 /// interpret.
-const TARGET: &str = "riscv64gc-unknown-linux-gnu";
+const MIRI_TARGET: &str = "riscv64gc-unknown-linux-gnu";
 
 /// Tests that only access memory; the other tests run compilers and other programs.
-const TESTS: [&str; 5] = ["--lib", "--test", "every_function", "--test", "hostile"];
+const TEST_ARGUMENTS: [&str; 5] = ["--lib", "--test", "every_function", "--test", "hostile"];
 
 /// Runs the tests under Miri; arguments select some of the tests.
 pub fn miri(arguments: &[String]) -> Result<(), String> {
-    if let Some(lacking) = lacking() {
+    if let Some(lacking) = install_command() {
         println!("skipped: hoid-ffi under Miri ({lacking})");
         return Ok(());
     }
@@ -25,15 +25,15 @@ pub fn miri(arguments: &[String]) -> Result<(), String> {
     let flags = "-Zmiri-disable-isolation -Zmiri-deterministic-floats";
     run(Command::new("rustup")
         .args(["run", "nightly"])
-        .args(["cargo", "miri", "test", "--target", TARGET, "-p", "hoid-ffi"])
-        .args(TESTS)
+        .args(["cargo", "miri", "test", "--target", MIRI_TARGET, "-p", "hoid-ffi"])
+        .args(TEST_ARGUMENTS)
         .arg("--")
         .args(arguments)
         .env("MIRIFLAGS", flags))
 }
 
 /// Returns the command that installs missing programs; `None` if all programs are installed.
-fn lacking() -> Option<&'static str> {
+fn install_command() -> Option<&'static str> {
     const INSTALL: &str = "rustup toolchain install nightly --profile minimal --component miri --component rust-src";
     let told = |arguments: &[&str]| output(Command::new("rustup").args(arguments)).unwrap_or_default();
     // A name such as `nightly-2026-01-31-...` belongs to a different toolchain.

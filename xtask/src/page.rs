@@ -6,18 +6,18 @@ use std::{fs, path::Path};
 ///
 /// # Errors
 /// The reason, if the page cannot be read or written, or does not contain these markers.
-pub fn write(page: &str, passage: &str, text: &str, dry: bool) -> Result<(), String> {
+pub fn update_section(page: &str, passage: &str, text: &str, dry: bool) -> Result<(), String> {
     if dry {
         return Ok(());
     }
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src").join(page);
     let said = |e: std::io::Error| format!("{}: {e}", path.display());
     let old = fs::read_to_string(&path).map_err(said)?;
-    let new = replaced(&old, passage, text).map_err(|reason| format!("{}: {reason}", path.display()))?;
+    let new = replace_section(&old, passage, text).map_err(|reason| format!("{}: {reason}", path.display()))?;
     fs::write(&path, new).map_err(said)
 }
 
-fn replaced(page: &str, passage: &str, text: &str) -> Result<String, String> {
+fn replace_section(page: &str, passage: &str, text: &str) -> Result<String, String> {
     let (begin, end) = (
         format!("<!-- generated: {passage} -->"),
         format!("<!-- end: {passage} -->"),
@@ -38,9 +38,9 @@ mod tests {
     #[test]
     fn only_the_generated_section_is_replaced() {
         let page = "a\n<!-- generated: x -->\nold\n<!-- end: x -->\nb\n";
-        let once = replaced(page, "x", "new\n").unwrap();
+        let once = replace_section(page, "x", "new\n").unwrap();
         assert_eq!(once, "a\n<!-- generated: x -->\n\nnew\n\n<!-- end: x -->\nb\n");
-        assert_eq!(replaced(&once, "x", "new").unwrap(), once);
-        assert!(replaced(page, "y", "new").is_err());
+        assert_eq!(replace_section(&once, "x", "new").unwrap(), once);
+        assert!(replace_section(page, "y", "new").is_err());
     }
 }

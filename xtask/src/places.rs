@@ -9,12 +9,12 @@ use std::{env, process::Command};
 
 use crate::{
     page,
-    process::{AS_TESTS, SHIPPED, cargo, output, target_directory},
-    processors::{BUILT, other_processors},
+    process::{SHIPPED_PROFILE, TEST_BUILD_ARGUMENTS, cargo, output, target_directory},
+    processors::{BUILT_VARIABLE, build_for_other_processors},
     python::{self, Wheel},
 };
 
-const PAGE: &str = "guides/simulators.md";
+const PAGE_PATH: &str = "guides/simulators.md";
 
 /// Measures all interfaces. `--dry` leaves the page unchanged; so does `--dev`, which uses the builds of the tests.
 pub fn places(arguments: &[String]) -> Result<(), String> {
@@ -26,25 +26,25 @@ pub fn places(arguments: &[String]) -> Result<(), String> {
         _ => return Err("usage: cargo xtask places [--dry | --dev]".to_owned()),
     };
     let (python, folder) = if shipped {
-        other_processors(SHIPPED)?;
-        let build = ["build", "--profile", SHIPPED];
+        build_for_other_processors(SHIPPED_PROFILE)?;
+        let build = ["build", "--profile", SHIPPED_PROFILE];
         let what = ["-p", "hoid-cli", "-p", "hoid-ffi", "--lib", "--bins"];
         cargo(&[&build[..], &what].concat(), &[])?;
         cargo(&[&build[..], &["-p", "hoid", "--example", "place"]].concat(), &[])?;
-        (python::environment(Wheel::Shipped)?, SHIPPED)
+        (python::environment_with_package(Wheel::Shipped)?, SHIPPED_PROFILE)
     } else {
-        other_processors("dev")?;
-        cargo(&AS_TESTS, &[])?;
-        (python::environment(Wheel::OfTests)?, "debug")
+        build_for_other_processors("dev")?;
+        cargo(&TEST_BUILD_ARGUMENTS, &[])?;
+        (python::environment_with_package(Wheel::OfTests)?, "debug")
     };
     let hoid = (target_directory().join(folder)).join(format!("hoid{}", env::consts::EXE_SUFFIX));
     let table = output(
         Command::new(python)
             .args(["-m", "places"])
-            .current_dir(python::package()?.join("tests"))
+            .current_dir(python::package_folder()?.join("tests"))
             .env("HOID_BINARY", hoid)
-            .env(BUILT, "1"),
+            .env(BUILT_VARIABLE, "1"),
     )?;
     println!("\n{table}");
-    page::write(PAGE, "places", &table, dry)
+    page::update_section(PAGE_PATH, "places", &table, dry)
 }

@@ -8,7 +8,7 @@ use std::{
 };
 
 /// Runs a command; prints each line of its output and passes it to `show`.
-pub fn each_line(command: &mut Command, mut show: impl FnMut(&str)) -> Result<ExitStatus, String> {
+pub fn run_by_line(command: &mut Command, mut show: impl FnMut(&str)) -> Result<ExitStatus, String> {
     let shown = format!("{command:?}");
     let cannot_run = |error: std::io::Error| format!("cannot run {shown}: {error}");
     let mut child = command.stdout(Stdio::piped()).spawn().map_err(cannot_run)?;
@@ -50,12 +50,12 @@ pub fn output(command: &mut Command) -> Result<String, String> {
 }
 
 /// Profile of the shipped programs, libraries and wheels.
-pub const SHIPPED: &str = "shipped";
+pub const SHIPPED_PROFILE: &str = "shipped";
 
 /// Arguments of the builds for tasks other than tests: the same features as for the tests, so nothing is compiled
 /// twice. `--lib` is not included, because maturin compiles the Python module with its own settings. Building the test
 /// `symbols` also builds the libraries for C, in the folder `deps`.
-pub const AS_TESTS: [&str; 6] = ["build", "--workspace", "--bins", "--examples", "--test", "symbols"];
+pub const TEST_BUILD_ARGUMENTS: [&str; 6] = ["build", "--workspace", "--bins", "--examples", "--test", "symbols"];
 
 /// Returns the target directory of cargo.
 pub fn target_directory() -> PathBuf {

@@ -14,35 +14,35 @@ use std::{
 
 use crate::{
     counts::Counts,
-    process::{AS_TESTS, SHIPPED, cargo, each_line, run, target_directory},
-    processors::{BUILT, other_processors},
+    process::{SHIPPED_PROFILE, TEST_BUILD_ARGUMENTS, cargo, run, run_by_line, target_directory},
+    processors::{BUILT_VARIABLE, build_for_other_processors},
 };
 
-/// Name of the task that creates the environment; `BUILD` is the name of the task that builds the wheel. `cargo xtask
+/// Name of the task that creates the environment; `BUILD_TASK` is the name of the task that builds the wheel. `cargo xtask
 /// test` runs both in parallel with the tests of Rust.
-pub const REQUIRE: &str = "python-require";
-pub const BUILD: &str = "python-build";
+pub const REQUIRE_TASK: &str = "python-require";
+pub const BUILD_TASK: &str = "python-build";
 
 /// Oldest Python version that the package supports.
 const OLDEST_PYTHON: (u32, u32) = (3, 10);
 
 /// Builds and installs the wheel, and runs pytest with these arguments.
 pub fn test(arguments: &[String]) -> Result<Counts, String> {
-    require()?;
+    create_test_environment()?;
     build()?;
     pytest(arguments)
 }
 
 /// Creates a new environment with all requirements of the tests except the wheel; Rust is not needed.
-pub fn require() -> Result<(), String> {
-    begin(Wheel::OfTests).map(|_| ())
+pub fn create_test_environment() -> Result<(), String> {
+    create_environment(Wheel::OfTests).map(|_| ())
 }
 
-/// Builds the wheel and all programs that its tests run, and installs the wheel after `require`.
+/// Builds the wheel and all programs that its tests run, and installs the wheel after `create_test_environment`.
 pub fn build() -> Result<(), String> {
     // This builds the command-line program as for the tests of Rust, for comparison, and the examples of the book.
-    cargo(&[&AS_TESTS[..], &["--quiet"]].concat(), &[])?;
-    other_processors("dev")?;
+    cargo(&[&TEST_BUILD_ARGUMENTS[..], &["--quiet"]].concat(), &[])?;
+    build_for_other_processors("dev")?;
     install(Wheel::OfTests)
 }
 
@@ -54,9 +54,9 @@ pub fn pytest(arguments: &[String]) -> Result<Counts, String> {
         .args(["-W", "error", "-m", "pytest", "--color=no", "--durations=5"])
         .args(["--numprocesses=logical", "--dist=loadgroup"])
         .args(arguments)
-        .current_dir(package()?)
+        .current_dir(package_folder()?)
         .env("MPLBACKEND", "Agg")
-        .env(BUILT, "1")
+        .env(BUILT_VARIABLE, "1")
         .env(
             "HOID_BINARY",
             target_directory()
@@ -64,7 +64,7 @@ pub fn pytest(arguments: &[String]) -> Result<Counts, String> {
                 .join(format!("hoid{}", env::consts::EXE_SUFFIX)),
         );
     let shown = format!("{command:?}");
-    let status = each_line(&mut command, |line| counts.add_pytest(line))?;
+    let status = run_by_line(&mut command, |line| counts.add_pytest(line))?;
     if !status.success() && counts.failed == 0 {
         return Err(format!("failed ({status}): {shown}"));
     }
@@ -98,7 +98,7 @@ impl Wheel {
     }
 
     /// Name of the optional requirements (`[project.optional-dependencies]`) that are installed with the package.
-    const fn extra(self) -> &'static str {
+    const fn extra_name(self) -> &'static str {
         match self {
             Self::OfTests => "test",
             Self::Shipped => "lsl",
@@ -108,23 +108,23 @@ impl Wheel {
 
 /// Creates a new environment with the package and returns its interpreter. The tests require that the workspace was
 /// built before.
-pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
-    begin(wheel)?;
+pub fn environment_with_package(wheel: Wheel) -> Result<PathBuf, String> {
+    create_environment(wheel)?;
     install(wheel)?;
     Ok(wheel.python())
 }
 
 /// Creates a new environment with the requirements for building the wheel and for its tests.
-fn begin(wheel: Wheel) -> Result<(), String> {
-    fresh_environment(&wheel.folder())?;
-    let project = package()?.join("pyproject.toml");
+fn create_environment(wheel: Wheel) -> Result<(), String> {
+    create_empty_environment(&wheel.folder())?;
+    let project = package_folder()?.join("pyproject.toml");
     let text = fs::read_to_string(&project).map_err(|e| format!("{}: {e}", project.display()))?;
-    let required = requirements(&text, wheel.extra());
+    let required = requirements(&text, wheel.extra_name());
     let others = match wheel {
         Wheel::OfTests => &["maturin>=1.9.4,<2"][..],
         Wheel::Shipped => &["maturin>=1.9.4,<2", "fmpy"],
     };
-    pip(&wheel.python(), &[others, &required].concat())
+    pip_install(&wheel.python(), &[others, &required].concat())
 }
 
 /// Returns the optional requirements of a project under the name `extra`, in the format of pip.
@@ -153,7 +153,7 @@ fn install(wheel: Wheel) -> Result<(), String> {
     let python = wheel.python();
     let profile = match wheel {
         Wheel::OfTests => &["--profile", "dev", "--features", "as-in-workspace"][..],
-        Wheel::Shipped => &["--profile", SHIPPED],
+        Wheel::Shipped => &["--profile", SHIPPED_PROFILE],
     };
     let wheels = target.join("python").join("wheels");
     let _ = fs::remove_dir_all(&wheels);
@@ -162,7 +162,7 @@ fn install(wheel: Wheel) -> Result<(), String> {
         .args(profile)
         .arg("--out")
         .arg(&wheels)
-        .current_dir(package()?)
+        .current_dir(package_folder()?)
         .env("CARGO_TARGET_DIR", &target))?;
     let built = fs::read_dir(&wheels)
         .map_err(|e| format!("{}: {e}", wheels.display()))?
@@ -170,17 +170,17 @@ fn install(wheel: Wheel) -> Result<(), String> {
         .map(|entry| entry.path())
         .find(|path| path.extension().is_some_and(|e| e == "whl"))
         .ok_or_else(|| format!("maturin wrote no wheel to {}", wheels.display()))?;
-    pip(&python, &[&format!("{}[{}]", built.display(), wheel.extra())])
+    pip_install(&python, &[&format!("{}[{}]", built.display(), wheel.extra_name())])
 }
 
 /// Returns the folder of the Python package.
-pub fn package() -> Result<PathBuf, String> {
+pub fn package_folder() -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
     Ok(root.ok_or("the folder of xtask has no parent")?.join("python"))
 }
 
 /// Creates an empty virtual environment.
-fn fresh_environment(directory: &Path) -> Result<(), String> {
+fn create_empty_environment(directory: &Path) -> Result<(), String> {
     let base = interpreter()?;
     let _ = fs::remove_dir_all(directory);
     run(Command::new(&base).args(["-m", "venv"]).arg(directory)).map_err(|e| {
@@ -233,7 +233,7 @@ fn interpreter() -> Result<String, String> {
     ))
 }
 
-fn pip(python: &Path, packages: &[&str]) -> Result<(), String> {
+fn pip_install(python: &Path, packages: &[&str]) -> Result<(), String> {
     run(Command::new(python)
         .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
         .args(packages))

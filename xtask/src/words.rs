@@ -1,6 +1,6 @@
 //! Words that comments, help texts, messages and the book must not use.
 //!
-//! The readers are control engineers. The words in [`BANNED`] occurred in sentences that such readers would rewrite:
+//! The readers are control engineers. The words in [`BANNED_WORDS`] occurred in sentences that such readers would rewrite:
 //! metaphors of speaking, standing and believing, nouns made from questions, and archaic words. The table contains a
 //! replacement for each word, which the check prints with file and line. Code spans (in backticks) and format arguments
 //! are not prose.
@@ -11,7 +11,7 @@
 use std::{fs, path::Path, process::Command};
 
 /// Words and phrases in lower case, with their replacements.
-const BANNED: [(&str, &str); 48] = [
+const BANNED_WORDS: [(&str, &str); 48] = [
     ("foretell", "predict"),
     ("foretells", "predicts"),
     ("foretold", "predicted"),
@@ -74,7 +74,7 @@ const EXCEPTIONS: [(&str, &str); 2] = [
 /// The words found, with file and line.
 pub fn check() -> Result<(), String> {
     let of_sources = |path: &str| path.ends_with(".rs") || path.ends_with(".py") || path.ends_with(".pyi");
-    report(&hits(of_sources)?)
+    report(&find_banned_words(of_sources)?)
 }
 
 /// Checks the book, the README and ARCHITECTURE.md.
@@ -85,7 +85,7 @@ pub fn check_book() -> Result<(), String> {
     let of_book = |path: &str| {
         path == "README.md" || path == "ARCHITECTURE.md" || path.starts_with("docs/src/") && path.ends_with(".md")
     };
-    report(&hits(of_book)?)
+    report(&find_banned_words(of_book)?)
 }
 
 fn report(found: &[String]) -> Result<(), String> {
@@ -98,7 +98,7 @@ fn report(found: &[String]) -> Result<(), String> {
     }
 }
 
-fn hits(counts: impl Fn(&str) -> bool) -> Result<Vec<String>, String> {
+fn find_banned_words(counts: impl Fn(&str) -> bool) -> Result<Vec<String>, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let listed = Command::new("git")
         .args(["ls-files"])
@@ -113,12 +113,12 @@ fn hits(counts: impl Fn(&str) -> bool) -> Result<Vec<String>, String> {
         }
         let text = fs::read_to_string(root.join(path)).map_err(|e| format!("{path}: {e}"))?;
         let prose = match path.rsplit('.').next() {
-            Some("rs") => of_rust(&text),
-            Some("md") => of_markdown(&text),
-            _ => of_python(&text),
+            Some("rs") => rust_prose(&text),
+            Some("md") => markdown_prose(&text),
+            _ => python_prose(&text),
         };
         for (line, words) in prose {
-            for (banned, instead) in banned_in(&words) {
+            for (banned, instead) in banned_words(&words) {
                 found.push(format!("{path}:{line}: {banned:?}; write {instead}"));
             }
         }
@@ -127,8 +127,8 @@ fn hits(counts: impl Fn(&str) -> bool) -> Result<Vec<String>, String> {
 }
 
 /// Returns the banned words in a line of prose, with their replacements.
-fn banned_in(prose: &str) -> Vec<(&'static str, &'static str)> {
-    let words: Vec<String> = without_code(prose)
+fn banned_words(prose: &str) -> Vec<(&'static str, &'static str)> {
+    let words: Vec<String> = strip_code(prose)
         .to_lowercase()
         .split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '\\' || c == '-'))
         .filter(|word| !word.is_empty())
@@ -140,11 +140,14 @@ fn banned_in(prose: &str) -> Vec<(&'static str, &'static str)> {
             .windows(phrase.len())
             .any(|window| window.iter().eq(phrase.iter()))
     };
-    BANNED.into_iter().filter(|(phrase, _)| is_there(phrase)).collect()
+    BANNED_WORDS
+        .into_iter()
+        .filter(|(phrase, _)| is_there(phrase))
+        .collect()
 }
 
 /// Removes text in backticks or braces.
-fn without_code(line: &str) -> String {
+fn strip_code(line: &str) -> String {
     let (mut prose, mut in_code, mut depth) = (String::new(), false, 0_u32);
     for c in line.chars() {
         match c {
@@ -160,7 +163,7 @@ fn without_code(line: &str) -> String {
 
 /// Returns the comments and the string literals that contain a space, by line. Code blocks in documentation comments
 /// are not prose.
-fn of_rust(text: &str) -> Vec<(usize, String)> {
+fn rust_prose(text: &str) -> Vec<(usize, String)> {
     let (mut prose, mut in_text, mut in_block) = (Vec::new(), false, false);
     for (number, line) in (1..).zip(text.lines()) {
         let bare = line.trim_start();
@@ -209,7 +212,7 @@ fn of_rust(text: &str) -> Vec<(usize, String)> {
 }
 
 /// Returns comments and strings in triple quotes, by line.
-fn of_python(text: &str) -> Vec<(usize, String)> {
+fn python_prose(text: &str) -> Vec<(usize, String)> {
     let (mut prose, mut in_text) = (Vec::new(), false);
     for (number, line) in (1..).zip(text.lines()) {
         let marks = line.matches("\"\"\"").count();
@@ -224,7 +227,7 @@ fn of_python(text: &str) -> Vec<(usize, String)> {
 }
 
 /// Returns the lines outside code blocks.
-fn of_markdown(text: &str) -> Vec<(usize, String)> {
+fn markdown_prose(text: &str) -> Vec<(usize, String)> {
     let mut in_block = false;
     let mut prose = Vec::new();
     for (number, line) in (1..).zip(text.lines()) {
@@ -244,18 +247,18 @@ mod tests {
     #[test]
     fn banned_words_are_found_only_in_prose() {
         let source = "/// Begins `begin` here.\nlet begins = \"it says so\"; // sought\n/// ```\n/// begin\n/// ```\nlet c = '\"';\n";
-        let found: Vec<(usize, Vec<&str>)> = (of_rust(source).into_iter())
-            .map(|(line, prose)| (line, banned_in(&prose).into_iter().map(|(word, _)| word).collect()))
+        let found: Vec<(usize, Vec<&str>)> = (rust_prose(source).into_iter())
+            .map(|(line, prose)| (line, banned_words(&prose).into_iter().map(|(word, _)| word).collect()))
             .collect();
         assert_eq!(found, [(1, vec!["begins"]), (2, vec!["says"]), (2, vec!["sought"])]);
-        assert!(banned_in("\\begin{tabular} of a recording that is noteworthy").is_empty());
-        assert!(banned_in("the usual {usual} one").contains(&("usual", "default, typical, common")));
+        assert!(banned_words("\\begin{tabular} of a recording that is noteworthy").is_empty());
+        assert!(banned_words("the usual {usual} one").contains(&("usual", "default, typical, common")));
     }
 
     #[test]
     fn prose_of_markdown_and_python_is_extracted() {
-        assert_eq!(of_markdown("a\n```\nbegin\n```\nb").len(), 2);
+        assert_eq!(markdown_prose("a\n```\nbegin\n```\nb").len(), 2);
         let package = "begin = 1  # it begins\n\"\"\"Doc\nbegin\n\"\"\"\nx = 1\n";
-        assert_eq!(of_python(package).len(), 4);
+        assert_eq!(python_prose(package).len(), 4);
     }
 }

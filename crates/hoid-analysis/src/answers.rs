@@ -12,18 +12,18 @@ use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::
 use crate::AnalysisError;
 
 /// Name of the answer for the response of the person.
-pub const RESPONSE: &str = "response";
+pub const RESPONSE_ANSWER: &str = "response";
 /// Names of the answers for the crossover frequency and the phase margin of the loop.
-pub const LOOP: [&str; 2] = ["crossover", "phase_margin"];
+pub const LOOP_ANSWERS: [&str; 2] = ["crossover", "phase_margin"];
 /// Kind of the finding that an individual answer is undetermined.
-const UNDETERMINED_ANSWER: &str = "open-answer";
+const UNDETERMINED_ANSWER_KIND: &str = "open-answer";
 /// Largest standard errors at which the crossover (relative to its value) and the phase margin (in deg) count as
 /// determined.
-const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
+const MAX_ERRORS: [f64; 2] = [0.5, 30.0];
 
 /// Name of an answer and, if the answer is undetermined, the reason.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Answered {
+pub struct AnswerStatus {
     /// Name of the answer: `response`, `crossover`, `phase_margin`, or the name of a parameter.
     pub name: String,
     /// Reason why the data do not determine the answer; `None` if they do.
@@ -33,21 +33,21 @@ pub struct Answered {
 /// A fit that judges each of its answers separately.
 pub trait Answers {
     /// Returns all answers, for the given controlled element.
-    fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered>;
+    fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus>;
 }
 
 /// Checks the names of the requested answers and returns them in their standard form.
 ///
 /// # Errors
 /// [`AnalysisError::Options`] for an unknown name.
-pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
+pub fn requested_names(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     let known = || {
         let parameters = PARAMETERS.iter().map(|(name, _)| *name);
-        [RESPONSE].into_iter().chain(LOOP).chain(parameters)
+        [RESPONSE_ANSWER].into_iter().chain(LOOP_ANSWERS).chain(parameters)
     };
     let one = |name: &String| {
         let name = match name.trim() {
-            "margin" => LOOP[1],
+            "margin" => LOOP_ANSWERS[1],
             "delay" => "tau_e",
             other => other,
         };
@@ -63,19 +63,19 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
 
 /// Adds the findings on the requested answers to the verdict on the fit. By default the response is requested, and an
 /// undetermined crossover or margin adds a warning.
-pub fn with_answers(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
+pub fn with_answers(verdict: Verdict, answers: &[AnswerStatus], asked: &[String]) -> Verdict {
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
     let open: Vec<Finding> = if asked.is_empty() {
         let is_told = |finding: &Finding| matches!(finding.kind, "no-crossover" | "unstable-loop");
-        let wanted = LOOP.iter().filter(|_| !verdict.findings().iter().any(is_told));
+        let wanted = LOOP_ANSWERS.iter().filter(|_| !verdict.findings().iter().any(is_told));
         let of_loop = wanted.filter_map(|name| of(name)?.open.clone());
         of_loop
-            .map(|finding| Finding::doubt(UNDETERMINED_ANSWER, finding.message))
+            .map(|finding| Finding::warning(UNDETERMINED_ANSWER_KIND, finding.message))
             .collect()
     } else {
         let wanted = asked.iter().filter_map(|name| match of(name) {
             Some(answer) => answer.open.clone(),
-            None => Some(undetermined(format!("this result does not contain {name}"))),
+            None => Some(undetermined_finding(format!("this result does not contain {name}"))),
         });
         wanted.collect()
     };
@@ -84,31 +84,31 @@ pub fn with_answers(verdict: Verdict, answers: &[Answered], asked: &[String]) ->
 
 /// Returns the verdict on one answer: the findings on the fit as a whole and, if this answer is undetermined, the
 /// reason.
-pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
+pub fn answer_verdict(verdict: &Verdict, answer: &AnswerStatus) -> Verdict {
     let whole = verdict
         .findings()
         .iter()
-        .filter(|finding| finding.kind != UNDETERMINED_ANSWER);
+        .filter(|finding| finding.kind != UNDETERMINED_ANSWER_KIND);
     Verdict::of(whole.chain(&answer.open).cloned().collect())
 }
 
-fn undetermined(message: String) -> Finding {
-    Finding::undetermined(UNDETERMINED_ANSWER, message)
+fn undetermined_finding(message: String) -> Finding {
+    Finding::undetermined(UNDETERMINED_ANSWER_KIND, message)
 }
 
-fn answered(name: &str, why: Option<String>) -> Answered {
-    Answered {
+fn answer_status(name: &str, why: Option<String>) -> AnswerStatus {
+    AnswerStatus {
         name: name.to_owned(),
-        open: why.map(undetermined),
+        open: why.map(undetermined_finding),
     }
 }
 
 /// An estimate with its 95 % interval.
-type Measured = (Estimate, Option<(f64, f64)>);
+type MeasureWithInterval = (Estimate, Option<(f64, f64)>);
 
 /// Judges the crossover and the phase margin of a loop. Each is given with its interval; `None` means that it does not
 /// exist.
-fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
+fn loop_answers(measures: [Option<MeasureWithInterval>; 2]) -> impl Iterator<Item = AnswerStatus> {
     let words = ["the crossover", "the phase margin"];
     (0..2).map(move |k| {
         let why = match measures[k] {
@@ -118,7 +118,7 @@ fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
             )),
             Some((value, interval)) => {
                 let scale = if k == 0 { value.value } else { 1.0 };
-                let wide = value.standard_error.is_none_or(|s| s > LARGEST_ERRORS[k] * scale);
+                let wide = value.standard_error.is_none_or(|s| s > MAX_ERRORS[k] * scale);
                 let zero = k == 0 && interval.is_some_and(|(low, _)| low <= 0.0);
                 (wide || zero).then(|| match interval {
                     Some((low, high)) => format!("{} is not determined: 95 % interval {low:.2} to {high:.2}", words[k]),
@@ -126,16 +126,16 @@ fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
                 })
             }
         };
-        answered(LOOP[k], why)
+        answer_status(LOOP_ANSWERS[k], why)
     })
 }
 
 impl Answers for FamilyFit {
-    fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
-        let mut all = vec![answered(RESPONSE, None)];
+    fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+        let mut all = vec![answer_status(RESPONSE_ANSWER, None)];
         if let Some(element) = element {
             let found = self.loop_measures(0, element);
-            all.extend(of_loop([
+            all.extend(loop_answers([
                 found.map(|m| (m.crossover_rad_s, m.crossover_interval)),
                 found.map(|m| (m.phase_margin_deg, m.phase_margin_interval)),
             ]));
@@ -146,32 +146,32 @@ impl Answers for FamilyFit {
                 (false, true) => Some(format!("{} is determined by the prior alone", p.name)),
                 (false, false) => Some(format!("{} is not determined by the data", p.name)),
             };
-            answered(&p.name, why)
+            answer_status(&p.name, why)
         }));
         all
     }
 }
 
 impl Answers for GreyBoxFit {
-    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
-        of_operator(self.polynomial_fit(0))
+    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+        operator_answers(self.polynomial_fit(0))
     }
 }
 
 impl Answers for SigmoidFit {
-    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
-        vec![answered(RESPONSE, None)]
+    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+        vec![answer_status(RESPONSE_ANSWER, None)]
     }
 }
 
 /// Returns the answers of a polynomial fit: the response, and the parameters of the operator that it represents.
-pub(crate) fn of_operator(fit: &Fit) -> Vec<Answered> {
-    let mut all = vec![answered(RESPONSE, None)];
+pub(crate) fn operator_answers(fit: &Fit) -> Vec<AnswerStatus> {
+    let mut all = vec![answer_status(RESPONSE_ANSWER, None)];
     if let Ok(operator) = fit.operator() {
         all.extend(operator.rows().iter().map(|(name, _, estimate)| {
             let why = is_undetermined(estimate)
                 .then(|| format!("{name} ({estimate}) is not significantly different from zero"));
-            answered(name, why)
+            answer_status(name, why)
         }));
     }
     all
@@ -186,8 +186,8 @@ mod tests {
     #[test]
     fn level_covers_only_the_requested_answers() {
         let answers = [
-            answered(RESPONSE, None),
-            answered("tau_e", Some("tau_e is not determined by the data".to_owned())),
+            answer_status(RESPONSE_ANSWER, None),
+            answer_status("tau_e", Some("tau_e is not determined by the data".to_owned())),
         ];
         let level = |asked: &[&str]| {
             let asked: Vec<String> = asked.iter().map(|name| (*name).to_owned()).collect();
@@ -198,10 +198,10 @@ mod tests {
         assert_eq!(level(&["response", "tau_e"]), VerdictLevel::NotDetermined);
         assert_eq!(level(&["T_I"]), VerdictLevel::NotDetermined);
         // A finding against the whole result affects each answer; an undetermined answer affects only itself.
-        let whole = Verdict::of(vec![Finding::doubt("leverage", "few samples")]);
+        let whole = Verdict::of(vec![Finding::warning("leverage", "few samples")]);
         let asked = with_answers(whole, &answers, &["tau_e".to_owned()]);
-        assert_eq!(of_answer(&asked, &answers[0]).level, VerdictLevel::Doubtful);
-        assert_eq!(of_answer(&asked, &answers[1]).level, VerdictLevel::NotDetermined);
+        assert_eq!(answer_verdict(&asked, &answers[0]).level, VerdictLevel::Doubtful);
+        assert_eq!(answer_verdict(&asked, &answers[1]).level, VerdictLevel::NotDetermined);
     }
 
     #[test]
@@ -209,7 +209,7 @@ mod tests {
         let of = |value: f64, s: f64| {
             let one = Estimate::with_variance(value, s * s);
             let interval = Some((value - 2.0 * s, value + 2.0 * s));
-            let all: Vec<Answered> = of_loop([Some((one, interval)), None]).collect();
+            let all: Vec<AnswerStatus> = loop_answers([Some((one, interval)), None]).collect();
             (all[0].open.is_some(), all[1].open.is_some())
         };
         assert_eq!(of(3.0, 0.1), (false, true));
@@ -218,7 +218,7 @@ mod tests {
 
     #[test]
     fn requested_names_are_parsed() {
-        let names = |text: &str| asked_for(&text.split(',').map(str::to_owned).collect::<Vec<_>>());
+        let names = |text: &str| requested_names(&text.split(',').map(str::to_owned).collect::<Vec<_>>());
         assert_eq!(
             names("crossover, delay,margin").unwrap(),
             ["crossover", "tau_e", "phase_margin"]

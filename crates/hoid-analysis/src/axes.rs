@@ -17,19 +17,19 @@ use std::str::FromStr;
 use hoid_ident::{
     diagnostics::other_inputs::response_to,
     family::{ChannelRole, SeenChannel},
-    frequency::{Excitation as Lines, LineSearch},
+    frequency::{Excitation as Lines, LineDetectionOptions},
 };
 use hoid_model::{Channel, Finding, Record, Verdict};
 use serde_json::{Map, Value, json};
 
-use crate::{AnalysisError, Excitation, Identification, Identified, Recordings, json};
+use crate::{AnalysisError, Excitation, Identification, IdentifiedModel, Recordings, json};
 
 /// Familywise significance level for reporting a coupling.
 const FAMILYWISE_LEVEL: f64 = 0.01;
 /// Relative difference below which two lines count as equal.
 const LINE_TOLERANCE: f64 = 1e-3;
 /// Value of `kind` in JSON.
-pub const AXES: &str = "axes";
+pub const AXES_KIND: &str = "axes";
 
 /// Error and control of an axis, and its recorded excitation.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -67,7 +67,7 @@ pub struct Axis {
     /// Signals of the axis.
     pub pair: AxisPair,
     /// Operator of the axis.
-    pub identified: Identified,
+    pub identified: IdentifiedModel,
     /// Responses of the control of this axis to the errors of the other axes.
     pub couplings: Vec<Coupling>,
 }
@@ -163,12 +163,12 @@ fn with_error(records: &mut [Record], name: &str, other: &[Record]) -> Result<()
 /// Tests whether the control of an axis responds to the error of another axis.
 fn coupling(
     asked: &Identification,
-    identified: &Identified,
+    identified: &IdentifiedModel,
     (pair, other): (&AxisPair, &AxisPair),
     tests: usize,
 ) -> Coupling {
     let records = &identified.data.records;
-    let tested = separate(records, pair, other, asked.period_s).and_then(|()| {
+    let tested = check_separate_lines(records, pair, other, asked.period_s).and_then(|()| {
         let channel = SeenChannel::new(other.input.clone(), ChannelRole::Feedforward);
         response_to(&asked.estimator, &identified.fit, records, channel)
             .map(|(found, _)| found.p_value)
@@ -188,17 +188,22 @@ fn coupling(
 
 /// Checks that the excitations of two axes have different lines; the error is the reason why their responses cannot be
 /// separated.
-fn separate(records: &[Record], pair: &AxisPair, other: &AxisPair, period_s: Option<f64>) -> Result<(), String> {
+fn check_separate_lines(
+    records: &[Record],
+    pair: &AxisPair,
+    other: &AxisPair,
+    period_s: Option<f64>,
+) -> Result<(), String> {
     let (Some(own), Some(of_other)) = (&pair.excitation, &other.excitation) else {
         return Err("the excitation is not given for both axes; add it to each pair, as in ex,ux,rx".to_owned());
     };
-    let search = LineSearch {
+    let search = LineDetectionOptions {
         period_s,
-        ..LineSearch::default()
+        ..LineDetectionOptions::default()
     };
     for record in records {
         let lines = |name: &String| {
-            let found = Lines::found_in(record, name, &search).map_err(|error| error.to_string())?;
+            let found = Lines::detect(record, name, &search).map_err(|error| error.to_string())?;
             Ok::<_, String>(found.omega_rad_s())
         };
         let (here, there) = (lines(own)?, lines(of_other)?);
@@ -267,7 +272,7 @@ pub fn axes_json(all: &[Axis]) -> Result<Map<String, Value>, AnalysisError> {
     let each = all.iter().map(axis).collect::<Result<Vec<_>, _>>()?;
     let mut map = Map::new();
     map.insert("hoid".to_owned(), json!(env!("CARGO_PKG_VERSION")));
-    map.insert("kind".to_owned(), json!(AXES));
+    map.insert("kind".to_owned(), json!(AXES_KIND));
     map.insert("axes".to_owned(), Value::Array(each));
     Ok(map)
 }

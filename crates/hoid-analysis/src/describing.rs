@@ -20,7 +20,7 @@ use crate::{
 
 /// Options for the estimation of a describing function from recordings.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Describing {
+pub struct DescribingFunctionOptions {
     /// Excitation, lines, period, controlled element and span. The offset given here, in samples of the recordings, is
     /// added to the offsets of the channels.
     pub options: DescriptionOptions,
@@ -34,7 +34,7 @@ pub struct Describing {
 
 /// A describing function with its recordings and settings.
 #[derive(Debug, Clone)]
-pub struct Described {
+pub struct DescribingFunctionResult {
     /// The describing function; its verdict includes the findings on the recordings.
     pub found: Description,
     /// The recordings used for the estimation.
@@ -43,13 +43,13 @@ pub struct Described {
     pub settings: Vec<Setting>,
 }
 
-impl Describing {
+impl DescribingFunctionOptions {
     /// Repairs and decimates the recordings, estimates their describing function and forms the verdict.
     ///
     /// # Errors
     /// [`AnalysisError`] if there is no result, for example because there are no lines, there is no whole period, or a
     /// channel does not exist.
-    pub fn run(&self, recordings: Recordings) -> Result<Described, AnalysisError> {
+    pub fn run(&self, recordings: Recordings) -> Result<DescribingFunctionResult, AnalysisError> {
         let read = recordings.repaired(self.faults, Of::Person)?;
         let first = read.records.first().ok_or(AnalysisError::NoRecordings)?;
         let late = self.options.offset_samples + late_samples(first, &self.offsets)?;
@@ -61,26 +61,32 @@ impl Describing {
         };
         let mut found = describe_runs(&data.records, &options)?;
         let (element, channel) = (options.controlled_element.as_ref(), options.excitation.as_deref());
-        let verdict = data.judged(found.verdict);
+        let verdict = data.with_findings(found.verdict);
         let verdict = verdict.append(data.element_finding(element, channel));
         found.verdict = verdict.append(data.display_finding(&[]));
         let settings = self.settings(&data, late, &found);
-        Ok(Described { found, data, settings })
+        Ok(DescribingFunctionResult { found, data, settings })
     }
 
     fn settings(&self, data: &Recordings, late_samples: f64, found: &Description) -> Vec<Setting> {
         let reading = data.source.as_ref().map(|source| &source.reading);
         let mut list = match reading {
             Some(reading) => reading.settings(self.rate),
-            None => vec![Setting::new("decimate", self.rate.to_string()).given(self.rate != Decimation::default())],
+            None => {
+                vec![Setting::new("decimate", self.rate.to_string()).with_given(self.rate != Decimation::default())]
+            }
         };
         if late_samples != 0.0 {
             let words = format!("{late_samples} samples, corrected as a phase shift");
-            list.push(Setting::new("offset of the output", words).given(true));
+            list.push(Setting::new("offset of the output", words).with_given(true));
         }
         let is_default = self.faults == FaultHandling::default();
-        list.push(Setting::new("faults", self.faults.to_string()).given(!is_default));
-        list.extend(reading.and_then(Reading::masked).map(|masked| masked.given(true)));
+        list.push(Setting::new("faults", self.faults.to_string()).with_given(!is_default));
+        list.extend(
+            reading
+                .and_then(Reading::masked_rows_setting)
+                .map(|masked| masked.with_given(true)),
+        );
         let given = self.options.lines_rad_s.is_some();
         let lines = match (given, &found.channel) {
             (true, None) => "given".to_owned(),
@@ -92,12 +98,12 @@ impl Describing {
             None => "ratios of u and e".to_owned(),
         };
         list.extend([
-            Setting::new("lines", lines).given(given),
+            Setting::new("lines", lines).with_given(given),
             Setting::new("average", average),
             Setting::new("delay removed between lines", format!("{:.3} s", found.delay_s)),
         ]);
         let element = self.options.controlled_element.as_ref();
-        list.extend(element.map(|element| Setting::new("controlled element", element.to_string()).given(true)));
+        list.extend(element.map(|element| Setting::new("controlled element", element.to_string()).with_given(true)));
         list
     }
 }

@@ -11,7 +11,7 @@ use crate::{
     AnalysisError,
     offset::{late_samples, without_offsets},
     recordings::Recordings,
-    repair::repaired_in_the_same_way,
+    repair::repair_records,
 };
 
 /// Channel with the recorded disturbance or target.
@@ -30,7 +30,7 @@ pub enum Excitation {
 
 impl Excitation {
     /// Interprets the text of the user: a channel or `none`; without a text the channel is found automatically.
-    pub fn of_text(text: Option<&str>) -> Self {
+    pub fn from_text(text: Option<&str>) -> Self {
         match text {
             None => Self::Found,
             Some("none") => Self::Nothing,
@@ -39,7 +39,7 @@ impl Excitation {
     }
 
     /// Returns the named channel, if there is one.
-    pub fn named(&self) -> Option<&str> {
+    pub fn channel_name(&self) -> Option<&str> {
         match self {
             Self::Named(name) | Self::IfRecorded(name) => Some(name),
             Self::Found | Self::Nothing => None,
@@ -54,7 +54,7 @@ impl Recordings {
     ///
     /// # Errors
     /// [`AnalysisError`] if there are no lines, or if the files cannot be read again.
-    pub fn described(
+    pub fn describe(
         &self,
         excitation: &Excitation,
         period_s: Option<f64>,
@@ -64,7 +64,7 @@ impl Recordings {
             return Ok(None);
         }
         let options = |offset_samples| DescriptionOptions {
-            excitation: excitation.named().map(str::to_owned),
+            excitation: excitation.channel_name().map(str::to_owned),
             period_s,
             offset_samples,
             // Detrending, if requested, has already been applied in reading.
@@ -81,8 +81,8 @@ impl Recordings {
         let Some((source, (reading, offsets))) = moved.filter(|(_, (_, offsets))| !offsets.is_empty()) else {
             return Ok(Some(describe_runs(&self.records, &options(0.0))?));
         };
-        let again = reading.files(&source.paths, |_, _| ())?;
-        let again = repaired_in_the_same_way(again.records, handling)?;
+        let again = reading.read_files(&source.paths, |_, _| ())?;
+        let again = repair_records(again.records, handling)?;
         let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
         let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
         // The records that were read again are decimated to the sampling rate of the fit.
@@ -98,13 +98,13 @@ impl Recordings {
 
 /// Returns the describing function for a fit that also uses the lines. A missing channel is an error only if the user
 /// named it.
-pub(crate) fn of_lines(
+pub(crate) fn line_describing_function(
     described: &Result<Option<Description>, AnalysisError>,
     excitation: &Excitation,
 ) -> Option<Result<hoid_ident::frequency::DescribingFunction, IdentError>> {
     match described {
         Ok(found) => found.as_ref().map(|found| Ok(found.function.clone())),
-        Err(AnalysisError::Ident(error)) if excitation.named().is_some() => Some(Err(error.clone())),
+        Err(AnalysisError::Ident(error)) if excitation.channel_name().is_some() => Some(Err(error.clone())),
         Err(_) => None,
     }
 }

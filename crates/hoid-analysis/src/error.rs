@@ -110,7 +110,7 @@ impl From<IdentError> for AnalysisError {
 impl AnalysisError {
     /// Creates the error for a file that cannot be read. If the requested columns are missing, the error contains the
     /// columns to request.
-    pub fn of_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
+    pub fn from_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
         match other_columns(&error, path, options) {
             Some(others) => Self::OtherColumns(Box::new(others)),
             None => error.into(),

@@ -16,7 +16,7 @@ impl Reading {
     ///
     /// # Errors
     /// The errors of reading; [`AnalysisError::OtherColumns`] if error and control have other names in a file.
-    pub fn files(
+    pub fn read_files(
         &self,
         paths: &[PathBuf],
         mut on_read: impl FnMut(&Path, &ReadRecord),
@@ -24,7 +24,7 @@ impl Reading {
         let mut all = Recordings::default();
         for path in paths {
             let reads = self
-                .segments(path)
+                .read_segments(path)
                 .map_err(|error| column_in_another_file(error, path, paths))?;
             let parts = reads.len() > 1 || !self.mask.is_empty();
             for read in reads {
@@ -46,27 +46,31 @@ impl Reading {
     /// Reads one file: its record, or the records between masked rows.
     ///
     /// # Errors
-    /// As [`Reading::files`].
-    pub fn segments(&self, path: &Path) -> Result<Vec<ReadRecord>, AnalysisError> {
+    /// As [`Reading::read_files`].
+    pub fn read_segments(&self, path: &Path) -> Result<Vec<ReadRecord>, AnalysisError> {
         read_segments(path, &self.options, &self.preparation, &self.mask, self.shortest_s)
-            .map_err(|error| AnalysisError::of_reading(error, path, &self.options))
+            .map_err(|error| AnalysisError::from_reading(error, path, &self.options))
     }
 
     /// Reads the record of a file that contains one trial.
     ///
     /// # Errors
-    /// As [`Reading::files`].
-    pub fn one(&self, path: &Path) -> Result<ReadRecord, AnalysisError> {
+    /// As [`Reading::read_files`].
+    pub fn single_record(&self, path: &Path) -> Result<ReadRecord, AnalysisError> {
         read_prepared(path, &self.options, &self.preparation)
-            .map_err(|error| AnalysisError::of_reading(error, path, &self.options))
+            .map_err(|error| AnalysisError::from_reading(error, path, &self.options))
     }
 
     /// Reads one file without masking.
     ///
     /// # Errors
-    /// As [`Reading::files`].
-    pub fn file(&self, path: &Path, on_read: impl FnOnce(&Path, &ReadRecord)) -> Result<Recordings, AnalysisError> {
-        let read = self.one(path)?;
+    /// As [`Reading::read_files`].
+    pub fn read_file(
+        &self,
+        path: &Path,
+        on_read: impl FnOnce(&Path, &ReadRecord),
+    ) -> Result<Recordings, AnalysisError> {
+        let read = self.single_record(path)?;
         on_read(path, &read);
         let (record, account) = with_account(read);
         let mut one = Recordings::default();

@@ -4,7 +4,7 @@ use std::fmt;
 
 use hoid_ident::{
     Fit,
-    diagnostics::response,
+    diagnostics::response_to_error,
     family::FamilyFit,
     frequency::{Description, check_excitation},
     validation::GoodnessOfFit,
@@ -14,9 +14,9 @@ use serde_json::{Map, Value};
 
 use crate::{
     AnalysisError,
-    answers::{self, Answered, Answers, of_answer},
+    answers::{self, AnswerStatus, Answers, answer_verdict},
     description::Excitation,
-    estimators::{BatchEstimator, Fitted},
+    estimators::{BatchEstimator, FittedModel},
     identification::Identification,
     quality::Of,
     reading::Reading,
@@ -26,7 +26,7 @@ use crate::{
 
 /// An identified model, with its verdict and data.
 #[derive(Debug, Clone)]
-pub struct Identified<F = FamilyFit> {
+pub struct IdentifiedModel<F = FamilyFit> {
     /// Result of the fit.
     pub fit: F,
     /// Final verdict on the result.
@@ -50,7 +50,7 @@ pub struct Identified<F = FamilyFit> {
 
 /// Goodness of fit of a model on a recording that was not used in the estimation.
 #[derive(Debug, Clone)]
-pub struct Validated {
+pub struct ValidationResult {
     /// Name of the recording.
     pub name: String,
     /// Goodness of fit.
@@ -61,16 +61,16 @@ pub struct Validated {
 ///
 /// # Errors
 /// As [`Identification::run`].
-pub fn identify(records: &[Record]) -> Result<Identified, AnalysisError> {
-    Identification::default().run(Recordings::of_records(records.iter().cloned()))
+pub fn identify(records: &[Record]) -> Result<IdentifiedModel, AnalysisError> {
+    Identification::default().run(Recordings::from_records(records.iter().cloned()))
 }
 
 impl<E: BatchEstimator> Identification<E> {
     /// Repairs the recordings, fits the model, makes a second fit as a check, and forms the verdict.
     ///
     /// # Errors
-    /// [`AnalysisError`] if there is no result. A doubtful result is not an error: see [`Identified::verdict`].
-    pub fn run(&self, recordings: Recordings) -> Result<Identified<E::Fit>, AnalysisError> {
+    /// [`AnalysisError`] if there is no result. A doubtful result is not an error: see [`IdentifiedModel::verdict`].
+    pub fn run(&self, recordings: Recordings) -> Result<IdentifiedModel<E::Fit>, AnalysisError> {
         if recordings.is_empty() {
             return Err(AnalysisError::NoRecordings);
         }
@@ -82,9 +82,9 @@ impl<E: BatchEstimator> Identification<E> {
             .repaired(self.faults, E::OF)?
             .at_rate(self.rate, counts_samples)?;
         // The controlled element is checked before the fit, which removes the response to further inputs from u.
-        let element = data.element_finding(self.controlled_element.as_ref(), self.excitation.named());
+        let element = data.element_finding(self.controlled_element.as_ref(), self.excitation.channel_name());
         let displayed = data.display_finding(&self.estimator.further_inputs());
-        let Fitted {
+        let FittedModel {
             mut fit,
             verdict,
             described,
@@ -92,21 +92,23 @@ impl<E: BatchEstimator> Identification<E> {
             used,
             found,
         } = E::fit(self, &mut data)?;
-        let verdict = data.judged(verdict);
-        let response = (E::OF == Of::Person).then(|| response(&data.records)).flatten();
+        let verdict = data.with_findings(verdict);
+        let response = (E::OF == Of::Person)
+            .then(|| response_to_error(&data.records))
+            .flatten();
         let verdict = verdict.prepend(response.and_then(|found| found.finding()));
         let verdict = verdict.append(element).append(displayed);
         let verdict = answers::with_answers(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
-        E::judged(&mut fit, &verdict);
+        E::set_verdict(&mut fit, &verdict);
         let reading = data.source.as_ref().map(|source| &source.reading);
-        let by_default = Identification::of(self.estimator.by_default());
+        let by_default = Identification::of(self.estimator.with_defaults());
         let default_reading = reading.map(|_| Reading::default());
         let mut default = by_default.settings(data.records[0].sample_time());
         default.extend(shared_settings(&by_default, default_reading.as_ref()));
-        let mut settings = Setting::against(used, &default);
+        let mut settings = Setting::mark_non_defaults(used, &default);
         settings.extend(found);
-        settings.extend(Setting::against(shared_settings(self, reading), &default));
-        Ok(Identified {
+        settings.extend(Setting::mark_non_defaults(shared_settings(self, reading), &default));
+        Ok(IdentifiedModel {
             fit,
             verdict,
             data,
@@ -122,11 +124,11 @@ impl<E: BatchEstimator> Identification<E> {
     }
 }
 
-impl<F: Answers> Identified<F> {
+impl<F: Answers> IdentifiedModel<F> {
     /// Returns the verdict on each answer.
     pub fn answers(&self) -> Vec<(String, Verdict)> {
         let all = self.fit.answers(self.controlled_element.as_ref());
-        let one = |answer: Answered| (of_answer(&self.verdict, &answer), answer.name);
+        let one = |answer: AnswerStatus| (answer_verdict(&self.verdict, &answer), answer.name);
         all.into_iter()
             .map(one)
             .map(|(verdict, name)| (name, verdict))
@@ -134,7 +136,7 @@ impl<F: Answers> Identified<F> {
     }
 }
 
-impl Identified {
+impl IdentifiedModel {
     /// Returns VAF and NRMSE over all recordings, where each recording is predicted by its own operator.
     ///
     /// # Errors
@@ -156,7 +158,7 @@ fn shared_settings<E: BatchEstimator>(how: &Identification<E>, reading: Option<&
         None => list.push(Setting::new("decimate", decimation.to_string())),
     }
     list.push(Setting::new("faults", how.faults.to_string()));
-    list.extend(reading.and_then(Reading::masked));
+    list.extend(reading.and_then(Reading::masked_rows_setting));
     list.extend([
         Setting::new(
             "search",
@@ -169,7 +171,7 @@ fn shared_settings<E: BatchEstimator>(how: &Identification<E>, reading: Option<&
     list
 }
 
-impl fmt::Display for Identified {
+impl fmt::Display for IdentifiedModel {
     /// Prints the verdict and the parameters of each operator.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}\n\n{}", self.verdict, self.fit.title())?;
@@ -190,18 +192,18 @@ impl fmt::Display for Identified {
     }
 }
 
-impl<F> Identified<F> {
+impl<F> IdentifiedModel<F> {
     /// Computes how well a model of the fit predicts another recording of the person, which is decimated and detrended
     /// like the fitted recordings.
     ///
     /// # Errors
     /// [`AnalysisError`] if there is no recording, or if the recording has another sampling rate or is too short.
-    pub fn validated(&self, model: &Fit, other: Recordings) -> Result<Validated, AnalysisError> {
+    pub fn validated(&self, model: &Fit, other: Recordings) -> Result<ValidationResult, AnalysisError> {
         let name = other.names.first().cloned().ok_or(AnalysisError::NoRecordings)?;
         let other = other.at_rate(self.rate, self.counts_samples)?.records.into_iter();
         let prepared: Vec<Record> = other.map(|record| record.detrended(self.taken_out)).collect();
         let quality = model.quality(&prepared)?;
-        Ok(Validated { name, quality })
+        Ok(ValidationResult { name, quality })
     }
 
     /// True if the means of e and u were removed before the fit; each record then has a separate level.

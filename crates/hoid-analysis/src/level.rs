@@ -19,7 +19,7 @@ pub(crate) fn may_have_level(recordings: &Recordings, with_input: bool, handling
 }
 
 /// Writes the level of each record as read into its account; `of` receives the index of the record and the record.
-pub(crate) fn levels_into(
+pub(crate) fn write_levels(
     accounts: &mut [Account],
     as_read: &[Record],
     of: impl Fn(usize, &Record) -> Option<Estimate>,
@@ -85,7 +85,7 @@ impl Level {
         data: &mut Recordings,
         of: impl Fn(usize, &Record) -> Option<Estimate>,
     ) -> Option<Setting> {
-        levels_into(&mut data.accounts, self.as_read.as_ref()?, |k, record| {
+        write_levels(&mut data.accounts, self.as_read.as_ref()?, |k, record| {
             let separate_mean = self.separate_means.get(k).copied().unwrap_or(0.0);
             of(k, record).map(|level| Estimate {
                 value: level.value + separate_mean,

@@ -6,7 +6,7 @@
 //! analysis of groups and Python only parse options and show results.
 //!
 //! ```text
-//! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, verdict, data, settings }
+//! files -- Reading --> Recordings -- Identification { options }.run --> IdentifiedModel { fit, verdict, data, settings }
 //! ```
 //!
 //! | step of [`Identification::run`] | rules |
@@ -35,7 +35,7 @@
 //!
 //! let simulator = Simulator::new(&Scenario::condition(Condition::C1))?;
 //! let record = simulator.run(RunSeed::default(), false)?;
-//! let found = Identification::default().run(Recordings::of_records([record]))?;
+//! let found = Identification::default().run(Recordings::from_records([record]))?;
 //! let tau = found.fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
 //! assert!(tau.is_some_and(|tau| (tau.value - 0.28).abs() < 0.02));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -70,23 +70,27 @@ mod settings;
 mod several_inputs;
 mod tracking;
 
-pub use answers::{Answered, Answers};
+pub use answers::{AnswerStatus, Answers};
 pub use axes::{Axis, AxisPair, Coupling, axes, axes_json, check_axes};
-pub use describing::{Described, Describing};
+pub use describing::{DescribingFunctionOptions, DescribingFunctionResult};
 pub use description::Excitation;
 pub use error::AnalysisError;
-pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};
+pub use estimators::{BatchEstimator, FittedModel, PolynomialFit, Polynomials};
 pub use found::FoundFault;
 pub use identification::Identification;
-pub use identified::{Identified, Validated, identify};
-pub use look::{Advice, Lag, Look, LookOptions, OtherColumns, Periods, RecordSummary, Role, Roles, typed};
+pub use identified::{IdentifiedModel, ValidationResult, identify};
+pub use look::{
+    Advice, FileExamination, Lag, LookOptions, OtherColumns, Periods, RecordSummary, Role, Roles, shell_command,
+};
 pub use offset::{late_samples, without_offsets};
-pub use prior::prior_of_text;
+pub use prior::parse_prior;
 pub use quality::Of;
-pub use rate::kept_rate;
+pub use rate::kept_rate_message;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};
 pub use request::{Request, ResolvedRequest};
 pub use settings::Setting;
-pub use several_inputs::{SeveralInputsResult, roles, several_inputs};
-pub use tracking::{Tracked, Tracking, options_of_recursion, relative_errors, settings_of_recursion, two_inputs};
+pub use several_inputs::{SeveralInputsResult, parse_roles, several_inputs};
+pub use tracking::{
+    Tracking, TrackingResult, recursion_options_error, relative_errors, settings_of_recursion, two_inputs,
+};

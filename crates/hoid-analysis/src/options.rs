@@ -7,31 +7,32 @@
 use hoid_ident::{
     family::OperatorPrior,
     settings::{BatchOption, BatchOptions, Bounds, Kind, Setting},
-    shared_options::Field,
+    shared_options::FieldAccessor,
 };
 
 use crate::{
-    AnalysisError, answers::asked_for, description::Excitation, identification::Identification, prior::prior_of_text,
+    AnalysisError, answers::requested_names, description::Excitation, identification::Identification,
+    prior::parse_prior,
 };
 
 /// An option of an estimator or of the analysis.
 pub type AnalysisOption<E> = BatchOption<Identification<E>, AnalysisError>;
 
 /// Returns the options that an estimator declares.
-pub(crate) fn own<E: BatchOptions>() -> Vec<AnalysisOption<E>> {
+pub(crate) fn estimator_options<E: BatchOptions>() -> Vec<AnalysisOption<E>> {
     let own = E::options().into_iter();
-    own.map(|option| option.within(|how: &Identification<E>| &how.estimator, |how| &mut how.estimator))
+    own.map(|option| option.nested(|how: &Identification<E>| &how.estimator, |how| &mut how.estimator))
         .collect()
 }
 
 /// Returns the options of an estimator whose prior may be the result of another fit, given as JSON or as a file.
 pub(crate) fn with_prior_of_fits<E: 'static>(
     options: Vec<AnalysisOption<E>>,
-    field: Field<E, OperatorPrior>,
+    field: FieldAccessor<E, OperatorPrior>,
 ) -> Vec<AnalysisOption<E>> {
     let read = move |option: AnalysisOption<E>| match option.setting.kind {
-        Kind::Prior => option.read_by(move |how: &mut Identification<E>, _, text| {
-            *field(&mut how.estimator) = prior_of_text(text)?;
+        Kind::Prior => option.with_parser(move |how: &mut Identification<E>, _, text| {
+            *field(&mut how.estimator) = parse_prior(text)?;
             Ok(())
         }),
         _ => option,
@@ -40,7 +41,7 @@ pub(crate) fn with_prior_of_fits<E: 'static>(
 }
 
 /// Returns the options for the channel of the excitation and its period.
-pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
+pub(crate) fn excitation_options<E: 'static>() -> [AnalysisOption<E>; 2] {
     let help = "Column of the recorded disturbance or target for the fit at its lines; none: no fit at lines";
     let channel = Setting::new("excitation", Kind::Channel, help).default("the first of f_t, d, r ... with lines");
     let period = Setting::new("period", Kind::Number, "Period of the excitation")
@@ -49,7 +50,7 @@ pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
         .bounds(Bounds::PositiveFinite);
     [
         BatchOption::new(channel, |how: &mut Identification<E>, _, text| {
-            how.excitation = Excitation::of_text(Some(text));
+            how.excitation = Excitation::from_text(Some(text));
             Ok(())
         }),
         BatchOption::new(period, |how: &mut Identification<E>, option, text| {
@@ -60,7 +61,7 @@ pub(crate) fn excitation<E: 'static>() -> [AnalysisOption<E>; 2] {
 }
 
 /// Returns the option for the controlled element.
-pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
+pub(crate) fn controlled_element_option<E: 'static>() -> AnalysisOption<E> {
     let help = "Controlled element, such as 90/(s(s+6)) or 90/1,6,0 (NUM/DEN in descending powers of s): adds \
                 crossover frequency and margins";
     let setting = Setting::new("controlled_element", Kind::Element, help);
@@ -73,11 +74,11 @@ pub(crate) fn controlled_element<E: 'static>() -> AnalysisOption<E> {
 }
 
 /// Returns the option for the answers to which the verdict refers.
-pub(crate) fn answers<E: 'static>() -> AnalysisOption<E> {
+pub(crate) fn answers_option<E: 'static>() -> AnalysisOption<E> {
     let help = "Quantities in the verdict: response,crossover,phase_margin or parameters, such as tau_e";
     let setting = Setting::new("answers", Kind::Names, help).default("response and loop");
     BatchOption::new(setting, |how: &mut Identification<E>, option, text| {
-        how.answers = asked_for(&option.read::<Vec<String>>(text)?)?;
+        how.answers = requested_names(&option.read::<Vec<String>>(text)?)?;
         Ok(())
     })
 }

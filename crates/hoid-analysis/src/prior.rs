@@ -11,7 +11,7 @@ use crate::AnalysisError;
 ///
 /// # Errors
 /// [`AnalysisError::Option`]; [`AnalysisError::Io`] for a file that cannot be read.
-pub fn prior_of_text(text: &str) -> Result<OperatorPrior, AnalysisError> {
+pub fn parse_prior(text: &str) -> Result<OperatorPrior, AnalysisError> {
     let refuse = |reason: String| AnalysisError::Option { name: "prior", reason };
     let (found, source) = match text {
         json if json.trim_start().starts_with('{') => (parse_fit(json, "the fit"), "an earlier fit"),
@@ -28,7 +28,8 @@ pub fn prior_of_text(text: &str) -> Result<OperatorPrior, AnalysisError> {
         other => refuse(other.to_string()),
     })?;
     let parameters = found.parameters.iter();
-    let prior = OperatorPrior::of_parameters(parameters.map(|p| (p.name.as_str(), p.estimate, p.determined)), source)?;
+    let prior =
+        OperatorPrior::from_parameters(parameters.map(|p| (p.name.as_str(), p.estimate, p.determined)), source)?;
     if prior.entries().is_empty() {
         return Err(refuse(format!(
             "{source}: no parameter is determined and has a standard error"

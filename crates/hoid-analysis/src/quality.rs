@@ -15,7 +15,7 @@ use hoid_io::{QualityIssueKind, Step};
 use hoid_model::{Finding, Record};
 use hoid_numerics::statistics::standard_deviation;
 
-use crate::recordings::{Account, RESTING};
+use crate::recordings::{Account, RESTING_STICK};
 
 /// Limits above which a result is doubtful, because clipping or rounding lost information: the fraction of samples at
 /// the limits of the stick, and the quantisation steps of e and u relative to their standard deviations.
@@ -43,7 +43,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         .map(|issue| issue.share)
         .sum();
     if at_ends > MAX_SATURATED_SHARE {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "stick-at-its-end",
             format!(
                 "{output} is saturated in {:.0} % of the samples: gain and margins are biased",
@@ -53,7 +53,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
     }
     if let Some(rest) = Rest::of(record.output()).filter(|_| of == Of::Person) {
         all.push(Finding::note(
-            RESTING,
+            RESTING_STICK,
             format!(
                 "{output} rests at {} for {:.0} % of the samples, on {} occasions, as if the stick had a dead zone or \
                  were moved in pulses; the operator describes only the linear part of the response",
@@ -74,7 +74,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         let deviation = standard_deviation(values);
         let coarse = issues(QualityIssueKind::Quantised).find(|issue| issue.channel == channel);
         if let Some(issue) = coarse.filter(|issue| issue.size > least * deviation) {
-            all.push(Finding::doubt(
+            all.push(Finding::warning(
                 "coarse",
                 format!(
                     "{channel} is quantised in steps of {:.2} standard deviations: intervals and bands are too narrow",
@@ -95,7 +95,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
     };
     let longest = account.steps.iter().map(seconds).fold(0.0, f64::max);
     if longest > MAX_BRIDGED_S {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "bridged",
             format!(
                 "gaps of up to {longest:.2} s are bridged by straight lines, which are analysed as if recorded; \
@@ -114,7 +114,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
             continue;
         };
         if *longest_s > MAX_BRIDGED_S {
-            all.push(Finding::doubt(
+            all.push(Finding::warning(
                 "held",
                 format!(
                     "{channel} is held for up to {longest_s:.2} s: changes during this time were not recorded; \

@@ -18,7 +18,7 @@ impl Recordings {
             return Ok(self);
         }
         let decimation = if counts_samples {
-            decimation.when_named()
+            decimation.explicit_only()
         } else {
             decimation
         };
@@ -47,15 +47,15 @@ impl Recordings {
     }
 
     /// Returns a message if a high rate is kept because orders are numbers of samples.
-    pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
+    pub fn kept_rate_message(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
         let settled = self.has_fixed_rate();
         let record = self.records.first().filter(|_| !settled)?;
-        kept_rate(record.sample_time(), decimation, counts_samples)
+        kept_rate_message(record.sample_time(), decimation, counts_samples)
     }
 }
 
 /// Returns a message if a high rate is kept because orders are numbers of samples.
-pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples: bool) -> Option<String> {
+pub fn kept_rate_message(sample_time: SampleTime, decimation: Decimation, counts_samples: bool) -> Option<String> {
     let factor = decimation.factor(sample_time);
     let kept = counts_samples && decimation == Decimation::Auto && factor > 1;
     let hz = (1e4 / sample_time.s()).round() / 1e4;

@@ -1,13 +1,13 @@
 //! Recordings before and during identification, with an account of their processing.
 
 use hoid_ident::diagnostics::recorded_element;
-use hoid_io::{QualityIssue, Step, quality_of_record};
+use hoid_io::{QualityIssue, Step, issues_of_channels};
 use hoid_model::{Channel, ContinuousTransferFunction, Fault, Finding, Record, Verdict, uncertainty::Estimate};
 
 use crate::reading::Source;
 
 /// Kind of the note that the stick was at rest.
-pub(crate) const RESTING: &str = "resting-stick";
+pub(crate) const RESTING_STICK: &str = "resting-stick";
 
 /// Processing of a record, and the problems found in its file.
 #[derive(Debug, Clone, Default)]
@@ -42,11 +42,11 @@ pub struct Recordings {
 impl Recordings {
     /// Creates recordings from records that were not read from files by this crate. They are named by their labels, or
     /// by their numbers if a label is empty, and their channels are checked for problems.
-    pub fn of_records(records: impl IntoIterator<Item = Record>) -> Self {
+    pub fn from_records(records: impl IntoIterator<Item = Record>) -> Self {
         let mut all = Self::default();
         for record in records {
             let account = Account {
-                quality_issues: quality_of_record(&record),
+                quality_issues: issues_of_channels(&record),
                 ..Account::default()
             };
             let name = match record.label() {
@@ -86,13 +86,13 @@ impl Recordings {
     /// since all recordings come from the same stick.
     pub fn findings(&self) -> Vec<Finding> {
         let several = self.names.len() > 1;
-        let own = |account: &Account| account.findings.iter().filter(|f| f.kind == RESTING).count();
+        let own = |account: &Account| account.findings.iter().filter(|f| f.kind == RESTING_STICK).count();
         let resting: usize = self.accounts.iter().map(own).sum();
         let mut is_noted = false;
         let mut all = Vec::new();
         for (name, account) in self.names.iter().zip(&self.accounts) {
             for finding in &account.findings {
-                let of_stick = finding.kind == RESTING && resting > 1;
+                let of_stick = finding.kind == RESTING_STICK && resting > 1;
                 if of_stick && std::mem::replace(&mut is_noted, true) {
                     continue;
                 }
@@ -138,7 +138,7 @@ impl Recordings {
         } else {
             "the display showed"
         };
-        Some(Finding::doubt(
+        Some(Finding::warning(
             "displayed",
             format!(
                 "{received} {name} ({role}), but the model lacks this input: the response to the error, the crossover \
@@ -150,7 +150,7 @@ impl Recordings {
 
     /// Adds the findings of the recordings to a verdict. They precede other findings, because faults of a recording may
     /// explain a wrong result.
-    pub fn judged(&self, verdict: Verdict) -> Verdict {
+    pub fn with_findings(&self, verdict: Verdict) -> Verdict {
         let more = self.findings();
         if more.is_empty() {
             verdict

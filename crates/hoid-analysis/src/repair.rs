@@ -1,6 +1,6 @@
 //! Detection and repair of faults of recordings, before all other processing.
 
-use hoid_ident::faults::{SLOWEST_S, repair};
+use hoid_ident::faults::{MAX_SAMPLE_TIME_S, repair};
 use hoid_model::{FaultHandling, Finding, ModelError, Record};
 
 use crate::{
@@ -12,7 +12,7 @@ use crate::{
 
 /// Length in s below which a segment between two faults is not used if there is a longer one, since a few seconds do
 /// not determine an operator.
-const SHORTEST_PIECE_S: f64 = 4.0;
+const MIN_SEGMENT_S: f64 = 4.0;
 /// Maximum number of levels of a step input.
 const MAX_LEVELS: usize = 16;
 
@@ -30,14 +30,14 @@ impl Recordings {
         };
         let one = self.names.into_iter().zip(self.records).zip(self.accounts);
         for (((name, record), account), origin) in one.zip(self.origins) {
-            let steps = of == Of::System && steps_from_level_to_level(&record);
+            let steps = of == Of::System && is_multilevel_input(&record);
             let handling = match handling {
                 // Settling after a step is not a sensor fault, so it is reported and the recording is not cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
             let mut found = repair(&record, handling)?;
-            if steps || (of == Of::System && record.sample_time().s() > SLOWEST_S) {
+            if steps || (of == Of::System && record.sample_time().s() > MAX_SAMPLE_TIME_S) {
                 // Faults found in data with step inputs, or in data of slow systems such as a furnace, are typical and
                 // become notes.
                 let note = |finding: Finding| Finding::note(finding.kind, finding.message);
@@ -48,7 +48,7 @@ impl Recordings {
             findings.extend(findings_of_quality(&account, &record, of));
             let ts_s = record.sample_time().s();
             let longest = found.segments.iter().map(Record::len).max().unwrap_or(0);
-            let is_short = |piece: &Record| piece.len() < longest && (piece.len() as f64) * ts_s < SHORTEST_PIECE_S;
+            let is_short = |piece: &Record| piece.len() < longest && (piece.len() as f64) * ts_s < MIN_SEGMENT_S;
             if of == Of::Person && found.segments.iter().any(is_short) {
                 let left: f64 = found
                     .segments
@@ -59,9 +59,7 @@ impl Recordings {
                 found.segments.retain(|piece| !is_short(piece));
                 findings.push(Finding::note(
                     "short-piece",
-                    format!(
-                        "pieces between faults shorter than {SHORTEST_PIECE_S} s were left out: {left:.1} s in total"
-                    ),
+                    format!("pieces between faults shorter than {MIN_SEGMENT_S} s were left out: {left:.1} s in total"),
                 ));
             }
             let mut account = Account {
@@ -86,7 +84,7 @@ impl Recordings {
 }
 
 /// True if the input takes only a few levels, as in a step test or a binary sequence.
-pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
+pub(crate) fn is_multilevel_input(record: &Record) -> bool {
     let mut levels: Vec<f64> = Vec::new();
     for value in record.input() {
         if !levels.contains(value) {
@@ -100,10 +98,7 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
 }
 
 /// Repairs the same recordings, read with other options, in the same manner.
-pub(crate) fn repaired_in_the_same_way(
-    records: Vec<Record>,
-    handling: FaultHandling,
-) -> Result<Vec<Record>, ModelError> {
+pub(crate) fn repair_records(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
     let mut all = Vec::with_capacity(records.len());
     for record in records {
         all.extend(repair(&record, handling)?.segments);

@@ -61,7 +61,7 @@ macro_rules! each {
 
 impl ResolvedRequest {
     /// Returns the estimator with this name in the registry, with default options; `None` if there is none.
-    pub fn of_estimator(name: &str, structure: Structure) -> Option<Self> {
+    pub fn from_estimator(name: &str, structure: Structure) -> Option<Self> {
         let polynomials = |structure: Structure, method: Option<IvMethod>| {
             Self::Polynomials(Identification::of(Polynomials {
                 method,
@@ -130,7 +130,7 @@ impl Request {
         let own = own.map(|spec| spec.settings.as_slice()).unwrap_or_default();
         for name in self.options.keys() {
             if !own.iter().any(|setting| setting.name == name) {
-                return Err(misplaced(name, &all));
+                return Err(misplaced_option_error(name, &all));
             }
         }
         // Options are set in the order of the registry, in which an option that affects others precedes them.
@@ -179,7 +179,7 @@ impl Request {
             None | Some(PEM) => None,
             Some(name) => {
                 let known = IvMethod::ALL.into_iter().find(|method| method.name() == name);
-                Some(known.ok_or_else(|| options(unknown_method(name)))?)
+                Some(known.ok_or_else(|| options(unknown_method_message(name)))?)
             }
         };
         let estimator = if let Some(method) = method {
@@ -196,8 +196,8 @@ impl Request {
         } else {
             self.operator(typed.as_deref(), notes)?
         };
-        ResolvedRequest::of_estimator(estimator, polynomial.unwrap_or(Structure::BoxJenkins))
-            .ok_or_else(|| options(unknown_method(estimator)))
+        ResolvedRequest::from_estimator(estimator, polynomial.unwrap_or(Structure::BoxJenkins))
+            .ok_or_else(|| options(unknown_method_message(estimator)))
     }
 
     /// True if an option in the request selects a polynomial model.
@@ -262,7 +262,7 @@ impl Request {
 
 /// Creates the error for an option of other estimators, with the names of these estimators and the option to use
 /// instead.
-fn misplaced(name: &str, all: &[MethodSpec]) -> AnalysisError {
+fn misplaced_option_error(name: &str, all: &[MethodSpec]) -> AnalysisError {
     let has = |spec: &&MethodSpec| spec.settings.iter().any(|setting| setting.name == name);
     let of: Vec<&'static str> = all.iter().filter(has).map(|spec| spec.name).collect();
     let setting = all
@@ -289,7 +289,7 @@ fn misplaced(name: &str, all: &[MethodSpec]) -> AnalysisError {
     }
 }
 
-fn unknown_method(found: &str) -> String {
+fn unknown_method_message(found: &str) -> String {
     let known = IvMethod::ALL.map(IvMethod::name).join(", ");
     format!("method is {found}, expected one of {PEM}, {known}")
 }

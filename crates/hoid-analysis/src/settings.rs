@@ -29,12 +29,12 @@ impl Setting {
 
     /// Sets the flag that the user gave the value.
     #[must_use]
-    pub fn given(self, given: bool) -> Self {
+    pub fn with_given(self, given: bool) -> Self {
         Self { given, ..self }
     }
 
     /// Marks as given the settings whose values differ from the defaults.
-    pub fn against(all: Vec<Self>, by_default: &[Self]) -> Vec<Self> {
+    pub fn mark_non_defaults(all: Vec<Self>, by_default: &[Self]) -> Vec<Self> {
         let is_default = |one: &Self| {
             by_default
                 .iter()
@@ -43,7 +43,7 @@ impl Setting {
         all.into_iter()
             .map(|one| {
                 let given = one.given || !is_default(&one);
-                one.given(given)
+                one.with_given(given)
             })
             .collect()
     }
@@ -52,7 +52,7 @@ impl Setting {
 impl Reading {
     /// Returns the options with which records are read, including defaults.
     pub fn settings(&self, decimation: Decimation) -> Vec<Setting> {
-        Setting::against(self.rows(decimation), &Self::default().rows(Decimation::default()))
+        Setting::mark_non_defaults(self.rows(decimation), &Self::default().rows(Decimation::default()))
     }
 
     fn rows(&self, decimation: Decimation) -> Vec<Setting> {
@@ -100,7 +100,7 @@ impl Reading {
     }
 
     /// Returns the setting for masked rows, if any are masked.
-    pub(crate) fn masked(&self) -> Option<Setting> {
+    pub(crate) fn masked_rows_setting(&self) -> Option<Setting> {
         let kinds: Vec<&str> = self.mask.iter().map(|kind: &QualityIssueKind| kind.name()).collect();
         (!kinds.is_empty()).then(|| {
             Setting::new(

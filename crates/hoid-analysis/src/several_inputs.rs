@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Frequencies at which responses are given, as fractions of the Nyquist frequency.
-const RESPONSE_AT: [f64; 12] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.2, 0.35, 0.5, 0.9];
+const RESPONSE_FREQUENCIES: [f64; 12] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.035, 0.05, 0.1, 0.2, 0.35, 0.5, 0.9];
 /// Minimum distance from zero, in standard errors, at which a coefficient counts as determined.
 const MIN_STANDARD_ERRORS: f64 = 2.0;
 
@@ -138,7 +138,7 @@ pub fn several_inputs(
 /// # Errors
 /// [`AnalysisError::Options`] if the text is not a role, names something other than a further input, or gives a preview
 /// or a form, which polynomials do not have.
-pub fn roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, AnalysisError> {
+pub fn parse_roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, AnalysisError> {
     let options = |reason: String| AnalysisError::Options { reason };
     let mut all = vec![ChannelRole::default(); further.len()];
     for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
@@ -182,7 +182,7 @@ impl SeveralInputsResult {
         let fit = model.fit(&data.records)?;
         let mut findings = Vec::new();
         if !fit.termination.converged() {
-            findings.push(Finding::doubt(
+            findings.push(Finding::warning(
                 "not-converged",
                 format!("the search did not converge: {}", fit.termination),
             ));
@@ -202,7 +202,7 @@ impl SeveralInputsResult {
                     .is_some_and(|s| e.value.abs() < MIN_STANDARD_ERRORS * s)
             };
             if gains.clone().count() > 0 && gains.clone().all(|(_, e)| open(&e)) {
-                findings.push(Finding::doubt(
+                findings.push(Finding::warning(
                     "undetermined-input",
                     format!("no coefficient of {name} differs from zero by two standard errors: the response to {name} is not determined"),
                 ));
@@ -210,7 +210,7 @@ impl SeveralInputsResult {
         }
         let inputs: Vec<&str> = model.inputs.iter().map(|(name, _)| name.as_str()).collect();
         findings.extend(data.display_finding(&inputs));
-        let verdict = data.judged(Verdict::of(findings));
+        let verdict = data.with_findings(Verdict::of(findings));
         Ok(Self {
             fit,
             roles,
@@ -254,7 +254,7 @@ impl SeveralInputsResult {
             json!({"vaf_prediction": number(fit.vaf_prediction), "aic": number(fit.aic())}),
         );
         let nyquist = fit.sample_time.nyquist_rad_s();
-        let omega: Vec<f64> = RESPONSE_AT.iter().map(|share| share * nyquist).collect();
+        let omega: Vec<f64> = RESPONSE_FREQUENCIES.iter().map(|share| share * nyquist).collect();
         let channel = |(k, (name, _)): (usize, &(String, InputOrders))| {
             let own = format!("[{name}]");
             let own = parameters.iter().filter(|(p, _)| p.ends_with(&own));

@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 
 use hoid_analysis::{
     AnalysisError, BatchEstimator, Excitation, Identification, Polynomials, Reading, Recordings, late_samples,
-    prior_of_text, without_offsets,
+    parse_prior, without_offsets,
 };
 use hoid_ident::{GreyBox, SigmoidChange, family::FamilyEstimator};
 use hoid_io::{NewRate, Offset, write_record};
@@ -17,7 +17,7 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 
 /// A run as recorded, which contains only e and u.
-fn recorded(seed: u64, change: impl Fn(f64, f64) -> (f64, f64)) -> Record {
+fn recorded_run(seed: u64, change: impl Fn(f64, f64) -> (f64, f64)) -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let run = RunSeed {
         seed,
@@ -35,12 +35,12 @@ fn recorded(seed: u64, change: impl Fn(f64, f64) -> (f64, f64)) -> Record {
         .labelled(format!("run {seed}"))
 }
 
-fn clipped(seed: u64) -> Record {
-    recorded(seed, |e, u| (e, u.clamp(-0.086, 0.086)))
+fn clipped_run(seed: u64) -> Record {
+    recorded_run(seed, |e, u| (e, u.clamp(-0.086, 0.086)))
 }
 
 /// Only one form and few noise orders are tried, because their selection is not tested here.
-fn quick() -> Identification {
+fn quick_identification() -> Identification {
     Identification {
         estimator: FamilyEstimator {
             forms: vec![Form::Lead],
@@ -53,8 +53,8 @@ fn quick() -> Identification {
 
 #[test]
 fn saturation_is_reported_for_files_and_records() {
-    let clean = quick()
-        .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
+    let clean = quick_identification()
+        .run(Recordings::from_records([recorded_run(1, |e, u| (e, u))]))
         .unwrap();
     assert_eq!(
         clean.fit.verdict.level,
@@ -67,19 +67,21 @@ fn saturation_is_reported_for_files_and_records() {
         shown.starts_with("Verdict: trustworthy\n") && shown.contains("\ntau_e = 0.28"),
         "{shown}"
     );
-    let two = [clipped(1), clipped(2)];
-    let of_records = quick().run(Recordings::of_records(two.clone())).unwrap();
+    let two = [clipped_run(1), clipped_run(2)];
+    let of_records = quick_identification()
+        .run(Recordings::from_records(two.clone()))
+        .unwrap();
     assert_eq!(of_records.fit.verdict.level, VerdictLevel::Doubtful);
     let directory = tempfile::tempdir().unwrap();
     let paths = ["run 1", "run 2"].map(|name| directory.path().join(format!("{name}.csv")));
     for (path, record) in paths.iter().zip(&two) {
         write_record(path, record).unwrap();
     }
-    let of_files = quick()
-        .run(Reading::default().files(&paths, |_, _| ()).unwrap())
+    let of_files = quick_identification()
+        .run(Reading::default().read_files(&paths, |_, _| ()).unwrap())
         .unwrap();
     let place = format!("{}/", directory.path().display());
-    let words = |found: &hoid_analysis::Identified| -> Vec<String> {
+    let words = |found: &hoid_analysis::IdentifiedModel| -> Vec<String> {
         let all = found.fit.verdict.findings().iter();
         all.map(|f| f.message.replace(&place, "").replace(".csv", "")).collect()
     };
@@ -93,33 +95,39 @@ fn saturation_is_reported_for_files_and_records() {
 
 #[test]
 fn duplicate_and_unusable_runs_are_refused() {
-    let record = recorded(1, |e, u| (e, u));
+    let record = recorded_run(1, |e, u| (e, u));
     let copy = record.clone().labelled("again");
-    let refused = quick().run(Recordings::of_records([record.clone(), copy])).unwrap_err();
+    let refused = quick_identification()
+        .run(Recordings::from_records([record.clone(), copy]))
+        .unwrap_err();
     assert!(matches!(refused, AnalysisError::SameSamples { .. }));
     let words = refused.to_string();
     assert!(words.starts_with("run 1 and again hold the same samples"), "{words}");
-    let nothing = quick().run(Recordings::default()).unwrap_err();
+    let nothing = quick_identification().run(Recordings::default()).unwrap_err();
     assert!(matches!(nothing, AnalysisError::NoRecordings));
     // If the stick does not move, the estimator reports this.
-    let resting = quick().run(Recordings::of_records([recorded(1, |e, _| (e, 0.0))]));
+    let resting = quick_identification().run(Recordings::from_records([recorded_run(1, |e, _| (e, 0.0))]));
     assert!(matches!(resting.unwrap_err(), AnalysisError::Ident(_)));
     let short = record.span(0.0, 0.5).unwrap();
     assert!(matches!(
-        quick().run(Recordings::of_records([short])).unwrap_err(),
+        quick_identification()
+            .run(Recordings::from_records([short]))
+            .unwrap_err(),
         AnalysisError::Ident(_)
     ));
 }
 
 #[test]
 fn unstable_loop_is_reported_if_the_element_is_known() {
-    let reversed = || Recordings::of_records([recorded(1, |e, u| (-e, u))]);
+    let reversed = || Recordings::from_records([recorded_run(1, |e, u| (-e, u))]);
     let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
     let with = Identification {
         controlled_element: Some(element.clone()),
-        ..quick()
+        ..quick_identification()
     };
-    let right = with.run(Recordings::of_records([recorded(1, |e, u| (e, u))])).unwrap();
+    let right = with
+        .run(Recordings::from_records([recorded_run(1, |e, u| (e, u))]))
+        .unwrap();
     assert_eq!(
         right.fit.verdict.level,
         VerdictLevel::Trustworthy,
@@ -138,9 +146,11 @@ fn unstable_loop_is_reported_if_the_element_is_known() {
 
 #[test]
 fn settings_list_the_values_used() {
-    let mut how = quick();
+    let mut how = quick_identification();
     how.estimator.search.tolerance = 1e-7;
-    let found = how.run(Recordings::of_records([recorded(1, |e, u| (e, u))])).unwrap();
+    let found = how
+        .run(Recordings::from_records([recorded_run(1, |e, u| (e, u))]))
+        .unwrap();
     let value = |name: &str| found.settings.iter().find(|s| s.name == name).map(|s| s.value.as_str());
     assert_eq!(value("search"), Some("auto, relative tolerance 1e-7"));
     assert_eq!(value("initial state"), Some("estimate"));
@@ -152,17 +162,17 @@ fn settings_list_the_values_used() {
 #[test]
 fn faults_are_repaired_or_kept() {
     let with_outlier = || {
-        let record = recorded(1, |e, u| (e, u));
+        let record = recorded_run(1, |e, u| (e, u));
         let mut u = record.output().to_vec();
         u[3000] = 5.0;
         let e = Channel::new("e", "", record.input().to_vec());
-        Recordings::of_records([Record::new(record.sample_time(), e, Channel::new("u", "", u)).unwrap()])
+        Recordings::from_records([Record::new(record.sample_time(), e, Channel::new("u", "", u)).unwrap()])
     };
-    let repaired = quick().run(with_outlier()).unwrap();
+    let repaired = quick_identification().run(with_outlier()).unwrap();
     assert_eq!(repaired.data.accounts[0].faults.len(), 1);
     let kept = Identification {
         faults: FaultHandling::Keep,
-        ..quick()
+        ..quick_identification()
     };
     let kept = kept.run(with_outlier()).unwrap();
     assert!(kept.data.accounts[0].faults.is_empty());
@@ -174,18 +184,18 @@ fn high_rates_are_reduced_unless_samples_are_counted() {
     let ts = SampleTime::new(0.002).unwrap();
     let wave = |phase: f64| (0..4000).map(|k| (0.01 * f64::from(k) - phase).sin()).collect();
     let record = Record::new(ts, Channel::new("e", "", wave(0.0)), Channel::new("u", "", wave(0.3))).unwrap();
-    let all = || Recordings::of_records([record.clone()]);
+    let all = || Recordings::from_records([record.clone()]);
     let lower = all().at_rate(Decimation::Auto, false).unwrap();
     assert!((lower.records[0].sample_time().s() - 0.01).abs() < 1e-12);
     assert_eq!(lower.accounts[0].steps.len(), 1);
     let kept = all().at_rate(Decimation::Auto, true).unwrap();
     assert_eq!(kept.records[0].len(), 4000);
-    let words = all().kept_rate(Decimation::Auto, true).unwrap();
+    let words = all().kept_rate_message(Decimation::Auto, true).unwrap();
     assert!(
         words.starts_with("500 Hz is kept") && words.contains("--decimate 5"),
         "{words}"
     );
-    assert_eq!(all().kept_rate(Decimation::By(5), true), None);
+    assert_eq!(all().kept_rate_message(Decimation::By(5), true), None);
     assert_eq!(all().at_rate(Decimation::By(5), true).unwrap().records[0].len(), 800);
 }
 
@@ -193,17 +203,17 @@ fn high_rates_are_reduced_unless_samples_are_counted() {
 fn rate_given_in_hz_is_not_reduced_again() {
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("run.csv");
-    write_record(&path, &recorded(1, |e, u| (e, u))).unwrap();
+    write_record(&path, &recorded_run(1, |e, u| (e, u))).unwrap();
     let mut reading = Reading::default();
     reading.preparation.rate = NewRate::Hz(400.0);
-    let read = reading.file(&path, |_, _| ()).unwrap();
+    let read = reading.read_file(&path, |_, _| ()).unwrap();
     let used = read.at_rate(Decimation::Auto, false).unwrap();
     assert!((used.records[0].sample_time().s() - 0.0025).abs() < 1e-9);
 }
 
 #[test]
 fn offsets_are_converted_to_lag_samples() {
-    let record = recorded(1, |e, u| (e, u));
+    let record = recorded_run(1, |e, u| (e, u));
     let of = |name: &str, offset| BTreeMap::from([(name.to_owned(), offset)]);
     assert_eq!(late_samples(&record, &of("u", Offset::Samples(2.0))).unwrap(), 2.0);
     assert_eq!(late_samples(&record, &of("e", Offset::Seconds(0.01))).unwrap(), -1.0);
@@ -221,45 +231,48 @@ fn offsets_are_converted_to_lag_samples() {
 }
 
 #[test]
-fn a_named_excitation_must_be_recorded() {
+fn unrecorded_excitation_is_refused() {
     let with = |excitation| {
-        let of = Identification { excitation, ..quick() };
-        of.run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
+        let of = Identification {
+            excitation,
+            ..quick_identification()
+        };
+        of.run(Recordings::from_records([recorded_run(1, |e, u| (e, u))]))
     };
-    let error = with(Excitation::of_text(Some("f_t"))).unwrap_err().to_string();
+    let error = with(Excitation::from_text(Some("f_t"))).unwrap_err().to_string();
     assert!(error.contains("found f_t; expected one of e, u"), "{error}");
     // The excitation of a group is named for all recordings, of which some may lack it.
     let found = with(Excitation::IfRecorded("f_t".to_owned())).unwrap();
     assert!(found.fit.no_lines.is_some_and(|why| why.contains("f_t")));
-    let looked_for = quick()
-        .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
+    let looked_for = quick_identification()
+        .run(Recordings::from_records([recorded_run(1, |e, u| (e, u))]))
         .unwrap();
     assert_eq!(looked_for.fit.no_lines, None);
-    assert_eq!(Excitation::of_text(Some("none")), Excitation::Nothing);
+    assert_eq!(Excitation::from_text(Some("none")), Excitation::Nothing);
 }
 
 #[test]
 fn prior_is_read_by_name_or_from_a_file() {
-    assert!(prior_of_text("none").unwrap().entries().is_empty());
+    assert!(parse_prior("none").unwrap().entries().is_empty());
     for (text, expected) in [
         ("omega_nm", "prior: found omega_nm; expected population, none, "),
         ("nowhere.json", "nowhere.json"),
     ] {
-        let words = prior_of_text(text).unwrap_err().to_string();
+        let words = parse_prior(text).unwrap_err().to_string();
         assert!(words.contains(expected), "{words}");
     }
     let directory = tempfile::tempdir().unwrap();
     let path = directory.path().join("fit.json");
     fs::write(&path, "{\"parameters\": []}").unwrap();
-    assert!(prior_of_text(Path::new(&path).to_str().unwrap()).is_err());
+    assert!(parse_prior(Path::new(&path).to_str().unwrap()).is_err());
 }
 
 #[test]
 fn operator_is_validated_on_another_run() {
-    let found = quick()
-        .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
+    let found = quick_identification()
+        .run(Recordings::from_records([recorded_run(1, |e, u| (e, u))]))
         .unwrap();
-    let other = Recordings::of_records([recorded(2, |e, u| (e, u))]);
+    let other = Recordings::from_records([recorded_run(2, |e, u| (e, u))]);
     let model = &found.fit.operator(0).polynomial_fit;
     let judged = found.validated(model, other).unwrap();
     assert_eq!(judged.name, "run 2");
@@ -273,7 +286,7 @@ fn operator_is_validated_on_another_run() {
 
 #[test]
 fn given_orders_replace_those_of_the_operator() {
-    let ts = SampleTime::HUNDREDTH;
+    let ts = SampleTime::AT_100_HZ;
     let default = Polynomials::new(Structure::BoxJenkins).ranges(ts).unwrap();
     assert_eq!((default.nk, default.nd, default.nb), (6..=61, 1..=4, 2..=2));
     let some = Polynomials {
@@ -295,12 +308,12 @@ fn given_orders_replace_those_of_the_operator() {
 fn every_estimator_reports_saturated_recordings() {
     fn assert_doubtful<E: BatchEstimator>(estimator: E, record: &Record) {
         let found = Identification::of(estimator)
-            .run(Recordings::of_records([record.clone()]))
+            .run(Recordings::from_records([record.clone()]))
             .unwrap();
         let first = found.verdict.reasons().next().unwrap_or_default().to_owned();
         assert!(first.contains("is saturated in"), "{first}");
     }
-    let record = clipped(1);
+    let record = clipped_run(1);
     let polynomials = Polynomials {
         orders: [("nd".to_owned(), 1..=1), ("nk".to_owned(), 29..=29)].into(),
         ..Polynomials::new(Structure::BoxJenkins)
@@ -313,7 +326,7 @@ fn every_estimator_reports_saturated_recordings() {
         start: Some([("b0".to_owned(), 0.04)].into()),
         ..polynomials
     };
-    let refused = Identification::of(searched).run(Recordings::of_records([record]));
+    let refused = Identification::of(searched).run(Recordings::from_records([record]));
     assert!(
         refused
             .unwrap_err()
@@ -351,7 +364,7 @@ fn rules_for_people_do_not_apply_to_polynomials() {
     for (name, order) in [("nb", 2), ("nf", 2), ("nd", 1), ("nc", 0), ("nk", 1)] {
         bj.orders.insert(name.to_owned(), order..=order);
     }
-    let found = Identification::of(bj).run(Recordings::of_records([record])).unwrap();
+    let found = Identification::of(bj).run(Recordings::from_records([record])).unwrap();
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
     for (name, truth) in [("f1", -1.5), ("f2", 0.7), ("b0", 1.0), ("b1", 0.5)] {
         let (_, of) = found.fit.fit.parameters().into_iter().find(|(n, _)| n == name).unwrap();
@@ -377,7 +390,7 @@ fn verdict_refers_to_the_requested_answers() {
             controlled_element: Some(ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap()),
             ..Identification::default()
         };
-        how.run(Recordings::of_records([record.clone()])).unwrap()
+        how.run(Recordings::from_records([record.clone()])).unwrap()
     };
     let nothing = identified(&unrelated, &[]);
     assert_eq!(nothing.verdict.level, VerdictLevel::NotDetermined);

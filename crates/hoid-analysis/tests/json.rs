@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used)]
 
 use hoid_analysis::{
-    BatchEstimator, Identification, Identified, Polynomials, Recordings,
-    json::{BatchAnswer, BatchResult},
+    BatchEstimator, Identification, IdentifiedModel, Polynomials, Recordings,
+    json::{BatchResult, JsonFit},
 };
 use hoid_ident::{GreyBox, SigmoidChange, family::FamilyEstimator};
 use hoid_model::{
@@ -23,13 +23,13 @@ fn run(seed: u64) -> Record {
 }
 
 /// Returns the result and the result restored from its JSON, after checking that they are equal.
-fn back<E: BatchEstimator>(with: Identification<E>) -> (Identified<E::Fit>, Identified<E::Fit>)
+fn json_round_trip<E: BatchEstimator>(with: Identification<E>) -> (IdentifiedModel<E::Fit>, IdentifiedModel<E::Fit>)
 where
-    E::Fit: BatchAnswer,
+    E::Fit: JsonFit,
 {
-    let found = with.run(Recordings::of_records([run(1)])).unwrap();
+    let found = with.run(Recordings::from_records([run(1)])).unwrap();
     let text = found.to_json().unwrap();
-    let again = Identified::<E::Fit>::from_json(&text).unwrap();
+    let again = IdentifiedModel::<E::Fit>::from_json(&text).unwrap();
     assert!(again == found);
     assert_eq!(again.to_json().unwrap(), text);
     assert_eq!(again.verdict, found.verdict);
@@ -37,13 +37,13 @@ where
     assert!(again.data.records.is_empty());
     // The printed text contains only JSON numbers, so a program that writes the JSON again does not change the state.
     let value: Value = serde_json::from_str(&text).unwrap();
-    assert!(Identified::<E::Fit>::from_json(&value.to_string()).unwrap() == found);
-    let other = Identified::<E::Fit>::from_json(&text.replacen("\"state\": \"", "\"state\": \"0", 1));
+    assert!(IdentifiedModel::<E::Fit>::from_json(&value.to_string()).unwrap() == found);
+    let other = IdentifiedModel::<E::Fit>::from_json(&text.replacen("\"state\": \"", "\"state\": \"0", 1));
     assert!(other.is_err());
     (found, again)
 }
 
-fn quick() -> FamilyEstimator {
+fn quick_estimator() -> FamilyEstimator {
     FamilyEstimator {
         forms: vec![Form::Lead, Form::Gain],
         nd: Some(0..=4),
@@ -54,17 +54,17 @@ fn quick() -> FamilyEstimator {
 #[test]
 fn json_round_trip_keeps_predictions() {
     let other = run(2);
-    let (one, two) = back(Identification::of(quick()));
+    let (one, two) = json_round_trip(Identification::of(quick_estimator()));
     let models = [&one, &two].map(|found| &found.fit.operator(0).polynomial_fit);
     assert_eq!(models[0].predict(&other).unwrap(), models[1].predict(&other).unwrap());
-    let (one, two) = back(Identification::of(GreyBox::new(1..=2)));
+    let (one, two) = json_round_trip(Identification::of(GreyBox::new(1..=2)));
     assert_eq!(
         one.fit.polynomial_fit(0).simulate(&other).unwrap(),
         two.fit.polynomial_fit(0).simulate(&other).unwrap()
     );
-    let (one, two) = back(Identification::of(SigmoidChange::default()));
+    let (one, two) = json_round_trip(Identification::of(SigmoidChange::default()));
     assert_eq!(one.fit.residuals(&other).unwrap(), two.fit.residuals(&other).unwrap());
-    let (one, two) = back(Identification::of(Polynomials {
+    let (one, two) = json_round_trip(Identification::of(Polynomials {
         orders: [("nd".to_owned(), 1..=2), ("nk".to_owned(), 28..=30)].into(),
         ..Polynomials::new(Structure::BoxJenkins)
     }));
@@ -74,12 +74,12 @@ fn json_round_trip_keeps_predictions() {
 
 #[test]
 fn result_kind_is_detected_and_checked() {
-    let found = Identification::of(quick())
-        .run(Recordings::of_records([run(1)]))
+    let found = Identification::of(quick_estimator())
+        .run(Recordings::from_records([run(1)]))
         .unwrap();
     let text = found.to_json().unwrap();
     assert!(matches!(BatchResult::from_json(&text), Ok(BatchResult::Operator(again)) if again == found));
-    let words = Identified::<hoid_ident::SigmoidFit>::from_json(&text)
+    let words = IdentifiedModel::<hoid_ident::SigmoidFit>::from_json(&text)
         .unwrap_err()
         .to_string();
     assert!(words.contains("operator change=sigmoid"), "{words}");
@@ -99,9 +99,9 @@ fn result_kind_is_detected_and_checked() {
 fn non_default_settings_are_marked_as_given() {
     let with = Identification {
         controlled_element: Some("1/s".parse().unwrap()),
-        ..Identification::of(quick())
+        ..Identification::of(quick_estimator())
     };
-    let found = with.run(Recordings::of_records([run(1)])).unwrap();
+    let found = with.run(Recordings::from_records([run(1)])).unwrap();
     let given = |name: &str| {
         let one = found.settings.iter().find(|one| one.name == name);
         one.unwrap().given

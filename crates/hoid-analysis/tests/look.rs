@@ -3,12 +3,12 @@
 
 use std::{f64::consts::TAU, fs, path::PathBuf};
 
-use hoid_analysis::{AnalysisError, Look, LookOptions, Reading};
+use hoid_analysis::{AnalysisError, FileExamination, LookOptions, Reading};
 use tempfile::TempDir;
 
 /// A record of 25 s with a target of period 10 s from 2 s to 22 s, and the output y = u/s of a control that is recorded
 /// one sample late.
-fn written(header: &str, columns: impl Fn(f64, f64, f64, f64) -> String) -> (TempDir, PathBuf) {
+fn write_record(header: &str, columns: impl Fn(f64, f64, f64, f64) -> String) -> (TempDir, PathBuf) {
     let (ts, n) = (0.02, 1250);
     let sum = |t: f64, phase: f64| {
         let of = |h: f64| (TAU * h * t / 10.0 + phase * h).sin();
@@ -32,18 +32,18 @@ fn written(header: &str, columns: impl Fn(f64, f64, f64, f64) -> String) -> (Tem
     (directory, path)
 }
 
-fn plain(t: f64, r: f64, y: f64, u: f64) -> String {
+fn record_row(t: f64, r: f64, y: f64, u: f64) -> String {
     format!("{t},{r},{y},{u}")
 }
 
 #[test]
 fn columns_periods_and_lag_are_found() {
-    let (_directory, path) = written("Time (s),Target,y,Stick [V]", plain);
+    let (_directory, path) = write_record("Time (s),Target,y,Stick [V]", record_row);
     let known = LookOptions {
         controlled_element: Some(("1/s".to_owned(), "1/s".parse().unwrap())),
         ..LookOptions::default()
     };
-    let look = Look::at(&path, &known).unwrap();
+    let look = FileExamination::at(&path, &known).unwrap();
     assert_eq!(look.units(), [("Stick [V]", "V")]);
     let seen = look.seen.as_ref().unwrap();
     assert_eq!(seen.periods.as_ref().unwrap().span_s, (2.0, 22.0));
@@ -62,7 +62,7 @@ fn columns_periods_and_lag_are_found() {
         offset_samples: Some(0.0),
         ..known
     };
-    let look = Look::at(&path, &known).unwrap();
+    let look = FileExamination::at(&path, &known).unwrap();
     let advice = look.advice().unwrap();
     assert_eq!(
         (advice.from_s, advice.to_s, advice.late_samples),
@@ -73,26 +73,31 @@ fn columns_periods_and_lag_are_found() {
 
 #[test]
 fn unreadable_record_still_gives_column_advice() {
-    let (_directory, path) = written("t,r,y,u", |t, r, y, u| {
+    let (_directory, path) = write_record("t,r,y,u", |t, r, y, u| {
         if (7.0..7.1).contains(&t) {
             format!("{t},{r},,{u}")
         } else {
-            plain(t, r, y, u)
+            record_row(t, r, y, u)
         }
     });
-    let look = Look::at(&path, &LookOptions::default()).unwrap();
+    let look = FileExamination::at(&path, &LookOptions::default()).unwrap();
     assert!(look.seen.as_ref().unwrap_err().to_string().contains("--fill"));
     assert_eq!(look.advice().unwrap().arguments(), ["--input", "r-y", "--output", "u"]);
     fs::write(&path, "a,b\n1,2\n").unwrap();
-    assert!(Look::at(&path, &LookOptions::default()).unwrap().advice().is_none());
+    assert!(
+        FileExamination::at(&path, &LookOptions::default())
+            .unwrap()
+            .advice()
+            .is_none()
+    );
     fs::write(&path, "").unwrap();
-    assert!(Look::at(&path, &LookOptions::default()).is_err());
+    assert!(FileExamination::at(&path, &LookOptions::default()).is_err());
 }
 
 #[test]
 fn error_suggests_other_columns() {
-    let (_directory, path) = written("t,r,y,u", plain);
-    let refused = |reading: &Reading| reading.file(&path, |_, _| ()).unwrap_err();
+    let (_directory, path) = write_record("t,r,y,u", record_row);
+    let refused = |reading: &Reading| reading.read_file(&path, |_, _| ()).unwrap_err();
     let default = Reading::default();
     let AnalysisError::OtherColumns(others) = refused(&default) else {
         panic!("no other columns");

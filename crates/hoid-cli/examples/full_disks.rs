@@ -18,7 +18,7 @@ mod interrupted;
 use std::process::ExitCode;
 
 use draw::Draw;
-use full_disks::rounds;
+use full_disks::run_rounds;
 use interrupted::{Bench, GROUP, STUDY, TRACK, built_program_path};
 
 fn main() -> ExitCode {
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     }
     for work in works {
-        let Some(outcome) = rounds(&bench, &work, count, &mut draw) else {
+        let Some(outcome) = run_rounds(&bench, &work, count, &mut draw) else {
             println!("skipped: no disk of its own can be mounted here");
             return ExitCode::SUCCESS;
         };

@@ -21,7 +21,7 @@ use std::{
 };
 
 use draw::Draw;
-use interrupted::{Bench, GROUP, REPRODUCE, STUDY, built_program_path, compare, files};
+use interrupted::{Bench, GROUP, REPRODUCE, STUDY, built_program_path, compare, read_files};
 
 /// Number of kills of one run before it may finish.
 const MAX_CONSECUTIVE_KILLS: usize = 5;
@@ -49,11 +49,11 @@ fn main() -> ExitCode {
             continue;
         }
         let start_time = Instant::now();
-        bench.whole(work, "whole");
+        bench.run_to_end(work, "whole");
         // The duration of a run depends on the load of the machine: after a kill that was too late, the following kills
         // are earlier.
         let mut took = start_time.elapsed();
-        let expected = files(&bench.place(work, "whole"));
+        let expected = read_files(&bench.output_path(work, "whole"));
         // The remainder of the division by three is assigned to the first works.
         let share = |all: usize, of: usize| all / of + usize::from(k < all % of);
         let (mut killed, mut runs) = (0, 0);
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
             let name = format!("killed-{runs}");
             for _ in 0..MAX_CONSECUTIVE_KILLS.min(share(kills, 3) - killed) {
                 let child = bench.start(work, &name);
-                let hit = kill(child, took.mul_f64(draw.share()));
+                let hit = kill(child, took.mul_f64(draw.uniform()));
                 killed += usize::from(hit);
                 if !hit {
                     took = took.mul_f64(0.8);
@@ -70,14 +70,14 @@ fn main() -> ExitCode {
                 }
             }
             let start_time = Instant::now();
-            bench.whole(work, &name);
+            bench.run_to_end(work, &name);
             took = took.max(start_time.elapsed());
             failures.extend(compare(
                 &expected,
-                &bench.place(work, &name),
+                &bench.output_path(work, &name),
                 &format!("{} {name}", work.name),
             ));
-            fs::remove_dir_all(bench.place(work, &name)).unwrap();
+            fs::remove_dir_all(bench.output_path(work, &name)).unwrap();
         }
         let mut hit = 0;
         let mut tries = 0;
@@ -85,17 +85,17 @@ fn main() -> ExitCode {
             tries += 1;
             let name = format!("damaged-{tries}");
             let child = bench.start(work, &name);
-            if !kill(child, took.mul_f64(0.1 + 0.8 * draw.share())) {
+            if !kill(child, took.mul_f64(0.1 + 0.8 * draw.uniform())) {
                 took = took.mul_f64(0.8);
             }
-            let what = damage(&bench.place(work, &name).join("parts"), &mut draw);
+            let what = damage(&bench.output_path(work, &name).join("parts"), &mut draw);
             hit += usize::from(what.is_some());
             let start_time = Instant::now();
-            bench.whole(work, &name);
+            bench.run_to_end(work, &name);
             took = took.max(start_time.elapsed());
             let description = format!("{} {name} ({})", work.name, what.unwrap_or("no block yet"));
-            failures.extend(compare(&expected, &bench.place(work, &name), &description));
-            fs::remove_dir_all(bench.place(work, &name)).unwrap();
+            failures.extend(compare(&expected, &bench.output_path(work, &name), &description));
+            fs::remove_dir_all(bench.output_path(work, &name)).unwrap();
         }
         println!(
             "{}: {killed} kills over {runs} runs, {hit} blocks damaged in {tries}; {} files compared each, {} failures so far",
@@ -127,20 +127,20 @@ fn damage(parts: &Path, draw: &mut Draw) -> Option<&'static str> {
     if all.is_empty() {
         return None;
     }
-    let path = &all[draw.below(all.len())];
+    let path = &all[draw.integer_below(all.len())];
     let mut bytes = fs::read(path).unwrap();
-    let what = match draw.below(5) {
+    let what = match draw.integer_below(5) {
         0 if !bytes.is_empty() => {
-            let at = draw.below(bytes.len());
-            bytes[at] ^= 1 << draw.below(8);
+            let at = draw.integer_below(bytes.len());
+            bytes[at] ^= 1 << draw.integer_below(8);
             "a bit"
         }
         1 => {
-            bytes.truncate(draw.below(bytes.len()));
+            bytes.truncate(draw.integer_below(bytes.len()));
             "cut"
         }
         2 => {
-            bytes = fs::read(&all[draw.below(all.len())]).unwrap();
+            bytes = fs::read(&all[draw.integer_below(all.len())]).unwrap();
             "another file in its place"
         }
         3 => {

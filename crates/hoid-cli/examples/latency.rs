@@ -18,14 +18,14 @@ use std::{
 
 use live::{
     Draw,
-    paced::{Tally, over_pipes, over_udp},
+    paced::{Tally, measure_pipes, measure_udp},
     troubles,
 };
 
 const RATES_HZ: [usize; 2] = [100, 1000];
 /// Duration of a pause of a reader.
-const PAUSE: Duration = Duration::from_secs(2);
-const HOSTILE: usize = 20_000;
+const READER_PAUSE: Duration = Duration::from_secs(2);
+const HOSTILE_COUNT: usize = 20_000;
 
 fn main() -> ExitCode {
     let (mut seconds, mut seed, mut program, mut python) = (600, 1, built_program_path(), None);
@@ -46,13 +46,13 @@ fn main() -> ExitCode {
     let mut lost = 0;
     for rate_hz in RATES_HZ {
         let n = seconds * rate_hz;
-        let udp = over_udp(&program, rate_hz, n, &mut draw);
-        let pipe = over_pipes(&program, rate_hz, n, &mut draw, Duration::ZERO);
+        let udp = measure_udp(&program, rate_hz, n, &mut draw);
+        let pipe = measure_pipes(&program, rate_hz, n, &mut draw, Duration::ZERO);
         for (way, tally) in [("UDP, structs", &udp), ("pipes, lines", &pipe)] {
             println!("{}", row(way, rate_hz, tally));
-            lost += tally.lost() + tally.summary.skipped + tally.summary.dropped;
+            lost += tally.lost_count() + tally.summary.skipped + tally.summary.dropped;
         }
-        match over_lsl(python.clone().unwrap_or_else(interpreter), rate_hz, seconds) {
+        match measure_lsl(python.clone().unwrap_or_else(interpreter), rate_hz, seconds) {
             Ok((row, missing)) => {
                 println!("{row}");
                 lost += missing;
@@ -61,7 +61,7 @@ fn main() -> ExitCode {
         }
     }
     println!("\n| what | sent | answered | bridged | dropped |\n|---|---:|---:|---:|---:|");
-    for found in troubles::all(&program, PAUSE, HOSTILE, &mut draw) {
+    for found in troubles::run_all_cases(&program, READER_PAUSE, HOSTILE_COUNT, &mut draw) {
         let summary = found.summary;
         println!(
             "| {} | {} | {} | {} | {} |",
@@ -77,7 +77,7 @@ fn main() -> ExitCode {
 }
 
 fn row(way: &str, rate_hz: usize, tally: &Tally) -> String {
-    let times = [0.5, 0.99, 0.999, 1.0].map(|share| shown(tally.within(share)));
+    let times = [0.5, 0.99, 0.999, 1.0].map(|share| format_ms(tally.latency_quantile(share)));
     format!(
         "| {way} | {rate_hz} Hz | {} | {} | {} |",
         tally.sent,
@@ -86,12 +86,12 @@ fn row(way: &str, rate_hz: usize, tally: &Tally) -> String {
     )
 }
 
-fn shown(time: Duration) -> String {
+fn format_ms(time: Duration) -> String {
     format!("{:.2} ms", 1e3 * time.as_secs_f64())
 }
 
 /// Returns the table row for LabStreamingLayer and the number of lost samples, or the reason why there is no row.
-fn over_lsl(python: PathBuf, rate_hz: usize, seconds: usize) -> Result<(String, usize), String> {
+fn measure_lsl(python: PathBuf, rate_hz: usize, seconds: usize) -> Result<(String, usize), String> {
     let output = Command::new(python)
         .args(["-m", "places.pace", &rate_hz.to_string(), &seconds.to_string()])
         .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../python/tests"))
@@ -106,19 +106,19 @@ fn over_lsl(python: PathBuf, rate_hz: usize, seconds: usize) -> Result<(String, 
 }
 
 /// Returns the folder of the build profile of this example.
-fn profile() -> PathBuf {
+fn profile_folder() -> PathBuf {
     let path = std::env::current_exe().unwrap();
     path.ancestors().nth(2).unwrap().to_owned()
 }
 
 /// Returns the path of the program built with this example.
 fn built_program_path() -> PathBuf {
-    profile().join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
+    profile_folder().join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
 }
 
 /// Returns the interpreter installed by `cargo xtask places` or by the tests.
 fn interpreter() -> PathBuf {
-    let of = |environment: &str| profile().join("../python").join(environment).join("bin/python");
+    let of = |environment: &str| profile_folder().join("../python").join(environment).join("bin/python");
     let found = ["venv-shipped", "venv"].map(of).into_iter().find(|path| path.exists());
     found.unwrap_or_else(|| PathBuf::from("python3"))
 }

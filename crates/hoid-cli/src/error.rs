@@ -74,7 +74,7 @@ impl From<AnalysisError> for CliError {
             AnalysisError::OtherColumns(others) => {
                 let typed = std::env::args_os().skip(1);
                 let command = others.command(typed.map(|word| word.to_string_lossy().into_owned()));
-                Self::OtherColumns(format!("{}: {command}", others.found()))
+                Self::OtherColumns(format!("{}: {command}", others.description()))
             }
             AnalysisError::InAnotherFile { .. } => Self::OtherColumns(error.to_string()),
             AnalysisError::SameSamples { .. }
@@ -82,17 +82,21 @@ impl From<AnalysisError> for CliError {
             | AnalysisError::Options { .. }
             | AnalysisError::NotAResult { .. }
             | AnalysisError::NoRecordings => Self::Usage(error.to_string()),
-            AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", typed(name))),
+            AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", option_text(name))),
             AnalysisError::Misplaced { name, of, instead } => {
                 let instead = instead.replace("delay", "--delay");
-                Self::Usage(format!("{} applies only to {}{instead}", typed(name), as_text(&of)))
+                Self::Usage(format!(
+                    "{} applies only to {}{instead}",
+                    option_text(name),
+                    as_text(&of)
+                ))
             }
         }
     }
 }
 
 /// Returns an option as the user types it.
-fn typed(name: &str) -> String {
+fn option_text(name: &str) -> String {
     match estimator_setting(name) {
         Some(setting) => format!("--{}", flag(setting.name)),
         None => name.to_owned(),
@@ -112,13 +116,13 @@ impl From<hoid_lab::LabError> for CliError {
 
 impl CliError {
     /// Converts an error in the options that was found before any file was read.
-    pub fn of_options(error: AnalysisError) -> Self {
+    pub fn from_options(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Ident(IdentError::BadOption {
                 option,
                 found,
                 expected,
-            }) => Self::Usage(format!("{}: found {found}; expected {expected}", typed(&option))),
+            }) => Self::Usage(format!("{}: found {found}; expected {expected}", option_text(&option))),
             other => other.into(),
         }
     }
@@ -127,7 +131,7 @@ impl CliError {
     ///
     /// # Errors
     /// [`CliError::NotDetermined`] if the data do not determine the requested quantity.
-    pub fn of_verdict(verdict: &Verdict) -> Result<(), Self> {
+    pub fn check_verdict(verdict: &Verdict) -> Result<(), Self> {
         match verdict.level {
             VerdictLevel::NotDetermined => {
                 let reasons: Vec<&str> = verdict.reasons().collect();
@@ -153,7 +157,7 @@ impl CliError {
                 | StudyError::Pattern { .. }
                 | StudyError::NoManifest { .. },
             ) => 2,
-            Self::Design(error) if error.is_of_request() => 2,
+            Self::Design(error) if error.is_request_error() => 2,
             Self::Stopped(_) => u8::try_from(interrupt::exit_code()).unwrap_or(1),
             _ => 1,
         }

@@ -6,10 +6,10 @@ use hoid::model::{GainUnit, NotConvertible};
 use crate::text;
 
 /// A conversion to an operator of the family, or the reason why it is not possible.
-pub type Converted = Result<FamilyConversion, NotConvertible>;
+pub type ConversionResult = Result<FamilyConversion, NotConvertible>;
 
 /// Formats a conversion as a table and sentences.
-pub fn to_text(found: &Converted, gain: &GainUnit) -> String {
+pub fn to_text(found: &ConversionResult, gain: &GainUnit) -> String {
     let found = match found {
         Ok(found) => found,
         Err(reason) => return format!("The model does not convert to an operator: {reason}.\n"),

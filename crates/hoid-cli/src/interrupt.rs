@@ -22,20 +22,20 @@ pub fn catch() {
     // If interrupts cannot be caught, the command runs without this handling.
     let _ = listen(|signal| {
         LAST_SIGNAL.store(signal, Ordering::Relaxed);
-        match answer().as_mut() {
+        match handler().as_mut() {
             Some(answer) => answer(signal),
-            None => end(exit_code()),
+            None => exit(exit_code()),
         }
     });
 }
 
 /// Replaces the default handling of interrupts by a function, which is called on a separate thread.
 pub fn on_interrupt(new: impl FnMut(i32) + Send + 'static) {
-    *answer() = Some(Box::new(new));
+    *handler() = Some(Box::new(new));
 }
 
 /// Ends the program and removes files that are still being written.
-pub fn end(code: i32) -> ! {
+pub fn exit(code: i32) -> ! {
     hoid::io::remove_unfinished_files();
     std::process::exit(code)
 }
@@ -45,7 +45,7 @@ pub fn exit_code() -> i32 {
     128 + LAST_SIGNAL.load(Ordering::Relaxed)
 }
 
-fn answer() -> MutexGuard<'static, Option<Handler>> {
+fn handler() -> MutexGuard<'static, Option<Handler>> {
     HANDLER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

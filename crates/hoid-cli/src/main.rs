@@ -37,7 +37,7 @@ fn main() -> ExitCode {
     let cli = match parsed {
         Ok(cli) => cli,
         // Help and version texts are printed like results.
-        Err(error) if !error.use_stderr() => return exit(output::printed(error.print())),
+        Err(error) if !error.use_stderr() => return exit(output::check_written(error.print())),
         Err(wrong) => wrong.exit(),
     };
     let outcome = match cli.command {
@@ -69,7 +69,7 @@ fn exit(outcome: Result<(), CliError>) -> ExitCode {
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            output::message(&format!("error: {error}"));
+            output::print_message(&format!("error: {error}"));
             ExitCode::from(error.exit_code())
         }
     }

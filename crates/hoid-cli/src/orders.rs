@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hoid::ident::{
     NamedOrders,
     order_selection::check_order,
-    settings::{DelayRange, Value, named_pairs},
+    settings::{DelayRange, Value, parse_named_pairs},
 };
 
 use crate::error::CliError;
@@ -33,7 +33,7 @@ pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<Nam
 
 /// Parses `name=number,name=number`; each name may occur only once.
 pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
-    named_pairs(text)
+    parse_named_pairs(text)
         .map_err(|expected| format!("expected {expected}"))?
         .into_iter()
         .map(|(name, value)| match value.parse::<f64>() {
@@ -44,7 +44,7 @@ pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
 }
 
 /// Parses start values such as `f1=..,b0=..`; each coefficient may occur only once.
-pub fn start(text: &str) -> Result<BTreeMap<String, f64>, CliError> {
+pub fn parse_start(text: &str) -> Result<BTreeMap<String, f64>, CliError> {
     let numbers = parse_numbers(text).map_err(|reason| CliError::Usage(format!("--start: {reason}")))?;
     Ok(numbers.into_iter().collect())
 }
@@ -67,9 +67,9 @@ mod tests {
 
     #[test]
     fn start_names_each_coefficient_once() {
-        assert_eq!(start("f1=-1.9,b0=.04").unwrap()["f1"], -1.9);
+        assert_eq!(parse_start("f1=-1.9,b0=.04").unwrap()["f1"], -1.9);
         for bad in ["f1=1,f1=2", "f1=abc", "f1"] {
-            assert!(start(bad).is_err(), "{bad}");
+            assert!(parse_start(bad).is_err(), "{bad}");
         }
     }
 }

@@ -23,7 +23,7 @@ use crate::error::CliError;
 /// # Errors
 /// [`CliError::Output`] for an error reported by the operating system, except for a pipe closed by its reader.
 pub fn print(text: &str) -> Result<(), CliError> {
-    printed(io::stdout().lock().write_all(text.as_bytes()))
+    check_written(io::stdout().lock().write_all(text.as_bytes()))
 }
 
 /// Writes a page of text to standard output, with sentences wrapped at the width of the screen.
@@ -58,9 +58,9 @@ fn coloured(page: &str) -> String {
 }
 
 /// Minimum and maximum width of a page: narrower lines would split words, wider lines are hard to read.
-const WIDTHS: (usize, usize) = (60, 110);
+const WIDTH_RANGE: (usize, usize) = (60, 110);
 
-/// Returns the width for wrapping in columns, limited to [`WIDTHS`]: the value of `COLUMNS`, otherwise the width of the
+/// Returns the width for wrapping in columns, limited to [`WIDTH_RANGE`]: the value of `COLUMNS`, otherwise the width of the
 /// terminal. Returns `None` if neither is known, as for output to a file; lines are then not wrapped.
 pub fn width() -> Option<usize> {
     let columns = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
@@ -68,7 +68,9 @@ pub fn width() -> Option<usize> {
         let terminal = io::stdout().is_terminal().then(terminal_size::terminal_size)?;
         terminal.map(|(columns, _)| usize::from(columns.0))
     };
-    columns.or_else(asked).map(|columns| columns.clamp(WIDTHS.0, WIDTHS.1))
+    columns
+        .or_else(asked)
+        .map(|columns| columns.clamp(WIDTH_RANGE.0, WIDTH_RANGE.1))
 }
 
 /// Wraps the sentences of a page; tables keep their width. The continuation lines of a list item are indented.
@@ -105,15 +107,15 @@ fn wrapped(page: &str, width: usize) -> String {
 static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
 
 /// Prefix of a warning.
-const WARNING: &str = "warning: ";
+const WARNING_PREFIX: &str = "warning: ";
 
-/// Stores a warning until the result is printed, as [`notice`] does for a remark.
-pub fn warning(of: &str, words: &str) {
-    notice(of, format!("{WARNING}{words}"));
+/// Stores a warning until the result is printed, as [`add_notice`] does for a remark.
+pub fn add_warning(of: &str, words: &str) {
+    add_notice(of, format!("{WARNING_PREFIX}{words}"));
 }
 
 /// Stores a remark until the result is printed. A remark that concerns several files is printed once.
-pub fn notice(of: &str, words: String) {
+pub fn add_notice(of: &str, words: String) {
     let mut all = NOTICES.lock().unwrap_or_else(PoisonError::into_inner);
     match all.iter_mut().find(|(known, _)| *known == words) {
         Some((_, files)) if files.iter().any(|file| file == of) => {}
@@ -127,14 +129,14 @@ pub fn print_notices() {
     let all = std::mem::take(&mut *NOTICES.lock().unwrap_or_else(PoisonError::into_inner));
     for (words, files) in all {
         let (kind, words) = words
-            .strip_prefix(WARNING)
-            .map_or(("", words.as_str()), |words| (WARNING, words));
+            .strip_prefix(WARNING_PREFIX)
+            .map_or(("", words.as_str()), |words| (WARNING_PREFIX, words));
         let of = match files.as_slice() {
             [first, others @ ..] if !others.is_empty() => format!("{first} and {} more: ", others.len()),
             [only] if !only.is_empty() => format!("{only}: "),
             _ => String::new(),
         };
-        message(&format!("{kind}{of}{words}"));
+        print_message(&format!("{kind}{of}{words}"));
     }
 }
 
@@ -143,7 +145,7 @@ pub fn print_notices() {
 ///
 /// # Errors
 /// As [`print`].
-pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
+pub fn check_written(written: io::Result<()>) -> Result<(), CliError> {
     match written.and_then(|()| io::stdout().flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => {
             OUTPUT_CLOSED.store(true, Ordering::Relaxed);
@@ -157,19 +159,19 @@ pub fn printed(written: io::Result<()>) -> Result<(), CliError> {
 static OUTPUT_CLOSED: AtomicBool = AtomicBool::new(false);
 
 /// True if the reader of standard output has closed the pipe.
-pub fn pipe_closed() -> bool {
+pub fn is_pipe_closed() -> bool {
     OUTPUT_CLOSED.load(Ordering::Relaxed)
 }
 
 /// Writes a warning, a note or an error to standard error.
-pub fn message(text: &str) {
+pub fn print_message(text: &str) {
     // If standard error is closed too, the message is lost.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
 /// Returns a progress bar on standard error with rate and remaining time; it is hidden if standard error is not a
 /// terminal.
-pub fn progress(total: usize, what: &str) -> ProgressBar {
+pub fn progress_bar(total: usize, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
     // With an invalid template, the plain bar is used.
     if let Ok(style) =
@@ -182,14 +184,14 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
 
 /// Runs a long computation and shows the elapsed time on standard error. Once the computation reports progress, a bar
 /// and the remaining time are also shown. Nothing is shown if standard error is not a terminal.
-pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
+pub fn run_with_spinner<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new_spinner().with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {
         bar.set_style(style);
     }
     bar.enable_steady_tick(Duration::from_millis(200));
     let bar_handle = bar.clone();
-    let done = progress::watched(
+    let done = progress::with_watcher(
         move |step| {
             if bar_handle.length() != Some(step.total as u64)
                 && let Ok(style) = ProgressStyle::with_template(&format!(

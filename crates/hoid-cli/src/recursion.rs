@@ -16,7 +16,7 @@ use crate::{
 };
 
 /// Name of the option whose value may be a file.
-const PRIOR: &str = "prior";
+const PRIOR_OPTION: &str = "prior";
 
 /// Returns the requested recursion.
 ///
@@ -33,9 +33,9 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
             )));
         }
     };
-    let delay = DelayRange::given(nk, args.delay);
+    let delay = DelayRange::from_options(nk, args.delay);
     let orders = orders::named_orders(args.orders.as_deref(), delay.as_ref())?;
-    of_orders(args, orders, delay)
+    request_from_orders(args, orders, delay)
 }
 
 /// Returns the requested recursion of a model with two inputs.
@@ -54,23 +54,27 @@ fn two_input_request(args: &TrackArgs) -> Result<TrackRequest, CliError> {
     }
     let nk = typed.nk.iter().map(samples).collect::<Result<Vec<_>, _>>()?.join(",");
     let (orders, further) = two_inputs(
-        &method(typed)?,
+        &method_with_settings(typed)?,
         typed.structure,
         typed.orders.as_deref().unwrap_or_default(),
         Some(nk.as_str()).filter(|nk| !nk.is_empty()),
         &args.read.inputs,
         args.role.as_deref().unwrap_or_default(),
     )
-    .map_err(CliError::of_options)?;
+    .map_err(CliError::from_options)?;
     Ok(TrackRequest {
         further: Some(further),
-        ..of_orders(typed, orders, None)?
+        ..request_from_orders(typed, orders, None)?
     })
 }
 
-fn of_orders(args: &RecursionArgs, orders: NamedOrders, delay: Option<DelayRange>) -> Result<TrackRequest, CliError> {
+fn request_from_orders(
+    args: &RecursionArgs,
+    orders: NamedOrders,
+    delay: Option<DelayRange>,
+) -> Result<TrackRequest, CliError> {
     Ok(TrackRequest {
-        method: method(args)?,
+        method: method_with_settings(args)?,
         structure: args.structure,
         orders,
         delay,
@@ -78,7 +82,7 @@ fn of_orders(args: &RecursionArgs, orders: NamedOrders, delay: Option<DelayRange
         start: match args.start.as_deref().map(str::trim) {
             None => RequestedStart::Default,
             Some("nothing") => RequestedStart::Nothing,
-            Some(text) => RequestedStart::Coefficients(orders::start(text)?),
+            Some(text) => RequestedStart::Coefficients(orders::parse_start(text)?),
         },
         criterion: args.criterion,
         largest: args.largest,
@@ -117,17 +121,17 @@ pub fn tracking(args: &TrackArgs) -> Result<Tracking, CliError> {
 /// # Errors
 /// The errors of the search.
 pub fn choose(plan: &TrackPlan, span: &Record) -> Result<(TrackOptions, Option<Choice>), IdentError> {
-    searching(plan, |each| plan.choose(span, each))
+    run_search(plan, |each| plan.choose(span, each))
 }
 
 /// Runs a computation that selects the open orders of a plan, with a progress display. `work` must call its argument
 /// after every candidate.
-pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T) -> T {
-    if plan.is_settled() {
+pub fn run_search<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T) -> T {
+    if plan.has_fixed_orders() {
         return work(&|| {});
     }
     let candidates = plan.ranges().combinations().map_or(0, |all| all.len());
-    let bar = output::progress(candidates, "candidates");
+    let bar = output::progress_bar(candidates, "candidates");
     let done = work(&|| bar.inc(1));
     bar.finish_and_clear();
     done
@@ -137,9 +141,9 @@ pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T
 ///
 /// # Errors
 /// [`CliError::Usage`] for an unknown name.
-pub fn method_of(name: &str) -> Result<Method, CliError> {
-    if let Some((_, renamed)) = survey::renamed(name) {
-        output::notice("", format!("note: {renamed}"));
+pub fn parse_method(name: &str) -> Result<Method, CliError> {
+    if let Some((_, renamed)) = survey::renamed_method(name) {
+        output::add_notice("", format!("note: {renamed}"));
     }
     Ok(survey::method(name)?)
 }
@@ -148,15 +152,15 @@ pub fn method_of(name: &str) -> Result<Method, CliError> {
 ///
 /// # Errors
 /// [`CliError::Usage`] if an option belongs to another method or a value is invalid.
-fn method(args: &RecursionArgs) -> Result<Method, CliError> {
+fn method_with_settings(args: &RecursionArgs) -> Result<Method, CliError> {
     let usage = |name: &str, text: &str| CliError::Usage(format!("--{} {text}", flag(name)));
-    let mut method = method_of(&args.method)?;
-    for (name, text) in args.settings.given() {
+    let mut method = parse_method(&args.method)?;
+    for (name, text) in args.settings.given_settings() {
         let of = methods_with(name, &survey::registry()).join(" or ");
         if !method.settings().list().iter().any(|setting| setting.name == name) {
             return Err(usage(name, &format!("applies only to --method {of}")));
         }
-        if name == PRIOR && is_fit_file(text) {
+        if name == PRIOR_OPTION && is_fit_file(text) {
             let fit = read_fit(Path::new(text))?.operator()?;
             method
                 .start_from(fit)
@@ -172,7 +176,7 @@ fn method(args: &RecursionArgs) -> Result<Method, CliError> {
 
 /// Returns the path given by `--prior`, if its value is a file.
 pub fn prior_file(args: &RecursionArgs) -> Option<&Path> {
-    let prior = args.settings.given().find(|(name, _)| *name == PRIOR);
+    let prior = args.settings.given_settings().find(|(name, _)| *name == PRIOR_OPTION);
     prior
         .map(|(_, text)| text)
         .filter(|text| is_fit_file(text))

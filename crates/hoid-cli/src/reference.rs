@@ -156,7 +156,7 @@ impl<'a> Keywords<'a> {
         }
     }
 
-    fn about(&self, setting: &Setting, of: &[&str]) -> String {
+    fn option_description(&self, setting: &Setting, of: &[&str]) -> String {
         let of = if of.len() < self.methods {
             let words = as_text(of)
                 .replace("--noise remnant", "noise=\"remnant\"")
@@ -169,7 +169,7 @@ impl<'a> Keywords<'a> {
     }
 
     /// Returns the Python class that contains the types of the keywords.
-    fn typed(&self, class: &str, doc: &str) -> String {
+    fn typed_dict(&self, class: &str, doc: &str) -> String {
         let mut text = format!("\n\nclass {class}(TypedDict, total=False):\n    \"\"\"{doc}\"\"\"\n");
         for (setting, of) in &self.settings {
             let kind = python_type(setting.kind);
@@ -185,13 +185,16 @@ impl<'a> Keywords<'a> {
                 ),
                 _ => line,
             };
-            text.push_str(&format!("\n{}\n{line}\n", wrapped(&self.about(setting, of), "    # ")));
+            text.push_str(&format!(
+                "\n{}\n{line}\n",
+                wrapped(&self.option_description(setting, of), "    # ")
+            ));
         }
         text
     }
 
     /// Returns the paragraphs of a docstring that describe the keywords.
-    fn listed(&self, name: &str, function: &str) -> String {
+    fn docstring(&self, name: &str, function: &str) -> String {
         let paragraphs: Vec<String> = self
             .settings
             .iter()
@@ -201,7 +204,10 @@ impl<'a> Keywords<'a> {
                     keyword(setting.name),
                     python_type(setting.kind).replace('"', "'")
                 );
-                format!("{head}\n{}", wrapped(&self.about(setting, of), "            "))
+                format!(
+                    "{head}\n{}",
+                    wrapped(&self.option_description(setting, of), "            ")
+                )
             })
             .collect();
         format!(
@@ -241,11 +247,11 @@ fn python_settings(methods: &[MethodSpec], batch: &[MethodSpec]) -> String {
          #: The methods, as the documentation of `track` lists them.\nMETHODS = \"\"\"{}.\"\"\"\n\n{}\n{}",
         one_a_line(&names),
         one_a_line(&structures),
-        recursive.typed("MethodSettings", "Options of the recursive methods."),
-        batch.typed("BatchSettings", "Options of the batch estimators."),
+        recursive.typed_dict("MethodSettings", "Options of the recursive methods."),
+        batch.typed_dict("BatchSettings", "Options of the batch estimators."),
         methods_text.join("\n").trim_start().trim_end_matches(';'),
-        recursive.listed("SETTINGS", "track"),
-        batch.listed("BATCH_SETTINGS", "identify"),
+        recursive.docstring("SETTINGS", "track"),
+        batch.docstring("BATCH_SETTINGS", "identify"),
     )
 }
 

@@ -11,7 +11,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle
 use crate::output;
 
 /// Three horizontal rules, as in print.
-const STYLE: TableStyle = {
+const TABLE_STYLE: TableStyle = {
     let rule = LineStyle::none().fill('─').junction('─');
     TableStyle::new()
         .top_border(rule)
@@ -23,7 +23,7 @@ const PADDING: usize = 2;
 /// Number of additional blanks between two columns.
 const COLUMN_GAP: usize = 1;
 /// A blank at which a line is not wrapped.
-const FIXED_BLANK: &str = "\u{a0}";
+const NO_BREAK_SPACE: &str = "\u{a0}";
 
 /// Rows under a header: the first column is left-aligned, the others are right-aligned.
 pub struct Rows {
@@ -34,7 +34,7 @@ pub struct Rows {
 }
 
 impl Rows {
-    pub fn under(header: &[&str]) -> Self {
+    pub fn with_header(header: &[&str]) -> Self {
         Self {
             header: header.iter().map(|&name| name.to_owned()).collect(),
             rows: Vec::new(),
@@ -56,7 +56,7 @@ impl Rows {
 
     /// Returns the table for a screen of the given width; the width is unlimited if it is `None`.
     fn for_width(&self, width: Option<usize>) -> String {
-        let whole = self.drawn(None);
+        let whole = self.draw(None);
         let Some(width) = width else { return whole };
         if whole.lines().all(|line| line.chars().count() <= width) {
             return whole;
@@ -64,7 +64,7 @@ impl Rows {
         let least = self.min_widths();
         let blanks = least.len() * PADDING + least.len().saturating_sub(1) * COLUMN_GAP;
         match least.iter().sum::<usize>() + blanks <= width {
-            true => self.drawn(Some((width, &least))),
+            true => self.draw(Some((width, &least))),
             false => self.transposed(width).unwrap_or_else(|| self.as_lists()),
         }
     }
@@ -88,17 +88,17 @@ impl Rows {
                 rows: (1..self.header.len()).map(line).collect(),
                 is_time_series: false,
             };
-            let drawn = turned.drawn(None);
+            let drawn = turned.draw(None);
             drawn.lines().all(|l| l.chars().count() <= width).then_some(drawn)
         })
     }
 
-    fn drawn(&self, on: Option<(usize, &[usize])>) -> String {
+    fn draw(&self, on: Option<(usize, &[usize])>) -> String {
         let mut table = Table::new();
-        table.load_style(STYLE);
+        table.load_style(TABLE_STYLE);
         table.set_header(&self.header);
         let cell = |text: &String| match on {
-            Some(_) => joined_with_error(text),
+            Some(_) => join_error(text),
             None => text.clone(),
         };
         for row in &self.rows {
@@ -120,12 +120,7 @@ impl Rows {
 
     /// Returns the length of the longest word in each column.
     fn min_widths(&self) -> Vec<usize> {
-        let longest = |text: &String| {
-            joined_with_error(text)
-                .split(' ')
-                .map(|word| word.chars().count())
-                .max()
-        };
+        let longest = |text: &String| join_error(text).split(' ').map(|word| word.chars().count()).max();
         let of = |k: usize| {
             let cells = self.rows.iter().filter_map(|row| row.get(k));
             cells.chain(self.header.get(k)).filter_map(longest).max().unwrap_or(0)
@@ -157,8 +152,8 @@ impl fmt::Display for Rows {
 }
 
 /// Joins a number and its error into one word, so that they are not separated.
-fn joined_with_error(text: &str) -> String {
-    text.replace(" ± ", &format!("{FIXED_BLANK}±{FIXED_BLANK}"))
+fn join_error(text: &str) -> String {
+    text.replace(" ± ", &format!("{NO_BREAK_SPACE}±{NO_BREAK_SPACE}"))
 }
 
 #[cfg(test)]
@@ -166,7 +161,7 @@ mod tests {
     use super::*;
 
     fn rows() -> Rows {
-        let mut rows = Rows::under(&["person", "phase margin (deg)", "remark"]);
+        let mut rows = Rows::with_header(&["person", "phase margin (deg)", "remark"]);
         rows.add_row(["anna", "13.5 ± 1.9", "at the end of its range"]);
         rows.add_row(["bert", "7 ± 19", ""]);
         rows
@@ -182,7 +177,7 @@ mod tests {
             "zeta_nm",
             "tau_e (s)",
         ];
-        let mut course = Rows::under(&[&["t in s"], names.as_slice()].concat()).into_time_series();
+        let mut course = Rows::with_header(&[&["t in s"], names.as_slice()].concat()).into_time_series();
         for t in 1..9 {
             let values = names.iter().map(|_| "0.0914 ± 0.0062".to_owned());
             course.add_row(std::iter::once(format!("{t}.00")).chain(values));

@@ -7,7 +7,7 @@ use hoid::ident::{
     order_selection::Criterion,
     validation::{GoodnessOfFit, Validation},
 };
-use hoid::model::numbers::counted;
+use hoid::model::numbers::count_with_noun;
 use hoid::model::{
     GainUnit, NotConvertible, Record, Verdict,
     margins::Crossings,
@@ -24,7 +24,7 @@ const FAULTS_SHOWN: usize = 10;
 
 /// Returns an empty table in the style common to all output.
 pub fn table(header: &[&str]) -> Rows {
-    Rows::under(header)
+    Rows::with_header(header)
 }
 
 /// Formats a value and its standard error with the digits that the error justifies.
@@ -38,13 +38,13 @@ pub fn verdict(verdict: &Verdict) -> String {
 }
 
 /// Hint at the end of a page that has further details.
-pub const MORE: &str = "More with -v: other candidates, tests, all settings; --report DIR writes a page.\n";
+pub const MORE_HINT: &str = "More with -v: other candidates, tests, all settings; --report DIR writes a page.\n";
 
 /// Hint at the end of the page of an operator whose gains change; there is no report about such an operator.
-pub const MORE_CHANGE: &str = "More with -v: search, residual tests, all settings; --trace FILE writes the gains.\n";
+pub const CHANGE_HINT: &str = "More with -v: search, residual tests, all settings; --trace FILE writes the gains.\n";
 
 /// Hint at the end of a page whose only further details are the settings.
-pub const MORE_SETTINGS: &str = "More with -v: all settings.\n";
+pub const SETTINGS_HINT: &str = "More with -v: all settings.\n";
 
 /// Maximum number of records that are listed by name.
 const RECORDS_SHOWN: usize = 4;
@@ -55,7 +55,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
         let mut lines = format!(
             "{file}: {} samples of {} s from t = {:.4} s\n",
             record.len(),
-            numbers::plain(record.sample_time().s()),
+            numbers::format_plain(record.sample_time().s()),
             record.time_s(0)
         );
         for step in &account.steps {
@@ -66,7 +66,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
         }
         if account.faults.len() > FAULTS_SHOWN {
             let more = account.faults.len() - FAULTS_SHOWN;
-            lines.push_str(&format!("  and {}\n", counted(more, "more fault")));
+            lines.push_str(&format!("  and {}\n", count_with_noun(more, "more fault")));
         }
         lines
     };
@@ -99,7 +99,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
 }
 
 /// Lists, for each record, the constant level of u that was estimated together with the fit, if there is one.
-pub fn levels(files: &[String], accounts: &[Account]) -> String {
+pub fn output_levels(files: &[String], accounts: &[Account]) -> String {
     let line = |(file, account): (&String, &Account)| {
         let level = account.level.as_ref()?;
         Some(format!(
@@ -134,7 +134,7 @@ pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
         match &candidate.outcome {
             Ok(f) => rows.add_row([
                 m,
-                numbers::plain(f.loss),
+                numbers::format_plain(f.loss),
                 format!("{:.1}", f.aic),
                 format!("{:.1}", f.bic),
                 if f.converged { "" } else { "not converged" }.to_owned(),
@@ -169,7 +169,7 @@ pub fn search(fit: &Fit) -> String {
     format!(
         "Search: {}, {}, start: {}.\n",
         t.reason,
-        counted(t.iterations, "step"),
+        count_with_noun(t.iterations, "step"),
         fit.start()
     )
 }
@@ -184,7 +184,7 @@ pub fn instability(fit: &Fit) -> &'static str {
 }
 
 /// Formats a p-value as a relation such as `p = 0.03`, so that it is never rounded to 0 or 1.
-pub fn p_value(p: f64) -> String {
+pub fn format_p_value(p: f64) -> String {
     match p {
         p if p > 0.99 => "p > 0.99".to_owned(),
         p if p < 0.01 => format!("p = {p:.0e}"),
@@ -213,9 +213,9 @@ pub fn quality(fit: &Fit, q: &GoodnessOfFit) -> String {
     };
     let mut text = format!(
         "Loss {} over {} residuals; innovation variance {} ({variance}).\n",
-        numbers::plain(fit.loss()),
+        numbers::format_plain(fit.loss()),
         fit.residual_count(),
-        numbers::plain(fit.innovation_variance()),
+        numbers::format_plain(fit.innovation_variance()),
     );
     text.push_str(&if fit.model().structure().has_input() {
         format!(
@@ -240,14 +240,16 @@ const NORMAL_95: f64 = 1.959_963_984_540_054;
 pub fn interval(e: &Estimate) -> (String, String) {
     let end = |sign: f64| {
         let error = e.standard_error.filter(|error| error.is_finite());
-        error.map_or_else(String::new, |error| significant(e.value + sign * NORMAL_95 * error))
+        error.map_or_else(String::new, |error| {
+            format_significant(e.value + sign * NORMAL_95 * error)
+        })
     };
     (end(-1.0), end(1.0))
 }
 
 /// Formats a value with three significant digits, which suffice for an interval.
-pub fn significant(value: f64) -> String {
-    hoid::model::numbers::significant(value, 3)
+pub fn format_significant(value: f64) -> String {
+    hoid::model::numbers::format_significant(value, 3)
 }
 
 /// Formats an estimate as `value ± standard error`.
@@ -356,19 +358,19 @@ pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     if let ([_, others @ ..], Some((omega, margin))) = (shape.crossovers.as_slice(), shape.smallest_margin())
         && !others.is_empty()
     {
-        let each = (others.iter()).map(|(w, m)| format!("{} rad/s ({:.0} deg)", significant(w.value), m.value));
+        let each = (others.iter()).map(|(w, m)| format!("{} rad/s ({:.0} deg)", format_significant(w.value), m.value));
         parts.push(format!("unit gain also at {}", each.collect::<Vec<_>>().join(", ")));
         parts.push(format!(
             "smallest phase margin {} deg, at {} rad/s",
             plus_minus(&margin),
-            significant(omega.value)
+            format_significant(omega.value)
         ));
     }
     if let Some((omega, db)) = &shape.gain_margin {
         parts.push(format!(
             "gain margin {} dB at {} rad/s",
             plus_minus(db),
-            significant(omega.value)
+            format_significant(omega.value)
         ));
     }
     if shape.is_stable() == Some(false) {
@@ -475,7 +477,7 @@ pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
 /// if there is no interval.
 pub fn delay(choice: &Choice) -> String {
     let ts = choice.fit.model().sample_time().s();
-    let seconds = |nk: usize| significant((nk as f64 - 1.0).max(0.0) * ts);
+    let seconds = |nk: usize| format_significant((nk as f64 - 1.0).max(0.0) * ts);
     choice.delay_interval().map_or_else(String::new, |(low, high)| {
         format!(
             "Delay, 95 % likelihood interval: nk = {low} to {high} (dead time {} to {} s).\n",
@@ -507,13 +509,13 @@ pub fn candidates(choice: &Choice) -> String {
     for (orders, f) in good.iter().take(CANDIDATES_SHOWN) {
         let mut row = vec![
             orders.to_string(),
-            numbers::plain(f.loss),
+            numbers::format_plain(f.loss),
             format!("{:.1}", f.aic),
             format!("{:.1}", f.bic),
             if f.converged { "" } else { "not converged" }.to_owned(),
         ];
         if decides {
-            row.insert(4, numbers::plain(f.value(choice.criterion)));
+            row.insert(4, numbers::format_plain(f.value(choice.criterion)));
         }
         rows.add_row(row);
     }
@@ -525,7 +527,7 @@ pub fn candidates(choice: &Choice) -> String {
     if failed > 0 {
         text.push_str(&format!(
             "{} could not be fitted; --json lists the reasons.\n",
-            counted(failed, "candidate")
+            count_with_noun(failed, "candidate")
         ));
     }
     text

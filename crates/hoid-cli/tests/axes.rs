@@ -5,7 +5,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{bad, good, json};
+use common::{failure_of, json, stdout_of};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -34,12 +34,12 @@ T_n_s = 0.1
 share = 0.15
 "#;
 /// Delay of the coupling, samples.
-const LAG: usize = 18;
+const DELAY_SAMPLES: usize = 18;
 
 /// Returns the columns of a simulated run.
-fn run(at: &Path, lines: &str, seed: &str) -> Vec<[f64; 4]> {
+fn simulated_columns(at: &Path, lines: &str, seed: &str) -> Vec<[f64; 4]> {
     fs::write(at.join("task.toml"), TASK.replace("\"even\"", lines)).unwrap();
-    good(
+    stdout_of(
         at,
         &[
             "simulate",
@@ -64,11 +64,14 @@ fn run(at: &Path, lines: &str, seed: &str) -> Vec<[f64; 4]> {
 }
 
 /// Writes two axes to a table; the control of x contains a part of the error of y.
-fn two_axes(at: &Path, lines_of_y: &str, coupling: f64) {
-    let (x, y) = (run(at, "\"even\"", "1"), run(at, lines_of_y, "2"));
+fn write_two_axes(at: &Path, lines_of_y: &str, coupling: f64) {
+    let (x, y) = (
+        simulated_columns(at, "\"even\"", "1"),
+        simulated_columns(at, lines_of_y, "2"),
+    );
     let mut text = "t,ex,ux,rx,ey,uy,ry\n".to_owned();
     for (k, (a, b)) in x.iter().zip(&y).enumerate() {
-        let other = k.checked_sub(LAG).map_or(0.0, |before| y[before][1]);
+        let other = k.checked_sub(DELAY_SAMPLES).map_or(0.0, |before| y[before][1]);
         let ux = a[2] + coupling * other;
         text.push_str(&format!("{},{},{ux},{},{},{},{}\n", a[0], a[1], a[3], b[1], b[2], b[3]));
     }
@@ -82,7 +85,7 @@ fn coupling(found: &Value, axis: usize) -> &Value {
 #[test]
 fn each_axis_has_an_operator_and_coupling_is_reported() {
     let at = TempDir::new().unwrap();
-    two_axes(at.path(), "\"odd\"", 0.4);
+    write_two_axes(at.path(), "\"odd\"", 0.4);
     let call = ["identify", "two.csv", "--pair", "ex,ux,rx", "--pair", "ey,uy,ry"];
     let found = json(at.path(), &[&call[..], &["--json"]].concat());
     assert_eq!(found["kind"], "axes");
@@ -104,7 +107,7 @@ fn each_axis_has_an_operator_and_coupling_is_reported() {
     assert_eq!(coupling(&found, 1)["responds"], false, "{}", coupling(&found, 1));
     let kinds = |axis: usize| found["axes"][axis]["result"]["verdict"]["findings"].to_string();
     assert!(kinds(0).contains("axis-coupling") && !kinds(1).contains("axis-coupling"));
-    let text = good(at.path(), &call);
+    let text = stdout_of(at.path(), &call);
     assert!(
         text.contains("Axis ex, ux") && text.contains("ey to ux") && text.contains("a response"),
         "{text}"
@@ -130,7 +133,7 @@ fn each_axis_has_an_operator_and_coupling_is_reported() {
 #[test]
 fn coupling_is_not_tested_if_lines_are_shared() {
     let at = TempDir::new().unwrap();
-    two_axes(at.path(), "\"even\"", 0.0);
+    write_two_axes(at.path(), "\"even\"", 0.0);
     let reason = |pairs: [&str; 2]| {
         let call = [
             "identify", "two.csv", "--form", "lead", "--pair", pairs[0], "--pair", pairs[1], "--json",
@@ -167,7 +170,7 @@ fn invalid_pairs_are_refused() {
             "applies only to the structure operator",
         ),
     ] {
-        let (code, message) = bad(at.path(), &[&["identify", "two.csv"], pairs].concat());
+        let (code, message) = failure_of(at.path(), &[&["identify", "two.csv"], pairs].concat());
         assert!(code == 2 && message.contains(wanted), "{pairs:?}: {code} {message}");
     }
 }

@@ -7,27 +7,31 @@ use std::fs;
 
 use tempfile::TempDir;
 
-use common::{bad, good};
+use common::{failure_of, stdout_of};
 
-const HUGE: &str = "18446744073709551615";
+const HUGE_NUMBER: &str = "18446744073709551615";
 
 #[test]
 fn exceeded_limits_are_refused_at_once() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    good(d, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
+    stdout_of(d, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
     let (delays, all) = (
-        format!("0..{HUGE}"),
+        format!("0..{HUGE_NUMBER}"),
         "na=0..64,nb=1..64,nc=0..64,nd=0..64,nf=0..64".to_owned(),
     );
     let identify = ["identify", "c1.csv", "--structure", "bj"];
     let track = ["track", "c1.csv", "--out", "t.csv"];
     for (command, options, expected) in [
         (&identify[..], vec!["--nk", &delays], "at most 1000000;"),
-        (&identify, vec!["--nk", HUGE], "at most 1000000;"),
+        (&identify, vec!["--nk", HUGE_NUMBER], "at most 1000000;"),
         (&identify, vec!["--nk", "0..1000000"], "at most 100000"),
         (&identify, vec!["--orders", "nd=0..65"], "at most 64;"),
-        (&identify, vec!["--nk", "29", "--horizon", HUGE], "from 1 to 1000000"),
+        (
+            &identify,
+            vec!["--nk", "29", "--horizon", HUGE_NUMBER],
+            "from 1 to 1000000",
+        ),
         (&identify, vec!["--nk", "29", "--horizon", "0"], "from 1 to 1000000"),
         (
             &[
@@ -45,12 +49,12 @@ fn exceeded_limits_are_refused_at_once() {
         (&track, vec!["--method", "rls", "--nk", &delays], "at most 1000000;"),
     ] {
         let arguments: Vec<&str> = command.iter().copied().chain(options).collect();
-        let (code, message) = bad(d, &arguments);
+        let (code, message) = failure_of(d, &arguments);
         assert_eq!(code, 2, "{arguments:?}: {message}");
         assert!(message.contains(expected), "{arguments:?}: {message}");
     }
     // A horizon beyond the record is limited to the record.
-    good(
+    stdout_of(
         d,
         &[
             "identify",
@@ -65,12 +69,16 @@ fn exceeded_limits_are_refused_at_once() {
             "1000",
         ],
     );
-    for options in [["--subjects", "100000000"], ["--runs", HUGE], ["--subjects", HUGE]] {
+    for options in [
+        ["--subjects", "100000000"],
+        ["--runs", HUGE_NUMBER],
+        ["--subjects", HUGE_NUMBER],
+    ] {
         for kind in [&["--conditions", "C1"][..], &["--people"]] {
             let mut arguments = vec!["simulate-group", "--out", "g"];
             arguments.extend(options);
             arguments.extend(kind);
-            let (_, message) = bad(d, &arguments);
+            let (_, message) = failure_of(d, &arguments);
             assert!(message.contains("at most 100000 runs"), "{message}");
         }
     }
@@ -98,7 +106,7 @@ fn out_of_range_scenarios_name_the_key_and_its_limits() {
             &["simulate", "--scenario", "s.toml", "--out", "s.csv"][..],
             &["margins", "--scenario", "s.toml"],
         ] {
-            let (code, message) = bad(d, command);
+            let (code, message) = failure_of(d, command);
             assert_eq!(code, 1, "{message}");
             assert!(
                 message.contains(expected) && message.contains(" to 1"),
@@ -119,7 +127,7 @@ fn table_with_a_million_columns_is_refused() {
     )
     .unwrap();
     for command in [&["info", "wide.csv"][..], &["identify", "wide.csv"]] {
-        let (code, message) = bad(d, command);
+        let (code, message) = failure_of(d, command);
         assert_eq!(code, 1, "{message}");
         assert!(
             message.contains("has 1000000 columns, expected at most 10000"),

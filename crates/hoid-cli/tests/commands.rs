@@ -8,7 +8,7 @@ use std::fs;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, json};
+use common::{failure_of, json, stdout_of};
 
 #[test]
 fn simulate_is_repeatable_and_takes_its_options() {
@@ -17,7 +17,7 @@ fn simulate_is_repeatable_and_takes_its_options() {
     let file = |name: &str, more: &[&str]| {
         let mut arguments = vec!["simulate", "--condition", "C4", "--out", name];
         arguments.extend(more);
-        good(d, &arguments);
+        stdout_of(d, &arguments);
         fs::read_to_string(d.join(name)).unwrap()
     };
     let base = file("a.csv", &["--seed", "5"]);
@@ -41,7 +41,7 @@ fn simulate_is_repeatable_and_takes_its_options() {
     assert_eq!(rows(&file("f.csv", &["--keep-run-in"])), 9192);
     assert_eq!(rows(&file("g.csv", &["--sample-time", "0.02"])), 4096);
     fs::write(d.join("s.toml"), "condition = \"C2\"\n[remnant]\nnoise_level = 0.2\n").unwrap();
-    good(d, &["simulate", "--scenario", "s.toml", "--out", "h.csv"]);
+    stdout_of(d, &["simulate", "--scenario", "s.toml", "--out", "h.csv"]);
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn convert_identifies_the_lag_among_three_poles() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     // The operator is 25 (.6 s + 1)/(5 s + 1) with omega_nm = 12 rad/s, zeta_nm = .25 and tau_e = .137 s.
-    let family = hoid::model::FamilyOperator::of_names(
+    let family = hoid::model::FamilyOperator::from_names(
         hoid::model::Form::LeadLag,
         &[
             ("K", 25.0),
@@ -115,7 +115,7 @@ fn convert_identifies_the_lag_among_three_poles() {
         .map(|(name, value)| (name.to_owned(), value)),
     )
     .unwrap();
-    let held = family.zoh(hoid::model::SampleTime::HUNDREDTH).unwrap();
+    let held = family.zoh(hoid::model::SampleTime::AT_100_HZ).unwrap();
     let list = |c: &[f64]| c.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
     let (f, b, nk) = (list(&held.f), list(&held.b), held.nk.to_string());
     let arguments = ["convert", "--f", &f, "--b", &b, "--nk", &nk, "--sample-time", "0.01"];
@@ -127,7 +127,7 @@ fn convert_identifies_the_lag_among_three_poles() {
         assert!(off.abs() < 1e-4 * value, "{name} {off}");
     }
     assert_eq!(operator["real_poles"][0]["role"], "lag");
-    let page = good(d, &arguments);
+    let page = stdout_of(d, &arguments);
     assert!(page.contains("is the lag, T_I = 5.0"), "{page}");
     assert!(page.contains("Form lead-lag"), "{page}");
     let none = json(d, &["convert", "--f", "-0.5,0.1,0,0.01", "--b", "1", "--json"]);
@@ -187,7 +187,7 @@ fn margins_match_the_reference_states() {
 #[test]
 fn demo_writes_its_record_and_report() {
     let directory = TempDir::new().unwrap();
-    let text = good(directory.path(), &["demo", "--out", "here"]);
+    let text = stdout_of(directory.path(), &["demo", "--out", "here"]);
     assert!(
         text.contains("before the change") && text.contains("after the change"),
         "{text}"
@@ -204,7 +204,7 @@ fn family_scenario_is_simulated() {
     let d = directory.path();
     let person = include_str!("../../../fixtures/scenario/person.toml");
     fs::write(d.join("person.toml"), person).unwrap();
-    let printed = good(
+    let printed = stdout_of(
         d,
         &["simulate", "--scenario", "person.toml", "--seed", "3", "--out", "p.csv"],
     );
@@ -228,12 +228,12 @@ fn family_scenario_is_simulated() {
     assert_ne!(initial["phase_margin_deg"], last["phase_margin_deg"]);
     assert_eq!(initial["remnant_gain"].as_array().unwrap().len(), 3);
     assert_eq!(last["remnant_gain"][2]["gain"], 0.03);
-    let table = good(d, &["margins", "--scenario", "person.toml"]);
+    let table = stdout_of(d, &["margins", "--scenario", "person.toml"]);
     assert!(
         table.contains("Crossover frequency") && table.contains("given gain"),
         "{table}"
     );
-    let (code, message) = bad(
+    let (code, message) = failure_of(
         d,
         &[
             "simulate",
@@ -247,6 +247,6 @@ fn family_scenario_is_simulated() {
     );
     assert!(code == 2 && message.contains("[[remnant]]"), "{message}");
     fs::write(d.join("wild.toml"), person.replace("K = 20 ", "K = 200 ")).unwrap();
-    let (code, message) = bad(d, &["simulate", "--scenario", "wild.toml", "--out", "x.csv"]);
+    let (code, message) = failure_of(d, &["simulate", "--scenario", "wild.toml", "--out", "x.csv"]);
     assert!(code == 1 && message.contains("not stable"), "{message}");
 }

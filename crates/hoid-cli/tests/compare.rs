@@ -5,7 +5,7 @@ mod common;
 
 use std::fs;
 
-use common::{bad, good, hoid};
+use common::{failure_of, hoid, stdout_of};
 use tempfile::TempDir;
 
 /// Writes the results of three people in two conditions; one person has no crossover in the second condition.
@@ -36,7 +36,7 @@ fn results() -> TempDir {
 fn conditions_are_compared() {
     let directory = results();
     let at = directory.path();
-    let output_text = good(at, &["compare", "results.json", "--of", "crossover", "-v"]);
+    let output_text = stdout_of(at, &["compare", "results.json", "--of", "crossover", "-v"]);
     assert!(output_text.starts_with("Verdict: doubtful"), "{output_text}");
     assert!(
         output_text.contains("P11 in so is left out: it has no crossover"),
@@ -63,7 +63,7 @@ fn conditions_are_compared() {
         "f.svg",
         "--json",
     ];
-    let printed = good(at, &arguments);
+    let printed = stdout_of(at, &arguments);
     let object: serde_json::Value = serde_json::from_str(&printed).unwrap();
     assert_eq!(object["kind"], "comparison");
     assert_eq!(object["left_out"][0]["subject"], "P11");
@@ -100,13 +100,13 @@ fn mistakes_are_explained_with_a_remedy() {
         (&["--within", "--between"], 2, "cannot be used with"),
     ] {
         let all = [&["compare", "results.json"], arguments].concat();
-        let (found, output_text) = bad(at, &all);
+        let (found, output_text) = failure_of(at, &all);
         assert!(
             found == code && output_text.contains(word),
             "{arguments:?}: {found}, {output_text}"
         );
     }
-    let (code, output_text) = bad(at, &["compare", "."]);
+    let (code, output_text) = failure_of(at, &["compare", "."]);
     assert!(
         code == 1 && output_text.contains("there is no group.toml"),
         "{output_text}"
@@ -128,9 +128,9 @@ fn recordings_are_compared_in_a_common_form() {
     let at = directory.path();
     let people = "simulate-group --people --subjects 3 --runs 1 --plants integrator,double-integrator --remnants lag \
                   --remnant-share 0.05..0.1 --out runs";
-    good(at, &people.split_whitespace().collect::<Vec<_>>());
+    stdout_of(at, &people.split_whitespace().collect::<Vec<_>>());
     let compared = ["compare", "runs", "--of", "crossover,T_L", "--out", "found", "--json"];
-    let printed = good(at, &compared);
+    let printed = stdout_of(at, &compared);
     let object: serde_json::Value = serde_json::from_str(&printed).unwrap();
     let form = object["verdict"]["notes"].to_string();
     assert!(
@@ -143,17 +143,20 @@ fn recordings_are_compared_in_a_common_form() {
     };
     assert!(compared_of("T_L") && compared_of("crossover"), "{printed}");
     // The crossover is computed with the best form for each element.
-    let of_results: serde_json::Value =
-        serde_json::from_str(&good(at, &["compare", "found/group", "--of", "crossover", "--json"])).unwrap();
+    let of_results: serde_json::Value = serde_json::from_str(&stdout_of(
+        at,
+        &["compare", "found/group", "--of", "crossover", "--json"],
+    ))
+    .unwrap();
     assert_eq!(of_results["differences"][0]["value"], object["differences"][0]["value"]);
     // The results are kept and used again.
-    let same = good(at, &compared);
+    let same = stdout_of(at, &compared);
     assert_eq!(same, printed);
     let of_group = hoid(at, &["compare", "found/group", "--of", "T_L"]);
     let message = String::from_utf8(of_group.stderr).unwrap();
     assert!(message.contains("form = \"lead-lag\""), "{message}");
     // Without --out no files remain.
     let before = fs::read_dir(at).unwrap().count();
-    good(at, &["compare", "runs/group.toml", "--of", "crossover"]);
+    stdout_of(at, &["compare", "runs/group.toml", "--of", "crossover"]);
     assert_eq!(fs::read_dir(at).unwrap().count(), before);
 }

@@ -5,7 +5,7 @@ mod common;
 
 use std::{f64::consts::TAU, fmt::Write, fs, path::Path};
 
-use common::{bad, good, hoid, json};
+use common::{failure_of, hoid, json, stdout_of};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -28,7 +28,7 @@ fn excitation(t: f64) -> f64 {
 }
 
 /// Returns a value of a fixed pseudo-random sequence.
-fn rough(k: usize, stream: usize) -> f64 {
+fn pseudo_noise(k: usize, stream: usize) -> f64 {
     (0.37 * (k * k) as f64 + (3 * stream) as f64).sin()
 }
 
@@ -43,7 +43,7 @@ fn describe_finds_the_simulated_loop() {
     let names = ["1.csv", "2.csv", "3.csv", "4.csv"];
     for name in names {
         let r = &name[..1];
-        good(
+        stdout_of(
             at,
             &[
                 "simulate",
@@ -97,7 +97,7 @@ fn describe_finds_the_simulated_loop() {
     );
     assert!(share < ratio && (0.07..0.13).contains(&ratio), "{share} {ratio}");
     // The result with automatic detection is the same, here as text.
-    let page = good(at, &[&["describe", "-v"], &names[..], &options[2..]].concat());
+    let page = stdout_of(at, &[&["describe", "-v"], &names[..], &options[2..]].concat());
     assert!(page.starts_with("Verdict: trustworthy\n"), "{page}");
     for text in [
         "10 lines, over 4 runs of one period of 81.92 s",
@@ -118,7 +118,7 @@ fn recording_offset_is_compensated() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     write(at, "run.csv", 800, |t, k| {
-        2.0 * excitation(t - 0.5) + 0.05 * rough(k, 0)
+        2.0 * excitation(t - 0.5) + 0.05 * pseudo_noise(k, 0)
     });
     let phases = |options: &[&str]| -> Vec<f64> {
         let found = json(at, &[&["describe", "run.csv", "--json"], options].concat());
@@ -156,7 +156,7 @@ fn recording_offset_is_compensated() {
             );
         }
     }
-    let (code, message) = bad(at, &["describe", "run.csv", "--offset", "w=1"]);
+    let (code, message) = failure_of(at, &["describe", "run.csv", "--offset", "w=1"]);
     assert!(code == 2 && message.contains("no channel \"w\""), "{message}");
     // Columns are selected by name, as in `identify`.
     let by_name = [
@@ -178,9 +178,9 @@ fn figure_is_an_svg_of_the_requested_width() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     write(at, "run.csv", 800, |t, k| {
-        2.0 * excitation(t - 0.3) + 0.05 * rough(k, 1)
+        2.0 * excitation(t - 0.3) + 0.05 * pseudo_noise(k, 1)
     });
-    good(at, &["describe", "run.csv", "--figure", "bode.svg", "--width", "85mm"]);
+    stdout_of(at, &["describe", "run.csv", "--figure", "bode.svg", "--width", "85mm"]);
     let svg = fs::read_to_string(at.join("bode.svg")).unwrap();
     assert!(svg.starts_with("<svg") && svg.contains("width=\"85mm\"") && svg.contains("coherence"));
     for (options, expected) in [
@@ -190,7 +190,7 @@ fn figure_is_an_svg_of_the_requested_width() {
         (&["--figure", "b.svg", "--width", "85"], "85mm"),
         (&["--width", "85mm"], "--figure"),
     ] {
-        let (code, message) = bad(at, &[&["describe", "run.csv"], options].concat());
+        let (code, message) = failure_of(at, &[&["describe", "run.csv"], options].concat());
         assert!(code == 2 && message.contains(expected), "{message}");
     }
 }
@@ -201,7 +201,7 @@ fn unrelated_control_exits_with_one() {
     let at = directory.path();
     let names = ["a.csv", "b.csv", "c.csv"];
     for (stream, name) in names.iter().enumerate() {
-        write(at, name, 400, |_, k| rough(k, stream));
+        write(at, name, 400, |_, k| pseudo_noise(k, stream));
     }
     let output = hoid(at, &[&["describe"], &names[..], &["--json"]].concat());
     let found: Value = serde_json::from_slice(&output.stdout).unwrap();
@@ -220,8 +220,8 @@ fn unrelated_control_exits_with_one() {
 fn unusable_records_are_errors() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    write(at, "good.csv", 400, |t, k| excitation(t) + 0.1 * rough(k, 0));
-    write(at, "long.csv", 450, |t, k| excitation(t) + 0.1 * rough(k, 0));
+    write(at, "good.csv", 400, |t, k| excitation(t) + 0.1 * pseudo_noise(k, 0));
+    write(at, "long.csv", 450, |t, k| excitation(t) + 0.1 * pseudo_noise(k, 0));
     write(at, "flat.csv", 400, |_, _| 1.0);
     fs::write(at.join("bare.csv"), "t,e,u\n0,1,2\n0.1,2,3\n0.2,1,2\n0.3,2,2\n").unwrap();
     fs::write(at.join("empty.csv"), "t,e,u,d\n").unwrap();
@@ -250,7 +250,7 @@ fn unusable_records_are_errors() {
         (&["good.csv", "--from", "50"], 1, "good"),
         (&[], 2, "RECORD"),
     ] {
-        let (found, message) = bad(at, &[&["describe"], options].concat());
+        let (found, message) = failure_of(at, &[&["describe"], options].concat());
         assert!(
             found == code && message.contains(expected),
             "{options:?} {found}: {message}"

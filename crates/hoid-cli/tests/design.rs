@@ -5,7 +5,7 @@ mod common;
 
 use std::fs;
 
-use common::{bad, good, json};
+use common::{failure_of, json, stdout_of};
 use tempfile::TempDir;
 
 const PERSON: &str = "form = \"lead\"\n\n[initial]\nK = 1.0\nT_L_s = 0.4\nomega_nm_rad_s = 10\nzeta_nm = 0.3\ntau_e_s = 0.25\n\
@@ -27,7 +27,7 @@ fn design_is_reported_and_can_be_simulated() {
         "--out",
         "design",
     ];
-    let message = good(at, &arguments);
+    let message = stdout_of(at, &arguments);
     assert!(
         message.starts_with("Expected errors of") && message.contains("With reference they require"),
         "{message}"
@@ -55,7 +55,7 @@ fn design_is_reported_and_can_be_simulated() {
     assert!(tau["standard_error"].as_f64().unwrap() < of_text["standard_error"].as_f64().unwrap());
     assert!(fs::read_to_string(at.join("t.md")).unwrap().contains("| tau_e | 0.25"));
     // The scenario contains the operator and the lines of the design.
-    good(
+    stdout_of(
         at,
         &["simulate", "--scenario", "design/scenario.toml", "--out", "run.csv"],
     );
@@ -70,7 +70,7 @@ fn design_is_reported_and_can_be_simulated() {
             "--json",
         ],
     );
-    let of_design = good(
+    let of_design = stdout_of(
         at,
         &[
             "design",
@@ -104,7 +104,7 @@ fn difference_gives_the_number_of_people() {
         "--figure",
         "figure.svg",
     ];
-    let page = good(at, &arguments);
+    let page = stdout_of(at, &arguments);
     assert!(
         page.contains("Detecting a difference in crossover of") && page.contains("error of a run"),
         "{page}"
@@ -183,14 +183,14 @@ fn group_design_has_a_typical_and_a_worst_person() {
             .starts_with("D is left out"),
         "{found}"
     );
-    let (code, message) = bad(at, &["design", "--people", "group.json"]);
+    let (code, message) = failure_of(at, &["design", "--people", "group.json"]);
     assert!(
         code == 2 && message.contains("--controlled-element"),
         "{code} {message}"
     );
     group["people"][1]["condition"] = "position".into();
     fs::write(at.join("group.json"), group.to_string()).unwrap();
-    let (code, message) = bad(at, &[&["design", "--people", "group.json"], &element[..]].concat());
+    let (code, message) = failure_of(at, &[&["design", "--people", "group.json"], &element[..]].concat());
     assert!(code == 2 && message.contains("rate, position"), "{code} {message}");
     let parameter = |name: &str, value: f64| {
         let people: Vec<serde_json::Value> = [("A", 0.9), ("B", 1.1), ("C", 1.0)]
@@ -215,7 +215,7 @@ fn both_responses_to_a_displayed_target_are_designed() {
     let at = directory.path();
     let arguments = ["design", "--controlled-element", "4/s", "--display", "pursuit"];
     let all = [&arguments[..], &["--remnant-share", ".1", "--out", "design"]].concat();
-    let page = good(at, &all);
+    let page = stdout_of(at, &all);
     for words in [
         "K_f (s)",
         "tau_f (s)",
@@ -233,7 +233,7 @@ fn both_responses_to_a_displayed_target_are_designed() {
             .unwrap()
             .contains("gain of F")
     );
-    good(
+    stdout_of(
         at,
         &["simulate", "--scenario", "design/scenario.toml", "--out", "run.csv"],
     );
@@ -295,7 +295,7 @@ fn spread_of_a_difference_comes_from_the_people() {
         person("A", "slow", 0.24), person("B", "slow", 0.31), person("C", "slow", 0.26), person("D", "slow", 0.22),
     ]});
     fs::write(at.join("group.json"), group.to_string()).unwrap();
-    let compared = good(at, &["compare", "group.json", "--of", "tau_e", "--json"]);
+    let compared = stdout_of(at, &["compare", "group.json", "--of", "tau_e", "--json"]);
     fs::write(at.join("comparison.json"), &compared).unwrap();
     let compared: serde_json::Value = serde_json::from_str(&compared).unwrap();
     let tau = compared["differences"][0]["tau"].as_f64().unwrap();
@@ -345,7 +345,7 @@ fn spread_of_a_difference_comes_from_the_people() {
         "{bound}"
     );
     // The JSON of a group has no single runs.
-    let (code, message) = bad(
+    let (code, message) = failure_of(
         at,
         &["design", "--controlled-element", "4/s", "--run-to-run", "group.json"],
     );
@@ -363,7 +363,7 @@ fn spread_of_a_difference_comes_from_the_people() {
     );
     // The crossover is not a parameter of a population.
     let all = ["design", "--controlled-element", "4/s", "--difference", "crossover=10%"];
-    let (code, message) = bad(at, &[&all[..], &["--between-people", "population.json"]].concat());
+    let (code, message) = failure_of(at, &[&all[..], &["--between-people", "population.json"]].concat());
     assert!(
         code == 2 && message.contains("no spread of crossover between people"),
         "{code} {message}"
@@ -399,7 +399,7 @@ fn mistakes_are_explained_with_a_remedy() {
         (&["--power", ".9"], 2, "--difference"),
     ] {
         let all = [&["design", "--people", "person.toml"], arguments].concat();
-        let (found, message) = bad(at, &all);
+        let (found, message) = failure_of(at, &all);
         assert!(
             found == code && message.contains(word),
             "{arguments:?}: {found}, {message}"

@@ -9,13 +9,13 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{good, hoid, json, json_with_any_exit_code};
+use common::{hoid, json, json_with_any_exit_code, stdout_of};
 
 /// Time, error and control of a run.
 type Rows = Vec<[f64; 3]>;
 
-fn simulated(d: &Path, condition: &str, seed: &str) -> Rows {
-    good(
+fn simulated_rows(d: &Path, condition: &str, seed: &str) -> Rows {
+    stdout_of(
         d,
         &["simulate", "--condition", condition, "--seed", seed, "--out", "run.csv"],
     );
@@ -32,14 +32,14 @@ fn simulated(d: &Path, condition: &str, seed: &str) -> Rows {
         .collect()
 }
 
-fn written(d: &Path, rows: &Rows) {
+fn write_rows(d: &Path, rows: &Rows) {
     let lines: String = rows.iter().map(|[t, e, u]| format!("{t},{e},{u}\n")).collect();
     fs::write(d.join("c.csv"), "t,e,u\n".to_owned() + &lines).unwrap();
 }
 
-const BOX_JENKINS: [&str; 4] = ["--structure", "bj", "--nk", "29"];
+const BOX_JENKINS_OPTIONS: [&str; 4] = ["--structure", "bj", "--nk", "29"];
 
-fn identified(d: &Path, how: &[&str]) -> Value {
+fn identify(d: &Path, how: &[&str]) -> Value {
     json_with_any_exit_code(d, &[&["identify", "c.csv", "--json"], how].concat())
 }
 
@@ -86,7 +86,7 @@ fn assert_correct_or_flagged(found: &Value, what: &str) {
     }
 }
 
-fn kinds(found: &Value) -> Vec<&str> {
+fn fault_kinds(found: &Value) -> Vec<&str> {
     let faults = found["faults"].as_array().unwrap().iter();
     faults.map(|f| f["kind"].as_str().unwrap()).collect()
 }
@@ -95,16 +95,16 @@ fn kinds(found: &Value) -> Vec<&str> {
 fn single_outlier_is_repaired() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let clean = simulated(d, "C1", "71");
-    written(d, &clean);
-    let before = identified(d, &BOX_JENKINS);
-    assert!(kinds(&before).is_empty(), "{before}");
+    let clean = simulated_rows(d, "C1", "71");
+    write_rows(d, &clean);
+    let before = identify(d, &BOX_JENKINS_OPTIONS);
+    assert!(fault_kinds(&before).is_empty(), "{before}");
     for place in [1234, 4000] {
         let mut rows = clean.clone();
         rows[place][1] = 30.0;
-        written(d, &rows);
-        let found = identified(d, &BOX_JENKINS);
-        assert_eq!(kinds(&found), ["spike"]);
+        write_rows(d, &rows);
+        let found = identify(d, &BOX_JENKINS_OPTIONS);
+        assert_eq!(fault_kinds(&found), ["spike"]);
         let fault = &found["faults"][0];
         assert_eq!(
             (fault["channel"].as_str(), fault["action"].as_str()),
@@ -121,32 +121,32 @@ fn single_outlier_is_repaired() {
         }
     }
     // The fault is also found by default, and is shown on the page, in the report and in `info`.
-    let found = identified(d, &["--form", "lead"]);
-    assert_eq!(kinds(&found), ["spike"]);
+    let found = identify(d, &["--form", "lead"]);
+    assert_eq!(fault_kinds(&found), ["spike"]);
     assert_correct_or_flagged(&found, "family");
-    let page = good(
+    let page = stdout_of(
         d,
-        &[&["identify", "c.csv", "--report", "page"], &BOX_JENKINS[..]].concat(),
+        &[&["identify", "c.csv", "--report", "page"], &BOX_JENKINS_OPTIONS[..]].concat(),
     );
     assert!(page.contains("spike in e at 40 s, off by"), "{page}");
     let report = fs::read_to_string(d.join("page/report.html")).unwrap();
     assert!(report.contains("spike in e at 40 s"));
-    assert!(good(d, &["info", "c.csv"]).contains("spike in e at 40 s"));
-    assert_eq!(kinds(&json(d, &["info", "c.csv", "--json"])), ["spike"]);
+    assert!(stdout_of(d, &["info", "c.csv"]).contains("spike in e at 40 s"));
+    assert_eq!(fault_kinds(&json(d, &["info", "c.csv", "--json"])), ["spike"]);
 }
 
 #[test]
 fn reported_faults_are_doubtful_and_kept_ones_ignored() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let mut rows = simulated(d, "C1", "72");
+    let mut rows = simulated_rows(d, "C1", "72");
     rows[4000][1] = 30.0;
-    written(d, &rows);
-    let of = |handling: &str| identified(d, &[&BOX_JENKINS[..], &["--faults", handling]].concat());
+    write_rows(d, &rows);
+    let of = |handling: &str| identify(d, &[&BOX_JENKINS_OPTIONS[..], &["--faults", handling]].concat());
     let reported = of("report");
     assert_eq!(reported["verdict"]["level"], "doubtful");
     assert_eq!(reported["faults"][0]["action"], "reported");
-    assert!(kinds(&of("keep")).is_empty());
+    assert!(fault_kinds(&of("keep")).is_empty());
     let cut = of("cut");
     assert_eq!(
         (
@@ -166,42 +166,42 @@ fn reported_faults_are_doubtful_and_kept_ones_ignored() {
 fn rest_before_a_run_is_cut() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let run = simulated(d, "C1", "73");
+    let run = simulated_rows(d, "C1", "73");
     let rest = (0..1500).map(|k| [f64::from(k) / 100.0, 0.0, 0.0]);
     let rows: Rows = rest.chain(run.iter().map(|[t, e, u]| [t + 15.0, *e, *u])).collect();
-    written(d, &rows);
-    let found = identified(d, &BOX_JENKINS);
-    assert!(kinds(&found).contains(&"idle"), "{found}");
+    write_rows(d, &rows);
+    let found = identify(d, &BOX_JENKINS_OPTIONS);
+    assert!(fault_kinds(&found).contains(&"idle"), "{found}");
     assert_eq!(found["records"][0]["samples"].as_u64().unwrap() / 10, 819);
     assert_correct_or_flagged(&found, "rest");
-    assert_correct_or_flagged(&identified(d, &["--form", "lead"]), "rest, family");
+    assert_correct_or_flagged(&identify(d, &["--form", "lead"]), "rest, family");
 }
 
 #[test]
 fn wrong_units_columns_and_sign_are_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let run = simulated(d, "C1", "74");
-    let write = |change: fn(&[f64; 3]) -> [f64; 3]| written(d, &run.iter().map(change).collect());
+    let run = simulated_rows(d, "C1", "74");
+    let write = |change: fn(&[f64; 3]) -> [f64; 3]| write_rows(d, &run.iter().map(change).collect());
     write(|[t, e, u]| [1000.0 * t, *e, *u]);
-    let found = identified(d, &[]);
+    let found = identify(d, &[]);
     assert_eq!(found["verdict"]["level"], "not determined");
-    assert_eq!(kinds(&found)[0], "time-unit");
+    assert_eq!(fault_kinds(&found)[0], "time-unit");
     // Polynomial models are used for any system, even a furnace, so there is only a note.
-    let found = identified(d, &BOX_JENKINS);
+    let found = identify(d, &BOX_JENKINS_OPTIONS);
     assert_eq!(found["verdict"]["level"], "trustworthy", "{found}");
-    assert!(kinds(&found).contains(&"time-unit"), "{found}");
+    assert!(fault_kinds(&found).contains(&"time-unit"), "{found}");
     write(|[t, e, u]| [*t, *u, *e]);
-    let found = identified(d, &BOX_JENKINS);
-    assert!(kinds(&found).contains(&"exchanged"), "{found}");
+    let found = identify(d, &BOX_JENKINS_OPTIONS);
+    assert!(fault_kinds(&found).contains(&"exchanged"), "{found}");
     assert_ne!(found["verdict"]["level"], "trustworthy");
     write(|[t, e, u]| [*t, *e, -u]);
-    let found = identified(d, &BOX_JENKINS);
+    let found = identify(d, &BOX_JENKINS_OPTIONS);
     assert_eq!(
-        (kinds(&found), found["verdict"]["level"].as_str()),
+        (fault_kinds(&found), found["verdict"]["level"].as_str()),
         (vec!["sign"], Some("doubtful"))
     );
-    let repaired = identified(d, &[&BOX_JENKINS[..], &["--output=-u"]].concat());
+    let repaired = identify(d, &[&BOX_JENKINS_OPTIONS[..], &["--output=-u"]].concat());
     assert_eq!(repaired["verdict"]["level"], "trustworthy", "{}", repaired["verdict"]);
 }
 
@@ -209,10 +209,10 @@ fn wrong_units_columns_and_sign_are_reported() {
 fn too_short_record_is_not_determined() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let mut rows = simulated(d, "C1", "75");
+    let mut rows = simulated_rows(d, "C1", "75");
     rows.truncate(60);
-    written(d, &rows);
-    let found = identified(d, &BOX_JENKINS);
+    write_rows(d, &rows);
+    let found = identify(d, &BOX_JENKINS_OPTIONS);
     assert_eq!(found["verdict"]["level"], "not determined");
     let findings = found["verdict"]["findings"].as_array().unwrap();
     assert!(findings.iter().any(|f| f["kind"] == "too-few"), "{findings:?}");
@@ -222,11 +222,11 @@ fn too_short_record_is_not_determined() {
 fn offset_is_estimated_and_causes_no_bias() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let run = simulated(d, "C1", "76");
+    let run = simulated_rows(d, "C1", "76");
     let deviation = |k: usize| (run.iter().map(|row| row[k] * row[k]).sum::<f64>() / run.len() as f64).sqrt();
     let (of_e, of_u) = (deviation(1), deviation(2));
-    written(d, &run);
-    let clean = identified(d, &BOX_JENKINS);
+    write_rows(d, &run);
+    let clean = identify(d, &BOX_JENKINS_OPTIONS);
     let level = |found: &Value| {
         let level = &found["records"][0]["level"];
         (
@@ -236,8 +236,8 @@ fn offset_is_estimated_and_causes_no_bias() {
     };
     for share in [0.03, 0.5] {
         let moved = |[t, e, u]: &[f64; 3]| [*t, e + share * of_e, u + share * of_u];
-        written(d, &run.iter().map(moved).collect());
-        let found = identified(d, &BOX_JENKINS);
+        write_rows(d, &run.iter().map(moved).collect());
+        let found = identify(d, &BOX_JENKINS_OPTIONS);
         assert_eq!(found["verdict"]["level"], "trustworthy", "{}", found["verdict"]);
         for ((name, one, error), (_, other, _)) in estimates(&clean).iter().zip(estimates(&found)) {
             assert!((one - other).abs() < 0.01 * error, "{share}: {name} {one} {other}");
@@ -251,15 +251,18 @@ fn offset_is_estimated_and_causes_no_bias() {
             "{by} {added}"
         );
         // If the data are used unchanged, the level is reported where relevant.
-        let kept = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
+        let kept = identify(d, &[&BOX_JENKINS_OPTIONS[..], &["--detrend", "mean"]].concat());
         assert!(kept["records"][0]["level"].is_null());
-        let page = good(d, &[&["identify", "c.csv", "-v"], &BOX_JENKINS[..]].concat());
+        let page = stdout_of(d, &[&["identify", "c.csv", "-v"], &BOX_JENKINS_OPTIONS[..]].concat());
         assert!(page.contains("level of u in addition to the response to e: "), "{page}");
-        let family = identified(d, &["--form", "lead"]);
+        let family = identify(d, &["--form", "lead"]);
         assert!(family["records"][0]["level"]["value"].is_number());
     }
     // A simulated run, which contains its true values, has no level.
-    let as_simulated = json(d, &[&["identify", "run.csv", "--json"], &BOX_JENKINS[..]].concat());
+    let as_simulated = json(
+        d,
+        &[&["identify", "run.csv", "--json"], &BOX_JENKINS_OPTIONS[..]].concat(),
+    );
     assert!(as_simulated["records"][0]["level"].is_null());
 }
 
@@ -267,19 +270,19 @@ fn offset_is_estimated_and_causes_no_bias() {
 fn jump_of_delay_or_operator_is_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let (run, other) = (simulated(d, "C1", "77"), simulated(d, "C2", "78"));
+    let (run, other) = (simulated_rows(d, "C1", "77"), simulated_rows(d, "C2", "78"));
     let finding = |how: &[&str]| {
-        let found = identified(d, how);
+        let found = identify(d, how);
         let findings = found["verdict"]["findings"].as_array().unwrap().clone();
         let mut words = findings.iter().filter(|f| f["kind"] == "not-constant");
         words.next().map(|f| f["words"].as_str().unwrap().to_owned())
     };
-    let fits: [&[&str]; 3] = [&BOX_JENKINS, &["--remnant-order", "1"], &["--form", "lead"]];
+    let fits: [&[&str]; 3] = [&BOX_JENKINS_OPTIONS, &["--remnant-order", "1"], &["--form", "lead"]];
     let n = run.len();
     let late: Rows = (0..n)
         .map(|t| [run[t][0], run[t][1], run[if t < n / 2 { t } else { t - 20 }][2]])
         .collect();
-    written(d, &late);
+    write_rows(d, &late);
     for how in fits {
         let words = finding(how).unwrap();
         assert!(words.contains("tau_e changes by about +"), "{how:?}: {words}");
@@ -294,11 +297,11 @@ fn jump_of_delay_or_operator_is_reported() {
             }
         })
         .collect();
-    written(d, &second);
+    write_rows(d, &second);
     for how in fits {
         assert!(finding(how).is_some(), "{how:?}");
     }
-    written(d, &run);
+    write_rows(d, &run);
     for how in fits {
         assert_eq!(finding(how), None, "{how:?}");
     }
@@ -308,13 +311,13 @@ fn jump_of_delay_or_operator_is_reported() {
 fn robust_fit_is_insensitive_to_a_single_sample() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let mut rows = simulated(d, "C1", "79");
-    let how = [&BOX_JENKINS[..], &["--robust", "--faults", "keep"]].concat();
-    written(d, &rows);
-    let before = estimates(&identified(d, &how));
+    let mut rows = simulated_rows(d, "C1", "79");
+    let how = [&BOX_JENKINS_OPTIONS[..], &["--robust", "--faults", "keep"]].concat();
+    write_rows(d, &rows);
+    let before = estimates(&identify(d, &how));
     rows[4000][1] = 30.0;
-    written(d, &rows);
-    let after = estimates(&identified(d, &how));
+    write_rows(d, &rows);
+    let after = estimates(&identify(d, &how));
     assert!(before.len() > 3);
     for ((name, one, error), (_, other, _)) in before.iter().zip(&after) {
         assert!((one - other).abs() < 0.5 * error, "{name} {one} {other} ± {error}");

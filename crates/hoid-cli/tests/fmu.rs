@@ -7,10 +7,10 @@ use std::fs;
 
 use tempfile::TempDir;
 
-use common::{bad, good};
+use common::{failure_of, stdout_of};
 
 /// Writes the header of a shared library for Linux with the function names of the library of hoid.
-fn library(folder: &TempDir) {
+fn write_library(folder: &TempDir) {
     let mut bytes = vec![0_u8; 64];
     bytes[..6].copy_from_slice(b"\x7fELF\x02\x01");
     bytes[18] = 62;
@@ -21,10 +21,10 @@ fn library(folder: &TempDir) {
 #[test]
 fn fmu_is_complete_and_reproducible() {
     let folder = TempDir::new().unwrap();
-    library(&folder);
+    write_library(&folder);
     let with = |more: &[&str]| {
         let default = ["fmu", "--library", "libhoid.so", "--out", "a.fmu"];
-        let printed = good(folder.path(), &[&default[..], more].concat());
+        let printed = stdout_of(folder.path(), &[&default[..], more].concat());
         (printed, fs::read(folder.path().join("a.fmu")).unwrap())
     };
     let (printed, bytes) = with(&[]);
@@ -55,13 +55,13 @@ fn fmu_is_complete_and_reproducible() {
 #[test]
 fn invalid_fmu_requests_give_the_reason() {
     let folder = TempDir::new().unwrap();
-    library(&folder);
+    write_library(&folder);
     fs::write(folder.path().join("text"), "text").unwrap();
     fs::write(folder.path().join("fit.json"), "{}").unwrap();
     let quick =
         "form = \"gain\"\nneuromuscular = false\n[initial]\nK = 1\ntau_e_s = 0.004\ncontrolled_element = \"1/s\"\n";
     fs::write(folder.path().join("quick.toml"), quick).unwrap();
-    let of = |more: &[&str]| bad(folder.path(), &[&["fmu", "--out", "a.fmu"][..], more].concat());
+    let of = |more: &[&str]| failure_of(folder.path(), &[&["fmu", "--out", "a.fmu"][..], more].concat());
     let with = |more: &[&str]| of(&[&["--library", "libhoid.so"][..], more].concat());
     for (arguments, reason) in [
         (&["--library", "text"][..], "cargo xtask ffi"),
@@ -84,7 +84,7 @@ fn invalid_fmu_requests_give_the_reason() {
         let (code, message) = with(arguments);
         assert!(code > 0 && message.contains(reason), "{arguments:?}: {message}");
     }
-    let (_, message) = bad(
+    let (_, message) = failure_of(
         folder.path(),
         &["fmu", "--out", "libhoid.so", "--library", "libhoid.so"],
     );

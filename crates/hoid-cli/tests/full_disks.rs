@@ -14,7 +14,7 @@ mod full_disks;
 mod interrupted;
 
 use draw::Draw;
-use full_disks::rounds;
+use full_disks::run_rounds;
 use interrupted::{Bench, GROUP, STUDY, TRACK};
 
 #[test]
@@ -23,7 +23,7 @@ fn full_disk_leaves_complete_files_and_resumable_blocks() {
     let bench = Bench::new(env!("CARGO_BIN_EXE_hoid").into(), directory.path());
     let mut draw = Draw(54);
     for (work, count) in [(STUDY, 3), (GROUP, 3), (TRACK, 4)] {
-        let Some(outcome) = rounds(&bench, &work, count, &mut draw) else {
+        let Some(outcome) = run_rounds(&bench, &work, count, &mut draw) else {
             eprintln!("skipped: no disk of its own can be mounted here");
             return;
         };

@@ -12,7 +12,7 @@ use std::{
 
 use tempfile::TempDir;
 
-use common::{bad, good, hoid, json};
+use common::{failure_of, hoid, json, stdout_of};
 
 /// Simulates two people in C1 and C3 with two runs each.
 fn experiment() -> TempDir {
@@ -30,7 +30,7 @@ fn experiment() -> TempDir {
         "--out",
         "people",
     ];
-    let printed = good(directory.path(), &arguments);
+    let printed = stdout_of(directory.path(), &arguments);
     assert!(printed.contains("8 runs") && printed.contains("truth.csv"), "{printed}");
     // A narrow range of delays makes the test fast.
     let manifest = directory.path().join("people/group.toml");
@@ -69,7 +69,7 @@ fn files(directory: &Path) -> Vec<(String, Vec<u8>)> {
 fn virtual_experiment_is_analysed_and_reported() {
     let directory = experiment();
     let at = directory.path();
-    let printed = good(at, &["group", "people", "--out", "out", "--csv", "-v"]);
+    let printed = stdout_of(at, &["group", "people", "--out", "out", "--csv", "-v"]);
     assert!(printed.starts_with("Verdict: "), "{printed}");
     // Failures and doubtful results precede the numbers.
     let at_operators = printed.find("Operators").unwrap();
@@ -115,7 +115,7 @@ fn virtual_experiment_is_analysed_and_reported() {
     };
     assert!(of("C3") > 0 && of("C1") == 0, "{settling}");
     // A second run is refused, and with --resume nothing is computed twice.
-    let (code, message) = bad(at, &["group", "people", "--out", "out"]);
+    let (code, message) = failure_of(at, &["group", "people", "--out", "out"]);
     assert!(code == 1 && message.contains("--resume"), "{message}");
     let resumed = ["group", "people", "--out", "out", "--csv", "--resume"];
     let found = json(
@@ -151,7 +151,7 @@ fn virtual_experiment_is_analysed_and_reported() {
     }
     // In a column of 85 mm each subject has a separate figure, whose text of 13 px in 420 px has 7.5 pt; on a page the
     // subjects are next to each other.
-    good(
+    stdout_of(
         at,
         &[&resumed[..], &["--figure", "wide.svg", "--width", "170mm"]].concat(),
     );
@@ -185,12 +185,12 @@ fn virtual_experiment_is_analysed_and_reported() {
         fs::read_to_string(at.join("people/group.toml")).unwrap() + "\n# looked through\n",
     )
     .unwrap();
-    good(at, &["group", "people", "--out", "out", "--resume"]);
+    stdout_of(at, &["group", "people", "--out", "out", "--resume"]);
     let text = fs::read_to_string(at.join("people/group.toml"))
         .unwrap()
         .replace("trace_every = 64", "trace_every = 32");
     fs::write(at.join("people/group.toml"), text).unwrap();
-    let (code, message) = bad(at, &["group", "people", "--out", "out", "--resume"]);
+    let (code, message) = failure_of(at, &["group", "people", "--out", "out", "--resume"]);
     assert!(code == 1 && message.contains("holds another"), "{message}");
 }
 
@@ -198,7 +198,7 @@ fn virtual_experiment_is_analysed_and_reported() {
 fn killed_group_resumes_to_identical_files() {
     let directory = experiment();
     let at = directory.path();
-    good(at, &["group", "people", "--out", "whole"]);
+    stdout_of(at, &["group", "people", "--out", "whole"]);
     for wait_ms in [150, 400] {
         let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
             .args(["group", "people", "--out", "pieces", "--resume", "--jobs", "1"])
@@ -211,7 +211,7 @@ fn killed_group_resumes_to_identical_files() {
         child.kill().unwrap();
         child.wait().unwrap();
     }
-    good(at, &["group", "people", "--out", "pieces", "--resume"]);
+    stdout_of(at, &["group", "people", "--out", "pieces", "--resume"]);
     assert!(files(&at.join("whole")) == files(&at.join("pieces")));
 }
 
@@ -229,9 +229,9 @@ fn init_inspects_the_files_and_reports_findings() {
         "--plants",
         "integrator",
     ];
-    good(at, &[&people[..], &["--out", "people"]].concat());
+    stdout_of(at, &[&people[..], &["--out", "people"]].concat());
     fs::remove_file(at.join("people/group.toml")).unwrap();
-    let printed = good(at, &["group", "init", "people", "--controlled-element", "1/s"]);
+    let printed = stdout_of(at, &["group", "init", "people", "--controlled-element", "1/s"]);
     assert!(printed.contains("1 runs") && printed.contains("d has"), "{printed}");
     let text = fs::read_to_string(at.join("people/group.toml")).unwrap();
     let manifest: toml::Table = toml::from_str(&text).unwrap();
@@ -269,7 +269,7 @@ fn init_inspects_the_files_and_reports_findings() {
         "--out",
         "-",
     ];
-    let other = good(at, &[&["group", "init", "people"][..], &known].concat());
+    let other = stdout_of(at, &[&["group", "init", "people"][..], &known].concat());
     let manifest: toml::Table = toml::from_str(&other).unwrap();
     assert_eq!(manifest["read"]["input"].as_str(), Some("-e"));
     assert_eq!(manifest["read"]["from_s"].as_float(), Some(5.0));
@@ -287,19 +287,19 @@ fn init_inspects_the_files_and_reports_findings() {
 fn manifest_is_made_from_file_names() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    good(at, &["simulate", "--condition", "C1", "--out", "anna_C1_1.csv"]);
+    stdout_of(at, &["simulate", "--condition", "C1", "--out", "anna_C1_1.csv"]);
     fs::write(at.join("notes.txt"), "nothing").unwrap();
     let by_name = ["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"];
-    let printed = good(at, &[&by_name[..], &["--excitation", "none"]].concat());
+    let printed = stdout_of(at, &[&by_name[..], &["--excitation", "none"]].concat());
     assert!(printed.contains("1 runs") && printed.contains("notes.txt"), "{printed}");
-    let (code, message) = bad(
+    let (code, message) = failure_of(
         at,
         &["group", "init", ".", "--pattern", "{subject}_{condition}_{run}.csv"],
     );
     assert!(code == 2 && message.contains("already present"), "{message}");
-    let (code, message) = bad(at, &["group", "init", ".", "--pattern", "{who}.csv", "--out", "x.toml"]);
+    let (code, message) = failure_of(at, &["group", "init", ".", "--pattern", "{who}.csv", "--out", "x.toml"]);
     assert!(code == 2 && message.contains("{subject}"), "{message}");
-    let (code, message) = bad(at, &["group", "nowhere", "--out", "x"]);
+    let (code, message) = failure_of(at, &["group", "nowhere", "--out", "x"]);
     assert!(code == 2 && message.contains("hoid group init"), "{message}");
     let text = fs::read_to_string(at.join("group.toml")).unwrap();
     for (wrong, expected) in [
@@ -308,7 +308,7 @@ fn manifest_is_made_from_file_names() {
         ("[conditions.C1]\nmystery = 1\n", "mystery"),
     ] {
         fs::write(at.join("wrong.toml"), format!("{text}\n{wrong}")).unwrap();
-        let (code, message) = bad(at, &["group", "wrong.toml", "--out", "x"]);
+        let (code, message) = failure_of(at, &["group", "wrong.toml", "--out", "x"]);
         assert!(
             code == 2 && message.contains(expected) && message.contains("wrong.toml"),
             "{expected}: {message}"
@@ -356,7 +356,7 @@ fn people_are_simulated_with_their_own_options() {
         "--sample-time",
         "0.01",
     ];
-    let printed = good(at, &[&default[..], &more].concat());
+    let printed = stdout_of(at, &[&default[..], &more].concat());
     assert!(printed.contains("1 runs") && printed.contains("truth.csv"), "{printed}");
     let run = fs::read_to_string(at.join("people/S1_integrator_1.csv")).unwrap();
     assert!(run.starts_with("t,e,u,d,y\n") && run.lines().count() == 4001);
@@ -370,6 +370,6 @@ fn people_are_simulated_with_their_own_options() {
         &["simulate-group", "--people", "--plants", "1/s", "--out", "x"],
         &["simulate-group", "--people", "--sample-time", "0", "--out", "x"],
     ] {
-        bad(at, wrong);
+        failure_of(at, wrong);
     }
 }

@@ -13,11 +13,11 @@ use std::{
 
 use tempfile::TempDir;
 
-use common::{bad, good, json};
+use common::{failure_of, json, stdout_of};
 
 /// Returns a simulated run as text.
-fn run(directory: &Path) -> String {
-    good(directory, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
+fn simulated_run_text(directory: &Path) -> String {
+    stdout_of(directory, &["simulate", "--condition", "C1", "--out", "c1.csv"]);
     fs::read_to_string(directory.join("c1.csv")).unwrap()
 }
 
@@ -26,13 +26,13 @@ fn decimal_comma_is_explained_by_every_command() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     fs::write(d.join("comma.csv"), "t,e,u\n0.00,\"1,5\",2.5\n0.01,\"1,6\",2.6\n").unwrap();
-    let info = good(d, &["info", "comma.csv"]);
+    let info = stdout_of(d, &["info", "comma.csv"]);
     assert!(info.contains("decimal point instead of a comma"), "{info}");
     assert!(
         info.contains("column e, line 2: \"1,5\" is text (2 of 2 cells)"),
         "{info}"
     );
-    let (_, message) = bad(d, &["identify", "comma.csv"]);
+    let (_, message) = failure_of(d, &["identify", "comma.csv"]);
     assert!(message.contains("decimal point instead of a comma"), "{message}");
 }
 
@@ -40,25 +40,25 @@ fn decimal_comma_is_explained_by_every_command() {
 fn truncated_files_are_reported() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let text = run(d);
+    let text = simulated_run_text(d);
     fs::write(d.join("cut.csv"), &text[..text.len() - 60]).unwrap();
-    let (_, message) = bad(d, &["identify", "cut.csv"]);
+    let (_, message) = failure_of(d, &["identify", "cut.csv"]);
     assert!(
         message.contains("cut.csv is truncated in line") && message.contains("remove that line"),
         "{message}"
     );
     for extension in ["parquet", "mat"] {
         let (whole, cut) = (format!("c1.{extension}"), format!("cut.{extension}"));
-        good(d, &["simulate", "--condition", "C1", "--out", &whole]);
+        stdout_of(d, &["simulate", "--condition", "C1", "--out", &whole]);
         let bytes = fs::read(d.join(&whole)).unwrap();
         fs::write(d.join(&cut), &bytes[..bytes.len() / 2]).unwrap();
-        let (_, message) = bad(d, &["info", &cut]);
+        let (_, message) = failure_of(d, &["info", &cut]);
         assert!(message.contains("is truncated"), "{message}");
     }
     let xdf = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf/tracking.xdf");
     let bytes = fs::read(xdf).unwrap();
     fs::write(d.join("cut.xdf"), &bytes[..bytes.len() / 2]).unwrap();
-    let info = good(d, &["info", "cut.xdf"]);
+    let info = stdout_of(d, &["info", "cut.xdf"]);
     assert!(info.contains("the file is truncated at byte"), "{info}");
 }
 
@@ -66,7 +66,7 @@ fn truncated_files_are_reported() {
 fn gains_without_units_are_not_in_degrees() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let text = run(d);
+    let text = simulated_run_text(d);
     let identify = [
         "identify",
         "run.csv",
@@ -91,7 +91,7 @@ fn gains_without_units_are_not_in_degrees() {
         fs::write(d.join("run.csv"), format!("{units}{rest}")).unwrap();
         let mut arguments = identify.to_vec();
         arguments.extend(declared.iter().flat_map(|units| ["--unit", units]));
-        let page = good(d, &arguments);
+        let page = stdout_of(d, &arguments);
         let gain = page.lines().find(|line| line.trim_start().starts_with("K_e ")).unwrap();
         match expected {
             Some(expected) => assert!(gain.contains(expected), "{units}: {gain}"),
@@ -103,7 +103,7 @@ fn gains_without_units_are_not_in_degrees() {
     assert_eq!(found["records"][0]["units"], units);
     fs::write(d.join("run.csv"), text.replace("e deg", "e rad")).unwrap();
     let wrong = [&identify[..], &["--unit", "e=deg"]].concat();
-    let (code, message) = bad(d, &wrong);
+    let (code, message) = failure_of(d, &wrong);
     assert!(code == 1 && message.contains("--scale e=rad:deg"), "{message}");
 }
 
@@ -111,7 +111,7 @@ fn gains_without_units_are_not_in_degrees() {
 fn formula_like_subjects_are_escaped_in_every_table() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    good(
+    stdout_of(
         d,
         &[
             "simulate-group",
@@ -129,7 +129,7 @@ fn formula_like_subjects_are_escaped_in_every_table() {
     let text = fs::read_to_string(&manifest).unwrap();
     assert!(text.contains("\"S1\""), "{text}");
     fs::write(&manifest, text.replace("\"S1\"", "\"=1+1\"")).unwrap();
-    good(d, &["group", "h", "--out", "results"]);
+    stdout_of(d, &["group", "h", "--out", "results"]);
     let mut found = 0;
     for entry in fs::read_dir(d.join("results")).unwrap() {
         let path = entry.unwrap().path();

@@ -43,7 +43,7 @@ const CELLS: [&str; 28] = [
     "\u{0}",
 ];
 
-fn line() -> impl Strategy<Value = Vec<u8>> {
+fn line_strategy() -> impl Strategy<Value = Vec<u8>> {
     let cells = |n| vec(select(&CELLS[..]), n);
     let joined = (cells(0..5_usize), select(&[",", ";", "\t", " , "][..]))
         .prop_map(|(cells, separator)| cells.join(separator).into_bytes());
@@ -57,7 +57,7 @@ fn line() -> impl Strategy<Value = Vec<u8>> {
 }
 
 /// True if a line counts: neither blank nor a comment.
-fn counts(line: &[u8]) -> bool {
+fn is_counted(line: &[u8]) -> bool {
     let text = String::from_utf8_lossy(line);
     let text = text.trim_matches(['\r', ' ', '\u{feff}']);
     !(text.starts_with('#') || text.trim().is_empty() && !text.contains('\t'))
@@ -68,7 +68,7 @@ proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, rng_seed: RngSeed::Fixed(21), ..ProptestConfig::with_cases(12) })]
 
     #[test]
-    fn hostile_lines_do_not_end_the_stream(hostile in vec(line(), 1..120)) {
+    fn hostile_lines_do_not_end_the_stream(hostile in vec(line_strategy(), 1..120)) {
         let mut stream = Command::new(env!("CARGO_BIN_EXE_hoid"))
             .args(["stream", "--fs", "100", "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing"])
             .stdin(Stdio::piped())
@@ -98,7 +98,7 @@ proptest! {
             .lines()
             .map(|line| serde_json::from_str(line).unwrap())
             .collect();
-        let expected = hostile.iter().filter(|line| counts(line)).count() + good as usize;
+        let expected = hostile.iter().filter(|line| is_counted(line)).count() + good as usize;
         prop_assert_eq!(lines.len(), expected);
         let last = lines.last().unwrap();
         // The method without a guard uses all numbers, however extreme (`--method physical` holds them back); other

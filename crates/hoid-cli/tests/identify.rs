@@ -8,11 +8,11 @@ use std::fs;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, hoid, json, setting, simulated, wave, write};
+use common::{failure_of, hoid, json, setting, simulated_run, stdout_of, wave, write_samples};
 
 #[test]
 fn identify_prints_the_documented_json() {
-    let directory = simulated();
+    let directory = simulated_run();
     let found = json(
         directory.path(),
         &["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--json"],
@@ -70,11 +70,11 @@ fn identify_prints_the_documented_json() {
 #[test]
 #[cfg(feature = "pdf-png")]
 fn figure_format_follows_the_file_name() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     let draw = |name: &str| {
         let fit = ["identify", "c1.csv", "--nk", "29", "--orders", "nd=1"];
-        good(d, &[&fit[..], &["--figure", name, "--width", "85mm"]].concat());
+        stdout_of(d, &[&fit[..], &["--figure", name, "--width", "85mm"]].concat());
         fs::read(d.join(name)).unwrap()
     };
     let pdf = draw("bode.pdf");
@@ -90,7 +90,7 @@ fn figure_format_follows_the_file_name() {
 
 #[test]
 fn range_search_reports_its_candidates() {
-    let directory = simulated();
+    let directory = simulated_run();
     let found = json(
         directory.path(),
         &["identify", "c1.csv", "--nk", "27..31", "--orders", "nd=1..2", "--json"],
@@ -98,7 +98,7 @@ fn range_search_reports_its_candidates() {
     assert_eq!(found["candidates"].as_array().unwrap().len(), 10);
     assert_eq!(found["orders"]["nk"], 29);
     assert_eq!(found["orders"]["nd"], 1);
-    let text = good(
+    let text = stdout_of(
         directory.path(),
         &["identify", "c1.csv", "--structure", "arx", "--nk", "27..31", "-v"],
     );
@@ -107,7 +107,7 @@ fn range_search_reports_its_candidates() {
 
 #[test]
 fn search_options_reach_the_fit() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     let run = |more: &[&str]| {
         let mut all = vec!["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--json"];
@@ -147,7 +147,7 @@ fn search_options_reach_the_fit() {
         assert_ne!(value(&found, "f1").0, value(&plain, "f1").0, "{other:?}");
         assert!((value(&found, "f1").0 + 1.912).abs() < 0.05, "{other:?}");
     }
-    let (code, message) = bad(
+    let (code, message) = failure_of(
         d,
         &["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--fix", "x1=0"],
     );
@@ -159,7 +159,7 @@ fn search_options_reach_the_fit() {
 
 #[test]
 fn every_structure_and_method_runs_from_the_command_line() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     for name in ["arx", "armax", "oe", "bj", "fir", "ararx", "ararmax", "general"] {
         let orders = if name == "bj" { "nd=1" } else { "nb=2" };
@@ -188,7 +188,7 @@ fn every_structure_and_method_runs_from_the_command_line() {
         assert_eq!(found["structure"], name);
         assert!(found["operator"].is_null());
     }
-    let (code, message) = bad(d, &["identify", "alone.csv", "--structure", "arx"]);
+    let (code, message) = failure_of(d, &["identify", "alone.csv", "--structure", "arx"]);
     assert!(code == 1 && message.contains('e'), "{message}");
     for (method, structure) in [("iv4", "arx"), ("sriv", "oe"), ("rivbj", "bj")] {
         let orders = if method == "rivbj" { "nd=1" } else { "nb=2" };
@@ -207,7 +207,7 @@ fn every_structure_and_method_runs_from_the_command_line() {
 
 #[test]
 fn grey_box_gives_the_delay_a_standard_error() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     let found = json(
         d,
@@ -243,7 +243,7 @@ fn grey_box_gives_the_delay_a_standard_error() {
 fn change_is_found_and_its_gains_are_written() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    good(d, &["simulate", "--condition", "C4", "--seed", "3", "--out", "c4.csv"]);
+    stdout_of(d, &["simulate", "--condition", "C4", "--seed", "3", "--out", "c4.csv"]);
     let arguments = [
         "identify",
         "c4.csv",
@@ -275,7 +275,7 @@ fn documented_lead_lag_change_is_found() {
         .nth(1)
         .and_then(|rest| rest.split("END\n").next());
     fs::write(d.join("learns.toml"), scenario.unwrap()).unwrap();
-    good(
+    stdout_of(
         d,
         &[
             "simulate",
@@ -328,7 +328,7 @@ fn documented_lead_lag_change_is_found() {
     }
     let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
     assert!(trace.contains("t,K,K_se,K_over_T_I,K_over_T_I_se,T_L,T_L_se"));
-    let printed = good(d, &arguments);
+    let printed = stdout_of(d, &arguments);
     for part in ["of the form lead-lag", "before the change", "after it", "T_I"] {
         assert!(printed.contains(part), "{printed} lacks {part}");
     }
@@ -339,7 +339,7 @@ fn validation_file_is_reported_once() {
     let directory = tempfile::tempdir().unwrap();
     let d = directory.path();
     for name in ["run.csv", "again.csv"] {
-        write(d, name, "t,e,u", 2000, |k| {
+        write_samples(d, name, "t,e,u", 2000, |k| {
             let (t, e, u) = wave(k);
             let u = if name == "again.csv" { u.clamp(-0.8, 0.8) } else { u };
             format!("{t},{e},{u}")
@@ -359,9 +359,9 @@ fn validation_file_is_reported_once() {
 
 #[test]
 fn several_records_with_all_outputs_are_identified() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
-    good(
+    stdout_of(
         d,
         &["simulate", "--condition", "C1", "--seed", "2", "--out", "again.csv"],
     );
@@ -411,7 +411,7 @@ fn several_records_with_all_outputs_are_identified() {
 /// but the loop is unstable.
 #[test]
 fn unstable_loop_is_doubtful() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     let arguments = [
         "identify",
@@ -440,7 +440,7 @@ fn unstable_loop_is_doubtful() {
             .any(|f| f["kind"] == "unstable-loop" && f["severity"] == "doubt"),
         "{findings:?}"
     );
-    let text = good(d, &arguments);
+    let text = stdout_of(d, &arguments);
     assert!(
         text.contains("This loop: unit gain also at") && text.contains("is not stable"),
         "{text}"
@@ -463,7 +463,7 @@ fn noise_free_simulation_gives_the_exact_operator() {
             "--out",
             "run.csv",
         ];
-        good(d, &simulate);
+        stdout_of(d, &simulate);
         let found = json(d, &["identify", "run.csv", "--controlled-element", element, "--json"]);
         let verdict = &found["verdict"];
         assert_eq!(
@@ -512,7 +512,7 @@ fn simulation_with_little_noise_is_identified() {
             "--out",
             "run.csv",
         ];
-        good(d, &simulate);
+        stdout_of(d, &simulate);
         let found = json(d, &["identify", "run.csv", "--json"]);
         let verdict = &found["verdict"]["level"];
         assert_eq!(
@@ -533,7 +533,7 @@ fn simulation_with_little_noise_is_identified() {
 /// given intersample behaviour.
 #[test]
 fn intersample_behaviour_shifts_the_delay_by_half_a_sample() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     let arguments = ["identify", "c1.csv", "--form", "lead", "--orders", "nd=1", "--json"];
     let of = |course: &str| json(d, &[&arguments[..], &["--intersample", course]].concat());
@@ -547,7 +547,7 @@ fn intersample_behaviour_shifts_the_delay_by_half_a_sample() {
     assert_eq!(straight["intersample"]["tau_e_if_straight"], Value::Null);
     // There is only one model; the remaining difference is due to the centre of the prior.
     assert!((tau(&straight) - tau(&auto) - 0.005).abs() < 1e-4 && (tau(&held) - tau(&auto)).abs() < 1e-3);
-    let text = good(
+    let text = stdout_of(
         d,
         &[
             "identify",
@@ -561,7 +561,7 @@ fn intersample_behaviour_shifts_the_delay_by_half_a_sample() {
         ],
     );
     assert!(text.contains("an error that is linear between its samples"), "{text}");
-    let (code, words) = bad(d, &[&arguments[..], &["--intersample", "cubic"]].concat());
+    let (code, words) = failure_of(d, &[&arguments[..], &["--intersample", "cubic"]].concat());
     assert!(code == 2 && words.contains("zoh"), "{words}");
 }
 
@@ -571,8 +571,8 @@ fn intersample_behaviour_shifts_the_delay_by_half_a_sample() {
 fn parameters_of_an_uncertain_form_are_conditional() {
     let directory = tempfile::tempdir().unwrap();
     let d = directory.path();
-    good(d, &["simulate", "--condition", "C1", "--seed", "5", "--out", "c1.csv"]);
-    let out = good(d, &["identify", "c1.csv", "--excitation", "none"]);
+    stdout_of(d, &["simulate", "--condition", "C1", "--seed", "5", "--out", "c1.csv"]);
+    let out = stdout_of(d, &["identify", "c1.csv", "--excitation", "none"]);
     let note = "not determined, because other forms are likely too: K_e, K_e_dot; the intervals apply only if the form \
                 is lead (weight 0.32): use --form lead to report them";
     assert!(out.contains(note), "{out}");
@@ -580,7 +580,7 @@ fn parameters_of_an_uncertain_form_are_conditional() {
         !out.contains("K_e is not determined, but") && !out.contains("not determined by the data"),
         "{out}"
     );
-    let out = good(d, &["identify", "c1.csv", "--excitation", "none", "--form", "lead"]);
+    let out = stdout_of(d, &["identify", "c1.csv", "--excitation", "none", "--form", "lead"]);
     assert!(
         out.contains("K_e (deg/deg)") && !out.contains("not determined"),
         "{out}"

@@ -5,19 +5,19 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{bad, good, json};
+use common::{failure_of, json, stdout_of};
 use serde_json::Value;
 use tempfile::TempDir;
 
 const PURSUIT: &str = include_str!("../../../fixtures/scenario/pursuit.toml");
 
 /// Simulates runs of the scenario with a displayed target f_t.
-fn runs(at: &Path, scenario: &str, n: usize) -> Vec<String> {
+fn simulate_runs(at: &Path, scenario: &str, n: usize) -> Vec<String> {
     fs::write(at.join("task.toml"), scenario).unwrap();
     let of = |seed: usize| {
         let name = format!("run{seed}.csv");
         let seed = seed.to_string();
-        good(
+        stdout_of(
             at,
             &["simulate", "--scenario", "task.toml", "--seed", &seed, "--out", &name],
         );
@@ -32,11 +32,11 @@ fn of<'v>(parameters: &'v Value, name: &str) -> &'v Value {
 }
 
 /// Returns the deviation of an estimate from the true value, in standard errors.
-fn off(estimate: &Value, truth: f64) -> f64 {
+fn deviation(estimate: &Value, truth: f64) -> f64 {
     (estimate["value"].as_f64().unwrap() - truth) / estimate["standard_error"].as_f64().unwrap()
 }
 
-fn kinds(found: &Value) -> Vec<String> {
+fn finding_kinds(found: &Value) -> Vec<String> {
     let all = found["verdict"]["findings"].as_array().cloned().unwrap_or_default();
     all.iter()
         .filter_map(|f| Some(f["kind"].as_str()?.to_owned()))
@@ -46,7 +46,7 @@ fn kinds(found: &Value) -> Vec<String> {
 #[test]
 fn both_responses_are_found_and_one_input_is_doubtful() {
     let at = TempDir::new().unwrap();
-    let runs = runs(at.path(), PURSUIT, 3);
+    let runs = simulate_runs(at.path(), PURSUIT, 3);
     let files: Vec<&str> = runs.iter().map(String::as_str).collect();
     let element = ["--controlled-element", "1/s", "--intersample", "zoh", "--json"];
     let two = [
@@ -68,12 +68,12 @@ fn both_responses_are_found_and_one_input_is_doubtful() {
         (&channels[1]["parameters"], "K_d", 0.7),
         (&channels[1]["parameters"], "tau_f", -0.05),
     ] {
-        let off = off(of(parameters, name), truth);
+        let off = deviation(of(parameters, name), truth);
         assert!(off.abs() < 3.5, "{name} is off by {off} errors");
     }
     // Computed by hand: |2.2/omega| = 1, except for the effect of the neuromuscular system.
     let crossover = &two["open_loop"]["crossover_rad_s"];
-    assert!(off(crossover, 2.236).abs() < 3.5, "{crossover}");
+    assert!(deviation(crossover, 2.236).abs() < 3.5, "{crossover}");
 
     let one = json(at.path(), &[&["identify"][..], &files, &element].concat());
     assert_eq!(one["verdict"]["level"], "doubtful");
@@ -84,7 +84,7 @@ fn both_responses_are_found_and_one_input_is_doubtful() {
     );
     assert!(one.get("channels").is_none());
 
-    let text = good(
+    let text = stdout_of(
         at.path(),
         &[
             &["identify"][..],
@@ -109,11 +109,15 @@ fn hidden_target_has_no_response() {
     let start = PURSUIT.find("[feedforward]").unwrap();
     let end = PURSUIT.find("[disturbance]").unwrap();
     let compensatory = format!("{}{}", &PURSUIT[..start], &PURSUIT[end..]);
-    let runs = runs(at.path(), &compensatory, 2);
+    let runs = simulate_runs(at.path(), &compensatory, 2);
     let files: Vec<&str> = runs.iter().map(String::as_str).collect();
     let one = json(at.path(), &[&["identify"][..], &files, &["--json"]].concat());
-    assert!(!kinds(&one).contains(&"other-input".to_owned()), "{:?}", one["verdict"]);
-    let text = good(
+    assert!(
+        !finding_kinds(&one).contains(&"other-input".to_owned()),
+        "{:?}",
+        one["verdict"]
+    );
+    let text = stdout_of(
         at.path(),
         &[&["identify"][..], &files, &["--input", "e", "--input", "f_t"]].concat(),
     );
@@ -124,7 +128,7 @@ fn hidden_target_has_no_response() {
 fn target_without_disturbance_is_doubtful() {
     let at = TempDir::new().unwrap();
     let alone = PURSUIT.replace("interleaved = \"odd\"", "interleaved = \"odd\"\nrms = 0");
-    let runs = runs(at.path(), &alone, 1);
+    let runs = simulate_runs(at.path(), &alone, 1);
     let two = json(
         at.path(),
         &["identify", &runs[0], "--role", "f_t=feedforward:0.25", "--json"],
@@ -140,7 +144,7 @@ fn target_without_disturbance_is_doubtful() {
 #[test]
 fn invalid_inputs_are_refused_with_a_remedy() {
     let at = TempDir::new().unwrap();
-    let runs = runs(at.path(), PURSUIT, 1);
+    let runs = simulate_runs(at.path(), PURSUIT, 1);
     let run = runs[0].as_str();
     for (options, expected) in [
         (&["identify", run, "--input", "e", "--input", "q"][..], "no channel q"),
@@ -159,7 +163,7 @@ fn invalid_inputs_are_refused_with_a_remedy() {
             "use rls or rpem for f_t",
         ),
     ] {
-        let (_, message) = bad(at.path(), options);
+        let (_, message) = failure_of(at.path(), options);
         assert!(message.contains(expected), "{options:?}: {message}");
     }
 }
@@ -167,7 +171,7 @@ fn invalid_inputs_are_refused_with_a_remedy() {
 #[test]
 fn polynomials_with_two_inputs_are_identified() {
     let at = TempDir::new().unwrap();
-    let runs = runs(at.path(), PURSUIT, 1);
+    let runs = simulate_runs(at.path(), PURSUIT, 1);
     let run = runs[0].as_str();
     let orders = ["--orders", "na=2,nb=2,3", "--nk", "13,1"];
     let arx = [
@@ -198,7 +202,7 @@ fn polynomials_with_two_inputs_are_identified() {
         (&moved["channels"][0]["role"], &moved["channels"][1]["role"]),
         (&"feedback".into(), &"motion".into())
     );
-    let text = good(at.path(), &arx);
+    let text = stdout_of(at.path(), &arx);
     assert!(
         text.contains("ARX with the inputs e, f_t") && text.contains("b2[f_t]"),
         "{text}"
@@ -233,7 +237,7 @@ fn polynomials_with_two_inputs_are_identified() {
             options,
         ]
         .concat();
-        let (_, message) = bad(at.path(), &call);
+        let (_, message) = failure_of(at.path(), &call);
         assert!(message.contains(expected), "{options:?}: {message}");
     }
 }
@@ -243,12 +247,12 @@ fn group_reports_responses_to_further_inputs() {
     let at = TempDir::new().unwrap();
     let data = at.path().join("data");
     fs::create_dir(&data).unwrap();
-    for (n, name) in runs(&data, PURSUIT, 3).iter().enumerate() {
+    for (n, name) in simulate_runs(&data, PURSUIT, 3).iter().enumerate() {
         fs::rename(data.join(name), data.join(format!("P_seen_{n}.csv"))).unwrap();
     }
     let look = ["--excitation", "d", "--controlled-element", "1/s"];
     let role = ["--role", "f_t=feedforward:0.25"];
-    let (_, printed) = bad(
+    let (_, printed) = failure_of(
         at.path(),
         &[&["group", "init", "data"][..], &look, &["--role", "f_t=guess"]].concat(),
     );
@@ -256,7 +260,7 @@ fn group_reports_responses_to_further_inputs() {
         printed.contains("--role: roles: found \"f_t=guess\"") && printed.contains("feedforward"),
         "{printed}"
     );
-    good(at.path(), &[&["group", "init", "data"][..], &look, &role].concat());
+    stdout_of(at.path(), &[&["group", "init", "data"][..], &look, &role].concat());
     let manifest = fs::read_to_string(data.join("group.toml")).unwrap();
     assert!(manifest.contains("roles = [\"f_t=feedforward:0.25\"]"), "{manifest}");
     let group = json(at.path(), &["group", "data", "--out", "results", "--json"]);
@@ -268,14 +272,14 @@ fn group_reports_responses_to_further_inputs() {
     );
     for (name, truth) in [("K_d", 0.7), ("tau_f", -0.05)] {
         assert!(
-            off(&channel["parameters"][name], truth).abs() < 3.0,
+            deviation(&channel["parameters"][name], truth).abs() < 3.0,
             "{name}: {channel}"
         );
     }
     let crossover = &person["open_loop"]["crossover_rad_s"];
-    assert!(off(crossover, 2.2).abs() < 3.0, "{person}");
+    assert!(deviation(crossover, 2.2).abs() < 3.0, "{person}");
     // Models with one input would be wrong and are omitted, which does not count as a failure.
-    let kinds = kinds(&group);
+    let kinds = finding_kinds(&group);
     assert!(kinds.contains(&"one-input-models".to_owned()), "{kinds:?}");
     assert!(!kinds.contains(&"fits-failed".to_owned()), "{kinds:?}");
     let page = fs::read_to_string(at.path().join("results/report.html")).unwrap();
@@ -285,7 +289,7 @@ fn group_reports_responses_to_further_inputs() {
 #[test]
 fn omitted_displayed_target_is_reported() {
     let at = TempDir::new().unwrap();
-    let run = runs(at.path(), PURSUIT, 1).remove(0);
+    let run = simulate_runs(at.path(), PURSUIT, 1).remove(0);
     let text = fs::read_to_string(at.path().join(&run)).unwrap();
     fs::write(
         at.path().join("seen.csv"),
@@ -299,7 +303,7 @@ fn omitted_displayed_target_is_reported() {
             call.extend(["--out", "trace.csv"]);
         }
         let found = json(at.path(), &call);
-        assert!(kinds(&found).contains(&"displayed".to_owned()), "{command}");
+        assert!(finding_kinds(&found).contains(&"displayed".to_owned()), "{command}");
         assert_ne!(found["verdict"]["level"], "trustworthy", "{command}");
         assert!(
             found["verdict"].to_string().contains(role),
@@ -311,13 +315,13 @@ fn omitted_displayed_target_is_reported() {
         .into_iter()
         .chain(role.split(' '))
         .collect();
-    assert!(!kinds(&json(at.path(), &two)).contains(&"displayed".to_owned()));
+    assert!(!finding_kinds(&json(at.path(), &two)).contains(&"displayed".to_owned()));
 }
 
 #[test]
 fn recursion_tracks_both_responses() {
     let at = TempDir::new().unwrap();
-    let run = runs(at.path(), PURSUIT, 1).remove(0);
+    let run = simulate_runs(at.path(), PURSUIT, 1).remove(0);
     let two = [
         "track",
         &run,
@@ -347,7 +351,7 @@ fn recursion_tracks_both_responses() {
     let response = channels[1]["response"].as_array().unwrap();
     let gain = |k: usize| &response[k]["gain_db"];
     let truth = 20.0 * (0.7 * 4.0_f64).log10();
-    assert!(off(gain(1), truth).abs() < 3.0, "{} {truth}", gain(1));
+    assert!(deviation(gain(1), truth).abs() < 3.0, "{} {truth}", gain(1));
     assert!((gain(1)["value"].as_f64().unwrap() - gain(0)["value"].as_f64().unwrap() - 6.0).abs() < 1.5);
     let table = fs::read_to_string(at.path().join("trace.csv")).unwrap();
     let header = table.lines().find(|line| !line.starts_with('#')).unwrap();
@@ -361,7 +365,7 @@ fn recursion_tracks_both_responses() {
     ] {
         assert!(header.split(',').any(|column| column == name), "{name}: {header}");
     }
-    assert!(!kinds(&found).contains(&"displayed".to_owned()));
+    assert!(!finding_kinds(&found).contains(&"displayed".to_owned()));
 
     for (options, words) in [
         (&["--method", "rpem"][..], "give nk for each in samples"),
@@ -370,9 +374,9 @@ fn recursion_tracks_both_responses() {
         (&["--method", "rpem", "--nk", "0.2s,0.1s"], "one number of samples"),
         (&["--method", "rpem", "--nk", "14,1", "--validate", &run], "--validate"),
     ] {
-        let (_, message) = bad(at.path(), &[&two[..], options].concat());
+        let (_, message) = failure_of(at.path(), &[&two[..], options].concat());
         assert!(message.contains(words), "{options:?}: {message}");
     }
-    let (_, message) = bad(at.path(), &["track", &run, "--role", "f_t=feedforward"]);
+    let (_, message) = failure_of(at.path(), &["track", &run, "--role", "f_t=feedforward"]);
     assert!(message.contains("add it with --input"), "{message}");
 }

@@ -4,12 +4,12 @@
 
 mod common;
 
-use common::bad;
+use common::failure_of;
 
 #[test]
 fn error_names_the_missing_feature() {
     let directory = tempfile::TempDir::new().unwrap();
-    let (code, message) = bad(directory.path(), &["lab"]);
+    let (code, message) = failure_of(directory.path(), &["lab"]);
     assert_eq!(code, 2);
     assert!(message.contains("--features lab"), "{message}");
     assert!(!directory.path().join("hoid-lab").exists());

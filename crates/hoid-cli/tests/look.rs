@@ -8,14 +8,14 @@ use std::{fs, path::Path};
 
 use tempfile::TempDir;
 
-use common::{bad, good, hoid, json, wave, write};
+use common::{failure_of, hoid, json, stdout_of, wave, write_samples};
 
 /// An operator with an integrator, recorded as time, r, y and u. The recording has two periods of 20 s; it starts 3 s
 /// before the first period and stops 1 s after the last.
-fn recorded() -> TempDir {
+fn recording_folder() -> TempDir {
     let directory = TempDir::new().unwrap();
     let people = "simulate-group --people --subjects 1 --runs 1 --plants integrator --out people";
-    good(directory.path(), &people.split(' ').collect::<Vec<_>>());
+    stdout_of(directory.path(), &people.split(' ').collect::<Vec<_>>());
     let text = fs::read_to_string(directory.path().join("people/S1_integrator_1.csv")).unwrap();
     let rows: Vec<Vec<f64>> = text
         .lines()
@@ -41,18 +41,18 @@ fn words(line: &str) -> Vec<&str> {
 }
 
 /// Returns the arguments of a displayed command.
-fn shown<'a>(text: &'a str, verb: &str) -> Vec<&'a str> {
+fn displayed_arguments<'a>(text: &'a str, verb: &str) -> Vec<&'a str> {
     let at = text.find(&format!("hoid {verb} ")).unwrap();
     words(text[at..].lines().next().unwrap()).split_off(1)
 }
 
 #[test]
 fn info_and_identify_read_the_file_alike() {
-    let directory = recorded();
+    let directory = recording_folder();
     let at = directory.path();
     let file = "runs/A_so_1.csv";
-    let printed = good(at, &["info", file]);
-    let next = shown(&printed, "identify");
+    let printed = stdout_of(at, &["info", file]);
+    let next = displayed_arguments(&printed, "identify");
     assert_eq!(
         next,
         words("identify runs/A_so_1.csv --input r-y --output u --from 3 --to 43"),
@@ -68,7 +68,7 @@ fn info_and_identify_read_the_file_alike() {
     );
     assert!((look["excitation"]["period_s"].as_f64().unwrap() - 20.0).abs() < 1e-6);
 
-    good(at, &["group", "init", "runs"]);
+    stdout_of(at, &["group", "init", "runs"]);
     let manifest: toml::Table = toml::from_str(&fs::read_to_string(at.join("runs/group.toml")).unwrap()).unwrap();
     let read = &manifest["read"];
     assert_eq!(
@@ -88,21 +88,21 @@ fn info_and_identify_read_the_file_alike() {
         ("track", &["--out", "trace.csv"]),
     ] {
         let typed = [&[verb, file][..], more].concat();
-        let (code, message) = bad(at, &typed);
+        let (code, message) = failure_of(at, &typed);
         let expected =
             "there is no column e in runs/A_so_1.csv (columns: t, r, y, u). It looks like e = r-y and u = u: ";
         assert!(code == 1 && message.contains(expected), "{message}");
-        let command = shown(&message, verb);
+        let command = displayed_arguments(&message, verb);
         assert_eq!(command, [&typed[..], &["--input", "r-y", "--output", "u"]].concat());
         let found = json(at, &[&command[..], &["--from", "3", "--to", "43", "--json"]].concat());
         assert_eq!(found["records"][0]["samples"], 2400, "{verb}");
     }
     // Given values are replaced; for an unknown name a similar one is searched for.
-    let (_, message) = bad(at, &["identify", file, "--input", "R"]);
+    let (_, message) = failure_of(at, &["identify", file, "--input", "R"]);
     assert!(message.contains("did you mean \"r\"?"), "{message}");
-    let (_, message) = bad(at, &["identify", file, "--input=e", "--output", "u"]);
+    let (_, message) = failure_of(at, &["identify", file, "--input=e", "--output", "u"]);
     assert_eq!(
-        shown(&message, "identify"),
+        displayed_arguments(&message, "identify"),
         words("identify runs/A_so_1.csv --input r-y --output u")
     );
 }
@@ -111,7 +111,7 @@ fn info_and_identify_read_the_file_alike() {
 fn uncertain_columns_are_not_guessed() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    common::write(at, "two.csv", "t,r,target,y,u", 300, |k| {
+    common::write_samples(at, "two.csv", "t,r,target,y,u", 300, |k| {
         format!(
             "{},{},{},{},{}",
             k as f64 / 100.0,
@@ -121,9 +121,9 @@ fn uncertain_columns_are_not_guessed() {
             k % 3
         )
     });
-    common::write(at, "none.csv", "a,b", 9, |k| format!("{k},{}", k * k));
-    common::write(at, "empty.csv", "t,e,u", 0, |_| String::new());
-    let (_, message) = bad(at, &["identify", "two.csv"]);
+    common::write_samples(at, "none.csv", "a,b", 9, |k| format!("{k},{}", k * k));
+    common::write_samples(at, "empty.csv", "t,e,u", 0, |_| String::new());
+    let (_, message) = failure_of(at, &["identify", "two.csv"]);
     assert!(
         message.contains("has no column \"e\"") && !message.contains("looks like"),
         "{message}"
@@ -131,23 +131,23 @@ fn uncertain_columns_are_not_guessed() {
     for file in ["two.csv", "none.csv"] {
         let look = json(at, &["info", file, "--json"])["look"].clone();
         assert!(look["next"].is_null(), "{look}");
-        assert!(good(at, &["info", file]).contains("--input COLUMN --output COLUMN"));
+        assert!(stdout_of(at, &["info", file]).contains("--input COLUMN --output COLUMN"));
         // If the columns are given, they are read.
         let columns = ["info", file, "--input", "y", "--output", "b"];
-        assert!(!good(at, &columns).contains("not found"));
+        assert!(!stdout_of(at, &columns).contains("not found"));
     }
     let named = ["info", "two.csv", "--input", "r-y", "--excitation", "none"];
-    let printed = good(at, &named);
+    let printed = stdout_of(at, &named);
     assert!(
         printed.contains("excitation  as requested") && printed.contains("Next: hoid identify two.csv --input r-y")
     );
-    let (code, _) = bad(at, &["info", "empty.csv"]);
+    let (code, _) = failure_of(at, &["info", "empty.csv"]);
     assert_eq!(code, 1);
 }
 
 /// Returns the number of samples (at 60 Hz) in the longest fitted span of a group, and the estimates of its first
 /// person with their standard errors.
-fn of_group(at: &Path, manifest: &str) -> (f64, Vec<(f64, f64)>) {
+fn group_estimates(at: &Path, manifest: &str) -> (f64, Vec<(f64, f64)>) {
     fs::write(at.join("runs/group.toml"), manifest).unwrap();
     let _ = fs::remove_dir_all(at.join("out"));
     let found = json(at, &["group", "runs", "--out", "out", "--csv", "--json"]);
@@ -173,7 +173,7 @@ fn pairs(parameters: &serde_json::Value) -> Vec<(f64, f64)> {
 
 #[test]
 fn whole_periods_are_kept_with_an_offset() {
-    let directory = recorded();
+    let directory = recording_folder();
     let at = directory.path();
     let span = words("--input r-y --from 3 --to 43 --offset u=1 --json");
     let found = json(at, &[&["identify", "runs/A_so_1.csv"][..], &span].concat());
@@ -184,7 +184,7 @@ fn whole_periods_are_kept_with_an_offset() {
     let of_condition = "[conditions.so]\nexcitation = \"r\"\noffset_samples = 1.0\n";
     let prepared = "[prepare]\noffset = { u = 1 }\n[conditions.so]\nexcitation = \"r\"\n";
     for offset in [of_condition, prepared] {
-        let (samples, of_group) = of_group(at, &format!("{head}{offset}{run}"));
+        let (samples, of_group) = group_estimates(at, &format!("{head}{offset}{run}"));
         assert_eq!(samples, 2400.0);
         for (one, other) in of_identify.iter().zip(&of_group) {
             assert!(
@@ -202,7 +202,7 @@ fn whole_periods_are_kept_with_an_offset() {
 
 #[test]
 fn delay_in_seconds_equals_nk() {
-    let directory = common::simulated();
+    let directory = common::simulated_run();
     let at = directory.path();
     let fit = |delay: &[&str]| {
         let typed = words("identify c1.csv --structure bj --orders nd=1 --json");
@@ -230,7 +230,7 @@ fn delay_in_seconds_equals_nk() {
         (&["--delay", ".4...3"], "as 0.1..0.4"),
         (&["--delay", "inf"], "as 0.1..0.4"),
     ] {
-        let (code, message) = bad(at, &[&["identify", "c1.csv"][..], wrong].concat());
+        let (code, message) = failure_of(at, &[&["identify", "c1.csv"][..], wrong].concat());
         assert!(
             code == 2 && (message.contains(expected) || message.contains("unexpected")),
             "{message}"
@@ -250,14 +250,14 @@ fn info_interprets_cells_like_the_reader() {
         ("abc", false),
         ("Inf", false),
     ] {
-        write(d, "cells.csv", "t,e,u", 3000, |k| {
+        write_samples(d, "cells.csv", "t,e,u", 3000, |k| {
             let (t, e, u) = wave(k);
             match k {
                 700 => format!("{t},{cell},{u}"),
                 _ => format!("{t},{e},{u}"),
             }
         });
-        let info = good(d, &["info", "cells.csv"]);
+        let info = stdout_of(d, &["info", "cells.csv"]);
         let fill = [
             "identify",
             "cells.csv",

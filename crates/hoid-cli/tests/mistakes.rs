@@ -8,13 +8,13 @@ use std::fs;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, json, row, simulated, wave, write};
+use common::{failure_of, json, row, simulated_run, stdout_of, wave, write_samples};
 
 #[test]
 fn info_describes_the_columns() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    write(at, "run.csv", "t,e,u,k", 200, |k| {
+    write_samples(at, "run.csv", "t,e,u,k", 200, |k| {
         let (t, e, u) = wave(k);
         let t = if k < 150 { t } else { t + 0.05 };
         format!("{t},{:.1},{},7", e, u.min(0.6))
@@ -39,7 +39,7 @@ fn info_describes_the_columns() {
     assert!((column("e")["quantum"].as_f64().unwrap() - 0.1).abs() < 1e-9);
     assert!(column("u")["saturated_high"].as_u64().unwrap() > 10 && column("u")["quantum"].is_null());
     assert_eq!(column("k")["constant"], true);
-    let text = good(at, &["info", "run.csv"]);
+    let text = stdout_of(at, &["info", "run.csv"]);
     for words in [
         "CSV, 4 columns",
         "1 gap (5 samples",
@@ -51,39 +51,43 @@ fn info_describes_the_columns() {
         assert!(text.contains(words), "{words}: {text}");
     }
     fs::write(at.join("bad.mat"), "t,e,u").unwrap();
-    assert!(bad(at, &["info", "bad.mat"]).1.contains("is not in MATLAB format"));
+    assert!(
+        failure_of(at, &["info", "bad.mat"])
+            .1
+            .contains("is not in MATLAB format")
+    );
 }
 
 #[test]
 fn bad_input_is_reported_in_plain_words() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     let n = 400;
     fs::write(d.join("empty.csv"), "").unwrap();
-    write(d, "nocolumn.csv", "t,e,y", n, row);
-    write(d, "text.csv", "t,e,u", n, |k| {
+    write_samples(d, "nocolumn.csv", "t,e,y", n, row);
+    write_samples(d, "text.csv", "t,e,u", n, |k| {
         if k == 7 { "0.07,abc,1".to_owned() } else { row(k) }
     });
-    write(d, "nan.csv", "t,e,u", n, |k| {
+    write_samples(d, "nan.csv", "t,e,u", n, |k| {
         if k == 8 { "0.08,NaN,1".to_owned() } else { row(k) }
     });
-    write(d, "inf.csv", "t,e,u", n, |k| {
+    write_samples(d, "inf.csv", "t,e,u", n, |k| {
         if k == 9 { "0.09,1,inf".to_owned() } else { row(k) }
     });
-    write(d, "gap.csv", "t,e,u", n, |k| row(if k > 50 { k + 20 } else { k }));
-    write(d, "jitter.csv", "t,e,u", n, |k| {
+    write_samples(d, "gap.csv", "t,e,u", n, |k| row(if k > 50 { k + 20 } else { k }));
+    write_samples(d, "jitter.csv", "t,e,u", n, |k| {
         let (t, e, u) = wave(k);
         format!("{},{e},{u}", t + 0.003 * (k as f64 * 2.3).sin())
     });
-    write(d, "short.csv", "t,e,u", 33, row);
-    write(d, "zero.csv", "t,e,u", n, |k| format!("{},{},0", wave(k).0, wave(k).1));
-    write(d, "constant.csv", "t,e,u", n, |k| {
+    write_samples(d, "short.csv", "t,e,u", 33, row);
+    write_samples(d, "zero.csv", "t,e,u", n, |k| format!("{},{},0", wave(k).0, wave(k).1));
+    write_samples(d, "constant.csv", "t,e,u", n, |k| {
         format!("{},2.5,{}", wave(k).0, wave(k).2)
     });
-    write(d, "slow.csv", "t,e,u", n, |k| {
+    write_samples(d, "slow.csv", "t,e,u", n, |k| {
         format!("{},{},{}", 2.0 * wave(k).0, wave(k).1, wave(k).2)
     });
-    write(d, "one.csv", "t,e,u", n, row);
+    write_samples(d, "one.csv", "t,e,u", n, row);
     let cases: [(&[&str], &[&str]); 17] = [
         (&["empty.csv"], &["empty.csv", "empty"]),
         (&["absent.csv"], &["absent.csv", "cannot be read"]),
@@ -126,7 +130,7 @@ fn bad_input_is_reported_in_plain_words() {
             all.truncate(1);
         }
         all.extend(arguments);
-        let (code, message) = bad(d, &all);
+        let (code, message) = failure_of(d, &all);
         let usage = message.contains("--start lacks");
         assert_eq!(code, if usage { 2 } else { 1 }, "{arguments:?}: {message}");
         for part in expected {
@@ -137,7 +141,7 @@ fn bad_input_is_reported_in_plain_words() {
 
 #[test]
 fn wrong_usage_exits_with_two() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     for arguments in [
         &["identify"][..],
@@ -174,7 +178,7 @@ fn wrong_usage_exits_with_two() {
         &["margins"],
         &["nonsense"],
     ] {
-        let (code, message) = bad(d, arguments);
+        let (code, message) = failure_of(d, arguments);
         assert_eq!(code, 2, "{arguments:?}: {message}");
     }
 }
@@ -196,11 +200,11 @@ fn invalid_simulations_exit_with_one_and_write_nothing() {
     ] {
         let mut all = vec!["simulate", "--condition", "C1", "--out", "x.csv"];
         all.extend(arguments);
-        let (code, message) = bad(d, &all);
+        let (code, message) = failure_of(d, &all);
         assert_eq!(code, 1, "{arguments:?}: {message}");
         assert!(message.contains(expected), "{arguments:?}: {message}");
     }
-    let (code, _) = bad(d, &["simulate", "--condition", "C1", "--out", "no/such/place.csv"]);
+    let (code, _) = failure_of(d, &["simulate", "--condition", "C1", "--out", "no/such/place.csv"]);
     assert_eq!(code, 1);
 }
 
@@ -215,13 +219,13 @@ fn json_lines_and_matlab_headers_are_handled() {
     let lines = |of: &dyn Fn((f64, f64, f64)) -> String| (0..1000).map(|k| of(row(k)) + "\n").collect::<String>();
     let json = lines(&|(t, e, u)| format!("{{\"t\": {t}, \"e\": {e}, \"u\": {u}}}"));
     std::fs::write(d.join("lines.txt"), json).unwrap();
-    let (code, message) = bad(d, &["identify", "lines.txt"]);
+    let (code, message) = failure_of(d, &["identify", "lines.txt"]);
     assert!(
         code > 0 && message.contains("lines.txt holds JSON, expected a table"),
         "{message}"
     );
     let matlab = lines(&|(t, e, u)| format!("  {t:.2}  {e:.6}  {u:.6}"));
     std::fs::write(d.join("saved.txt"), format!("% t e u\n{matlab}")).unwrap();
-    let shown = good(d, &["info", "saved.txt"]);
+    let shown = stdout_of(d, &["info", "saved.txt"]);
     assert!(shown.contains("t: 1000 rows from 0 to 9.99 s"), "{shown}");
 }

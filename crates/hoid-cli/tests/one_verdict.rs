@@ -8,10 +8,10 @@ use std::{collections::BTreeSet, fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{good, json_with_any_exit_code};
+use common::{json_with_any_exit_code, stdout_of};
 
 const ELEMENT: &str = "90/(s(s+6))";
-const ROWS: usize = 4096;
+const ROW_COUNT: usize = 4096;
 
 type Rows = Vec<[f64; 2]>;
 /// Name of a fault, and the function that adds it to a recording.
@@ -40,16 +40,16 @@ const CORRUPTIONS: [Corruption; 9] = [
     }),
     ("reversed", |rows| rows.iter_mut().for_each(|row| row[0] = -row[0])),
     ("late", |rows| {
-        for k in (20..ROWS).rev() {
+        for k in (20..ROW_COUNT).rev() {
             rows[k][1] = rows[k - 20][1];
         }
     }),
     ("stepped", |rows| rows[2500..].iter_mut().for_each(|row| row[1] += 0.3)),
 ];
 
-fn simulated(at: &Path, seed: usize) -> Rows {
+fn simulated_rows(at: &Path, seed: usize) -> Rows {
     let seed = seed.to_string();
-    good(
+    stdout_of(
         at,
         &["simulate", "--condition", "C1", "--seed", &seed, "--out", "run.csv"],
     );
@@ -61,12 +61,12 @@ fn simulated(at: &Path, seed: usize) -> Rows {
         let cells: Vec<&str> = line.split(',').collect();
         columns.map(|c| cells[c].parse().unwrap())
     };
-    lines.take(ROWS).map(row).collect()
+    lines.take(ROW_COUNT).map(row).collect()
 }
 
 /// Writes two runs of each person as files of a group.
-fn people(at: &Path) {
-    let runs = [simulated(at, 1), simulated(at, 2)];
+fn write_people(at: &Path) {
+    let runs = [simulated_rows(at, 1), simulated_rows(at, 2)];
     fs::create_dir(at.join("people")).unwrap();
     for (name, spoil) in CORRUPTIONS {
         for (k, run) in runs.iter().enumerate() {
@@ -90,8 +90,8 @@ fn strings(of: &Value) -> Vec<&str> {
 fn group_findings_match_identify_word_for_word() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    people(at);
-    good(at, &["group", "init", "people", "--controlled-element", ELEMENT]);
+    write_people(at);
+    stdout_of(at, &["group", "init", "people", "--controlled-element", ELEMENT]);
     let found = json_with_any_exit_code(at, &["group", "people", "--out", "out", "--json"]);
     let all = found["people"].as_array().unwrap();
     assert_eq!(all.len(), CORRUPTIONS.len());
@@ -134,7 +134,7 @@ fn group_findings_match_identify_word_for_word() {
 fn duplicated_run_is_refused_by_both_commands() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    people(at);
+    write_people(at);
     let inside = at.join("people");
     for file in fs::read_dir(&inside).unwrap().map(|entry| entry.unwrap().path()) {
         if !file.ends_with("clean_C1_1.csv") {
@@ -142,7 +142,7 @@ fn duplicated_run_is_refused_by_both_commands() {
         }
     }
     fs::copy(inside.join("clean_C1_1.csv"), inside.join("clean_C1_2.csv")).unwrap();
-    good(at, &["group", "init", "people"]);
+    stdout_of(at, &["group", "init", "people"]);
     let found = json_with_any_exit_code(at, &["group", "people", "--out", "out", "--json"]);
     let alone = common::hoid(&inside, &["identify", "clean_C1_1.csv", "clean_C1_2.csv"]);
     assert_eq!(alone.status.code(), Some(2));

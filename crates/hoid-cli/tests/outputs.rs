@@ -13,14 +13,14 @@ use tempfile::TempDir;
 
 use hoid::model::numbers::with_uncertainty;
 
-use common::{bad, good, hoid, json, simulated};
+use common::{failure_of, hoid, json, simulated_run, stdout_of};
 
 /// Returns a folder with a simulated run `in.csv`, a group `g` of two runs, and a plan.
 fn workplace() -> TempDir {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    good(d, &["simulate", "--condition", "C1", "--seed", "1", "--out", "in.csv"]);
-    good(
+    stdout_of(d, &["simulate", "--condition", "C1", "--seed", "1", "--out", "in.csv"]);
+    stdout_of(
         d,
         &[
             "simulate-group",
@@ -61,7 +61,7 @@ fn output_that_is_an_input_is_refused() {
         names.push("soft.csv");
     }
     for name in names {
-        let (code, message) = bad(d, &["track", "in.csv", "--method", "rls", "--nk", "29", "--out", name]);
+        let (code, message) = failure_of(d, &["track", "in.csv", "--method", "rls", "--nk", "29", "--out", name]);
         assert_eq!(code, 2, "{message}");
         assert!(
             message.contains("of this command and would be overwritten"),
@@ -81,7 +81,7 @@ fn output_that_is_an_input_is_refused() {
     all.push(vec!["group", "g", "--out", "g"]);
     all.push(vec!["group", "g/group.toml", "--out", "g"]);
     for arguments in all {
-        let (code, message) = bad(d, &arguments);
+        let (code, message) = failure_of(d, &arguments);
         assert_eq!(code, 2, "{arguments:?}: {message}");
         assert!(message.contains("of this command"), "{arguments:?}: {message}");
     }
@@ -98,14 +98,14 @@ fn unwritable_outputs_are_refused_before_the_work() {
         &["identify", "in.csv", "--report", "in.csv/below"],
         &["simulate", "--condition", "C1", "--out", "no/run.csv"],
     ] {
-        let (code, message) = bad(d, arguments);
+        let (code, message) = failure_of(d, arguments);
         assert_eq!(code, 1, "{message}");
         assert!(message.contains("cannot be written"), "{message}");
     }
 }
 
 /// Returns each command that prints, with arguments for which it is fast.
-fn printing() -> Vec<Vec<&'static str>> {
+fn printing_commands() -> Vec<Vec<&'static str>> {
     let mut identify = vec!["identify", "in.csv"];
     identify.extend(FIT_OPTIONS);
     let mut as_json = identify.clone();
@@ -172,7 +172,7 @@ fn printing() -> Vec<Vec<&'static str>> {
 }
 
 /// Returns exit code and standard error of a command with redirected output.
-fn printed_into(directory: &Path, arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
+fn run_redirected(directory: &Path, arguments: &[&str], out: Stdio) -> (Option<i32>, String) {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
         .current_dir(directory)
@@ -187,9 +187,9 @@ fn printed_into(directory: &Path, arguments: &[&str], out: Stdio) -> (Option<i32
 #[test]
 fn full_output_is_an_error_of_every_command() {
     let directory = workplace();
-    for arguments in printing() {
+    for arguments in printing_commands() {
         let full = fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let (code, message) = printed_into(directory.path(), &arguments, full.into());
+        let (code, message) = run_redirected(directory.path(), &arguments, full.into());
         assert_eq!(code, Some(1), "{arguments:?}: {message}");
         assert!(
             message.contains("standard output cannot be written: No space left"),
@@ -210,10 +210,10 @@ fn full_output_is_an_error_of_every_command() {
 #[test]
 fn closed_output_pipe_does_not_abort_the_work() {
     let directory = workplace();
-    for arguments in printing() {
+    for arguments in printing_commands() {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
-        let (code, message) = printed_into(directory.path(), &arguments, writer.into());
+        let (code, message) = run_redirected(directory.path(), &arguments, writer.into());
         assert!(
             !message.contains("panicked") && !message.contains("pipe"),
             "{arguments:?}: {message}"
@@ -265,7 +265,7 @@ fn stale_temporary_files_are_removed() {
     let directory = workplace();
     let d = directory.path();
     fs::write(d.join(".hoid-Xy12ab.part"), "half a file").unwrap();
-    good(d, &["simulate", "--condition", "C1", "--out", "run.csv"]);
+    stdout_of(d, &["simulate", "--condition", "C1", "--out", "run.csv"]);
     assert!(!d.join(".hoid-Xy12ab.part").exists());
 }
 
@@ -341,7 +341,7 @@ fn signals_exit_with_their_code_and_leave_no_files() {
 /// A table for a paper contains the same estimates, standard errors and intervals as the JSON.
 #[test]
 fn table_for_a_paper_matches_the_json() {
-    let directory = simulated();
+    let directory = simulated_run();
     let d = directory.path();
     let identify = ["identify", "c1.csv", "--controlled-element", "90/(s(s+6))", "--json"];
     let found = json(d, &[&identify, ["--table", "c1.tex"].as_slice()].concat());
@@ -353,18 +353,18 @@ fn table_for_a_paper_matches_the_json() {
         "{latex}"
     );
     assert!(latex.contains("$\\omega_\\mathrm{c}$") && latex.ends_with("\\bottomrule\n\\end{tabular}\n"));
-    good(d, &["describe", "c1.csv", "--excitation", "f_t", "--table", "lines.md"]);
+    stdout_of(d, &["describe", "c1.csv", "--excitation", "f_t", "--table", "lines.md"]);
     let lines = fs::read_to_string(d.join("lines.md")).unwrap();
     assert!(
         lines.contains("| omega_rad_s | gain_db | phase_deg |") && lines.lines().count() == 13,
         "{lines}"
     );
-    good(d, &["track", "c1.csv", "--out", "trace.csv", "--table", "last.csv"]);
+    stdout_of(d, &["track", "c1.csv", "--out", "trace.csv", "--table", "last.csv"]);
     let last = fs::read_to_string(d.join("last.csv")).unwrap();
     assert!(
         last.contains("quantity,value,standard_error,low,high,unit,verdict\nK_e,"),
         "{last}"
     );
-    let (_, refused) = bad(d, &["identify", "c1.csv", "--table", "c1.docx"]);
+    let (_, refused) = failure_of(d, &["identify", "c1.csv", "--table", "c1.docx"]);
     assert!(refused.contains(".tex, .md, .csv"), "{refused}");
 }

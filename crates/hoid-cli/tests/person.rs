@@ -3,14 +3,14 @@
 
 mod common;
 
-use common::{bad, good, hoid, json};
+use common::{failure_of, hoid, json, stdout_of};
 use serde_json::Value;
 use tempfile::TempDir;
 
 /// Simulates five runs with the element 1/s of one virtual person, who has a lag and a lead.
 fn runs() -> TempDir {
     let directory = TempDir::new().unwrap();
-    good(
+    stdout_of(
         directory.path(),
         &[
             "simulate-group",
@@ -32,7 +32,7 @@ fn runs() -> TempDir {
     directory
 }
 
-fn files(directory: &TempDir) -> Vec<String> {
+fn file_names(directory: &TempDir) -> Vec<String> {
     let mut all: Vec<String> = std::fs::read_dir(directory.path().join("people"))
         .unwrap()
         .map(|f| f.unwrap().file_name().into_string().unwrap())
@@ -52,7 +52,7 @@ fn of<'v>(found: &'v Value, name: &str) -> &'v Value {
 fn operator_is_identified_with_defaults() {
     let directory = runs();
     let at = directory.path();
-    let files = files(&directory);
+    let files = file_names(&directory);
     let mut arguments = vec!["identify"];
     arguments.extend(files.iter().map(String::as_str));
     arguments.extend(["--excitation", "d", "--controlled-element", "1/s"]);
@@ -133,7 +133,7 @@ fn operator_is_identified_with_defaults() {
     assert!(sources.iter().all(|p| p["source"] == "person.json") && !sources.is_empty());
     assert!(of(&one, "T_L")["prior_share"].as_f64().unwrap() > 0.0);
 
-    let page = good(
+    let page = stdout_of(
         at,
         &[&arguments[..], &["--figure", "person.svg", "--report", "out", "-v"]].concat(),
     );
@@ -180,14 +180,14 @@ fn unrelated_signals_are_not_determined() {
     assert_eq!(output.status.code(), Some(1));
     // A person without a response, and a person without data.
     std::fs::write(at.join("still.csv"), "t,e,u\n0,1,2\n0.1,1,2\n0.2,1,2\n").unwrap();
-    let (code, message) = bad(at, &["identify", "still.csv"]);
+    let (code, message) = failure_of(at, &["identify", "still.csv"]);
     assert_eq!(code, 1, "{message}");
-    let (code, message) = bad(
+    let (code, message) = failure_of(
         at,
         &["identify", "noise.csv", "--form", "lead", "--neuromuscular", "no"],
     );
     assert_eq!(code, 1, "{message}");
-    let (code, _) = bad(at, &["identify", "noise.csv", "--individual", "K_q"]);
+    let (code, _) = failure_of(at, &["identify", "noise.csv", "--individual", "K_q"]);
     assert_eq!(code, 2);
     // Without lines, the figure shows the response; for a changing operator there is no figure.
     let output = hoid(at, &["identify", "noise.csv", "--figure", "a.svg"]);
@@ -201,6 +201,6 @@ fn unrelated_signals_are_not_determined() {
         "--figure",
         "b.svg",
     ];
-    let (code, message) = bad(at, &changing);
+    let (code, message) = failure_of(at, &changing);
     assert_eq!(code, 2, "{message}");
 }

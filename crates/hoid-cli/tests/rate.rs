@@ -15,7 +15,7 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, hoid, json};
+use common::{failure_of, hoid, json, stdout_of};
 
 /// Simulates a run of C1, or of a person with an element, at the given rate in Hz.
 fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
@@ -49,11 +49,11 @@ fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     } else {
         &["--scenario", "person.toml"]
     };
-    good(at, &[&["simulate", "--seed", &seed, "--out", &file], who].concat());
+    stdout_of(at, &[&["simulate", "--seed", &seed, "--out", &file], who].concat());
     file
 }
 
-fn pair(found: &Value) -> (f64, f64) {
+fn value_and_error(found: &Value) -> (f64, f64) {
     (
         found["value"].as_f64().unwrap(),
         found["standard_error"].as_f64().unwrap(),
@@ -77,9 +77,9 @@ fn operator_at_1000_hz_matches_100_hz() {
         let numbers = |result: &Value| {
             let open_loop = &result["open_loop"];
             [
-                pair(&open_loop["crossover_rad_s"]),
-                pair(&open_loop["phase_margin_deg"]),
-                pair(&result["operator"]["tau_e"]),
+                value_and_error(&open_loop["crossover_rad_s"]),
+                value_and_error(&open_loop["phase_margin_deg"]),
+                value_and_error(&result["operator"]["tau_e"]),
             ]
         };
         let (fast, slow) = (numbers(&found[0]), numbers(&found[1]));
@@ -103,7 +103,7 @@ fn operator_at_1000_hz_matches_100_hz() {
         assert!((of("input_lead_s") - 0.0045).abs() < 1e-12);
         assert_eq!(found[1]["records"][0]["preparation"].as_array().unwrap().len(), 0);
     }
-    let page = good(at, &["identify", "C1-1000-1.csv"]);
+    let page = stdout_of(at, &["identify", "C1-1000-1.csv"]);
     assert!(
         page.contains("1000 Hz, filtered and decimated by 10 to 100 Hz"),
         "{page}"
@@ -140,7 +140,7 @@ fn describing_function_does_not_depend_on_the_rate() {
         // Without the correction, the lead of the input would be .0045 s, which is 1 deg at 4 rad/s.
         assert!(distance("gain_db") < 0.02 && distance("phase_deg") < 0.1, "{a} {b}");
     }
-    let page = good(at, &["describe", &file]);
+    let page = stdout_of(at, &["describe", &file]);
     assert!(page.contains("filtered and decimated by 10"), "{page}");
 }
 
@@ -214,13 +214,13 @@ fn common_rates_are_decimated() {
         assert!((ts * hz - f64::from(factor)).abs() < 1e-6, "{hz}: {ts}");
     }
     let file = simulate(at, "gain", 1000.0, 1);
-    let (code, message) = bad(at, &["identify", &file, "--to", "0.1"]);
+    let (code, message) = failure_of(at, &["identify", &file, "--to", "0.1"]);
     assert!(
         code == 1 && message.contains("found 100 samples for a filter"),
         "{message}"
     );
     for wrong in ["0", "on", "-3", "2.5"] {
-        let (code, message) = bad(at, &["identify", &file, &format!("--decimate={wrong}")]);
+        let (code, message) = failure_of(at, &["identify", &file, &format!("--decimate={wrong}")]);
         assert!(code == 2 && message.contains("expected auto, off"), "{message}");
     }
     // The record is cut at a gap, and each part is decimated.

@@ -5,11 +5,11 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{bad, good, hoid, json, json_with_any_exit_code};
+use common::{failure_of, hoid, json, json_with_any_exit_code, stdout_of};
 use serde_json::Value;
 use tempfile::TempDir;
 
-const FIT: [&str; 8] = [
+const FIT_OPTIONS: [&str; 8] = [
     "--structure",
     "arx",
     "--orders",
@@ -21,10 +21,10 @@ const FIT: [&str; 8] = [
 ];
 
 /// Writes a simulated run with e in rad, u recorded two samples late, and t from 100 s on; `row` modifies the rows.
-fn recorded(row: impl Fn(usize, [f64; 3]) -> Vec<[f64; 3]>) -> TempDir {
+fn recording_folder(row: impl Fn(usize, [f64; 3]) -> Vec<[f64; 3]>) -> TempDir {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    good(
+    stdout_of(
         at,
         &["simulate", "--condition", "C1", "--seed", "3", "--out", "clean.csv"],
     );
@@ -56,12 +56,12 @@ fn parameters(found: &Value) -> Vec<f64> {
 }
 
 fn identify(at: &Path, options: &[&str]) -> Value {
-    json_with_any_exit_code(at, &[&["identify"], options, &FIT[..]].concat())
+    json_with_any_exit_code(at, &[&["identify"], options, &FIT_OPTIONS[..]].concat())
 }
 
 #[test]
 fn preparation_steps_are_reported_in_every_format() {
-    let directory = recorded(|_, values| vec![values]);
+    let directory = recording_folder(|_, values| vec![values]);
     let at = directory.path();
     let plain = json(
         at,
@@ -107,7 +107,7 @@ fn preparation_steps_are_reported_in_every_format() {
     for (a, b) in parameters(&found).iter().zip(parameters(&plain)) {
         assert!((a - b).abs() < 1e-7 * b.abs() + 1e-9, "{a} {b}");
     }
-    let text = good(
+    let text = stdout_of(
         at,
         &[
             "identify",
@@ -168,7 +168,7 @@ fn preparation_steps_are_reported_in_every_format() {
 #[test]
 fn data_faults_are_shown_and_repaired_only_on_request() {
     // Every five hundredth row is duplicated, 20 rows are missing, and u is clipped.
-    let directory = recorded(|k, [t, e, u]| {
+    let directory = recording_folder(|k, [t, e, u]| {
         let values = [t, e, u.clamp(-0.15, 0.15)];
         match k {
             2500..2520 => vec![],
@@ -191,7 +191,7 @@ fn data_faults_are_shown_and_repaired_only_on_request() {
         (&Value::from(20), &Value::from(20))
     );
     assert!((gap["places"][0]["from_s"].as_f64().unwrap() - 124.99).abs() < 1e-9);
-    let text = good(at, &["info", "run.csv"]);
+    let text = stdout_of(at, &["info", "run.csv"]);
     for words in [
         "Problems:",
         "7 rows are duplicated, including the time",
@@ -202,9 +202,9 @@ fn data_faults_are_shown_and_repaired_only_on_request() {
         assert!(text.contains(words), "{words}: {text}");
     }
     // Data are repaired only on request.
-    let (code, message) = bad(at, &["identify", "run.csv"]);
+    let (code, message) = failure_of(at, &["identify", "run.csv"]);
     assert!(code == 1 && message.contains("expected increasing time"), "{message}");
-    let (code, message) = bad(at, &["identify", "run.csv", "--drop-repeated"]);
+    let (code, message) = failure_of(at, &["identify", "run.csv", "--drop-repeated"]);
     assert!(code == 1 && message.contains("missing samples"), "{message}");
     let masked = identify(at, &["--drop-repeated", "--mask", "gap"]);
     let records = masked["records"].as_array().unwrap();
@@ -225,7 +225,7 @@ fn data_faults_are_shown_and_repaired_only_on_request() {
     assert_eq!(records[0]["trouble"].as_array().unwrap().len(), 4);
     let resampled = hoid(
         at,
-        &[&["identify"], &["--drop-repeated", "--resample"][..], &FIT[..]].concat(),
+        &[&["identify"], &["--drop-repeated", "--resample"][..], &FIT_OPTIONS[..]].concat(),
     );
     let complaints = String::from_utf8(resampled.stderr).unwrap();
     assert!(complaints.contains("warning: run.csv: u stays at its"), "{complaints}");
@@ -233,7 +233,7 @@ fn data_faults_are_shown_and_repaired_only_on_request() {
 
 #[test]
 fn invalid_preparations_are_reported_in_plain_words() {
-    let directory = recorded(|_, values| vec![values]);
+    let directory = recording_folder(|_, values| vec![values]);
     let at = directory.path();
     for (options, code, words) in [
         (&["--scale", "e=0"][..], 2, "finite nonzero factor"),
@@ -257,7 +257,7 @@ fn invalid_preparations_are_reported_in_plain_words() {
         (&["--mask", "clock"], 2, "possible values"),
         (&["--mask", "gap", "--run-in", "3"], 1, "--from"),
     ] {
-        let (found, message) = bad(at, &[&["identify", "run.csv"], options].concat());
+        let (found, message) = failure_of(at, &[&["identify", "run.csv"], options].concat());
         assert!(
             found == code && message.contains(words),
             "{options:?}: {found} {message}"
@@ -268,7 +268,7 @@ fn invalid_preparations_are_reported_in_plain_words() {
 /// Eye and stick are in separate files, at 100 and 50 Hz; the message describes how to read them.
 #[test]
 fn two_files_at_two_rates_can_be_joined() {
-    let directory = recorded(|k, [t, e, u]| {
+    let directory = recording_folder(|k, [t, e, u]| {
         assert!(k >= 2);
         vec![[t, e.to_degrees(), u]]
     });
@@ -282,7 +282,7 @@ fn two_files_at_two_rates_can_be_joined() {
     write("eye.csv", "t,e", &|_, cells| Some(format!("{},{}", cells[0], cells[1])));
     let slow = |k: usize, cells: &[&str]| k.is_multiple_of(2).then(|| format!("{},{}", cells[0], cells[2]));
     write("stick.csv", "t,u", &slow);
-    let (code, message) = bad(at, &["identify", "eye.csv", "stick.csv"]);
+    let (code, message) = failure_of(at, &["identify", "eye.csv", "stick.csv"]);
     assert_eq!(code, 1);
     for part in [
         "no column \"u\"",
@@ -306,6 +306,6 @@ fn two_files_at_two_rates_can_be_joined() {
     let (joined, whole) = (gain(&[&["joined.csv"], &advised[..]].concat()), gain(&["run.csv"]));
     assert!((joined / whole - 1.0).abs() < 0.03, "{joined} {whole}");
     // Neither a single file nor two runs without the column are mistaken for such a pair.
-    let (_, alone) = bad(at, &["identify", "eye.csv"]);
+    let (_, alone) = failure_of(at, &["identify", "eye.csv"]);
     assert!(!alone.contains("pandas"), "{alone}");
 }

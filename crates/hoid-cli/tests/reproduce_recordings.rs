@@ -6,10 +6,10 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{bad, good};
+use common::{failure_of, stdout_of};
 use tempfile::TempDir;
 
-const BY_RECORDINGS: [&str; 6] = [
+const RECORDING_OPTIONS: [&str; 6] = [
     "reproduce",
     "--only",
     "experiment",
@@ -19,9 +19,9 @@ const BY_RECORDINGS: [&str; 6] = [
 ];
 
 /// Writes recordings with an axis in their names, and their manifest by `hoid group init`.
-fn recorded(at: &Path) {
+fn write_recordings(at: &Path) {
     let arguments = "simulate-group --subjects 2 --runs 1 --conditions C1,C4 --noise-level 0.02 --out recordings";
-    good(at, &arguments.split(' ').collect::<Vec<_>>());
+    stdout_of(at, &arguments.split(' ').collect::<Vec<_>>());
     let directory = at.join("recordings");
     for name in ["group.toml", "truth.csv"] {
         fs::remove_file(directory.join(name)).unwrap();
@@ -32,7 +32,7 @@ fn recorded(at: &Path) {
             fs::rename(file(simulated), file(recorded)).unwrap();
         }
     }
-    good(
+    stdout_of(
         at,
         &[
             "group",
@@ -46,25 +46,25 @@ fn recorded(at: &Path) {
             "sudden-roll=90/(s(s+6)) > 30/(s(s+.2)) @ 40.96 : 100",
         ],
     );
-    changed(at, "delay_s = [\n    0.05,\n    0.6,\n]", "delay_s = [0.26, 0.3]");
+    edit_manifest(at, "delay_s = [\n    0.05,\n    0.6,\n]", "delay_s = [0.26, 0.3]");
 }
 
-fn changed(at: &Path, from: &str, to: &str) {
+fn edit_manifest(at: &Path, from: &str, to: &str) {
     let path = at.join("recordings/group.toml");
     let text = fs::read_to_string(&path).unwrap();
     assert!(text.contains(from), "{from}: {text}");
     fs::write(path, text.replace(from, to)).unwrap();
 }
 
-fn by_recordings<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    [&BY_RECORDINGS, more].concat()
+fn reproduce_arguments<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&RECORDING_OPTIONS, more].concat()
 }
 
 #[test]
 fn recorded_people_get_the_thesis_table_and_figures() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    recorded(at);
+    write_recordings(at);
     let manifest = fs::read_to_string(at.join("recordings/group.toml")).unwrap();
     for line in [
         "[conditions.sudden-roll]",
@@ -75,7 +75,7 @@ fn recorded_people_get_the_thesis_table_and_figures() {
     }
     // One run cannot be read.
     fs::write(at.join("recordings/S2_fixed_roll_1.csv"), "t,e,u\n0,1,x\n").unwrap();
-    good(at, &by_recordings(&["out"]));
+    stdout_of(at, &reproduce_arguments(&["out"]));
 
     let table = fs::read_to_string(at.join("out/tables/table-3.csv")).unwrap();
     let rows: Vec<Vec<&str>> = table
@@ -117,11 +117,11 @@ fn unusable_recordings_are_refused_with_a_remedy() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     for only in [&["reproduce"][..], &["reproduce", "--only", "experiment,fig-3"]] {
-        let (code, message) = bad(at, &[only, &["--recordings", "recordings", "--out", "out"]].concat());
+        let (code, message) = failure_of(at, &[only, &["--recordings", "recordings", "--out", "out"]].concat());
         assert!(code == 2 && message.contains("--only experiment"), "{message}");
     }
     fs::create_dir(at.join("recordings")).unwrap();
-    let (code, message) = bad(at, &by_recordings(&["out"]));
+    let (code, message) = failure_of(at, &reproduce_arguments(&["out"]));
     assert!(
         code == 2 && message.contains("group.toml") && message.contains("hoid group init"),
         "{message}"
@@ -130,10 +130,10 @@ fn unusable_recordings_are_refused_with_a_remedy() {
     fs::write(at.join("recordings/a.csv"), "t,error,u\n0,1,2\n0.01,2,1\n").unwrap();
     let manifest = "name = \"x\"\n[[runs]]\nfile = \"a.csv\"\nsubject = \"a\"\ncondition = \"slow\"\nrun = \"1\"\n";
     fs::write(at.join("recordings/group.toml"), manifest).unwrap();
-    let (code, message) = bad(at, &by_recordings(&["out"]));
+    let (code, message) = failure_of(at, &reproduce_arguments(&["out"]));
     assert!(code == 1 && message.contains("[conditions.slow]"), "{message}");
-    changed(at, "\"slow\"", "\"C4\"");
-    let (code, message) = bad(at, &by_recordings(&["out"]));
+    edit_manifest(at, "\"slow\"", "\"C4\"");
+    let (code, message) = failure_of(at, &reproduce_arguments(&["out"]));
     assert!(
         code == 1 && message.contains("no column e in ") && message.contains("error"),
         "{message}"

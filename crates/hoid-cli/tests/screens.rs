@@ -7,18 +7,18 @@ mod common;
 
 use std::{fs, path::Path, process::Command};
 
-use common::{bad, good};
+use common::{failure_of, stdout_of};
 use tempfile::TempDir;
 
-fn simulated() -> TempDir {
+fn simulated_runs() -> TempDir {
     let directory = TempDir::new().unwrap();
     for name in ["1.csv", "2.csv"] {
-        good(directory.path(), &["simulate", "--condition", "C1", "--out", name]);
+        stdout_of(directory.path(), &["simulate", "--condition", "C1", "--out", name]);
     }
     directory
 }
 
-const FIT: [&str; 8] = [
+const FIT_OPTIONS: [&str; 8] = [
     "identify",
     "1.csv",
     "--structure",
@@ -30,7 +30,7 @@ const FIT: [&str; 8] = [
 ];
 
 /// Returns the standard output on a screen of the given width.
-fn at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
+fn output_at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
         .current_dir(directory)
@@ -42,9 +42,9 @@ fn at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
 
 #[test]
 fn answer_comes_first_and_fits_on_a_screen() {
-    let directory = simulated();
+    let directory = simulated_runs();
     let d = directory.path();
-    let page = good(d, &FIT);
+    let page = stdout_of(d, &FIT_OPTIONS);
     assert!(page.starts_with("Verdict: "), "{page}");
     let lines = page.lines().count();
     assert!(lines <= 24, "{lines} lines:\n{page}");
@@ -61,7 +61,7 @@ fn answer_comes_first_and_fits_on_a_screen() {
         !page.contains("Settings given:") && !page.contains("Ljung-Box"),
         "{page}"
     );
-    let all = good(d, &[&FIT[..], &["-v"]].concat());
+    let all = stdout_of(d, &[&FIT_OPTIONS[..], &["-v"]].concat());
     for part in [
         "Settings given: ",
         "By default: ",
@@ -78,9 +78,13 @@ fn answer_comes_first_and_fits_on_a_screen() {
 
 #[test]
 fn pages_fit_the_screen_width() {
-    let directory = simulated();
+    let directory = simulated_runs();
     for columns in [60_usize, 80] {
-        let text = at_width(directory.path(), &columns.to_string(), &[&FIT[..], &["-v"]].concat());
+        let text = output_at_width(
+            directory.path(),
+            &columns.to_string(),
+            &[&FIT_OPTIONS[..], &["-v"]].concat(),
+        );
         let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
         assert!(widest <= columns, "{widest} columns on a screen of {columns}:\n{text}");
     }
@@ -95,7 +99,7 @@ fn pages_fit_the_screen_width() {
             "K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28",
         ],
     ] {
-        let text = at_width(directory.path(), "60", arguments);
+        let text = output_at_width(directory.path(), "60", arguments);
         let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
         assert!(widest <= 60, "{arguments:?}, {widest} columns:\n{text}");
     }
@@ -103,7 +107,7 @@ fn pages_fit_the_screen_width() {
 
 #[test]
 fn common_notes_of_several_files_appear_once() {
-    let directory = simulated();
+    let directory = simulated_runs();
     let d = directory.path();
     // The same row is duplicated in both files.
     for name in ["1.csv", "2.csv"] {
@@ -140,11 +144,11 @@ fn common_notes_of_several_files_appear_once() {
 
 #[test]
 fn mistakes_are_answered_with_suggestions() {
-    let directory = simulated();
+    let directory = simulated_runs();
     let d = directory.path();
-    let (code, message) = bad(d, &["identify", "1.csv", "--input", "F_T"]);
+    let (code, message) = failure_of(d, &["identify", "1.csv", "--input", "F_T"]);
     assert!(code == 1 && message.contains("did you mean \"f_t\"?"), "{message}");
-    let (code, message) = bad(d, &["simulate", "--condition", "C1", "--out", "none/x.csv"]);
+    let (code, message) = failure_of(d, &["simulate", "--condition", "C1", "--out", "none/x.csv"]);
     assert!(code == 1 && !message.contains(".part"), "{message}");
     // The error is reported before any work, and no output files are written.
     fs::write(d.join("file"), "").unwrap();
@@ -153,7 +157,7 @@ fn mistakes_are_answered_with_suggestions() {
         &["reproduce", "--only", "fig-5", "--out", "file/x"],
         &["man", "file/x"],
     ] {
-        let (code, message) = bad(d, arguments);
+        let (code, message) = failure_of(d, arguments);
         assert!(
             code == 1 && message.contains("cannot be written"),
             "{arguments:?}: {message}"
@@ -164,7 +168,7 @@ fn mistakes_are_answered_with_suggestions() {
 /// Typical files of users, with other names, decimal commas, no units, and t in ms.
 #[test]
 fn unprepared_files_are_read_or_refused_with_advice() {
-    let directory = simulated();
+    let directory = simulated_runs();
     let d = directory.path();
     let simulated = fs::read_to_string(d.join("1.csv")).unwrap();
     let rows: Vec<Vec<&str>> = simulated
@@ -193,7 +197,7 @@ fn unprepared_files_are_read_or_refused_with_advice() {
         )
     });
 
-    let (_, message) = bad(d, &["identify", "mine.csv"]);
+    let (_, message) = failure_of(d, &["identify", "mine.csv"]);
     let command = "hoid identify mine.csv --input 'Tracking error' --output Stick";
     assert!(message.contains(command), "{message}");
     let own = [
@@ -207,7 +211,7 @@ fn unprepared_files_are_read_or_refused_with_advice() {
         "29",
     ];
     let page = |file: &str, more: &[&str]| {
-        let page = good(d, &[&["identify", file], &own[..], more].concat());
+        let page = stdout_of(d, &[&["identify", file], &own[..], more].concat());
         page.replace(file, "FILE")
     };
     let default = page("mine.csv", &[]);
@@ -218,11 +222,11 @@ fn unprepared_files_are_read_or_refused_with_advice() {
         page("mine.csv", &["--unit", "e=deg,u=rad"])
     );
     // The columns have other names than e and u, and there are no units; six table columns fit into 80 characters.
-    let info = at_width(d, "80", &["info", "mine.csv"]);
+    let info = output_at_width(d, "80", &["info", "mine.csv"]);
     assert!(info.contains(" column") && !info.contains("unit"), "{info}");
     assert!(info.lines().all(|line| line.chars().count() <= 80), "{info}");
 
-    let reasons = at_width(d, "110", &["identify", "ms.csv"]);
+    let reasons = output_at_width(d, "110", &["identify", "ms.csv"]);
     let first = reasons.lines().nth(1).unwrap();
     assert!(first.contains("the sample time of 10 s"), "{reasons}");
     assert!(!reasons.contains("all channels are idle"), "{reasons}");
@@ -230,9 +234,9 @@ fn unprepared_files_are_read_or_refused_with_advice() {
 
 #[test]
 fn choices_and_delays_are_parsed_leniently() {
-    let directory = simulated();
+    let directory = simulated_runs();
     let d = directory.path();
-    let page = |arguments: &[&str]| good(d, &[&["identify", "1.csv", "--orders", "nd=1"], arguments].concat());
+    let page = |arguments: &[&str]| stdout_of(d, &[&["identify", "1.csv", "--orders", "nd=1"], arguments].concat());
     let default = page(&["--structure", "bj", "--nk", "29"]);
     assert_eq!(page(&["--structure", "BJ", "--nk", "0.28s"]), default);
     assert!(page(&["--nk", "0.27s..0.29s"]).contains("BJ(nb=2, nd=1, nf=2, nk=29)"));
@@ -242,20 +246,20 @@ fn choices_and_delays_are_parsed_leniently() {
 fn help_is_plain_and_completions_exist() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    let help = good(d, &["-h"]);
+    let help = stdout_of(d, &["-h"]);
     assert!(help.contains("Recordings:") && !help.contains('\u{1b}'), "{help}");
-    let short = good(d, &["identify", "-h"]);
-    let long = good(d, &["identify", "--help"]);
+    let short = stdout_of(d, &["identify", "-h"]);
+    let long = stdout_of(d, &["identify", "--help"]);
     assert!(!short.contains("--search-method") && long.contains("--search-method"));
     assert!(
         short.contains("Examples:") && short.contains("Data:") && short.contains("Results:"),
         "{short}"
     );
     for shell in ["bash", "zsh", "fish", "powershell"] {
-        let text = good(d, &["completions", shell]);
+        let text = stdout_of(d, &["completions", shell]);
         assert!(text.contains("controlled-element"), "{shell}");
     }
-    let printed = good(d, &["man", "pages"]);
+    let printed = stdout_of(d, &["man", "pages"]);
     let page = fs::read_to_string(d.join("pages/hoid-identify.1")).unwrap();
     assert!(
         page.contains(".TH") && page.contains("controlled\\-element"),

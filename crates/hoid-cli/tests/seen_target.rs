@@ -5,11 +5,11 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{bad, good, json};
+use common::{failure_of, json, stdout_of};
 use serde_json::Value;
 use tempfile::TempDir;
 
-const SEEN: [&str; 4] = [
+const DISPLAY_OPTIONS: [&str; 4] = [
     "--feedforward",
     "derivative:0.05,tau_f=0.1,preview=0.25",
     "--disturbance",
@@ -19,7 +19,7 @@ const ELEMENTS: [(&str, &str); 2] = [("C1", "90/(s(s+6))"), ("C2", "30/(s(s+0.2)
 
 fn simulate(at: &Path, condition: &str, seed: &str, others: &[&str]) {
     let base = ["simulate", "--condition", condition, "--seed", seed, "--out", "run.csv"];
-    good(at, &[&base[..], &SEEN, others].concat());
+    stdout_of(at, &[&base[..], &DISPLAY_OPTIONS, others].concat());
 }
 
 fn identify(at: &Path, element: &str, others: &[&str]) -> Value {
@@ -112,7 +112,7 @@ fn changed_response_is_found_in_both_halves() {
                 [schedule]\nmidpoint_s = 81.92\n[feedforward]\nform = \"derivative\"\nK_d_s = 0.03\ntau_f_s = 0.1\n\
                 [feedforward.last]\nK_d_s = 0.06\n";
     fs::write(at.path().join("task.toml"), text).unwrap();
-    good(
+    stdout_of(
         at.path(),
         &["simulate", "--scenario", "task.toml", "--seed", "4", "--out", "run.csv"],
     );
@@ -175,7 +175,7 @@ fn plan_with_displays_is_simulated_and_analysed() {
                 [[estimators]]\nname = \"person\"\nmethod = \"operator\"\nform = \"lead\"\nintersample = \"zoh\"\n\
                 role = [\"f_t=feedforward:0.25\"]\n";
     fs::write(at.path().join("plan.toml"), plan).unwrap();
-    good(at.path(), &["study", "run", "plan.toml", "--out", "out", "--csv"]);
+    stdout_of(at.path(), &["study", "run", "plan.toml", "--out", "out", "--csv"]);
     let fits = fs::read_to_string(at.path().join("out/fits.csv")).unwrap();
     let mut rows = fits.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = rows.next().unwrap().split(',').collect();
@@ -209,7 +209,7 @@ fn invalid_displays_are_refused() {
         (["--disturbance", "-1"], "--disturbance is wrong"),
         (["--disturbance", "nan"], "--disturbance is wrong"),
     ] {
-        let message = bad(at.path(), &[&simulate[..], &options].concat());
+        let message = failure_of(at.path(), &[&simulate[..], &options].concat());
         let message = format!("{message:?}");
         assert!(message.contains(words), "{options:?}: {message}");
     }

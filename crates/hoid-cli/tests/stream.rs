@@ -16,12 +16,12 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, json, physical};
+use common::{failure_of, json, stdout_of, with_physical_method};
 
 /// Timeout for a line: much longer than its latency, so that no test fails on a slow machine, and a missing line does
 /// not block a test.
-const PATIENCE: Duration = Duration::from_secs(60);
-const NO_WARM_UP: [&str; 8] = [
+const LINE_TIMEOUT: Duration = Duration::from_secs(60);
+const NO_WARM_UP_OPTIONS: [&str; 8] = [
     "--method", "rpem", "--nk", "29", "--orders", "nd=1", "--start", "nothing",
 ];
 
@@ -36,7 +36,7 @@ impl Stream {
     fn new(arguments: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
             .args(["stream", "--fs", "100"])
-            .args(physical(arguments))
+            .args(with_physical_method(arguments))
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
@@ -69,15 +69,15 @@ impl Stream {
         input.flush().unwrap();
     }
 
-    fn line(&self) -> Value {
-        let line = self.lines.recv_timeout(PATIENCE).unwrap();
+    fn next_line(&self) -> Value {
+        let line = self.lines.recv_timeout(LINE_TIMEOUT).unwrap();
         assert!(line.ends_with('\n'), "{line}");
         serde_json::from_str(&line).unwrap()
     }
 
-    fn ask(&mut self, line: &str) -> Value {
+    fn request(&mut self, line: &str) -> Value {
         self.write(&format!("{line}\n"));
-        self.line()
+        self.next_line()
     }
 
     fn interrupt(&self) {
@@ -93,7 +93,7 @@ impl Stream {
             if let Some(status) = self.child.try_wait().unwrap() {
                 break status;
             }
-            assert!(start_time.elapsed() < PATIENCE, "the stream does not end");
+            assert!(start_time.elapsed() < LINE_TIMEOUT, "the stream does not end");
             thread::sleep(Duration::from_millis(2));
         };
         let mut said = String::new();
@@ -112,7 +112,7 @@ fn wave(k: usize) -> (f64, f64) {
 }
 
 /// Sends a whole text and collects the answers.
-fn answers(arguments: &[&str], text: &str) -> (Vec<Value>, String) {
+fn collect_answers(arguments: &[&str], text: &str) -> (Vec<Value>, String) {
     let mut stream = Stream::new(arguments);
     let mut input = stream.input.take().unwrap();
     let text = text.to_owned();
@@ -127,12 +127,12 @@ fn answers(arguments: &[&str], text: &str) -> (Vec<Value>, String) {
 }
 
 /// Returns a simulated run as text, and writes it to `c.csv`.
-fn simulated(directory: &Path, seed: &str) -> String {
-    let text = good(
+fn simulated_run_text(directory: &Path, seed: &str) -> String {
+    let text = stdout_of(
         directory,
         &["simulate", "--condition", "C4", "--seed", seed, "--out", "-"],
     );
-    good(
+    stdout_of(
         directory,
         &["simulate", "--condition", "C4", "--seed", seed, "--out", "c.csv"],
     );
@@ -142,10 +142,10 @@ fn simulated(directory: &Path, seed: &str) -> String {
 
 #[test]
 fn each_line_is_answered_at_once() {
-    let mut stream = Stream::new(&NO_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP_OPTIONS);
     for k in 0..200 {
         let (e, u) = wave(k);
-        let line = stream.ask(&format!("{e},{u}"));
+        let line = stream.request(&format!("{e},{u}"));
         assert!((line["t"].as_f64().unwrap() - k as f64 / 100.0).abs() < 1e-9);
         let names: Vec<&String> = line["parameters"].as_object().unwrap().keys().collect();
         assert_eq!(names, ["b0", "b1", "d1", "f1", "f2"]);
@@ -184,7 +184,7 @@ fn stream_of_a_simulation_matches_track() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(said.contains("method: physical") && said.contains("nk=29"), "{said}");
     // With the same fit of the first 20 s and the same samples, the numbers are the same.
-    simulated(d, "3");
+    simulated_run_text(d, "3");
     let tracked = json(
         d,
         &[
@@ -208,7 +208,7 @@ fn stream_of_a_simulation_matches_track() {
 #[test]
 fn default_method_answers_from_the_second_second() {
     let directory = TempDir::new().unwrap();
-    let text = simulated(directory.path(), "7");
+    let text = simulated_run_text(directory.path(), "7");
     let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
     let run: Vec<String> = rows
         .map(|row| row.split(',').skip(2).take(2).collect::<Vec<_>>().join(","))
@@ -221,7 +221,7 @@ fn default_method_answers_from_the_second_second() {
         "--controlled-element",
         "90/(s(s+6))",
     ];
-    let (lines, said) = answers(&arguments, &(run.join("\n") + "\n"));
+    let (lines, said) = collect_answers(&arguments, &(run.join("\n") + "\n"));
     assert!(
         said.contains("started at once") && said.contains("method: adaptive"),
         "{said}"
@@ -242,12 +242,12 @@ fn default_method_answers_from_the_second_second() {
 
 #[test]
 fn hostile_lines_are_counted_and_have_no_effect() {
-    let mut stream = Stream::new(&NO_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP_OPTIONS);
     let sound = |stream: &mut Stream, from: usize| {
         let mut last = Value::Null;
         for k in from..from + 300 {
             let (e, u) = wave(k);
-            last = stream.ask(&format!("{e},{u}"));
+            last = stream.request(&format!("{e},{u}"));
         }
         last
     };
@@ -270,7 +270,7 @@ fn hostile_lines_are_counted_and_have_no_effect() {
     ];
     let mut skipped = 0;
     for (text, fault) in hostile {
-        let line = stream.ask(text);
+        let line = stream.request(text);
         skipped += 1;
         assert!(line["fault"].as_str().unwrap().contains(fault), "{line}");
         assert_eq!(line["skipped"], skipped, "{line}");
@@ -293,7 +293,7 @@ fn hostile_lines_are_counted_and_have_no_effect() {
 #[test]
 fn outliers_and_faulty_spans_are_reported_in_their_lines() {
     let directory = TempDir::new().unwrap();
-    let text = simulated(directory.path(), "5");
+    let text = simulated_run_text(directory.path(), "5");
     let mut lines: Vec<String> = Vec::new();
     for (k, row) in text.lines().filter(|l| !l.starts_with(['#', 't'])).enumerate() {
         let cells: Vec<f64> = row.split(',').map(|c| c.parse().unwrap()).collect();
@@ -306,7 +306,7 @@ fn outliers_and_faulty_spans_are_reported_in_their_lines() {
         lines.push(format!("{e},{u}"));
     }
     let arguments = ["--nk", "29", "--orders", "nd=1", "--largest", "1e300"];
-    let (answers, said) = answers(&arguments, &(lines.join("\n") + "\n"));
+    let (answers, said) = collect_answers(&arguments, &(lines.join("\n") + "\n"));
     let events: Vec<(usize, &Value)> = answers
         .iter()
         .enumerate()
@@ -343,19 +343,19 @@ fn outliers_and_faulty_spans_are_reported_in_their_lines() {
 #[test]
 fn idle_start_prolongs_the_warm_up() {
     let directory = TempDir::new().unwrap();
-    let text = simulated(directory.path(), "6");
+    let text = simulated_run_text(directory.path(), "6");
     let rows = text.lines().filter(|l| !l.starts_with(['#', 't']));
     let run: Vec<String> = rows
         .map(|row| row.split(',').skip(2).take(2).collect::<Vec<_>>().join(","))
         .collect();
-    let (_, without) = answers(&["--orders", "nd=1"], &(run.join("\n") + "\n"));
+    let (_, without) = collect_answers(&["--orders", "nd=1"], &(run.join("\n") + "\n"));
     let all = vec!["0,0".to_owned(); 1500]
         .into_iter()
         .chain(run)
         .collect::<Vec<_>>()
         .join("\n")
         + "\n";
-    let (answers, said) = answers(&["--orders", "nd=1"], &all);
+    let (answers, said) = collect_answers(&["--orders", "nd=1"], &all);
     // The delay agrees to within a sample with the delay for the run alone, because the warm-up ends some samples
     // later.
     let nk = |said: &str| {
@@ -380,41 +380,41 @@ fn idle_start_prolongs_the_warm_up() {
 
 #[test]
 fn missing_lines_are_bridged_and_late_lines_dropped() {
-    let mut stream = Stream::new(&NO_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP_OPTIONS);
     stream.write("t;e;u;f_t\n");
     let row = |k: usize| {
         let (e, u) = wave(k);
         format!("{};{e};{u};0.5", k as f64 / 100.0)
     };
     for k in 0..50 {
-        assert!(stream.ask(&row(k)).get("fault").is_none());
+        assert!(stream.request(&row(k)).get("fault").is_none());
     }
-    let line = stream.ask(&row(53));
+    let line = stream.request(&row(53));
     assert!(line["fault"].as_str().unwrap().contains("3 samples missing"), "{line}");
     assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &0.into()));
     assert!(line["innovation"].is_f64());
-    let line = stream.ask(&row(53));
+    let line = stream.request(&row(53));
     assert!(line["fault"].as_str().unwrap().contains("not later"), "{line}");
     assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &1.into()));
-    let line = stream.ask("x;1;2;3");
+    let line = stream.request("x;1;2;3");
     assert!(line["fault"].as_str().unwrap().contains("t is \"x\""), "{line}");
     assert_eq!((&line["skipped"], &line["dropped"]), (&3.into(), &2.into()));
-    assert!(stream.ask(&row(54)).get("fault").is_none());
+    assert!(stream.request(&row(54)).get("fault").is_none());
     // Ten seconds of a pause of one minute are filled.
-    let line = stream.ask(&row(6054));
+    let line = stream.request(&row(6054));
     assert!(line["fault"].as_str().unwrap().contains("10 s are bridged"), "{line}");
     assert_eq!(line["skipped"], 1003);
-    assert!(stream.ask(&row(6055)).get("fault").is_none());
+    assert!(stream.request(&row(6055)).get("fault").is_none());
     let (status, _, said) = stream.end();
     assert!(status.success() && said.contains("2 lines dropped"), "{said}");
 }
 
 #[test]
 fn stream_without_samples_exits_with_one() {
-    let mut stream = Stream::new(&NO_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP_OPTIONS);
     stream.write("t;e;u\n");
     for k in 0..5 {
-        let line = stream.ask(&format!("0,0{k};0,{k};-0,{k}"));
+        let line = stream.request(&format!("0,0{k};0,{k};-0,{k}"));
         assert!(line["fault"].as_str().unwrap().contains("dropped"), "{line}");
     }
     let (status, _, said) = stream.end();
@@ -428,7 +428,7 @@ fn stream_without_samples_exits_with_one() {
 #[test]
 fn failed_warm_up_is_extended() {
     let directory = TempDir::new().unwrap();
-    let text = simulated(directory.path(), "1");
+    let text = simulated_run_text(directory.path(), "1");
     let mut input = String::new();
     // Constant signals precede the run; they are excluded, and the warm-up extends over the run.
     for _ in 0..600 {
@@ -440,7 +440,7 @@ fn failed_warm_up_is_extended() {
         writeln!(input, "{},{}", cells[2], cells[3]).unwrap();
     }
     let arguments = ["--warm-up", "6", "--nk", "29", "--orders", "nd=1"];
-    let (lines, said) = answers(&arguments, &input);
+    let (lines, said) = collect_answers(&arguments, &input);
     assert_eq!(lines.len(), 3600);
     let tried = &lines[599]["warm_up"];
     assert!(
@@ -455,15 +455,15 @@ fn failed_warm_up_is_extended() {
     assert_eq!(last["operator"]["convertible"], true, "{last}");
     assert!(said.contains("started after"), "{said}");
     // A stream that ends during the warm-up reports this.
-    let (lines, said) = answers(&arguments, "0.1,0.2\n0.2,0.1\n");
+    let (lines, said) = collect_answers(&arguments, "0.1,0.2\n0.2,0.1\n");
     assert_eq!(lines.len(), 2);
     assert!(said.contains("The warm-up did not end: 2 of 600"), "{said}");
     // A short fault within the warm-up is filled; a long fault restarts the warm-up.
     let mut input: String = (0..50).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
     input.push_str("nan,0\n0.1,0.2\n");
-    let (lines, _) = answers(&arguments, &input);
+    let (lines, _) = collect_answers(&arguments, &input);
     assert_eq!(lines.last().unwrap()["warm_up"]["collected"], 52);
-    let (lines, _) = answers(&arguments, &(input + &",\n".repeat(101) + "0.1,0.2\n"));
+    let (lines, _) = collect_answers(&arguments, &(input + &",\n".repeat(101) + "0.1,0.2\n"));
     let last = &lines.last().unwrap()["warm_up"];
     assert!(
         last["collected"] == 1 && last["reason"].as_str().unwrap().contains("was restarted"),
@@ -473,11 +473,11 @@ fn failed_warm_up_is_extended() {
 
 #[test]
 fn every_nth_line_reports_faults_in_between() {
-    let mut arguments = NO_WARM_UP.to_vec();
+    let mut arguments = NO_WARM_UP_OPTIONS.to_vec();
     arguments.extend(["--every", "10"]);
     let mut input: String = (0..40).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
     input = input.replacen(&format!("{},{}\n", wave(14).0, wave(14).1), "nan,1\n", 1);
-    let (lines, _) = answers(&arguments, &input);
+    let (lines, _) = collect_answers(&arguments, &input);
     assert_eq!(lines.len(), 4);
     assert!(lines[1]["fault"] == "e is NaN" && lines[2].get("fault").is_none());
     assert!((lines[3]["t"].as_f64().unwrap() - 0.39).abs() < 1e-9);
@@ -487,7 +487,7 @@ fn every_nth_line_reports_faults_in_between() {
 fn closed_output_pipe_ends_the_stream_quietly() {
     let mut child = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(["stream", "--fs", "100"])
-        .args(NO_WARM_UP)
+        .args(NO_WARM_UP_OPTIONS)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -521,25 +521,25 @@ fn closed_output_pipe_ends_the_stream_quietly() {
 #[test]
 fn interrupt_exits_with_zero_and_complete_lines() {
     // The stream is interrupted while it waits for input.
-    let mut stream = Stream::new(&NO_WARM_UP);
-    stream.ask("0.1,0.2");
+    let mut stream = Stream::new(&NO_WARM_UP_OPTIONS);
+    stream.request("0.1,0.2");
     stream.interrupt();
     let start_time = Instant::now();
     while stream.child.try_wait().unwrap().is_none() {
-        assert!(start_time.elapsed() < PATIENCE);
+        assert!(start_time.elapsed() < LINE_TIMEOUT);
         thread::sleep(Duration::from_millis(2));
     }
     let (status, rest, said) = stream.end();
     assert_eq!(status.code(), Some(0));
     assert!(rest.is_empty() && said.contains("1 samples"), "{said}");
     // The stream is interrupted during a computation.
-    let mut stream = Stream::new(&NO_WARM_UP);
+    let mut stream = Stream::new(&NO_WARM_UP_OPTIONS);
     let mut input = stream.input.take().unwrap();
     let writer = thread::spawn(move || {
         let text: String = (0..1000).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
         while input.write_all(text.as_bytes()).is_ok() {}
     });
-    stream.line();
+    stream.next_line();
     thread::sleep(Duration::from_millis(100));
     stream.interrupt();
     let (status, rest, _) = stream.end();
@@ -571,11 +571,11 @@ fn wrong_usage_and_headers_are_errors() {
         &["stream", "--fs", "100", "--memory", "0.001s"],
     ] {
         let arguments = if arguments.len() > 3 {
-            physical(arguments)
+            with_physical_method(arguments)
         } else {
             arguments.to_vec()
         };
-        let (code, message) = bad(d, &arguments);
+        let (code, message) = failure_of(d, &arguments);
         assert_eq!(code, 2, "{arguments:?}: {message}");
     }
     for (more, expected) in [
@@ -584,7 +584,7 @@ fn wrong_usage_and_headers_are_errors() {
         (&["--prior", "omega_nm=1"], "CENTRE:SPREAD"),
     ] {
         let arguments: Vec<&str> = ["stream", "--fs", "100"].iter().chain(more).copied().collect();
-        let (code, message) = bad(d, &arguments);
+        let (code, message) = failure_of(d, &arguments);
         assert!(code == 2 && message.contains(expected), "{arguments:?}: {message}");
     }
     let mut stream = Stream::new(&[]);

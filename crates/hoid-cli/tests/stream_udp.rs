@@ -17,11 +17,11 @@ use std::{path::Path, time::Duration};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::bad;
+use common::failure_of;
 #[cfg(unix)]
 use live::{
     Draw, paced, troubles,
-    udp::{PATIENCE, Stream, as_struct},
+    udp::{LONG_TIMEOUT, Stream, as_struct},
 };
 
 /// Timeout for an answer that does not come.
@@ -35,7 +35,7 @@ fn stream(arguments: &[&str]) -> Stream {
 
 #[cfg(unix)]
 fn received_json(stream: &Stream) -> Value {
-    serde_json::from_slice(&stream.answer()).unwrap()
+    serde_json::from_slice(&stream.receive_answer()).unwrap()
 }
 
 /// Lost, duplicated and late samples are detected from their sequence numbers, as from a column t.
@@ -46,11 +46,11 @@ fn lost_samples_are_bridged_and_counted() {
     let wave = |k: u32| (0.1 * f64::from(k)).sin();
     for k in (0..100).chain(105..200) {
         udp.send(&as_struct(k, f64::NAN, wave(k), wave(k + 3)));
-        assert_eq!(udp.estimate().0, k);
+        assert_eq!(udp.receive_estimate().0, k);
     }
     for k in [199, 150] {
         udp.send(&as_struct(k, f64::NAN, 0.0, 0.0));
-        udp.estimate();
+        udp.receive_estimate();
     }
     // A line of text is answered with the state of the stream.
     udp.send(b"2.00,0.1,0.2");
@@ -113,10 +113,10 @@ fn hostile_datagrams_are_counted() {
     udp.send(b"# a comment\n\n");
     udp.socket.set_read_timeout(Some(SHORT_TIMEOUT)).unwrap();
     assert_eq!(udp.receive(&mut [0; 16]), None, "no answer for what is not a sample");
-    udp.socket.set_read_timeout(Some(PATIENCE)).unwrap();
+    udp.socket.set_read_timeout(Some(LONG_TIMEOUT)).unwrap();
     // Invalid values are samples with a fault.
     udp.send(&as_struct(2, f64::NAN, f64::INFINITY, f64::NAN));
-    assert!(udp.estimate().1[17].is_nan());
+    assert!(udp.receive_estimate().1[17].is_nan());
     udp.send(b"0.03,0.1,0.2");
     let line = received_json(&udp);
     assert_eq!(
@@ -134,11 +134,11 @@ fn every_sample_at_a_rate_is_answered() {
     let program = Path::new(env!("CARGO_BIN_EXE_hoid"));
     let mut draw = Draw(7);
     for rate_hz in [100, 1000] {
-        let udp = paced::over_udp(program, rate_hz, 100, &mut draw);
-        let pipe = paced::over_pipes(program, rate_hz, 200, &mut draw, Duration::ZERO);
+        let udp = paced::measure_udp(program, rate_hz, 100, &mut draw);
+        let pipe = paced::measure_pipes(program, rate_hz, 200, &mut draw, Duration::ZERO);
         for tally in [udp, pipe] {
             let summary = tally.summary;
-            assert_eq!((tally.lost(), summary.samples), (0, tally.sent));
+            assert_eq!((tally.lost_count(), summary.samples), (0, tally.sent));
             assert_eq!((summary.skipped, summary.dropped), (0, 0));
         }
     }
@@ -148,7 +148,7 @@ fn every_sample_at_a_rate_is_answered() {
 #[test]
 fn stream_survives_restarts_and_clock_jumps() {
     let program = Path::new(env!("CARGO_BIN_EXE_hoid"));
-    let outcomes = troubles::all(program, Duration::from_millis(400), 600, &mut Draw(8));
+    let outcomes = troubles::run_all_cases(program, Duration::from_millis(400), 600, &mut Draw(8));
     assert_eq!(outcomes.len(), 7);
 }
 
@@ -156,7 +156,7 @@ fn stream_survives_restarts_and_clock_jumps() {
 fn lsl_options_refer_to_python() {
     let directory = TempDir::new().unwrap();
     let arguments = ["stream", "--fs", "100", "--lsl-in", "person", "--lsl-out", "estimate"];
-    let (code, message) = bad(directory.path(), &arguments);
+    let (code, message) = failure_of(directory.path(), &arguments);
     assert!(code > 0 && message.contains("pyhoid.lsl.stream"), "{message}");
 }
 
@@ -170,7 +170,7 @@ fn invalid_udp_addresses_are_refused() {
         ("5005:5005", "give another output port"),
         (&format!("{port}:9"), "cannot listen on"),
     ] {
-        let (code, message) = bad(directory.path(), &["stream", "--fs", "100", "--udp", places]);
+        let (code, message) = failure_of(directory.path(), &["stream", "--fs", "100", "--udp", places]);
         assert!(code > 0 && message.contains(reason), "{message}");
     }
 }

@@ -12,7 +12,7 @@ use std::{
 
 use tempfile::TempDir;
 
-use common::{bad, good, json};
+use common::{failure_of, json, stdout_of};
 
 const PLAN: &str = r#"
 name = "short"
@@ -31,13 +31,13 @@ structure = "bj"
 orders.nd = [1, 2]
 "#;
 
-fn with_plan() -> TempDir {
+fn plan_folder() -> TempDir {
     let directory = TempDir::new().unwrap();
     fs::write(directory.path().join("plan.toml"), PLAN).unwrap();
     directory
 }
 
-fn parts(directory: &Path) -> usize {
+fn part_count(directory: &Path) -> usize {
     fs::read_dir(directory.join("parts")).map_or(0, |entries| {
         entries
             .filter(|e| e.as_ref().unwrap().path().extension().is_some_and(|x| x == "parquet"))
@@ -47,9 +47,9 @@ fn parts(directory: &Path) -> usize {
 
 #[test]
 fn killed_study_resumes_to_identical_files() {
-    let directory = with_plan();
+    let directory = plan_folder();
     let at = directory.path();
-    good(at, &["study", "run", "plan.toml", "--out", "whole"]);
+    stdout_of(at, &["study", "run", "plan.toml", "--out", "whole"]);
     let mut killed = 0;
     // The study is killed at several instants, regardless of what it writes at that time.
     for wait_ms in [0, 35, 71, 13] {
@@ -69,8 +69,8 @@ fn killed_study_resumes_to_identical_files() {
             .stderr(Stdio::null())
             .spawn()
             .unwrap();
-        let (before, start_time) = (parts(&at.join("killed")), Instant::now());
-        while parts(&at.join("killed")) <= before && child.try_wait().unwrap().is_none() {
+        let (before, start_time) = (part_count(&at.join("killed")), Instant::now());
+        while part_count(&at.join("killed")) <= before && child.try_wait().unwrap().is_none() {
             assert!(start_time.elapsed() < Duration::from_secs(60), "nothing is written");
             std::thread::sleep(Duration::from_millis(1));
         }
@@ -81,9 +81,9 @@ fn killed_study_resumes_to_identical_files() {
         }
     }
     assert!(killed > 0, "the study was over before it could be killed");
-    let (_, message) = bad(at, &["study", "run", "plan.toml", "--out", "killed"]);
+    let (_, message) = failure_of(at, &["study", "run", "plan.toml", "--out", "killed"]);
     assert!(message.contains("--resume"), "{message}");
-    good(at, &["study", "run", "plan.toml", "--out", "killed", "--resume"]);
+    stdout_of(at, &["study", "run", "plan.toml", "--out", "killed", "--resume"]);
     for name in [
         "cells.parquet",
         "fits.parquet",
@@ -99,21 +99,21 @@ fn killed_study_resumes_to_identical_files() {
 
 #[test]
 fn shards_are_merged_and_missing_ones_reported() {
-    let directory = with_plan();
+    let directory = plan_folder();
     let at = directory.path();
     let few = ["--replications", "3"];
-    good(
+    stdout_of(
         at,
         &[&["study", "run", "plan.toml", "--out", "whole", "--csv"], &few[..]].concat(),
     );
     for shard in ["1/2", "2/2"] {
         let out = &shard[..1];
-        good(
+        stdout_of(
             at,
             &[&["study", "run", "plan.toml", "--out", out, "--shard", shard], &few[..]].concat(),
         );
     }
-    let (code, message) = bad(at, &["study", "merge", "1", "--out", "merged"]);
+    let (code, message) = failure_of(at, &["study", "merge", "1", "--out", "merged"]);
     assert!(code == 1 && message.contains("are missing"), "{message}");
     let merged = json(at, &["study", "merge", "2", "1", "--out", "merged", "--csv", "--json"]);
     assert_eq!(merged["estimates"], 2 * 2 * 3);
@@ -126,9 +126,9 @@ fn shards_are_merged_and_missing_ones_reported() {
 
 #[test]
 fn single_run_of_a_study_can_be_repeated() {
-    let directory = with_plan();
+    let directory = plan_folder();
     let at = directory.path();
-    good(
+    stdout_of(
         at,
         &[
             "study",
@@ -141,7 +141,7 @@ fn single_run_of_a_study_can_be_repeated() {
             "2",
         ],
     );
-    good(
+    stdout_of(
         at,
         &[
             "simulate",
@@ -222,7 +222,7 @@ name = "SRIV"
 method = "sriv"
 "#;
     fs::write(at.join("twins.toml"), plan).unwrap();
-    let printed = good(at, &["study", "run", "twins.toml", "--out", "s", "--csv"]);
+    let printed = stdout_of(at, &["study", "run", "twins.toml", "--out", "s", "--csv"]);
     assert!(printed.contains("trustworthy"), "{printed}");
     let table = hoid::io::read_table(&at.join("s/fits.csv")).unwrap();
     let texts = |column: &str| match table.column(column) {
@@ -233,7 +233,7 @@ method = "sriv"
     for (cell, condition) in [("0", "C1"), ("1", "C4")] {
         let simulate =
             format!("simulate --condition {condition} --noise-level 0.1 --seed 3 --cell {cell} --out run.csv");
-        good(at, &simulate.split(' ').collect::<Vec<_>>());
+        stdout_of(at, &simulate.split(' ').collect::<Vec<_>>());
         for (name, options) in [
             ("operator", "--prior none"),
             ("change", "--change sigmoid"),
@@ -272,15 +272,15 @@ fn wrong_plans_and_names_are_refused() {
         PLAN.replace("noise_level = 0.1", "noise_level = 1.5"),
     )
     .unwrap();
-    let (code, message) = bad(at, &["study", "run", "bad.toml", "--out", "x"]);
+    let (code, message) = failure_of(at, &["study", "run", "bad.toml", "--out", "x"]);
     assert!(code == 2 && message.contains("bad.toml, line 9"), "{message}");
-    let (code, message) = bad(at, &["study", "check", "nothing.toml"]);
+    let (code, message) = failure_of(at, &["study", "check", "nothing.toml"]);
     assert!(code == 1 && message.contains("nothing.toml"), "{message}");
-    let (code, message) = bad(at, &["study", "plans", "nothing"]);
+    let (code, message) = failure_of(at, &["study", "plans", "nothing"]);
     assert!(code == 2 && message.contains("recursive"), "{message}");
-    let (code, message) = bad(at, &["reproduce", "--only", "fig-99"]);
+    let (code, message) = failure_of(at, &["reproduce", "--only", "fig-99"]);
     assert!(code == 2 && message.contains("--list"), "{message}");
-    let (code, _) = bad(at, &["study", "run", "bias", "--out", "x", "--shard", "3/2"]);
+    let (code, _) = failure_of(at, &["study", "run", "bias", "--out", "x", "--shard", "3/2"]);
     assert_eq!(code, 2);
 }
 
@@ -288,7 +288,7 @@ fn wrong_plans_and_names_are_refused() {
 fn reproduction_draws_the_requested_items() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    let list = good(at, &["reproduce", "--list"]);
+    let list = stdout_of(at, &["reproduce", "--list"]);
     for name in ["table-2", "fig-12", "C.16", "D.18", "E.16", "F.8", "G.8", "H.12", "A.1"] {
         assert!(list.lines().any(|line| line.starts_with(&format!("{name} "))), "{name}");
     }
@@ -301,7 +301,7 @@ fn reproduction_draws_the_requested_items() {
         "--out",
         "r",
     ];
-    good(at, &arguments);
+    stdout_of(at, &arguments);
     let page = fs::read_to_string(at.join("r/index.html")).unwrap();
     for part in [
         "figures/fig-3.svg",
@@ -316,8 +316,8 @@ fn reproduction_draws_the_requested_items() {
         ["r/figures/A.1.svg", "r/figures/A.1.csv", "r/figures/fig-3.svg"].map(|name| fs::read(at.join(name)).unwrap())
     };
     let before = read();
-    good(at, &arguments);
+    stdout_of(at, &arguments);
     assert!(read() == before, "drawn again from the study that is there");
-    let (_, message) = bad(at, &["reproduce", "--only", "A.1", "--replications", "3", "--out", "r"]);
+    let (_, message) = failure_of(at, &["reproduce", "--only", "A.1", "--replications", "3", "--out", "r"]);
     assert!(message.contains("replications is 2, but this run has 3"), "{message}");
 }

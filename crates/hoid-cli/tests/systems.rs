@@ -6,7 +6,7 @@ mod common;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{json, wave, write};
+use common::{json, wave, write_samples};
 
 fn coefficients(found: &Value) -> Vec<(String, f64)> {
     let all = found["parameters"].as_array().unwrap();
@@ -14,7 +14,7 @@ fn coefficients(found: &Value) -> Vec<(String, f64)> {
     all.iter().map(one).collect()
 }
 
-fn kinds(found: &Value) -> Vec<&str> {
+fn finding_kinds(found: &Value) -> Vec<&str> {
     let all = found["verdict"]["findings"].as_array().unwrap();
     all.iter().map(|finding| finding["kind"].as_str().unwrap()).collect()
 }
@@ -38,7 +38,7 @@ fn exact_data_give_exact_coefficients() {
     for t in 4..e.len() {
         u[t] = -a * u[t - 1] + (0..3).map(|j| b[j] * e[t - 2 - j]).sum::<f64>();
     }
-    write(d, "exact.csv", "t,e,u", e.len(), |t| {
+    write_samples(d, "exact.csv", "t,e,u", e.len(), |t| {
         format!("{},{},{}", t as f64 / 10.0, e[t], u[t] + 3.0)
     });
     let options = ["--structure", "arx", "--orders", "na=1,nb=3", "--nk", "2", "--json"];
@@ -49,7 +49,7 @@ fn exact_data_give_exact_coefficients() {
     let level = found["records"][0]["level"]["value"].as_f64().unwrap();
     assert!((level - 3.0).abs() < 1e-8, "{level}");
     assert_eq!(found["verdict"]["level"], "trustworthy", "{}", found["verdict"]);
-    assert_eq!(kinds(&found), ["no-noise"]);
+    assert_eq!(finding_kinds(&found), ["no-noise"]);
 }
 
 /// A furnace at a level of 13.5, with a step of 10 after 3 s at rest, a dead time of .35 s, a lag of 1.5 s and a gain
@@ -59,7 +59,7 @@ fn step_response_gives_gain_lag_and_level() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let (ts, at, dead, lag, gain) = (0.05, 60, 7, 1.5, 2.0);
-    write(d, "step.csv", "t,e,u", 400, |t| {
+    write_samples(d, "step.csv", "t,e,u", 400, |t| {
         let e = if t < at { 0.0 } else { 10.0 };
         let since = t.saturating_sub(at + dead) as f64 * ts;
         let u = 13.5 + gain * 10.0 * (1.0 - (-since / lag).exp()) + 0.02 * noise(t);

@@ -8,22 +8,22 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, hoid, json, physical, setting};
+use common::{failure_of, hoid, json, setting, stdout_of, with_physical_method};
 
 const KNOWN_ORDERS: [&str; 4] = ["--nk", "29", "--orders", "nd=1"];
 
-fn simulated(condition: &str) -> TempDir {
+fn simulated_run(condition: &str) -> TempDir {
     let directory = TempDir::new().unwrap();
     let arguments = ["simulate", "--condition", condition, "--seed", "1", "--out", "c.csv"];
-    good(directory.path(), &arguments);
+    stdout_of(directory.path(), &arguments);
     directory
 }
 
 /// Runs `track` with the trace in `trace.csv`.
-fn tracked(directory: &Path, more: &[&str]) -> Value {
+fn track_json(directory: &Path, more: &[&str]) -> Value {
     let mut arguments = vec!["track", "c.csv", "--out", "trace.csv", "--json"];
     arguments.extend(more);
-    json(directory, &physical(&arguments))
+    json(directory, &with_physical_method(&arguments))
 }
 
 /// Returns header and rows of a trace; an empty cell is NaN.
@@ -49,11 +49,11 @@ fn column(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> Vec<f64> {
 /// The result is printed in any case; its rows are written only if a file is given.
 #[test]
 fn answer_needs_no_trace_file() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
-    let with = good(d, &["track", "c.csv", "--out", "trace.csv"]);
+    let with = stdout_of(d, &["track", "c.csv", "--out", "trace.csv"]);
     fs::remove_file(d.join("trace.csv")).unwrap();
-    let without = good(d, &["track", "c.csv"]);
+    let without = stdout_of(d, &["track", "c.csv"]);
     assert!(without.contains("--out TRACE.csv"), "{without}");
     let named = |line: &&str| !line.contains("trace.csv") && !line.contains("TRACE.csv");
     let [with, without] =
@@ -65,9 +65,9 @@ fn answer_needs_no_trace_file() {
 
 #[test]
 fn start_fit_finds_the_operator_and_its_change() {
-    let directory = simulated("C4");
+    let directory = simulated_run("C4");
     let d = directory.path();
-    let found = tracked(d, &[]);
+    let found = track_json(d, &[]);
     assert_eq!(found["method"], "physical");
     assert_eq!(
         found["orders"],
@@ -107,7 +107,7 @@ fn start_fit_finds_the_operator_and_its_change() {
 }
 
 /// Writes the run with changed rows to `c.csv`.
-fn changed(directory: &Path, change: &mut dyn FnMut(Vec<String>) -> Vec<String>) {
+fn modify_record(directory: &Path, change: &mut dyn FnMut(Vec<String>) -> Vec<String>) {
     let file = directory.join("c.csv");
     let text = fs::read_to_string(&file).unwrap();
     let (head, rows): (Vec<&str>, Vec<&str>) = text.lines().partition(|l| l.starts_with('#') || l.starts_with('t'));
@@ -117,19 +117,19 @@ fn changed(directory: &Path, change: &mut dyn FnMut(Vec<String>) -> Vec<String>)
 
 #[test]
 fn single_outlier_is_held_back_and_reported() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
     let mut arguments = KNOWN_ORDERS.to_vec();
-    let clean = tracked(d, &arguments);
+    let clean = track_json(d, &arguments);
     assert_eq!(clean["faults"], serde_json::json!([]));
     assert_eq!((&clean["held"], &clean["restarts"]), (&0.into(), &0.into()));
-    changed(d, &mut |mut rows| {
+    modify_record(d, &mut |mut rows| {
         let mut cells: Vec<&str> = rows[5000].split(',').collect();
         cells[2] = "100";
         rows[5000] = cells.join(",");
         rows
     });
-    let found = tracked(d, &arguments);
+    let found = track_json(d, &arguments);
     let fault = &found["faults"][0];
     assert_eq!((&fault["kind"], &fault["channel"]), (&"spike".into(), &"e".into()));
     assert_eq!(
@@ -146,7 +146,7 @@ fn single_outlier_is_held_back_and_reported() {
     }
     // Without the guard the estimate differs.
     arguments.extend(["--guard", "no"]);
-    let bare = tracked(d, &arguments);
+    let bare = track_json(d, &arguments);
     assert_eq!((&bare["held"], &bare["faults"]), (&0.into(), &serde_json::json!([])));
     let moved = (last(&bare, "omega_nm", "value") - last(&clean, "omega_nm", "value")).abs();
     assert!(moved > 3.0 * last(&clean, "omega_nm", "standard_error"), "{moved}");
@@ -155,9 +155,9 @@ fn single_outlier_is_held_back_and_reported() {
 
 #[test]
 fn idle_start_is_excluded_from_the_start_fit() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
-    changed(d, &mut |rows| {
+    modify_record(d, &mut |rows| {
         let columns = rows[0].split(',').count();
         let idle = (0..1500).map(|k| {
             let rest = vec!["0"; columns - 1].join(",");
@@ -172,7 +172,7 @@ fn idle_start_is_excluded_from_the_start_fit() {
         });
         idle.chain(later).collect()
     });
-    let found = tracked(d, &["--orders", "nd=1"]);
+    let found = track_json(d, &["--orders", "nd=1"]);
     assert_eq!(found["orders"]["nk"], 29);
     assert!((found["idle_head"].as_f64().unwrap() - 15.0).abs() < 0.5);
     let updated = found["updated_from"].as_f64().unwrap();
@@ -183,12 +183,12 @@ fn idle_start_is_excluded_from_the_start_fit() {
 
 #[test]
 fn page_contains_the_expected_text() {
-    let directory = simulated("C4");
+    let directory = simulated_run("C4");
     let d = directory.path();
     let mut arguments = vec!["track", "c.csv", "--out", "trace.csv"];
     arguments.extend(KNOWN_ORDERS);
     arguments.extend(["--method", "physical", "-v"]);
-    let page = good(d, &arguments);
+    let page = stdout_of(d, &arguments);
     for part in [
         "8192 samples of 0.01 s",
         "Start: batch fit of 0.00 to 27.31 s, BJ(nb=2, nd=1, nf=2, nk=29)",
@@ -209,12 +209,12 @@ fn page_contains_the_expected_text() {
         .iter()
         .fold(text, |t, n| t.replace(&format!(",{n},"), &format!(",was_{n},")));
     fs::write(d.join("c.csv"), renamed).unwrap();
-    assert!(!good(d, &arguments).contains("RMS relative error"));
+    assert!(!stdout_of(d, &arguments).contains("RMS relative error"));
 }
 
 #[test]
 fn every_method_structure_and_forgetting_rule_runs() {
-    let directory = simulated("C4");
+    let directory = simulated_run("C4");
     let d = directory.path();
     let cases: [&[&str]; 17] = [
         &["--method", "rls"],
@@ -256,7 +256,7 @@ fn every_method_structure_and_forgetting_rule_runs() {
     for case in cases {
         let mut arguments = vec!["--nk", "29", "--to", "30", "--every", "7"];
         arguments.extend(case);
-        let found = tracked(d, &arguments);
+        let found = track_json(d, &arguments);
         let trace = trace(d);
         // Of 3000 samples, every seventh and the last are rows.
         assert_eq!(trace.1.len(), 429, "{case:?}");
@@ -274,20 +274,20 @@ fn every_method_structure_and_forgetting_rule_runs() {
             "{case:?}"
         );
     }
-    let found = tracked(d, &["--orders", "nd=1", "--track-delay", ".2...4", "--to", "30"]);
+    let found = track_json(d, &["--orders", "nd=1", "--track-delay", ".2...4", "--to", "30"]);
     assert!((found["last"]["operator"]["tau_e"]["value"].as_f64().unwrap() - 0.28).abs() < 0.03);
     assert!(column(&trace(d), "tau_e_se").iter().all(|e| *e > 0.0));
 }
 
 /// Returns value and standard error in the columns of a quantity in the last row.
-fn last_of(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> (f64, f64) {
+fn last_value(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> (f64, f64) {
     let of = |name: &str| *column(trace, name).last().unwrap();
     (of(name), of(&format!("{name}_se")))
 }
 
 #[test]
 fn default_method_needs_no_start_and_reports_the_loop() {
-    let directory = simulated("C4");
+    let directory = simulated_run("C4");
     let d = directory.path();
     let arguments = [
         "track",
@@ -313,7 +313,7 @@ fn default_method_needs_no_start_and_reports_the_loop() {
     // The controlled element is the element before the change.
     assert!(crossover[3000..4000].iter().all(|w| (w - 1.56).abs() < 0.5));
     for name in ["crossover_rad_s", "phase_margin_deg"] {
-        let (value, error) = last_of(&trace, name);
+        let (value, error) = last_value(&trace, name);
         let told = &found["last"]["open_loop"][name];
         assert_eq!(told["value"].as_f64().unwrap(), value);
         assert_eq!(told["standard_error"].as_f64().unwrap(), error);
@@ -329,7 +329,7 @@ fn default_method_needs_no_start_and_reports_the_loop() {
         found["last"]["operator"]["K_e"]["determined"],
         column(&trace, "K_e_determined").last() == Some(&1.0)
     );
-    let page = good(
+    let page = stdout_of(
         d,
         &[
             "track",
@@ -346,7 +346,7 @@ fn default_method_needs_no_start_and_reports_the_loop() {
 /// An earlier name of a method gives the same numbers; a note on standard error reports it.
 #[test]
 fn former_method_name_is_accepted_with_a_notice() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
     let by = |method: &str| {
         let output = hoid(
@@ -369,7 +369,7 @@ fn earlier_fit_is_a_prior_for_tracking() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for (seed, file) in [("1", "earlier.csv"), ("2", "c.csv")] {
-        good(d, &["simulate", "--condition", "C1", "--seed", seed, "--out", file]);
+        stdout_of(d, &["simulate", "--condition", "C1", "--seed", seed, "--out", file]);
     }
     let fit = json(d, &["identify", "earlier.csv", "--form", "lead", "--json"]);
     fs::write(d.join("fit.json"), fit.to_string()).unwrap();
@@ -407,7 +407,7 @@ fn earlier_fit_is_a_prior_for_tracking() {
     assert!((0..gain.len()).all(|k| off(k) < 2.0 * error[k] && off(k) < 0.02));
     assert!(off(8191) < 0.003, "{}", gain[8191]);
     // Inconsistent options are reported before the work.
-    good(
+    stdout_of(
         d,
         &[
             "simulate",
@@ -426,30 +426,30 @@ fn earlier_fit_is_a_prior_for_tracking() {
         ("c.csv", "T_L=1:0.2", "T_L"),
         ("c.csv", "absent.json", "cannot be read"),
     ] {
-        let (_, message) = bad(d, &["track", file, "--out", "trace.csv", "--prior", prior]);
+        let (_, message) = failure_of(d, &["track", file, "--out", "trace.csv", "--prior", prior]);
         assert!(message.contains(expected), "{prior}: {message}");
     }
-    let (code, message) = bad(
+    let (code, message) = failure_of(
         d,
         &[
             "track", "c.csv", "--out", "t.csv", "--method", "physical", "--prior", "none",
         ],
     );
     assert!(code == 2 && message.contains("--method adaptive"), "{message}");
-    let (code, message) = bad(d, &["track", "c.csv", "--out", "fit.json", "--prior", "fit.json"]);
+    let (code, message) = failure_of(d, &["track", "c.csv", "--out", "fit.json", "--prior", "fit.json"]);
     assert!(code != 0 && !message.is_empty());
     assert!(fs::read_to_string(d.join("fit.json")).unwrap().contains("covariance"));
 }
 
 #[test]
 fn memory_units_are_equivalent() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
     let rows = |more: &[&str]| {
         let mut arguments = vec!["--method", "rpem", "--every", "50"];
         arguments.extend(KNOWN_ORDERS);
         arguments.extend(more);
-        tracked(d, &arguments);
+        track_json(d, &arguments);
         trace(d).1
     };
     let samples = rows(&["--memory", "256"]);
@@ -470,20 +470,20 @@ fn memory_units_are_equivalent() {
 
 #[test]
 fn report_contains_the_batch_fits() {
-    let directory = simulated("C4");
+    let directory = simulated_run("C4");
     let d = directory.path();
     let page = |more: &[&str]| {
         let mut arguments = KNOWN_ORDERS.to_vec();
         arguments.extend(["--every", "8", "--report", "out"]);
         arguments.extend(more);
-        tracked(d, &arguments);
+        track_json(d, &arguments);
         fs::read_to_string(d.join("out/report.html")).unwrap()
     };
     let own = page(&[]);
     assert!(own.contains("<svg") && own.contains("c tracked by physical"));
     let typed = page(&["--batch", "0..30.72,51.2..81.92"]);
     assert!(typed.contains("51.2") && typed != own);
-    let (code, message) = bad(
+    let (code, message) = failure_of(
         d,
         &[
             "track", "c.csv", "--out", "x.csv", "--method", "physical", "--nk", "29", "--report", "r", "--batch",
@@ -495,7 +495,7 @@ fn report_contains_the_batch_fits() {
 
 #[test]
 fn contradictory_options_exit_with_two() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
     for (arguments, expected) in [
         (&["--method", "rls", "--structure", "bj"][..], "arx or fir"),
@@ -550,7 +550,7 @@ fn contradictory_options_exit_with_two() {
     ] {
         let mut all = vec!["track", "c.csv", "--out", "trace.csv"];
         all.extend(arguments);
-        let (code, message) = bad(d, &physical(&all));
+        let (code, message) = failure_of(d, &with_physical_method(&all));
         assert_eq!(code, 2, "{arguments:?}: {message}");
         assert!(message.contains(expected), "{arguments:?}: {message}");
     }
@@ -558,7 +558,7 @@ fn contradictory_options_exit_with_two() {
 
 #[test]
 fn missing_results_exit_with_one() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
     let text = fs::read_to_string(d.join("c.csv")).unwrap();
     fs::write(d.join("silent.csv"), "e,u\n".to_owned() + &"0,0\n".repeat(500)).unwrap();
@@ -577,15 +577,15 @@ fn missing_results_exit_with_one() {
     ] {
         let mut all = vec!["track", "--out", "trace.csv"];
         all.extend(arguments);
-        let (code, message) = bad(d, &physical(&all));
+        let (code, message) = failure_of(d, &with_physical_method(&all));
         assert_eq!(code, 1, "{arguments:?}: {message}");
         assert!(message.contains(expected), "{arguments:?}: {message}");
     }
     for out in ["trace.xyz", "trace", "."] {
-        assert_eq!(bad(d, &["track", "c.csv", "--out", out]).0, 1, "{out}");
+        assert_eq!(failure_of(d, &["track", "c.csv", "--out", out]).0, 1, "{out}");
     }
     assert_eq!(
-        bad(d, &["track", "c.csv", "--nk", "29", "--out", "no/such/place.csv"]).0,
+        failure_of(d, &["track", "c.csv", "--nk", "29", "--out", "no/such/place.csv"]).0,
         1
     );
 }
@@ -606,7 +606,7 @@ fn other_rates_need_no_extra_options() {
             "--out",
             "c.csv",
         ];
-        good(d, &run);
+        stdout_of(d, &run);
         let with = ["--nk", "0.28s", "--every", "100", "--controlled-element", "90/(s(s+6))"];
         let track = ["track", "c.csv", "--out", "trace.csv", "--json"];
         json(d, &[&track[..], &with[..]].concat());
@@ -626,9 +626,9 @@ fn other_rates_need_no_extra_options() {
 
 #[test]
 fn second_run_selects_the_start_covariance() {
-    let directory = simulated("C4");
+    let directory = simulated_run("C4");
     let d = directory.path();
-    good(
+    stdout_of(
         d,
         &["simulate", "--condition", "C4", "--seed", "2", "--out", "second.csv"],
     );
@@ -665,18 +665,18 @@ fn second_run_selects_the_start_covariance() {
     assert!((0.0..=100.0).contains(&vaf(best)) && vaf(best) > 80.0, "{choice}");
     let said: f64 = setting(&found, "covariance").parse().unwrap();
     assert_eq!(Some(said), choice["covariance"].as_f64());
-    let page = good(d, &arguments);
+    let page = stdout_of(d, &arguments);
     assert!(
         page.contains("P0") && page.contains("chosen") && page.contains("second.csv"),
         "{page}"
     );
-    let (status, warnings) = bad(d, &with(&["--covariance", "0.1"]));
+    let (status, warnings) = failure_of(d, &with(&["--covariance", "0.1"]));
     assert!(status == 2 && warnings.contains("--covariance"), "{warnings}");
     // The result is independent of the initial P.
     let updated = json(d, &with(&["--json", "--update-covariance", "--covariance", "0.1"]));
     assert!(updated["covariance_choice"].is_null());
     assert!(setting(&updated, "covariance updated").contains("second.csv"));
-    let (status, warnings) = bad(
+    let (status, warnings) = failure_of(
         d,
         &[
             "track",
@@ -689,16 +689,16 @@ fn second_run_selects_the_start_covariance() {
         ],
     );
     assert!(status == 2 && warnings.contains("--validate"), "{warnings}");
-    let (status, warnings) = bad(d, &with(&["--track-delay", "0.2..0.4"]));
+    let (status, warnings) = failure_of(d, &with(&["--track-delay", "0.2..0.4"]));
     assert!(status == 1 && warnings.contains("without track_delay"), "{warnings}");
     fs::write(d.join("second.csv"), "t,e,u\n0,1,1\n0.01,2,1\n").unwrap();
-    let (_, warnings) = bad(d, &arguments);
+    let (_, warnings) = failure_of(d, &arguments);
     assert!(warnings.contains("in common"), "{warnings}");
 }
 
 #[test]
 fn rpem_tracks_a_delay_and_reports_the_windup_guard() {
-    let directory = simulated("C4");
+    let directory = simulated_run("C4");
     let d = directory.path();
     let text = [
         "--method",
@@ -732,7 +732,7 @@ fn rpem_tracks_a_delay_and_reports_the_windup_guard() {
 #[test]
 fn methods_are_listed_without_a_record() {
     let directory = TempDir::new().unwrap();
-    let text = good(directory.path(), &["track", "--methods"]);
+    let text = stdout_of(directory.path(), &["track", "--methods"]);
     let lines: Vec<&str> = text.lines().collect();
     assert!(lines[0].starts_with("adaptive        default"), "{text}");
     assert!(
@@ -746,9 +746,9 @@ fn methods_are_listed_without_a_record() {
     assert_eq!(all[0]["default"], true);
     assert!(all.iter().all(|one| !one["structures"].as_array().unwrap().is_empty()));
     // The command without `--methods` requires a record.
-    let (code, message) = bad(directory.path(), &["track"]);
+    let (code, message) = failure_of(directory.path(), &["track"]);
     assert!(code == 2 && message.contains("RECORD"), "{message}");
-    assert_eq!(bad(directory.path(), &["track", "c.csv", "--methods"]).0, 2);
+    assert_eq!(failure_of(directory.path(), &["track", "c.csv", "--methods"]).0, 2);
 }
 
 #[test]
@@ -759,7 +759,7 @@ fn non_recursive_methods_are_refused_with_advice() {
         ("lpv", "lpv-subspace is not a recursion"),
         ("rls-fir", "rls-fir does not track recordings"),
     ] {
-        let (code, message) = bad(directory.path(), &["track", "c.csv", "--method", typed]);
+        let (code, message) = failure_of(directory.path(), &["track", "c.csv", "--method", typed]);
         assert_eq!(code, 2);
         assert!(message.contains(name), "{message}");
         assert!(message.contains("survey_methods"), "{message}");

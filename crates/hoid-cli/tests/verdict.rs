@@ -12,19 +12,19 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{good, hoid, json};
+use common::{hoid, json, stdout_of};
 
-const BOX_JENKINS: [&str; 6] = ["--structure", "bj", "--nk", "29", "--orders", "nd=1"];
+const BOX_JENKINS_OPTIONS: [&str; 6] = ["--structure", "bj", "--nk", "29", "--orders", "nd=1"];
 
-fn simulated(condition: &str) -> TempDir {
+fn simulated_run(condition: &str) -> TempDir {
     let directory = TempDir::new().unwrap();
     let arguments = ["simulate", "--condition", condition, "--seed", "1", "--out", "c.csv"];
-    good(directory.path(), &arguments);
+    stdout_of(directory.path(), &arguments);
     directory
 }
 
 /// Writes a run with the same errors and an independent output.
-fn without_response(directory: &Path) {
+fn remove_response(directory: &Path) {
     let mut state = 11_u64;
     let mut draw = || {
         state = state
@@ -49,11 +49,11 @@ fn without_response(directory: &Path) {
 
 #[test]
 fn clean_run_is_trustworthy_in_text_and_json() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
     let mut arguments = vec!["identify", "c.csv"];
-    arguments.extend(BOX_JENKINS);
-    let page = good(d, &arguments);
+    arguments.extend(BOX_JENKINS_OPTIONS);
+    let page = stdout_of(d, &arguments);
     assert!(
         page.starts_with("Verdict: trustworthy\n\nBJ(nb=2, nd=1, nf=2, nk=29)\n")
             && page.contains("c.csv: 8192 samples"),
@@ -77,7 +77,7 @@ fn clean_run_is_trustworthy_in_text_and_json() {
 
 #[test]
 fn delay_at_its_bound_is_the_first_finding() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
     let arguments = [
         "identify",
@@ -89,7 +89,7 @@ fn delay_at_its_bound_is_the_first_finding() {
         "--orders",
         "nd=1",
     ];
-    let page = good(d, &arguments);
+    let page = stdout_of(d, &arguments);
     assert!(page.starts_with("Verdict: doubtful\n- "), "{page}");
     assert!(
         page.contains("is at an end of its search range, 0.190 to 0.230 s"),
@@ -109,7 +109,7 @@ fn delay_at_its_bound_is_the_first_finding() {
 fn undetermined_result_is_printed_and_exits_with_one() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    without_response(d);
+    remove_response(d);
     let arguments = [
         "identify",
         "n.csv",
@@ -138,7 +138,7 @@ fn undetermined_result_is_printed_and_exits_with_one() {
 
 #[test]
 fn trace_includes_the_findings_of_its_start() {
-    let directory = simulated("C4");
+    let directory = simulated_run("C4");
     let d = directory.path();
     let physical = [
         "track",
@@ -152,7 +152,7 @@ fn trace_includes_the_findings_of_its_start() {
         "--out",
         "trace.csv",
     ];
-    let page = good(d, &physical);
+    let page = stdout_of(d, &physical);
     assert!(page.starts_with("Verdict: trustworthy\n"), "{page}");
     let rls = json(
         d,
@@ -178,7 +178,7 @@ fn trace_includes_the_findings_of_its_start() {
 }
 
 /// Returns the lines of a stream and its exit code.
-fn streamed(directory: &Path, more: &[&str]) -> (Vec<Value>, Option<i32>) {
+fn run_stream(directory: &Path, more: &[&str]) -> (Vec<Value>, Option<i32>) {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args([
             "stream", "--fs", "100", "--method", "physical", "--nk", "29", "--orders", "nd=1", "--every", "500",
@@ -195,8 +195,8 @@ fn streamed(directory: &Path, more: &[&str]) -> (Vec<Value>, Option<i32>) {
 
 #[test]
 fn stream_lines_have_a_level_that_sets_the_exit_code() {
-    let directory = simulated("C1");
-    let (lines, code) = streamed(directory.path(), &[]);
+    let directory = simulated_run("C1");
+    let (lines, code) = run_stream(directory.path(), &[]);
     assert_eq!(code, Some(0));
     assert_eq!(lines[0]["level"], "not determined");
     assert_eq!(
@@ -205,14 +205,14 @@ fn stream_lines_have_a_level_that_sets_the_exit_code() {
         "{}",
         lines.last().unwrap()
     );
-    let (lines, code) = streamed(directory.path(), &["--warm-up", "200"]);
+    let (lines, code) = run_stream(directory.path(), &["--warm-up", "200"]);
     assert_eq!(code, Some(1));
     assert!(lines.iter().all(|line| line["level"] == "not determined"));
 }
 
 #[test]
 fn wrong_controlled_element_is_doubtful_in_every_command() {
-    let directory = simulated("C1");
+    let directory = simulated_run("C1");
     let d = directory.path();
     let commands: [&[&str]; 4] = [
         &["identify", "c.csv"],

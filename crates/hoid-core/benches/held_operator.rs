@@ -9,7 +9,7 @@ use std::hint::black_box;
 use criterion::{Criterion, criterion_group, criterion_main};
 use hoid_core::held_operator::{held_operator, held_operator_delayed};
 
-fn holds(c: &mut Criterion) {
+fn bench_held_operator(c: &mut Criterion) {
     for (name, omega, zeta, ts) in [
         ("11.25 rad/s, 0.35, 100 Hz", 11.25, 0.35, 0.01),
         ("11.25 rad/s, 0.35, 1 kHz", 11.25, 0.35, 0.001),
@@ -30,6 +30,6 @@ fn holds(c: &mut Criterion) {
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = holds
+    targets = bench_held_operator
 }
 criterion_main!(benches);

@@ -10,21 +10,21 @@ use hoid_core::{
     adaptation::Forgetting,
     adaptive::{
         AdaptiveFilter,
-        defaults::{DefaultOperator, REPLAYED_S},
+        defaults::{DefaultOperator, REPLAY_SPAN_S},
         memory_needed,
     },
     covariance::Covariance,
     error_bars::{ErrorBars, NoErrorBars},
     innovation_variance::InnovationVariance,
     predictor::Regressor,
-    recursion::Stable,
+    recursion::StablePolynomials,
     rls::Rls,
     rpem::Rpem,
     shape::{AnyShape, FixedShape, Shape},
     ud_covariance::UdCovariance,
 };
 
-const SAMPLES: usize = 8192;
+const SAMPLE_COUNT: usize = 8192;
 
 /// Returns input and output of a Box-Jenkins model with the poles of the operator, and noise from a fixed generator.
 fn data() -> Vec<(f64, f64)> {
@@ -36,7 +36,7 @@ fn data() -> Vec<(f64, f64)> {
         (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
     };
     let (mut w, mut n, mut x1) = ([0.0; 2], 0.0, 0.0);
-    (0..SAMPLES)
+    (0..SAMPLE_COUNT)
         .map(|t| {
             let t = t as f64;
             let x = (0.005 * t).sin() + (0.023 * t).sin() + 0.3 * (0.11 * t).sin();
@@ -53,38 +53,38 @@ fn covariance<const N: usize>(forgetting: Forgetting<N>) -> Covariance<N> {
     Covariance::new(UdCovariance::diagonal([0.1; N]), forgetting, [1e3; N])
 }
 
-fn bars<const N: usize, const K: usize>() -> ErrorBars<N, K> {
+fn error_bars<const N: usize, const K: usize>() -> ErrorBars<N, K> {
     let start: [[f64; N]; N] = std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 0.1 } else { 0.0 }));
     ErrorBars::new(&start, InnovationVariance::new(1e-4, 100.0, 0.999), 5.0)
 }
 
-fn scalar<const N: usize>() -> Forgetting<N> {
+fn scalar_forgetting<const N: usize>() -> Forgetting<N> {
     Forgetting::Exponential {
         lambda: [1.0 - 1.0 / 256.0; N],
     }
 }
 
-fn matrix<const N: usize>() -> Forgetting<N> {
+fn matrix_forgetting<const N: usize>() -> Forgetting<N> {
     let mut lambda = [1.0 - 1.0 / 256.0; N];
     lambda[N - 1] = 1.0;
     Forgetting::Exponential { lambda }
 }
 
-fn rls<S: Shape, const N: usize>(
+fn run_rls<S: Shape, const N: usize>(
     shape: S,
     forgetting: Forgetting<N>,
     data: &[(f64, f64)],
     history: &mut Vec<[f64; N]>,
 ) {
     history.clear();
-    let mut recursion = Rls::new(shape, [0.0; N], covariance(forgetting), bars::<N, 0>()).unwrap();
+    let mut recursion = Rls::new(shape, [0.0; N], covariance(forgetting), error_bars::<N, 0>()).unwrap();
     for &(x, u) in data {
         recursion.step(x, u);
         history.push(*recursion.theta());
     }
 }
 
-fn rpem<S: Shape, const N: usize, const K: usize>(
+fn run_rpem<S: Shape, const N: usize, const K: usize>(
     shape: S,
     forgetting: Forgetting<N>,
     data: &[(f64, f64)],
@@ -99,10 +99,10 @@ fn rpem<S: Shape, const N: usize, const K: usize>(
     let mut recursion = Rpem::new(
         shape,
         Regressor::Gradient,
-        Stable::Predictor,
+        StablePolynomials::Predictor,
         theta,
         covariance(forgetting),
-        bars::<N, K>(),
+        error_bars::<N, K>(),
     )
     .unwrap();
     for &(x, u) in data {
@@ -113,9 +113,13 @@ fn rpem<S: Shape, const N: usize, const K: usize>(
 
 /// Recursive least squares without error bars, for comparison with libraries that have none: no guard, and no limit on
 /// outliers.
-fn bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
+fn run_bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     history.clear();
-    let adaptation = Covariance::new(UdCovariance::diagonal([0.1; 4]), scalar(), [f64::INFINITY; 4]);
+    let adaptation = Covariance::new(
+        UdCovariance::diagonal([0.1; 4]),
+        scalar_forgetting(),
+        [f64::INFINITY; 4],
+    );
     let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], adaptation, NoErrorBars).unwrap();
     for &(x, u) in data {
         recursion.step(x, u);
@@ -124,14 +128,18 @@ fn bare_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
 }
 
 /// The same for the prediction-error method.
-fn bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
+fn run_bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
     history.clear();
     let mut recursion = Rpem::<_, 5, 0, _, _>::new(
         FixedShape::<0, 2, 0, 1, 2>,
         Regressor::Gradient,
-        Stable::Predictor,
+        StablePolynomials::Predictor,
         [0.04, -0.04, -0.8, -1.9, 0.92],
-        Covariance::new(UdCovariance::diagonal([0.1; 5]), scalar(), [f64::INFINITY; 5]),
+        Covariance::new(
+            UdCovariance::diagonal([0.1; 5]),
+            scalar_forgetting(),
+            [f64::INFINITY; 5],
+        ),
         NoErrorBars,
     )
     .unwrap();
@@ -142,7 +150,7 @@ fn bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
 }
 
 /// Baseline: recursive least squares with one triangle of a plain covariance, without a guard or error bars.
-fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
+fn run_plain_rls(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     history.clear();
     let (mut theta, mut psi) = ([0.0; 4], [0.0; 4]);
     let mut p = [[0.0; 4]; 4];
@@ -172,15 +180,15 @@ fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
 }
 
 /// Returns the adaptive filter with the default settings for a person.
-fn person() -> AdaptiveFilter<Vec<f64>> {
+fn person_filter() -> AdaptiveFilter<Vec<f64>> {
     let (default_operator, ts) = (DefaultOperator::with_delay(0.285), 0.01);
-    let memory = vec![0.0; memory_needed(ts, REPLAYED_S)];
+    let memory = vec![0.0; memory_needed(ts, REPLAY_SPAN_S)];
     AdaptiveFilter::new(default_operator.prior(ts), memory).unwrap()
 }
 
 /// Continues with an adaptive filter, either from the start, when replays are short, or from a time when replays are
 /// long.
-fn follow(mut person: AdaptiveFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
+fn run_filter(mut person: AdaptiveFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
     history.clear();
     for &(x, u) in data {
         history.push(person.step(x, u).innovation);
@@ -191,51 +199,59 @@ fn bench(c: &mut Criterion) {
     let data = data();
     let data = black_box(data.as_slice());
     let mut group = c.benchmark_group("recursion");
-    group.throughput(Throughput::Elements(SAMPLES as u64));
+    group.throughput(Throughput::Elements(SAMPLE_COUNT as u64));
     let any = |na, nb, nd, nf| AnyShape { na, nb, nc: 0, nd, nf };
-    let mut h4: Vec<[f64; 4]> = Vec::with_capacity(SAMPLES);
-    group.bench_function("rls 4, plain yardstick", |b| b.iter(|| plain(data, &mut h4)));
+    let mut h4: Vec<[f64; 4]> = Vec::with_capacity(SAMPLE_COUNT);
+    group.bench_function("rls 4, plain yardstick", |b| b.iter(|| run_plain_rls(data, &mut h4)));
     let arx = FixedShape::<2, 2, 0, 0, 0>;
-    group.bench_function("rls 4", |b| b.iter(|| rls(arx, scalar(), data, &mut h4)));
-    group.bench_function("rls 4, no error bars", |b| b.iter(|| bare_rls(data, &mut h4)));
-    group.bench_function("rls 4, matrix", |b| b.iter(|| rls(arx, matrix(), data, &mut h4)));
+    group.bench_function("rls 4", |b| b.iter(|| run_rls(arx, scalar_forgetting(), data, &mut h4)));
+    group.bench_function("rls 4, no error bars", |b| b.iter(|| run_bare_rls(data, &mut h4)));
+    group.bench_function("rls 4, matrix", |b| {
+        b.iter(|| run_rls(arx, matrix_forgetting(), data, &mut h4))
+    });
     group.bench_function("rls 4, any shape", |b| {
-        b.iter(|| rls(any(2, 2, 0, 0), scalar(), data, &mut h4))
+        b.iter(|| run_rls(any(2, 2, 0, 0), scalar_forgetting(), data, &mut h4))
     });
-    let mut h5: Vec<[f64; 5]> = Vec::with_capacity(SAMPLES);
+    let mut h5: Vec<[f64; 5]> = Vec::with_capacity(SAMPLE_COUNT);
     let bj = FixedShape::<0, 2, 0, 1, 2>;
-    group.bench_function("rpem 5", |b| b.iter(|| rpem::<_, 5, 2>(bj, scalar(), data, &mut h5)));
-    group.bench_function("rpem 5, default error bars", |b| {
-        b.iter(|| rpem::<_, 5, 0>(bj, scalar(), data, &mut h5))
+    group.bench_function("rpem 5", |b| {
+        b.iter(|| run_rpem::<_, 5, 2>(bj, scalar_forgetting(), data, &mut h5))
     });
-    group.bench_function("rpem 5, no error bars", |b| b.iter(|| bare_rpem(data, &mut h5)));
+    group.bench_function("rpem 5, default error bars", |b| {
+        b.iter(|| run_rpem::<_, 5, 0>(bj, scalar_forgetting(), data, &mut h5))
+    });
+    group.bench_function("rpem 5, no error bars", |b| b.iter(|| run_bare_rpem(data, &mut h5)));
     group.bench_function("rpem 5, matrix", |b| {
-        b.iter(|| rpem::<_, 5, 2>(bj, matrix(), data, &mut h5))
+        b.iter(|| run_rpem::<_, 5, 2>(bj, matrix_forgetting(), data, &mut h5))
     });
     group.bench_function("rpem 5, any shape", |b| {
-        b.iter(|| rpem::<_, 5, 2>(any(0, 2, 1, 2), scalar(), data, &mut h5))
+        b.iter(|| run_rpem::<_, 5, 2>(any(0, 2, 1, 2), scalar_forgetting(), data, &mut h5))
     });
-    let mut h8: Vec<[f64; 8]> = Vec::with_capacity(SAMPLES);
+    let mut h8: Vec<[f64; 8]> = Vec::with_capacity(SAMPLE_COUNT);
     group.bench_function("rpem 8", |b| {
-        b.iter(|| rpem::<_, 8, 4>(any(0, 2, 4, 2), scalar(), data, &mut h8))
+        b.iter(|| run_rpem::<_, 8, 4>(any(0, 2, 4, 2), scalar_forgetting(), data, &mut h8))
     });
-    group.bench_function("rls 8", |b| b.iter(|| rls(any(4, 4, 0, 0), scalar(), data, &mut h8)));
-    let mut h16: Vec<[f64; 16]> = Vec::with_capacity(SAMPLES);
-    group.bench_function("rls 16", |b| b.iter(|| rls(any(8, 8, 0, 0), scalar(), data, &mut h16)));
-    let mut h32: Vec<[f64; 32]> = Vec::with_capacity(SAMPLES);
+    group.bench_function("rls 8", |b| {
+        b.iter(|| run_rls(any(4, 4, 0, 0), scalar_forgetting(), data, &mut h8))
+    });
+    let mut h16: Vec<[f64; 16]> = Vec::with_capacity(SAMPLE_COUNT);
+    group.bench_function("rls 16", |b| {
+        b.iter(|| run_rls(any(8, 8, 0, 0), scalar_forgetting(), data, &mut h16))
+    });
+    let mut h32: Vec<[f64; 32]> = Vec::with_capacity(SAMPLE_COUNT);
     group.bench_function("rls 32", |b| {
-        b.iter(|| rls(any(16, 16, 0, 0), scalar(), data, &mut h32))
+        b.iter(|| run_rls(any(16, 16, 0, 0), scalar_forgetting(), data, &mut h32))
     });
-    let mut innovations: Vec<f64> = Vec::with_capacity(SAMPLES);
+    let mut innovations: Vec<f64> = Vec::with_capacity(SAMPLE_COUNT);
     group.bench_function("adaptive, from the start", |b| {
-        b.iter(|| follow(person(), data, &mut innovations))
+        b.iter(|| run_filter(person_filter(), data, &mut innovations))
     });
-    let mut later = person();
+    let mut later = person_filter();
     data.iter().for_each(|&(x, u)| {
         later.step(x, u);
     });
     group.bench_function("adaptive, after 82 s", |b| {
-        b.iter(|| follow(later.clone(), data, &mut innovations))
+        b.iter(|| run_filter(later.clone(), data, &mut innovations))
     });
     group.finish();
 }

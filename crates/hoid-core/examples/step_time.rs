@@ -14,9 +14,9 @@ fn main() {
     let repetitions: u32 = std::env::args().nth(1).map_or(15, |text| text.parse().unwrap());
     println!("rate in Hz   replay   mean in us   longest in us   share of a sample");
     for rate_hz in [50.0, 100.0, 200.0] {
-        let run = simulated(1.0 / rate_hz);
+        let run = simulated_samples(1.0 / rate_hz);
         for replay_s in [0.0, 100.0] {
-            let shortest = shortest_us(&run, 1.0 / rate_hz, replay_s, repetitions);
+            let shortest = shortest_step_times_us(&run, 1.0 / rate_hz, replay_s, repetitions);
             let mean = shortest.iter().sum::<f64>() / shortest.len() as f64;
             let longest = shortest.iter().copied().fold(0.0, f64::max);
             println!(
@@ -28,7 +28,7 @@ fn main() {
 }
 
 /// Returns the shortest time of each step in several runs, us.
-fn shortest_us(run: &[(f64, f64)], ts_s: f64, replay_s: f64, repetitions: u32) -> Vec<f64> {
+fn shortest_step_times_us(run: &[(f64, f64)], ts_s: f64, replay_s: f64, repetitions: u32) -> Vec<f64> {
     let memory = if replay_s > 0.0 {
         memory_needed(ts_s, replay_s)
     } else {
@@ -49,7 +49,7 @@ fn shortest_us(run: &[(f64, f64)], ts_s: f64, replay_s: f64, repetitions: u32) -
 
 /// Simulates an operator with a gain that doubles after a minute, a neuromuscular system of 11 rad/s, a delay of 0.2 s,
 /// and noise.
-fn simulated(ts_s: f64) -> Vec<(f64, f64)> {
+fn simulated_samples(ts_s: f64) -> Vec<(f64, f64)> {
     let late = (0.2 / ts_s).round() as usize;
     let (mut u, mut rate, mut draw, mut errors) = (0.0, 0.0, 1_u32, vec![0.0; late]);
     let samples = (LENGTH_S / ts_s) as u32;

@@ -62,7 +62,7 @@ pub struct ParameterStep<const N: usize> {
 
 impl<const N: usize> ParameterStep<N> {
     /// Step of zero, at which the estimate stays constant.
-    pub(crate) const NONE: Self = Self {
+    pub(crate) const ZERO: Self = Self {
         step: [0.0; N],
         gain: [0.0; N],
     };

@@ -17,15 +17,15 @@ use crate::{
 /// variance of a parameter then grows by at most e^{1/4} between two of its pseudo-measurements.
 const ROUNDS_PER_MEMORY: f64 = 4.0;
 /// `psi' P psi` below which a sample is not used as a measurement.
-const NO_EXCITATION: f64 = 1e-100;
+const MIN_EXCITATION: f64 = 1e-100;
 /// Weight of the newest sample in the mean power of psi.
 const POWER_WEIGHT: f64 = 0.01;
 /// Offset c of the normalised gradient, relative to the largest mean power of psi.
 const GRADIENT_OFFSET: f64 = 0.01;
 /// Value of the additional forgetting of early samples below which it ends.
-const NO_EARLY_FORGETTING: f64 = 1e-9;
+const MIN_EARLY_FORGETTING: f64 = 1e-9;
 /// Maximum number of samples between two pseudo-measurements.
-const LONGEST_PERIOD: f64 = 64.0;
+const MAX_GUARD_PERIOD: f64 = 64.0;
 
 /// P in factored form, with a rule of forgetting.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,10 +61,10 @@ pub struct Covariance<const N: usize> {
 
 crate::state!([const N: usize] Covariance<N> {
     factors, initial, scales, uniform_growth, bound, guard, forgotten, forgotten_at_turn, early, early_decay, power, largest_power, period, until_turn, turn,
-}, bounded);
+}, limit_restored);
 
 impl<const N: usize> Covariance<N> {
-    fn bounded(&mut self) {
+    fn limit_restored(&mut self) {
         self.period = self.period.max(1);
         self.until_turn = self.until_turn.clamp(1, self.period);
         self.turn = self.turn.min(N.saturating_sub(1));
@@ -143,9 +143,9 @@ impl<const N: usize> Covariance<N> {
     /// [`Adaptation::update`] itself handles exponential forgetting without early forgetting.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
-        if self.early > NO_EARLY_FORGETTING {
+        if self.early > MIN_EARLY_FORGETTING {
             self.factors.scale_all(1.0 / (1.0 - self.early));
-            self.count_forgotten(self.early);
+            self.accumulate_forgetting(self.early);
             self.early *= self.early_decay;
         }
         let mut growth = 1.0;
@@ -157,7 +157,7 @@ impl<const N: usize> Covariance<N> {
                     } else {
                         self.factors.scale(&self.scales[0], &self.scales[1]);
                     }
-                    self.count_forgotten(1.0);
+                    self.accumulate_forgetting(1.0);
                 }
             }
             Forgetting::RandomWalk { drift } => {
@@ -168,7 +168,7 @@ impl<const N: usize> Covariance<N> {
                         self.factors.rank_one_update(*q, unit);
                     }
                 }
-                self.count_forgotten(1.0);
+                self.accumulate_forgetting(1.0);
             }
             Forgetting::Variable { memory, smallest } => {
                 return self.update_variable(psi, eps, *memory * variance, *smallest);
@@ -176,7 +176,7 @@ impl<const N: usize> Covariance<N> {
             Forgetting::Directional { lambda } => return self.update_directional(psi, eps, *lambda),
             Forgetting::Gradient { rate } => return self.update_gradient(psi, eps, *rate),
         }
-        scaled(self.factors.inflate_and_update(growth, psi, 1.0), eps)
+        gain_step(self.factors.inflate_and_update(growth, psi, 1.0), eps)
     }
 
     /// Returns the step with the variable forgetting factor; `sum_of_squares` is N_0 sigma^2.
@@ -192,8 +192,8 @@ impl<const N: usize> Covariance<N> {
             1.0
         };
         self.factors.scale_all(1.0 / lambda);
-        self.count_forgotten(1.0 - lambda);
-        scaled(gain, eps)
+        self.accumulate_forgetting(1.0 - lambda);
+        gain_step(gain, eps)
     }
 
     fn update_directional(&mut self, psi: &[f64; N], eps: f64, lambda: f64) -> ParameterStep<N> {
@@ -201,11 +201,11 @@ impl<const N: usize> Covariance<N> {
         let gain = self.factors.times(psi).map(|g| g / (1.0 + power));
         let beta = lambda - (1.0 - lambda) / power;
         // Without excitation there is nothing to measure and no direction in which to forget.
-        if power > NO_EXCITATION && beta != 0.0 {
+        if power > MIN_EXCITATION && beta != 0.0 {
             self.factors.measurement_update(psi, 1.0 / beta);
         }
-        self.count_forgotten(1.0 - lambda);
-        scaled(gain, eps)
+        self.accumulate_forgetting(1.0 - lambda);
+        gain_step(gain, eps)
     }
 
     fn update_gradient(&mut self, psi: &[f64; N], eps: f64, rate: f64) -> ParameterStep<N> {
@@ -216,23 +216,23 @@ impl<const N: usize> Covariance<N> {
         self.largest_power = self.largest_power.max(self.power);
         let denominator = GRADIENT_OFFSET * self.largest_power + power;
         let scale = if denominator > 0.0 { rate / denominator } else { 0.0 };
-        scaled(psi.map(|p| scale * p), eps)
+        gain_step(psi.map(|p| scale * p), eps)
     }
 
     /// Accumulates the forgetting of this sample, and makes the next pseudo-measurement at the end of a period.
     #[inline]
-    fn count_forgotten(&mut self, forgotten: f64) {
+    fn accumulate_forgetting(&mut self, forgotten: f64) {
         self.forgotten += forgotten;
         self.until_turn -= 1;
         if self.until_turn > 0 {
             return;
         }
-        self.guard_next();
+        self.guard_next_parameter();
     }
 
     /// Makes the pseudo-measurement of the parameter whose turn it is.
     #[inline(never)]
-    fn guard_next(&mut self) {
+    fn guard_next_parameter(&mut self) {
         self.until_turn = self.period;
         if !self.factors.is_valid() {
             // After an overflow P is reset to its initial value.
@@ -254,7 +254,7 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
     #[inline(always)]
     fn update(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> ParameterStep<N> {
         let exponential = matches!(self.forgetting, Forgetting::Exponential { .. });
-        if !exponential || self.early > NO_EARLY_FORGETTING {
+        if !exponential || self.early > MIN_EARLY_FORGETTING {
             // The copy allows psi to stay in registers under exponential forgetting.
             let psi = *psi;
             return self.update_by_rule(&psi, eps, variance);
@@ -267,9 +267,9 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
             } else {
                 self.factors.scale(&self.scales[0], &self.scales[1]);
             }
-            self.count_forgotten(1.0);
+            self.accumulate_forgetting(1.0);
         }
-        scaled(self.factors.inflate_and_update(growth, psi, 1.0), eps)
+        gain_step(self.factors.inflate_and_update(growth, psi, 1.0), eps)
     }
 
     #[inline(always)]
@@ -292,12 +292,12 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
 
 /// Number of samples between two pseudo-measurements, for the shortest memory and the number of parameters.
 fn guard_period(shortest: f64, parameters: usize) -> u32 {
-    (shortest / (ROUNDS_PER_MEMORY * parameters as f64)).clamp(1.0, LONGEST_PERIOD) as u32
+    (shortest / (ROUNDS_PER_MEMORY * parameters as f64)).clamp(1.0, MAX_GUARD_PERIOD) as u32
 }
 
 /// Returns the step `g eps`.
 #[inline(always)]
-fn scaled<const N: usize>(gain: [f64; N], eps: f64) -> ParameterStep<N> {
+fn gain_step<const N: usize>(gain: [f64; N], eps: f64) -> ParameterStep<N> {
     ParameterStep {
         step: gain.map(|g| g * eps),
         gain,

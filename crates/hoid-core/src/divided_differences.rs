@@ -60,13 +60,13 @@ impl DividedDifferences {
         let size = if x < 0.0 { product } else { 2.0 * (half * half + x) };
         // The relative size |z|^N/N! of the first omitted term is below 3e-17.
         if size <= 1.0 / 64.0 {
-            Self::by_series::<11>(sum, product)
+            Self::from_series::<11>(sum, product)
         } else if size <= 0.25 {
-            Self::by_series::<15>(sum, product)
+            Self::from_series::<15>(sum, product)
         } else if size <= 2.0 {
-            Self::by_series::<21>(sum, product)
+            Self::from_series::<21>(sum, product)
         } else {
-            Self::by_exponentials(sum, product)
+            Self::from_exponentials(sum, product)
         }
     }
 
@@ -95,7 +95,7 @@ impl DividedDifferences {
 
     /// Evaluates the series by Clenshaw's summation, downwards from `Phi_{N+1}`.
     #[inline]
-    fn by_series<const N: usize>(s: f64, q: f64) -> Self {
+    fn from_series<const N: usize>(s: f64, q: f64) -> Self {
         let (mut phi, mut phi_above) = (RECIPROCALS[N + 1], RECIPROCALS[N + 2]);
         let (mut slope, mut slope_above) = (RECIPROCALS[N + 2], 0.0);
         for j in (2..=N).rev() {
@@ -114,7 +114,7 @@ impl DividedDifferences {
     }
 
     #[cold]
-    fn by_exponentials(s: f64, q: f64) -> Self {
+    fn from_exponentials(s: f64, q: f64) -> Self {
         if !(s.is_finite() && q.is_finite()) {
             return Self {
                 sum: s,
@@ -150,7 +150,7 @@ fn complex_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
     let (sin, cos) = libm::sincos(r);
     let mean = e * cos;
     let (phi1, phi2_slope) = if x > -1.0 {
-        near_double(e, x)
+        near_double_pole(e, x)
     } else {
         let phi1 = e * sin / r;
         (phi1, (mean - phi1) / (2.0 * x))
@@ -170,7 +170,7 @@ fn real_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
     let (far_exp, far_expm1) = exp_and_expm1(far);
     let mean = (near_exp + far_exp) / 2.0;
     let (phi1, phi2_slope) = if x < 1.0 {
-        near_double(libm::exp(h), x)
+        near_double_pole(libm::exp(h), x)
     } else {
         let phi1 = (far_exp - near_exp) / (far - near);
         (phi1, (mean - phi1) / (2.0 * x))
@@ -187,7 +187,7 @@ fn real_poles(h: f64, q: f64, x: f64) -> [f64; 4] {
 }
 
 /// Returns `E S` and `E G` for `|x| < 1`, from `S = sum x^k/(2k+1)!`, `G = sum (k+1) x^k/(2k+3)!`.
-fn near_double(e: f64, x: f64) -> (f64, f64) {
+fn near_double_pole(e: f64, x: f64) -> (f64, f64) {
     let (mut s, mut g) = (0.0, 0.0);
     for k in (0..10).rev() {
         s = RECIPROCALS[2 * k + 1] + x * s;
@@ -320,18 +320,18 @@ mod tests {
         };
         meet(
             1.0 / 64.0,
-            DividedDifferences::by_series::<11>,
-            DividedDifferences::by_series::<15>,
+            DividedDifferences::from_series::<11>,
+            DividedDifferences::from_series::<15>,
         );
         meet(
             0.25,
-            DividedDifferences::by_series::<15>,
-            DividedDifferences::by_series::<21>,
+            DividedDifferences::from_series::<15>,
+            DividedDifferences::from_series::<21>,
         );
         meet(
             2.0,
-            DividedDifferences::by_series::<21>,
-            DividedDifferences::by_exponentials,
+            DividedDifferences::from_series::<21>,
+            DividedDifferences::from_exponentials,
         );
     }
 
@@ -340,15 +340,15 @@ mod tests {
         for h in [-6.0, -1.5, 1.5] {
             // x = h^2 - q at -1, 0, 1 and where sqrt x = 0.25.
             for x in [-1.0, 0.0, 0.0625, 1.0] {
-                meets_its_neighbours(2.0 * h, h * h - x);
+                assert_branches_agree(2.0 * h, h * h - x);
             }
         }
         // The pole nearer to the origin is at -0.5 and at 0.5.
-        meets_its_neighbours(-3.5, 1.5);
-        meets_its_neighbours(3.5, 1.5);
+        assert_branches_agree(-3.5, 1.5);
+        assert_branches_agree(3.5, 1.5);
     }
 
-    fn meets_its_neighbours(s: f64, q: f64) {
+    fn assert_branches_agree(s: f64, q: f64) {
         let at = |q: f64| values(&DividedDifferences::at(s, q));
         for neighbour in [q.next_down(), q.next_up()] {
             // Each value is within 16 eps of the exact value, which itself changes by less than one eps.

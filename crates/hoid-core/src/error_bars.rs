@@ -38,12 +38,12 @@ use crate::{
 };
 
 /// Largest variance of a parameter, relative to its initial variance; a parameter with this variance counts as unknown.
-pub const LARGEST_GROWTH: f64 = 1e6;
+pub const MAX_VARIANCE_GROWTH: f64 = 1e6;
 /// Number of samples between two checks of the variances.
 const CHECK_PERIOD: u32 = 64;
 
 /// Covariance Sigma in units of sigma^2, and sigma^2 itself. N is the capacity for parameters, K the capacity for the
-/// errors of the filters ([`ErrorLayout::filter_errors`]).
+/// errors of the filters ([`ErrorLayout::filter_error_count`]).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ErrorBars<const N: usize, const K: usize> {
     /// Covariance of theta, divided by sigma^2.
@@ -63,7 +63,7 @@ pub struct ErrorBars<const N: usize, const K: usize> {
 
 crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
     theta, cross, filters, initial_variances, innovation_variance, limit, until_check,
-}, bounded);
+}, limit_restored);
 
 /// Propagation of the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] if error bars are
 /// not needed.
@@ -112,7 +112,7 @@ impl<const N: usize> ErrorPropagation<N, 0> for NoErrorBars {
 }
 
 impl<const N: usize, const K: usize> ErrorBars<N, K> {
-    fn bounded(&mut self) {
+    fn limit_restored(&mut self) {
         self.until_check = self.until_check.clamp(1, CHECK_PERIOD);
     }
 
@@ -159,8 +159,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
     /// Inserts the new dw, dv and de, each in front of the past errors of its kind, given `Sigma h`.
     #[inline(always)]
     fn insert(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, z: [f64; N], z_filters: [f64; K]) {
-        let (with_theta, with_filters) = self.covariances_of_new(layout, rows, z, z_filters);
-        let among = Self::covariances_among_new(layout, rows, &with_theta, &with_filters);
+        let (with_theta, with_filters) = self.covariances_of_new_errors(layout, rows, z, z_filters);
+        let among = Self::covariances_among_new_errors(layout, rows, &with_theta, &with_filters);
         self.shift(layout);
         let kinds = [layout.w, layout.v, layout.e];
         for i in 0..3 {
@@ -179,7 +179,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
                 }
             }
             self.filters[at] = row;
-            for c in 0..layout.filter_errors() {
+            for c in 0..layout.filter_error_count() {
                 self.filters[c][at] = row[c];
             }
         }
@@ -188,14 +188,14 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
     /// Returns `Sigma a` for the rows a of the new dw, dv and de, computed from `Sigma h`: the covariances of the new
     /// errors with theta and with the past filter errors.
     #[inline(always)]
-    fn covariances_of_new(
+    fn covariances_of_new_errors(
         &self,
         layout: &ErrorLayout,
         rows: &Sensitivities<N, K>,
         z: [f64; N],
         z_filters: [f64; K],
     ) -> ([[f64; N]; 3], [[f64; K]; 3]) {
-        let count = layout.filter_errors();
+        let count = layout.filter_error_count();
         let kinds = [layout.w, layout.v];
         let new = [&rows.w, &rows.v];
         let mut with_theta = [z; 3];
@@ -231,7 +231,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
 
     /// Covariances between the new dw, dv and de.
     #[inline(always)]
-    fn covariances_among_new(
+    fn covariances_among_new_errors(
         layout: &ErrorLayout,
         rows: &Sensitivities<N, K>,
         with_theta: &[[f64; N]; 3],
@@ -247,7 +247,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
                     for k in 0..N {
                         sum += new[j].theta[k] * with_theta[i][k];
                     }
-                    for k in 0..layout.filter_errors() {
+                    for k in 0..layout.filter_error_count() {
                         sum += new[j].filters[k] * with_filters[i][k];
                     }
                     among[i][j] = sum;
@@ -269,7 +269,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
             }
         }
         for (first, n) in kinds {
-            for row in &mut self.filters[..layout.filter_errors()] {
+            for row in &mut self.filters[..layout.filter_error_count()] {
                 for at in (first + 1..first + n).rev() {
                     row[at] = row[at - 1];
                 }
@@ -277,7 +277,7 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Limits the variances to [`LARGEST_GROWTH`] times their initial values, since the first-order equations can be
+    /// Limits the variances to [`MAX_VARIANCE_GROWTH`] times their initial values, since the first-order equations can be
     /// unstable for large gains for which the recursion itself is stable. After an overflow all variances are set to
     /// this limit.
     #[cold]
@@ -287,11 +287,11 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
             self.filters = [[0.0; K]; K];
             self.theta = [[0.0; N]; N];
             for i in 0..N {
-                self.theta[i][i] = LARGEST_GROWTH * self.initial_variances[i];
+                self.theta[i][i] = MAX_VARIANCE_GROWTH * self.initial_variances[i];
             }
         }
         for i in 0..N {
-            let limit = LARGEST_GROWTH * self.initial_variances[i];
+            let limit = MAX_VARIANCE_GROWTH * self.initial_variances[i];
             if self.initial_variances[i] > 0.0 && self.theta[i][i] > limit {
                 let scale = libm::sqrt(limit / self.theta[i][i]);
                 for j in 0..N {
@@ -336,7 +336,7 @@ impl<const N: usize, const K: usize> ErrorPropagation<N, K> for ErrorBars<N, K> 
 
     #[inline(always)]
     fn update(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>, gain: &[f64; N], eps: f64) {
-        let count = layout.filter_errors();
+        let count = layout.filter_error_count();
         let (mut z, z_filters) = self.times(count, &rows.e);
         let mut along = 0.0;
         for i in 0..N {
@@ -387,7 +387,7 @@ impl<const N: usize, const K: usize> ErrorPropagation<N, K> for ErrorBars<N, K> 
 
     #[inline]
     fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>) {
-        let count = layout.filter_errors();
+        let count = layout.filter_error_count();
         if count > 0 {
             let (z, z_filters) = self.times(count, &rows.e);
             self.insert(layout, rows, z, z_filters);

@@ -115,7 +115,7 @@ impl SecondOrder {
 
     /// Filters one sample.
     #[inline(always)]
-    pub fn one(&mut self, x: f64) -> f64 {
+    pub fn filter_one(&mut self, x: f64) -> f64 {
         let y = (x + self.g[0] * self.y2) + self.h[0] * self.y1;
         (self.y2, self.y1) = (self.y1, y);
         y
@@ -130,7 +130,7 @@ fn divide_by_second_order(d1: f64, d2: f64, x: &[f64], y: &mut [f64]) {
         *y = filter.filter_four(*x);
     }
     for (y, x) in y_rest.iter_mut().zip(x_rest) {
-        *y = filter.one(*x);
+        *y = filter.filter_one(*x);
     }
 }
 
@@ -140,7 +140,7 @@ fn divide_by_second_order_in_place(mut filter: SecondOrder, x: &mut [f64]) {
         *block = filter.filter_four(*block);
     }
     for value in rest {
-        *value = filter.one(*value);
+        *value = filter.filter_one(*value);
     }
 }
 

@@ -28,7 +28,7 @@ pub struct NoiseFilters<'a> {
 /// The further inputs of a predictor with capacity for N coefficients. `own` is the part of theta after `[a, b, c, d, f]`.
 pub trait FurtherInputs<const N: usize>: State {
     /// Number of coefficients.
-    fn parameters(&self) -> usize;
+    fn parameter_count(&self) -> usize;
     /// True if all roots of every F_i are inside the unit circle.
     fn are_stable(&self, own: &[f64]) -> bool;
     /// Sets the values `x_i(t) = r_i(t - nk_i)` of this sample, in the order of the inputs. They must be finite.
@@ -53,7 +53,7 @@ impl State for NoFurtherInputs {
 
 impl<const N: usize> FurtherInputs<N> for NoFurtherInputs {
     #[inline(always)]
-    fn parameters(&self) -> usize {
+    fn parameter_count(&self) -> usize {
         0
     }
 
@@ -126,7 +126,7 @@ impl<const N: usize> FurtherInput<N> {
 }
 
 impl<const N: usize, const M: usize> FurtherInputs<N> for [FurtherInput<N>; M] {
-    fn parameters(&self) -> usize {
+    fn parameter_count(&self) -> usize {
         self.iter().map(|input| input.nb + input.nf).sum()
     }
 

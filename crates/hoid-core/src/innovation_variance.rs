@@ -43,7 +43,7 @@ impl InnovationVariance {
 
     /// Returns the number of residuals from which the variance is estimated.
     #[inline(always)]
-    pub fn residuals(&self) -> f64 {
+    pub fn residual_count(&self) -> f64 {
         self.residuals
     }
 
@@ -56,7 +56,7 @@ impl InnovationVariance {
 
     /// Limits the number of residuals from which the variance counts as estimated, without changing the variance: the
     /// next residuals then have more weight.
-    pub fn limit_residuals(&mut self, residuals: f64) {
+    pub fn limit_residual_count(&mut self, residuals: f64) {
         if self.residuals > residuals && residuals > 0.0 {
             self.sum *= residuals / self.residuals;
             self.residuals = residuals;

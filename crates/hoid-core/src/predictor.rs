@@ -90,15 +90,15 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     /// Builds the predictor of a model with one input, with all filters at rest. Returns `None` if the shape exceeds the
     /// capacities N or L, or has no parameter.
     pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
-        Self::with_further(shape, regressor, NoFurtherInputs)
+        Self::with_further_inputs(shape, regressor, NoFurtherInputs)
     }
 }
 
 impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S, N, L, I> {
     /// As [`Predictor::new`], with further inputs.
-    pub fn with_further(shape: S, regressor: Regressor, further: I) -> Option<Self> {
+    pub fn with_further_inputs(shape: S, regressor: Regressor, further: I) -> Option<Self> {
         let inputs = shape.nb().max(shape.nd() + 1).max(shape.nc() + shape.nf());
-        let parameters = shape.parameters() + further.parameters();
+        let parameters = shape.parameter_count() + further.parameter_count();
         let fits = (1..=N).contains(&parameters) && (shape.nb() == 0 || inputs <= L);
         fits.then_some(Self {
             shape,
@@ -122,12 +122,12 @@ impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S,
     }
 
     /// Returns the further inputs.
-    pub fn further(&self) -> &I {
+    pub fn further_inputs(&self) -> &I {
         &self.further
     }
 
     /// Returns the further inputs, for the values of the next sample.
-    pub fn further_mut(&mut self) -> &mut I {
+    pub fn further_inputs_mut(&mut self) -> &mut I {
         &mut self.further
     }
 
@@ -209,14 +209,14 @@ impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S,
             let of = [&self.u, &self.eps, &self.v, &self.w];
             gather(&shape, &self.x[offset..], of)
         };
-        let first = shape.parameters();
-        let noise = self.noise(c, d);
+        let first = shape.parameter_count();
+        let noise = self.noise_filters(c, d);
         self.further.predict(&theta[first..], noise, &mut psi[first..]);
         (psi, self.residual(theta)[2])
     }
 
     #[inline(always)]
-    fn noise<'a>(&self, c: &'a [f64], d: &'a [f64]) -> NoiseFilters<'a> {
+    fn noise_filters<'a>(&self, c: &'a [f64], d: &'a [f64]) -> NoiseFilters<'a> {
         let filtered = self.regressor != Regressor::PseudoLinear;
         NoiseFilters { c, d, filtered }
     }
@@ -226,7 +226,7 @@ impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S,
     fn residual(&self, theta: &[f64; N]) -> [f64; 3] {
         let [a, b, c, d, f] = self.shape.split(theta);
         let w = dot(b, &self.x[self.offset()..]) - dot(f, &self.w);
-        let all = self.further.add_responses(&theta[self.shape.parameters()..], w);
+        let all = self.further.add_responses(&theta[self.shape.parameter_count()..], w);
         let v = self.pending[0] + dot(a, &self.u) - all;
         [w, v, v + dot(d, &self.v) - dot(c, &self.eps)]
     }
@@ -269,8 +269,8 @@ impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S,
                 push(&mut self.filtered_w, shape.nf() + shape.nc(), filtered);
             }
         }
-        let noise = self.noise(c, d);
-        self.further.correct(&theta[shape.parameters()..], noise);
+        let noise = self.noise_filters(c, d);
+        self.further.correct(&theta[shape.parameter_count()..], noise);
         if shape.na() > 0 {
             push(&mut self.u, shape.na().max(shape.nd()), u);
         }

@@ -14,7 +14,7 @@ pub struct Step {
 /// Polynomials whose roots a recursion keeps inside the unit circle. If C or F is unstable, the predictor and its
 /// gradient diverge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Stable {
+pub enum StablePolynomials {
     /// C and F.
     #[default]
     Predictor,
@@ -23,12 +23,12 @@ pub enum Stable {
 }
 
 /// Maximum number of halvings of a step. If it is reached, the estimate stays constant.
-const HALVINGS: u32 = 12;
+const MAX_HALVINGS: u32 = 12;
 
-impl Stable {
+impl StablePolynomials {
     /// True if all roots of the selected polynomials of theta are inside the unit circle.
     #[inline]
-    pub fn holds<S: Shape>(self, shape: &S, theta: &[f64]) -> bool {
+    pub fn accepts<S: Shape>(self, shape: &S, theta: &[f64]) -> bool {
         let [_, _, c, d, f] = shape.split(theta);
         roots_inside(c, 1.0) && roots_inside(f, 1.0) && (self == Self::Predictor || roots_inside(d, 1.0))
     }
@@ -60,15 +60,19 @@ pub fn backtrack<const N: usize>(
         return (1.0, whole);
     }
     let (theta, step) = (*theta, *step);
-    halved(&theta, &step, allowed)
+    halve_until_allowed(&theta, &step, allowed)
 }
 
 /// Like [`backtrack`], for a full step that is not allowed.
 #[cold]
 #[inline(never)]
-fn halved<const N: usize>(theta: &[f64; N], step: &[f64; N], allowed: impl Fn(&[f64; N]) -> bool) -> (f64, [f64; N]) {
+fn halve_until_allowed<const N: usize>(
+    theta: &[f64; N],
+    step: &[f64; N],
+    allowed: impl Fn(&[f64; N]) -> bool,
+) -> (f64, [f64; N]) {
     let mut fraction = 0.5;
-    for _ in 0..HALVINGS {
+    for _ in 0..MAX_HALVINGS {
         let moved: [f64; N] = core::array::from_fn(|i| theta[i] + fraction * step[i]);
         if moved.iter().all(|t| t.is_finite()) && allowed(&moved) {
             return (fraction, moved);

@@ -36,7 +36,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
     pub fn new(shape: S, theta: [f64; N], adaptation: A, bars: B) -> Option<Self> {
         let linear = (shape.nc(), shape.nd(), shape.nf()) == (0, 0, 0);
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
-        (linear && known && (1..=N).contains(&shape.parameters())).then_some(Self {
+        (linear && known && (1..=N).contains(&shape.parameter_count())).then_some(Self {
             shape,
             theta,
             psi: [0.0; N],
@@ -66,7 +66,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
             let used = ratio(limited, innovation);
             let gain = moved.gain.map(|g| used * g);
             self.bars.update(
-                &ErrorLayout::NONE,
+                &ErrorLayout::NO_FILTER_ERRORS,
                 &Sensitivities::from_gradient(&psi),
                 &gain,
                 innovation,
@@ -147,7 +147,7 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
     }
 
     /// Returns the number of restarts: steps that were not finite, after which the regressor was reset.
-    pub fn restarts(&self) -> u64 {
+    pub fn restart_count(&self) -> u64 {
         self.restarts
     }
 }

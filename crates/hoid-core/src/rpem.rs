@@ -11,13 +11,13 @@ use crate::{
     error_bars::{ErrorBars, ErrorPropagation},
     further_input::{FurtherInputs, NoFurtherInputs},
     predictor::{Predictor, Regressor},
-    recursion::{Stable, Step, backtrack, ratio},
+    recursion::{StablePolynomials, Step, backtrack, ratio},
     sensitivities::{ErrorLayout, Sensitivities},
     shape::Shape,
 };
 
 /// Recursive prediction-error method, with further inputs I. N is the capacity for parameters and K the capacity for filter errors
-/// ([`ErrorLayout::filter_errors`]). K is 0 for the default error bars and for B =
+/// ([`ErrorLayout::filter_error_count`]). K is 0 for the default error bars and for B =
 /// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -27,7 +27,7 @@ pub struct Rpem<S, const N: usize, const K: usize, A, B = ErrorBars<N, K>, I = N
     psi: [f64; N],
     adaptation: A,
     bars: B,
-    stable: Stable,
+    stable: StablePolynomials,
     restarts: u64,
 }
 
@@ -41,12 +41,12 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
     pub fn new(
         shape: S,
         regressor: Regressor,
-        stable: Stable,
+        stable: StablePolynomials,
         theta: [f64; N],
         adaptation: A,
         bars: B,
     ) -> Option<Self> {
-        Self::with_further(shape, NoFurtherInputs, regressor, stable, theta, adaptation, bars)
+        Self::with_further_inputs(shape, NoFurtherInputs, regressor, stable, theta, adaptation, bars)
     }
 }
 
@@ -55,22 +55,23 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
 {
     /// As [`Rpem::new`], with further inputs, whose coefficients follow those of `[a.. b.. c.. d.. f..]`. The error bars
     /// of a model with further inputs have no filter errors: also `None` if K is not zero.
-    pub fn with_further(
+    pub fn with_further_inputs(
         shape: S,
         further: I,
         regressor: Regressor,
-        stable: Stable,
+        stable: StablePolynomials,
         theta: [f64; N],
         adaptation: A,
         bars: B,
     ) -> Option<Self> {
-        let (first, of_further) = (shape.parameters(), further.parameters());
+        let (first, of_further) = (shape.parameter_count(), further.parameter_count());
         let fits = first + of_further <= N && (K == 0 || of_further == 0);
         let sound = fits && further.are_stable(&theta[first..]);
-        let predictor = Predictor::with_further(shape, regressor, further).filter(|_| sound)?;
+        let predictor = Predictor::with_further_inputs(shape, regressor, further).filter(|_| sound)?;
         let known = bars.variance().is_some() || !adaptation.needs_innovation_variance();
-        let usable =
-            known && stable.holds(&shape, &theta) && ErrorLayout::for_capacity::<S, K>(&shape).filter_errors() <= K;
+        let usable = known
+            && stable.accepts(&shape, &theta)
+            && ErrorLayout::for_capacity::<S, K>(&shape).filter_error_count() <= K;
         usable.then_some(Self {
             predictor,
             theta,
@@ -98,9 +99,9 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         let stable = self.stable;
         // eps and psi are outputs of filters with the poles of C and F. If these poles are unstable, eps and psi
         // diverge, and with them the estimate (Ljung and Söderström 1983, section 3.7.3).
-        let further = self.predictor.further();
+        let further = self.predictor.further_inputs();
         let (allowed, theta) = backtrack(&theta, &moved.step, |theta| {
-            stable.holds(&shape, theta) && further.are_stable(&theta[shape.parameters()..])
+            stable.accepts(&shape, theta) && further.are_stable(&theta[shape.parameter_count()..])
         });
         // The filters continue with the a-posteriori residuals of the new theta (Ljung and Söderström 1983, eq. 3.151).
         self.correct(&theta);
@@ -121,7 +122,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         let theta = self.theta;
         let (psi, innovation) = self.predictor.predict(&theta, x, u);
         self.psi = psi;
-        self.follow_bars();
+        self.propagate_error_bars();
         self.correct(&theta);
         Step {
             innovation,
@@ -134,11 +135,11 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         let theta = self.theta;
         (self.psi, _) = self.predictor.predict(&theta, x, 0.0);
         self.predictor.bridge(&theta);
-        self.follow_bars();
+        self.propagate_error_bars();
         self.correct(&theta);
     }
 
-    fn follow_bars(&mut self) {
+    fn propagate_error_bars(&mut self) {
         let (layout, rows) = self.sensitivities(&self.theta, &self.psi);
         self.bars.propagate(&layout, &rows);
     }
@@ -163,8 +164,8 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
     }
 
     /// Returns the further inputs, for the values of the next sample.
-    pub fn further_mut(&mut self) -> &mut I {
-        self.predictor.further_mut()
+    pub fn further_inputs_mut(&mut self) -> &mut I {
+        self.predictor.further_inputs_mut()
     }
 
     /// Returns the estimate theta.
@@ -188,7 +189,7 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
     }
 
     /// Returns the number of overflows after which the filters were reset.
-    pub fn restarts(&self) -> u64 {
+    pub fn restart_count(&self) -> u64 {
         self.restarts
     }
 }

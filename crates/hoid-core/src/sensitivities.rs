@@ -40,7 +40,7 @@ impl ErrorLayout {
     }
 
     /// Layout without filter errors, for the default error bars with `h = psi`.
-    pub const NONE: Self = Self {
+    pub const NO_FILTER_ERRORS: Self = Self {
         na: 0,
         noise: (0, 0),
         w: (0, 0),
@@ -48,15 +48,19 @@ impl ErrorLayout {
         e: (0, 0),
     };
 
-    /// Returns the layout for a shape, or [`ErrorLayout::NONE`] for K = 0.
+    /// Returns the layout for a shape, or [`ErrorLayout::NO_FILTER_ERRORS`] for K = 0.
     #[inline(always)]
     pub fn for_capacity<S: Shape, const K: usize>(shape: &S) -> Self {
-        if K == 0 { Self::NONE } else { Self::of(shape) }
+        if K == 0 {
+            Self::NO_FILTER_ERRORS
+        } else {
+            Self::of(shape)
+        }
     }
 
     /// Returns the number of past filter errors.
     #[inline(always)]
-    pub fn filter_errors(&self) -> usize {
+    pub fn filter_error_count(&self) -> usize {
         self.e.0 + self.e.1
     }
 }

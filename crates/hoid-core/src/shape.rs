@@ -21,7 +21,7 @@ pub trait Shape: Copy {
 
     /// Returns the length of `theta = [a.. b.. c.. d.. f..]`.
     #[inline]
-    fn parameters(&self) -> usize {
+    fn parameter_count(&self) -> usize {
         self.na() + self.nb() + self.nc() + self.nd() + self.nf()
     }
 

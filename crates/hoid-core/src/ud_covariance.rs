@@ -88,12 +88,12 @@ impl<const N: usize> UdCovariance<N> {
             f[j] = sum;
             v[j] = grown[j] * sum;
         }
-        self.update_projected_by(grown, f, v, variance)
+        self.update_grown(grown, f, v, variance)
     }
 
     /// Performs the measurement with the given d_j (in `grown`) and projections f and v.
     #[inline(always)]
-    fn update_projected_by(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
+    fn update_grown(&mut self, grown: [f64; N], f: [f64; N], v: [f64; N], variance: f64) -> [f64; N] {
         // Bierman's recursion: alpha_j = R + sum_{i<=j} f_i v_i. All d_j are multiplied by positive ratios, so P stays
         // positive regardless of rounding. `gain` accumulates P psi.
         let mut gain = [0.0; N];
@@ -126,9 +126,9 @@ impl<const N: usize> UdCovariance<N> {
 
     /// As [`UdCovariance::measurement_update`], given the result of [`UdCovariance::projections`] for psi.
     #[inline(always)]
-    pub fn update_projected(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
+    pub fn update_with_projections(&mut self, (f, v): ([f64; N], [f64; N]), variance: f64) -> [f64; N] {
         let grown = core::array::from_fn(|j| self.u[j][j]);
-        self.update_projected_by(grown, f, v, variance)
+        self.update_grown(grown, f, v, variance)
     }
 
     /// Returns `f = U' psi` and `v = D f`, for which `psi' P psi = f' v`.

@@ -22,7 +22,7 @@ use crate::adaptation::{Adaptation, ParameterStep};
 /// the rounding unit.
 const SMALLEST_PIVOT: f64 = 1e-13;
 /// Power of a gradient component, relative to its largest power so far, below which the parameter is not excited.
-const NO_EXCITATION: f64 = 1e-20;
+const MIN_EXCITATION: f64 = 1e-20;
 
 /// Sums of the normal equations over a number of samples: `sum psi psi'` (lower triangle) and `sum psi y`.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,7 +113,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
     }
 
     /// Returns the number of samples at which the window did not determine theta, so theta stayed constant.
-    pub fn undetermined(&self) -> u64 {
+    pub fn undetermined_count(&self) -> u64 {
         self.undetermined
     }
 
@@ -123,7 +123,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
         let (mut l, mut scale) = ([[0.0; N]; N], [0.0; N]);
         for i in 0..p {
             let power = self.growing.r[i][i] + self.fading.r[i][i];
-            if power.is_nan() || power <= NO_EXCITATION * self.largest[i] {
+            if power.is_nan() || power <= MIN_EXCITATION * self.largest[i] {
                 return None;
             }
             scale[i] = 1.0 / libm::sqrt(power);
@@ -131,7 +131,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
                 l[i][j] = (self.growing.r[i][j] + self.fading.r[i][j]) * scale[i] * scale[j];
             }
         }
-        cholesky::factor_above(&mut l, p, SMALLEST_PIVOT).then_some(Cholesky {
+        cholesky::factor_with_min_pivot(&mut l, p, SMALLEST_PIVOT).then_some(Cholesky {
             l,
             scale,
             parameters: p,
@@ -155,8 +155,8 @@ impl<const N: usize> Cholesky<N> {
         for i in 0..p {
             x[i] = right[i] * self.scale[i];
         }
-        cholesky::forward(&self.l, p, &mut x);
-        cholesky::backward(&self.l, p, &mut x);
+        cholesky::substitute_forward(&self.l, p, &mut x);
+        cholesky::substitute_backward(&self.l, p, &mut x);
         for i in 0..p {
             x[i] *= self.scale[i];
         }
@@ -190,7 +190,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
         let factor = if self.filled > p { self.cholesky() } else { None };
         let Some(factor) = factor else {
             self.undetermined += 1;
-            return ParameterStep::NONE;
+            return ParameterStep::ZERO;
         };
         let right: [f64; N] = core::array::from_fn(|i| self.growing.psi_y[i] + self.fading.psi_y[i]);
         let best = factor.solve(&right);
@@ -202,7 +202,7 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Adaptation<N> for Window<N,
             }
         } else {
             self.undetermined += 1;
-            ParameterStep::NONE
+            ParameterStep::ZERO
         }
     }
 

@@ -3,10 +3,10 @@
 
 use hoid_core::{
     adaptive::{
-        AdaptiveFilter, AdaptivePrior, GAINS, LARGEST_ORDER, STATES,
+        AdaptiveFilter, AdaptivePrior, GAIN_COUNT, MAX_NOISE_ORDER, STATE_COUNT,
         basis::{Basis, Point},
-        defaults::{DefaultOperator, REPLAYED_S},
-        detector::Detection,
+        defaults::{DefaultOperator, REPLAY_SPAN_S},
+        detector::DetectorSettings,
         initial_estimate::InitialEstimate,
         memory_needed, min_memory,
         mixture::ChangePrior,
@@ -20,7 +20,7 @@ const TS: f64 = 0.02;
 fn prior(threshold: f64) -> AdaptivePrior {
     AdaptivePrior {
         order: 8,
-        detection: Detection {
+        detection: DetectorSettings {
             recent: [10, 16],
             least: 16,
             most: 80,
@@ -46,14 +46,14 @@ fn basis(point: Point) -> Basis {
 }
 
 fn filter(threshold: f64) -> AdaptiveFilter<Vec<f64>> {
-    let memory = vec![0.0; memory_needed(TS, REPLAYED_S)];
+    let memory = vec![0.0; memory_needed(TS, REPLAY_SPAN_S)];
     AdaptiveFilter::new(prior(threshold), memory).expect("a sound prior")
 }
 
 /// Nearly normal random numbers from a fixed stream: sums of twelve uniform numbers.
-struct Stream(u64);
+struct NormalStream(u64);
 
-impl Stream {
+impl NormalStream {
     fn uniform(&mut self) -> f64 {
         self.0 = self
             .0
@@ -69,7 +69,7 @@ impl Stream {
 
 /// A person with gains in a basis and an autoregressive remnant of order 2.
 struct Person {
-    stream: Stream,
+    stream: NormalStream,
     basis: Basis,
     past: Vec<f64>,
     e: f64,
@@ -86,7 +86,7 @@ impl Person {
     fn at(seed: u64, point: Point) -> Self {
         let basis = basis(point);
         Self {
-            stream: Stream(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1),
+            stream: NormalStream(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1),
             past: vec![0.0; basis.delay() + 3],
             basis,
             e: 0.0,
@@ -96,7 +96,7 @@ impl Person {
     }
 
     /// Returns e and u of a sample, for these gains and this level of the remnant.
-    fn sample(&mut self, gains: [f64; GAINS], remnant: f64) -> [f64; 2] {
+    fn sample(&mut self, gains: [f64; GAIN_COUNT], remnant: f64) -> [f64; 2] {
         self.e = 0.97 * self.e + 0.24 * self.stream.normal();
         self.past.rotate_right(1);
         self.past[0] = self.e;
@@ -110,20 +110,20 @@ impl Person {
     }
 }
 
-const OPERATOR_GAINS: [f64; GAINS] = [1.2, 1.8, 0.9];
+const OPERATOR_GAINS: [f64; GAIN_COUNT] = [1.2, 1.8, 0.9];
 
-fn response(basis: &Basis, gains: [f64; GAINS], omega: f64) -> [f64; 2] {
+fn response(basis: &Basis, gains: [f64; GAIN_COUNT], omega: f64) -> [f64; 2] {
     let h = basis.response(omega, basis.point());
-    [0, 1].map(|part| (0..GAINS).map(|i| gains[i] * h[i][part]).sum())
+    [0, 1].map(|part| (0..GAIN_COUNT).map(|i| gains[i] * h[i][part]).sum())
 }
 
 /// Returns the real and imaginary part of the estimate at a frequency, with their variances.
 fn estimate(filter: &AdaptiveFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2]) {
     let (value, by) = filter.response_with_derivatives(omega);
     let c = filter.state_covariance();
-    let variance = |row: &[f64; STATES]| -> f64 {
-        (0..STATES)
-            .map(|i| (0..STATES).map(|j| row[i] * c[i][j] * row[j]).sum::<f64>())
+    let variance = |row: &[f64; STATE_COUNT]| -> f64 {
+        (0..STATE_COUNT)
+            .map(|i| (0..STATE_COUNT).map(|j| row[i] * c[i][j] * row[j]).sum::<f64>())
             .sum()
     };
     (value, [variance(&by[0]), variance(&by[1])])
@@ -165,8 +165,8 @@ fn bands_cover_the_truth_and_narrow_with_time() {
 
 /// Returns the samples of a remnant with the power .04 and a given number of poles at -1/.06 per second, and the
 /// variance of its innovations.
-fn steep(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
-    let (pole, mut stream, mut state) = ((-TS / 0.06).exp(), Stream(seed), vec![0.0; poles]);
+fn steep_remnant(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
+    let (pole, mut stream, mut state) = ((-TS / 0.06).exp(), NormalStream(seed), vec![0.0; poles]);
     let mut sample = || {
         state.iter_mut().fold(stream.normal(), |input, v| {
             *v = pole * *v + input;
@@ -184,7 +184,7 @@ fn steep(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
 fn steep_remnant_is_estimated_as_precisely_as_a_flat_one() {
     let mut precision = Vec::new();
     for poles in [1, 4] {
-        let (v, variance) = steep(poles, 5000, 7);
+        let (v, variance) = steep_remnant(poles, 5000, 7);
         let (mut person, mut filter) = (Person::new(3), filter(1e9));
         for (k, v) in v.iter().enumerate() {
             let [e, u] = person.sample(OPERATOR_GAINS, 0.0);
@@ -280,14 +280,17 @@ fn delay_change_is_distinguished_from_a_gain_change() {
             past[0] = e;
             let l = other.delay();
             let z = other.step([past[l], past[l + 1], past[l + 2]]);
-            let response_of = |x: [f64; GAINS]| -> f64 { OPERATOR_GAINS.iter().zip(x).map(|(g, x)| g * x).sum() };
+            let response_of = |x: [f64; GAIN_COUNT]| -> f64 { OPERATOR_GAINS.iter().zip(x).map(|(g, x)| g * x).sum() };
             // The change takes half a second.
             let part = ((f64::from(k) - 1500.0) / 25.0).clamp(0.0, 1.0);
             let u = u + part * (response_of(other.regressors(&z).x) - person.w);
             filter.step(e, u);
-            if filter.detector().declared() && (1500..2000).contains(&k) {
+            if filter.detector().is_change_declared() && (1500..2000).contains(&k) {
                 let told = filter.detector().difference();
-                let (by, error) = (told.value[STATES - 1], told.covariance[STATES - 1][STATES - 1].sqrt());
+                let (by, error) = (
+                    told.value[STATE_COUNT - 1],
+                    told.covariance[STATE_COUNT - 1][STATE_COUNT - 1].sqrt(),
+                );
                 found += u32::from(told.changed[2] && !told.changed[0] && by > 3.0 * error);
             }
         }
@@ -305,8 +308,11 @@ fn change_is_tracked_and_a_larger_remnant_is_no_change() {
             let gains = if k < 1500 { OPERATOR_GAINS } else { after };
             let [e, u] = person.sample(gains, 0.03);
             filter.step(e, u);
-            found += u32::from(filter.detector().declared() && (1500..2000).contains(&k));
-            assert!(!filter.detector().declared() || k >= 1500, "{seed}: false alarm at {k}");
+            found += u32::from(filter.detector().is_change_declared() && (1500..2000).contains(&k));
+            assert!(
+                !filter.detector().is_change_declared() || k >= 1500,
+                "{seed}: false alarm at {k}"
+            );
         }
         let truth = response(&person.basis, after, 2.0);
         let (value, variance) = estimate(&filter, 2.0);
@@ -326,7 +332,7 @@ fn change_is_tracked_and_a_larger_remnant_is_no_change() {
         for k in 0..3000 {
             let [e, u] = person.sample(OPERATOR_GAINS, if k < 1500 { 0.03 } else { 0.06 });
             filter.step(e, u);
-            alarms += u32::from(filter.detector().declared());
+            alarms += u32::from(filter.detector().is_change_declared());
         }
     }
     assert_eq!(alarms, 0);
@@ -348,7 +354,7 @@ fn constant_span_is_no_change_and_a_later_change_is_found() {
             let is_constant = (1500..1650).contains(&k) || (2400..2550).contains(&k);
             let [e, u] = if is_constant { [0.0; 2] } else { [e, u] };
             filter.step(e, u);
-            let declared = u32::from(filter.detector().declared());
+            let declared = u32::from(filter.detector().is_change_declared());
             alarms += if k < 2550 { declared } else { 0 };
             found += if (2550..2950).contains(&k) { declared } else { 0 };
         }
@@ -389,7 +395,7 @@ fn uninformative_data_keep_the_filter_finite() {
     }
     assert!(!silent.has_started());
     // The error is always zero and the output moves: the estimate cannot start.
-    let mut stream = Stream(3);
+    let mut stream = NormalStream(3);
     for _ in 0..500 {
         silent.step(0.0, stream.normal());
     }
@@ -414,7 +420,7 @@ fn uninformative_data_keep_the_filter_finite() {
     assert!(value.iter().chain(&variance).all(|v| v.is_finite()));
     assert!(filter.step(1e200, 1.0).shortened || filter.step(1.0, 1e200).shortened);
     let [e, u] = person.sample(OPERATOR_GAINS, 0.05);
-    assert!(filter.step(e, u).innovation.is_finite() && filter.restarts() > 0);
+    assert!(filter.step(e, u).innovation.is_finite() && filter.restart_count() > 0);
 }
 
 #[test]
@@ -470,7 +476,7 @@ fn invalid_priors_and_memory_are_refused() {
             ..sound
         },
         AdaptivePrior {
-            detection: Detection {
+            detection: DetectorSettings {
                 most: 500,
                 ..sound.detection
             },
@@ -511,9 +517,9 @@ fn operator_is_tracked_without_replay_memory() {
 
 #[test]
 fn initial_estimate_is_used() {
-    let mut state = [0.0; STATES];
-    state[..GAINS].copy_from_slice(&OPERATOR_GAINS);
-    let mut covariance = [[0.0; STATES]; STATES];
+    let mut state = [0.0; STATE_COUNT];
+    state[..GAIN_COUNT].copy_from_slice(&OPERATOR_GAINS);
+    let mut covariance = [[0.0; STATE_COUNT]; STATE_COUNT];
     for (i, row) in covariance.iter_mut().enumerate() {
         row[i] = 1e-3;
     }
@@ -533,8 +539,8 @@ fn initial_estimate_is_used() {
     let mut told = filter(1e9).with_initial_estimate(&known).expect("a sound estimate");
     assert!(told.has_started() && (told.d()[0] + 1.6).abs() < 0.01 && (told.d()[1] - 0.63).abs() < 0.01);
     let spread = told.state_covariance();
-    for i in 0..STATES {
-        for j in 0..STATES {
+    for i in 0..STATE_COUNT {
+        for j in 0..STATE_COUNT {
             assert!((spread[i][j] - covariance[i][j]).abs() < 1e-12);
         }
     }
@@ -564,7 +570,7 @@ fn initial_estimate_is_used() {
             ..known
         },
         InitialEstimate {
-            remnant: Some(([0.0; LARGEST_ORDER + 1], 1.0)),
+            remnant: Some(([0.0; MAX_NOISE_ORDER + 1], 1.0)),
             ..known
         },
     ] {

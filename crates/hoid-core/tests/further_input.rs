@@ -5,22 +5,22 @@
 
 mod common;
 
-use common::{Noise, bars, box_jenkins, covariance, diagonal};
+use common::{Noise, box_jenkins, covariance, diagonal, error_bars};
 use hoid_core::{
     adaptation::Forgetting,
     error_bars::ErrorBars,
     further_input::{FurtherInput, FurtherInputs},
     innovation_variance::InnovationVariance,
     predictor::{Predictor, Regressor},
-    recursion::Stable,
+    recursion::StablePolynomials,
     rpem::Rpem,
     shape::AnyShape,
 };
 
-const WHOLE: Forgetting<7> = Forgetting::Exponential { lambda: [0.998; 7] };
+const FORGETTING: Forgetting<7> = Forgetting::Exponential { lambda: [0.998; 7] };
 
 /// Returns samples of the error, of a target and of the output `u = (B/F) e + (B_1/F_1) r + n`.
-fn two_inputs(samples: usize, seed: u64) -> Vec<[f64; 3]> {
+fn two_input_samples(samples: usize, seed: u64) -> Vec<[f64; 3]> {
     let mut noise = Noise(seed + 100);
     let (mut w, mut slow) = (0.0, 0.0);
     box_jenkins(samples, seed, 0.02)
@@ -55,25 +55,25 @@ fn single_further_input_equals_the_first_input() {
         let mut alone = Rpem::new(
             first,
             regressor,
-            Stable::PredictorAndNoise,
+            StablePolynomials::PredictorAndNoise,
             theta,
-            covariance::<7>(0.1, WHOLE),
-            bars::<7, 0>(0.1),
+            covariance::<7>(0.1, FORGETTING),
+            error_bars::<7, 0>(0.1),
         )
         .unwrap();
-        let mut further = Rpem::with_further(
+        let mut further = Rpem::with_further_inputs(
             noise,
             [FurtherInput::new(2, 2)],
             regressor,
-            Stable::PredictorAndNoise,
+            StablePolynomials::PredictorAndNoise,
             order.map(|i| theta[i]),
-            covariance::<7>(0.1, WHOLE),
-            bars::<7, 0>(0.1),
+            covariance::<7>(0.1, FORGETTING),
+            error_bars::<7, 0>(0.1),
         )
         .unwrap();
         let mut far: f64 = 0.0;
         for (k, (x, u)) in box_jenkins(4000, 5, 0.02).into_iter().enumerate() {
-            further.further_mut().set(&[x]);
+            further.further_inputs_mut().set(&[x]);
             // Some samples only advance the filters, and some lack the output.
             let (a, b) = match k % 50 {
                 48 => (alone.step_without_update(x, u), further.step_without_update(0.0, u)),
@@ -110,13 +110,13 @@ fn psi_is_the_negative_derivative_of_the_innovation() {
     };
     // [a1, b0, c1, d1, f1], then [b0, b1, f1] and [b0] of two further inputs.
     let theta = [-0.3, 0.5, 0.2, -0.6, -0.8, 0.3, -0.1, -0.7, 0.2];
-    let data = two_inputs(300, 3);
+    let data = two_input_samples(300, 3);
     let run = |theta: [f64; 9]| {
         let inputs = [FurtherInput::new(2, 1), FurtherInput::new(1, 0)];
-        let mut predictor = Predictor::<_, 9, 9, _>::with_further(shape, Regressor::Gradient, inputs).unwrap();
+        let mut predictor = Predictor::<_, 9, 9, _>::with_further_inputs(shape, Regressor::Gradient, inputs).unwrap();
         let mut last = ([0.0; 9], 0.0);
         for [e, r, u] in &data {
-            predictor.further_mut().set(&[*r, r * r]);
+            predictor.further_inputs_mut().set(&[*r, r * r]);
             last = predictor.predict(&theta, *e, *u);
             predictor.correct(&theta);
         }
@@ -147,13 +147,13 @@ fn infinite_memory_gives_the_least_squares_estimate() {
         nb: 2,
         ..AnyShape::default()
     };
-    let data = two_inputs(2000, 9);
+    let data = two_input_samples(2000, 9);
     let prior = 1e8;
-    let mut recursion = Rpem::with_further(
+    let mut recursion = Rpem::with_further_inputs(
         shape,
         [FurtherInput::new(2, 0)],
         Regressor::Gradient,
-        Stable::Predictor,
+        StablePolynomials::Predictor,
         [0.0; 5],
         covariance::<5>(prior, Forgetting::Exponential { lambda: [1.0; 5] }),
         // Without a limit on innovations, which the first samples of an unknown model would exceed.
@@ -162,7 +162,7 @@ fn infinite_memory_gives_the_least_squares_estimate() {
     .unwrap();
     let (mut gram, mut right, mut past) = ([[0.0; 5]; 5], [0.0; 5], [0.0; 3]);
     for &[e, r, u] in &data {
-        recursion.further_mut().set(&[r]);
+        recursion.further_inputs_mut().set(&[r]);
         recursion.step(e, u);
         let [before_e, before_r, before_u] = past;
         let row = [-before_u, e, before_e, r, before_r];
@@ -189,14 +189,14 @@ fn unstable_or_too_large_further_input_is_refused() {
         ..AnyShape::default()
     };
     let build = |theta: [f64; 4], input: FurtherInput<4>| {
-        Rpem::with_further(
+        Rpem::with_further_inputs(
             shape,
             [input],
             Regressor::Gradient,
-            Stable::Predictor,
+            StablePolynomials::Predictor,
             theta,
             covariance::<4>(1.0, Forgetting::Exponential { lambda: [1.0; 4] }),
-            bars::<4, 0>(1.0),
+            error_bars::<4, 0>(1.0),
         )
         .is_some()
     };
@@ -213,17 +213,17 @@ fn reset_clears_the_filters_of_all_inputs() {
         ..AnyShape::default()
     };
     let inputs = [FurtherInput::new(1, 1)];
-    let mut predictor = Predictor::<_, 3, 3, _>::with_further(shape, Regressor::Gradient, inputs).unwrap();
+    let mut predictor = Predictor::<_, 3, 3, _>::with_further_inputs(shape, Regressor::Gradient, inputs).unwrap();
     let theta = [1.0, 1.0, -0.5];
     let first = predictor.predict(&theta, 1.0, 2.0);
     predictor.correct(&theta);
-    predictor.further_mut().set(&[1e300]);
+    predictor.further_inputs_mut().set(&[1e300]);
     predictor.predict(&theta, 0.0, 0.0);
     predictor.correct(&theta);
     predictor.reset();
-    predictor.further_mut().set(&[0.0]);
+    predictor.further_inputs_mut().set(&[0.0]);
     assert_eq!(predictor.predict(&theta, 1.0, 2.0), first);
-    assert_eq!(predictor.further().parameters(), 2);
+    assert_eq!(predictor.further_inputs().parameter_count(), 2);
 }
 
 /// Solves a system of five equations by Gaussian elimination with pivoting.

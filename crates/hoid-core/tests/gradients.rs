@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{box_jenkins, shapes, start};
+use common::{box_jenkins, shapes, start_coefficients};
 use hoid_core::{
     predictor::{Predictor, Regressor},
     shape::{AnyShape, Shape},
@@ -15,7 +15,7 @@ fn psi_is_the_negative_gradient_of_the_frozen_predictor() {
     let data = box_jenkins(400, 5, 0.02);
     const N: usize = 8;
     for shape in shapes() {
-        let theta: [f64; N] = start(&shape);
+        let theta: [f64; N] = start_coefficients(&shape);
         let run = |theta: [f64; N]| {
             let mut predictor = Predictor::<AnyShape, N, N>::new(shape, Regressor::Gradient).unwrap();
             let mut all = Vec::new();
@@ -27,7 +27,7 @@ fn psi_is_the_negative_gradient_of_the_frozen_predictor() {
             all
         };
         let at = run(theta);
-        for i in 0..shape.parameters() {
+        for i in 0..shape.parameter_count() {
             let step = 1e-6;
             let shifted = |sign: f64| {
                 let mut moved = theta;

@@ -4,14 +4,17 @@
 
 mod common;
 
-use common::{Noise, Plain, bars, box_jenkins, covariance, diagonal, relative_difference, shapes, start};
+use common::{
+    Noise, PlainCovariance, box_jenkins, covariance, diagonal, error_bars, relative_difference, shapes,
+    start_coefficients,
+};
 use hoid_core::{
     adaptation::{Adaptation, Forgetting},
     covariance::Covariance,
     error_bars::{ErrorBars, ErrorPropagation, NoErrorBars},
     innovation_variance::InnovationVariance,
     predictor::Regressor,
-    recursion::Stable,
+    recursion::StablePolynomials,
     rls::Rls,
     rpem::Rpem,
     sensitivities::{ErrorLayout, Sensitivities},
@@ -22,7 +25,7 @@ use hoid_core::{
 
 const LAMBDA: f64 = 1.0 - 1.0 / 256.0;
 
-fn ways<const N: usize>() -> Vec<Forgetting<N>> {
+fn forgetting_rules<const N: usize>() -> Vec<Forgetting<N>> {
     vec![
         Forgetting::Exponential { lambda: [1.0; N] },
         Forgetting::Exponential { lambda: [LAMBDA; N] },
@@ -45,17 +48,17 @@ fn ways<const N: usize>() -> Vec<Forgetting<N>> {
 fn factored_covariance_matches_the_plain_form() {
     let data = box_jenkins(20_000, 1, 0.02);
     let shape = shapes()[4];
-    for forgetting in ways::<5>() {
+    for forgetting in forgetting_rules::<5>() {
         let mut recursion = Rpem::new(
             shape,
             Regressor::Gradient,
-            Stable::Predictor,
-            start(&shape),
+            StablePolynomials::Predictor,
+            start_coefficients(&shape),
             covariance::<5>(1.0, forgetting.clone()),
-            bars::<5, 2>(1.0),
+            error_bars::<5, 2>(1.0),
         )
         .unwrap();
-        let mut plain = Plain {
+        let mut plain = PlainCovariance {
             p: diagonal(1.0),
             power: 0.0,
             largest: 0.0,
@@ -91,16 +94,22 @@ fn factored_covariance_matches_the_plain_form() {
 fn rpem_without_c_d_f_is_bit_identical_to_rls() {
     let data = box_jenkins(3000, 2, 0.02);
     let shape = shapes()[0];
-    for forgetting in ways::<4>() {
+    for forgetting in forgetting_rules::<4>() {
         let adaptation = covariance::<4>(0.1, forgetting);
-        let mut rls = Rls::new(shapes()[0], start(&shape), adaptation.clone(), bars::<4, 0>(0.1)).unwrap();
+        let mut rls = Rls::new(
+            shapes()[0],
+            start_coefficients(&shape),
+            adaptation.clone(),
+            error_bars::<4, 0>(0.1),
+        )
+        .unwrap();
         let mut rpem = Rpem::new(
             shape,
             Regressor::Gradient,
-            Stable::Predictor,
-            start(&shape),
+            StablePolynomials::Predictor,
+            start_coefficients(&shape),
             adaptation,
-            bars::<4, 0>(0.1),
+            error_bars::<4, 0>(0.1),
         )
         .unwrap();
         for &(x, u) in &data {
@@ -112,14 +121,20 @@ fn rpem_without_c_d_f_is_bit_identical_to_rls() {
         assert_eq!(rls.innovation_variance(), rpem.innovation_variance());
     }
     let window = || Window::<4, Vec<f64>>::new(vec![0.0; Window::<4, Vec<f64>>::memory_length(100)], 4).unwrap();
-    let mut rls = Rls::new(shapes()[0], start(&shape), window(), bars::<4, 0>(0.1)).unwrap();
+    let mut rls = Rls::new(
+        shapes()[0],
+        start_coefficients(&shape),
+        window(),
+        error_bars::<4, 0>(0.1),
+    )
+    .unwrap();
     let mut rpem = Rpem::new(
         shape,
         Regressor::Gradient,
-        Stable::Predictor,
-        start(&shape),
+        StablePolynomials::Predictor,
+        start_coefficients(&shape),
         window(),
-        bars::<4, 0>(0.1),
+        error_bars::<4, 0>(0.1),
     )
     .unwrap();
     for &(x, u) in &data {
@@ -140,28 +155,35 @@ fn estimate_without_error_bars_is_bit_identical() {
             f64::INFINITY,
         )
     };
-    for forgetting in ways::<5>() {
+    for forgetting in forgetting_rules::<5>() {
         let needs_innovation_variance = matches!(forgetting, Forgetting::Variable { .. });
         let adaptation = || covariance::<5>(0.1, forgetting.clone());
         let rpem = |adaptation| {
-            let (regressor, stable) = (Regressor::Gradient, Stable::Predictor);
-            Rpem::<_, 5, 0, _, _>::new(bj, regressor, stable, start(&bj), adaptation, NoErrorBars)
+            let (regressor, stable) = (Regressor::Gradient, StablePolynomials::Predictor);
+            Rpem::<_, 5, 0, _, _>::new(bj, regressor, stable, start_coefficients(&bj), adaptation, NoErrorBars)
         };
         // A rule that needs the innovation variance is refused if it is not estimated.
         assert_eq!(rpem(adaptation()).is_none(), needs_innovation_variance);
         assert_eq!(
-            Rls::new(arx, start(&arx), adaptation(), NoErrorBars).is_none(),
+            Rls::new(arx, start_coefficients(&arx), adaptation(), NoErrorBars).is_none(),
             needs_innovation_variance
         );
         if needs_innovation_variance {
             continue;
         }
         let mut bare = rpem(adaptation()).unwrap();
-        let (regressor, stable) = (Regressor::Gradient, Stable::Predictor);
-        let mut full =
-            Rpem::<_, 5, 0, _>::new(bj, regressor, stable, start(&bj), adaptation(), unlimited(0.1)).unwrap();
-        let mut bare_rls = Rls::new(arx, start(&arx), adaptation(), NoErrorBars).unwrap();
-        let mut full_rls = Rls::new(arx, start(&arx), adaptation(), unlimited(0.1)).unwrap();
+        let (regressor, stable) = (Regressor::Gradient, StablePolynomials::Predictor);
+        let mut full = Rpem::<_, 5, 0, _>::new(
+            bj,
+            regressor,
+            stable,
+            start_coefficients(&bj),
+            adaptation(),
+            unlimited(0.1),
+        )
+        .unwrap();
+        let mut bare_rls = Rls::new(arx, start_coefficients(&arx), adaptation(), NoErrorBars).unwrap();
+        let mut full_rls = Rls::new(arx, start_coefficients(&arx), adaptation(), unlimited(0.1)).unwrap();
         for &(x, u) in &data {
             assert_eq!(bare.step(x, u), full.step(x, u));
             assert_eq!(bare.theta(), full.theta());
@@ -180,19 +202,19 @@ fn fixed_and_dynamic_orders_are_bit_identical() {
     let mut any = Rpem::new(
         shape,
         Regressor::Gradient,
-        Stable::Predictor,
-        start(&shape),
+        StablePolynomials::Predictor,
+        start_coefficients(&shape),
         adaptation.clone(),
-        bars::<5, 2>(0.1),
+        error_bars::<5, 2>(0.1),
     )
     .unwrap();
     let mut typed = Rpem::new(
         fixed,
         Regressor::Gradient,
-        Stable::Predictor,
-        start(&shape),
+        StablePolynomials::Predictor,
+        start_coefficients(&shape),
         adaptation,
-        bars::<5, 2>(0.1),
+        error_bars::<5, 2>(0.1),
     )
     .unwrap();
     for &(x, u) in &data {
@@ -211,10 +233,10 @@ fn equal_forgetting_matrix_matches_the_scalar_factor() {
         Rpem::new(
             shape,
             Regressor::Gradient,
-            Stable::Predictor,
-            start(&shape),
+            StablePolynomials::Predictor,
+            start_coefficients(&shape),
             adaptation,
-            bars::<5, 2>(0.1),
+            error_bars::<5, 2>(0.1),
         )
         .unwrap()
     };
@@ -309,7 +331,13 @@ fn error_bars_match_the_covariance_and_its_forgetting_limit() {
     let shape = shapes()[0];
     let spread_of = |lambda: f64| {
         let adaptation = covariance::<4>(1.0, Forgetting::Exponential { lambda: [lambda; 4] });
-        let mut rls = Rls::new(shapes()[0], start(&shape), adaptation, bars::<4, 0>(1.0)).unwrap();
+        let mut rls = Rls::new(
+            shapes()[0],
+            start_coefficients(&shape),
+            adaptation,
+            error_bars::<4, 0>(1.0),
+        )
+        .unwrap();
         data.iter().for_each(|&(x, u)| {
             rls.step(x, u);
         });
@@ -330,7 +358,7 @@ fn error_bars_match_the_covariance_and_its_forgetting_limit() {
 fn guard_keeps_every_variance_within_its_bound() {
     const BOUND: f64 = 50.0;
     let mut noise = Noise(10);
-    for forgetting in ways::<5>().into_iter().skip(1) {
+    for forgetting in forgetting_rules::<5>().into_iter().skip(1) {
         // Forgetting during one round of the guard: e^{1/4}, or five samples with the smallest variable factor.
         let slack = if matches!(forgetting, Forgetting::Variable { .. }) {
             0.9_f64.powi(-5)
@@ -350,7 +378,7 @@ fn guard_keeps_every_variance_within_its_bound() {
             let eps = noise.next();
             let moved = adaptation.update(&psi, eps, &[0.0; 5], bars.innovation_variance());
             bars.update(
-                &ErrorLayout::NONE,
+                &ErrorLayout::NO_FILTER_ERRORS,
                 &Sensitivities::from_gradient(&psi),
                 &moved.gain,
                 eps,
@@ -399,10 +427,10 @@ fn pseudo_linear_regression_finds_a_model_with_coloured_noise() {
     let mut recursion = Rpem::new(
         shape,
         Regressor::PseudoLinear,
-        Stable::Predictor,
+        StablePolynomials::Predictor,
         [0.0; 6],
         adaptation,
-        bars::<6, 2>(100.0),
+        error_bars::<6, 2>(100.0),
     )
     .unwrap();
     for &(x, u) in &armax {
@@ -420,10 +448,10 @@ fn mismatched_shapes_and_unstable_starts_are_refused() {
         Rpem::new(
             shape,
             Regressor::Gradient,
-            Stable::Predictor,
+            StablePolynomials::Predictor,
             theta,
             adaptation,
-            bars::<4, 4>(1.0),
+            error_bars::<4, 4>(1.0),
         )
     };
     assert!(make(shapes()[5], [0.0; 4]).is_none());
@@ -437,7 +465,7 @@ fn mismatched_shapes_and_unstable_starts_are_refused() {
             AnyShape::default(),
             [0.0; 4],
             covariance::<4>(1.0, Forgetting::Exponential { lambda: [1.0; 4] }),
-            bars::<4, 0>(1.0)
+            error_bars::<4, 0>(1.0)
         )
         .is_none()
     );

@@ -9,7 +9,7 @@ use hoid_core::{
     error_bars::ErrorBars,
     innovation_variance::InnovationVariance,
     predictor::{Predictor, Regressor},
-    recursion::Stable,
+    recursion::StablePolynomials,
     rpem::Rpem,
     shape::{AnyShape, FixedShape, Shape},
     ud_covariance::UdCovariance,
@@ -72,7 +72,7 @@ fn recursion(shape: AnyShape, regressor: Regressor) -> Rpem<AnyShape, N, 8, Cova
     let mut unit = [[0.0; N]; N];
     (0..N).for_each(|i| unit[i][i] = P0);
     let bars = ErrorBars::new(&unit, InnovationVariance::new(0.0, 0.0, 1.0), f64::INFINITY);
-    Rpem::new(shape, regressor, Stable::Predictor, theta, covariance, bars).unwrap()
+    Rpem::new(shape, regressor, StablePolynomials::Predictor, theta, covariance, bars).unwrap()
 }
 
 /// Returns, for each shape, the largest difference of theta from the Python implementation, relative to the largest
@@ -94,7 +94,7 @@ fn differences(regressor: Regressor) -> Vec<(String, f64)> {
         }
         let size = 1.0_f64.max(row.innovation.abs());
         *worst = worst.max((step.innovation - row.innovation).abs() / size);
-        assert_eq!(row.theta.len(), row.shape.parameters());
+        assert_eq!(row.theta.len(), row.shape.parameter_count());
     }
     found
 }

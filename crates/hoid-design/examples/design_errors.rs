@@ -16,7 +16,7 @@ use std::env;
 use hoid_design::experiment::ExperimentDesign;
 use hoid_ident::family::{ChannelRole, FamilyEstimator, Intersample, OperatorPrior, SeenChannel};
 use hoid_model::{FamilyScenario, Record};
-use simulated::{CASES, Case, Checked, Responses};
+use simulated::{CASES, Case, CheckedQuantity, Responses};
 
 fn main() {
     let number = |i: usize, otherwise: u64| env::args().nth(i).map_or(otherwise, |text| text.parse().unwrap());
@@ -24,12 +24,12 @@ fn main() {
     let (mut within, mut all) = (0, 0);
     // Other remnants in each case.
     for (case, seed) in CASES.iter().zip((seed..).step_by(1000)) {
-        let found = case.checked(experiments, seed);
+        let found = case.check_errors(experiments, seed);
         let held = found.iter().filter(|q| is_within(q)).count();
         (within, all) = (within + held, all + found.len());
         print(case, "at the lines", &found);
         if identified > 0 {
-            print(case, "identified", &case.checked_by(identified, seed, identify));
+            print(case, "identified", &case.check_errors_with(identified, seed, identify));
         }
     }
     println!(
@@ -38,11 +38,11 @@ fn main() {
     );
 }
 
-fn is_within(q: &Checked) -> bool {
+fn is_within(q: &CheckedQuantity) -> bool {
     (q.ratio - 1.0).abs() <= 0.1
 }
 
-fn print(case: &Case, how: &str, found: &[Checked]) {
+fn print(case: &Case, how: &str, found: &[CheckedQuantity]) {
     println!(
         "{}, {how}: {} of {} s, remnant {:?}; {} experiments",
         case.name, case.runs, case.length_s, case.remnant, found[0].experiments

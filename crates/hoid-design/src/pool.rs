@@ -80,13 +80,16 @@ pub struct Population {
 /// Returns the population of each condition of a group. `prior` is the prior with which the people were fitted.
 pub fn pool(people: &[Person], prior: &OperatorPrior) -> Vec<Population> {
     let mut conditions: Vec<&str> = Vec::new();
-    for person in people.iter().filter(|p| p.is_of_all_runs() && !p.parameters.is_empty()) {
+    for person in people
+        .iter()
+        .filter(|p| p.covers_all_runs() && !p.parameters.is_empty())
+    {
         if !conditions.contains(&person.condition.as_str()) {
             conditions.push(&person.condition);
         }
     }
     let of = |condition: &str| -> Vec<&Person> {
-        let is = |p: &&Person| p.condition == condition && p.is_of_all_runs() && !p.parameters.is_empty();
+        let is = |p: &&Person| p.condition == condition && p.covers_all_runs() && !p.parameters.is_empty();
         people.iter().filter(is).collect()
     };
     conditions
@@ -118,11 +121,12 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
             .map(|p| {
                 (
                     p.subject.as_str(),
-                    p.parameter(name).and_then(|parameter| data(parameter, prior)),
+                    p.parameter(name)
+                        .and_then(|parameter| observation_without_prior(parameter, prior)),
                 )
             })
             .collect();
-        match pooled((name, unit), &own) {
+        match pool_parameter((name, unit), &own) {
             Ok(parameter) => found.parameters.push(parameter),
             Err(error) => found.left_out.push((name.to_owned(), error.to_string())),
         }
@@ -132,7 +136,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
 
 /// Returns the logarithm of a parameter as determined by the person's own data, without the prior; `None` without
 /// information.
-fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
+fn observation_without_prior(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
     let error = parameter.standard_error_person.or(parameter.standard_error)?;
     let counts = parameter.determined && parameter.value > 0.0 && parameter.value.is_finite() && error > 0.0;
     let has_prior = prior.entries().iter().any(|entry| entry.parameter == parameter.name);
@@ -147,7 +151,10 @@ fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
     })
 }
 
-fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
+fn pool_parameter(
+    (name, unit): (&str, &str),
+    own: &[(&str, Option<Observation>)],
+) -> Result<PooledParameter, CompareError> {
     let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
     // With only two people, the variance between them is practically unknown.
     if known.len() < MIN_PEOPLE {
@@ -275,7 +282,7 @@ mod tests {
                 )
             })
             .collect();
-        pooled(("tau_e", "s"), &own).unwrap()
+        pool_parameter(("tau_e", "s"), &own).unwrap()
     }
 
     #[test]
@@ -334,11 +341,11 @@ mod tests {
         };
         let prior: OperatorPrior = "tau_e=0.2:0.3".parse().unwrap();
         // Half prior: the data are as far on the other side, with twice the variance.
-        let half = data(&parameter(0.3, 0.5), &prior).unwrap();
+        let half = observation_without_prior(&parameter(0.3, 0.5), &prior).unwrap();
         assert!((half.value - (0.3_f64.ln() + (0.3_f64 / 0.2).ln())).abs() < 1e-12);
         assert!((half.variance - 0.02).abs() < 1e-12);
-        assert!(data(&parameter(0.3, 0.95), &prior).is_none());
-        let without = data(&parameter(0.3, 0.5), &OperatorPrior::none()).unwrap();
+        assert!(observation_without_prior(&parameter(0.3, 0.95), &prior).is_none());
+        let without = observation_without_prior(&parameter(0.3, 0.5), &OperatorPrior::none()).unwrap();
         assert!((without.value - 0.3_f64.ln()).abs() < 1e-12 && (without.variance - 0.01).abs() < 1e-12);
     }
 
@@ -357,7 +364,7 @@ mod tests {
             })
             .chain([("D", None)])
             .collect();
-        let parameter = pooled(("tau_e", "s"), &own).unwrap();
+        let parameter = pool_parameter(("tau_e", "s"), &own).unwrap();
         let unmeasured = &parameter.people[3];
         assert!(
             unmeasured.shrinkage == 1.0
@@ -370,7 +377,7 @@ mod tests {
             parameters: vec![parameter.clone()],
             left_out: Vec::new(),
         };
-        let prior = hoid_analysis::prior_of_text(&population.json().to_string()).unwrap();
+        let prior = hoid_analysis::parse_prior(&population.json().to_string()).unwrap();
         let entry = &prior.entries()[0];
         assert_eq!(entry.parameter, "tau_e");
         assert!((entry.centre - parameter.centre).abs() < 1e-12);

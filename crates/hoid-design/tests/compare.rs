@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use hoid_design::compare::{
-    Adjustment, CompareError, Comparing, Comparison, Factor, GroupEstimates, Quantity, Variation,
+    Adjustment, CompareError, Comparison, ComparisonOptions, Factor, GroupEstimates, Quantity, Variation,
 };
 use hoid_model::VerdictLevel;
 use serde_json::{Value, json};
@@ -28,16 +28,16 @@ fn group(rows: &[Row<'_>]) -> GroupEstimates {
         })
     };
     let people: Vec<Value> = rows.iter().map(person).collect();
-    of_text(&json!({"group": "pilots", "people": people}).to_string()).unwrap()
+    parse_group(&json!({"group": "pilots", "people": people}).to_string()).unwrap()
 }
 
-fn of_text(text: &str) -> Result<GroupEstimates, CompareError> {
+fn parse_group(text: &str) -> Result<GroupEstimates, CompareError> {
     let file = tempfile::Builder::new().suffix(".json").tempfile().unwrap();
     std::fs::write(file.path(), text).unwrap();
     GroupEstimates::read(file.path())
 }
 
-const THREE: [Row<'static>; 6] = [
+const THREE_PEOPLE: [Row<'static>; 6] = [
     ("P03", "fo", 2.0, 0.05, 0.25, "lead"),
     ("P03", "so", 1.2, 0.05, 0.40, "lead"),
     ("P05", "fo", 4.0, 0.05, 0.22, "lead"),
@@ -46,13 +46,13 @@ const THREE: [Row<'static>; 6] = [
     ("P09", "so", 2.6, 0.05, 0.32, "lead"),
 ];
 
-fn crossover() -> Vec<Quantity> {
+fn crossover_quantity() -> Vec<Quantity> {
     vec![Quantity::Crossover]
 }
 
 #[test]
 fn conditions_are_compared_within_people() {
-    let found = Comparing::default().run(&group(&THREE)).unwrap();
+    let found = ComparisonOptions::default().run(&group(&THREE_PEOPLE)).unwrap();
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
     let names: Vec<String> = found.differences.iter().map(|d| d.quantity.to_string()).collect();
     assert_eq!(names, ["crossover", "phase_margin", "tau_e"]);
@@ -73,11 +73,11 @@ fn conditions_are_compared_within_people() {
     let least = p.iter().copied().fold(1.0, f64::min);
     let adjusted = found.differences.iter().map(|d| d.p_adjusted).fold(1.0, f64::min);
     assert!((adjusted - 3.0 * least).abs() < 1e-12);
-    let unadjusted = Comparing {
-        quantities: crossover(),
-        ..Comparing::default()
+    let unadjusted = ComparisonOptions {
+        quantities: crossover_quantity(),
+        ..ComparisonOptions::default()
     };
-    let found = unadjusted.run(&group(&THREE)).unwrap();
+    let found = unadjusted.run(&group(&THREE_PEOPLE)).unwrap();
     assert_eq!(
         found.differences[0].sentence,
         "crossover fell by 0.63 rad/s from fo to so (95 % 0.12 to 1.15, t(2) = -5.3, p = 0.034, d_z = -3, n = 3)"
@@ -86,12 +86,12 @@ fn conditions_are_compared_within_people() {
 
 #[test]
 fn missing_results_are_reported() {
-    let mut rows = THREE.to_vec();
+    let mut rows = THREE_PEOPLE.to_vec();
     rows.push(("P11", "fo", 2.5, 0.1, 0.2, "lead"));
     rows[1].2 = f64::NAN; // null in JSON
-    let found = Comparing {
-        quantities: crossover(),
-        ..Comparing::default()
+    let found = ComparisonOptions {
+        quantities: crossover_quantity(),
+        ..ComparisonOptions::default()
     }
     .run(&group(&rows))
     .unwrap();
@@ -114,9 +114,9 @@ fn missing_results_are_reported() {
         "{reasons:?}"
     );
     // No one is left.
-    let found = Comparing {
-        quantities: crossover(),
-        ..Comparing::default()
+    let found = ComparisonOptions {
+        quantities: crossover_quantity(),
+        ..ComparisonOptions::default()
     }
     .run(&group(&rows[..4]))
     .unwrap();
@@ -129,12 +129,12 @@ fn missing_results_are_reported() {
 #[test]
 fn parameters_are_compared_only_for_one_form() {
     let of = vec!["K".parse().unwrap(), "tau_e".parse().unwrap()];
-    let comparing = Comparing {
+    let comparing = ComparisonOptions {
         quantities: of,
-        ..Comparing::default()
+        ..ComparisonOptions::default()
     };
-    assert_eq!(comparing.run(&group(&THREE)).unwrap().differences.len(), 2);
-    let mut rows = THREE;
+    assert_eq!(comparing.run(&group(&THREE_PEOPLE)).unwrap().differences.len(), 2);
+    let mut rows = THREE_PEOPLE;
     rows[3].5 = "lead2-lag";
     let found = comparing.run(&group(&rows)).unwrap();
     let names: Vec<String> = found.differences.iter().map(|d| d.quantity.to_string()).collect();
@@ -162,11 +162,11 @@ fn groups_and_interactions_are_compared() {
         "condition".parse().unwrap(),
         "training:no=A,B,C;yes=D,E,F".parse().unwrap(),
     ];
-    let comparing = Comparing {
+    let comparing = ComparisonOptions {
         factors,
-        quantities: crossover(),
+        quantities: crossover_quantity(),
         adjustment: Adjustment::None,
-        ..Comparing::default()
+        ..ComparisonOptions::default()
     };
     let found = comparing.run(&group(&rows)).unwrap();
     let of = |factor: &str| found.differences.iter().find(|d| d.factor == factor).unwrap();
@@ -199,7 +199,7 @@ fn groups_and_interactions_are_compared() {
 
 #[test]
 fn result_round_trips_through_json() {
-    let found = Comparing::default().run(&group(&THREE)).unwrap();
+    let found = ComparisonOptions::default().run(&group(&THREE_PEOPLE)).unwrap();
     let text = found.to_json();
     assert_eq!(Comparison::from_json(&text).unwrap(), found);
     let object: Value = serde_json::from_str(&text).unwrap();
@@ -219,29 +219,29 @@ fn result_round_trips_through_json() {
 
 #[test]
 fn error_messages_contain_advice() {
-    let all = group(&THREE);
+    let all = group(&THREE_PEOPLE);
     let of = |names: &[&str]| names.iter().map(|n| n.parse().unwrap()).collect::<Vec<Quantity>>();
-    let run = |comparing: Comparing| comparing.run(&all).unwrap_err().to_string();
-    let from_runs = run(Comparing {
+    let run = |comparing: ComparisonOptions| comparing.run(&all).unwrap_err().to_string();
+    let from_runs = run(ComparisonOptions {
         quantities: of(&["gain_db@2"]),
-        ..Comparing::default()
+        ..ComparisonOptions::default()
     });
     assert!(
         from_runs.contains("gain at 2 rad/s") && from_runs.contains("give the directory"),
         "{from_runs}"
     );
     let factors = vec!["display".parse().unwrap()];
-    let unknown = run(Comparing {
+    let unknown = run(ComparisonOptions {
         factors,
-        ..Comparing::default()
+        ..ComparisonOptions::default()
     });
     assert!(
         unknown.contains("fo, so") && unknown.contains("P03, P05, P09"),
         "{unknown}"
     );
-    let between = run(Comparing {
+    let between = run(ComparisonOptions {
         variation: Some(Variation::Between),
-        ..Comparing::default()
+        ..ComparisonOptions::default()
     });
     assert!(between.contains("varies within people"), "{between}");
     for (text, word) in [
@@ -249,7 +249,7 @@ fn error_messages_contain_advice() {
         ("{}", "no people"),
         ("{\"people\": [{}]}", "no subject"),
     ] {
-        let error = of_text(text).unwrap_err().to_string();
+        let error = parse_group(text).unwrap_err().to_string();
         assert!(error.contains(word) && error.contains("hoid group"), "{error}");
     }
     let empty = tempfile::tempdir().unwrap();

@@ -14,17 +14,17 @@ use hoid_design::compare::{Observation, Weights, meta_mean, meta_regression};
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{ChiSquared, Distribution, StandardNormal};
 
-const EXPERIMENTS: usize = 6_000;
-const DELTA: f64 = -0.6;
+const EXPERIMENT_COUNT: usize = 6_000;
+const TRUE_DIFFERENCE: f64 = -0.6;
 
-fn normal(rng: &mut ChaCha8Rng) -> f64 {
+fn normal_deviate(rng: &mut ChaCha8Rng) -> f64 {
     StandardNormal.sample(rng)
 }
 
 /// An estimate of a person.
 fn person(rng: &mut ChaCha8Rng, share: f64, mean: f64, tau: f64, estimated: bool) -> Observation {
     let error = 0.1 + 0.4 * share;
-    let value = mean + tau * normal(rng) + error * normal(rng);
+    let value = mean + tau * normal_deviate(rng) + error * normal_deviate(rng);
     let variance_factor = if estimated {
         ChiSquared::new(4.0).unwrap().sample(rng) / 4.0
     } else {
@@ -37,16 +37,17 @@ fn person(rng: &mut ChaCha8Rng, share: f64, mean: f64, tau: f64, estimated: bool
 }
 
 /// Share of intervals that hold the difference.
-fn paired(n: usize, tau: f64, estimated: bool, weights: Weights) -> f64 {
+fn paired_coverage(n: usize, tau: f64, estimated: bool, weights: Weights) -> f64 {
     let mut rng = ChaCha8Rng::seed_from_u64(53 + n as u64);
     let mut held = 0;
-    for _ in 0..EXPERIMENTS {
-        let one = |i: usize, rng: &mut ChaCha8Rng| person(rng, i as f64 / (n - 1) as f64, DELTA, tau, estimated);
+    for _ in 0..EXPERIMENT_COUNT {
+        let one =
+            |i: usize, rng: &mut ChaCha8Rng| person(rng, i as f64 / (n - 1) as f64, TRUE_DIFFERENCE, tau, estimated);
         let people: Vec<Observation> = (0..n).map(|i| one(i, &mut rng)).collect();
         let (low, high) = meta_mean(&people, weights).unwrap().coefficients[0].interval;
-        held += usize::from(low <= DELTA && DELTA <= high);
+        held += usize::from(low <= TRUE_DIFFERENCE && TRUE_DIFFERENCE <= high);
     }
-    held as f64 / EXPERIMENTS as f64
+    held as f64 / EXPERIMENT_COUNT as f64
 }
 
 #[test]
@@ -54,7 +55,7 @@ fn within_person_intervals_have_nominal_coverage() {
     for n in [3, 6, 12] {
         for tau in [1.0, 0.4, 0.0] {
             for estimated in [false, true] {
-                let held = paired(n, tau, estimated, Weights::Penalised);
+                let held = paired_coverage(n, tau, estimated, Weights::Penalised);
                 println!("{n} people, tau {tau}, errors estimated {estimated}: intervals {held:.4}");
                 let most = if tau == 0.0 { 0.99 } else { 0.96 };
                 assert!((0.94..=most).contains(&held), "{n} {tau} {estimated}: {held}");
@@ -66,7 +67,7 @@ fn within_person_intervals_have_nominal_coverage() {
 /// Why the weights are not those of the restricted likelihood.
 #[test]
 fn restricted_likelihood_undercovers_for_three_people() {
-    let held = paired(3, 0.4, false, Weights::Restricted);
+    let held = paired_coverage(3, 0.4, false, Weights::Restricted);
     println!("restricted likelihood, 3 people: intervals {held:.4}");
     assert!((0.86..0.89).contains(&held), "{held}");
 }
@@ -78,17 +79,17 @@ fn between_group_intervals_have_nominal_coverage() {
             let mut rng = ChaCha8Rng::seed_from_u64(530 + n as u64);
             let x: Vec<Vec<f64>> = (0..n).map(|i| vec![1.0, f64::from(u8::from(i >= n / 2))]).collect();
             let mut held = 0;
-            for _ in 0..EXPERIMENTS {
+            for _ in 0..EXPERIMENT_COUNT {
                 let one = |i: usize| {
                     let share = (i % (n / 2)) as f64 / (n / 2 - 1) as f64;
-                    person(&mut rng, share, 3.0 + DELTA * x[i][1], 0.4, estimated)
+                    person(&mut rng, share, 3.0 + TRUE_DIFFERENCE * x[i][1], 0.4, estimated)
                 };
                 let people: Vec<Observation> = (0..n).map(one).collect();
                 let found = meta_regression(&people, &x, Weights::Penalised).unwrap();
                 let (low, high) = found.coefficients[1].interval;
-                held += usize::from(low <= DELTA && DELTA <= high);
+                held += usize::from(low <= TRUE_DIFFERENCE && TRUE_DIFFERENCE <= high);
             }
-            let held = held as f64 / EXPERIMENTS as f64;
+            let held = held as f64 / EXPERIMENT_COUNT as f64;
             println!(
                 "two groups of {}, errors estimated {estimated}: intervals {held:.4}",
                 n / 2

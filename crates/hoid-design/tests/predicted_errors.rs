@@ -8,18 +8,18 @@ mod simulated;
 
 use simulated::CASES;
 
-const EXPERIMENTS: u64 = 200;
+const EXPERIMENT_COUNT: u64 = 200;
 
 #[test]
 fn scatter_matches_the_prediction() {
     // A target, a disturbance, and both.
     for case in [&CASES[1], &CASES[4], &CASES[10]] {
-        for q in case.checked(EXPERIMENTS, 53) {
+        for q in case.check_errors(EXPERIMENT_COUNT, 53) {
             println!(
                 "{}: {} {:.3}, predicted {:.4}, {:.3} of it, off by {:.2}",
                 case.name, q.name, q.value, q.predicted, q.ratio, q.off
             );
-            assert_eq!(q.experiments as u64, EXPERIMENTS, "{}: {}", case.name, q.name);
+            assert_eq!(q.experiments as u64, EXPERIMENT_COUNT, "{}: {}", case.name, q.name);
             assert!((q.ratio - 1.0).abs() < 0.15, "{}: {} {}", case.name, q.name, q.ratio);
         }
     }

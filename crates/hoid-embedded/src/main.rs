@@ -18,11 +18,11 @@ mod run;
 fn main() -> Result<(), String> {
     use std::io::{Read, Write, stdout};
 
-    let path = run::FILE.to_string_lossy();
+    let path = run::FILE_NAME.to_string_lossy();
     let mut file = std::fs::File::open(&*path).map_err(|e| format!("{path}: {e}"))?;
     let mut out = stdout().lock();
     run::run(
-        |bytes| file.read(bytes).map_err(|_| run::UNREADABLE),
+        |bytes| file.read(bytes).map_err(|_| run::UNREADABLE_MESSAGE),
         |line| writeln!(out, "{line}").map_err(|_| "standard output takes no more"),
     )?;
     writeln!(out, "# state {} bytes", run::STATE_BYTES).map_err(|e| e.to_string())

@@ -7,14 +7,14 @@
 use core::{ffi::CStr, fmt::Arguments};
 
 use hoid_core::adaptive::{
-    AdaptiveFilter, PARAMETERS,
-    defaults::{DefaultOperator, GIVEN_DELAY_S, SPREAD},
+    AdaptiveFilter, PARAMETER_COUNT,
+    defaults::{DefaultOperator, GIVEN_DELAY_DEVIATION_S, PRIOR_DEVIATIONS},
 };
 
 /// Name of the file with the samples.
-pub const FILE: &CStr = c"run.csv";
+pub const FILE_NAME: &CStr = c"run.csv";
 /// Message if the file cannot be read.
-pub const UNREADABLE: &str = "run.csv cannot be read";
+pub const UNREADABLE_MESSAGE: &str = "run.csv cannot be read";
 /// Columns of the output.
 const HEADER: &str = "t,K_e,K_e_se,K_e_dot,K_e_dot_se,omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,tau_e,tau_e_se";
 /// Sample time in s.
@@ -24,12 +24,12 @@ const NK: f64 = 29.0;
 /// Number of samples per output line.
 const SAMPLES_PER_LINE: u32 = 100;
 /// Length of the memory in numbers: more than `min_memory(SAMPLE_TIME_S)`, but too short for replays.
-const MEMORY: usize = 3 * 128;
+const MEMORY_LEN: usize = 3 * 128;
 /// Longest input line in bytes.
 const MAX_LINE_BYTES: usize = 80;
 
 /// Recursion with its own memory.
-type Filter = AdaptiveFilter<[f64; MEMORY]>;
+type Filter = AdaptiveFilter<[f64; MEMORY_LEN]>;
 
 /// Size of the recursion in bytes.
 pub const STATE_BYTES: usize = size_of::<Filter>();
@@ -43,20 +43,20 @@ pub fn run(
     mut write: impl FnMut(Arguments<'_>) -> Result<(), &'static str>,
 ) -> Result<(), &'static str> {
     let supposed = DefaultOperator {
-        spread: [SPREAD[0], SPREAD[1], GIVEN_DELAY_S],
+        spread: [PRIOR_DEVIATIONS[0], PRIOR_DEVIATIONS[1], GIVEN_DELAY_DEVIATION_S],
         ..DefaultOperator::with_delay((NK - 0.5) * SAMPLE_TIME_S)
     };
     let mut filter =
-        Filter::new(supposed.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("there is no filter for this prior")?;
-    let mut lines = Lines::new(read);
+        Filter::new(supposed.prior(SAMPLE_TIME_S), [0.0; MEMORY_LEN]).ok_or("there is no filter for this prior")?;
+    let mut lines = LineReader::new(read);
     write(format_args!("{HEADER}"))?;
     let mut samples = 0_u32;
-    while let Some((e, u)) = lines.next()? {
+    while let Some((e, u)) = lines.next_sample()? {
         filter.step(e, u);
         samples += 1;
         if samples.is_multiple_of(SAMPLES_PER_LINE) && filter.has_started() {
             let (values, covariance) = (filter.operator(), filter.operator_covariance());
-            let [a, b, c, d, t]: [f64; PARAMETERS] = values;
+            let [a, b, c, d, t]: [f64; PARAMETER_COUNT] = values;
             let se = |i: usize| libm::sqrt(covariance[i][i]);
             let at = f64::from(samples - 1) * SAMPLE_TIME_S;
             let of = [se(0), se(1), se(2), se(3), se(4)];
@@ -70,14 +70,14 @@ pub fn run(
 }
 
 /// Reader of lines with two numbers each.
-struct Lines<R> {
+struct LineReader<R> {
     read: R,
     chunk: [u8; 256],
     at: usize,
     end: usize,
 }
 
-impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> Lines<R> {
+impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> LineReader<R> {
     fn new(read: R) -> Self {
         Self {
             read,
@@ -88,10 +88,10 @@ impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> Lines<R> {
     }
 
     /// Returns e and u of the next line; `None` at the end of the file.
-    fn next(&mut self) -> Result<Option<(f64, f64)>, &'static str> {
+    fn next_sample(&mut self) -> Result<Option<(f64, f64)>, &'static str> {
         let (mut line, mut length) = ([0_u8; MAX_LINE_BYTES], 0);
         loop {
-            let byte = self.byte()?;
+            let byte = self.next_byte()?;
             match byte {
                 None | Some(b'\n') if length > 0 => break,
                 None => return Ok(None),
@@ -112,7 +112,7 @@ impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> Lines<R> {
         sample.map(Some).ok_or("a line of run.csv is not two numbers, e,u")
     }
 
-    fn byte(&mut self) -> Result<Option<u8>, &'static str> {
+    fn next_byte(&mut self) -> Result<Option<u8>, &'static str> {
         if self.at == self.end {
             (self.at, self.end) = (0, (self.read)(&mut self.chunk)?);
         }

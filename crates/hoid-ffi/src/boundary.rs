@@ -12,7 +12,7 @@ use std::{
 use crate::{
     session::Session,
     status::{
-        Failure, HOID_BAD_POINTER, HOID_BAD_TEXT, HOID_BROKEN, HOID_PANIC, HOID_TOO_SMALL, HoidStatus, guarded,
+        Failure, HOID_BAD_POINTER, HOID_BAD_TEXT, HOID_BROKEN, HOID_PANIC, HOID_TOO_SMALL, HoidStatus, catch_failures,
         panic_message,
     },
 };
@@ -144,7 +144,7 @@ pub(crate) unsafe fn with_tracker(
     tracker: *const HoidTracker,
     call: impl FnOnce(&Session) -> Result<(), Failure>,
 ) -> HoidStatus {
-    guarded(|| {
+    catch_failures(|| {
         check(tracker, "the tracker")?;
         // SAFETY: the pointer is not null and is aligned; the caller guarantees a tracker that no other code changes.
         let tracker = unsafe { &*tracker };
@@ -161,7 +161,7 @@ pub(crate) unsafe fn with_tracker_mut(
     tracker: *mut HoidTracker,
     call: impl FnOnce(&mut Session) -> Result<(), Failure>,
 ) -> HoidStatus {
-    guarded(|| {
+    catch_failures(|| {
         check(tracker, "the tracker")?;
         // SAFETY: the pointer is not null and is aligned; the caller guarantees a tracker that no other code uses.
         let tracker = unsafe { &mut *tracker };
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
     use crate::{HOID_OK, hoid_last_error, session::Session};
 
-    fn last() -> String {
+    fn last_error_text() -> String {
         // SAFETY: the text belongs to this thread, and no call follows before it is read.
         let text = unsafe { CStr::from_ptr(hoid_last_error()) };
         text.to_str().unwrap().to_owned()
@@ -214,15 +214,15 @@ mod tests {
         // SAFETY: the tracker was created above.
         let status = unsafe { with_tracker_mut(trackers[0], |_| panic!("as planned")) };
         assert_eq!(status, HOID_PANIC);
-        assert!(last().contains("as planned"), "{}", last());
+        assert!(last_error_text().contains("as planned"), "{}", last_error_text());
         // SAFETY: the tracker was created above.
         let status = unsafe { with_tracker_mut(trackers[0], |_| Ok(())) };
         assert_eq!(status, HOID_BROKEN);
         // SAFETY: the tracker was created above.
         let status = unsafe { with_tracker(trackers[1], |_| Ok(())) };
         assert_eq!(status, HOID_OK);
-        assert_eq!(guarded(|| panic!("{}", 7)), HOID_PANIC);
-        assert!(last().ends_with('7'));
+        assert_eq!(catch_failures(|| panic!("{}", 7)), HOID_PANIC);
+        assert!(last_error_text().ends_with('7'));
         for tracker in trackers {
             // SAFETY: the tracker was created above and is taken back once.
             unsafe { free_handle(tracker) };

@@ -5,7 +5,7 @@ use std::ffi::{CStr, c_char};
 use crate::{
     boundary::{HoidTracker, bytes, free_handle, into_handle, text, with_tracker_mut, write_array},
     session::Session,
-    status::{Failure, HOID_BAD_POINTER, HoidStatus, guarded},
+    status::{Failure, HOID_BAD_POINTER, HoidStatus, catch_failures},
 };
 
 /// Version of this interface. Within a version, functions and constants may be added but are never changed.
@@ -41,7 +41,7 @@ pub unsafe extern "C" fn hoid_tracker_new(
     options: *const c_char,
     tracker: *mut *mut HoidTracker,
 ) -> HoidStatus {
-    guarded(|| {
+    catch_failures(|| {
         // SAFETY: guaranteed by the caller of this function.
         let method = unsafe { text(method, "the method") }?;
         // SAFETY: guaranteed by the caller of this function.
@@ -64,7 +64,7 @@ pub unsafe extern "C" fn hoid_tracker_from_fit(
     options: *const c_char,
     tracker: *mut *mut HoidTracker,
 ) -> HoidStatus {
-    guarded(|| {
+    catch_failures(|| {
         // SAFETY: guaranteed by the caller of this function.
         let fit = unsafe { text(fit, "the fit") }?;
         let fit = fit.ok_or_else(|| Failure::new(HOID_BAD_POINTER, "the fit is null"))?;
@@ -82,7 +82,7 @@ pub unsafe extern "C" fn hoid_tracker_from_fit(
 /// `tracker` is NULL or a tracker of this library that has not been freed.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hoid_tracker_free(tracker: *mut HoidTracker) {
-    guarded(|| {
+    catch_failures(|| {
         // SAFETY: guaranteed by the caller of this function.
         unsafe { free_handle(tracker) };
         Ok(())
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn hoid_tracker_save(
 ) -> HoidStatus {
     let save = |session: &mut Session| {
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { write_array(&session.saved(), buffer, room, length, "the buffer") }
+        unsafe { write_array(&session.to_bytes(), buffer, room, length, "the buffer") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker_mut(tracker, save) }
@@ -122,10 +122,10 @@ pub unsafe extern "C" fn hoid_tracker_restore(
     length: usize,
     tracker: *mut *mut HoidTracker,
 ) -> HoidStatus {
-    guarded(|| {
+    catch_failures(|| {
         // SAFETY: guaranteed by the caller of this function.
         let saved = unsafe { bytes(buffer, length, "the buffer") }?;
-        let session = Session::restored(saved)?;
+        let session = Session::from_bytes(saved)?;
         // SAFETY: guaranteed by the caller of this function.
         unsafe { into_handle(session, tracker) }
     })

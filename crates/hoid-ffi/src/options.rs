@@ -36,32 +36,32 @@ impl TrackerRequest {
     /// Builds the requested recursion in its initial state.
     pub fn live(&self) -> Result<Live, Failure> {
         let sample_time = SampleTime::new(self.sample_time_s)?;
-        let mut options = object(self.options.as_deref().unwrap_or("{}"))?;
+        let mut options = parse_object(self.options.as_deref().unwrap_or("{}"))?;
         let mut method = match &self.method {
             Some(name) => hoid_survey::method(name)?,
             None => Method::default(),
         };
-        let structure: Option<Structure> = taken(&mut options, "structure", choice)?;
-        let criterion: Option<Criterion> = taken(&mut options, "criterion", choice)?;
-        let largest = taken(&mut options, "largest", number)?;
-        let at_rad_s = taken(&mut options, "at", numbers)?;
-        let controlled_element = taken(&mut options, "controlled_element", element)?;
-        let start = taken(&mut options, "start", start)?;
-        let decimation = taken(&mut options, "decimate", decimation)?.unwrap_or_default();
-        let warm_up_s = taken(&mut options, "warm_up", number)?.unwrap_or(DEFAULT_WARM_UP_S);
+        let structure: Option<Structure> = take_option(&mut options, "structure", choice)?;
+        let criterion: Option<Criterion> = take_option(&mut options, "criterion", choice)?;
+        let largest = take_option(&mut options, "largest", number)?;
+        let at_rad_s = take_option(&mut options, "at", numbers)?;
+        let controlled_element = take_option(&mut options, "controlled_element", element)?;
+        let start = take_option(&mut options, "start", start)?;
+        let decimation = take_option(&mut options, "decimate", decimation)?.unwrap_or_default();
+        let warm_up_s = take_option(&mut options, "warm_up", number)?.unwrap_or(DEFAULT_WARM_UP_S);
         let mut orders = NamedOrders::new();
         for name in ["na", "nb", "nc", "nd", "nf", "nk"] {
-            if let Some(range) = taken(&mut options, name, |value| range(value, name))? {
+            if let Some(range) = take_option(&mut options, name, |value| range(value, name))? {
                 orders.insert(name.to_owned(), range);
             }
         }
-        set(&mut method, options, self.fit.as_deref())?;
+        set_method_options(&mut method, options, self.fit.as_deref())?;
         let asked = TrackRequest {
             structure,
             orders,
             start: start.unwrap_or_default(),
             criterion: criterion.unwrap_or(Criterion::Bic),
-            largest: largest.unwrap_or(TrackOptions::LARGEST),
+            largest: largest.unwrap_or(TrackOptions::DEFAULT_MAX_MAGNITUDE),
             at_rad_s: at_rad_s.unwrap_or_default(),
             controlled_element,
             ..TrackRequest::of(method)
@@ -72,7 +72,7 @@ impl TrackerRequest {
 
 /// Sets the options of the method, in an order in which each option follows those on which it depends, and then the
 /// fit.
-fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) -> Result<(), Failure> {
+fn set_method_options(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) -> Result<(), Failure> {
     let mut fitted = fit.map(|text| operator(text, "the fit")).transpose()?;
     if let Some(prior) = options.get("prior") {
         let other = match prior {
@@ -83,7 +83,7 @@ fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) 
             _ => None,
         };
         if fit.is_some() {
-            return Err(Failure::option(
+            return Err(Failure::bad_option(
                 "prior is given twice, as a fit and in the options; remove one",
             ));
         }
@@ -100,7 +100,7 @@ fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) 
     }
     if let Some((unknown, _)) = options.into_iter().next() {
         let own: Vec<&str> = method.settings().list().iter().map(|own| own.name).collect();
-        return Err(Failure::option(format!(
+        return Err(Failure::bad_option(format!(
             "there is no option {unknown}; the options are structure, na to nk, criterion, start, largest, at, \
              controlled_element, decimate, warm_up, and for {method} {}",
             own.join(", ")
@@ -116,17 +116,17 @@ fn operator(text: &str, source: &str) -> Result<FittedOperator, Failure> {
     Ok(parse_fit(text, source).and_then(FitFile::operator)?)
 }
 
-fn object(text: &str) -> Result<Map<String, Value>, Failure> {
+fn parse_object(text: &str) -> Result<Map<String, Value>, Failure> {
     let text = if text.trim().is_empty() { "{}" } else { text };
     serde_json::from_str(text).map_err(|error| {
-        Failure::option(format!(
+        Failure::bad_option(format!(
             "the options are not a JSON object ({error}); write them as {{\"nk\": 29, \"memory\": \"4s\"}}"
         ))
     })
 }
 
 /// Removes an option from the object and returns it; `None` if it is missing or null.
-fn taken<T>(
+fn take_option<T>(
     options: &mut Map<String, Value>,
     name: &str,
     read: impl FnOnce(&Value) -> Result<T, String>,
@@ -135,14 +135,14 @@ fn taken<T>(
         None | Some(Value::Null) => Ok(None),
         Some(value) => match read(&value) {
             Ok(read) => Ok(Some(read)),
-            Err(expected) => Err(Failure::option(format!("{name} is {value}, expected {expected}"))),
+            Err(expected) => Err(Failure::bad_option(format!("{name} is {value}, expected {expected}"))),
         },
     }
 }
 
 fn choice<T: NamedChoice>(value: &Value) -> Result<T, String> {
     let name = value.as_str().ok_or("its name as text")?;
-    T::of_name(name).map_err(|error| error.to_string())
+    T::from_name(name).map_err(|error| error.to_string())
 }
 
 fn decimation(value: &Value) -> Result<Decimation, String> {
@@ -255,7 +255,7 @@ mod tests {
         assert_eq!((options.largest, options.at_rad_s.clone()), (50.0, vec![1.0, 2.5]));
         let memory = options.method.settings().get("memory_of").unwrap();
         assert_eq!(memory, "b=inf");
-        assert!(!found.plan().is_settled());
+        assert!(!found.plan().has_fixed_orders());
         let pair = live("adaptive", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
         assert_eq!(pair.plan().options().controlled_element, options.controlled_element);
         let none = live("adaptive", " ").unwrap();

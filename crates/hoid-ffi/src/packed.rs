@@ -12,21 +12,21 @@
 
 use serde_json::Value;
 
-const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-const PRIME: u64 = 0x0000_0100_0000_01b3;
+const FNV_BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
 
 /// Reason why packed bytes cannot be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Closed {
+pub(crate) enum UnpackError {
     /// The bytes are of another type or version.
     Other,
     /// The bytes were changed or truncated.
     Damaged,
 }
 
-pub(crate) fn sum(bytes: &[u8]) -> u64 {
-    let next = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(PRIME);
-    bytes.iter().fold(BASIS, next)
+pub(crate) fn checksum(bytes: &[u8]) -> u64 {
+    let next = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(FNV_PRIME);
+    bytes.iter().fold(FNV_BASIS, next)
 }
 
 pub(crate) fn pack(magic: [u8; 8], description: &Value, bytes: &[u8]) -> Vec<u8> {
@@ -35,17 +35,17 @@ pub(crate) fn pack(magic: [u8; 8], description: &Value, bytes: &[u8]) -> Vec<u8>
     all.extend_from_slice(&(description.len() as u64).to_le_bytes());
     all.extend_from_slice(description.as_bytes());
     all.extend_from_slice(bytes);
-    let sum = sum(&all);
+    let sum = checksum(&all);
     all.extend_from_slice(&sum.to_le_bytes());
     all
 }
 
 /// Returns the description and the data of packed bytes.
-pub(crate) fn unpack(magic: [u8; 8], all: &[u8]) -> Result<(Value, &[u8]), Closed> {
-    let rest = all.strip_prefix(&magic).ok_or(Closed::Other)?;
+pub(crate) fn unpack(magic: [u8; 8], all: &[u8]) -> Result<(Value, &[u8]), UnpackError> {
+    let rest = all.strip_prefix(&magic).ok_or(UnpackError::Other)?;
     let of = || {
         let (body, stated) = all.split_last_chunk::<8>()?;
-        if sum(body) != u64::from_le_bytes(*stated) {
+        if checksum(body) != u64::from_le_bytes(*stated) {
             return None;
         }
         let (length, rest) = rest.split_first_chunk::<8>()?;
@@ -54,7 +54,7 @@ pub(crate) fn unpack(magic: [u8; 8], all: &[u8]) -> Result<(Value, &[u8]), Close
         let bytes = rest.get(..rest.len().checked_sub(8)?)?;
         Some((serde_json::from_slice(description).ok()?, bytes))
     };
-    of().ok_or(Closed::Damaged)
+    of().ok_or(UnpackError::Damaged)
 }
 
 /// Converts numbers to bytes.

@@ -25,7 +25,7 @@ pub const HOID_NOT_DETERMINED: i32 = 2;
 ///
 /// # Safety
 /// As for [`with_tracker`] and [`write_array`].
-unsafe fn list<T: Copy>(
+unsafe fn write_list<T: Copy>(
     tracker: *const HoidTracker,
     of: impl FnOnce(&Session) -> Result<Vec<T>, Failure>,
     list: *mut T,
@@ -66,7 +66,7 @@ pub unsafe extern "C" fn hoid_tracker_operator(
     count: *mut usize,
 ) -> HoidStatus {
     // SAFETY: guaranteed by the caller of this function.
-    unsafe { list(tracker, Session::operator, estimates, room, count) }
+    unsafe { write_list(tracker, Session::operator, estimates, room, count) }
 }
 
 /// Writes the coefficients of the polynomials, in the order of theta, with their standard errors. The array is used as
@@ -82,7 +82,7 @@ pub unsafe extern "C" fn hoid_tracker_parameters(
     count: *mut usize,
 ) -> HoidStatus {
     // SAFETY: guaranteed by the caller of this function.
-    unsafe { list(tracker, Session::parameters, estimates, room, count) }
+    unsafe { write_list(tracker, Session::parameters, estimates, room, count) }
 }
 
 /// Writes the covariance matrix of the coefficients, row by row. The array is used as in hoid_tracker_operator.
@@ -97,7 +97,7 @@ pub unsafe extern "C" fn hoid_tracker_covariance(
     count: *mut usize,
 ) -> HoidStatus {
     // SAFETY: guaranteed by the caller of this function.
-    unsafe { list(tracker, Session::covariance, covariance, room, count) }
+    unsafe { write_list(tracker, Session::covariance, covariance, room, count) }
 }
 
 /// Writes the crossover frequency (crossover_rad_s) and the phase margin (phase_margin_deg) of the open loop with the
@@ -113,7 +113,7 @@ pub unsafe extern "C" fn hoid_tracker_open_loop(
     count: *mut usize,
 ) -> HoidStatus {
     // SAFETY: guaranteed by the caller of this function.
-    unsafe { list(tracker, Session::open_loop, estimates, room, count) }
+    unsafe { write_list(tracker, Session::open_loop, estimates, room, count) }
 }
 
 /// Writes the gain (gain_db) and the phase (phase_deg) of the operator at the frequency `omega` in rad/s. The array is
@@ -130,7 +130,7 @@ pub unsafe extern "C" fn hoid_tracker_response(
     count: *mut usize,
 ) -> HoidStatus {
     // SAFETY: guaranteed by the caller of this function.
-    unsafe { list(tracker, |session| session.response(omega), estimates, room, count) }
+    unsafe { write_list(tracker, |session| session.response(omega), estimates, room, count) }
 }
 
 /// Writes the change that was declared at the last sample; returns HOID_NOTHING if none was declared.
@@ -169,7 +169,7 @@ pub unsafe extern "C" fn hoid_tracker_change_log_odds(tracker: *const HoidTracke
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn hoid_tracker_level(tracker: *const HoidTracker, level: *mut i32) -> HoidStatus {
     let write = |session: &Session| {
-        let number = number_of(session.level());
+        let number = level_number(session.level());
         // SAFETY: guaranteed by the caller of this function.
         unsafe { write_value(level, number, "the pointer for the level") }
     };
@@ -177,7 +177,7 @@ pub unsafe extern "C" fn hoid_tracker_level(tracker: *const HoidTracker, level: 
     unsafe { with_tracker(tracker, write) }
 }
 
-pub(crate) fn number_of(level: VerdictLevel) -> i32 {
+pub(crate) fn level_number(level: VerdictLevel) -> i32 {
     match level {
         VerdictLevel::Trustworthy => HOID_TRUSTWORTHY,
         VerdictLevel::Doubtful => HOID_DOUBTFUL,
@@ -237,7 +237,7 @@ mod tests {
     fn level_names_match_the_verdict() {
         for level in VerdictLevel::ALL {
             // SAFETY: a constant text.
-            let name = unsafe { CStr::from_ptr(hoid_level_name(number_of(level))) };
+            let name = unsafe { CStr::from_ptr(hoid_level_name(level_number(level))) };
             assert_eq!(name.to_str().unwrap(), level.name());
         }
         // SAFETY: a constant text.

@@ -1,14 +1,14 @@
 //! Serialisation of a tracker, so that it can be continued elsewhere with bit-identical results.
 //!
 //! In the packed format (`packed`), the description contains the request and the orders, and the data are the numbers
-//! of [`hoid_track::Live::saved`].
+//! of [`hoid_track::Live::save`].
 
 use hoid_model::Orders;
 use serde_json::{Value, json};
 
 use crate::{
     options::TrackerRequest,
-    packed::{Closed, as_bytes, as_numbers, pack, unpack},
+    packed::{UnpackError, as_bytes, as_numbers, pack, unpack},
     session::Session,
     status::{Failure, HOID_BAD_STATE},
 };
@@ -16,9 +16,9 @@ use crate::{
 const MAGIC: [u8; 8] = *b"hoid\x01\0\0\0";
 impl Session {
     /// Returns the tracker as bytes, without changing it.
-    pub fn saved(&mut self) -> Vec<u8> {
-        let (asked, live) = self.parts();
-        let (orders, numbers) = live.saved();
+    pub fn to_bytes(&mut self) -> Vec<u8> {
+        let (asked, live) = self.request_and_recursion();
+        let (orders, numbers) = live.save();
         let orders = orders.map(|o| json!([o.na, o.nb, o.nc, o.nd, o.nf, o.nk]));
         let description = json!({
             "hoid": env!("CARGO_PKG_VERSION"),
@@ -31,13 +31,13 @@ impl Session {
         pack(MAGIC, &description, &as_bytes(&numbers))
     }
 
-    /// Restores a tracker from the bytes of [`Session::saved`].
-    pub fn restored(bytes: &[u8]) -> Result<Self, Failure> {
+    /// Restores a tracker from the bytes of [`Session::to_bytes`].
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Failure> {
         let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
         let damaged = || wrong("the bytes were changed or truncated since they were saved");
         let (description, numbers) = unpack(MAGIC, bytes).map_err(|closed| match closed {
-            Closed::Other => wrong("the bytes are not a tracker that this version of hoid has saved"),
-            Closed::Damaged => damaged(),
+            UnpackError::Other => wrong("the bytes are not a tracker that this version of hoid has saved"),
+            UnpackError::Damaged => damaged(),
         })?;
         let numbers = as_numbers(numbers).ok_or_else(damaged)?;
         let orders = match &description["orders"] {
@@ -125,9 +125,9 @@ mod tests {
             for sample in &samples[..taken] {
                 first.take(*sample, true);
             }
-            let bytes = first.saved();
-            assert_eq!(bytes, first.saved(), "saving changes nothing");
-            let mut second = Session::restored(&bytes).unwrap();
+            let bytes = first.to_bytes();
+            assert_eq!(bytes, first.to_bytes(), "saving changes nothing");
+            let mut second = Session::from_bytes(&bytes).unwrap();
             for sample in &samples[taken..all] {
                 let (a, b) = (first.take(*sample, true), second.take(*sample, true));
                 assert_eq!(a.innovation.to_bits(), b.innovation.to_bits());
@@ -145,10 +145,10 @@ mod tests {
             (None, None)
         };
         let mut session = Session::new(method, 0.01, options, None).unwrap();
-        let bytes = session.saved();
+        let bytes = session.to_bytes();
         let places = if cfg!(miri) { 9 } else { 199 };
         let refused = |bytes: &[u8]| {
-            let failure = Session::restored(bytes).err().unwrap();
+            let failure = Session::from_bytes(bytes).err().unwrap();
             assert_eq!(failure.status, HOID_BAD_STATE);
         };
         for length in [0, 7, 8, 15, 16, 24, 100, bytes.len() - 1] {
@@ -169,7 +169,7 @@ mod tests {
             let Some(place) = place else { continue };
             let mut changed = bytes[..bytes.len() - 8].to_vec();
             changed[place..place + from.len()].copy_from_slice(to.as_bytes());
-            let true_sum = crate::packed::sum(&changed);
+            let true_sum = crate::packed::checksum(&changed);
             changed.extend_from_slice(&true_sum.to_le_bytes());
             refused(&changed);
         }

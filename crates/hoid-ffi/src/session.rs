@@ -22,7 +22,7 @@ const OPERATOR: [(&CStr, &CStr); 6] = [
     (c"tau_e", c"s"),
 ];
 /// Quantities for which a change is reported.
-const SHIFTED: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_nm", c"remnant", c"tau_e"];
+const SHIFT_NAMES: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_nm", c"remnant", c"tau_e"];
 
 /// Tracker with the request from which it was built.
 pub(crate) struct Session {
@@ -56,23 +56,23 @@ impl Session {
             asked,
             names: Vec::new(),
         };
-        session.name();
+        session.update_parameter_names();
         Ok(session)
     }
 
     /// Restores the recursion from its saved state.
     pub fn restore(&mut self, orders: Option<Orders>, numbers: &[f64]) -> Result<(), Failure> {
         self.live.restore(orders, numbers)?;
-        self.name();
+        self.update_parameter_names();
         Ok(())
     }
 
     /// Returns the request and the recursion, for saving.
-    pub fn parts(&mut self) -> (&TrackerRequest, &mut Live) {
+    pub fn request_and_recursion(&mut self) -> (&TrackerRequest, &mut Live) {
         (&self.asked, &mut self.live)
     }
 
-    fn name(&mut self) {
+    fn update_parameter_names(&mut self) {
         if let Some(tracker) = self.live.tracker() {
             let names = tracker.parameter_names();
             self.names = names.into_iter().filter_map(|name| CString::new(name).ok()).collect();
@@ -85,7 +85,7 @@ impl Session {
             Stage::Tracking(tracker) => Ok(tracker),
             Stage::Collecting(warm_up) => {
                 let trouble = warm_up.trouble.as_deref().map_or(String::new(), |t| format!("; {t}"));
-                Err(Failure::nothing(format!(
+                Err(Failure::no_result(format!(
                     "the tracker is warming up: it has {} of {} samples{trouble}",
                     warm_up.collected, warm_up.needed
                 )))
@@ -98,7 +98,7 @@ impl Session {
     pub fn take(&mut self, sample: Sample, moves: bool) -> HoidOutcome {
         let taken = (self.live).update(sample, moves, &|plan, record| plan.choose(record, &|| {}));
         if taken.started.is_some() {
-            self.name();
+            self.update_parameter_names();
         }
         let outcome = taken.outcome;
         let tracker = self.tracker().ok();
@@ -125,8 +125,8 @@ impl Session {
         let tracker = self.tracker()?;
         let operator = tracker
             .operator()
-            .map_err(|reason| Failure::nothing(reason.to_string()))?;
-        let judged = tracker.determined(&operator);
+            .map_err(|reason| Failure::no_result(reason.to_string()))?;
+        let judged = tracker.determinations(&operator);
         let rows = operator.rows().into_iter().zip(OPERATOR);
         Ok(rows
             .map(|((name, _, estimate), (name_c, unit))| HoidEstimate {
@@ -142,9 +142,9 @@ impl Session {
     /// Returns the crossover frequency and the phase margin.
     pub fn open_loop(&self) -> Result<Vec<HoidEstimate>, Failure> {
         let found = self.tracker()?.open_loop().ok_or_else(|| {
-            Failure::nothing("there is no controlled element; give it in the options as \"controlled_element\"")
+            Failure::no_result("there is no controlled element; give it in the options as \"controlled_element\"")
         })?;
-        let found = found.map_err(|reason| Failure::nothing(reason.words()))?;
+        let found = found.map_err(|reason| Failure::no_result(reason.as_text()))?;
         Ok(vec![
             HoidEstimate::new(c"crossover_rad_s".as_ptr(), c"rad/s".as_ptr(), found.crossover_rad_s),
             HoidEstimate::new(c"phase_margin_deg".as_ptr(), c"deg".as_ptr(), found.phase_margin_deg),
@@ -154,12 +154,12 @@ impl Session {
     /// Returns gain and phase at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Result<Vec<HoidEstimate>, Failure> {
         if !(omega_rad_s > 0.0 && omega_rad_s.is_finite()) {
-            return Err(Failure::option(format!(
+            return Err(Failure::bad_option(format!(
                 "the frequency is {omega_rad_s} rad/s, expected a positive frequency"
             )));
         }
         let found = self.tracker()?.response(omega_rad_s);
-        let found = found.ok_or_else(|| Failure::nothing("there is no estimate yet"))?;
+        let found = found.ok_or_else(|| Failure::no_result("there is no estimate yet"))?;
         Ok(vec![
             HoidEstimate::new(c"gain_db".as_ptr(), c"dB".as_ptr(), found.gain_db()),
             HoidEstimate::new(c"phase_deg".as_ptr(), c"deg".as_ptr(), found.phase_deg()),
@@ -169,26 +169,26 @@ impl Session {
     /// Returns the covariance of the coefficients, row by row.
     pub fn covariance(&self) -> Result<Vec<f64>, Failure> {
         let covariance = self.tracker()?.covariance();
-        covariance.ok_or_else(|| Failure::nothing("the estimate has no covariance yet"))
+        covariance.ok_or_else(|| Failure::no_result("the estimate has no covariance yet"))
     }
 
     /// Returns the change that was declared at the last sample.
     pub fn change(&self) -> Result<HoidChange, Failure> {
         let change = self.tracker()?.change();
-        let change = change.ok_or_else(|| Failure::nothing("no change was declared at the last sample"))?;
-        Ok(shown(&change))
+        let change = change.ok_or_else(|| Failure::no_result("no change was declared at the last sample"))?;
+        Ok(reported_change(&change))
     }
 
     /// Returns the current evidence of a change (`log_odds` of [`HoidChange`]).
     pub fn change_log_odds(&self) -> Result<f64, Failure> {
         let odds = self.tracker()?.change_odds();
-        odds.ok_or_else(|| Failure::nothing("the method does not report changes; adaptive and multiple-model do"))
+        odds.ok_or_else(|| Failure::no_result("the method does not report changes; adaptive and multiple-model do"))
     }
 
     /// Returns the verdict on the current estimate.
     pub fn level(&self) -> VerdictLevel {
         self.tracker().map_or(VerdictLevel::NotDetermined, |tracker| {
-            tracker.level(&tracker.operator())
+            tracker.verdict_level(&tracker.operator())
         })
     }
 
@@ -210,7 +210,7 @@ impl Session {
     }
 }
 
-fn shown(change: &Change) -> HoidChange {
+fn reported_change(change: &Change) -> HoidChange {
     let [before, after] = change.innovation_variance.map(Estimate::fixed);
     let pairs = [
         change.k_e,
@@ -221,7 +221,8 @@ fn shown(change: &Change) -> HoidChange {
         change.tau_e_s,
     ];
     let mut shifts = [HoidShift::default(); HOID_SHIFTS];
-    for (shift, ((name, [before, after]), z)) in shifts.iter_mut().zip(SHIFTED.into_iter().zip(pairs).zip(change.z)) {
+    for (shift, ((name, [before, after]), z)) in shifts.iter_mut().zip(SHIFT_NAMES.into_iter().zip(pairs).zip(change.z))
+    {
         *shift = HoidShift {
             name: name.as_ptr(),
             before: before.value,
@@ -260,7 +261,7 @@ mod tests {
             assert_eq!((name, unit), (name_c.to_str().unwrap(), unit_c.to_str().unwrap()));
         }
         // If only one quantity changes, it is reported as the one that changed.
-        for (i, name) in SHIFTED.into_iter().enumerate() {
+        for (i, name) in SHIFT_NAMES.into_iter().enumerate() {
             let fixed = [Estimate::fixed(1.0); 2];
             let mut change = Change {
                 seconds_ago: 0.5,
@@ -276,8 +277,8 @@ mod tests {
                 of_operator: false,
             };
             change.z[i] = 5.0;
-            assert_eq!(change.changed(), [name.to_str().unwrap()]);
-            assert_eq!(shown(&change).shifts[i].z, 5.0);
+            assert_eq!(change.changed_quantities(), [name.to_str().unwrap()]);
+            assert_eq!(reported_change(&change).shifts[i].z, 5.0);
         }
     }
 }

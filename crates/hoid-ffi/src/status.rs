@@ -50,30 +50,30 @@ impl Failure {
         }
     }
 
-    pub fn option(text: impl Into<String>) -> Self {
+    pub fn bad_option(text: impl Into<String>) -> Self {
         Self::new(HOID_BAD_OPTION, text)
     }
 
-    pub fn nothing(text: impl Into<String>) -> Self {
+    pub fn no_result(text: impl Into<String>) -> Self {
         Self::new(HOID_NOTHING, text)
     }
 }
 
 impl From<IdentError> for Failure {
     fn from(error: IdentError) -> Self {
-        Self::option(error.to_string())
+        Self::bad_option(error.to_string())
     }
 }
 
 impl From<ModelError> for Failure {
     fn from(error: ModelError) -> Self {
-        Self::option(error.to_string())
+        Self::bad_option(error.to_string())
     }
 }
 
 impl From<IoError> for Failure {
     fn from(error: IoError) -> Self {
-        Self::option(error.to_string())
+        Self::bad_option(error.to_string())
     }
 }
 
@@ -83,13 +83,13 @@ thread_local! {
 
 /// Runs a function of the interface and returns its status. Panics are caught, and the message of a failure is stored
 /// for [`hoid_last_error`].
-pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus {
+pub(crate) fn catch_failures(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus {
     let failure = match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(())) => return HOID_OK,
         Ok(Err(failure)) => failure,
         Err(panic) => Failure::new(HOID_PANIC, panic_message(&*panic)),
     };
-    remember(&failure.text);
+    store_error(&failure.text);
     failure.status
 }
 
@@ -101,7 +101,7 @@ pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     format!("an internal error of hoid; please report it: {words}")
 }
 
-fn remember(text: &str) {
+fn store_error(text: &str) {
     let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
     // While a thread is terminating, its thread-local storage may no longer exist.
     let _ = LAST_ERROR.try_with(|last| *last.borrow_mut() = text);

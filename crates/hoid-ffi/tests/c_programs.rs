@@ -9,18 +9,18 @@ use std::{fs, path::PathBuf};
 
 use hoid_ident::{NamedOrders, order_selection::Criterion};
 use hoid_model::{Record, Structure, uncertainty::Estimate};
-use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, Tracker, ranges_of};
+use hoid_track::{Method, StartSource, TrackOptions, TrackPlan, Tracker, search_ranges};
 use tempfile::TempDir;
 
-use common::{compile, compiler, example, good, lines, record, run};
+use common::{compile, compiler, example_path, lines, record, run, successful_output};
 
 const ELEMENT: &str = "90/(s(s+6))";
 
-fn built(name: &str, with: &str, options: &[&str]) -> Option<(TempDir, PathBuf)> {
+fn compile_example(name: &str, with: &str, options: &[&str]) -> Option<(TempDir, PathBuf)> {
     let with = compiler(with)?;
     let folder = TempDir::new().unwrap();
     let program = folder.path().join("tracker");
-    good(&compile(&with, &example(name), &program, options));
+    successful_output(&compile(&with, &example_path(name), &program, options));
     Some((folder, program))
 }
 
@@ -35,7 +35,7 @@ fn numbers(estimates: &[Option<Estimate>]) -> Vec<f64> {
 }
 
 /// Returns the expected output of the example, computed by the tracker in Rust.
-fn expected(record: &Record, options: &TrackOptions) -> Vec<Vec<f64>> {
+fn expected_rows(record: &Record, options: &TrackOptions) -> Vec<Vec<f64>> {
     let mut tracker = Tracker::new(options, None, record.sample_time()).unwrap();
     let pairs = record.input().iter().zip(record.output());
     pairs
@@ -55,15 +55,15 @@ fn expected(record: &Record, options: &TrackOptions) -> Vec<Vec<f64>> {
         .collect()
 }
 
-fn typical(record: &Record) -> TrackOptions {
+fn typical_options(record: &Record) -> TrackOptions {
     let (method, structure) = (Method::adaptive(), Structure::BoxJenkins);
-    let ranges = ranges_of(&method, structure, &NamedOrders::new(), &[], record.sample_time()).unwrap();
+    let ranges = search_ranges(&method, structure, &NamedOrders::new(), &[], record.sample_time()).unwrap();
     let options = TrackOptions::default_for(method, 29);
     let plan = TrackPlan::new(options, ranges, Criterion::Bic, record.sample_time()).unwrap();
     plan.options().clone()
 }
 
-fn same(found: &str, expected: &[Vec<f64>], columns: &[usize]) {
+fn assert_same_rows(found: &str, expected: &[Vec<f64>], columns: &[usize]) {
     let mut rows = 0;
     for (line, expected) in found.lines().zip(expected) {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
@@ -82,20 +82,20 @@ fn same(found: &str, expected: &[Vec<f64>], columns: &[usize]) {
 
 #[test]
 fn c_example_matches_rust() {
-    let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11", "-pedantic"]) else {
+    let Some((_folder, program)) = compile_example("tracker.c", "cc", &["-std=c11", "-pedantic"]) else {
         return;
     };
     let record = record();
     let with_element = TrackOptions {
         controlled_element: Some(ELEMENT.parse().unwrap()),
-        ..typical(&record)
+        ..typical_options(&record)
     };
-    let expected_rows = expected(&record, &with_element);
+    let expected_rows = expected_rows(&record, &with_element);
     let options = format!("{{\"controlled_element\": \"{ELEMENT}\"}}");
     let all: Vec<usize> = (0..17).collect();
     // The tracker is saved, freed and restored in the middle of the run.
     let output = run(&program, &["adaptive", "0.01", &options, "4000"], &lines(&record));
-    same(&good(&output), &expected_rows, &all);
+    assert_same_rows(&successful_output(&output), &expected_rows, &all);
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(message.contains("after 8192 samples, 0 skipped"), "{message}");
 }
@@ -104,13 +104,13 @@ fn c_example_matches_rust() {
 #[test]
 fn s_function_matches_rust() {
     let stubs = format!("-I{}/tests/stubs", env!("CARGO_MANIFEST_DIR"));
-    let Some((_folder, program)) = built("simulink/sfun_hoid.c", "cc", &["-std=c11", &stubs]) else {
+    let Some((_folder, program)) = compile_example("simulink/sfun_hoid.c", "cc", &["-std=c11", &stubs]) else {
         return;
     };
     let record = record();
-    let rows = expected(&record, &typical(&record));
+    let rows = expected_rows(&record, &typical_options(&record));
     let output = run(&program, &["adaptive", "0.01", ""], &lines(&record));
-    same(&good(&output), &rows, &(0..17).collect::<Vec<_>>());
+    assert_same_rows(&successful_output(&output), &rows, &(0..17).collect::<Vec<_>>());
     let refused = run(&program, &["kalman", "0.01", ""], "");
     let message = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(!refused.status.success() && message.contains("adaptive"), "{message}");
@@ -120,24 +120,25 @@ fn s_function_matches_rust() {
 #[test]
 fn dueca_module_matches_rust() {
     let stubs = format!("-I{}/tests/stubs/dueca", env!("CARGO_MANIFEST_DIR"));
-    let Some((_folder, program)) = built("../tests/stubs/dueca/drive.cpp", "c++", &["-std=c++14", &stubs]) else {
+    let Some((_folder, program)) = compile_example("../tests/stubs/dueca/drive.cpp", "c++", &["-std=c++14", &stubs])
+    else {
         return;
     };
     let record = record();
-    let rows = expected(&record, &typical(&record));
-    let found = good(&run(&program, &[], &lines(&record)));
-    same(&found, &rows, &[0, 1, 2, 3, 6, 8, 10]);
+    let rows = expected_rows(&record, &typical_options(&record));
+    let found = successful_output(&run(&program, &[], &lines(&record)));
+    assert_same_rows(&found, &rows, &[0, 1, 2, 3, 6, 8, 10]);
 }
 
 #[test]
 fn c_example_reports_a_change() {
-    let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11"]) else {
+    let Some((_folder, program)) = compile_example("tracker.c", "cc", &["-std=c11"]) else {
         return;
     };
     let record = record();
     let options = r#"{"nk": 29, "nd": 1, "warm_up": 20}"#;
     let output = run(&program, &["multiple-model", "0.01", options], &lines(&record));
-    assert_eq!(good(&output).lines().count(), record.len());
+    assert_eq!(successful_output(&output).lines().count(), record.len());
     let message = String::from_utf8_lossy(&output.stderr).into_owned();
     // The task changes at 40.96 s.
     let place = |line: &str| line.strip_prefix("sample ")?.split(':').next()?.parse::<usize>().ok();
@@ -148,23 +149,23 @@ fn c_example_reports_a_change() {
 
 #[test]
 fn cpp_example_matches_rust() {
-    let Some((_folder, program)) = built("tracker.cpp", "c++", &["-std=c++14"]) else {
+    let Some((_folder, program)) = compile_example("tracker.cpp", "c++", &["-std=c++14"]) else {
         return;
     };
     let record = record();
     let options = TrackOptions {
-        start: StartAt::Span(None),
-        ..typical(&record)
+        start: StartSource::Span(None),
+        ..typical_options(&record)
     };
-    let rows = expected(&record, &options);
-    let found = good(&run(&program, &["adaptive", "0.01"], &lines(&record)));
+    let rows = expected_rows(&record, &options);
+    let found = successful_output(&run(&program, &["adaptive", "0.01"], &lines(&record)));
     // Rows without an operator contain only the innovation.
     let lines: Vec<&str> = found.lines().collect();
     assert_eq!(lines.len(), rows.len());
     let columns: Vec<usize> = (0..12).chain([16]).collect();
     let first = lines.iter().position(|line| line.contains(',')).unwrap();
-    same(&lines[first..].join("\n"), &rows[first..], &columns);
-    same(&lines[..first].join("\n"), &rows[..first], &[16]);
+    assert_same_rows(&lines[first..].join("\n"), &rows[first..], &columns);
+    assert_same_rows(&lines[..first].join("\n"), &rows[..first], &[16]);
 }
 
 #[test]
@@ -180,11 +181,11 @@ fn c_example_is_clean_under_sanitizers() {
         eprintln!("skipped: {with} has no address and undefined-behaviour sanitizer");
         return;
     }
-    good(&compile(&with, &example("tracker.c"), &program, &sanitizers));
+    successful_output(&compile(&with, &example_path("tracker.c"), &program, &sanitizers));
     let record = record();
     let input = lines(&record);
-    good(&run(&program, &["adaptive", "0.01", "{}", "1000"], &input));
-    good(&run(
+    successful_output(&run(&program, &["adaptive", "0.01", "{}", "1000"], &input));
+    successful_output(&run(
         &program,
         &["rpem", "0.01", "{\"nk\": 29, \"nd\": 1}", "1000"],
         &input,

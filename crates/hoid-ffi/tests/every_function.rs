@@ -20,7 +20,7 @@ use hoid_io::fmu::{FmuKind, FmuStart, FmuVariable};
 /// Options with which a method is created at once and starts with the first sample.
 const NO_WARM_UP: &str = r#"{"nk": 3, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92},
     "controlled_element": "90/(s(s+6))"}"#;
-const SAMPLES: usize = 2;
+const SAMPLE_COUNT: usize = 2;
 
 fn sample(k: usize) -> [f64; 2] {
     [(0.3 * k as f64).sin(), (0.2 * k as f64).cos()]
@@ -32,10 +32,10 @@ fn read(text: *const c_char) -> String {
     text.to_str().unwrap().to_owned()
 }
 
-type Lists<T> = unsafe extern "C" fn(*const HoidTracker, *mut T, usize, *mut usize) -> HoidStatus;
+type ListFunction<T> = unsafe extern "C" fn(*const HoidTracker, *mut T, usize, *mut usize) -> HoidStatus;
 
 /// Reads a list: first its length, and then its values into uninitialised memory of exactly this length.
-fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
+fn read_list<T: Copy>(tracker: *const HoidTracker, of: ListFunction<T>) -> Vec<T> {
     let mut count = 0;
     // SAFETY: the tracker is valid, and only the count is requested.
     assert_eq!(unsafe { of(tracker, ptr::null_mut(), 0, &mut count) }, HOID_OK);
@@ -62,7 +62,7 @@ fn read_value<T>(tracker: *const HoidTracker, of: unsafe extern "C" fn(*const Ho
     unsafe { place.assume_init() }
 }
 
-fn made(method: &str, options: &str) -> *mut HoidTracker {
+fn new_tracker(method: &str, options: &str) -> *mut HoidTracker {
     let (method, options) = (CString::new(method).unwrap(), CString::new(options).unwrap());
     let mut tracker = ptr::null_mut();
     // SAFETY: the strings are null-terminated, and the pointer refers to the stack.
@@ -75,9 +75,9 @@ fn made(method: &str, options: &str) -> *mut HoidTracker {
 fn every_tracker_function_works() {
     assert_eq!(hoid_abi_version(), HOID_ABI_VERSION);
     assert_eq!(read(hoid_version()), env!("CARGO_PKG_VERSION"));
-    let tracker = made("rpem", NO_WARM_UP);
+    let tracker = new_tracker("rpem", NO_WARM_UP);
     let mut outcome = MaybeUninit::<HoidOutcome>::uninit();
-    for k in 0..SAMPLES {
+    for k in 0..SAMPLE_COUNT {
         let [e, u] = sample(k);
         // SAFETY: the tracker is valid, and the outcome may be null.
         assert_eq!(unsafe { hoid_tracker_step(tracker, e, u, ptr::null_mut()) }, HOID_OK);
@@ -90,10 +90,10 @@ fn every_tracker_function_works() {
 
     // SAFETY: the tracker is valid.
     assert_eq!(unsafe { hoid_tracker_ready(tracker) }, HOID_OK);
-    let parameters = listed(tracker, hoid_tracker_parameters);
+    let parameters = read_list(tracker, hoid_tracker_parameters);
     let names: Vec<String> = parameters.iter().map(|one| read(one.name) + &read(one.unit)).collect();
     assert_eq!(names, ["b0", "b1", "d1", "f1", "f2"]);
-    assert_eq!(listed(tracker, hoid_tracker_covariance).len(), 25);
+    assert_eq!(read_list(tracker, hoid_tracker_covariance).len(), 25);
     let mut list = [MaybeUninit::<HoidEstimate>::uninit(); 6];
     let (mut count, place) = (0, list.as_mut_ptr().cast());
     // SAFETY: the tracker is valid, and the memory has the stated size.
@@ -111,7 +111,10 @@ fn every_tracker_function_works() {
         read(hoid_level_name(read_value(tracker, hoid_tracker_level))),
         "doubtful"
     );
-    assert_eq!(read_value(tracker, hoid_tracker_counts).samples, 2 * SAMPLES as u64);
+    assert_eq!(
+        read_value(tracker, hoid_tracker_counts).samples,
+        2 * SAMPLE_COUNT as u64
+    );
     assert_eq!(read_value(tracker, hoid_tracker_sample_time), 0.01);
     let mut change = MaybeUninit::uninit();
     // SAFETY: the tracker is valid, and the pointer refers to the stack.
@@ -145,7 +148,11 @@ fn every_tracker_function_works() {
         // SAFETY: the tracker is valid, and the outcome may be null.
         assert_eq!(unsafe { hoid_tracker_step(t, 0.5, 0.5, ptr::null_mut()) }, HOID_OK);
     }
-    let digits = |tracker| listed(tracker, hoid_tracker_covariance).into_iter().map(f64::to_bits);
+    let digits = |tracker| {
+        read_list(tracker, hoid_tracker_covariance)
+            .into_iter()
+            .map(f64::to_bits)
+    };
     assert!(digits(tracker).eq(digits(second)));
     for t in [tracker, second, ptr::null_mut()] {
         // SAFETY: the handle was created above and is freed once; null is allowed.
@@ -157,7 +164,7 @@ fn every_tracker_function_works() {
 #[test]
 fn each_thread_has_its_own_error_message() {
     let tracked = |names: &'static str| {
-        let tracker = made("rpem", NO_WARM_UP);
+        let tracker = new_tracker("rpem", NO_WARM_UP);
         let mut odds = 0.0;
         // SAFETY: the tracker belongs to this thread.
         let status = unsafe { hoid_tracker_change_log_odds(tracker, &mut odds) };
@@ -197,7 +204,7 @@ impl Unit {
     }
 
     /// Returns the references of the variables of a type.
-    fn of_type(&self, like: &FmuStart) -> Vec<u32> {
+    fn references_of_type(&self, like: &FmuStart) -> Vec<u32> {
         let same = |v: &FmuVariable| std::mem::discriminant(&v.start) == std::mem::discriminant(like);
         let each = (0..).zip(&self.variables).filter(|(_, v)| same(v));
         each.map(|(reference, _)| reference).collect()
@@ -261,7 +268,7 @@ macro_rules! life_of_a_unit {
             }
         };
         let numbers = || {
-            let references = unit.of_type(&FmuStart::Real(0.0));
+            let references = unit.references_of_type(&FmuStart::Real(0.0));
             let mut values = vec![0.0; references.len()];
             assert_eq!(
                 counted!($get_number, references, references.len(), values.as_mut_ptr()),
@@ -271,11 +278,11 @@ macro_rules! life_of_a_unit {
         };
 
         set_up();
-        stepped(0, SAMPLES);
+        stepped(0, SAMPLE_COUNT);
         let references = [unit.reference("samples"), unit.reference("skipped")];
         let mut counts = [-1; 2];
         assert_eq!(counted!($get_count, references, 2, counts.as_mut_ptr()), 0);
-        assert_eq!(counts, [SAMPLES as c_int, 0]);
+        assert_eq!(counts, [SAMPLE_COUNT as c_int, 0]);
         // An output cannot be set, a null list is not read, and a list without elements is empty.
         assert_eq!(counted!($set_count, references, 2, counts.as_ptr()), 3);
         assert_eq!(counted!($get_count, references, 2, ptr::null_mut()), 3);
@@ -296,7 +303,7 @@ macro_rules! life_of_a_unit {
             // SAFETY: the component is valid, and the place contains null or a state.
             assert_eq!(unsafe { $get_state(component, &mut state) }, 0);
         }
-        stepped(SAMPLES, 2 * SAMPLES);
+        stepped(SAMPLE_COUNT, 2 * SAMPLE_COUNT);
         let expected = numbers();
         let mut size = 0;
         // SAFETY: the component and the state are valid, and the pointer refers to the stack.
@@ -317,7 +324,7 @@ macro_rules! life_of_a_unit {
         for one in [&mut state, &mut again] {
             // SAFETY: the component and the state are valid.
             assert_eq!(unsafe { $set_state(component, *one) }, 0);
-            stepped(SAMPLES, 2 * SAMPLES);
+            stepped(SAMPLE_COUNT, 2 * SAMPLE_COUNT);
             assert_eq!(numbers(), expected);
             for _ in 0..2 {
                 // SAFETY: the component is valid, and the place contains a state and then null.
@@ -367,14 +374,14 @@ unsafe extern "C" fn logger_2(
     assert_eq!((read(name).as_str(), read(format).as_str()), ("one", "%s"));
     // SAFETY: the format consumes one string.
     let text: *const c_char = unsafe { rest.next_arg() };
-    note(environment, status, text);
+    record_message(environment, status, text);
 }
 
 unsafe extern "C" fn logger_3(environment: *mut c_void, status: c_int, _category: *const c_char, text: *const c_char) {
-    note(environment, status, text);
+    record_message(environment, status, text);
 }
 
-fn note(environment: *mut c_void, status: c_int, text: *const c_char) {
+fn record_message(environment: *mut c_void, status: c_int, text: *const c_char) {
     // SAFETY: the list belongs to the test, which reads it only when no call is in progress.
     let notes = unsafe { &mut *environment.cast::<Vec<(c_int, String)>>() };
     notes.push((status, read(text)));

@@ -10,26 +10,26 @@ use hoid_ffi::*;
 use proptest::prelude::*;
 
 /// A tracker that is freed when it is dropped.
-struct Owned(*mut HoidTracker);
+struct OwnedTracker(*mut HoidTracker);
 
-impl Drop for Owned {
+impl Drop for OwnedTracker {
     fn drop(&mut self) {
         // SAFETY: the tracker was created by this library and is freed once.
         unsafe { hoid_tracker_free(self.0) };
     }
 }
 
-fn made(method: &str, sample_time: f64, options: &str) -> Result<Owned, (HoidStatus, String)> {
+fn new_tracker(method: &str, sample_time: f64, options: &str) -> Result<OwnedTracker, (HoidStatus, String)> {
     let (method, options) = (CString::new(method).unwrap(), CString::new(options).unwrap());
     let mut tracker = ptr::null_mut();
     // SAFETY: the strings are null-terminated, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_new(method.as_ptr(), sample_time, options.as_ptr(), &mut tracker) };
-    answered(status, tracker)
+    tracker_or_error(status, tracker)
 }
 
-fn answered(status: HoidStatus, tracker: *mut HoidTracker) -> Result<Owned, (HoidStatus, String)> {
+fn tracker_or_error(status: HoidStatus, tracker: *mut HoidTracker) -> Result<OwnedTracker, (HoidStatus, String)> {
     if status == HOID_OK {
-        return Ok(Owned(tracker));
+        return Ok(OwnedTracker(tracker));
     }
     assert!(tracker.is_null());
     // SAFETY: the text belongs to this thread.
@@ -37,7 +37,7 @@ fn answered(status: HoidStatus, tracker: *mut HoidTracker) -> Result<Owned, (Hoi
     Err((status, text.to_str().unwrap().to_owned()))
 }
 
-fn saved(tracker: &Owned) -> Vec<u8> {
+fn save_tracker(tracker: &OwnedTracker) -> Vec<u8> {
     let mut length = 0;
     // SAFETY: the tracker is valid, and only the length is requested.
     let status = unsafe { hoid_tracker_save(tracker.0, ptr::null_mut(), 0, &mut length) };
@@ -49,14 +49,14 @@ fn saved(tracker: &Owned) -> Vec<u8> {
     bytes
 }
 
-fn restored(bytes: &[u8]) -> Result<Owned, (HoidStatus, String)> {
+fn restore_tracker(bytes: &[u8]) -> Result<OwnedTracker, (HoidStatus, String)> {
     let mut tracker = ptr::null_mut();
     // SAFETY: the bytes are a slice, and the pointer refers to the stack.
     let status = unsafe { hoid_tracker_restore(bytes.as_ptr(), bytes.len(), &mut tracker) };
-    answered(status, tracker)
+    tracker_or_error(status, tracker)
 }
 
-const ANY: HoidEstimate = HoidEstimate {
+const EMPTY_ESTIMATE: HoidEstimate = HoidEstimate {
     name: ptr::null(),
     unit: ptr::null(),
     value: 0.0,
@@ -65,9 +65,9 @@ const ANY: HoidEstimate = HoidEstimate {
 };
 
 /// Requests all results of a tracker; no call may return an error.
-fn request_all(tracker: &Owned) -> Vec<HoidStatus> {
+fn request_all(tracker: &OwnedTracker) -> Vec<HoidStatus> {
     let t = tracker.0;
-    let mut list = [ANY; 64];
+    let mut list = [EMPTY_ESTIMATE; 64];
     let (room, list) = (list.len(), list.as_mut_ptr());
     let mut count = 0;
     let mut numbers = vec![0.0; 4096];
@@ -113,7 +113,7 @@ fn request_all(tracker: &Owned) -> Vec<HoidStatus> {
 
 #[test]
 fn null_pointers_are_refused_everywhere() {
-    let nothing = Owned(ptr::null_mut());
+    let nothing = OwnedTracker(ptr::null_mut());
     assert!(request_all(&nothing).iter().all(|status| *status == HOID_BAD_POINTER));
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
@@ -134,7 +134,7 @@ fn null_pointers_are_refused_everywhere() {
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_restore(ptr::null(), 9, &mut tracker) };
     assert_eq!(status, HOID_BAD_POINTER);
-    let tracker = made("rpem", 0.01, r#"{"nk": 9}"#).ok().unwrap();
+    let tracker = new_tracker("rpem", 0.01, r#"{"nk": 9}"#).ok().unwrap();
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_operator(tracker.0, ptr::null_mut(), 6, ptr::null_mut()) };
     assert!([HOID_BAD_POINTER, HOID_NOTHING].contains(&status));
@@ -159,17 +159,17 @@ fn tracker_starts_from_a_fit() {
         let mut tracker = ptr::null_mut();
         // SAFETY: the string is null-terminated, and the pointer refers to the stack.
         let status = unsafe { hoid_tracker_from_fit(text.as_ptr(), sample_time, ptr::null(), &mut tracker) };
-        answered(status, tracker)
+        tracker_or_error(status, tracker)
     };
     let tracker = of(0.01, fit).ok().unwrap();
     let options = format!("{{\"prior\": {fit}}}");
-    let same = made("adaptive", 0.01, &options).ok().unwrap();
+    let same = new_tracker("adaptive", 0.01, &options).ok().unwrap();
     for tracker in [&tracker, &same] {
         // SAFETY: the tracker is valid.
         unsafe { hoid_tracker_step(tracker.0, 0.1, 0.2, ptr::null_mut()) };
     }
-    let first = |tracker: &Owned| {
-        let mut list = [ANY; 6];
+    let first = |tracker: &OwnedTracker| {
+        let mut list = [EMPTY_ESTIMATE; 6];
         let mut count = 0;
         // SAFETY: the tracker is valid, and the memory has the stated size.
         let status = unsafe { hoid_tracker_operator(tracker.0, list.as_mut_ptr(), 6, &mut count) };
@@ -180,7 +180,10 @@ fn tracker_starts_from_a_fit() {
     let value = f64::from_bits(first(&tracker)[0].0);
     assert!((value - 2.0).abs() < 0.2, "the gain of the fit: {value}");
     // The restored tracker continues from its bytes, which contain the fit.
-    assert_eq!(first(&restored(&saved(&tracker)).ok().unwrap()), first(&tracker));
+    assert_eq!(
+        first(&restore_tracker(&save_tracker(&tracker)).ok().unwrap()),
+        first(&tracker)
+    );
     // The sample time must equal the sample time of the fit.
     let (status, message) = of(0.02, fit).err().unwrap();
     assert_eq!(status, HOID_BAD_OPTION);
@@ -211,7 +214,7 @@ fn hostile_value() -> impl Strategy<Value = String> {
     ]
 }
 
-const NAMES: [&str; 24] = [
+const OPTION_NAMES: [&str; 24] = [
     "structure",
     "na",
     "nb",
@@ -252,7 +255,7 @@ proptest! {
             r#"{"nk": 9, "nd": 1, "start": "nothing"}"#
         };
         // Methods that require a start fit have a short warm-up.
-        let tracker = made(method, 0.01, options).or_else(|_| made(method, 0.01, r#"{"nk": 9, "nd": 1, "warm_up": 0.2}"#));
+        let tracker = new_tracker(method, 0.01, options).or_else(|_| new_tracker(method, 0.01, r#"{"nk": 9, "nd": 1, "warm_up": 0.2}"#));
         let tracker = tracker.map_err(|(_, message)| TestCaseError::fail(message))?;
         let mut outcome = HoidOutcome { innovation: 0.0, ready: 0, skipped: 0, held: 0, shortened: 0, changed: 0 };
         for (e, u, f_t, moves) in samples {
@@ -263,8 +266,8 @@ proptest! {
         for status in request_all(&tracker) {
             prop_assert!([HOID_OK, HOID_NOTHING].contains(&status), "{}", status);
         }
-        let again = restored(&saved(&tracker)).map_err(|(_, message)| TestCaseError::fail(message))?;
-        prop_assert_eq!(saved(&again), saved(&tracker));
+        let again = restore_tracker(&save_tracker(&tracker)).map_err(|(_, message)| TestCaseError::fail(message))?;
+        prop_assert_eq!(save_tracker(&again), save_tracker(&tracker));
     }
 
     /// Arbitrary options create a tracker or give a reason for the refusal.
@@ -273,11 +276,11 @@ proptest! {
     fn arbitrary_options_work_or_give_a_reason(
         method in prop_oneof![Just("adaptive"), Just("rpem"), Just("multiple-model"), Just("rls"), Just("window"), Just("ekf")],
         sample_time in prop_oneof![4 => Just(0.01), 1 => hostile_number()],
-        given in prop::collection::btree_map(prop::sample::select(&NAMES[..]), hostile_value(), 0..5),
+        given in prop::collection::btree_map(prop::sample::select(&OPTION_NAMES[..]), hostile_value(), 0..5),
     ) {
         let each: Vec<String> = given.iter().map(|(name, value)| format!("\"{name}\": {value}")).collect();
         let options = format!("{{{}}}", each.join(", "));
-        match made(method, sample_time, &options) {
+        match new_tracker(method, sample_time, &options) {
             Ok(tracker) => {
                 for status in request_all(&tracker) {
                     prop_assert!([HOID_OK, HOID_NOTHING, HOID_TOO_SMALL].contains(&status), "{}: {}", options, status);
@@ -294,7 +297,7 @@ proptest! {
     #[test]
     fn arbitrary_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
         let bytes = if magic { [b"hoid\x01\0\0\0".as_slice(), &bytes].concat() } else { bytes };
-        let status = restored(&bytes).err().map(|(status, _)| status);
+        let status = restore_tracker(&bytes).err().map(|(status, _)| status);
         prop_assert_eq!(status, Some(HOID_BAD_STATE));
     }
 }

@@ -12,7 +12,7 @@ use std::{collections::BTreeSet, fs, path::Path, process::Command};
 
 use hoid_ffi::HOID_ABI_VERSION;
 
-fn listed() -> BTreeSet<String> {
+fn listed_symbols() -> BTreeSet<String> {
     let file = format!("{}/abi/symbols-{HOID_ABI_VERSION}.txt", env!("CARGO_MANIFEST_DIR"));
     let text = fs::read_to_string(Path::new(&file)).unwrap();
     let lines = text.lines().filter(|line| !line.starts_with('#'));
@@ -33,7 +33,7 @@ fn library_exports_the_listed_symbols() {
         .filter_map(|line| line.rsplit(' ').next())
         .map(str::to_owned)
         .collect();
-    let listed = listed();
+    let listed = listed_symbols();
     let vanished: Vec<_> = listed.difference(&symbols).collect();
     assert!(
         vanished.is_empty(),
@@ -50,7 +50,7 @@ fn library_exports_the_listed_symbols() {
 #[test]
 fn header_declares_the_listed_symbols() {
     let header = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/include/hoid.h")).unwrap();
-    let ours = listed().into_iter().filter(|name| name.starts_with("hoid_"));
+    let ours = listed_symbols().into_iter().filter(|name| name.starts_with("hoid_"));
     let missing: Vec<String> = ours.filter(|name| !header.contains(&format!("{name}("))).collect();
     assert_eq!(missing, Vec::<String>::new());
 }

@@ -26,7 +26,7 @@ pub(crate) struct Solution {
 ///
 /// # Errors
 /// The errors of [`PolynomialModel::new`].
-pub(crate) fn assembled_fit(
+pub(crate) fn assemble_fit(
     criterion: &Criterion<'_>,
     structure: Structure,
     sample_time: SampleTime,
@@ -39,9 +39,9 @@ pub(crate) fn assembled_fit(
         is_fixed_or_bounded,
         start,
     } = solution;
-    let n = criterion.residuals();
+    let n = criterion.residual_count();
     let free = is_fixed_or_bounded.iter().filter(|held| !**held).count();
-    let freedom = n - free - criterion.states();
+    let freedom = n - free - criterion.state_count();
     Ok(Fit {
         is_fixed_or_bounded,
         model: PolynomialModel::new(structure, criterion.orders, sample_time, theta)?,
@@ -49,7 +49,7 @@ pub(crate) fn assembled_fit(
         loss: sum_of_squares / n as f64,
         innovation_variance: sum_of_squares / freedom as f64,
         residuals: n,
-        states: criterion.states(),
+        states: criterion.state_count(),
         initial_state: criterion.initial,
         termination,
         start,
@@ -73,6 +73,6 @@ impl Fit {
 
 /// Returns, for each of the p parameters, whether it is fixed or at a bound, i.e. whether its index is missing from
 /// `free`.
-pub(crate) fn is_fixed_or_bounded(free: &[usize], p: usize) -> Vec<bool> {
+pub(crate) fn fixed_or_bounded_flags(free: &[usize], p: usize) -> Vec<bool> {
     (0..p).map(|i| !free.contains(&i)).collect()
 }

@@ -19,7 +19,7 @@ impl Constraint {
     }
 
     /// True if the numbers are valid: a finite value, or a lower bound that does not exceed the upper bound.
-    pub fn is_sound(self) -> bool {
+    pub fn is_valid(self) -> bool {
         match self {
             Self::Fixed(value) => value.is_finite(),
             Self::Between(low, high) => low <= high,

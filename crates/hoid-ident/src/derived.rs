@@ -185,7 +185,7 @@ mod tests {
         };
         Fit {
             is_fixed_or_bounded: vec![false; theta.len()],
-            model: PolynomialModel::new(Structure::BoxJenkins, orders, SampleTime::HUNDREDTH, theta).unwrap(),
+            model: PolynomialModel::new(Structure::BoxJenkins, orders, SampleTime::AT_100_HZ, theta).unwrap(),
             covariance: Some(covariance),
             loss: 1.0,
             innovation_variance: 1.0,
@@ -215,7 +215,7 @@ mod tests {
     }
 
     /// Covariance in which only this parameter is uncertain; the standard error is then the derivative.
-    fn only(i: usize) -> Vec<f64> {
+    fn single_parameter_covariance(i: usize) -> Vec<f64> {
         let mut covariance = vec![0.0; 49];
         covariance[i * 7 + i] = 1.0;
         covariance
@@ -228,9 +228,13 @@ mod tests {
             let shifted = |sign: f64| {
                 let mut theta = theta();
                 theta[i] += sign * h;
-                fit(theta, only(i))
+                fit(theta, single_parameter_covariance(i))
             };
-            let (up, down, here) = (shifted(1.0), shifted(-1.0), fit(theta(), only(i)));
+            let (up, down, here) = (
+                shifted(1.0),
+                shifted(-1.0),
+                fit(theta(), single_parameter_covariance(i)),
+            );
             for ((a, b), root) in up.roots().iter().zip(down.roots()).zip(here.roots()) {
                 let slope = (a.value - b.value) / (2.0 * h);
                 // A root that does not depend on this parameter has no error.
@@ -261,14 +265,14 @@ mod tests {
     fn double_roots_have_no_error_and_no_crossover_gives_no_margins() {
         let mut double = theta();
         (double[5], double[6]) = (-1.0, 0.25);
-        let roots = fit(double, only(5)).roots();
+        let roots = fit(double, single_parameter_covariance(5)).roots();
         let f: Vec<&Root> = roots.iter().filter(|r| r.polynomial == 'f').collect();
         assert_eq!(f.len(), 2);
         assert!(
             f.iter().all(|r| r.standard_error.is_none_or(|(re, _)| re > 1e4)),
             "{f:?}"
         );
-        let none = fit(theta(), only(0)).margins(|omega| 1e-9 * element(omega), (1.0, 300.0));
+        let none = fit(theta(), single_parameter_covariance(0)).margins(|omega| 1e-9 * element(omega), (1.0, 300.0));
         assert!(none.crossover_rad_s.is_none() && none.phase_margin_deg.is_none());
     }
 

@@ -25,7 +25,7 @@ pub enum IdentError {
     #[error(
         "record {label} has a sample time of {found} s, but the first record has {expected} s; resample them to one \
          rate, for example with --new-fs {rate}, or fit them separately",
-        rate = lower_rate(*found, *expected)
+        rate = lower_rate_text(*found, *expected)
     )]
     MixedSampling {
         /// Label of the record that differs from the first.
@@ -199,7 +199,7 @@ pub enum IdentError {
 
 /// Returns the lower of the sampling frequencies that belong to two sample times, in Hz: records with either sample
 /// time can be resampled to it.
-fn lower_rate(a_s: f64, b_s: f64) -> String {
+fn lower_rate_text(a_s: f64, b_s: f64) -> String {
     let hz = 1.0 / a_s.max(b_s);
     let digits = format!("{hz:.6}");
     digits.trim_end_matches('0').trim_end_matches('.').to_owned()

@@ -9,7 +9,7 @@ use hoid_model::{Orders, Record, Structure};
 
 use crate::{
     Constraint, Fit, IdentError, InitialState, Loss, Prior, SearchOptions,
-    faults::held,
+    faults::limited_records,
     pem::{batched, fit_settings::FitSettings, prediction_focus, simulation_focus},
 };
 
@@ -48,7 +48,7 @@ pub struct Estimator {
     /// Weighted prior guesses of coefficients, by name.
     pub priors: BTreeMap<String, Prior>,
     /// Loss function of the residuals. Default: quadratic. With a robust loss, each sample of e and u is first limited
-    /// to four standard deviations from the value interpolated from its neighbours ([`crate::faults::resistant`]).
+    /// to four standard deviations from the value interpolated from its neighbours ([`crate::faults::limited_record`]).
     pub loss: Loss,
     /// Purpose of the model. Default: prediction.
     pub focus: Focus,
@@ -106,7 +106,7 @@ impl Estimator {
                 });
             }
         }
-        if let Some((name, constraint)) = self.constraints.iter().find(|(_, c)| !c.is_sound()) {
+        if let Some((name, constraint)) = self.constraints.iter().find(|(_, c)| !c.is_valid()) {
             return Err(IdentError::BadOption {
                 option: format!("the constraint on {name}"),
                 found: format!("{constraint:?}"),
@@ -150,7 +150,7 @@ impl Estimator {
     }
 
     /// Returns the assumption about the initial states that the fit uses: the given one, or the automatic choice.
-    pub fn initial_state_in_use(&self) -> InitialState {
+    pub fn effective_initial_state(&self) -> InitialState {
         self.initial_state.unwrap_or(if self.structure.has_input() {
             InitialState::Estimate
         } else {
@@ -176,11 +176,11 @@ impl Estimator {
         // Outlying samples of e and u are limited first, since the robust loss bounds the effect of large residuals but
         // not the effect of faulty samples in the regressors.
         let held = match self.loss {
-            Loss::Huber { .. } => held(records),
+            Loss::Huber { .. } => limited_records(records),
             Loss::Quadratic => None,
         };
         let records = held.as_deref().unwrap_or(records);
-        if self.simulates() {
+        if self.minimises_simulation_error() {
             simulation_focus::fit(&self.settings(), records, first)
         } else {
             prediction_focus::fit(&self.settings(), records, first)
@@ -210,7 +210,7 @@ impl Estimator {
 
     /// True if the fit minimises a simulation error that differs from the prediction error, as for every structure
     /// except output error.
-    fn simulates(&self) -> bool {
+    fn minimises_simulation_error(&self) -> bool {
         self.focus == Focus::Simulation && self.structure != Structure::OutputError
     }
 
@@ -219,14 +219,14 @@ impl Estimator {
         FitSettings {
             structure: self.structure,
             orders: self.orders,
-            initial_state: self.initial_state_in_use(),
+            initial_state: self.effective_initial_state(),
             search: self.search,
             starts: self.starts,
             start: self.start.clone(),
             constraints: self.constraints.clone(),
             priors: self.priors.clone(),
             loss: self.loss,
-            level: self.level && self.initial_state_in_use() != InitialState::Zero,
+            level: self.level && self.effective_initial_state() != InitialState::Zero,
             stable: self.stable,
         }
     }

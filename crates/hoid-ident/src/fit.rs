@@ -150,7 +150,7 @@ impl Fit {
     }
 
     /// Returns for each coefficient whether it is fixed or at a bound; such coefficients have no standard error.
-    pub fn held(&self) -> &[bool] {
+    pub fn fixed_or_bounded_flags(&self) -> &[bool] {
         &self.is_fixed_or_bounded
     }
 
@@ -292,7 +292,7 @@ impl Fit {
     /// # Errors
     /// [`IdentError::MixedSampling`], [`IdentError::TooFewSamples`].
     pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
-        self.errors_of(self.orders(), self.model.theta(), record)
+        self.residual_series(self.orders(), self.model.theta(), record)
     }
 
     /// Returns the one-step-ahead prediction of the output.
@@ -300,7 +300,7 @@ impl Fit {
     /// # Errors
     /// Same as [`Fit::residuals`].
     pub fn predict(&self, record: &Record) -> Result<Series, IdentError> {
-        Ok(output_less(record, self.residuals(record)?))
+        Ok(subtract_from_output(record, self.residuals(record)?))
     }
 
     /// Returns the simulated output: the response of `B/(A F)` to the input alone, without the noise model. If the fit
@@ -317,7 +317,10 @@ impl Fit {
             });
         }
         let (orders, theta) = output_error_form(&self.model);
-        Ok(output_less(record, self.errors_of(orders, &theta, record)?))
+        Ok(subtract_from_output(
+            record,
+            self.residual_series(orders, &theta, record)?,
+        ))
     }
 
     /// Returns the variance of a quantity with the gradient `by_theta` with respect to theta and the derivative
@@ -332,7 +335,7 @@ impl Fit {
         Some(variance_along(by_theta, covariance) + with_delay)
     }
 
-    fn errors_of(&self, orders: Orders, theta: &[f64], record: &Record) -> Result<Series, IdentError> {
+    fn residual_series(&self, orders: Orders, theta: &[f64], record: &Record) -> Result<Series, IdentError> {
         let (ours, theirs) = (self.model.sample_time(), record.sample_time());
         if !ours.matches(theirs) {
             return Err(IdentError::MixedSampling {
@@ -352,10 +355,10 @@ impl Fit {
             });
         }
         let data = Data::new(record.input(), record.output());
-        let criterion = Criterion::of_record(orders, data, self.initial_state, first);
+        let criterion = Criterion::for_record(orders, data, self.initial_state, first);
         Ok(Series {
             first,
-            values: criterion.residuals_of(theta, 0, &mut Workspace::of_thread()),
+            values: criterion.residuals_of(theta, 0, &mut Workspace::borrow_from_thread()),
         })
     }
 
@@ -390,7 +393,7 @@ impl Fit {
     }
 }
 
-fn output_less(record: &Record, mut errors: Series) -> Series {
+fn subtract_from_output(record: &Record, mut errors: Series) -> Series {
     let output = &record.output()[errors.first..];
     errors.values.iter_mut().zip(output).for_each(|(e, u)| *e = u - *e);
     errors

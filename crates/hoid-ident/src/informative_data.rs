@@ -76,8 +76,8 @@ pub(crate) fn check_record(
 /// # Errors
 /// [`IdentError::TooFewSamples`].
 pub(crate) fn check_degrees_of_freedom(criterion: &Criterion<'_>, records: &[Record]) -> Result<(), IdentError> {
-    let unknowns = criterion.parameters() + criterion.states();
-    if criterion.residuals() > unknowns {
+    let unknowns = criterion.parameter_count() + criterion.state_count();
+    if criterion.residual_count() > unknowns {
         return Ok(());
     }
     Err(IdentError::TooFewSamples {

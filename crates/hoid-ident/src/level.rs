@@ -28,13 +28,13 @@ use crate::{Fit, IdentError, linalg::least_squares::dot};
 /// Mean square of the residuals for u = 1 below which a constant in u counts as having no effect on the residuals.
 const MIN_MEAN_SQUARE: f64 = 1e-16;
 /// Channel that contains the true gain in simulated runs, which have no level.
-const TRUTH: &str = "K_e";
+const TRUE_GAIN_CHANNEL: &str = "K_e";
 
 /// True if the records may have a level. False for simulated runs, which are recognised by the channel of their true
 /// gain. False also if e or u is constant: the fit rejects such a record, and must report the value before the removal
 /// of the means.
 pub fn may_have_level(records: &[Record]) -> bool {
-    let simulated = records.iter().any(|record| record.channel(TRUTH).is_some());
+    let simulated = records.iter().any(|record| record.channel(TRUE_GAIN_CHANNEL).is_some());
     let moves = |x: &[f64]| x.iter().any(|v| *v != x[0]);
     let alive = |record: &Record| moves(record.input()) && moves(record.output());
     !simulated && records.iter().all(alive)
@@ -51,7 +51,7 @@ impl Fit {
     ///
     /// # Errors
     /// The errors of [`Fit::residuals`].
-    pub fn constant_of(&self, record: &Record) -> Result<Option<f64>, IdentError> {
+    pub fn constant_part(&self, record: &Record) -> Result<Option<f64>, IdentError> {
         let ones = |name: &str, one: f64| Channel::new(name, "", vec![one; record.len()]);
         let unit = Record::new(record.sample_time(), ones("e", 0.0), ones("u", 1.0))?;
         let (of_record, of_unit) = (self.residuals(record)?.values, self.residuals(&unit)?.values);
@@ -92,7 +92,7 @@ mod tests {
     use super::*;
     use crate::{Estimator, linalg::least_squares::solve_symmetric};
 
-    fn simulated(replication: u64) -> Record {
+    fn simulated_record(replication: u64) -> Record {
         let streams = RunSeed {
             seed: 31,
             replication,
@@ -102,14 +102,14 @@ mod tests {
         simulator.run(streams, false).unwrap()
     }
 
-    fn moved(record: &Record, by_e: f64, by_u: f64) -> Record {
+    fn shifted_record(record: &Record, by_e: f64, by_u: f64) -> Record {
         let add = |x: &[f64], by: f64| x.iter().map(|v| v + by).collect::<Vec<f64>>();
         let e = Channel::new("e", "", add(record.input(), by_e));
         let u = Channel::new("u", "", add(record.output(), by_u));
         Record::new(record.sample_time(), e, u).unwrap()
     }
 
-    fn fitted(structure: Structure, record: &Record) -> Fit {
+    fn fit_without_level(structure: Structure, record: &Record) -> Fit {
         let without = record.clone().detrended(Detrend::Mean);
         Estimator::new(structure, structure.operator_orders(29))
             .fit(&[without])
@@ -121,9 +121,12 @@ mod tests {
         // Sum over the runs of the squared errors of c, in standard errors.
         let (mut squares, runs) = (0.0, 12);
         for k in 0..runs {
-            let record = simulated(k);
-            let (clean, off) = (fitted(Structure::BoxJenkins, &record), moved(&record, 0.02, 0.01));
-            let fit = fitted(Structure::BoxJenkins, &off);
+            let record = simulated_record(k);
+            let (clean, off) = (
+                fit_without_level(Structure::BoxJenkins, &record),
+                shifted_record(&record, 0.02, 0.01),
+            );
+            let fit = fit_without_level(Structure::BoxJenkins, &off);
             assert!((fit.model().b()[0] - clean.model().b()[0]).abs() < 1e-9);
             let (before, after) = (clean.level(&record).unwrap(), fit.level(&off).unwrap());
             let gain = fit.model().response(0.0).re;
@@ -137,8 +140,8 @@ mod tests {
     #[test]
     fn level_equals_the_regression_constant() {
         // Reference: ARX is linear, so a column of ones is added to the regressors.
-        let record = moved(&simulated(40), 0.0, 0.03);
-        let fit = fitted(Structure::Arx, &record);
+        let record = shifted_record(&simulated_record(40), 0.0, 0.03);
+        let fit = fit_without_level(Structure::Arx, &record);
         let (e, u) = (record.input(), record.output());
         let rows: Vec<[f64; 5]> = (31..u.len())
             .map(|t| [-u[t - 1], -u[t - 2], e[t - 29], e[t - 30], 1.0])
@@ -160,7 +163,7 @@ mod tests {
     }
 
     /// Returns a record with `u(t) = level + y(t)` and `y(t) = 0.9 y(t-1) + 0.2 e(t-3)`, started from rest.
-    fn after_a_rest(e: &[f64], level: f64) -> Record {
+    fn record_from_rest(e: &[f64], level: f64) -> Record {
         let mut y = vec![0.0; e.len()];
         for t in 3..e.len() {
             y[t] = 0.9 * y[t - 1] + 0.2 * e[t - 3];
@@ -177,7 +180,7 @@ mod tests {
     #[test]
     fn level_of_a_noise_free_step_response_is_exact() {
         let step: Vec<f64> = (0..200).map(|t| if t < 40 { 0.0 } else { 10.0 }).collect();
-        let two: Vec<Record> = [13.5, -2.0].map(|level| after_a_rest(&step, level)).into();
+        let two: Vec<Record> = [13.5, -2.0].map(|level| record_from_rest(&step, level)).into();
         let without = without_level(&two);
         let orders = |na, nf| hoid_model::Orders {
             na,
@@ -206,7 +209,7 @@ mod tests {
                 // Removing the means subtracts mean(u), a part of which mean(e) explains.
                 let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
                 let taken = mean(two[0].output()) - 13.5 + level - gain * mean(&step);
-                let found = fit.constant_of(record).unwrap().unwrap();
+                let found = fit.constant_part(record).unwrap().unwrap();
                 assert!((found + taken - level).abs() < 1e-8, "{structure} {found} {taken}");
             }
             // If a lag responds to a step, removing the means alone biases the static gain.
@@ -218,7 +221,7 @@ mod tests {
 
     #[test]
     fn level_hardly_changes_other_estimates() {
-        let record = moved(&simulated(43), 0.0, 0.03);
+        let record = shifted_record(&simulated_record(43), 0.0, 0.03);
         let without = without_level(std::slice::from_ref(&record));
         let plain = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
         let with = Estimator {
@@ -262,12 +265,12 @@ mod tests {
             ..Estimator::new(Structure::Arx, orders)
         };
         let fit = exact.fit(std::slice::from_ref(&record)).unwrap();
-        assert_eq!(fit.constant_of(&record).unwrap(), None);
+        assert_eq!(fit.constant_part(&record).unwrap(), None);
     }
 
     #[test]
     fn model_without_input_has_no_level() {
-        let record = simulated(41);
+        let record = simulated_record(41);
         let orders = hoid_model::Orders {
             na: 2,
             ..hoid_model::Orders::default()

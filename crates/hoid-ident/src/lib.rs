@@ -121,6 +121,6 @@ pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
 pub use order_selection::{Candidate, Choice, NamedOrders, OrderRanges, choose_orders, identify_box_jenkins};
 pub use pem::loss::Loss;
 pub use sigmoid::{
-    ChangeParameter, ChangedOperator, Comparison, GainsAt, NamedEstimate, NoiseLevel, Remark, SIGMOID_NAMES,
+    ChangeParameter, ChangedOperator, Comparison, InstantGains, NamedEstimate, NoiseLevel, Remark, SIGMOID_NAMES,
     SigmoidChange, SigmoidFit,
 };

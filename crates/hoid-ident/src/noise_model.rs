@@ -1,6 +1,6 @@
 //! A noise model estimated from the disturbance v alone.
 
-use hoid_model::polynomial::reflected_inside;
+use hoid_model::polynomial::reflect_roots_inside;
 
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
@@ -32,7 +32,7 @@ pub(crate) fn noise_model(v: &[Vec<f64>], nc: usize, nd: usize) -> (Vec<f64>, Ve
     let Some(theta) = lagged_regression(&signals, &lags, long + nc.max(nd)) else {
         return nothing;
     };
-    match reflected_inside(&theta[..nc]) {
+    match reflect_roots_inside(&theta[..nc]) {
         Some(c) => (c, theta[nc..].iter().map(|t| -t).collect()),
         None => nothing,
     }

@@ -85,7 +85,7 @@ impl From<Orders> for OrderRanges {
 impl fmt::Display for OrderRanges {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut separator = "";
-        for (name, range) in self.named() {
+        for (name, range) in self.named_ranges() {
             match (*range.start(), *range.end()) {
                 (0, 0) if name != "nk" || *self.nb.end() == 0 => continue,
                 _ => write!(f, "{separator}{name}={}", range_text(range))?,
@@ -97,7 +97,7 @@ impl fmt::Display for OrderRanges {
 }
 
 impl OrderRanges {
-    fn named(&self) -> [(&'static str, &RangeInclusive<usize>); 6] {
+    fn named_ranges(&self) -> [(&'static str, &RangeInclusive<usize>); 6] {
         [
             ("na", &self.na),
             ("nb", &self.nb),
@@ -112,7 +112,7 @@ impl OrderRanges {
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for a name that is not an order.
-    pub fn with(mut self, named: &NamedOrders) -> Result<Self, IdentError> {
+    pub fn with_named_orders(mut self, named: &NamedOrders) -> Result<Self, IdentError> {
         for (name, range) in named {
             let place = match name.as_str() {
                 "na" => &mut self.na,
@@ -139,13 +139,13 @@ impl OrderRanges {
     /// # Errors
     /// [`IdentError::EmptyRange`] if a range is empty, [`IdentError::BadOption`] for more than [`MAX_CANDIDATES`].
     pub fn candidate_count(&self) -> Result<usize, IdentError> {
-        if let Some((name, range)) = self.named().into_iter().find(|(_, r)| r.is_empty()) {
+        if let Some((name, range)) = self.named_ranges().into_iter().find(|(_, r)| r.is_empty()) {
             return Err(IdentError::EmptyRange {
                 range: format!("{name}={}..{}", range.start(), range.end()),
             });
         }
         let numbers = self
-            .named()
+            .named_ranges()
             .map(|(_, range)| *range.end() as f64 - *range.start() as f64 + 1.0);
         let all: f64 = numbers.iter().product();
         if all > MAX_CANDIDATES as f64 {
@@ -343,7 +343,7 @@ pub fn choose_orders_with(
     }
     let first = combinations
         .iter()
-        .map(|o| first_residual(o, template.initial_state_in_use()))
+        .map(|o| first_residual(o, template.effective_initial_state()))
         .max()
         .unwrap_or(0);
     // A ranking of candidates does not need the full accuracy of the loss; the selected model is fitted again with full
@@ -363,7 +363,7 @@ pub fn choose_orders_with(
     let delays = ranges.nk.clone().count();
     let blocks: Vec<&[Orders]> = combinations
         .chunks(delays)
-        .flat_map(|row| row.chunks(BLOCK_SIZE))
+        .flat_map(|row| row.chunks(DELAYS_PER_BLOCK))
         .collect();
     let (candidates, errors): (Vec<Candidate>, Vec<Option<IdentError>>) = blocks
         .into_par_iter()
@@ -391,7 +391,7 @@ pub fn choose_orders_with(
 }
 
 /// Number of delays in a block; within a block, each fit starts from the result for the previous delay.
-const BLOCK_SIZE: usize = 12;
+const DELAYS_PER_BLOCK: usize = 12;
 
 /// Fits candidates that differ only in the delay. Each search starts from the coefficients of the previous fit; if it
 /// does not converge, it is repeated with automatic starts.

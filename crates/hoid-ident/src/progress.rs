@@ -29,20 +29,20 @@ thread_local! {
 }
 
 /// Runs `work`, passes every progress report of this thread to the watcher, and returns the result of `work`.
-pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnOnce() -> T) -> T {
+pub fn with_watcher<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnOnce() -> T) -> T {
     /// Restores the previous watcher when dropped, also after a panic.
-    struct Before(Option<Watcher>);
-    impl Drop for Before {
+    struct PreviousWatcher(Option<Watcher>);
+    impl Drop for PreviousWatcher {
         fn drop(&mut self) {
             WATCHER.set(self.0.take());
         }
     }
-    let _before = Before(WATCHER.replace(Some(Arc::new(watcher))));
+    let _before = PreviousWatcher(WATCHER.replace(Some(Arc::new(watcher))));
     work()
 }
 
 /// Reports the number of finished items to the watcher of this thread.
-pub(crate) fn step(what: &'static str, done: usize, total: usize) {
+pub(crate) fn report_step(what: &'static str, done: usize, total: usize) {
     // The watcher is cloned out of the cell first, because it may itself run a fit.
     let watcher = WATCHER.with_borrow(Clone::clone);
     if let Some(watcher) = watcher {
@@ -73,21 +73,21 @@ mod tests {
     fn innermost_watcher_is_notified_and_outer_one_restored() {
         let notified = Arc::new(Mutex::new(Vec::new()));
         let (outer, inner) = (notified.clone(), notified.clone());
-        step("nobody", 0, 1);
-        watched(
+        report_step("nobody", 0, 1);
+        with_watcher(
             move |step| outer.lock().unwrap().push(("outer", step.done)),
             || {
-                step("forms", 0, 2);
-                watched(
+                report_step("forms", 0, 2);
+                with_watcher(
                     move |step| inner.lock().unwrap().push(("inner", step.done)),
                     || {
-                        step("orders", 7, 9);
+                        report_step("orders", 7, 9);
                     },
                 );
-                step("forms", 1, 2);
+                report_step("forms", 1, 2);
             },
         );
-        step("nobody", 1, 1);
+        report_step("nobody", 1, 1);
         assert_eq!(*notified.lock().unwrap(), [("outer", 0), ("inner", 7), ("outer", 1)]);
     }
 
@@ -95,7 +95,7 @@ mod tests {
     fn progress_of_other_threads_is_counted() {
         let notified = Arc::new(Mutex::new(Vec::new()));
         let seen = notified.clone();
-        watched(
+        with_watcher(
             move |step| seen.lock().unwrap().push(step.done),
             || {
                 let one = counter("candidates", 3);

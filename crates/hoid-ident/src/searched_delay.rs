@@ -35,7 +35,7 @@ impl Fit {
     /// not represent an operator are returned unchanged: with many coefficients of B, a shift by one sample only
     /// renumbers them.
     pub(crate) fn with_searched_delay(self, records: &[Record], delays: usize) -> Self {
-        match self.delay_from(records, delays) {
+        match self.searched_delay(records, delays) {
             None => self,
             Some(delay) => {
                 let p = delay.slope.len();
@@ -51,7 +51,7 @@ impl Fit {
         }
     }
 
-    fn delay_from(&self, records: &[Record], delays: usize) -> Option<SearchedDelay> {
+    fn searched_delay(&self, records: &[Record], delays: usize) -> Option<SearchedDelay> {
         let apart = self.instrumented || self.physical.is_some();
         if apart || delays < 2 || self.covariance.is_none() || self.operator().is_err() {
             return None;
@@ -62,10 +62,10 @@ impl Fit {
         let mut gram = DMatrix::<f64>::zeros(n, n);
         let mut along = DVector::<f64>::zeros(n);
         let mut own = 0.0;
-        let mut workspace = Workspace::of_thread();
+        let mut workspace = Workspace::borrow_from_thread();
         for data in Data::of(records) {
             let first = first_residual(&orders, self.initial_state);
-            let criterion = Criterion::of_record(orders, data, self.initial_state, first);
+            let criterion = Criterion::for_record(orders, data, self.initial_state, first);
             let psi = self.jacobian_with_delay(&criterion, &mut workspace);
             let d = &psi[theta.len()];
             own += dot(d, d);
@@ -99,13 +99,13 @@ impl Fit {
     pub(crate) fn jacobian_with_delay(&self, criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let mut psi = criterion.jacobian(self.model.theta(), 0, workspace);
         let of_b = &psi[criterion.orders.na..];
-        psi.push(along_the_delay(self.model.b(), of_b, self.model.sample_time().s()));
+        psi.push(delay_derivative(self.model.b(), of_b, self.model.sample_time().s()));
         psi
     }
 }
 
 /// Returns `-d eps/d tau`, computed from the columns of psi for the coefficients of B.
-fn along_the_delay(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64> {
+fn delay_derivative(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64> {
     let n = of_b.first().map_or(0, Vec::len);
     let x = |t: usize| -> f64 { b.iter().zip(of_b).map(|(b, column)| b * column[t]).sum() };
     (0..n)
@@ -140,7 +140,7 @@ mod tests {
         simulator.run(streams, false).unwrap().span(0.0, 40.0).unwrap()
     }
 
-    fn searched(record: &Record) -> Choice {
+    fn search_delay(record: &Record) -> Choice {
         let orders = Structure::BoxJenkins.operator_orders(29);
         let mut ranges = OrderRanges::from(orders);
         ranges.nk = 25..=33;
@@ -152,7 +152,7 @@ mod tests {
     fn slope_of_theta_matches_neighbouring_delays() {
         // Reference: the fits with one sample less and one sample more of delay, a chord of 20 ms.
         let record = run(0);
-        let fit = searched(&record).fit;
+        let fit = search_delay(&record).fit;
         let slope = &fit.searched_delay.as_ref().unwrap().slope;
         let nk = fit.orders().nk;
         let at = |nk: usize| {
@@ -191,7 +191,7 @@ mod tests {
         let runs = 40;
         let (mut z2, mut without) = ([0.0; 3], 0.0);
         for k in 0..runs {
-            let fit = searched(&run(k)).fit;
+            let fit = search_delay(&run(k)).fit;
             let found = fit.operator().unwrap();
             let z = |value: f64, truth: f64, error: Option<f64>| ((value - truth) / error.unwrap()).powi(2);
             z2[0] += z(

@@ -19,7 +19,7 @@
 //! for t in 2..400 {
 //!     u[t] = 0.8 * u[t - 1] + 0.5 * e[t - 2] + 0.2 * r[t - 1] - 0.1 * r[t - 2];
 //! }
-//! let record = Record::new(SampleTime::HUNDREDTH, Channel::new("e", "", e), Channel::new("u", "", u))?
+//! let record = Record::new(SampleTime::AT_100_HZ, Channel::new("e", "", e), Channel::new("u", "", u))?
 //!     .with_channel(Channel::new("r", "", r))?;
 //! let fit = SeveralInputs {
 //!     na: 1,
@@ -54,14 +54,14 @@ use crate::{
 
 /// Maximum number of coefficients that A and each B of the high-order ARX model have in addition to the orders of the
 /// fitted model.
-const HIGH_ORDER: usize = 12;
+const MAX_ADDITIONAL_ORDER: usize = 12;
 /// Relative increase of the diagonal of the normal matrix in the regression for the high-order ARX model.
-const RIDGE: f64 = 1e-8;
+const RIDGE_FACTOR: f64 = 1e-8;
 /// Order of the autoregression that estimates the innovations for the start of C.
 const LONG_AR_ORDER: usize = 24;
 
 /// Termination of a linear regression.
-const DIRECT: Termination = Termination {
+const DIRECT_TERMINATION: Termination = Termination {
     reason: Reason::Direct,
     iterations: 0,
 };
@@ -186,10 +186,13 @@ impl SeveralInputs {
         let sample_time = common_sample_time(records)?;
         let criterion = self.criterion(records, self.orders(), |(_, orders)| *orders)?;
         check_degrees_of_freedom(&criterion, records)?;
-        let mut workspace = Workspace::of_thread();
+        let mut workspace = Workspace::borrow_from_thread();
         let (theta, termination) = if self.structure.is_linear() {
-            let at = criterion.linearise(&vec![0.0; self.parameters_count()], &mut workspace);
-            (self.refined(&criterion, &at.gram, &at.descent, &mut workspace)?, DIRECT)
+            let at = criterion.linearise(&vec![0.0; self.parameter_count()], &mut workspace);
+            (
+                self.solve_refined(&criterion, &at.gram, &at.descent, &mut workspace)?,
+                DIRECT_TERMINATION,
+            )
         } else {
             let mut best: Option<Minimum> = None;
             for start in self.starts(records, &mut workspace)? {
@@ -205,35 +208,38 @@ impl SeveralInputs {
             (found.theta, found.termination)
         };
         let at = criterion.linearise(&theta, &mut workspace);
-        Ok(self.assembled(&criterion, sample_time, (theta, termination), &at))
+        Ok(self.assemble(&criterion, sample_time, (theta, termination), &at))
     }
 
     /// Fits an ARX model of the orders of `criterion` by ridge regression. This gives a frequency response even if the
     /// records determine only few combinations of the coefficients. `None` if the normal equations are singular.
-    pub(crate) fn ridge(
+    pub(crate) fn fit_ridge(
         &self,
         criterion: &Criterion<'_>,
         ridge: f64,
         sample_time: SampleTime,
     ) -> Option<SeveralInputsFit> {
-        let mut at = criterion.linearise(&vec![0.0; criterion.parameters()], &mut Workspace::of_thread());
+        let mut at = criterion.linearise(
+            &vec![0.0; criterion.parameter_count()],
+            &mut Workspace::borrow_from_thread(),
+        );
         let theta = at.solution(ridge)?;
         // The sum of squares must not be smaller than the rounding error of this regression.
         let squares = (at.sum_of_squares - dot(&theta, &at.descent)).max(1e-12 * at.sum_of_squares);
         at.sum_of_squares = squares;
-        Some(self.assembled(criterion, sample_time, (theta, DIRECT), &at))
+        Some(self.assemble(criterion, sample_time, (theta, DIRECT_TERMINATION), &at))
     }
 
     /// Returns the result for theta; `at` contains the sum of squares and `psi' psi` at theta.
-    fn assembled(
+    fn assemble(
         &self,
         criterion: &Criterion<'_>,
         sample_time: SampleTime,
         (theta, termination): (Vec<f64>, Termination),
         at: &Linearisation,
     ) -> SeveralInputsFit {
-        let n = criterion.residuals();
-        let innovation_variance = at.sum_of_squares / (n - theta.len() - criterion.states()) as f64;
+        let n = criterion.residual_count();
+        let innovation_variance = at.sum_of_squares / (n - theta.len() - criterion.state_count()) as f64;
         let power: f64 = (criterion.data.iter()).map(|d| spread(&d.u[criterion.first..])).sum();
         SeveralInputsFit {
             model: self.clone(),
@@ -253,7 +259,7 @@ impl SeveralInputs {
     }
 
     /// Solves the normal equations, with two refinement steps that recompute the residuals.
-    fn refined(
+    fn solve_refined(
         &self,
         criterion: &Criterion<'_>,
         gram: &[f64],
@@ -272,7 +278,7 @@ impl SeveralInputs {
         Ok(theta)
     }
 
-    fn parameters_count(&self) -> usize {
+    fn parameter_count(&self) -> usize {
         let of_inputs: usize = self.inputs.iter().map(|(_, o)| o.nb + o.nf).sum();
         self.na + self.nc + self.nd + of_inputs
     }
@@ -403,7 +409,7 @@ impl SeveralInputs {
                 series.iter_mut().for_each(|v| *v -= mean);
                 left.push(series);
             }
-            starts.push(self.theta_of(&vec![0.0; self.na], &systems, &self.noise(&left)));
+            starts.push(self.assemble_theta(&vec![0.0; self.na], &systems, &self.noise_coefficients(&left)));
         }
         Ok(starts)
     }
@@ -411,7 +417,9 @@ impl SeveralInputs {
     /// Returns the response to each input in each record, computed with a high-order ARX model.
     fn responses(&self, records: &[Record], workspace: &mut Workspace) -> Result<Vec<Vec<Vec<f64>>>, IdentError> {
         let shortest = records.iter().map(Record::len).min().unwrap_or(0);
-        let high = HIGH_ORDER.min(shortest / (4 * (self.inputs.len() + 1))).max(2);
+        let high = MAX_ADDITIONAL_ORDER
+            .min(shortest / (4 * (self.inputs.len() + 1)))
+            .max(2);
         let own = |(_, o): &(String, InputOrders)| InputOrders {
             nb: o.nb + high,
             nf: 0,
@@ -427,9 +435,9 @@ impl SeveralInputs {
         };
         let criterion = self.criterion(records, orders, own)?;
         let counts: Vec<usize> = self.inputs.iter().map(|input| own(input).nb).collect();
-        let mut at = criterion.linearise(&vec![0.0; criterion.parameters()], workspace);
-        let theta = at.solution(RIDGE).ok_or(IdentError::NoFiniteLoss)?;
-        let a = polynomial::reflected_inside(&theta[..orders.na]).ok_or(IdentError::NoFiniteLoss)?;
+        let mut at = criterion.linearise(&vec![0.0; criterion.parameter_count()], workspace);
+        let theta = at.solution(RIDGE_FACTOR).ok_or(IdentError::NoFiniteLoss)?;
+        let a = polynomial::reflect_roots_inside(&theta[..orders.na]).ok_or(IdentError::NoFiniteLoss)?;
         let mut from = orders.na;
         let mut all = Vec::with_capacity(self.inputs.len());
         for ((name, o), count) in self.inputs.iter().zip(counts) {
@@ -456,7 +464,7 @@ impl SeveralInputs {
             ..self.orders()
         };
         let criterion = self.criterion(records, arx, |(_, o)| *o)?;
-        let mut at = criterion.linearise(&vec![0.0; criterion.parameters()], workspace);
+        let mut at = criterion.linearise(&vec![0.0; criterion.parameter_count()], workspace);
         let theta = at.solution(0.0).ok_or(IdentError::NoFiniteLoss)?;
         let (a, mut rest) = theta.split_at(self.na);
         let mut systems = Vec::new();
@@ -465,12 +473,12 @@ impl SeveralInputs {
             systems.push((b.to_vec(), Vec::new()));
             rest = others;
         }
-        Ok(self.theta_of(a, &systems, &vec![0.0; self.nc + self.nd]))
+        Ok(self.assemble_theta(a, &systems, &vec![0.0; self.nc + self.nd]))
     }
 
     /// Returns the coefficients of C and D for the part `left` of u that the inputs do not explain; zero if they cannot
     /// be estimated.
-    fn noise(&self, left: &[Vec<f64>]) -> Vec<f64> {
+    fn noise_coefficients(&self, left: &[Vec<f64>]) -> Vec<f64> {
         let none = || vec![0.0; self.nc + self.nd];
         if self.nc == 0 {
             let products = NoiseProducts::new(left, self.nd);
@@ -479,7 +487,7 @@ impl SeveralInputs {
         hannan_rissanen(left, (self.nc, self.nd), LONG_AR_ORDER).unwrap_or_else(none)
     }
 
-    fn theta_of(&self, a: &[f64], systems: &[(Vec<f64>, Vec<f64>)], noise: &[f64]) -> Vec<f64> {
+    fn assemble_theta(&self, a: &[f64], systems: &[(Vec<f64>, Vec<f64>)], noise: &[f64]) -> Vec<f64> {
         let mut theta = a.to_vec();
         theta.extend(&systems[0].0);
         theta.extend(noise);
@@ -541,14 +549,14 @@ impl SeveralInputsFit {
     }
 
     /// Returns the indices in theta of the coefficients of A, and of B and F of an input.
-    fn places(&self, input: usize) -> [std::ops::Range<usize>; 3] {
+    fn coefficient_ranges(&self, input: usize) -> [std::ops::Range<usize>; 3] {
         let o = self.model.orders();
         let a = 0..o.na;
         if input == 0 {
             let f = o.na + o.nb + o.nc + o.nd;
             return [a, o.na..o.na + o.nb, f..f + o.nf];
         }
-        let mut from = o.parameters();
+        let mut from = o.parameter_count();
         for (_, orders) in &self.model.inputs[1..input] {
             from += orders.nb + orders.nf;
         }
@@ -559,7 +567,7 @@ impl SeveralInputsFit {
     /// Returns gain and phase of `B_i/(A F_i) q^-nk_i`, the response of u to the input with this index, at frequencies
     /// in rad/s.
     pub fn frequency_response(&self, input: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
-        let [a, b, f] = self.places(input);
+        let [a, b, f] = self.coefficient_ranges(input);
         let nk = self.model.inputs[input].1.nk;
         let p = self.theta.len();
         let point = |&omega: &f64| {

@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-use hoid_model::{estimate_table::write_rows, numbers::significant};
+use hoid_model::{estimate_table::write_rows, numbers::format_significant};
 
 use crate::{Fit, Reason};
 
 /// Number of significant digits of loss and criteria.
-const DIGITS: i32 = 5;
+const SIGNIFICANT_DIGITS: i32 = 5;
 
 impl fmt::Display for Fit {
     /// Formats the title, the parameters with standard errors (one row each), the loss, the criteria, and the
@@ -40,7 +40,7 @@ impl fmt::Display for Fit {
                 .into_iter()
                 .map(|(name, estimate)| (name, estimate, "")),
         )?;
-        let number = |value: f64| significant(value, DIGITS);
+        let number = |value: f64| format_significant(value, SIGNIFICANT_DIGITS);
         writeln!(
             f,
             "\nloss {}, innovation variance {}, {} residuals",

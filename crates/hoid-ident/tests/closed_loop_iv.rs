@@ -13,11 +13,11 @@ use hoid_sim::RunSeed;
 use rayon::prelude::*;
 
 const TS: f64 = 1.0 / 60.0;
-const SAMPLES: usize = 2400;
-const RUN_IN: usize = 1200;
+const SAMPLE_COUNT: usize = 2400;
+const RUN_IN_SAMPLES: usize = 1200;
 const NK: usize = 8;
 /// Frequencies of the comparison, rad/s.
-const OMEGA: [f64; 3] = [1.0, 2.5, 6.0];
+const FREQUENCIES_RAD_S: [f64; 3] = [1.0, 2.5, 6.0];
 
 /// B and F of the operator: gain 4 below 1/T_I, T_L = 0.6 s, T_I = 4 s, omega_nm = 13 rad/s, zeta_nm = 0.3.
 fn operator() -> (Vec<f64>, Vec<f64>) {
@@ -39,7 +39,7 @@ fn remnant() -> Vec<f64> {
 
 /// One trial: `u = (B/F) q^-nk e + v`, `y' = u + d`, `e = -y`.
 fn trial(replication: u64, number: u64) -> Record {
-    let n = SAMPLES + RUN_IN;
+    let n = SAMPLE_COUNT + RUN_IN_SAMPLES;
     let seed = RunSeed {
         seed: 60,
         cell: number,
@@ -67,7 +67,7 @@ fn trial(replication: u64, number: u64) -> Record {
         w[t] = through - back;
         u[t] = w[t] + 0.3 * v[t] / size;
     }
-    let channel = |name: &str, x: &[f64]| Channel::new(name, "", x[RUN_IN..].to_vec());
+    let channel = |name: &str, x: &[f64]| Channel::new(name, "", x[RUN_IN_SAMPLES..].to_vec());
     Record::new(SampleTime::new(TS).unwrap(), channel("e", &e), channel("u", &u))
         .unwrap()
         .with_channel(channel("d", &d))
@@ -104,8 +104,8 @@ fn study(runs: u64, trials: u64) -> (usize, Vec<[f64; 6]>) {
     let errors = (converged.iter().filter(|fit| fit.covariance().is_some()))
         .map(|fit| {
             let mut errors = [0.0; 6];
-            for (i, point) in fit.frequency_response(&OMEGA).iter().enumerate() {
-                let h = truth(OMEGA[i]);
+            for (i, point) in fit.frequency_response(&FREQUENCIES_RAD_S).iter().enumerate() {
+                let h = truth(FREQUENCIES_RAD_S[i]);
                 let gain = point.magnitude_db.value - 20.0 * h.norm().log10();
                 let phase = (point.phase_deg.value - h.arg().to_degrees() + 540.0).rem_euclid(360.0) - 180.0;
                 errors[2 * i] = gain / point.magnitude_db.standard_error.unwrap();
@@ -117,7 +117,7 @@ fn study(runs: u64, trials: u64) -> (usize, Vec<[f64; 6]>) {
     (converged.len(), errors)
 }
 
-fn covered(errors: &[[f64; 6]]) -> f64 {
+fn coverage(errors: &[[f64; 6]]) -> f64 {
     let all: Vec<f64> = errors.iter().flatten().copied().collect();
     all.iter().filter(|z| z.abs() < 1.96).count() as f64 / all.len() as f64
 }
@@ -127,13 +127,13 @@ fn covered(errors: &[[f64; 6]]) -> f64 {
 fn standard_errors_have_nominal_coverage() {
     let runs = 200;
     let (converged, errors) = study(runs, 10);
-    let covered = covered(&errors);
+    let covered = coverage(&errors);
     for i in 0..6 {
         let mean = errors.iter().map(|e| e[i]).sum::<f64>() / errors.len() as f64;
         let square = errors.iter().map(|e| e[i] * e[i]).sum::<f64>() / errors.len() as f64;
         println!(
             "{} rad/s: mean {mean:.2}, root mean square {:.2}",
-            OMEGA[i / 2],
+            FREQUENCIES_RAD_S[i / 2],
             square.sqrt()
         );
     }
@@ -143,10 +143,10 @@ fn standard_errors_have_nominal_coverage() {
 }
 
 #[test]
-fn converges_near_the_truth_with_complex_remnant() {
+fn fit_with_complex_remnant_converges_near_the_truth() {
     let (converged, errors) = study(4, 3);
     // 24 numbers, correlated within a run: fewer than 15 are beyond 1.96, except with probability 1e-6, and none is
     // beyond six.
-    assert!(converged == 4 && covered(&errors) > 0.5, "{converged}: {errors:?}");
+    assert!(converged == 4 && coverage(&errors) > 0.5, "{converged}: {errors:?}");
     assert!(errors.iter().flatten().all(|z| z.abs() < 6.0), "{errors:?}");
 }

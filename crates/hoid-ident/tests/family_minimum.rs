@@ -18,13 +18,13 @@ use hoid_model::{Channel, FamilyOperator, Form, Record, SampleTime, operator_fam
 use rayon::prelude::*;
 use simulated_operator::{Uniform, response_to};
 
-const OPERATORS: u64 = 45;
-const SAMPLES: usize = 3500;
-const RUN_IN: usize = 500;
+const OPERATOR_COUNT: u64 = 45;
+const SAMPLE_COUNT: usize = 3500;
+const RUN_IN_SAMPLES: usize = 500;
 /// Share of the noise in the power of u.
-const NOISE: f64 = 0.3;
+const NOISE_SHARE: f64 = 0.3;
 /// Time constant of the noise, s.
-const NOISE_S: f64 = 0.1;
+const NOISE_TIME_CONSTANT_S: f64 = 0.1;
 /// Difference of `n ln V` above which the search has ended in another minimum.
 const OTHER_MINIMUM_DIFFERENCE: f64 = 50.0;
 
@@ -54,11 +54,11 @@ fn record(operator: &FamilyOperator, random: &mut Uniform) -> Record {
         let line = |(w, phase): &(f64, f64)| (w * k as f64 * ts.s() + phase).sin() / (1.0 + 0.2 * w);
         lines.iter().map(line).sum()
     };
-    let e: Vec<f64> = (0..RUN_IN + SAMPLES).map(of).collect();
-    let mut u = response_to(&operator.zoh(ts).unwrap(), &e).split_off(RUN_IN);
+    let e: Vec<f64> = (0..RUN_IN_SAMPLES + SAMPLE_COUNT).map(of).collect();
+    let mut u = response_to(&operator.zoh(ts).unwrap(), &e).split_off(RUN_IN_SAMPLES);
     let power = u.iter().map(|u| u * u).sum::<f64>() / u.len() as f64;
-    let deviation = (NOISE / (1.0 - NOISE) * power).sqrt();
-    let pole = (-ts.s() / NOISE_S).exp();
+    let deviation = (NOISE_SHARE / (1.0 - NOISE_SHARE) * power).sqrt();
+    let pole = (-ts.s() / NOISE_TIME_CONSTANT_S).exp();
     let mut noise = 0.0;
     for u in &mut u {
         noise = pole * noise + (1.0 - pole * pole).sqrt() * random.normal();
@@ -66,14 +66,14 @@ fn record(operator: &FamilyOperator, random: &mut Uniform) -> Record {
     }
     Record::new(
         ts,
-        Channel::new("e", "", e[RUN_IN..].to_vec()),
+        Channel::new("e", "", e[RUN_IN_SAMPLES..].to_vec()),
         Channel::new("u", "", u),
     )
     .unwrap()
 }
 
 /// Returns `n ln V + 2 nd` of the search in one form.
-fn ended(record: &Record, form: Form, prior: OperatorPrior, delay_range_s: (f64, f64)) -> f64 {
+fn search_criterion(record: &Record, form: Form, prior: OperatorPrior, delay_range_s: (f64, f64)) -> f64 {
     let estimator = FamilyEstimator {
         forms: vec![form],
         prior,
@@ -82,7 +82,7 @@ fn ended(record: &Record, form: Form, prior: OperatorPrior, delay_range_s: (f64,
     };
     let fit = estimator.fit(std::slice::from_ref(record));
     fit.map_or(f64::INFINITY, |fit| {
-        SAMPLES as f64 * fit.loss.ln() + 2.0 * fit.noise_orders.1 as f64
+        SAMPLE_COUNT as f64 * fit.loss.ln() + 2.0 * fit.noise_orders.1 as f64
     })
 }
 
@@ -97,12 +97,12 @@ fn searches_reach_the_global_minimum() {
         let record = record(&truth, &mut random);
         let near = ((truth.tau_e_s() - 0.03).max(0.0), truth.tau_e_s() + 0.03);
         let priors = [OperatorPrior::none, OperatorPrior::population];
-        let least = priors.map(|prior| ended(&record, form, prior(), near));
-        let found = priors.map(|prior| ended(&record, form, prior(), (0.0, 0.8)));
+        let least = priors.map(|prior| search_criterion(&record, form, prior(), near));
+        let found = priors.map(|prior| search_criterion(&record, form, prior(), (0.0, 0.8)));
         let least = least.into_iter().chain(found).fold(f64::INFINITY, f64::min);
         found.map(|found| u64::from(found > least + OTHER_MINIMUM_DIFFERENCE))
     };
-    let missed: Vec<[u64; 2]> = (0..OPERATORS).into_par_iter().map(missed).collect();
+    let missed: Vec<[u64; 2]> = (0..OPERATOR_COUNT).into_par_iter().map(missed).collect();
     let [without, with] = [0, 1].map(|i| missed.iter().map(|m| m[i]).sum::<u64>());
     assert!(without <= 1 && with == 0, "{without} without a prior, {with} with it");
 }

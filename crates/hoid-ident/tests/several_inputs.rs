@@ -5,7 +5,7 @@ use hoid_ident::several_inputs::{InputOrders, SeveralInputs};
 use hoid_model::{Channel, Record, SampleTime, Structure};
 
 /// Name, value and standard error.
-const NUMPY: [(&str, f64, f64); 7] = [
+const NUMPY_ESTIMATES: [(&str, f64, f64); 7] = [
     ("a1", -1.283545131175736e+00, 2.422658995823053e-02),
     ("a2", 4.54561506267509e-01, 1.696994142512972e-02),
     ("b0[e]", 4.921553345453263e-01, 5.373048738401978e-03),
@@ -14,7 +14,7 @@ const NUMPY: [(&str, f64, f64); 7] = [
     ("b1[r]", 6.079761576196156e-02, 1.071641500412302e-02),
     ("b2[r]", -2.837021338580403e-01, 1.015635533020685e-02),
 ];
-const LOSS: f64 = 0.005733385405958988;
+const NUMPY_LOSS: f64 = 0.005733385405958988;
 
 fn record() -> Record {
     let n = 500;
@@ -28,7 +28,7 @@ fn record() -> Record {
         u[k] += 0.3 * r[k - 1] + 0.1 * r[k - 2] - 0.25 * r[k - 3] + noise[k] + 0.3;
     }
     Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "", e),
         Channel::new("u", "", u),
     )
@@ -48,8 +48,8 @@ fn arx_with_two_inputs_matches_numpy() {
         ..SeveralInputs::new(Structure::Arx)
     };
     let fit = model.fit(&[record()]).unwrap();
-    assert!((fit.loss / LOSS - 1.0).abs() < 1e-10, "{}", fit.loss);
-    for ((name, estimate), (expected, value, error)) in fit.parameters().iter().zip(NUMPY) {
+    assert!((fit.loss / NUMPY_LOSS - 1.0).abs() < 1e-10, "{}", fit.loss);
+    for ((name, estimate), (expected, value, error)) in fit.parameters().iter().zip(NUMPY_ESTIMATES) {
         assert_eq!(name, expected);
         assert!(
             (estimate.value - value).abs() < 1e-10,

@@ -17,7 +17,7 @@ use hoid_sim::{FamilySimulator, RunSeed, Simulator};
 const T_M: f64 = 30.0;
 const G: f64 = 2.0;
 /// K/T_I and T_L of a lead-lag operator before and after the change.
-const ENDS: [[f64; 2]; 2] = [[4.0, 0.3], [2.0, 1.0]];
+const END_PARAMETERS: [[f64; 2]; 2] = [[4.0, 0.3], [2.0, 1.0]];
 /// T_I, omega_nm, zeta_nm and tau_e, which is nine samples of 1/60 s.
 const CONSTANT_PARAMETERS: [f64; 4] = [5.0, 12.0, 0.4, 0.15];
 
@@ -40,8 +40,8 @@ fn scenario(form: Form, share: f64) -> FamilyScenario {
             controlled_element: element(if form == Form::Lag { "1" } else { "1/s" }),
         }
     };
-    let mut scenario = FamilyScenario::new(state(ENDS[0]), SampleTime::new(1.0 / 60.0).unwrap());
-    scenario.last = state(ENDS[1]);
+    let mut scenario = FamilyScenario::new(state(END_PARAMETERS[0]), SampleTime::new(1.0 / 60.0).unwrap());
+    scenario.last = state(END_PARAMETERS[1]);
     scenario.schedule = Schedule::Sigmoid {
         rate_per_s: G,
         midpoint_s: T_M,
@@ -82,10 +82,10 @@ fn value(fit: &SigmoidFit, name: &str) -> f64 {
 /// Name and true value of each parameter.
 fn truth() -> Vec<(&'static str, f64)> {
     vec![
-        ("K_over_T_I1", ENDS[0][0]),
-        ("K_over_T_I2", ENDS[1][0]),
-        ("T_L1", ENDS[0][1]),
-        ("T_L2", ENDS[1][1]),
+        ("K_over_T_I1", END_PARAMETERS[0][0]),
+        ("K_over_T_I2", END_PARAMETERS[1][0]),
+        ("T_L1", END_PARAMETERS[0][1]),
+        ("T_L2", END_PARAMETERS[1][1]),
         ("t_M", T_M),
         ("G", G),
         ("T_I", CONSTANT_PARAMETERS[0]),
@@ -104,15 +104,15 @@ fn noise_free_change_is_recovered() {
         assert!(error.abs() < 1e-7, "{name}: {error:e}, from {}", fit.start());
     }
     assert_eq!(fit.termination().reason, Reason::ExactFit);
-    assert!(fit.change_found() && fit.covariance().is_none());
+    assert!(fit.has_change() && fit.covariance().is_none());
     // The operator before and after the change, by the parameter names of the family.
     let (before, after) = (fit.initial_operator(), fit.last_operator());
-    for (operator, [gain, lead]) in [(before, ENDS[0]), (after, ENDS[1])] {
+    for (operator, [gain, lead]) in [(before, END_PARAMETERS[0]), (after, END_PARAMETERS[1])] {
         for (name, expected) in [("K", 5.0 * gain), ("K_over_T_I", gain), ("T_L", lead), ("T_I", 5.0)] {
             let found = operator.get(name).unwrap().value;
             assert!((found / expected - 1.0).abs() < 1e-7, "{name}: {found}");
         }
-        assert!(operator.lead().is_none() && operator.operator.form() == Form::LeadLag);
+        assert!(operator.operator_estimate().is_none() && operator.operator.form() == Form::LeadLag);
     }
     let names: Vec<&str> = fit.gains_at(30.0).gains.iter().map(|g| g.name).collect();
     assert_eq!(names, ["K", "K_over_T_I", "T_L"]);
@@ -205,7 +205,7 @@ fn study(runs: u64) -> Vec<(String, Vec<f64>)> {
         };
         let fit = estimator.fit(records).unwrap();
         assert!(fit.termination().converged(), "{}", fit.termination());
-        assert!(fit.change_found());
+        assert!(fit.has_change());
         for ((name, errors), (_, expected)) in all.iter_mut().zip(truth()) {
             let parameter = fit.parameter(name).unwrap();
             if ["t_M", "G"].contains(&name.as_str()) && parameter.remark == Some(Remark::ChangePoint) {
@@ -317,12 +317,12 @@ fn no_change_is_reported() {
     let record = run(&late, 0);
     let records = std::slice::from_ref(&record);
     let fit = estimator(Form::LeadLag).fit(records).unwrap();
-    assert!(!fit.change_found());
+    assert!(!fit.has_change());
     assert_eq!(fit.parameter("t_M").unwrap().remark, Some(Remark::NoChange));
     let steady = fit.constant_operator();
     let gain = steady.get("K_over_T_I").unwrap();
     assert!(
-        (gain.value - ENDS[0][0]).abs() < 4.0 * gain.standard_error.unwrap(),
+        (gain.value - END_PARAMETERS[0][0]).abs() < 4.0 * gain.standard_error.unwrap(),
         "{gain}"
     );
     assert_eq!(fit.gains_at(20.0).gains, fit.gains_at(50.0).gains);

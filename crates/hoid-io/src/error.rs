@@ -1,10 +1,10 @@
 //! All errors of files, described for the user who has to correct the file.
 
-use hoid_model::{ModelError, numbers::counted};
+use hoid_model::{ModelError, numbers::count_with_noun};
 use thiserror::Error;
 
 use crate::table::ColumnOption;
-use crate::wording::{list, sparse_option};
+use crate::wording::{list_names, sparse_option};
 
 /// Reason why a file could not be read or written. Each message gives the file, the place in it, the contents found,
 /// the expected contents and the remedy. A `place` is "line 12" if the format has lines, otherwise "row 12".
@@ -20,7 +20,7 @@ pub enum IoError {
         source: std::io::Error,
     },
     /// A file that cannot be written to the file system.
-    #[error("{file} cannot be written: {source}; {}", remedy_of_writing(source))]
+    #[error("{file} cannot be written: {source}; {}", write_error_remedy(source))]
     Unwritable {
         /// Name of the file.
         file: String,
@@ -158,8 +158,8 @@ pub enum IoError {
     #[error(
         "{file}, {place}: the header has {}, expected {} as in the rows below it; write one name for each column in \
          this line, and put names of several words in quotation marks or join them (Roll_error)",
-        counted(*words, "word"),
-        counted(*cells, "name")
+        count_with_noun(*words, "word"),
+        count_with_noun(*cells, "name")
     )]
     Words {
         /// Name of the file.
@@ -199,7 +199,7 @@ pub enum IoError {
     /// A row that is shorter or longer than the header.
     #[error(
         "{file}, {place}: {found} values, expected {expected} as in the header; {}",
-        remedy_of_row(*found, *expected)
+        row_length_remedy(*found, *expected)
     )]
     RowLength {
         /// Name of the file.
@@ -360,7 +360,7 @@ pub enum IoError {
     #[error(
         "{file}: {}, expected at least 2 to determine the sampling rate from t; check the file and the span, or give \
          --fs HZ",
-        counted(*found, "sample")
+        count_with_noun(*found, "sample")
     )]
     TooFewSamples {
         /// Name of the file.
@@ -369,7 +369,7 @@ pub enum IoError {
         found: usize,
     },
     /// Several trials where a single trial is expected.
-    #[error("{file} holds {} trials by {by}: {}; read one of them with --trial {by}={}", .trials.len(), listed(.trials), .trials.first().map_or("", |name| name.as_str()))]
+    #[error("{file} holds {} trials by {by}: {}; read one of them with --trial {by}={}", .trials.len(), list_of_names(.trials), .trials.first().map_or("", |name| name.as_str()))]
     SeveralTrials {
         /// Name of the file.
         file: String,
@@ -628,7 +628,7 @@ pub enum IoError {
 }
 
 /// Returns the remedy for a row of another length than the header.
-fn remedy_of_row(found: usize, expected: usize) -> &'static str {
+fn row_length_remedy(found: usize, expected: usize) -> &'static str {
     // In such a row, decimal commas split each number into two cells.
     if expected > 1 && expected.checked_mul(2) == Some(found) {
         "if the numbers have decimal commas, save the table with semicolons or tabs between the columns; otherwise look \
@@ -639,7 +639,7 @@ fn remedy_of_row(found: usize, expected: usize) -> &'static str {
 }
 
 /// Returns the remedy for a file that cannot be written.
-fn remedy_of_writing(source: &std::io::Error) -> &'static str {
+fn write_error_remedy(source: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
     // An I/O error inside an error of the CSV writer determines the remedy.
     let wrapped = source.get_ref().and_then(|inner| inner.downcast_ref::<csv::Error>());
@@ -656,6 +656,6 @@ fn remedy_of_writing(source: &std::io::Error) -> &'static str {
 }
 
 /// Lists names as text.
-fn listed(names: &[String]) -> String {
-    list(&names.iter().map(String::as_str).collect::<Vec<_>>())
+fn list_of_names(names: &[String]) -> String {
+    list_names(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }

@@ -6,7 +6,7 @@ use std::io::{self, Read as _};
 use std::path::Path;
 
 use crate::IoError;
-use crate::formats::Settings;
+use crate::formats::SettingsFormat;
 
 /// Reads a text file.
 ///
@@ -35,8 +35,12 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
     let is_json = path
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    let kind = if is_json { Settings::Json } else { Settings::Toml };
-    let longest = kind.longest();
+    let kind = if is_json {
+        SettingsFormat::Json
+    } else {
+        SettingsFormat::Toml
+    };
+    let longest = kind.max_bytes();
     let mut text = String::new();
     fs::File::open(path)?
         .take(longest.saturating_add(1))
@@ -48,7 +52,7 @@ pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
         "the settings exceed {} MB; if this size is intended, set HOID_MAX_UNPACKED_MB in the environment to {} times \
          the size in MB",
         longest >> 20,
-        kind.share()
+        kind.limit_divisor()
     )))
 }
 

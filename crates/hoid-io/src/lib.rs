@@ -24,8 +24,8 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `formats` | the file formats, one module per format, and their common parts; [`readable_endings`] |
-//! | `table` | the columns of a file of any format; [`ColumnExpression`], [`error_among`]: selection of columns |
+//! | `formats` | the file formats, one module per format, and their common parts; [`readable_extensions`] |
+//! | `table` | the columns of a file of any format; [`ColumnExpression`], [`find_error_column`]: selection of columns |
 //! | `time` | [`TimeChoice`]: choice of the time column; [`even_times`]: check that the times are evenly spaced |
 //! | `record` | [`read_record`], [`read_aligned`], [`read_segments`] with [`ReadOptions`]; [`write_record`] |
 //! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the list of applied steps |
@@ -57,9 +57,9 @@ mod table;
 mod time;
 mod wording;
 
-pub use data_quality::{QualityIssue, QualityIssueKind, RowSpan, quality_of_record};
+pub use data_quality::{QualityIssue, QualityIssueKind, RowSpan, issues_of_channels};
 pub use error::IoError;
-pub use formats::{readable_endings, writable_endings};
+pub use formats::{readable_extensions, writable_extensions};
 pub use input_file::{file_names, read_bytes, read_settings, read_text};
 pub use output::{
     DirectoryLock, check_output, check_output_directory, is_same_file, make_directory, remove_unfinished_files,
@@ -67,7 +67,7 @@ pub use output::{
 };
 pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
 pub use record::{
-    ReadOptions, ReadRecord, Repair, Sparse, TrialChoice, read, read_aligned, read_prepared, read_record,
+    ReadOptions, ReadRecord, Repair, SparseTreatment, TrialChoice, read, read_aligned, read_prepared, read_record,
     read_segments, write_record, write_record_csv,
 };
 pub use results::{
@@ -75,10 +75,10 @@ pub use results::{
     check_table_path, is_fit_file, parse_fit, read_fit, read_table, write_table,
 };
 pub use scenario::{
-    AnyScenario, ScenarioChangeError, ScenarioChanges, ScenarioFileError, WHOLE_KEYS, family_scenario_schema,
+    AnyScenario, LIST_VALUED_KEYS, ScenarioChangeError, ScenarioChanges, ScenarioFileError, family_scenario_schema,
     parse_any_scenario, parse_scenario, read_any_scenario, read_scenario, scenario_schema,
 };
 pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
-pub use table::{ColumnExpression, ColumnOption, control_among, error_among};
+pub use table::{ColumnExpression, ColumnOption, find_control_column, find_error_column};
 pub use time::{TimeChoice, even_times};
-pub use wording::printable;
+pub use wording::escape_control_characters;

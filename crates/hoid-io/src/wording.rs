@@ -2,13 +2,13 @@
 
 use std::borrow::Cow;
 
-use crate::table::{control_among, error_among};
+use crate::table::{find_control_column, find_error_column};
 
 /// Maximum length, in characters, of a cell quoted in a message.
 const MAX_CELL_CHARS: usize = 40;
 
 /// Formats a cell or a name for a message: shortened, and without terminal control characters.
-pub(crate) fn shown(text: &str) -> String {
+pub(crate) fn abbreviate(text: &str) -> String {
     let text = text.trim();
     let cut = match text.char_indices().nth(MAX_CELL_CHARS) {
         Some((at, _)) => Cow::Owned(format!("{}...", &text[..at])),
@@ -18,11 +18,11 @@ pub(crate) fn shown(text: &str) -> String {
 }
 
 /// Number of bytes at the start of a file that a message quotes.
-const FIRST_BYTES: usize = 12;
+const QUOTED_BYTES: usize = 12;
 
 /// Quotes the start of a file for a message about its format: `it starts with "..."`.
-pub(crate) fn start_of(bytes: &[u8]) -> String {
-    let start = bytes.get(..FIRST_BYTES).unwrap_or(bytes);
+pub(crate) fn quote_start(bytes: &[u8]) -> String {
+    let start = bytes.get(..QUOTED_BYTES).unwrap_or(bytes);
     format!("it starts with \"{}\"", String::from_utf8_lossy(start).escape_debug())
 }
 
@@ -31,7 +31,7 @@ const MAX_NAME_CHARS: usize = 80;
 
 /// Formats a column name for a message: a long name is shortened, and control characters are escaped; nothing else is
 /// changed.
-pub(crate) fn named(name: &str) -> String {
+pub(crate) fn format_name(name: &str) -> String {
     let mut text = String::with_capacity(name.len().min(4 * MAX_NAME_CHARS));
     for (at, character) in name.chars().enumerate() {
         if at == MAX_NAME_CHARS {
@@ -49,7 +49,7 @@ pub(crate) fn named(name: &str) -> String {
 
 /// Returns the command-line option for reading a sparse column.
 pub(crate) fn sparse_option(name: &str) -> String {
-    let name = named(name);
+    let name = format_name(name);
     if name.contains(char::is_whitespace) {
         format!("--sparse \"{name}=hold\"")
     } else {
@@ -60,7 +60,7 @@ pub(crate) fn sparse_option(name: &str) -> String {
 /// Escapes the terminal control characters, except line ends, of a message that may quote parts of a file; for example,
 /// escape is written as `\u{1b}`.
 #[must_use]
-pub fn printable(message: &str) -> String {
+pub fn escape_control_characters(message: &str) -> String {
     let mut text = String::with_capacity(message.len());
     for character in message.chars() {
         if character.is_control() && character != '\n' {
@@ -99,8 +99,8 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
         let best = known
             .max_by(|a, b| a.0.total_cmp(&b.0))
             .filter(|best| best.0 > MIN_SIMILARITY);
-        let meant = best.map(|best| best.1).or_else(|| by_role(&asked, names))?;
-        Some(format!("\"{}\"", named(&meant)))
+        let meant = best.map(|best| best.1).or_else(|| suggest_by_role(&asked, names))?;
+        Some(format!("\"{}\"", format_name(&meant)))
     };
     let near: Vec<String> = unknown.iter().filter_map(of).collect();
     if near.is_empty() {
@@ -112,20 +112,24 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
 
 /// Returns the column that holds the requested signal under another name: if `e` or `error` is requested, the column of
 /// the error; if `u` or `stick` is requested, the column of the control.
-fn by_role(asked: &str, names: &[&str]) -> Option<String> {
-    let default = match (error_among(&[asked]), control_among(&[asked])) {
-        (Some(_), _) => error_among(names),
-        (_, Some(_)) => control_among(names),
+fn suggest_by_role(asked: &str, names: &[&str]) -> Option<String> {
+    let default = match (find_error_column(&[asked]), find_control_column(&[asked])) {
+        (Some(_), _) => find_error_column(names),
+        (_, Some(_)) => find_control_column(names),
         _ => None,
     };
     default.map(str::to_owned)
 }
 
 /// Lists names for a message; a long list is shortened.
-pub(crate) fn list(names: &[&str]) -> String {
+pub(crate) fn list_names(names: &[&str]) -> String {
     const MAX_SHOWN_NAMES: usize = 40;
     let known: Vec<&str> = names.iter().copied().filter(|name| !name.is_empty()).collect();
-    let shown: Vec<String> = known.iter().take(MAX_SHOWN_NAMES).map(|name| named(name)).collect();
+    let shown: Vec<String> = known
+        .iter()
+        .take(MAX_SHOWN_NAMES)
+        .map(|name| format_name(name))
+        .collect();
     let mut text = shown.join(", ");
     match known.len() {
         0 => text.push_str("no named columns"),
@@ -136,13 +140,13 @@ pub(crate) fn list(names: &[&str]) -> String {
 }
 
 /// Formats a number for a message with up to nine significant digits, without trailing zeros.
-pub(crate) fn decimal(value: f64) -> String {
+pub(crate) fn format_decimal(value: f64) -> String {
     let rounded = format!("{value:.8e}").parse::<f64>().unwrap_or(value);
     format!("{rounded}")
 }
 
 /// Formats a number with up to four significant digits.
-pub(crate) fn short(value: f64) -> String {
+pub(crate) fn format_short(value: f64) -> String {
     let rounded = format!("{value:.3e}").parse::<f64>().unwrap_or(value);
     if rounded != 0.0 && !(1e-3..1e7).contains(&rounded.abs()) {
         format!("{rounded:e}")
@@ -175,7 +179,7 @@ mod tests {
 
     #[test]
     fn long_cells_are_shortened_and_escaped() {
-        let shown = shown(&"\u{1b}[31mé".repeat(1000));
+        let shown = abbreviate(&"\u{1b}[31mé".repeat(1000));
         assert!(shown.chars().count() < 200 && !shown.contains('\u{1b}'), "{shown}");
     }
 }

@@ -22,7 +22,7 @@ fn read(name: &str, input: &str, output: &str) -> ReadRecord {
     read_record(&fixture(name), &options(input, output)).unwrap()
 }
 
-fn refused(name: &str, input: &str, output: &str) -> String {
+fn refusal(name: &str, input: &str, output: &str) -> String {
     let message = read_record(&fixture(name), &options(input, output))
         .unwrap_err()
         .to_string();
@@ -39,7 +39,7 @@ fn u() -> Vec<f64> {
 }
 
 /// Compares values that may differ in the last bit, because the sine functions of two libraries do.
-fn close(found: &[f64], expected: &[f64]) {
+fn assert_close(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
     assert!(
         found
@@ -50,7 +50,7 @@ fn close(found: &[f64], expected: &[f64]) {
     );
 }
 
-fn same(found: &[f64], expected: &[f64]) {
+fn assert_identical(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
     assert!(
         found.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
@@ -59,10 +59,10 @@ fn same(found: &[f64], expected: &[f64]) {
 }
 
 /// e and u at 80 Hz.
-fn whole(read: &ReadRecord) {
+fn assert_complete_record(read: &ReadRecord) {
     assert_eq!(read.record.sample_time().s(), 0.0125);
-    close(read.record.input(), &e());
-    close(read.record.output(), &u());
+    assert_close(read.record.input(), &e());
+    assert_close(read.record.output(), &u());
 }
 
 fn channel<'a>(read: &'a ReadRecord, name: &str) -> &'a [f64] {
@@ -79,17 +79,17 @@ fn numpy_archives_are_read() {
         "npz/kinds.npz",
     ] {
         if name.contains("kinds") {
-            close(read(name, "column", "row").record.input(), &e());
+            assert_close(read(name, "column", "row").record.input(), &e());
         } else {
-            whole(&read(name, "e", "u"));
+            assert_complete_record(&read(name, "e", "u"));
         }
     }
     let twice: Vec<f64> = e().iter().map(|e| 2.0 * e).collect();
-    close(
+    assert_close(
         channel(&read("npz/savez_compressed.npz", "e", "x[:,1]"), "x[:,1]"),
         &twice,
     );
-    close(
+    assert_close(
         channel(&read("npz/savez_compressed.npz", "e", "f[0,:]"), "f[0,:]"),
         &u(),
     );
@@ -101,7 +101,7 @@ fn numpy_archives_are_read() {
     for path in ["z", "when", "cube", "empty", "objects", "short", "names"] {
         assert!(notes.contains(path), "{notes}");
     }
-    close(read("npz/others.npz", "e", "part.a").record.output(), &u());
+    assert_close(read("npz/others.npz", "e", "part.a").record.output(), &u());
 }
 
 #[test]
@@ -125,17 +125,17 @@ fn numpy_types_are_read() {
 fn single_numpy_arrays_are_read() {
     let found = read("npz/structured.npy", "e", "u");
     assert_eq!(found.record.sample_time().s(), 0.0125);
-    close(found.record.input(), &e());
+    assert_close(found.record.input(), &e());
     let single: Vec<f64> = u().iter().map(|u| f64::from(*u as f32)).collect();
-    same(found.record.output(), &single);
+    assert_identical(found.record.output(), &single);
     let counted = ReadOptions {
         sampling_hz: Some(80.0),
         ..options("arr_0[:,1]", "arr_0[:,2]")
     };
-    whole(&read_record(&fixture("npz/matrix.npy"), &counted).unwrap());
+    assert_complete_record(&read_record(&fixture("npz/matrix.npy"), &counted).unwrap());
 }
 
-fn times(factor: f64, values: &[f64]) -> Vec<f64> {
+fn scaled(factor: f64, values: &[f64]) -> Vec<f64> {
     values.iter().map(|value| factor * value).collect()
 }
 
@@ -143,10 +143,10 @@ fn times(factor: f64, values: &[f64]) -> Vec<f64> {
 fn matlab_variables_are_read() {
     for name in ["octave_v6", "octave_v7", "scipy_v7", "h5py_v73"] {
         let name = format!("mat/{name}.mat");
-        whole(&read(&name, "e", "u"));
-        close(channel(&read(&name, "e", "x(:,2)"), "x(:,2)"), &times(2.0, &e()));
+        assert_complete_record(&read(&name, "e", "u"));
+        assert_close(channel(&read(&name, "e", "x(:,2)"), "x(:,2)"), &scaled(2.0, &e()));
         if name != "mat/h5py_v73.mat" {
-            close(channel(&read(&name, "e", "u"), "wide(2,:)"), &times(3.0, &u()));
+            assert_close(channel(&read(&name, "e", "u"), "wide(2,:)"), &scaled(3.0, &u()));
         }
         // Elements of structures, selected by their full path and by the end of the path, with the nearest time.
         for run in 1..=3_i32 {
@@ -154,32 +154,32 @@ fn matlab_variables_are_read() {
             for path in ["run", "data.run"] {
                 let found = read(&name, &format!("{path}({run}).e"), &format!("{path}({run}).u"));
                 assert_eq!(found.record.sample_time().s(), 0.0125);
-                close(found.record.input(), &times(factor, &e()));
-                close(found.record.output(), &times(factor, &u()));
+                assert_close(found.record.input(), &scaled(factor, &e()));
+                assert_close(found.record.output(), &scaled(factor, &u()));
             }
         }
-        close(read(&name, "deep.e", "deep.u").record.output(), &times(5.0, &u()));
-        whole(&read(&name, "c{1}", "c{3}"));
+        assert_close(read(&name, "deep.e", "deep.u").record.output(), &scaled(5.0, &u()));
+        assert_complete_record(&read(&name, "c{1}", "c{3}"));
         assert_eq!(channel(&read(&name, "e", "u"), "flag")[..3], [1.0, 0.0, 1.0]);
-        let message = refused(&name, "z", "u");
+        let message = refusal(&name, "z", "u");
         assert!(message.contains("z holds complex numbers"), "{message}");
-        let message = refused(&name, "e", "run(4).e");
+        let message = refusal(&name, "e", "run(4).e");
         assert!(
             message.contains("run(4).e") && message.contains("data.run(3).e"),
             "{message}"
         );
-        let message = refused(&name, "e", "run(1).who");
+        let message = refusal(&name, "e", "run(1).who");
         assert!(message.contains("run(1).who holds text"), "{message}");
     }
     for name in ["mat/octave_v4.mat", "mat/scipy_v4.mat"] {
-        whole(&read(name, "e", "u"));
+        assert_complete_record(&read(name, "e", "u"));
     }
-    whole(&read("mat/h5py_latest_v73.mat", "e", "u"));
-    close(channel(&read("mat/h5py_v73.mat", "e", "u"), "big"), &e());
+    assert_complete_record(&read("mat/h5py_latest_v73.mat", "e", "u"));
+    assert_close(channel(&read("mat/h5py_v73.mat", "e", "u"), "big"), &e());
     for name in ["mat/octave_v7.mat", "mat/h5py_v73.mat"] {
         let found = read(name, "e", "u");
         let fine: Vec<f64> = e().iter().map(|e| f64::from(*e as f32)).collect();
-        same(channel(&found, "fine"), &fine);
+        assert_identical(channel(&found, "fine"), &fine);
         assert_eq!(channel(&found, "count")[39], 39.0);
     }
     let found = read("mat/octave_v7.mat", "e", "u");
@@ -192,18 +192,18 @@ fn matlab_variables_are_read() {
 }
 
 #[test]
-fn hdf5_of_h5py_is_read() {
+fn h5py_files_are_read() {
     let name = "mat/h5py.h5";
-    whole(&read(name, "e", "u"));
-    whole(&read(name, "session.run1.e", "session.run1.u"));
+    assert_complete_record(&read(name, "e", "u"));
+    assert_complete_record(&read(name, "session.run1.e", "session.run1.u"));
     // Lines of a matrix are counted as in numpy.
-    close(channel(&read(name, "e", "u"), "u"), &u());
+    assert_close(channel(&read(name, "e", "u"), "u"), &u());
     let counted = ReadOptions {
         sampling_hz: Some(80.0),
         ..options("x[:,1]", "x[:,2]")
     };
     let found = read_record(&fixture(name), &counted).unwrap();
-    close(found.record.output(), &times(2.0, &e()));
+    assert_close(found.record.output(), &scaled(2.0, &e()));
 }
 
 #[test]
@@ -211,30 +211,30 @@ fn hdf5_tables_of_records_are_read() {
     let name = "mat/h5py_table.h5";
     for (input, output) in [("run.e", "run.u"), ("e", "u")] {
         let found = read(name, input, output);
-        close(found.record.input(), &e());
-        close(found.record.output(), &u());
+        assert_close(found.record.input(), &e());
+        assert_close(found.record.output(), &u());
         assert_eq!(found.record.sample_time().s(), 0.0125);
     }
     let counted = channel(&read(name, "run.e", "run.u"), "n").to_vec();
     assert!(counted.iter().enumerate().all(|(k, n)| *n == k as f64), "{counted:?}");
-    let message = refused(name, "run.mark", "run.u");
+    let message = refusal(name, "run.mark", "run.u");
     assert!(message.contains("something other than numbers"), "{message}");
 }
 
 #[test]
 fn matlab_objects_are_refused_with_an_export_command() {
-    let message = refused("mat/h5py_objects_v73.mat", "runs", "stick");
+    let message = refusal("mat/h5py_objects_v73.mat", "runs", "stick");
     assert!(
         message.contains("runs holds an object of the class timetable") && message.contains("x.Properties.RowTimes"),
         "{message}"
     );
-    let message = refused("mat/h5py_objects_v73.mat", "stick", "runs");
+    let message = refusal("mat/h5py_objects_v73.mat", "stick", "runs");
     assert!(
         message.contains("timeseries") && message.contains("x.Time"),
         "{message}"
     );
     // The missing name may be inside the object.
-    let message = refused("mat/h5py_objects_v73.mat", "e", "u");
+    let message = refusal("mat/h5py_objects_v73.mat", "e", "u");
     assert!(
         message.contains("runs holds an object of the class timetable"),
         "{message}"
@@ -243,14 +243,14 @@ fn matlab_objects_are_refused_with_an_export_command() {
 
 #[test]
 fn names_are_searched_in_nested_structures() {
-    let message = refused("mat/octave_struct.mat", "e", "u");
+    let message = refusal("mat/octave_struct.mat", "e", "u");
     assert!(
         message.contains("\"e\" matches data.run(1).e, data.run(2).e"),
         "{message}"
     );
-    close(
+    assert_close(
         read("mat/octave_struct.mat", "deep.e", "deep.u").record.input(),
-        &times(5.0, &e()),
+        &scaled(5.0, &e()),
     );
     // Deeply nested structures.
     let dir = tempfile::tempdir().unwrap();
@@ -313,30 +313,30 @@ fn xdf_streams_are_joined() {
     assert_eq!(record.channels().find(|c| c.name == "u").unwrap().unit, "N");
     assert_eq!(record.channels().find(|c| c.name == "e").unwrap().unit, "deg");
     assert_eq!(channel(&found, "twice u")[3], 2.0 * record.output()[3]);
-    let message = refused("xdf/tracking.xdf", "Events.ch1", "u");
+    let message = refusal("xdf/tracking.xdf", "Events.ch1", "u");
     assert!(message.contains("Events.ch1 holds text"), "{message}");
 }
 
 #[test]
 fn unusable_variables_are_refused_with_the_reason() {
-    let message = refused("npz/others.npz", "z", "u");
+    let message = refusal("npz/others.npz", "z", "u");
     assert!(
         message.contains("z holds complex numbers") && message.contains("real numbers"),
         "{message}"
     );
-    let message = refused("npz/others.npz", "e", "short");
+    let message = refusal("npz/others.npz", "e", "short");
     assert!(
         message.contains("short holds 7 values, expected 40 as in e"),
         "{message}"
     );
-    let message = refused("npz/others.npz", "e", "w");
+    let message = refusal("npz/others.npz", "e", "w");
     assert!(
         message.contains("no column \"w\"") && message.contains("cube"),
         "{message}"
     );
-    let message = refused("npz/others.npz", "objects", "u");
+    let message = refusal("npz/others.npz", "objects", "u");
     assert!(message.contains("Python objects"), "{message}");
-    let message = refused("npz/others.npz", "empty", "empty");
+    let message = refusal("npz/others.npz", "empty", "empty");
     assert!(message.contains("no samples"), "{message}");
     let dir = tempfile::tempdir().unwrap();
     for (name, bytes, word) in [
@@ -356,7 +356,7 @@ fn unusable_variables_are_refused_with_the_reason() {
     }
 }
 
-const WRITTEN: [&str; 2] = ["npz", "mat"];
+const WRITTEN_FORMATS: [&str; 2] = ["npz", "mat"];
 
 /// Numbers in [-1, 1) from a linear congruential generator (Knuth's MMIX constants).
 struct Draw(u64);
@@ -398,7 +398,7 @@ fn record(n: usize, ts: f64, start: f64) -> Record {
 #[test]
 fn records_round_trip_bit_for_bit() {
     let dir = tempfile::tempdir().unwrap();
-    for extension in WRITTEN {
+    for extension in WRITTEN_FORMATS {
         let path = dir.path().join("run").with_extension(extension);
         for (n, ts, start) in [
             (5000, 0.01, 0.0),
@@ -421,7 +421,7 @@ fn records_round_trip_bit_for_bit() {
             for channel in record.channels() {
                 let other = back.channels().find(|c| c.name == channel.name).unwrap();
                 assert_eq!(other.unit, channel.unit, "{}", channel.name);
-                same(&other.values, &channel.values);
+                assert_identical(&other.values, &channel.values);
             }
         }
     }
@@ -429,10 +429,10 @@ fn records_round_trip_bit_for_bit() {
 
 /// Truncated files and files with modified bytes give values or an error that names the file, but never a panic.
 #[test]
-fn damaged_files_never_panic() {
+fn damaged_files_do_not_cause_a_panic() {
     let dir = tempfile::tempdir().unwrap();
     let mut seeds = Vec::new();
-    for extension in WRITTEN {
+    for extension in WRITTEN_FORMATS {
         let path = dir.path().join("seed").with_extension(extension);
         write_record(&path, &record(20, 0.01, 0.0)).unwrap();
         seeds.push(path);

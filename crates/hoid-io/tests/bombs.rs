@@ -17,24 +17,25 @@ mod mutations;
 use std::{fs, path::PathBuf};
 
 use bombs::{
-    FORMATS, burst, mat, npz,
-    parquet::{GROUP, Page, columns, groups, page},
+    FORMATS, mat, npz,
+    parquet::{Page, ROWS_PER_GROUP, file_with_columns, file_with_groups, file_with_page},
+    run_bomb,
     zeros::{self, MEGABYTE},
 };
 use hoid_io::{read_any_scenario, read_fit, read_table, survey};
 use parquet::basic::{Compression, GzipLevel};
 
 /// Largest memory of the process, kB, on systems that report it.
-const MAX_KB: u64 = 300_000;
+const MAX_MEMORY_KB: u64 = 300_000;
 /// Number of bombs of each format.
-const SAMPLE: u64 = 5;
+const BOMBS_PER_FORMAT: u64 = 5;
 
 #[test]
 fn decompression_bombs_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     let at = |name: &str| -> PathBuf { directory.path().join(name) };
     let zipped = |values: usize, unpacked: usize, megabytes: usize| {
-        page(&Page {
+        file_with_page(&Page {
             compression: Compression::GZIP(GzipLevel::default()),
             optional: false,
             values: values as u64,
@@ -42,7 +43,7 @@ fn decompression_bombs_are_refused() {
             packed: &zeros::gzip(megabytes),
         })
     };
-    let stated = page(&Page {
+    let stated = file_with_page(&Page {
         compression: Compression::SNAPPY,
         optional: false,
         values: 100,
@@ -57,17 +58,17 @@ fn decompression_bombs_are_refused() {
     for (name, bytes, message) in [
         (
             "constant.parquet",
-            groups("message m { required double e; }", 64, GROUP),
+            file_with_groups("message m { required double e; }", 64, ROWS_PER_GROUP),
             unpacks,
         ),
         (
             "dates.parquet",
-            groups("message m { required int64 t (TIMESTAMP_MICROS); }", 64, GROUP),
+            file_with_groups("message m { required int64 t (TIMESTAMP_MICROS); }", 64, ROWS_PER_GROUP),
             unpacks,
         ),
         (
             "texts.parquet",
-            groups("message m { required binary e (UTF8); }", 1, GROUP),
+            file_with_groups("message m { required binary e (UTF8); }", 1, ROWS_PER_GROUP),
             unpacks,
         ),
         (
@@ -77,10 +78,10 @@ fn decompression_bombs_are_refused() {
         ),
         ("lying.parquet", zipped(100, 800, 1024), "a page is longer than stated"),
         ("stated.parquet", stated, unpacks),
-        ("many.parquet", columns(10_001), "10001"),
+        ("many.parquet", file_with_columns(10_001), "10001"),
         (
             "zeros.npz",
-            npz::archive(&[npz::member("e", &npz::head("<f8", &[16 * MEGABYTE, 0]), 128)]),
+            npz::archive(&[npz::member("e", &npz::array_header("<f8", &[16 * MEGABYTE, 0]), 128)]),
             unpacks,
         ),
         (
@@ -90,7 +91,7 @@ fn decompression_bombs_are_refused() {
         ),
         (
             "texts.npz",
-            npz::archive(&[npz::member("e", &npz::head("|S1", &[8 * MEGABYTE, 0]), 8)]),
+            npz::archive(&[npz::member("e", &npz::array_header("|S1", &[8 * MEGABYTE, 0]), 8)]),
             unpacks,
         ),
         (
@@ -117,18 +118,18 @@ fn decompression_bombs_are_refused() {
     assert!(message.contains("the settings exceed 10 MB"), "{message}");
     drop(values);
     if let Some(peak) = memory::peak_kb() {
-        assert!(peak < MAX_KB, "{peak} kB");
+        assert!(peak < MAX_MEMORY_KB, "{peak} kB");
     }
     for (format, ending, maker) in FORMATS {
         let path = at("bomb").with_extension(ending);
-        let refused: u64 = (0..SAMPLE)
+        let refused: u64 = (0..BOMBS_PER_FORMAT)
             .map(|k| {
-                let refused = burst(&path, maker, k).0.refused;
+                let refused = run_bomb(&path, maker, k).0.refused;
                 let peak = memory::peak_kb().unwrap_or(0);
-                assert!(peak < MAX_KB, "{format} {k}: {peak} kB");
+                assert!(peak < MAX_MEMORY_KB, "{format} {k}: {peak} kB");
                 refused
             })
             .sum();
-        assert!(refused >= SAMPLE / 2, "{format}: {refused} refused");
+        assert!(refused >= BOMBS_PER_FORMAT / 2, "{format}: {refused} refused");
     }
 }

@@ -13,24 +13,27 @@ use mutations::{case, originals::originals, readers};
 
 /// A seed that differs from the seed of the page.
 const SEED: u64 = 5;
-const CASES: u64 = 2000;
+const CASE_COUNT: u64 = 2000;
 
 #[test]
 fn damaged_files_are_read_or_refused() {
     let originals = originals();
     let directory = tempfile::tempdir().unwrap();
     let (mut read, mut refused) = (0, 0);
-    for number in 0..CASES {
+    for number in 0..CASE_COUNT {
         let case = case(&originals, SEED, number);
         let path = directory.path().join(format!("{number}.{}", case.extension));
         fs::write(&path, &case.bytes).unwrap();
-        let answers = readers::all(&path, case.bytes.len(), case.choice);
+        let answers = readers::read_with_all(&path, case.bytes.len(), case.choice);
         read += answers.read;
         refused += answers.refused;
         fs::remove_file(&path).unwrap();
     }
     // Both valid and refused files occur.
-    assert!(read > CASES / 2 && refused > CASES, "{read} read, {refused} refused");
+    assert!(
+        read > CASE_COUNT / 2 && refused > CASE_COUNT,
+        "{read} read, {refused} refused"
+    );
 }
 
 #[test]
@@ -46,12 +49,12 @@ fn cases_are_reproducible_and_originals_are_readable() {
     for original in &originals {
         let path = directory.path().join("good").with_extension(original.extension);
         fs::write(&path, &original.bytes).unwrap();
-        let answers = readers::all(&path, original.bytes.len(), 1);
+        let answers = readers::read_with_all(&path, original.bytes.len(), 1);
         assert!(answers.read > 0, "{}", original.name);
         if let Some(inside) = &original.inside {
-            fs::write(&path, inside.packed()).unwrap();
+            fs::write(&path, inside.pack()).unwrap();
             assert!(
-                readers::all(&path, original.bytes.len(), 1).read > 0,
+                readers::read_with_all(&path, original.bytes.len(), 1).read > 0,
                 "{} packed",
                 original.name
             );

@@ -6,7 +6,7 @@ mod common;
 
 use std::io::Write;
 
-use common::Desk;
+use common::TestFolder;
 use flate2::{Compression, write::GzEncoder};
 use hoid_io::{ReadOptions, read_record};
 
@@ -18,7 +18,7 @@ fn gzip(text: &[u8]) -> Vec<u8> {
 
 #[test]
 fn compressed_tables_and_sidecars_are_read() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     std::fs::write(desk.path("run.csv.gz"), gzip(b"t,e,u\n0,1,2\n0.02,3,4\n")).unwrap();
     let read = read_record(&desk.path("run.csv.gz"), &ReadOptions::default()).unwrap();
     assert_eq!(
@@ -73,7 +73,7 @@ fn compressed_tables_and_sidecars_are_read() {
 /// directory.
 #[test]
 fn inherited_sidecars_are_read() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let folder = desk.path("sub-01/ses-1/beh");
     std::fs::create_dir_all(&folder).unwrap();
     let options = ReadOptions {
@@ -112,7 +112,7 @@ fn inherited_sidecars_are_read() {
 
 #[test]
 fn channel_tables_of_motion_recordings_are_read() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let name = desk.path("sub-01_task-track_motion.tsv");
     std::fs::write(&name, "1\t2\n3\t4\n5\t6\n").unwrap();
     std::fs::write(

@@ -6,7 +6,7 @@ mod common;
 
 use std::{fs, path::Path};
 
-use common::{Desk, defaults, options};
+use common::{TestFolder, default_options, options};
 use hoid_io::{IoError, ReadOptions, ReadRecord, Repair, read_record, write_record};
 use hoid_model::{Channel, Record, SampleTime};
 
@@ -52,7 +52,7 @@ fn record(n: usize, ts: f64, start: f64) -> Record {
 
 #[test]
 fn csv_records_round_trip_bit_for_bit() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let path = desk.path("run.csv");
     for (n, ts, start) in [
         (5000, 0.01, 0.0),
@@ -67,7 +67,7 @@ fn csv_records_round_trip_bit_for_bit() {
     ] {
         let record = record(n, ts, start);
         write_record(&path, &record).unwrap();
-        let back = read_record(&path, &defaults()).unwrap();
+        let back = read_record(&path, &default_options()).unwrap();
         assert!(back.notes.is_empty(), "{:?}", back.notes);
         let back = back.record;
         assert_eq!(back.sample_time().s().to_bits(), ts.to_bits(), "{n} samples of {ts} s");
@@ -91,7 +91,7 @@ fn csv_records_round_trip_bit_for_bit() {
 
 #[test]
 fn columns_are_written_in_task_order() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let path = desk.path("run.csv");
     write_record(&path, &record(3, 0.01, 0.0)).unwrap();
     let text = fs::read_to_string(&path).unwrap();
@@ -105,13 +105,13 @@ fn columns_are_written_in_task_order() {
 
 #[test]
 fn channel_roles_round_trip() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let seen = Channel::new("seen", "deg", vec![1.0, 2.0, 3.0]).with_role("feedforward:0.5");
     let written = record(3, 0.01, 0.0).with_channel(seen).unwrap();
     for name in ["run.csv", "run.parquet", "run.npz", "run.mat"] {
         let path = desk.path(name);
         write_record(&path, &written).unwrap();
-        let read = read_record(&path, &defaults()).unwrap().record;
+        let read = read_record(&path, &default_options()).unwrap().record;
         let roles = read.channels().filter(|c| !c.role.is_empty());
         let roles: Vec<(&str, &str)> = roles.map(|c| (c.name.as_str(), c.role.as_str())).collect();
         assert_eq!(roles, [("seen", "feedforward:0.5")], "{name}");
@@ -122,7 +122,7 @@ fn channel_roles_round_trip() {
 
 #[test]
 fn unreadable_channel_names_are_not_written() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     for name in ["t", "", " x"] {
         let record = record(3, 0.01, 0.0)
             .with_channel(Channel::new(name, "", vec![0.0; 3]))
@@ -135,10 +135,12 @@ fn unreadable_channel_names_are_not_written() {
 
 #[test]
 fn other_extensions_and_missing_files_are_errors() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     for name in ["run.xlsx", "run", "run.npz.gz", "run.dat"] {
         fs::write(desk.path(name), "PK\u{3}\u{4}\0\0 words only").unwrap();
-        let message = read_record(&desk.path(name), &defaults()).unwrap_err().to_string();
+        let message = read_record(&desk.path(name), &default_options())
+            .unwrap_err()
+            .to_string();
         assert!(
             message.contains("extension") && message.contains("; expected .csv"),
             "{message}"
@@ -146,13 +148,19 @@ fn other_extensions_and_missing_files_are_errors() {
         assert!(write_record(&desk.path(name), &record(3, 0.01, 0.0)).is_err());
     }
     fs::write(desk.path("run.TSV"), "t\te\tu\n0\t1\t2\n1\t1\t2\n").unwrap();
-    assert_eq!(read_record(&desk.path("run.TSV"), &defaults()).unwrap().record.len(), 2);
+    assert_eq!(
+        read_record(&desk.path("run.TSV"), &default_options())
+            .unwrap()
+            .record
+            .len(),
+        2
+    );
     assert!(matches!(
-        read_record(desk.dir.path(), &defaults()),
+        read_record(desk.dir.path(), &default_options()),
         Err(IoError::Directory { .. })
     ));
     assert!(matches!(
-        read_record(&desk.path("no.csv"), &defaults()),
+        read_record(&desk.path("no.csv"), &default_options()),
         Err(IoError::Unreadable { .. })
     ));
 }
@@ -160,7 +168,7 @@ fn other_extensions_and_missing_files_are_errors() {
 /// A text table is recognised by its contents, regardless of the name of the file.
 #[test]
 fn text_tables_with_other_extensions_are_read() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let rows = |mark: &str| format!("t{mark}e{mark}u\n0.00{mark}1{mark}2\n0.01{mark}3{mark}4\n0.02{mark}5{mark}6\n");
     for name in [
         "run.dat",
@@ -173,7 +181,7 @@ fn text_tables_with_other_extensions_are_read() {
     ] {
         for mark in [",", ";", "\t", " ", " | ", "|"] {
             fs::write(desk.path(name), rows(mark)).unwrap();
-            let read = read_record(&desk.path(name), &defaults()).unwrap().record;
+            let read = read_record(&desk.path(name), &default_options()).unwrap().record;
             assert_eq!(read.input(), [1.0, 3.0, 5.0], "{name} {mark}");
             assert_eq!(read.output(), [2.0, 4.0, 6.0], "{name} {mark}");
             assert_eq!(read.sample_time().s(), 0.01, "{name} {mark}");
@@ -187,13 +195,15 @@ fn text_tables_with_other_extensions_are_read() {
         "[table]\nx = [1, 2]\n",
     ] {
         fs::write(desk.path("run.dat"), words).unwrap();
-        let message = read_record(&desk.path("run.dat"), &defaults()).unwrap_err().to_string();
+        let message = read_record(&desk.path("run.dat"), &default_options())
+            .unwrap_err()
+            .to_string();
         assert!(
             message.contains(".dat is not the extension of a record format"),
             "{message}"
         );
     }
-    let message = read_record(&desk.path("missing.dat"), &defaults())
+    let message = read_record(&desk.path("missing.dat"), &default_options())
         .unwrap_err()
         .to_string();
     assert!(message.contains(".dat is not the extension"), "{message}");
@@ -203,13 +213,13 @@ fn text_tables_with_other_extensions_are_read() {
 /// missing value.
 #[test]
 fn number_notations_of_many_programs_are_read() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let fill = ReadOptions {
         repair: hoid_io::Repair {
             fill: true,
             ..Default::default()
         },
-        ..defaults()
+        ..default_options()
     };
     for (mark, half, large, missing) in [
         (";", "0,5", "-1.234,5", "n.a."),
@@ -240,12 +250,12 @@ fn number_notations_of_many_programs_are_read() {
 /// Rows below the table, repeated headers, preambles, and header cells that the rows lack do not change the record.
 #[test]
 fn lines_around_a_table_do_not_change_the_record() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let rows: Vec<String> = (0..30)
         .map(|k| format!("{:.2},{k},{}", 0.02 * f64::from(k), -k))
         .collect();
     let plain = format!("t,e,u\n{}\n", rows.join("\n"));
-    let expected = desk.read(&plain, &defaults()).unwrap().record;
+    let expected = desk.read(&plain, &default_options()).unwrap().record;
     let again = format!("t,e,u\n{}\nt,e,u\n{}\n", rows[..10].join("\n"), rows[10..].join("\n"));
     for (text, note) in [
         (format!("{plain}Mean,14.5,-14.5\n"), "the first is \"Mean,14.5,-14.5\""),
@@ -267,7 +277,7 @@ fn lines_around_a_table_do_not_change_the_record() {
         (plain.replace(',', "|"), "separated by vertical bars"),
     ] {
         let read = desk
-            .read(&text, &defaults())
+            .read(&text, &default_options())
             .unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(read.record, expected, "{text}");
         assert!(
@@ -292,7 +302,7 @@ fn lines_around_a_table_do_not_change_the_record() {
         plain.replace('\n', "\r\r\n"),
     ] {
         let read = desk
-            .read(&text, &defaults())
+            .read(&text, &default_options())
             .unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(read.record, expected, "{text}");
     }
@@ -300,7 +310,7 @@ fn lines_around_a_table_do_not_change_the_record() {
 
 #[test]
 fn column_expressions_select_and_combine() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let text = "# units: t s, r deg, y deg, stick mV\nt,r,y,stick\n0,1,0.25,3\n0.5,2,0.5,4\n";
     let ReadRecord { record, notes, .. } = desk.read(text, &options("r-y", "-stick")).unwrap();
     assert!(notes.is_empty());
@@ -324,7 +334,7 @@ fn column_expressions_select_and_combine() {
         .labelled("run");
     assert_eq!(again, record);
 
-    assert!(desk.error(text, &defaults()).contains(
+    assert!(desk.error(text, &default_options()).contains(
         "has no column \"e\" (requested: e); it has t, r, y, stick; select columns with --input and --output"
     ));
     let of_trial = ReadOptions {
@@ -354,8 +364,8 @@ fn column_expressions_select_and_combine() {
 /// Spreadsheet files with decimal commas: semicolons or tabs, a byte order mark, CRLF.
 #[test]
 fn decimal_commas_give_the_same_record() {
-    let desk = Desk::new();
-    let of = |text: &str| desk.read(text, &defaults()).unwrap();
+    let desk = TestFolder::new();
+    let of = |text: &str| desk.read(text, &default_options()).unwrap();
     let point = of("t,e,u\n0.00,-1.5,2e-3\n0.01,1.25,0\n0.02,1,5\n");
     for text in [
         "\u{feff}t;e;u\r\n0,00;-1,5;2e-3\r\n0,01;1,25;0\r\n0,02;1;5\r\n",
@@ -367,14 +377,17 @@ fn decimal_commas_give_the_same_record() {
         assert_eq!(comma.notes, ["the commas in the numbers are taken as decimal commas"]);
     }
     // A comma before three digits may separate thousands.
-    let message = desk.error("t,e,u\n0,\"1,500\",\"2,000\"\n1,\"1,250\",\"3,000\"\n", &defaults());
+    let message = desk.error(
+        "t,e,u\n0,\"1,500\",\"2,000\"\n1,\"1,250\",\"3,000\"\n",
+        &default_options(),
+    );
     assert!(message.contains("decimal point instead of a comma"), "{message}");
 }
 
 #[test]
 fn errors_name_line_column_and_remedy() {
-    let desk = Desk::new();
-    let message = |text: &str| desk.error(text, &defaults());
+    let desk = TestFolder::new();
+    let message = |text: &str| desk.error(text, &default_options());
     let says = |text: &str, parts: &[&str]| {
         let message = message(text);
         for part in parts {
@@ -480,9 +493,9 @@ fn errors_name_line_column_and_remedy() {
 
 #[test]
 fn non_numeric_columns_are_omitted_with_a_note() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let text = "t,e,u,who,d,\n0,1,2,P1,,\n1,1,2,P1,3,\n2,1,2,P1,4,\n";
-    let read = desk.read(text, &defaults()).unwrap();
+    let read = desk.read(text, &default_options()).unwrap();
     let names: Vec<&str> = read.record.channels().map(|c| c.name.as_str()).collect();
     assert_eq!(names, ["e", "u"]);
     assert_eq!(read.notes.len(), 3, "{:?}", read.notes);
@@ -493,8 +506,8 @@ fn non_numeric_columns_are_omitted_with_a_note() {
 
 /// For any content of a file, the result is a record of finite numbers or an error that names the file.
 #[test]
-fn damaged_files_never_panic() {
-    let desk = Desk::new();
+fn damaged_files_do_not_cause_a_panic() {
+    let desk = TestFolder::new();
     let path = desk.path("run.csv");
     write_record(&path, &record(12, 0.01, -0.05)).unwrap();
     let seeds = [
@@ -551,7 +564,7 @@ fn damaged_files_never_panic() {
                 resample: draw.below(2) == 0,
                 fill: draw.below(2) == 0,
             },
-            ..defaults()
+            ..default_options()
         };
         match desk.read(&bytes, &options) {
             Ok(good) => {
@@ -592,8 +605,8 @@ fn recordings_of_people_are_read() {
 }
 
 #[test]
-fn constant_term_of_a_difference_is_no_issue() {
-    let desk = Desk::new();
+fn constant_term_of_a_difference_is_not_reported() {
+    let desk = TestFolder::new();
     let rows: String = (0..50)
         .map(|k| format!("{:.2},0,{},7\n", 0.01 * f64::from(k), f64::from(k * k % 17).sqrt()))
         .collect();

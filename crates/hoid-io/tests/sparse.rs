@@ -5,18 +5,18 @@ mod common;
 
 use std::collections::BTreeMap;
 
-use common::{Desk, defaults};
-use hoid_io::{QualityIssueKind, ReadOptions, Repair, Sparse, Step, read_segments};
+use common::{TestFolder, default_options};
+use hoid_io::{QualityIssueKind, ReadOptions, Repair, SparseTreatment, Step, read_segments};
 
-fn with(sparse: &[(&str, Sparse)]) -> ReadOptions {
+fn options_with(sparse: &[(&str, SparseTreatment)]) -> ReadOptions {
     ReadOptions {
         sparse: sparse.iter().map(|(name, how)| ((*name).to_owned(), *how)).collect(),
-        ..defaults()
+        ..default_options()
     }
 }
 
 /// A table at 100 Hz with u in every row and e in every third row from the second row on; e = 10 t and u = 1 - t.
-fn thirds(rows: i32) -> String {
+fn table_with_sparse_e(rows: i32) -> String {
     let row = |k: i32| {
         let t = 0.01 * f64::from(k);
         let e = if k % 3 == 1 {
@@ -31,8 +31,10 @@ fn thirds(rows: i32) -> String {
 
 #[test]
 fn sparse_values_are_held() {
-    let desk = Desk::new();
-    let read = desk.read(thirds(30), &with(&[("e", Sparse::Hold)])).unwrap();
+    let desk = TestFolder::new();
+    let read = desk
+        .read(table_with_sparse_e(30), &options_with(&[("e", SparseTreatment::Hold)]))
+        .unwrap();
     // The record extends from the first value of e, in row 1, to the last one, in row 28.
     assert_eq!((read.record.len(), read.record.time_s(0)), (28, 0.01));
     for (k, e) in read.record.input().iter().enumerate() {
@@ -76,13 +78,20 @@ fn sparse_values_are_held() {
 
 #[test]
 fn sparse_values_are_interpolated_or_rows_dropped() {
-    let desk = Desk::new();
-    let read = desk.read(thirds(30), &with(&[("e", Sparse::Linear)])).unwrap();
+    let desk = TestFolder::new();
+    let read = desk
+        .read(
+            table_with_sparse_e(30),
+            &options_with(&[("e", SparseTreatment::Linear)]),
+        )
+        .unwrap();
     assert_eq!(read.record.len(), 28);
     for (k, e) in read.record.input().iter().enumerate() {
         assert!((e - 0.1 * (k + 1) as f64).abs() < 1e-12, "{k}: {e}");
     }
-    let read = desk.read(thirds(30), &with(&[("e", Sparse::Drop)])).unwrap();
+    let read = desk
+        .read(table_with_sparse_e(30), &options_with(&[("e", SparseTreatment::Drop)]))
+        .unwrap();
     assert_eq!(read.record.len(), 10);
     assert!((read.record.sample_time().s() - 0.03).abs() < 1e-12);
     for (k, (e, u)) in read.record.input().iter().zip(read.record.output()).enumerate() {
@@ -90,27 +99,27 @@ fn sparse_values_are_interpolated_or_rows_dropped() {
         assert!((e - 10.0 * t).abs() < 1e-12 && (u - (1.0 - t)).abs() < 1e-12, "{k}");
     }
     // The remaining rows must be evenly spaced.
-    let uneven = thirds(30).replace("0.1000,1.0,", "0.1000,,");
-    let refused = desk.error(&uneven, &with(&[("e", Sparse::Drop)]));
+    let uneven = table_with_sparse_e(30).replace("0.1000,1.0,", "0.1000,,");
+    let refused = desk.error(&uneven, &options_with(&[("e", SparseTreatment::Drop)]));
     assert!(refused.contains("--resample"), "{refused}");
     let resampled = ReadOptions {
         repair: Repair {
             resample: true,
             fill: false,
         },
-        ..with(&[("e", Sparse::Drop)])
+        ..options_with(&[("e", SparseTreatment::Drop)])
     };
     assert_eq!(desk.read(&uneven, &resampled).unwrap().record.len(), 10);
 }
 
 #[test]
 fn held_value_before_the_span_is_used() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let options = ReadOptions {
         span_s: (Some(0.12), Some(0.2)),
-        ..with(&[("e", Sparse::Hold)])
+        ..options_with(&[("e", SparseTreatment::Hold)])
     };
-    let read = desk.read(thirds(30), &options).unwrap();
+    let read = desk.read(table_with_sparse_e(30), &options).unwrap();
     assert_eq!((read.record.len(), read.record.time_s(0)), (8, 0.12));
     assert!(
         (read.record.input()[0] - 1.0).abs() < 1e-12,
@@ -122,7 +131,7 @@ fn held_value_before_the_span_is_used() {
 /// Two separate clocks at 50 and 40 Hz: the grid is that of the faster clock, as with `--fill`.
 #[test]
 fn topics_with_two_clocks_are_resampled() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let mut rows: Vec<(f64, bool)> = (0..50).map(|k| (0.02 * f64::from(k), true)).collect();
     rows.extend((0..40).map(|k| (0.013 + 0.025 * f64::from(k), false)));
     rows.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -137,7 +146,7 @@ fn topics_with_two_clocks_are_resampled() {
     };
     let options = ReadOptions {
         repair: resample,
-        ..with(&[("e", Sparse::Linear), ("u", Sparse::Hold)])
+        ..options_with(&[("e", SparseTreatment::Linear), ("u", SparseTreatment::Hold)])
     };
     let read = desk.read(&text, &options).unwrap();
     assert!((read.record.sample_time().s() - 0.02).abs() < 1e-12);
@@ -156,9 +165,9 @@ fn topics_with_two_clocks_are_resampled() {
 }
 
 #[test]
-fn without_sparse_option_the_error_names_it() {
-    let desk = Desk::new();
-    let refused = desk.error(thirds(60), &defaults());
+fn error_names_the_missing_sparse_option() {
+    let desk = TestFolder::new();
+    let refused = desk.error(table_with_sparse_e(60), &default_options());
     assert!(
         refused.contains("--sparse e=hold") && refused.contains("--fill"),
         "{refused}"
@@ -168,9 +177,9 @@ fn without_sparse_option_the_error_names_it() {
             resample: false,
             fill: true,
         },
-        ..defaults()
+        ..default_options()
     };
-    let read = desk.read(thirds(60), &filled).unwrap();
+    let read = desk.read(table_with_sparse_e(60), &filled).unwrap();
     assert!(
         read.notes.iter().any(|note| note.contains("--sparse e=hold holds")),
         "{:?}",
@@ -181,14 +190,14 @@ fn without_sparse_option_the_error_names_it() {
         + &(0..60)
             .map(|k| format!("{k},{},1\n", if k == 9 { String::new() } else { k.to_string() }))
             .collect::<String>();
-    assert!(!desk.error(dropout, &defaults()).contains("--sparse"));
+    assert!(!desk.error(dropout, &default_options()).contains("--sparse"));
 }
 
 #[test]
 fn invalid_sparse_options_are_refused() {
-    let desk = Desk::new();
-    let refused = |text: &str, sparse: &[(&str, Sparse)]| desk.error(text, &with(sparse));
-    let text = thirds(30);
+    let desk = TestFolder::new();
+    let refused = |text: &str, sparse: &[(&str, SparseTreatment)]| desk.error(text, &options_with(sparse));
+    let text = table_with_sparse_e(30);
     for (text, name, words) in [
         (
             text.as_str(),
@@ -198,14 +207,14 @@ fn invalid_sparse_options_are_refused() {
         (text.as_str(), "t", "t is the time"),
         ("t,e,u\n0,,1\n1,,2\n2,,1\n", "e", "column e has no value in 3 rows"),
     ] {
-        for how in Sparse::ALL {
+        for how in SparseTreatment::ALL {
             let message = refused(text, &[(name, how)]);
             assert!(message.contains(words) && message.contains("sparse"), "{message}");
         }
     }
     let apart = refused(
         "t,e,u\n0,1,\n1,2,\n2,,1\n3,,2\n",
-        &[("e", Sparse::Hold), ("u", Sparse::Hold)],
+        &[("e", SparseTreatment::Hold), ("u", SparseTreatment::Hold)],
     );
     assert!(
         apart.contains("the columns e, u have no rows in common between their first and last values"),
@@ -213,7 +222,7 @@ fn invalid_sparse_options_are_refused() {
     );
     assert!(
         "held"
-            .parse::<Sparse>()
+            .parse::<SparseTreatment>()
             .unwrap_err()
             .to_string()
             .contains("hold, linear or drop")
@@ -221,11 +230,14 @@ fn invalid_sparse_options_are_refused() {
     // Text and infinite numbers do not count as missing values.
     for bad in ["lost", "inf"] {
         let corrupted = text.replace("0.1000,1.0,", &format!("0.1000,{bad},"));
-        assert!(refused(&corrupted, &[("e", Sparse::Hold)]).contains(bad));
+        assert!(refused(&corrupted, &[("e", SparseTreatment::Hold)]).contains(bad));
     }
     // A column without missing values is reported.
     let read = desk
-        .read(&text, &with(&[("e", Sparse::Hold), ("u", Sparse::Drop)]))
+        .read(
+            &text,
+            &options_with(&[("e", SparseTreatment::Hold), ("u", SparseTreatment::Drop)]),
+        )
         .unwrap();
     assert!(
         read.notes
@@ -238,17 +250,20 @@ fn invalid_sparse_options_are_refused() {
 
 #[test]
 fn e_and_u_denote_input_and_output() {
-    let desk = Desk::new();
-    let text = thirds(300).replace("t,e,u", "t,error,stick");
+    let desk = TestFolder::new();
+    let text = table_with_sparse_e(300).replace("t,e,u", "t,error,stick");
     let options = ReadOptions {
         input: Some("error".parse().unwrap()),
         output: "stick".parse().unwrap(),
-        ..with(&[("e", Sparse::Linear)])
+        ..options_with(&[("e", SparseTreatment::Linear)])
     };
     let read = desk.read(&text, &options).unwrap();
     assert_eq!(read.record.len(), 298);
     let twice = ReadOptions {
-        sparse: BTreeMap::from([("e".to_owned(), Sparse::Hold), ("error".to_owned(), Sparse::Hold)]),
+        sparse: BTreeMap::from([
+            ("e".to_owned(), SparseTreatment::Hold),
+            ("error".to_owned(), SparseTreatment::Hold),
+        ]),
         ..options.clone()
     };
     assert!(desk.error(&text, &twice).contains("named twice"));

@@ -13,7 +13,7 @@ use hoid_model::{Channel, Record, SampleTime};
 
 const FORMATS: [&str; 7] = ["csv", "TXT", "tsv", "parquet", "pq", "npz", "mat"];
 
-fn column(name: &str, values: ColumnValues) -> OutputColumn {
+fn output_column(name: &str, values: ColumnValues) -> OutputColumn {
     OutputColumn {
         name: name.to_owned(),
         values,
@@ -45,23 +45,23 @@ fn table(rows: usize) -> OutputTable {
             "#".into(),
         ],
         columns: vec![
-            column(
+            output_column(
                 "t",
                 ColumnValues::Real((0..rows).map(|k| 0.01 * k as f64 - 1.0).collect()),
             ),
-            column(
+            output_column(
                 "K_e",
                 ColumnValues::Real((0..rows).map(|k| awkward[k % awkward.len()]).collect()),
             ),
-            column(
+            output_column(
                 "convertible",
                 ColumnValues::Whole((0..rows).map(|k| u64::MAX * (k as u64 % 2)).collect()),
             ),
-            column(
+            output_column(
                 "who, \"when\"",
                 ColumnValues::Text((0..rows).map(|k| texts[k % texts.len()].to_owned()).collect()),
             ),
-            column("none", ColumnValues::Real(vec![f64::NAN; rows])),
+            output_column("none", ColumnValues::Real(vec![f64::NAN; rows])),
         ],
     }
 }
@@ -93,7 +93,7 @@ fn tables_round_trip_bit_for_bit() {
             assert_same(&read_table(&path).unwrap(), &table);
         }
         let single = OutputTable {
-            columns: vec![column("a", ColumnValues::Real(vec![f64::NAN, 2.0, f64::NAN]))],
+            columns: vec![output_column("a", ColumnValues::Real(vec![f64::NAN, 2.0, f64::NAN]))],
             ..OutputTable::default()
         };
         write_table(&path, &single).unwrap();
@@ -142,9 +142,11 @@ fn appending_rows_gives_the_same_file() {
         for step in [977, 65_536, 140_000] {
             let mut writer = TableWriter::create(&grown, &whole.schema()).unwrap();
             for start in (0..150_000).step_by(step) {
-                writer.append(&part(&whole, start, 150_000.min(start + step))).unwrap();
+                writer
+                    .append(&table_rows(&whole, start, 150_000.min(start + step)))
+                    .unwrap();
             }
-            writer.append(&part(&whole, 0, 0)).unwrap();
+            writer.append(&table_rows(&whole, 0, 0)).unwrap();
             writer.finish().unwrap();
             assert!(
                 fs::read(&at_once).unwrap() == fs::read(&grown).unwrap(),
@@ -155,14 +157,14 @@ fn appending_rows_gives_the_same_file() {
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 4);
 }
 
-fn part(table: &OutputTable, start: usize, end: usize) -> OutputTable {
+fn table_rows(table: &OutputTable, start: usize, end: usize) -> OutputTable {
     let part = |c: &OutputColumn| {
         let values = match &c.values {
             ColumnValues::Real(values) => ColumnValues::Real(values[start..end].to_vec()),
             ColumnValues::Whole(values) => ColumnValues::Whole(values[start..end].to_vec()),
             ColumnValues::Text(values) => ColumnValues::Text(values[start..end].to_vec()),
         };
-        column(&c.name, values)
+        output_column(&c.name, values)
     };
     OutputTable {
         comments: Vec::new(),
@@ -171,7 +173,7 @@ fn part(table: &OutputTable, start: usize, end: usize) -> OutputTable {
 }
 
 #[test]
-fn unfinished_table_leaves_the_old_file() {
+fn unfinished_write_keeps_the_old_file() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("study.parquet");
     fs::write(&path, "before").unwrap();
@@ -241,12 +243,12 @@ fn fixture(name: &str) -> PathBuf {
         .with_extension("parquet")
 }
 
-const ROWS: usize = 300;
+const ROW_COUNT: usize = 300;
 
 /// The columns as `fixtures/parquet/make.py` defines them.
-fn expected(name: &str, missing: bool) -> ColumnValues {
-    let real = |f: &dyn Fn(f64) -> f64| ColumnValues::Real((0..ROWS).map(|k| f(k as f64)).collect());
-    let whole = |f: &dyn Fn(u64) -> u64| ColumnValues::Whole((0..ROWS as u64).map(f).collect());
+fn expected_values(name: &str, missing: bool) -> ColumnValues {
+    let real = |f: &dyn Fn(f64) -> f64| ColumnValues::Real((0..ROW_COUNT).map(|k| f(k as f64)).collect());
+    let whole = |f: &dyn Fn(u64) -> u64| ColumnValues::Whole((0..ROW_COUNT as u64).map(f).collect());
     match name {
         "t" => real(&|k| 0.01 * k),
         "e" => real(&|k| match k as usize {
@@ -265,7 +267,7 @@ fn expected(name: &str, missing: bool) -> ColumnValues {
         "u64" => whole(&|k| u64::MAX - k),
         "flag" => whole(&|k| u64::from(k % 3 == 0)),
         "who" => ColumnValues::Text(
-            (0..ROWS)
+            (0..ROW_COUNT)
                 .map(|k| match k % 5 {
                     4 if missing => String::new(),
                     _ => format!("P{}", k % 3),
@@ -276,7 +278,7 @@ fn expected(name: &str, missing: bool) -> ColumnValues {
     }
 }
 
-const NUMBERS: [&str; 13] = [
+const NUMERIC_COLUMNS: [&str; 13] = [
     "half", "i8", "i32", "i64", "u16", "u32", "u64", "price", "cost", "flag", "inner.x", "e", "u",
 ];
 
@@ -298,9 +300,9 @@ fn pyarrow_files_are_read() {
         };
         let read = read_record(&fixture(name), &options).unwrap();
         let record = read.record;
-        assert_eq!((record.len(), record.sample_time().s()), (ROWS, 0.01), "{name}");
+        assert_eq!((record.len(), record.sample_time().s()), (ROW_COUNT, 0.01), "{name}");
         let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
-        for number in NUMBERS {
+        for number in NUMERIC_COLUMNS {
             assert!(names.contains(&number), "{name}: {number} of {names:?}");
             let channel = record.channels().find(|c| c.name == number).unwrap();
             let check = |k: usize, value: f64| {
@@ -311,7 +313,7 @@ fn pyarrow_files_are_read() {
                     "{name}, {number}, row {k}: {found} {value}"
                 );
             };
-            match expected(number, missing) {
+            match expected_values(number, missing) {
                 ColumnValues::Real(values) => values.iter().enumerate().for_each(|(k, v)| check(k, *v)),
                 ColumnValues::Whole(values) => values.iter().enumerate().for_each(|(k, v)| check(k, *v as f64)),
                 ColumnValues::Text(_) => unreachable!(),
@@ -336,7 +338,7 @@ fn pyarrow_files_are_read() {
 fn pyarrow_column_kinds_are_read() {
     let table = read_table(&fixture("kinds")).unwrap();
     for name in ["t", "e", "i8", "i64", "u32", "u64", "flag", "who", "inner.x"] {
-        let (found, expected) = (table.column(name).unwrap(), expected(name, true));
+        let (found, expected) = (table.column(name).unwrap(), expected_values(name, true));
         match (found, &expected) {
             (ColumnValues::Real(a), ColumnValues::Real(b)) => {
                 assert_eq!(a.len(), b.len());
@@ -376,7 +378,11 @@ fn missing_parquet_values_are_located() {
     let path = dir.path().join("run.parquet");
     let write = |t: ColumnValues, e: Vec<f64>| {
         let u = ColumnValues::Real(vec![0.5; e.len()]);
-        let columns = vec![column("t", t), column("e", ColumnValues::Real(e)), column("u", u)];
+        let columns = vec![
+            output_column("t", t),
+            output_column("e", ColumnValues::Real(e)),
+            output_column("u", u),
+        ];
         write_table(
             &path,
             &OutputTable {
@@ -484,7 +490,7 @@ fn invalid_parquet_files_are_errors() {
 /// Files with modified bytes, especially in footers, give a table, a record or an error, without a panic or excessive
 /// memory.
 #[test]
-fn damaged_parquet_never_panics() {
+fn damaged_parquet_files_do_not_cause_a_panic() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("run.parquet");
     write_table(&path, &table(60)).unwrap();

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{Desk, defaults};
+use common::{TestFolder, default_options};
 use hoid_io::{IoError, ReadOptions, ReadRecord, Repair, read_record};
 
 const FILL: Repair = Repair {
@@ -49,16 +49,16 @@ fn recorder_names_of_time_are_accepted() {
 }
 
 /// A header, the format of its times, and the requested time.
-type Written<'a> = (&'a str, &'a dyn Fn(i64) -> String, Option<&'a str>);
+type TimeNotation<'a> = (&'a str, &'a dyn Fn(i64) -> String, Option<&'a str>);
 
 /// The record of a header, with 40 rows at 50 Hz whose times are formatted by `time`.
 fn record_with(header: &str, time: impl Fn(i64) -> String, choice: Option<&str>) -> Result<ReadRecord, IoError> {
     let rows: String = (0..40).map(|k| format!("{},{k},{}\n", time(k), 2 * k)).collect();
     let options = ReadOptions {
         time: choice.map(|choice| choice.parse().unwrap()),
-        ..defaults()
+        ..default_options()
     };
-    Desk::new().read(format!("{header},e,u\n{rows}"), &options)
+    TestFolder::new().read(format!("{header},e,u\n{rows}"), &options)
 }
 
 #[test]
@@ -87,7 +87,7 @@ fn time_units_and_formats_give_the_same_record() {
         ms @ ..86_400_000 => format!("23:59:{:02}.{:03}", ms / 1000 % 60, ms % 1000),
         ms => format!("00:00:00,{:03}", ms % 1000),
     };
-    let found: [Written<'_>; 27] = [
+    let found: [TimeNotation<'_>; 27] = [
         ("Date Time", &excel, None),
         ("Time", &excel, None),
         ("t", &excel, None),
@@ -152,11 +152,11 @@ fn time_units_and_formats_give_the_same_record() {
 }
 
 #[test]
-fn given_sampling_rate_wins_over_t() {
-    let desk = Desk::new();
+fn given_sampling_rate_overrides_t() {
+    let desk = TestFolder::new();
     let with = |hz| ReadOptions {
         sampling_hz: Some(hz),
-        ..defaults()
+        ..default_options()
     };
     let text = "t,e,u\n5,1,0\n5.1,2,0\n9,3,0\n";
     let read = desk.read(text, &with(50.0)).unwrap();
@@ -177,7 +177,7 @@ fn given_sampling_rate_wins_over_t() {
     );
     assert_eq!(desk.read("e,u\n1,2\n", &with(2.0)).unwrap().record.len(), 1);
     assert!(
-        desk.error("e,u\n1,2\n", &defaults())
+        desk.error("e,u\n1,2\n", &default_options())
             .contains("has no column t (time in s)")
     );
     for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-320] {
@@ -196,9 +196,12 @@ fn given_sampling_rate_wins_over_t() {
 }
 
 #[test]
-fn fill_interpolates_and_reports_it() {
-    let desk = Desk::new();
-    let fill = |repair| ReadOptions { repair, ..defaults() };
+fn filled_values_are_interpolated_and_reported() {
+    let desk = TestFolder::new();
+    let fill = |repair| ReadOptions {
+        repair,
+        ..default_options()
+    };
     let text = "t,e,u,d\n0,1,2,1\n,NaN,2,NA\n2,,2,\n3,4,2,4\n";
     let read = desk.read(text, &fill(FILL)).unwrap();
     assert_eq!(read.record.input(), [1.0, 2.0, 3.0, 4.0]);
@@ -233,12 +236,15 @@ fn fill_interpolates_and_reports_it() {
 /// An outer join of two topics: each row has a value of only one topic, including the first and the last row.
 #[test]
 fn two_topics_are_read_where_both_have_values() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let both = Repair {
         fill: true,
         resample: true,
     };
-    let ask = |repair| ReadOptions { repair, ..defaults() };
+    let ask = |repair| ReadOptions {
+        repair,
+        ..default_options()
+    };
     // Both topics have a common clock, and e is in every second row.
     let mut text = String::from("t,e,u\n");
     for k in 0..=21 {
@@ -250,7 +256,7 @@ fn two_topics_are_read_where_both_have_values() {
         };
         text.push_str(&format!("{t:.2},{e},{}\n", 1.0 - t));
     }
-    assert!(desk.error(&text, &defaults()).contains("--fill"));
+    assert!(desk.error(&text, &default_options()).contains("--fill"));
     let read = desk.read(&text, &ask(FILL)).unwrap();
     assert_eq!((read.record.len(), read.record.time_s(0)), (21, 0.01));
     for k in 0..21 {
@@ -296,11 +302,11 @@ fn two_topics_are_read_where_both_have_values() {
 
 #[test]
 fn resampling_bridges_gaps_and_jitter() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let ask = |repair, sampling_hz| ReadOptions {
         repair,
         sampling_hz,
-        ..defaults()
+        ..default_options()
     };
     // With e = 10 t and u = 1 - t on an uneven t with two missing samples, the straight lines are reproduced up to
     // rounding.
@@ -310,7 +316,7 @@ fn resampling_bridges_gaps_and_jitter() {
         .iter()
         .for_each(|t| text.push_str(&format!("{t:.3},{},{}\n", 10.0 * t, 1.0 - t)));
     assert!(matches!(
-        desk.read(&text, &defaults()),
+        desk.read(&text, &default_options()),
         Err(IoError::Gap { missing: 2, .. })
     ));
     let read = desk.read(&text, &ask(RESAMPLE, None)).unwrap();
@@ -339,7 +345,7 @@ fn resampling_bridges_gaps_and_jitter() {
     let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
     assert_eq!(
         desk.read(even, &ask(RESAMPLE, None)).unwrap(),
-        desk.read(even, &defaults()).unwrap()
+        desk.read(even, &default_options()).unwrap()
     );
     let away = desk.error("t,e,u\n0,1,2\n1,1,2\n2,1,2\n1e9,1,2\n", &ask(RESAMPLE, None));
     assert!(away.contains("would turn 4 samples into 1000000001"), "{away}");
@@ -353,10 +359,10 @@ fn time_as_a_signal_is_resampled() {
     let options = ReadOptions {
         repair: RESAMPLE,
         output: "t".parse().unwrap(),
-        ..defaults()
+        ..default_options()
     };
     let text = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,3,4\n0.3,4,5\n0.6,7,8\n0.7,8,9\n";
-    let read = Desk::new().read(text, &options).unwrap().record;
+    let read = TestFolder::new().read(text, &options).unwrap().record;
     assert_eq!(read.len(), 8);
     assert!(
         read.times_s()
@@ -369,11 +375,11 @@ fn time_as_a_signal_is_resampled() {
 /// The remainder of a truncated file, or a short span of one.
 #[test]
 fn one_sample_is_not_resampled() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let options = ReadOptions {
         sampling_hz: Some(50.0),
         repair: RESAMPLE,
-        ..defaults()
+        ..default_options()
     };
     let message = desk.error("# sample_time: 0.01 s\nt,e,u\n0,1,2\n", &options);
     assert!(message.contains("1 sample, expected at least 2"), "{message}");
@@ -381,10 +387,10 @@ fn one_sample_is_not_resampled() {
 
 #[test]
 fn rows_outside_the_span_are_ignored() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let span = |from, to| ReadOptions {
         span_s: (from, to),
-        ..defaults()
+        ..default_options()
     };
     let text = "t,e,u\n0,x,2\n1,1,2\n2,2,2\n3,3,2\n7,,2\n";
     let read = desk.read(text, &span(Some(1.0), Some(7.0))).unwrap().record;
@@ -441,10 +447,12 @@ fn serial_days_are_recognised() {
 /// The unit below the header also applies if the name denotes a time without a unit.
 #[test]
 fn time_unit_below_the_header_is_used() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let rows: String = (0..40)
         .map(|k| format!("{:.1},{k},{}\n", 12.5 * f64::from(k), 2 * k))
         .collect();
-    let read = desk.read(format!("Time,e,u\nms,deg,V\n{rows}"), &defaults()).unwrap();
+    let read = desk
+        .read(format!("Time,e,u\nms,deg,V\n{rows}"), &default_options())
+        .unwrap();
     assert_eq!(read.record.sample_time().s(), 0.0125);
 }

@@ -4,8 +4,8 @@
 
 mod common;
 
-use common::{Desk, defaults};
-use hoid_io::{ReadOptions, Sparse};
+use common::{TestFolder, default_options};
+use hoid_io::{ReadOptions, SparseTreatment};
 
 /// A table of two topics with e every `step_e` and u every `step_u` hundredths of a second.
 fn table(step_e: usize, step_u: usize) -> String {
@@ -19,7 +19,7 @@ fn table(step_e: usize, step_u: usize) -> String {
 
 #[test]
 fn topics_with_the_same_times_are_joined() {
-    let read = Desk::new().read(table(1, 1), &defaults()).unwrap();
+    let read = TestFolder::new().read(table(1, 1), &default_options()).unwrap();
     assert_eq!((read.record.len(), read.record.sample_time().s()), (300, 0.01));
     assert_eq!(read.record.input()[299], 299.0);
     assert_eq!(read.record.output()[299], 598.0);
@@ -32,15 +32,15 @@ fn topics_with_the_same_times_are_joined() {
 
 #[test]
 fn topics_with_two_rates_need_sparse() {
-    let desk = Desk::new();
-    let message = desk.error(table(5, 1), &defaults());
+    let desk = TestFolder::new();
+    let message = desk.error(table(5, 1), &default_options());
     assert!(
         message.contains("column e: the value is missing") && message.contains("--sparse e=hold"),
         "{message}"
     );
     let options = ReadOptions {
-        sparse: [(String::from("e"), Sparse::Linear)].into_iter().collect(),
-        ..defaults()
+        sparse: [(String::from("e"), SparseTreatment::Linear)].into_iter().collect(),
+        ..default_options()
     };
     let record = desk.read(table(5, 1), &options).unwrap().record;
     assert_eq!(record.len(), 296);
@@ -49,17 +49,17 @@ fn topics_with_two_rates_need_sparse() {
 
 #[test]
 fn trials_are_not_joined_as_topics() {
-    let desk = Desk::new();
+    let desk = TestFolder::new();
     let trial = |first: i32| {
         (0..20)
             .map(|k| format!("{:.2},{},{k}\n", 0.02 * f64::from(k), first + k))
             .collect::<String>()
     };
-    let message = desk.error(format!("t,e,u\n{}{}", trial(0), trial(7)), &defaults());
+    let message = desk.error(format!("t,e,u\n{}{}", trial(0), trial(7)), &default_options());
     assert!(message.contains("2 trials by t"), "{message}");
     // A table with only one topic, or without any value.
     for text in ["t,e,u\n0,1,\n1,2,\n0,1,\n1,2,\n", "t,e,u\n1,,\n0,,\n"] {
-        let message = desk.error(text, &defaults());
+        let message = desk.error(text, &default_options());
         assert!(!message.contains("joined"), "{message}");
     }
 }

@@ -4,11 +4,11 @@
 
 mod common;
 
-use common::{Desk, defaults};
+use common::{TestFolder, default_options};
 use hoid_io::{IoError, Preparation, ReadOptions, ReadRecord, read_segments};
 
-fn trials(text: &str, choice: Option<&str>) -> Result<Vec<ReadRecord>, IoError> {
-    let desk = Desk::new();
+fn read_trials(text: &str, choice: Option<&str>) -> Result<Vec<ReadRecord>, IoError> {
+    let desk = TestFolder::new();
     let path = desk.path("run.csv");
     std::fs::write(&path, text).unwrap();
     read_segments(&path, &by(choice), &Preparation::default(), &[], 0.0)
@@ -17,12 +17,12 @@ fn trials(text: &str, choice: Option<&str>) -> Result<Vec<ReadRecord>, IoError> 
 fn by(choice: Option<&str>) -> ReadOptions {
     ReadOptions {
         trial: choice.map(|choice| choice.parse().unwrap()),
-        ..defaults()
+        ..default_options()
     }
 }
 
 /// Three trials of 10, 12 and 14 rows; e counts all rows.
-fn text(header: &str, label: impl Fn(usize) -> String, restarts: bool) -> String {
+fn trial_text(header: &str, label: impl Fn(usize) -> String, restarts: bool) -> String {
     let mut row = 0;
     let mut text = format!("{header}\n");
     for trial in 0..3 {
@@ -46,24 +46,32 @@ fn trials_are_split_by_restarting_time_or_a_column() {
     let expected = [(0.0, 10), (10.0, 12), (22.0, 14)];
     let number = |trial: usize| format!("{},", trial + 1);
     let name = |trial: usize| format!("{},", ["a", "b", "a"][trial]);
-    let counted = text("trial,t,e,u", number, true);
+    let counted = trial_text("trial,t,e,u", number, true);
     for (text, choice, labels) in [
-        (text("t,e,u", |_| String::new(), true), None, ["t 1", "t 2", "t 3"]),
-        (text("t,e,u", |_| String::new(), true), Some("t"), ["t 1", "t 2", "t 3"]),
+        (
+            trial_text("t,e,u", |_| String::new(), true),
+            None,
+            ["t 1", "t 2", "t 3"],
+        ),
+        (
+            trial_text("t,e,u", |_| String::new(), true),
+            Some("t"),
+            ["t 1", "t 2", "t 3"],
+        ),
         (counted.clone(), None, ["trial 1", "trial 2", "trial 3"]),
         (counted.clone(), Some("trial"), ["trial 1", "trial 2", "trial 3"]),
         (
-            text("trial,t,e,u", number, false),
+            trial_text("trial,t,e,u", number, false),
             Some("trial"),
             ["trial 1", "trial 2", "trial 3"],
         ),
         (
-            text("block,t,e,u", name, false),
+            trial_text("block,t,e,u", name, false),
             Some("block"),
             ["block a", "block b", "block a (2)"],
         ),
     ] {
-        let read = trials(&text, choice).unwrap();
+        let read = read_trials(&text, choice).unwrap();
         assert_eq!(first_and_len(&read), expected, "{choice:?}\n{text}");
         assert!(
             read.iter()
@@ -79,16 +87,19 @@ fn trials_are_split_by_restarting_time_or_a_column() {
         );
     }
     // A single trial is requested, and then a trial that does not exist.
-    assert_eq!(first_and_len(&trials(&counted, Some("trial=2")).unwrap()), [(10.0, 12)]);
-    let message = |choice| trials(&counted, Some(choice)).unwrap_err().to_string();
+    assert_eq!(
+        first_and_len(&read_trials(&counted, Some("trial=2")).unwrap()),
+        [(10.0, 12)]
+    );
+    let message = |choice| read_trials(&counted, Some(choice)).unwrap_err().to_string();
     assert!(message("trial=4").contains("there is no trial trial=4; it has 1, 2, 3"));
     assert!(message("block").contains("no column \"block\""));
 }
 
 #[test]
 fn several_trials_without_a_choice_are_refused() {
-    let desk = Desk::new();
-    let message = desk.error(text("trial,t,e,u", |k| format!("{k},"), true), &defaults());
+    let desk = TestFolder::new();
+    let message = desk.error(trial_text("trial,t,e,u", |k| format!("{k},"), true), &default_options());
     assert!(
         message.contains("holds 3 trials by trial: 0, 1, 2; read one of them with --trial trial=0"),
         "{message}"
@@ -97,7 +108,7 @@ fn several_trials_without_a_choice_are_refused() {
     let set: String = (0..40)
         .map(|k| format!("{:.2},{k},{k}\n", 0.02 * f64::from(k - 2 * i32::from(k > 20))))
         .collect();
-    let message = desk.error(format!("t,e,u\n{set}"), &defaults());
+    let message = desk.error(format!("t,e,u\n{set}"), &default_options());
     assert!(
         message.contains("expected increasing time") && message.contains("--drop-repeated"),
         "{message}"

@@ -24,11 +24,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use hostile::Hostile;
-use spent::Spent;
+use hostile::HostileTest;
+use spent::ProcessorTime;
 
 /// Limit of the processor time of one case.
-const LIMIT: Duration = Duration::from_secs(2);
+const CPU_TIME_LIMIT: Duration = Duration::from_secs(2);
 /// Number of panics, including those that are caught.
 static PANICS: AtomicUsize = AtomicUsize::new(0);
 
@@ -43,13 +43,13 @@ fn main() -> ExitCode {
     let jobs = thread::available_parallelism().map_or(1, |n| n.get() as u64);
     let start_time = Instant::now();
     let part = |job: u64| {
-        let mut hostile = Hostile::new();
+        let mut hostile = HostileTest::new();
         let mut slowest = (Duration::ZERO, 0);
         for number in (first..first + cases).filter(|number| number / 4 % jobs == job) {
-            let start = Spent::now();
-            if panic::catch_unwind(AssertUnwindSafe(|| hostile.case(seed, number))).is_err() {
+            let start = ProcessorTime::now();
+            if panic::catch_unwind(AssertUnwindSafe(|| hostile.run_case(seed, number))).is_err() {
                 println!("case {number}: a panic");
-                hostile = Hostile::new();
+                hostile = HostileTest::new();
             }
             slowest = slowest.max((start.elapsed(), number));
         }
@@ -66,7 +66,7 @@ fn main() -> ExitCode {
         slowest.0.as_secs_f64(),
         slowest.1
     );
-    if panics == 0 && slowest.0 < LIMIT {
+    if panics == 0 && slowest.0 < CPU_TIME_LIMIT {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE

@@ -30,14 +30,14 @@ use hoid_sim::RunSeed;
 use serde_json::{Value, json};
 
 /// Range wide enough that no operator reaches its ends.
-const MAP: InputMap = InputMap {
+const INPUT_MAP: InputMap = InputMap {
     centre: 0.0,
     span: 1000.0,
     dead: 0.0,
     gain: 1000.0,
 };
-const REMNANT_S: f64 = 0.06;
-const SHARE: f64 = 0.1;
+const REMNANT_TIME_CONSTANT_S: f64 = 0.06;
+const REMNANT_SHARE: f64 = 0.1;
 
 struct Person {
     name: &'static str,
@@ -74,11 +74,11 @@ fn people() -> Vec<Person> {
     ]
 }
 
-fn bytes(values: &[f64]) -> String {
+fn encode_values(values: &[f64]) -> String {
     BASE64.encode(&values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>())
 }
 
-fn values(answer: &Value) -> Vec<f64> {
+fn decode_values(answer: &Value) -> Vec<f64> {
     let bytes = BASE64.decode(answer.as_str().unwrap().as_bytes()).unwrap();
     bytes
         .chunks_exact(8)
@@ -92,7 +92,7 @@ fn variance(values: &[f64]) -> f64 {
 }
 
 /// Returns the task with u and e at each tick, for a remnant of the given standard deviation.
-fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) -> (Task, Vec<f64>, Vec<f64>) {
+fn simulate_run(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) -> (Task, Vec<f64>, Vec<f64>) {
     let condition = Condition {
         controlled_element: person.element.clone(),
         target: Some(Signal::default()),
@@ -103,12 +103,12 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
     let transfer: ContinuousTransferFunction = operator.transfer_function().unwrap();
     let held = HeldSystem::new(transfer.num(), transfer.den(), 0.0, SampleTime::new(TICK_S).unwrap()).unwrap();
     let plant = Plant {
-        a: held.transition().to_vec(),
-        b: held.input().to_vec(),
+        a: held.transition_matrix().to_vec(),
+        b: held.input_vector().to_vec(),
         c: held.output_row().to_vec(),
-        d: held.direct(),
+        d: held.direct_feedthrough(),
     };
-    let a = (-TICK_S / REMNANT_S).exp();
+    let a = (-TICK_S / REMNANT_TIME_CONSTANT_S).exp();
     let mut n = 0.0;
     let white = RunSeed {
         seed,
@@ -125,11 +125,11 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
         .collect();
     // An event takes effect at the next tick, which is one tick of the delay.
     let delay = (operator.tau_e_s() / TICK_S).round() as usize - 1;
-    let answer = engine.ask(
-        &json!({"phases": task.phases, "ticks": task.ticks, "map": MAP, "target": bytes(&task.target),
-        "operator": {"plant": plant, "delay": delay}, "noise": bytes(&noise)}),
+    let answer = engine.request(
+        &json!({"phases": task.phases, "ticks": task.ticks, "map": INPUT_MAP, "target": encode_values(&task.target),
+        "operator": {"plant": plant, "delay": delay}, "noise": encode_values(&noise)}),
     );
-    (task, values(&answer["u"]), values(&answer["e"]))
+    (task, decode_values(&answer["u"]), decode_values(&answer["e"]))
 }
 
 fn main() -> ExitCode {
@@ -139,21 +139,23 @@ fn main() -> ExitCode {
         println!("skipped: there is no node");
         return ExitCode::SUCCESS;
     };
-    let differing = (1..=runs).filter(|seed| !page::same_bits(&mut engine, *seed)).count();
+    let differing = (1..=runs)
+        .filter(|seed| !page::is_bit_identical(&mut engine, *seed))
+        .count();
     println!("{differing} of {runs} runs of the page's plant differ from Rust in a bit");
     let mut wrong = differing > 0;
     println!("operator\tparameter\ttruth\tbias %\tits error %\tcoverage %\truns");
     for person in people() {
-        let quiet = tracked(&mut engine, &person, 0, 0.0).1;
-        let remnant = (SHARE * variance(&quiet[10_000..])).sqrt();
+        let quiet = simulate_run(&mut engine, &person, 0, 0.0).1;
+        let remnant = (REMNANT_SHARE * variance(&quiet[10_000..])).sqrt();
         let kinds = person.form.coordinates(person.neuromuscular);
         let mut found: Vec<Vec<(f64, f64)>> = vec![Vec::new(); kinds.len()];
         let mut lags = Vec::new();
         for seed in 1..=u64::from(seeds) {
-            let (task, u, e) = tracked(&mut engine, &person, seed, remnant);
+            let (task, u, e) = simulate_run(&mut engine, &person, seed, remnant);
             let every = |signal: &[f64]| signal[task.run_in..].iter().copied().step_by(10).collect::<Vec<f64>>();
             let channel = |name: &str, signal: &[f64]| Channel::new(name, "", every(signal));
-            let record = Record::new(SampleTime::HUNDREDTH, channel("e", &e), channel("u", &u)).unwrap();
+            let record = Record::new(SampleTime::AT_100_HZ, channel("e", &e), channel("u", &u)).unwrap();
             if let Lag::Known(lag) = Lag::of(record.clone()) {
                 lags.push((lag.value, lag.standard_error.unwrap_or(f64::NAN)));
             }

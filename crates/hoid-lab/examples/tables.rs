@@ -34,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (k, planned) in plan(&config, 0).iter().enumerate() {
         let condition = &config.condition[planned.condition];
         let task = Task::new(condition, planned.condition as u64, k as u64 + 1)?;
-        let element = condition.course()?.constant_element()?;
+        let element = condition.task_definition()?.constant_element()?;
         runs.push(json!({
             "condition": condition,
             "element": element.map(|element| element.to_string()),
@@ -42,8 +42,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             "run_in": task.run_in,
             "ticks": task.ticks,
             "phases": task.phases,
-            "target": base64(&task.target),
-            "disturbance": base64(&task.disturbance),
+            "target": encode_base64(&task.target),
+            "disturbance": encode_base64(&task.disturbance),
         }));
     }
     let experiment = json!({"name": config.name, "consent": config.consent, "live": config.live, "runs": runs});
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn base64(values: &[f64]) -> String {
+fn encode_base64(values: &[f64]) -> String {
     let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
     BASE64.encode(&bytes)
 }

@@ -18,7 +18,7 @@ use crate::{
     LabError,
     config::{Condition, Config, Signal},
     plant::Plant,
-    session::Logged,
+    session::LoggedRun,
     task::{TICK_S, Task},
     utc,
     wire::SimulatedOperator,
@@ -28,12 +28,12 @@ use crate::{
 const GAIN: f64 = 0.75;
 const OMEGA_RAD_S: f64 = 14.0;
 const ZETA: f64 = 0.5;
-const DELAY: usize = 150;
+const DELAY_TICKS: usize = 150;
 /// Standard deviation of the remnant, and time constant of its filter in s.
-const REMNANT: f64 = 0.05;
-const REMNANT_S: f64 = 0.1;
+const REMNANT_SD: f64 = 0.05;
+const REMNANT_TIME_CONSTANT_S: f64 = 0.1;
 /// Prior spread of the neuromuscular parameters, which are known except for the effect of the hold.
-const KNOWN_SPREAD: f64 = 0.01;
+const NEUROMUSCULAR_PRIOR_SPREAD: f64 = 0.01;
 
 /// Result of a calibration, stored in `calibration.toml` of the experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -105,10 +105,10 @@ pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>),
     let tick = SampleTime::new(TICK_S)?;
     let system = HeldSystem::new(&[GAIN * square], &[1.0, 2.0 * ZETA * OMEGA_RAD_S, square], 0.0, tick)?;
     let plant = Plant {
-        a: system.transition().to_vec(),
-        b: system.input().to_vec(),
+        a: system.transition_matrix().to_vec(),
+        b: system.input_vector().to_vec(),
         c: system.output_row().to_vec(),
-        d: system.direct(),
+        d: system.direct_feedthrough(),
     };
     let white = RunSeed {
         seed,
@@ -117,25 +117,33 @@ pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>),
     }
     .white_noise(task.ticks);
     // First-order remnant with standard deviation sigma: n <- a n + sqrt(1 - a^2) sigma w.
-    let a = (-TICK_S / REMNANT_S).exp();
-    let (drive, mut n) = (REMNANT * (1.0 - a * a).sqrt(), 0.0);
+    let a = (-TICK_S / REMNANT_TIME_CONSTANT_S).exp();
+    let (drive, mut n) = (REMNANT_SD * (1.0 - a * a).sqrt(), 0.0);
     let noise = white.iter().map(|w| {
         n = a * n + drive * w;
         n
     });
-    Ok((SimulatedOperator { plant, delay: DELAY }, noise.collect()))
+    Ok((
+        SimulatedOperator {
+            plant,
+            delay: DELAY_TICKS,
+        },
+        noise.collect(),
+    ))
 }
 
 /// Evaluates the run of a calibration and stores the result in the folder of the experiment.
 ///
 /// # Errors
 /// [`LabError::Ident`] if the run cannot be identified; errors of reading or writing files.
-pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration, LabError> {
+pub fn evaluate(out: &Path, record: &Record, logged: &LoggedRun) -> Result<Calibration, LabError> {
     let measured = record.span(0.0, record.time_s(record.len()))?;
     let estimator = FamilyEstimator {
         forms: vec![Form::Gain],
-        prior: format!("omega_nm={OMEGA_RAD_S}:{KNOWN_SPREAD},zeta_nm={ZETA}:{KNOWN_SPREAD}")
-            .parse::<OperatorPrior>()?,
+        prior: format!(
+            "omega_nm={OMEGA_RAD_S}:{NEUROMUSCULAR_PRIOR_SPREAD},zeta_nm={ZETA}:{NEUROMUSCULAR_PRIOR_SPREAD}"
+        )
+        .parse::<OperatorPrior>()?,
         run_to_run: 0.0,
         ..FamilyEstimator::default()
     };
@@ -153,18 +161,18 @@ pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration
         .collect();
     let found = Calibration {
         utc: utc::now(),
-        latency_s: value - DELAY as f64 * TICK_S,
+        latency_s: value - DELAY_TICKS as f64 * TICK_S,
         latency_se_s: error,
         input_jitter_ms: standard_deviation(&waits),
         frame_jitter_ms: standard_deviation(&frames),
     };
     let path = out.join("calibration.toml");
     let mut kept: Kept = match hoid_io::read_settings(&path) {
-        Ok(text) => toml::from_str(&text).map_err(|error| LabError::damaged(&path, error.message()))?,
+        Ok(text) => toml::from_str(&text).map_err(|error| LabError::damaged_file(&path, error.message()))?,
         Err(_) => Kept::default(),
     };
     kept.calibration.push(found.clone());
-    let text = toml::to_string(&kept).map_err(|error| LabError::damaged(&path, error.to_string()))?;
+    let text = toml::to_string(&kept).map_err(|error| LabError::damaged_file(&path, error.to_string()))?;
     hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
     Ok(found)
 }

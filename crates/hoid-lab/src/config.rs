@@ -24,7 +24,7 @@ use hoid_model::{
 };
 use serde::{Deserialize, Serialize};
 
-use crate::{LabError, plant::MOST_STATES};
+use crate::{LabError, plant::MAX_STATES};
 
 /// Configuration of an experiment.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -252,12 +252,12 @@ impl Config {
                 .map_or(1, |before| before.split('\n').count());
             LabError::Config {
                 place: format!("{place}, line {line}"),
-                reason: hoid_io::printable(error.message().trim_end()),
+                reason: hoid_io::escape_control_characters(error.message().trim_end()),
             }
         })?;
         let directory = path.parent().unwrap_or_else(|| Path::new("."));
         for condition in &mut config.condition {
-            condition.load(directory)?;
+            condition.load_scenario(directory)?;
         }
         config.check(&place)?;
         Ok(config)
@@ -319,11 +319,11 @@ impl Config {
 }
 
 /// Maximum length of a run, s.
-const LONGEST_S: f64 = 1800.0;
+const MAX_RUN_S: f64 = 1800.0;
 
 impl Condition {
     /// Loads the text of the scenario file.
-    fn load(&mut self, directory: &Path) -> Result<(), LabError> {
+    fn load_scenario(&mut self, directory: &Path) -> Result<(), LabError> {
         let Some(name) = &self.scenario else { return Ok(()) };
         if self.scenario_text.is_some() {
             return Ok(());
@@ -365,11 +365,11 @@ impl Condition {
                 self.full_deflection
             ));
         }
-        let course = self.course()?;
-        let (run_in, measured) = course.times_s();
-        if !(0.0..=LONGEST_S).contains(&(run_in + measured)) {
+        let course = self.task_definition()?;
+        let (run_in, measured) = course.durations_s();
+        if !(0.0..=MAX_RUN_S).contains(&(run_in + measured)) {
             return wrong(format!(
-                "a run lasts {} s, expected at most {LONGEST_S}",
+                "a run lasts {} s, expected at most {MAX_RUN_S}",
                 run_in + measured
             ));
         }
@@ -379,9 +379,9 @@ impl Condition {
             }
         }
         let states = course.element_at(0.0)?.den().len().saturating_sub(1);
-        if states > MOST_STATES {
+        if states > MAX_STATES {
             return wrong(format!(
-                "the controlled element has {states} states, expected at most {MOST_STATES}"
+                "the controlled element has {states} states, expected at most {MAX_STATES}"
             ));
         }
         if course.has_lines() == [false, false] {
@@ -432,8 +432,8 @@ mod tests {
         let path = dir.path().join("lab.toml");
         std::fs::write(&path, "[[condition]]\nname = \"c4\"\nscenario = \"C4\"\n").unwrap();
         let config = Config::read(&path).unwrap();
-        let course = config.condition[0].course().unwrap();
-        assert_eq!(course.times_s(), (10.0, 81.92));
+        let course = config.condition[0].task_definition().unwrap();
+        assert_eq!(course.durations_s(), (10.0, 81.92));
         assert_eq!(course.change_s(), Some(40.96));
         std::fs::write(&path, "nme = \"x\"\n").unwrap();
         let message = Config::read(&path).unwrap_err().to_string();

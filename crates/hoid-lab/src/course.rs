@@ -39,7 +39,7 @@ impl Condition {
     ///
     /// # Errors
     /// [`LabError::Scenario`], [`LabError::Model`].
-    pub fn course(&self) -> Result<TaskDefinition, LabError> {
+    pub fn task_definition(&self) -> Result<TaskDefinition, LabError> {
         if let Some(text) = &self.scenario_text {
             let name = self.scenario.as_deref().unwrap_or(&self.name);
             return Ok(match hoid_io::parse_any_scenario(text, name, &self.name)? {
@@ -55,7 +55,7 @@ impl Condition {
                 controlled_element,
             })
         };
-        let mut scenario = FamilyScenario::new(state(element)?, SampleTime::HUNDREDTH);
+        let mut scenario = FamilyScenario::new(state(element)?, SampleTime::AT_100_HZ);
         scenario.name.clone_from(&self.name);
         (scenario.measurement_s, scenario.run_in_s) = (self.measurement_s, self.run_in_s);
         if let Some(last) = &self.last_element {
@@ -81,13 +81,13 @@ impl Condition {
     /// display shows the error only.
     ///
     /// # Errors
-    /// As [`Condition::course`].
-    pub(crate) fn role_of_target(&self) -> Result<Option<String>, LabError> {
-        Ok(self.role_of_target_in(&self.course()?))
+    /// As [`Condition::task_definition`].
+    pub(crate) fn target_role(&self) -> Result<Option<String>, LabError> {
+        Ok(self.target_role_in(&self.task_definition()?))
     }
 
-    /// Returns [`Self::role_of_target`] for the course of this condition.
-    pub(crate) fn role_of_target_in(&self, course: &TaskDefinition) -> Option<String> {
+    /// Returns [`Self::target_role`] for the course of this condition.
+    pub(crate) fn target_role_in(&self, course: &TaskDefinition) -> Option<String> {
         let [has_target, _] = course.has_lines();
         let feedforward = ChannelRole::Feedforward;
         let role = match self.display {
@@ -101,7 +101,7 @@ impl Condition {
 
 impl TaskDefinition {
     /// Returns the lengths of run-in and measurement, s.
-    pub fn times_s(&self) -> (f64, f64) {
+    pub fn durations_s(&self) -> (f64, f64) {
         match self {
             Self::Reference(course) => (course.scenario().run_in_s, course.scenario().measurement_s),
             Self::Family(course) => (course.scenario().run_in_s, course.scenario().measurement_s),

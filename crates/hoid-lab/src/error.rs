@@ -74,7 +74,7 @@ impl LabError {
         }
     }
 
-    pub(crate) fn damaged(path: &Path, reason: impl Into<String>) -> Self {
+    pub(crate) fn damaged_file(path: &Path, reason: impl Into<String>) -> Self {
         Self::Damaged {
             file: path.display().to_string(),
             reason: reason.into(),

@@ -3,13 +3,13 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use hoid_study::group::{ConditionSettings, MANIFEST, Manifest, ReadSettings, RunEntry};
+use hoid_study::group::{ConditionSettings, MANIFEST_FILE, Manifest, ReadSettings, RunEntry};
 use serde_json::json;
 
 use crate::{
     LabError,
     config::{Condition, Config},
-    record::TARGET,
+    record::TARGET_CHANNEL,
     session::{RunEnd, Session},
 };
 
@@ -59,7 +59,7 @@ validator may reject the folder.
 ///
 /// # Errors
 /// [`LabError::Io`].
-pub fn describe(out: &Path, config: &Config) -> Result<(), LabError> {
+pub fn write_description(out: &Path, config: &Config) -> Result<(), LabError> {
     let description = json!({
         "Name": config.name,
         "BIDSVersion": "1.10.0",
@@ -84,7 +84,7 @@ fn write(path: &Path, text: &str) -> Result<(), LabError> {
 ///
 /// # Errors
 /// Errors of reading or writing files.
-pub fn list(out: &Path) -> Result<(), LabError> {
+pub fn write_participants(out: &Path) -> Result<(), LabError> {
     let mut people: BTreeMap<String, (usize, String)> = BTreeMap::new();
     for folder in Session::folders(out)? {
         let facts = Session::read(&folder)?.facts;
@@ -105,7 +105,7 @@ pub fn list(out: &Path) -> Result<(), LabError> {
 ///
 /// # Errors
 /// Errors of reading or writing files.
-pub fn manifest(out: &Path) -> Result<(), LabError> {
+pub fn write_manifest(out: &Path) -> Result<(), LabError> {
     let mut runs = Vec::new();
     let mut conditions: BTreeMap<String, Condition> = BTreeMap::new();
     for folder in Session::folders(out)? {
@@ -153,24 +153,27 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
             .collect::<Result<_, LabError>>()?,
         runs,
     };
-    write(&out.join(MANIFEST), &manifest.text())
+    write(&out.join(MANIFEST_FILE), &manifest.text())
 }
 
 /// Returns the known properties of a condition for the manifest.
 fn known_settings(condition: &Condition) -> Result<ConditionSettings, LabError> {
-    let course = condition.course()?;
+    let course = condition.task_definition()?;
     let [has_target, has_disturbance] = course.has_lines();
-    let role = condition.role_of_target()?;
+    let role = condition.target_role()?;
     // At the lines of a displayed target, u/e is not the response to the error.
     let excitation = match (&role, has_target, has_disturbance) {
         (Some(_), _, true) | (None, false, true) => Some("d"),
-        (None, true, _) => Some(TARGET),
+        (None, true, _) => Some(TARGET_CHANNEL),
         _ => None,
     };
     Ok(ConditionSettings {
         controlled_element: course.constant_element()?.map(|element| element.to_string()),
         excitation: excitation.map(str::to_owned),
-        roles: role.map(|role| format!("{TARGET}={role}")).into_iter().collect(),
+        roles: role
+            .map(|role| format!("{TARGET_CHANNEL}={role}"))
+            .into_iter()
+            .collect(),
         change_s: course.change_s(),
         ..ConditionSettings::default()
     })

@@ -22,13 +22,13 @@ pub fn archive(out: &Path, folder: &Path) -> Result<Vec<u8>, LabError> {
         .map(|name| out.join(name))
         .filter(|path| path.exists())
         .collect();
-    collect(folder, &mut files)?;
+    collect_files(folder, &mut files)?;
     files.sort();
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default());
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let unwritable = |error: String| LabError::damaged(folder, format!("the archive cannot be written: {error}"));
+    let unwritable = |error: String| LabError::damaged_file(folder, format!("the archive cannot be written: {error}"));
     for path in &files {
         let name = path
             .strip_prefix(out)
@@ -47,13 +47,13 @@ pub fn archive(out: &Path, folder: &Path) -> Result<Vec<u8>, LabError> {
     Ok(cursor.into_inner())
 }
 
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), LabError> {
+fn collect_files(folder: &Path, files: &mut Vec<PathBuf>) -> Result<(), LabError> {
     let entries = std::fs::read_dir(folder).map_err(|source| LabError::file(folder, source))?;
     for entry in entries.flatten() {
         let path = entry.path();
         let hidden = entry.file_name().to_string_lossy().starts_with('.');
         match entry.file_type() {
-            Ok(kind) if kind.is_dir() => collect(&path, files)?,
+            Ok(kind) if kind.is_dir() => collect_files(&path, files)?,
             Ok(kind) if kind.is_file() && !hidden => files.push(path),
             _ => {}
         }

@@ -40,7 +40,7 @@ use crate::{
 
 /// A message to a page.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Outgoing {
+pub enum OutgoingMessage {
     /// A text message.
     Text(String),
     /// The tables of a run.
@@ -60,17 +60,17 @@ pub enum Mode {
 
 /// A running experiment.
 pub struct Lab {
-    shared: Arc<Shared>,
+    shared: Arc<SharedState>,
     next_page: AtomicU64,
 }
 
-struct Shared {
+struct SharedState {
     out: PathBuf,
     config: Config,
     mode: Mode,
     /// Path of the program `hoid`, which creates the pages of results.
     program: Option<PathBuf>,
-    state: Mutex<Current>,
+    state: Mutex<LabState>,
     pages: Mutex<BTreeMap<u64, Page>>,
     /// Prevents a second server for the same experiment.
     _lock: Option<DirectoryLock>,
@@ -79,17 +79,17 @@ struct Shared {
 struct Page {
     role: Option<Role>,
     browser: BTreeMap<String, String>,
-    sender: Sender<Outgoing>,
+    sender: Sender<OutgoingMessage>,
 }
 
 #[derive(Default)]
-struct Current {
+struct LabState {
     session: Option<Session>,
     /// Number of the page used for tracking.
     person: Option<u64>,
     /// A run that was sent to the page but not started.
-    ready: Option<Ready>,
-    run: Option<Running>,
+    ready: Option<PreparedRun>,
+    run: Option<ActiveRun>,
     /// Number of the last run that ended; its page may still send batches.
     last_ended_run: Option<usize>,
     reporting: bool,
@@ -97,13 +97,13 @@ struct Current {
     calibration: Option<Calibration>,
 }
 
-struct Ready {
+struct PreparedRun {
     planned: usize,
     number: usize,
     task: Task,
 }
 
-struct Running {
+struct ActiveRun {
     run_start: RunStart,
     stem: Stem,
     task: Task,
@@ -111,15 +111,15 @@ struct Running {
     live: Option<Sender<Samples>>,
 }
 
-impl Current {
+impl LabState {
     /// Returns the current run if it has this number.
-    fn running(&self, number: usize) -> Result<&Running, LabError> {
+    fn active_run(&self, number: usize) -> Result<&ActiveRun, LabError> {
         let run = self.run.as_ref().filter(|run| run.run_start.number == number);
         run.ok_or_else(|| LabError::Order(format!("run {number} is not in progress")))
     }
 
     /// Makes a session the current one; a run that was sent for another session cannot be started in it.
-    fn enter(&mut self, session: Session) {
+    fn set_session(&mut self, session: Session) {
         self.session = Some(session);
         self.ready = None;
         self.pages = Pages::default();
@@ -132,11 +132,11 @@ impl Lab {
     /// # Errors
     /// [`LabError`] for a folder that cannot be used, or that contains no session to replay.
     pub fn open(out: &Path, config: Config, mode: Mode, program: Option<PathBuf>) -> Result<Self, LabError> {
-        let mut current = Current::default();
+        let mut current = LabState::default();
         let config = match &mode {
             Mode::Replay(folder) => {
                 let session = Session::read(folder)?;
-                current.pages = reports::found(&session.folder);
+                current.pages = reports::existing_pages(&session.folder);
                 let config = session.facts.config.clone();
                 current.session = Some(session);
                 config
@@ -156,10 +156,10 @@ impl Lab {
             lock = Some(DirectoryLock::take(&out)?);
         }
         if mode == Mode::Sessions {
-            experiment::describe(&out, &config)?;
+            experiment::write_description(&out, &config)?;
         }
         Ok(Self {
-            shared: Arc::new(Shared {
+            shared: Arc::new(SharedState {
                 out,
                 config,
                 mode,
@@ -173,7 +173,7 @@ impl Lab {
     }
 
     /// Registers a page and returns its number.
-    pub fn join(&self, sender: Sender<Outgoing>) -> u64 {
+    pub fn join(&self, sender: Sender<OutgoingMessage>) -> u64 {
         let id = self.next_page.fetch_add(1, Ordering::Relaxed);
         self.shared.pages().insert(
             id,
@@ -216,7 +216,7 @@ impl Lab {
     pub fn receive(&self, id: u64, message: FromPage) -> Result<(), LabError> {
         let shared = &self.shared;
         if let FromPage::Hello { role, browser } = message {
-            return shared.hello(id, role, browser);
+            return shared.handle_hello(id, role, browser);
         }
         if matches!(shared.mode, Mode::Replay(_)) {
             return Err(LabError::Order(
@@ -259,7 +259,7 @@ impl Lab {
         let (Some(number), Some(folder)) = (number, self.shared.session_folder()) else {
             return Ok(None);
         };
-        let found = Stem::all(&folder)?.into_iter().find(|(known, _)| *known == number);
+        let found = Stem::find_all(&folder)?.into_iter().find(|(known, _)| *known == number);
         let Some((_, stem)) = found else { return Ok(None) };
         Ok(Some((replay::data(&stem)?, "application/json")))
     }
@@ -273,12 +273,12 @@ impl Lab {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);
         };
-        reports::file(&folder, &self.shared.out, names)
+        reports::read_page(&folder, &self.shared.out, names)
     }
 }
 
-impl Shared {
-    fn state(&self) -> MutexGuard<'_, Current> {
+impl SharedState {
+    fn state(&self) -> MutexGuard<'_, LabState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -291,7 +291,7 @@ impl Shared {
         self.pages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn hello(&self, id: u64, role: Role, browser: BTreeMap<String, String>) -> Result<(), LabError> {
+    fn handle_hello(&self, id: u64, role: Role, browser: BTreeMap<String, String>) -> Result<(), LabError> {
         let long = |(name, value): (&String, &String)| name.len() > 64 || value.len() > 512;
         if browser.len() > 32 || browser.iter().any(long) {
             return Err(LabError::Message(
@@ -331,7 +331,7 @@ impl Shared {
     }
 
     /// Continues the session in the window `id`.
-    fn transfer_session_to(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
+    fn transfer_session_to(&self, state: &mut LabState, id: u64) -> Result<(), LabError> {
         state.person = Some(id);
         state.ready = None;
         let browser = self
@@ -349,43 +349,43 @@ impl Shared {
     }
 
     /// Executes a message from the tracking page.
-    fn execute(self: &Arc<Self>, state: &mut Current, id: u64, message: FromPage) -> Result<(), LabError> {
+    fn execute(self: &Arc<Self>, state: &mut LabState, id: u64, message: FromPage) -> Result<(), LabError> {
         match message {
             FromPage::Hello { .. } => Ok(()),
-            FromPage::Consent { subject, agreed, cc0 } => self.consent(state, &subject, agreed, cc0),
+            FromPage::Consent { subject, agreed, cc0 } => self.handle_consent(state, &subject, agreed, cc0),
             FromPage::Resume { session } => self.resume(state, &session),
             FromPage::Next {} => self.send_run(state, id),
-            begin @ FromPage::Begin { .. } => self.begin(state, begin),
-            FromPage::Batch { number, batch } => self.take(state, number, &batch),
+            begin @ FromPage::Begin { .. } => self.start_run(state, begin),
+            FromPage::Batch { number, batch } => self.append_batch(state, number, &batch),
             FromPage::Abort { number } => {
-                state.running(number)?;
+                state.active_run(number)?;
                 self.end_run(state, RunEnd::Interrupted, BTreeMap::new())
             }
-            FromPage::Finish { number, counted } => self.finish(state, number, counted),
+            FromPage::Finish { number, counted } => self.finish_run(state, number, counted),
             FromPage::Reports {} => {
-                self.report(state);
+                self.create_reports(state);
                 Ok(())
             }
         }
     }
 
-    fn consent(&self, state: &mut Current, subject: &str, agreed: bool, cc0: bool) -> Result<(), LabError> {
+    fn handle_consent(&self, state: &mut LabState, subject: &str, agreed: bool, cc0: bool) -> Result<(), LabError> {
         if !agreed {
             return Err(LabError::Order("nothing is measured without consent".to_owned()));
         }
         if state.run.is_some() || matches!(self.mode, Mode::Replay(_)) {
             return Err(LabError::Order("another session is in progress".to_owned()));
         }
-        state.enter(Session::begin(&self.out, &self.config, subject, cc0)?);
-        experiment::list(&self.out)
+        state.set_session(Session::create(&self.out, &self.config, subject, cc0)?);
+        experiment::write_participants(&self.out)
     }
 
-    fn resume(&self, state: &mut Current, name: &str) -> Result<(), LabError> {
+    fn resume(&self, state: &mut LabState, name: &str) -> Result<(), LabError> {
         let open = self.open_sessions();
         if state.run.is_some() || !open.iter().any(|known| known == name) {
             return Err(LabError::Order(format!("there is no session {name:?} to continue")));
         }
-        state.enter(Session::open(&self.out.join(name))?);
+        state.set_session(Session::open(&self.out.join(name))?);
         Ok(())
     }
 }

@@ -19,8 +19,8 @@ use hoid_model::{Channel, Record, SampleTime, uncertainty::Estimate};
 use hoid_track::Sample;
 
 /// Minimum length of the data for a fit, and time between fits, s.
-const SHORTEST_S: f64 = 40.0;
-const EVERY_S: f64 = 10.0;
+const MIN_SPAN_S: f64 = 40.0;
+const FIT_INTERVAL_S: f64 = 10.0;
 /// Minimum ratio of a reported lag to its standard error.
 const MIN_SIGNIFICANCE: f64 = 10.0;
 
@@ -104,13 +104,13 @@ impl LagFits {
     }
 
     /// Adds a sample of the measurement.
-    pub fn take(&mut self, sample: Sample) {
+    pub fn push(&mut self, sample: Sample) {
         self.e.push(sample.e);
         self.u.push(sample.u);
     }
 
     /// Discards the samples before a change of the operator at the time `at_s`.
-    pub fn changed(&mut self, at_s: f64) {
+    pub fn discard_before(&mut self, at_s: f64) {
         let past = ((at_s - self.from_s) / self.ts.s())
             .ceil()
             .clamp(0.0, self.e.len() as f64) as usize;
@@ -130,7 +130,7 @@ impl LagFits {
             }
         }
         let samples = |seconds: f64| (seconds / self.ts.s()).round() as usize;
-        let due = samples(SHORTEST_S).max(self.fitted.saturating_add(samples(EVERY_S)));
+        let due = samples(MIN_SPAN_S).max(self.fitted.saturating_add(samples(FIT_INTERVAL_S)));
         if !self.busy
             && self.e.len() >= due
             && let Ok(record) = Record::new(
@@ -154,9 +154,9 @@ mod tests {
     use hoid_sim::RunSeed;
 
     use super::*;
-    use crate::live::tests::samples_of_c1;
+    use crate::live::tests::c1_samples;
 
-    const TS: SampleTime = SampleTime::HUNDREDTH;
+    const TS: SampleTime = SampleTime::AT_100_HZ;
     const LAG_S: f64 = 1.0;
 
     fn noise(samples: usize, seed: u64) -> Vec<f64> {
@@ -168,12 +168,16 @@ mod tests {
     }
 
     /// Returns e and u of a gain of .4 with a lag, with the element 4/s and a first-order remnant.
-    fn with_lag(seconds: f64, seed: u64) -> Vec<Sample> {
+    fn lagged_samples(seconds: f64, seed: u64) -> Vec<Sample> {
         let n = (seconds / TS.s()) as usize;
         let operator = FamilyOperator::new(Form::Lag, false, &[0.4 / LAG_S, 1.0 / LAG_S, 0.18]).unwrap();
         let transfer = operator.transfer_function().unwrap();
         let held = HeldSystem::new(transfer.num(), transfer.den(), 0.0, TS).unwrap();
-        let (a, b, c) = (held.transition()[0], held.input()[0], held.output_row()[0]);
+        let (a, b, c) = (
+            held.transition_matrix()[0],
+            held.input_vector()[0],
+            held.output_row()[0],
+        );
         let target = ForcingFunction::reference().samples(0.0, TS, n);
         let (mut x, mut y, mut v) = (0.0, 0.0, 0.0);
         let mut answers = vec![0.0; 18];
@@ -203,7 +207,7 @@ mod tests {
 
     #[test]
     fn lag_is_found_in_sufficient_data() {
-        let Lag::Known(found) = Lag::of(record(&with_lag(60.0, 1))) else {
+        let Lag::Known(found) = Lag::of(record(&lagged_samples(60.0, 1))) else {
             panic!("60 s of a lag of {LAG_S} s carry no information about it");
         };
         let error = found.standard_error.unwrap();
@@ -215,7 +219,7 @@ mod tests {
         // Without the limit of `MIN_SIGNIFICANCE`, a lag would be reported for the last three.
         for (seed, n) in [(1, 3000), (21, 3000), (31, 3000), (2, 8000)] {
             assert_eq!(
-                Lag::of(record(&samples_of_c1(seed)[..n])),
+                Lag::of(record(&c1_samples(seed)[..n])),
                 Lag::NotDetermined,
                 "seed {seed}"
             );
@@ -225,16 +229,16 @@ mod tests {
     #[test]
     fn fits_follow_the_run_and_discard_data_before_a_change() {
         let mut fits = LagFits::new(TS);
-        let samples = with_lag(60.0, 2);
+        let samples = lagged_samples(60.0, 2);
         let (first, rest) = samples.split_at(3999);
-        first.iter().for_each(|sample| fits.take(*sample));
+        first.iter().for_each(|sample| fits.push(*sample));
         assert_eq!(fits.lag(), Lag::Waiting);
-        assert!(!fits.busy, "a fit of less than {SHORTEST_S} s");
-        rest.iter().for_each(|sample| fits.take(*sample));
+        assert!(!fits.busy, "a fit of less than {MIN_SPAN_S} s");
+        rest.iter().for_each(|sample| fits.push(*sample));
         assert_eq!(fits.lag(), Lag::Waiting);
         assert!(fits.busy);
         // The fit in progress now refers to the operator before the change.
-        fits.changed(50.0);
+        fits.discard_before(50.0);
         assert_eq!((fits.e.len(), fits.from_s), (1000, 50.0));
         let answer = fits.found.recv().unwrap();
         assert_eq!(answer.0, 0.0);

@@ -35,9 +35,9 @@ use crate::{
 /// Dead time n_k with which a method starts, in samples of 10 ms.
 const DEFAULT_NK: usize = 21;
 /// Frequency range in rad/s of the search for the crossover, and the number of its logarithmically spaced steps.
-const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
+const CROSSOVER_GRID: (f64, f64, usize) = (0.3, 15.0, 40);
 /// Relative frequency step for the slopes.
-const SLOPE: f64 = 1e-3;
+const SLOPE_STEP: f64 = 1e-3;
 
 /// A value and its standard error; each is `None` if unknown.
 type ReportedValue = (Option<f64>, Option<f64>);
@@ -93,16 +93,16 @@ impl LiveRun {
         let ranges = default_operator_ranges(options.structure, ts);
         let plan = TrackPlan::new(options, ranges, Criterion::Bic, ts)?;
         Ok(Self {
-            live: Live::of_plan(plan, DEFAULT_WARM_UP_S)?,
+            live: Live::from_plan(plan, DEFAULT_WARM_UP_S)?,
             lags: LagFits::new(ts),
-            t_s: -course.times_s().0,
+            t_s: -course.durations_s().0,
             course,
             ts,
         })
     }
 
     /// Processes samples and returns the estimates after the last sample.
-    pub fn take(&mut self, samples: &[Sample]) -> LiveLine {
+    pub fn process(&mut self, samples: &[Sample]) -> LiveLine {
         let mut changed_s = None;
         for sample in samples {
             self.live
@@ -110,11 +110,11 @@ impl LiveRun {
             if let Some(change) = self.live.tracker().and_then(Tracker::change) {
                 let at_s = self.t_s - change.seconds_ago;
                 changed_s = Some(at_s);
-                self.lags.changed(at_s);
+                self.lags.discard_before(at_s);
             }
             // The run-in, during which the target is faded in, is excluded.
             if self.t_s > -self.ts.s() / 2.0 {
-                self.lags.take(*sample);
+                self.lags.push(*sample);
             }
             self.t_s += self.ts.s();
         }
@@ -126,7 +126,7 @@ impl LiveRun {
         match self.lags.lag() {
             Lag::Waiting => line.lag_waiting = Some("after 40 s"),
             Lag::NotDetermined => line.lag_waiting = Some("not determined"),
-            Lag::Known(lag) => line.lag_s = reported(lag),
+            Lag::Known(lag) => line.lag_s = reported_value(lag),
         }
         let tracker = match self.live.stage() {
             Stage::Tracking(tracker) => tracker,
@@ -140,29 +140,29 @@ impl LiveRun {
         };
         match tracker.operator() {
             Ok(operator) => {
-                line.gain = reported(operator.k_e);
-                line.lead_s = reported(operator.t_l_s);
-                line.omega_nm_rad_s = reported(operator.omega_nm_rad_s);
-                line.delay_s = reported(operator.tau_e_s);
+                line.gain = reported_value(operator.k_e);
+                line.lead_s = reported_value(operator.t_l_s);
+                line.omega_nm_rad_s = reported_value(operator.omega_nm_rad_s);
+                line.delay_s = reported_value(operator.tau_e_s);
             }
             Err(reason) => line.waiting = Some(reason.to_string()),
         }
         if let Ok(element) = self.course.element_at(self.t_s)
             && let Some((crossover, margin)) = crossover(&|omega| tracker.response(omega), &element)
         {
-            (line.crossover_rad_s, line.phase_margin_deg) = (reported(crossover), reported(margin));
+            (line.crossover_rad_s, line.phase_margin_deg) = (reported_value(crossover), reported_value(margin));
         }
         line
     }
 }
 
-fn reported(estimate: Estimate) -> ReportedValue {
+fn reported_value(estimate: Estimate) -> ReportedValue {
     let finite = |v: f64| v.is_finite().then_some(v);
     (finite(estimate.value), estimate.standard_error.and_then(finite))
 }
 
 /// Returns the crossover frequency in rad/s and the phase margin in degrees, with first-order standard errors; `None`
-/// if `|L|` does not fall below one within the range of [`CROSSOVERS`].
+/// if `|L|` does not fall below one within the range of [`CROSSOVER_GRID`].
 fn crossover(
     response: &dyn Fn(f64) -> Option<Response>,
     element: &ContinuousTransferFunction,
@@ -171,7 +171,7 @@ fn crossover(
         let [re, im] = response(omega)?.value;
         Some(Complex64::new(re, im) * element.response(omega))
     };
-    let (low, high, steps) = CROSSOVERS;
+    let (low, high, steps) = CROSSOVER_GRID;
     let at = |k: usize| low * (high / low).powf(k as f64 / steps as f64);
     let mut above = None;
     let mut found = None;
@@ -195,8 +195,8 @@ fn crossover(
     }
     let omega = (from + to) / 2.0;
     let own = response(omega)?;
-    let ratio = open(omega * (1.0 + SLOPE))? / open(omega * (1.0 - SLOPE))?;
-    let width = 2.0 * SLOPE * omega;
+    let ratio = open(omega * (1.0 + SLOPE_STEP))? / open(omega * (1.0 - SLOPE_STEP))?;
+    let width = 2.0 * SLOPE_STEP * omega;
     let (slope_gain, slope_phase) = (ratio.norm().ln() / width, ratio.arg() / width);
     // Derivatives of ln Y with respect to Re Y and Im Y: d ln Y = (dRe + j dIm)/Y.
     let [re, im] = own.value;
@@ -233,24 +233,24 @@ pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 's
                 let _ = file.write_all(text.as_bytes());
             }
         };
-        write(HEADER);
+        write(CSV_HEADER);
         while let Ok(mut samples) = receiver.recv() {
             // Samples that have arrived in the meantime are processed together.
             while let Ok(more) = receiver.try_recv() {
                 samples.extend(more);
             }
-            let line = run.take(&samples);
-            write(&row(&line));
+            let line = run.process(&samples);
+            write(&csv_row(&line));
             tell(&line);
         }
     });
     sender
 }
 
-const HEADER: &str = "t,K_e,K_e_se,T_L,T_L_se,omega_nm,omega_nm_se,tau_e,tau_e_se,crossover_rad_s,\
+const CSV_HEADER: &str = "t,K_e,K_e_se,T_L,T_L_se,omega_nm,omega_nm_se,tau_e,tau_e_se,crossover_rad_s,\
 crossover_rad_s_se,phase_margin_deg,phase_margin_deg_se,changed_s,T_I,T_I_se\n";
 
-fn row(line: &LiveLine) -> String {
+fn csv_row(line: &LiveLine) -> String {
     let cell = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
     let pairs = [
         line.gain,
@@ -279,13 +279,13 @@ pub(crate) mod tests {
     use crate::config::Condition;
 
     /// Returns e and u of the operator of C1 for a seed.
-    pub(crate) fn samples_of_c1(seed: u64) -> Vec<Sample> {
+    pub(crate) fn c1_samples(seed: u64) -> Vec<Sample> {
         let simulator = Simulator::new(&Scenario::condition(Reference::C1)).unwrap();
         let seed = RunSeed {
             seed,
             ..RunSeed::default()
         };
-        let signals = simulator.signals(&seed.white_noise(simulator.samples())).unwrap();
+        let signals = simulator.signals(&seed.white_noise(simulator.sample_count())).unwrap();
         (signals.e.iter().zip(&signals.u))
             .map(|(e, u)| Sample {
                 e: *e,
@@ -302,10 +302,10 @@ pub(crate) mod tests {
             scenario_text: Some("condition = \"C1\"\n".to_owned()),
             ..Condition::default()
         };
-        let mut run = LiveRun::new("adaptive", condition.course().unwrap()).unwrap();
+        let mut run = LiveRun::new("adaptive", condition.task_definition().unwrap()).unwrap();
         let mut last = LiveLine::default();
-        for five in samples_of_c1(3).chunks(5) {
-            last = run.take(five);
+        for five in c1_samples(3).chunks(5) {
+            last = run.process(five);
         }
         assert!((last.t - 81.92).abs() < 1e-6, "{}", last.t);
         // The margins of C1 are computed from the formulas of the loop of s1.

@@ -30,10 +30,10 @@ impl Plant {
         self.b.len()
     }
 
-    /// True if the dimensions of the matrices are consistent and the number of states is at most [`MOST_STATES`].
+    /// True if the dimensions of the matrices are consistent and the number of states is at most [`MAX_STATES`].
     pub fn is_valid(&self) -> bool {
         let n = self.order();
-        n <= MOST_STATES && self.a.len() == n.saturating_mul(n) && self.c.len() == n
+        n <= MAX_STATES && self.a.len() == n.saturating_mul(n) && self.c.len() == n
     }
 
     /// Computes y from the state and v.
@@ -48,7 +48,7 @@ impl Plant {
     /// Advances the state by one tick.
     pub fn step(&self, x: &mut [f64], v: f64) {
         let rows = self.a.chunks_exact(self.order().max(1));
-        let mut next = [0.0; MOST_STATES];
+        let mut next = [0.0; MAX_STATES];
         for ((next, row), b) in next.iter_mut().zip(rows).zip(&self.b) {
             let mut sum = 0.0;
             for (a, x) in row.iter().zip(&*x) {
@@ -63,7 +63,7 @@ impl Plant {
 }
 
 /// Maximum number of states of a controlled element.
-pub const MOST_STATES: usize = 16;
+pub const MAX_STATES: usize = 16;
 
 /// Map from the raw value of a device to u.
 ///

@@ -6,18 +6,18 @@ use hoid_model::{Channel, Record, SampleTime};
 
 use crate::{
     LabError,
-    session::{Logged, RunStart},
+    session::{LoggedRun, RunStart},
     task::{TICK_S, TICKS_PER_SAMPLE, Task},
 };
 
 /// Name of the channel of the target.
-pub(crate) const TARGET: &str = "f_t";
+pub(crate) const TARGET_CHANNEL: &str = "f_t";
 
 /// Returns the record of a run, including the run-in.
 ///
 /// # Errors
 /// [`LabError::Model`] for a run without samples.
-pub fn record(run_start: &RunStart, task: &Task, logged: &Logged) -> Result<Record, LabError> {
+pub fn record(run_start: &RunStart, task: &Task, logged: &LoggedRun) -> Result<Record, LabError> {
     // If a log is longer than its run, the additional ticks are invalid.
     let n = logged.signals.e.len().min(logged.signals.u.len()).min(task.ticks);
     let every = |values: &[f64]| {
@@ -44,9 +44,9 @@ pub fn record(run_start: &RunStart, task: &Task, logged: &Logged) -> Result<Reco
         channel("u", every(&logged.signals.u)),
     )?
     .starting_at(-(run_start.run_in as f64) * TICK_S);
-    let role_of_target = run_start.condition.role_of_target()?.unwrap_or_default();
+    let role_of_target = run_start.condition.target_role()?.unwrap_or_default();
     for (name, values, role) in [
-        (TARGET, &task.target, role_of_target),
+        (TARGET_CHANNEL, &task.target, role_of_target),
         ("d", &task.disturbance, String::new()),
     ] {
         if values.iter().any(|v| *v != 0.0) {

@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::{
     LabError,
     record::record,
-    session::{Logged, RunStart, Stem},
+    session::{LoggedRun, RunStart, Stem},
     verify::check,
 };
 
@@ -16,10 +16,10 @@ use crate::{
 pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
     let run_start = RunStart::read(stem)?;
     let task = run_start.task(stem)?;
-    let logged = Logged::read(stem)?;
+    let logged = LoggedRun::read(stem)?;
     let checked = check(stem)?;
     let record = record(&run_start, &task, &logged)?;
-    let channel = |name: &str| record.channel(name).map(rounded);
+    let channel = |name: &str| record.channel(name).map(round_for_display);
     let data = json!({
         "number": run_start.number,
         "condition": run_start.condition,
@@ -30,21 +30,21 @@ pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
         "u": channel("u"),
         "y": channel("y"),
         "f": channel("f_t"),
-        "live": live(stem),
-        "verdict": checked.word(),
+        "live": live_rows(stem),
+        "verdict": checked.label(),
         "reasons": checked.reasons(),
         "measures": checked.measures,
     });
-    serde_json::to_vec(&data).map_err(|error| LabError::damaged(&stem.file("beh.parquet"), error.to_string()))
+    serde_json::to_vec(&data).map_err(|error| LabError::damaged_file(&stem.file("beh.parquet"), error.to_string()))
 }
 
 /// Rounds to six decimal places, which suffice for display.
-fn rounded(values: &[f64]) -> Vec<f64> {
+fn round_for_display(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| (v * 1e6).round() / 1e6).collect()
 }
 
 /// Returns the rows of the live estimate (numbers or null) without the header; empty if there was no live estimate.
-fn live(stem: &Stem) -> Vec<Vec<Value>> {
+fn live_rows(stem: &Stem) -> Vec<Vec<Value>> {
     let text = hoid_io::read_text(&stem.file("live.csv")).unwrap_or_default();
     let cell = |cell: &str| cell.parse::<f64>().map_or(Value::Null, Value::from);
     text.lines()

@@ -7,17 +7,17 @@ use std::{
     process::Command,
 };
 
-use hoid_study::group::MANIFEST;
+use hoid_study::group::MANIFEST_FILE;
 
 use crate::{
     LabError,
     config::Config,
-    record::TARGET,
+    record::TARGET_CHANNEL,
     session::{RunEnd, Session, Stem},
 };
 
 /// Folder of the results of `hoid group` within the experiment.
-const GROUP: &str = "group";
+const GROUP_FOLDER: &str = "group";
 
 /// Titles and paths of the existing pages.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -35,7 +35,7 @@ const COMMANDS: [&str; 3] = ["identify", "track", "describe"];
 
 /// Creates the missing pages of all finished runs except training runs, then the page of the group; `each` is called
 /// after every page of a run.
-pub fn make(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) -> Pages {
+pub fn make_pages(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) -> Pages {
     let Ok(session) = Session::read(folder) else {
         return Pages::default();
     };
@@ -46,38 +46,42 @@ pub fn make(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Pages)) ->
     for done in runs {
         let stem = session.stem(&done.condition, done.number);
         for name in COMMANDS {
-            let page = stem.reports().join(name).join("report.html");
+            let page = stem.report_folder().join(name).join("report.html");
             if !page.exists() && stem.file("beh.parquet").exists() {
-                one(program, &session.facts.config, &stem, name);
-                each(&found(folder));
+                make_run_page(program, &session.facts.config, &stem, name);
+                each(&existing_pages(folder));
             }
         }
     }
-    if out.join(MANIFEST).exists() {
-        let place = out.join(GROUP);
-        let mut command = hoid(program);
-        command.arg("group").arg(out.join(MANIFEST)).arg("--out").arg(&place);
+    if out.join(MANIFEST_FILE).exists() {
+        let place = out.join(GROUP_FOLDER);
+        let mut command = hoid_command(program);
+        command
+            .arg("group")
+            .arg(out.join(MANIFEST_FILE))
+            .arg("--out")
+            .arg(&place);
         run_command(&mut command, &place, "group");
     }
-    found(folder)
+    existing_pages(folder)
 }
 
-fn hoid(program: &Path) -> Command {
+fn hoid_command(program: &Path) -> Command {
     let mut command = Command::new(program);
     command.env("RAYON_NUM_THREADS", "1").env("COLUMNS", "100");
     command
 }
 
 /// Creates one page for a run.
-fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
-    let place = stem.reports().join(name);
-    let mut command = hoid(program);
+fn make_run_page(program: &Path, config: &Config, stem: &Stem, name: &str) {
+    let place = stem.report_folder().join(name);
+    let mut command = hoid_command(program);
     command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
     let run_start = crate::session::RunStart::read(stem).ok();
     let condition = run_start.as_ref().map(|run_start| &run_start.condition);
-    let course = condition.and_then(|condition| condition.course().ok());
+    let course = condition.and_then(|condition| condition.task_definition().ok());
     let role_of_target =
-        (condition.zip(course.as_ref())).and_then(|(condition, course)| condition.role_of_target_in(course));
+        (condition.zip(course.as_ref())).and_then(|(condition, course)| condition.target_role_in(course));
     // Margins are defined only for a constant controlled element.
     let element = course
         .filter(|course| course.change_s().is_none())
@@ -93,8 +97,8 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
         }
         "identify" => {
             if let Some(role) = role_of_target {
-                command.args(["--input", "e", "--input", TARGET]);
-                command.arg(format!("--role={TARGET}={role}"));
+                command.args(["--input", "e", "--input", TARGET_CHANNEL]);
+                command.arg(format!("--role={TARGET_CHANNEL}={role}"));
             }
             command.arg("--report").arg(&place);
         }
@@ -136,23 +140,23 @@ fn run_command(command: &mut Command, place: &Path, name: &str) {
          <style>body{{font:15px/1.5 system-ui,sans-serif;margin:2rem auto;max-width:60rem;padding:0 1rem;\
          color-scheme:light dark}}pre{{overflow-x:auto}}img{{max-width:100%;background:#fff}}</style>\n\
          <h1>hoid {name}</h1>\n{figure}<pre>{}</pre>\n<pre>{}</pre>\n</html>\n",
-        escaped(&out),
-        escaped(&wrong)
+        escape_html(&out),
+        escape_html(&wrong)
     );
     // If the page cannot be written, its link is missing, which indicates the failure.
     let _ = hoid_io::write_atomically(&page, |file| file.write_all(html.as_bytes()));
 }
 
-fn escaped(text: &str) -> String {
+fn escape_html(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// Returns the existing pages.
-pub fn found(folder: &Path) -> Pages {
+pub fn existing_pages(folder: &Path) -> Pages {
     let mut pages = Vec::new();
-    for (number, stem) in Stem::all(folder).unwrap_or_default() {
+    for (number, stem) in Stem::find_all(folder).unwrap_or_default() {
         for name in COMMANDS {
-            if stem.reports().join(name).join("report.html").exists() {
+            if stem.report_folder().join(name).join("report.html").exists() {
                 pages.push((
                     format!("run {number}: {name}"),
                     format!("reports/{}/{name}/report.html", stem.text()),
@@ -161,10 +165,10 @@ pub fn found(folder: &Path) -> Pages {
         }
     }
     let out = folder.parent().and_then(Path::parent);
-    if out.is_some_and(|out| out.join(GROUP).join("report.html").exists()) {
+    if out.is_some_and(|out| out.join(GROUP_FOLDER).join("report.html").exists()) {
         pages.push((
             "all people so far: group".to_owned(),
-            format!("reports/{GROUP}/report.html"),
+            format!("reports/{GROUP_FOLDER}/report.html"),
         ));
     }
     Pages(pages)
@@ -175,7 +179,7 @@ pub fn found(folder: &Path) -> Pages {
 ///
 /// # Errors
 /// Errors of reading the files.
-pub fn file(folder: &Path, out: &Path, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
+pub fn read_page(folder: &Path, out: &Path, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
     let sound = |name: &&str| {
         let known = |b: u8| b.is_ascii_alphanumeric() || b"-_.".contains(&b);
         !name.is_empty() && !name.starts_with('.') && name.bytes().all(known)
@@ -184,7 +188,7 @@ pub fn file(folder: &Path, out: &Path, names: &[&str]) -> Result<Option<(Vec<u8>
         return Ok(None);
     }
     let path: PathBuf = match names {
-        [GROUP, rest @ ..] => rest.iter().fold(out.join(GROUP), |path, name| path.join(name)),
+        [GROUP_FOLDER, rest @ ..] => rest.iter().fold(out.join(GROUP_FOLDER), |path, name| path.join(name)),
         _ => names.iter().fold(folder.join("reports"), |path, name| path.join(name)),
     };
     let kind = match path.extension().and_then(|end| end.to_str()) {

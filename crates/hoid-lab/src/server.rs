@@ -39,7 +39,7 @@ use http::{Reply, Request};
 
 /// Number of connections that the operating system queues until they are accepted. With the value of 128 in the
 /// standard library, a burst of strangers fills the queue, and the page must then retry its connection after a second.
-const QUEUE: i32 = 4096;
+const CONNECTION_QUEUE_LENGTH: i32 = 4096;
 /// Maximum number of simultaneous connections with the token.
 const MAX_CONNECTIONS: usize = 64;
 /// Timeout for reading from and writing to an authorised connection.
@@ -53,7 +53,7 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     token: String,
-    /// Token of [`Server::address_once`] until it is used.
+    /// Token of [`Server::single_use_address`] until it is used.
     single_use_token: Mutex<Option<String>>,
     policy: String,
     lab: Arc<Lab>,
@@ -65,7 +65,7 @@ struct AuthorisedConnection(Arc<Server>);
 
 impl AuthorisedConnection {
     /// Admits another connection if the limit allows it.
-    fn enter(server: &Arc<Server>) -> Option<Self> {
+    fn admit(server: &Arc<Server>) -> Option<Self> {
         let before = server.connection_count.fetch_add(1, Ordering::Relaxed);
         let known = Self(Arc::clone(server));
         (before < MAX_CONNECTIONS).then_some(known)
@@ -91,7 +91,7 @@ impl Server {
             LabError::Server(format!("{asked}: {error}; leave --port out to use any free port"))
         })?;
         let address = SockRef::from(&listener)
-            .listen(QUEUE)
+            .listen(CONNECTION_QUEUE_LENGTH)
             .and_then(|()| listener.local_addr())
             .map_err(|error| LabError::Server(error.to_string()))?;
         Ok(Self {
@@ -99,7 +99,7 @@ impl Server {
             address,
             token: random_token()?,
             single_use_token: Mutex::new(None),
-            policy: policy(PAGE),
+            policy: content_security_policy(PAGE),
             lab: Arc::new(lab),
             connection_count: AtomicUsize::new(0),
         })
@@ -115,33 +115,35 @@ impl Server {
     ///
     /// # Errors
     /// [`LabError::Server`] if the operating system provides no random numbers.
-    pub fn address_once(&self) -> Result<String, LabError> {
+    pub fn single_use_address(&self) -> Result<String, LabError> {
         let token = random_token()?;
         let address = format!("http://{}/{token}/", self.address);
         *self.single_use_token.lock().unwrap_or_else(PoisonError::into_inner) = Some(token);
         Ok(address)
     }
 
-    /// True for the first use of the token from [`Server::address_once`].
+    /// True for the first use of the token from [`Server::single_use_address`].
     fn take_single_use_token(&self, token: &str) -> bool {
         let mut single_use_token = self.single_use_token.lock().unwrap_or_else(PoisonError::into_inner);
-        single_use_token.take_if(|known| same(known, token)).is_some()
+        single_use_token
+            .take_if(|known| equal_in_constant_time(known, token))
+            .is_some()
     }
 
     /// Serves requests while the program runs.
     pub fn serve(self) {
         let server = Arc::new(self);
-        reception::receive(&server.listener, |request, stream| {
-            let busy = |words: &str| Reply::refused(503, words);
+        reception::accept_requests(&server.listener, |request, stream| {
+            let busy = |words: &str| Reply::refusal(503, words);
             if let Err(reply) = server.check_origin(&request) {
                 return Err((reply, stream));
             }
-            let Some(known) = AuthorisedConnection::enter(&server) else {
+            let Some(known) = AuthorisedConnection::admit(&server) else {
                 return Err((busy("too many connections"), stream));
             };
             // The stream moves into the thread; if the thread cannot be created, the copy is used for the reply.
             let other = stream.try_clone();
-            let made = thread::Builder::new().spawn(move || known.0.answer(stream, &request));
+            let made = thread::Builder::new().spawn(move || known.0.respond(stream, &request));
             match (made, other) {
                 (Err(_), Ok(stream)) => Err((busy("the system cannot start a thread for the connection"), stream)),
                 _ => Ok(()),
@@ -149,7 +151,7 @@ impl Server {
         });
     }
 
-    fn answer(&self, mut stream: TcpStream, request: &Request) {
+    fn respond(&self, mut stream: TcpStream, request: &Request) {
         let timed = stream
             .set_nonblocking(false)
             .and(stream.set_read_timeout(Some(IO_TIMEOUT)))
@@ -157,7 +159,7 @@ impl Server {
         if timed.and(stream.set_nodelay(true)).is_err() {
             return;
         }
-        let reply = match self.routed(request) {
+        let reply = match self.route(request) {
             Ok(Route::Socket(key)) => return socket::run(stream, &key, &self.lab),
             Ok(Route::Reply(reply)) | Err(reply) => reply,
         };
@@ -172,43 +174,43 @@ impl Server {
             authority == format!("127.0.0.1:{port}") || authority == format!("localhost:{port}")
         };
         if !request.host.as_deref().is_some_and(own) {
-            return Err(Reply::refused(403, "another host"));
+            return Err(Reply::refusal(403, "another host"));
         }
         let foreign = |origin: &str| !origin.strip_prefix("http://").is_some_and(own);
         if request.origin.as_deref().is_some_and(foreign) {
-            return Err(Reply::refused(403, "another origin"));
+            return Err(Reply::refusal(403, "another origin"));
         }
-        let (token, rest) = request.token();
+        let (token, rest) = request.token_and_path();
         if request.method == "GET" && rest.is_empty() && self.take_single_use_token(token) {
-            return Err(Reply::moved(&self.address()));
+            return Err(Reply::redirect(&self.address()));
         }
-        if !same(token, &self.token) {
-            return Err(Reply::refused(403, "no token: open the address that hoid lab printed"));
+        if !equal_in_constant_time(token, &self.token) {
+            return Err(Reply::refusal(403, "no token: open the address that hoid lab printed"));
         }
         if request.method != "GET" {
-            return Err(Reply::refused(405, "only GET"));
+            return Err(Reply::refusal(405, "only GET"));
         }
         Ok(())
     }
 
     /// Returns the resource for an admitted request.
-    fn routed(&self, request: &Request) -> Result<Route, Reply> {
-        let parts: Vec<&str> = request.token().1.split('/').collect();
+    fn route(&self, request: &Request) -> Result<Route, Reply> {
+        let parts: Vec<&str> = request.token_and_path().1.split('/').collect();
         let file = |found: Result<Option<(Vec<u8>, &'static str)>, LabError>| match found {
             Ok(Some((body, kind))) => Ok(Route::Reply(Reply::file(body, kind))),
-            Ok(None) => Err(Reply::refused(404, "not found")),
-            Err(error) => Err(Reply::refused(500, &error.to_string())),
+            Ok(None) => Err(Reply::refusal(404, "not found")),
+            Err(error) => Err(Reply::refusal(500, &error.to_string())),
         };
         match parts.as_slice() {
             [""] | ["experimenter"] => Ok(Route::Reply(Reply::page(PAGE, &self.policy))),
             ["socket"] => match &request.socket_key {
                 Some(key) if request.origin.is_some() => Ok(Route::Socket(key.clone())),
-                _ => Err(Reply::refused(403, "not a WebSocket request from this page")),
+                _ => Err(Reply::refusal(403, "not a WebSocket request from this page")),
             },
             ["export.zip"] => file(self.lab.export()),
             ["data", name] => file(self.lab.data(name)),
             ["reports", names @ ..] => file(self.lab.report(names)),
-            _ => Err(Reply::refused(404, "not found")),
+            _ => Err(Reply::refusal(404, "not found")),
         }
     }
 }
@@ -226,13 +228,13 @@ fn random_token() -> Result<String, LabError> {
 }
 
 /// Compares two strings in constant time.
-fn same(a: &str, b: &str) -> bool {
+fn equal_in_constant_time(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
 }
 
 /// Returns the content security policy of the page: only its own script and style, identified by their hashes, and its
 /// own socket and data are permitted.
-fn policy(page: &str) -> String {
+fn content_security_policy(page: &str) -> String {
     let hash = |tag: &str| {
         let inside = page
             .split_once(&format!("<{tag}>"))

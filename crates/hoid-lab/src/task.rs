@@ -69,9 +69,9 @@ impl Task {
     /// element that cannot be discretised.
     pub fn new(condition: &Condition, cell: u64, replication: u64) -> Result<Self, LabError> {
         condition.check()?;
-        let course = condition.course()?;
+        let course = condition.task_definition()?;
         let tick = SampleTime::new(TICK_S)?;
-        let (run_in_s, measured_s) = course.times_s();
+        let (run_in_s, measured_s) = course.durations_s();
         let whole = |s: f64| (s / TICK_S).round() as usize;
         let (run_in, ticks) = (whole(run_in_s), whole(run_in_s).saturating_add(whole(measured_s)));
         let start_s = -(run_in as f64) * TICK_S;
@@ -82,7 +82,7 @@ impl Task {
             if last.as_ref() == Some(&element) {
                 continue;
             }
-            let plant = held(element.num(), element.den(), course.realisation(), tick)?;
+            let plant = discretise_with_hold(element.num(), element.den(), course.realisation(), tick)?;
             phases.push(Phase { from, plant });
             last = Some(element);
             if course.change_s().is_none() {
@@ -96,10 +96,10 @@ impl Task {
         };
         let [target, disturbance] = course.excitations();
         let lines = [&target, &disturbance].map(|excitation| excitation.function.sinusoids().len());
-        let mut turns = seed.uniform(lines.iter().sum()).into_iter();
+        let mut turns = seed.uniform_numbers(lines.iter().sum()).into_iter();
         let fade = FADE_S.min(run_in_s);
         let mut table = |excitation: &Excitation, n: usize| -> Result<Vec<f64>, LabError> {
-            let mut values = drawn(excitation, &mut turns)?.samples(start_s, tick, n);
+            let mut values = draw_phases(excitation, &mut turns)?.samples(start_s, tick, n);
             for (k, value) in values.iter_mut().enumerate().take(whole(fade)) {
                 *value *= k as f64 * TICK_S / fade;
             }
@@ -137,7 +137,7 @@ impl Task {
 }
 
 /// Returns the excitation as a function of time, with random phases if requested.
-fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Result<ForcingFunction, LabError> {
+fn draw_phases(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Result<ForcingFunction, LabError> {
     if !excitation.random_phases {
         return Ok(excitation.function.clone());
     }
@@ -150,7 +150,12 @@ fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Resu
 }
 
 /// Discretises a controlled element over one tick; `realisation` gives the position of its leading gain.
-fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) -> Result<Plant, LabError> {
+fn discretise_with_hold(
+    num: &[f64],
+    den: &[f64],
+    realisation: Realisation,
+    tick: SampleTime,
+) -> Result<Plant, LabError> {
     let gain = num.first().copied().unwrap_or(0.0);
     let shape: Vec<f64> = num.iter().map(|c| if gain == 0.0 { *c } else { c / gain }).collect();
     let system = HeldSystem::new(&shape, den, 0.0, tick)?;
@@ -160,10 +165,10 @@ fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) ->
         Realisation::Output => (1.0, gain),
     };
     Ok(Plant {
-        a: system.transition().to_vec(),
-        b: scaled(system.input(), at_input),
+        a: system.transition_matrix().to_vec(),
+        b: scaled(system.input_vector(), at_input),
         c: scaled(system.output_row(), at_output),
-        d: system.direct() * gain,
+        d: system.direct_feedthrough() * gain,
     })
 }
 
@@ -234,7 +239,7 @@ mod tests {
         let task = Task::new(&own, 0, 0).unwrap();
         let simulator = Simulator::new(&Scenario::condition(Reference::C1)).unwrap();
         let signals = simulator
-            .signals(&RunSeed::default().white_noise(simulator.samples()))
+            .signals(&RunSeed::default().white_noise(simulator.sample_count()))
             .unwrap();
         // Only ticks after the fade-in are compared, because the simulator has no fade-in.
         let faded = (FADE_S / TICK_S) as usize;

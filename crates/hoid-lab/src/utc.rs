@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// Returns the current time with a resolution of one second.
 pub fn now() -> String {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    of_seconds(since.as_secs())
+    format_utc(since.as_secs())
 }
 
 /// Formats seconds since 1970 as text such as `2026-11-23T05:33:00Z`; the date is computed by H. Hinnant's algorithm
@@ -14,7 +14,7 @@ pub fn now() -> String {
     clippy::arithmetic_side_effects,
     reason = "the first step divides, so that no u64 overflows; what is subtracted is part of what it is subtracted from"
 )]
-fn of_seconds(seconds: u64) -> String {
+fn format_utc(seconds: u64) -> String {
     let (days, of_day) = (seconds / 86_400 + 719_468, seconds % 86_400);
     let (era, day_of_era) = (days / 146_097, days % 146_097);
     let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
@@ -29,7 +29,7 @@ fn of_seconds(seconds: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::of_seconds;
+    use super::format_utc;
 
     #[test]
     fn known_times_are_formatted_as_utc() {
@@ -39,7 +39,7 @@ mod tests {
             (1_709_251_199, "2024-02-29T23:59:59Z"),
             (4_107_542_400, "2100-03-01T00:00:00Z"),
         ] {
-            assert_eq!(of_seconds(seconds), text);
+            assert_eq!(format_utc(seconds), text);
         }
     }
 }

@@ -25,18 +25,18 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    session::{Ended, Logged, RunEnd, RunStart, Stem},
+    session::{Ended, LoggedRun, RunEnd, RunStart, Stem},
     task::{Task, held_inputs},
 };
 
 /// Largest relative difference in a table that may be due to different sine functions.
-const TABLE: f64 = 1e-9;
+const TABLE_TOLERANCE: f64 = 1e-9;
 /// A frame counts as missed if the interval between frames exceeds the typical interval by this factor.
 const MISSED_FRAME_RATIO: f64 = 1.5;
 
 /// Result of the verification of a run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Checked {
+pub struct Verification {
     /// Verdict on the run; trustworthy means verified.
     pub verdict: Verdict,
     /// Additional measurements.
@@ -68,14 +68,14 @@ pub struct Measures {
     pub score: f64,
 }
 
-impl Checked {
+impl Verification {
     /// True if the run is verified.
     pub fn is_verified(&self) -> bool {
         self.verdict.level == VerdictLevel::Trustworthy
     }
 
     /// Returns `verified` or `unverified`.
-    pub fn word(&self) -> &'static str {
+    pub fn label(&self) -> &'static str {
         if self.is_verified() { "verified" } else { "unverified" }
     }
 
@@ -90,32 +90,32 @@ impl Checked {
 /// # Errors
 /// [`LabError`] if `run.json` is missing or the operating system cannot read a file; problems of the other files are
 /// findings.
-pub fn check(stem: &Stem) -> Result<Checked, LabError> {
+pub fn check(stem: &Stem) -> Result<Verification, LabError> {
     let run_start = RunStart::read(stem)?;
-    let logged = Logged::read(stem)?;
+    let logged = LoggedRun::read(stem)?;
     let ended = Ended::read(stem).unwrap_or_default();
     let mut findings: Vec<Finding> = (logged.faults.iter())
-        .map(|words| Finding::doubt("lab-log", words.clone()))
+        .map(|words| Finding::warning("lab-log", words.clone()))
         .collect();
     let task = match run_start.task(stem) {
         Ok(task) => task,
         Err(error) => {
-            findings.push(Finding::doubt("lab-task", error.to_string()));
-            return Ok(Checked {
+            findings.push(Finding::warning("lab-task", error.to_string()));
+            return Ok(Verification {
                 verdict: Verdict::of(findings),
                 measures: Measures::default(),
             });
         }
     };
-    findings.extend(end_of(&run_start, ended.as_ref(), &logged));
-    findings.extend(task_of(&run_start, &task));
-    findings.extend(ticks_of(&logged));
-    findings.extend(events_of(&run_start, &logged));
-    findings.extend(inputs_of(&run_start, &logged));
-    findings.extend(errors_of(&task, &logged));
-    findings.extend(frames_of(&run_start, &logged));
+    findings.extend(check_end(&run_start, ended.as_ref(), &logged));
+    findings.extend(check_task(&run_start, &task));
+    findings.extend(check_ticks(&logged));
+    findings.extend(check_events(&run_start, &logged));
+    findings.extend(check_inputs(&run_start, &logged));
+    findings.extend(check_errors(&task, &logged));
+    findings.extend(check_frames(&run_start, &logged));
     if let Some(ended) = &ended {
-        findings.extend(files_of(stem, ended)?);
+        findings.extend(check_files(stem, ended)?);
         findings.extend(input_findings(&run_start, ended));
     }
     let measures = measures(&run_start, &task, &logged);
@@ -123,35 +123,35 @@ pub fn check(stem: &Stem) -> Result<Checked, LabError> {
         let words = format!("{} of {} frames were missed", measures.missed_frames, measures.frames);
         findings.push(Finding::note("lab-missed-frames", words));
     }
-    Ok(Checked {
+    Ok(Verification {
         verdict: Verdict::of(findings),
         measures,
     })
 }
 
-fn end_of(run_start: &RunStart, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
+fn check_end(run_start: &RunStart, ended: Option<&Ended>, logged: &LoggedRun) -> Option<Finding> {
     let finished = ended.is_some_and(|ended| ended.how == RunEnd::Finished);
     let ticks = logged.numbers.len();
     (!finished || ticks != run_start.ticks).then(|| {
         let words = format!("the run ended after {ticks} of {} ticks", run_start.ticks);
-        Finding::doubt("lab-interrupted", words)
+        Finding::warning("lab-interrupted", words)
     })
 }
 
-fn task_of(run_start: &RunStart, task: &Task) -> Option<Finding> {
+fn check_task(run_start: &RunStart, task: &Task) -> Option<Finding> {
     let wrong = |what: &str| {
-        Some(Finding::doubt(
+        Some(Finding::warning(
             "lab-task",
             format!("{what} does not match its condition and seed"),
         ))
     };
     let Ok(made) = Task::new(&run_start.condition, run_start.cell, run_start.replication) else {
         let words = "the task cannot be built from its condition".to_owned();
-        return Some(Finding::doubt("lab-task", words));
+        return Some(Finding::warning("lab-task", words));
     };
     let near = |a: &[f64], b: &[f64]| {
         let size = b.iter().fold(1e-300, |m: f64, v| m.max(v.abs()));
-        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= TABLE * size)
+        a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= TABLE_TOLERANCE * size)
     };
     if !near(&task.target, &made.target) {
         return wrong("the target");
@@ -167,12 +167,12 @@ fn task_of(run_start: &RunStart, task: &Task) -> Option<Finding> {
     if same { None } else { wrong("the controlled element") }
 }
 
-fn ticks_of(logged: &Logged) -> Option<Finding> {
+fn check_ticks(logged: &LoggedRun) -> Option<Finding> {
     let wrong = logged.numbers.iter().enumerate().find(|(k, tick)| **tick != *k as f64);
-    wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("found tick {tick} where tick {k} was expected")))
+    wrong.map(|(k, tick)| Finding::warning("lab-ticks", format!("found tick {tick} where tick {k} was expected")))
 }
 
-fn events_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
+fn check_events(run_start: &RunStart, logged: &LoggedRun) -> Option<Finding> {
     let mut last = 0.0;
     for (number, event) in (1_usize..).zip(&logged.events) {
         let whole = event.tick >= 0.0 && event.tick.fract() == 0.0 && event.raw.is_finite();
@@ -191,35 +191,35 @@ fn events_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
             last = event.tick;
             continue;
         };
-        return Some(Finding::doubt("lab-event", format!("input event {number} {words}")));
+        return Some(Finding::warning("lab-event", format!("input event {number} {words}")));
     }
     None
 }
 
-fn inputs_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
+fn check_inputs(run_start: &RunStart, logged: &LoggedRun) -> Option<Finding> {
     let events: Vec<(usize, f64)> = (logged.events.iter())
         .map(|event| (event.tick as usize, run_start.input.u(event.raw)))
         .collect();
     let made = held_inputs(&events, logged.signals.u.len());
-    differing(&made, &logged.signals.u).map(|(first, count)| {
+    find_differences(&made, &logged.signals.u).map(|(first, count)| {
         let all = logged.signals.u.len();
         let words = format!("u does not match the input events at {count} of {all} ticks, first at tick {first}");
-        Finding::doubt("lab-input", words)
+        Finding::warning("lab-input", words)
     })
 }
 
-fn errors_of(task: &Task, logged: &Logged) -> Option<Finding> {
+fn check_errors(task: &Task, logged: &LoggedRun) -> Option<Finding> {
     let made = task.run(&logged.signals.u);
-    differing(&made.e, &logged.signals.e).map(|(first, count)| {
+    find_differences(&made.e, &logged.signals.e).map(|(first, count)| {
         let all = logged.signals.e.len();
         let words = format!("e does not match the controlled element at {count} of {all} ticks, first at tick {first}");
-        Finding::doubt("lab-tick", words)
+        Finding::warning("lab-tick", words)
     })
 }
 
 /// Returns the first index at which two signals differ in a bit, and the number of differences; `None` if they are
 /// equal.
-fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
+fn find_differences(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     // Adding zero converts minus zero to zero.
     let differ = |(a, b): (&f64, &f64)| (a + 0.0).to_bits() != (b + 0.0).to_bits();
     let places: Vec<usize> = (logged.iter().enumerate())
@@ -229,15 +229,15 @@ fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     Some((*places.first()?, places.len()))
 }
 
-fn frames_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
+fn check_frames(run_start: &RunStart, logged: &LoggedRun) -> Option<Finding> {
     let limit = run_start.limits.frame_ms;
-    let wrong = |number: usize, words: String| Some(Finding::doubt("lab-frame", format!("frame {number} {words}")));
+    let wrong = |number: usize, words: String| Some(Finding::warning("lab-frame", format!("frame {number} {words}")));
     let mut last = 0.0;
     for (number, frame) in (1_usize..).zip(&logged.frames) {
         let shown = (frame.tick >= 0.0)
             .then(|| logged.signals.e.get(frame.tick as usize))
             .flatten();
-        if shown.is_none_or(|e| differing(&[*e], &[frame.e]).is_some()) {
+        if shown.is_none_or(|e| find_differences(&[*e], &[frame.e]).is_some()) {
             return wrong(number, format!("does not show e of tick {}", frame.tick));
         }
         let due = frame.drawn_ms.floor().min(run_start.ticks as f64 - 1.0);
@@ -268,12 +268,12 @@ fn frames_of(run_start: &RunStart, logged: &Logged) -> Option<Finding> {
             "the last frame came {:.1} ms before the last tick, expected at most {limit} ms",
             end - last
         );
-        return Some(Finding::doubt("lab-frame", words));
+        return Some(Finding::warning("lab-frame", words));
     }
     None
 }
 
-fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
+fn check_files(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
     let names = ["ticks", "events", "frames"];
     let changed: Vec<&str> = (Ended::hashes(stem)?.iter().zip(names).enumerate())
         .filter(|(k, (hash, _))| ended.sha256.get(*k) != Some(hash))
@@ -281,7 +281,7 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
         .collect();
     Ok((!changed.is_empty()).then(|| {
         let words = format!("files changed after the end of the run: {}", changed.join(", "));
-        Finding::doubt("lab-changed", words)
+        Finding::warning("lab-changed", words)
     }))
 }
 
@@ -301,7 +301,7 @@ fn input_findings(run_start: &RunStart, ended: &Ended) -> Vec<Finding> {
     notes
 }
 
-fn measures(run_start: &RunStart, task: &Task, logged: &Logged) -> Measures {
+fn measures(run_start: &RunStart, task: &Task, logged: &LoggedRun) -> Measures {
     let intervals: Vec<f64> = logged
         .frames
         .iter()

@@ -26,11 +26,11 @@ fn designed_experiments_are_read() {
         };
         let design = request.run().unwrap();
         fs::write(at.join("scenario.toml"), design.scenario()).unwrap();
-        fs::write(at.join("lab.toml"), design.lab("scenario.toml").unwrap()).unwrap();
+        fs::write(at.join("lab.toml"), design.lab_config("scenario.toml").unwrap()).unwrap();
         let config = Config::read(&at.join("lab.toml")).unwrap();
         let condition = &config.condition[0];
         assert_eq!((condition.runs, condition.display), (3, display));
-        let course = condition.course().unwrap();
+        let course = condition.task_definition().unwrap();
         let [target, disturbance] = course.excitations();
         let lines = |of| design.lines.iter().filter(|line| line.enters == of).count();
         assert_eq!(target.function.sinusoids().len(), lines(Enters::Target));
@@ -42,6 +42,6 @@ fn designed_experiments_are_read() {
             course.element_at(0.0).unwrap().to_string(),
             design.task.state.controlled_element.to_string()
         );
-        assert!((course.times_s().1 - design.length_s).abs() < 1e-9);
+        assert!((course.durations_s().1 - design.length_s).abs() < 1e-9);
     }
 }

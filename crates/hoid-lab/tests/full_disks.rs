@@ -15,23 +15,23 @@ mod run;
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use disk::{Disk, copied, fill};
+use disk::{Disk, copy_folder, fill};
 use hoid_lab::{
     config::{Condition, Config, Signal},
     plant::InputMap,
-    session::{Batch, Event, Frame, Logged, RunEnd, RunLog, Session, Stem},
+    session::{Batch, Event, Frame, LoggedRun, RunEnd, RunLog, Session, Stem},
     task::{Task, held_inputs},
     verify::check,
 };
 use person::Person;
 use serde_json::Value;
 
-const ROUNDS: usize = 200;
-const SMALLEST_KB: f64 = 64.0;
-const LARGEST_KB: f64 = 4096.0;
-const RUNS: usize = 3;
+const ROUND_COUNT: usize = 200;
+const MIN_DISK_KB: f64 = 64.0;
+const MAX_DISK_KB: f64 = 4096.0;
+const RUN_COUNT: usize = 3;
 
-const MAP: InputMap = InputMap {
+const INPUT_MAP: InputMap = InputMap {
     centre: 512.0,
     span: 300.0,
     dead: 0.0,
@@ -45,7 +45,7 @@ fn config() -> Config {
             controlled_element: "4/(s(0.2s+1))".to_owned(),
             measurement_s: 3.0,
             run_in_s: 1.0,
-            runs: RUNS,
+            runs: RUN_COUNT,
             ..Condition::default()
         }],
         ..Config::default()
@@ -60,7 +60,7 @@ fn batches(task: &Task) -> Vec<Batch> {
             Event::from((stamp.ceil(), stamp, stamp + 0.4, raw))
         })
         .collect();
-    let inputs: Vec<(usize, f64)> = events.iter().map(|v| (v.tick as usize, MAP.u(v.raw))).collect();
+    let inputs: Vec<(usize, f64)> = events.iter().map(|v| (v.tick as usize, INPUT_MAP.u(v.raw))).collect();
     let u = held_inputs(&inputs, task.ticks);
     let signals = task.run(&u);
     let frames: Vec<Frame> = (0..)
@@ -86,20 +86,20 @@ fn batches(task: &Task) -> Vec<Batch> {
 
 /// Data reported before the disk was full.
 #[derive(Default)]
-struct LoggedBefore {
+struct ConfirmedData {
     /// Number of logged ticks of each run.
     ticks: Vec<(Stem, usize)>,
     verified: Vec<Stem>,
 }
 
 /// Runs a session whose disk is full from batch `full` until batch `until`.
-fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Option<Session> {
+fn run_session(out: &Path, full: usize, until: usize, told: &mut ConfirmedData) -> Option<Session> {
     let ballast = out.join("ballast");
-    let mut session = Session::begin(out, &config(), "P01", false).ok()?;
+    let mut session = Session::create(out, &config(), "P01", false).ok()?;
     let mut instant = 0_usize;
-    for _ in 0..RUNS {
-        let Ok(number) = session.new_number() else { break };
-        let Some((run_start, task)) = run::started_run(&session, number, MAP) else {
+    for _ in 0..RUN_COUNT {
+        let Ok(number) = session.next_run_number() else { break };
+        let Some((run_start, task)) = run::start_run(&session, number, INPUT_MAP) else {
             break;
         };
         let stem = session.stem(&run_start.condition.name, number);
@@ -126,7 +126,7 @@ fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Op
             let _ = log.sync();
         }
         if session
-            .end(&stem, how, BTreeMap::new())
+            .end_run(&stem, how, BTreeMap::new())
             .is_ok_and(|checked| checked.is_verified())
         {
             told.verified.push(stem);
@@ -146,19 +146,19 @@ fn full_disk_loses_no_confirmed_data() {
         (state >> 11) as f64 / (1_u64 << 53) as f64
     };
     let (mut opened, mut verified, mut broken) = (0, 0, 0);
-    for round in 0..ROUNDS {
-        let kilobytes = SMALLEST_KB * (LARGEST_KB / SMALLEST_KB).powf(random());
-        let full = (random() * 80.0 * RUNS as f64) as usize;
+    for round in 0..ROUND_COUNT {
+        let kilobytes = MIN_DISK_KB * (MAX_DISK_KB / MIN_DISK_KB).powf(random());
+        let full = (random() * 80.0 * RUN_COUNT as f64) as usize;
         let until = full + (random() * 120.0) as usize;
         let Some(disk) = Disk::mount(at.path(), kilobytes as usize) else {
             eprintln!("skipped: no disk of its own can be mounted here");
             return;
         };
-        let mut told = LoggedBefore::default();
-        let session = session(at.path(), full, until, &mut told);
+        let mut told = ConfirmedData::default();
+        let session = run_session(at.path(), full, until, &mut told);
         let elsewhere = tempfile::tempdir().unwrap();
         let _ = fs::remove_file(at.path().join("ballast"));
-        copied(at.path(), elsewhere.path());
+        copy_folder(at.path(), elsewhere.path());
         drop(disk);
         let moved = |path: &Path| elsewhere.path().join(path.strip_prefix(at.path()).unwrap());
         let Some(session) = session else {
@@ -168,14 +168,14 @@ fn full_disk_loses_no_confirmed_data() {
         let folder = moved(&session.folder);
         let again = Session::open(&folder).unwrap_or_else(|error| panic!("{round}, {kilobytes:.0} kB: {error}"));
         opened += 1;
-        for (number, stem) in Stem::all(&folder).unwrap() {
+        for (number, stem) in Stem::find_all(&folder).unwrap() {
             let same = |other: &&Stem| other.text() == stem.text();
             let ticks = told
                 .ticks
                 .iter()
                 .find(|(other, _)| same(&other))
                 .map_or(0, |(_, ticks)| *ticks);
-            let logged = Logged::read(&stem).unwrap();
+            let logged = LoggedRun::read(&stem).unwrap();
             assert!(
                 logged.numbers.len() >= ticks,
                 "{round}, run {number}: {} of {ticks}",
@@ -195,11 +195,11 @@ fn full_disk_loses_no_confirmed_data() {
             }
         }
         // The session can be continued.
-        assert!(again.new_number().is_ok());
+        assert!(again.next_run_number().is_ok());
         again.save().unwrap();
     }
     assert!(
-        opened > ROUNDS / 2 && verified > ROUNDS / 4 && broken > ROUNDS / 4,
+        opened > ROUND_COUNT / 2 && verified > ROUND_COUNT / 4 && broken > ROUND_COUNT / 4,
         "{opened} {verified} {broken}"
     );
 }
@@ -213,9 +213,9 @@ fn full_disk_ends_the_run_and_notifies_the_page() {
         eprintln!("skipped: no disk of its own can be mounted here");
         return;
     };
-    let mut person = Person::begin(at.path(), config());
+    let mut person = Person::start_session(at.path(), config());
     let ballast = at.path().join("ballast");
-    person.next(1).unwrap();
+    person.start_next_run(1).unwrap();
     person.track(1, 0..500).unwrap();
     fill(&ballast);
     let message = person.track(1, 500..4000).unwrap_err();
@@ -226,15 +226,15 @@ fn full_disk_ends_the_run_and_notifies_the_page() {
     person.track(1, 3000..3100).unwrap();
     assert_eq!(person.state()["running"], Value::Null);
     // No run starts while the disk is full.
-    let message = person.next(2).unwrap_err();
+    let message = person.start_next_run(2).unwrap_err();
     assert!(
         message.contains("No space left") && message.contains("free space"),
         "{message}"
     );
     fs::remove_file(&ballast).unwrap();
     let folder = at.path().join("sub-P01/ses-01");
-    let number = 1 + Stem::all(&folder).unwrap().last().unwrap().0;
-    person.next(number).unwrap();
+    let number = 1 + Stem::find_all(&folder).unwrap().last().unwrap().0;
+    person.start_next_run(number).unwrap();
     person.track(number, 0..4000).unwrap();
     // A run that cannot be closed is not verified.
     fill(&ballast);
@@ -245,7 +245,7 @@ fn full_disk_ends_the_run_and_notifies_the_page() {
     );
     assert_eq!(person.state()["next"], 0);
     fs::remove_file(&ballast).unwrap();
-    person.next(number + 1).unwrap();
+    person.start_next_run(number + 1).unwrap();
     person.track(number + 1, 0..4000).unwrap();
     person.finish(number + 1).unwrap();
     assert_eq!(person.state()["next"], 1);
@@ -258,5 +258,5 @@ fn full_disk_ends_the_run_and_notifies_the_page() {
     for number in [1, number] {
         assert_eq!(verdict(number), Some("unverified"), "run {number}");
     }
-    assert_eq!(session.next(), Some(1));
+    assert_eq!(session.next_run(), Some(1));
 }

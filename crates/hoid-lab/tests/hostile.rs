@@ -16,21 +16,21 @@ use hoid_lab::{
     config::{Condition, Signal},
     session::Session,
 };
-use hostile::Hostile;
+use hostile::HostileTest;
 use person::Person;
 use serde_json::json;
 
-const CASES: u64 = 1500;
+const CASE_COUNT: u64 = 1500;
 /// Cases that failed in the past: a preview of eleven days, and more samples held back than the ring buffer contains.
 const REGRESSION_CASES: [u64; 2] = [6025, 66_758];
 
 #[test]
 fn hostile_messages_and_files_do_not_stop_the_server() {
-    let mut hostile = Hostile::new();
-    (0..CASES).for_each(|number| hostile.case(5, number));
+    let mut hostile = HostileTest::new();
+    (0..CASE_COUNT).for_each(|number| hostile.run_case(5, number));
     REGRESSION_CASES
         .into_iter()
-        .for_each(|number| hostile.case(2026, number));
+        .for_each(|number| hostile.run_case(2026, number));
 }
 
 /// A page requests a run, continues with a session whose plan is shorter, and tries to start the run there.
@@ -47,17 +47,17 @@ fn run_requested_in_another_session_does_not_start() {
         }],
         ..Config::default()
     };
-    Session::begin(dir.path(), &config(1), "P02", false).unwrap();
-    let mut person = Person::begin(dir.path(), config(2));
-    person.next(1).unwrap();
+    Session::create(dir.path(), &config(1), "P02", false).unwrap();
+    let mut person = Person::start_session(dir.path(), config(2));
+    person.start_next_run(1).unwrap();
     person.track(1, 0..500).unwrap();
     person.finish(1).unwrap();
-    person.say(json!({"type": "next"})).unwrap();
+    person.send(json!({"type": "next"})).unwrap();
     person
-        .say(json!({"type": "resume", "session": "sub-P02/ses-01"}))
+        .send(json!({"type": "resume", "session": "sub-P02/ses-01"}))
         .unwrap();
-    let message = person.say(person::begin(2)).unwrap_err();
+    let message = person.send(person::begin_message(2)).unwrap_err();
     assert!(message.contains("run 2 was not requested"), "{message}");
     // The next run of that session can start.
-    person.next(1).unwrap();
+    person.start_next_run(1).unwrap();
 }

@@ -11,6 +11,8 @@ fn page_arithmetic_is_bit_identical() {
         eprintln!("skipped: there is no node");
         return;
     };
-    let differing: Vec<u32> = (1..=60).filter(|seed| !page::same_bits(&mut engine, *seed)).collect();
+    let differing: Vec<u32> = (1..=60)
+        .filter(|seed| !page::is_bit_identical(&mut engine, *seed))
+        .collect();
     assert!(differing.is_empty(), "{differing:?}");
 }

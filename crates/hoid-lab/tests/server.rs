@@ -40,12 +40,12 @@ fn config() -> Config {
     }
 }
 
-fn served(out: &Path, mode: Mode) -> ServedLab {
+fn serve_lab(out: &Path, mode: Mode) -> ServedLab {
     let server = Server::new(Lab::open(out, config(), mode, None).unwrap(), None).unwrap();
-    served_by(server)
+    serve_on_thread(server)
 }
 
-fn served_by(server: Server) -> ServedLab {
+fn serve_on_thread(server: Server) -> ServedLab {
     let address = server.address();
     thread::spawn(move || server.serve());
     let mut parts = address
@@ -61,7 +61,7 @@ fn served_by(server: Server) -> ServedLab {
 
 impl ServedLab {
     /// Sends a request unchanged and returns the reply.
-    fn raw(&self, request: &[u8]) -> String {
+    fn send_raw(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
         // The server may refuse the request before it has been written completely.
@@ -72,10 +72,10 @@ impl ServedLab {
     }
 
     fn get(&self, path: &str, headers: &str) -> String {
-        self.raw(format!("GET {path} HTTP/1.1\r\nHost: {}\r\n{headers}\r\n", self.host).as_bytes())
+        self.send_raw(format!("GET {path} HTTP/1.1\r\nHost: {}\r\n{headers}\r\n", self.host).as_bytes())
     }
 
-    fn page(&self) -> Page {
+    fn open_page(&self) -> Page {
         let request = Request::builder()
             .uri(format!("ws://{}/{}/socket", self.host, self.token))
             .header("Host", &self.host)
@@ -99,7 +99,7 @@ fn status(reply: &str) -> &str {
 #[test]
 fn requests_without_the_token_are_refused() {
     let dir = tempfile::tempdir().unwrap();
-    let at = served(dir.path(), Mode::Sessions);
+    let at = serve_lab(dir.path(), Mode::Sessions);
     let own = format!("/{}/", at.token);
     let page = at.get(&own, "");
     assert_eq!(status(&page), "200");
@@ -134,12 +134,12 @@ fn requests_without_the_token_are_refused() {
         assert_eq!(status(&at.get(path, headers)), expected, "{path} {headers}");
     }
     let other = format!("GET {own} HTTP/1.1\r\nHost: example.org\r\n\r\n");
-    assert_eq!(status(&at.raw(other.as_bytes())), "403");
+    assert_eq!(status(&at.send_raw(other.as_bytes())), "403");
     let post = format!("POST {own} HTTP/1.1\r\nHost: {}\r\nContent-Length: 0\r\n\r\n", at.host);
-    assert_eq!(status(&at.raw(post.as_bytes())), "405");
+    assert_eq!(status(&at.send_raw(post.as_bytes())), "405");
     let long = format!("GET {own} HTTP/1.1\r\nX: {}\r\n\r\n", "x".repeat(20_000));
-    assert!(["431", "closed"].contains(&status(&at.raw(long.as_bytes()))));
-    assert_eq!(status(&at.raw(b"\x16\x03\x01 not http\r\n\r\n")), "400");
+    assert!(["431", "closed"].contains(&status(&at.send_raw(long.as_bytes()))));
+    assert_eq!(status(&at.send_raw(b"\x16\x03\x01 not http\r\n\r\n")), "400");
 }
 
 /// A page of the program, without a browser.
@@ -162,18 +162,18 @@ impl Page {
         }
     }
 
-    fn hello(&mut self, role: &str) -> Value {
+    fn send_hello(&mut self, role: &str) -> Value {
         self.send(&json!({"type": "hello", "role": role, "browser": {"user_agent": "test"}}));
         self.receive("state")
     }
 
-    fn consent(&mut self) {
+    fn give_consent(&mut self) {
         self.send(&json!({"type": "consent", "subject": "P01", "agreed": true, "cc0": false}));
         while self.receive("state")["phase"] != "runs" {}
     }
 
     /// Starts the next run and returns its number.
-    fn begin(&mut self) -> u64 {
+    fn start_run(&mut self) -> u64 {
         self.send(&json!({"type": "next"}));
         let number = self.receive("run")["number"].as_u64().unwrap();
         assert!(matches!(self.0.read().unwrap(), Message::Binary(_)));
@@ -193,7 +193,7 @@ impl Page {
 }
 
 /// Returns a batch of ticks of a person who does not move the device, so e equals the target.
-fn batch(number: u64, first: usize, target: &[f64]) -> Value {
+fn batch_message(number: u64, first: usize, target: &[f64]) -> Value {
     let e: Vec<f64> = target[first..first + 50].to_vec();
     let frame = json!([first as f64 + 0.5, first as f64 + 0.5, first, e[0]]);
     json!({"type": "batch", "number": number, "batch": {"first": first, "u": vec![0.0; 50], "e": e, "events": [],
@@ -203,17 +203,17 @@ fn batch(number: u64, first: usize, target: &[f64]) -> Value {
 #[test]
 fn complete_run_sends_a_live_estimate() {
     let dir = tempfile::tempdir().unwrap();
-    let at = served(dir.path(), Mode::Sessions);
-    let (mut person, mut other) = (at.page(), at.page());
-    assert_eq!(person.hello("person")["phase"], "consent");
-    other.hello("experimenter");
-    person.consent();
-    let number = person.begin();
+    let at = serve_lab(dir.path(), Mode::Sessions);
+    let (mut person, mut other) = (at.open_page(), at.open_page());
+    assert_eq!(person.send_hello("person")["phase"], "consent");
+    other.send_hello("experimenter");
+    person.give_consent();
+    let number = person.start_run();
     let target = hoid_lab::task::Task::new(&config().condition[0], 0, number)
         .unwrap()
         .target;
     for first in (0..1500).step_by(50) {
-        person.send(&batch(number, first, &target));
+        person.send(&batch_message(number, first, &target));
     }
     let live = other.receive("live");
     assert_eq!(live["number"], number);
@@ -238,17 +238,17 @@ fn complete_run_sends_a_live_estimate() {
 #[test]
 fn closing_the_window_interrupts_the_run() {
     let dir = tempfile::tempdir().unwrap();
-    let at = served(dir.path(), Mode::Sessions);
-    let mut person = at.page();
-    person.hello("person");
-    person.consent();
-    let number = person.begin();
+    let at = serve_lab(dir.path(), Mode::Sessions);
+    let mut person = at.open_page();
+    person.send_hello("person");
+    person.give_consent();
+    let number = person.start_run();
     let target = hoid_lab::task::Task::new(&config().condition[0], 0, number)
         .unwrap()
         .target;
-    person.send(&batch(number, 0, &target));
+    person.send(&batch_message(number, 0, &target));
     // A second window does not take over a current run.
-    let mut second = at.page();
+    let mut second = at.open_page();
     second.send(&json!({"type": "hello", "role": "person"}));
     assert!(
         second.receive("refused")["words"]
@@ -267,7 +267,7 @@ fn closing_the_window_interrupts_the_run() {
             break;
         }
     }
-    assert_eq!(second.begin(), 2);
+    assert_eq!(second.start_run(), 2);
     let folder = dir.path().join("sub-P01/ses-01");
     assert!(
         Session::read(&folder).unwrap().done[0]
@@ -279,12 +279,12 @@ fn closing_the_window_interrupts_the_run() {
 #[test]
 fn invalid_messages_end_the_connection() {
     let dir = tempfile::tempdir().unwrap();
-    let at = served(dir.path(), Mode::Sessions);
+    let at = serve_lab(dir.path(), Mode::Sessions);
     let closed = |message: Message| {
-        let mut page = at.page();
-        page.hello("person");
-        page.consent();
-        let number = page.begin();
+        let mut page = at.open_page();
+        page.send_hello("person");
+        page.give_consent();
+        let number = page.start_run();
         let text = message.to_string().replace("NUMBER", &number.to_string());
         let message = if message.is_text() {
             Message::text(text)
@@ -323,7 +323,7 @@ fn invalid_messages_end_the_connection() {
 #[test]
 fn second_server_of_an_experiment_is_refused() {
     let dir = tempfile::tempdir().unwrap();
-    let _at = served(dir.path(), Mode::Sessions);
+    let _at = serve_lab(dir.path(), Mode::Sessions);
     let second = Lab::open(dir.path(), config(), Mode::Sessions, None);
     assert!(second.is_err_and(|error| error.to_string().contains("another process is using")));
 }
@@ -353,7 +353,7 @@ fn burst_of_connections_is_queued() {
 #[test]
 fn slow_connections_do_not_block_the_page() {
     let dir = tempfile::tempdir().unwrap();
-    let at = served(dir.path(), Mode::Sessions);
+    let at = serve_lab(dir.path(), Mode::Sessions);
     let mut slow = Vec::new();
     for k in 0..400 {
         let Ok(mut stream) = TcpStream::connect(&at.host) else {
@@ -379,7 +379,7 @@ fn slow_connections_do_not_block_the_page() {
 #[test]
 fn hostile_connections_do_not_block_the_page() {
     let dir = tempfile::tempdir().unwrap();
-    let at = served(dir.path(), Mode::Sessions);
+    let at = serve_lab(dir.path(), Mode::Sessions);
     let over = Arc::new(AtomicBool::new(false));
     let connection_count = Arc::new(AtomicUsize::new(0));
     let (strangers, each) = (8, 125);
@@ -450,8 +450,8 @@ fn hostile_connections_do_not_block_the_page() {
 fn browser_address_works_only_once() {
     let dir = tempfile::tempdir().unwrap();
     let server = Server::new(Lab::open(dir.path(), config(), Mode::Sessions, None).unwrap(), None).unwrap();
-    let once = server.address_once().unwrap();
-    let at = served_by(server);
+    let once = server.single_use_address().unwrap();
+    let at = serve_on_thread(server);
     assert!(!once.contains(&at.token), "{once}");
     let path = once.strip_prefix(&format!("http://{}", at.host)).unwrap();
     let reply = at.get(path, "");

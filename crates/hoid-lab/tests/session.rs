@@ -12,7 +12,7 @@ use hoid_lab::{
     plant::InputMap,
     session::{Batch, Event, Frame, RunEnd, RunLog, RunStart, Session, Stem},
     task::{Task, held_inputs},
-    verify::{Checked, check},
+    verify::{Verification, check},
 };
 use hoid_model::family_scenario::{Display, Interleaved};
 
@@ -34,15 +34,15 @@ fn config() -> Config {
     }
 }
 
-const MAP: InputMap = InputMap {
+const INPUT_MAP: InputMap = InputMap {
     centre: 512.25,
     span: 300.0,
     dead: 0.02,
     gain: 3.0,
 };
 
-fn started_run(session: &Session, number: usize) -> (RunStart, Task) {
-    run::started_run(session, number, MAP).unwrap()
+fn start_run(session: &Session, number: usize) -> (RunStart, Task) {
+    run::start_run(session, number, INPUT_MAP).unwrap()
 }
 
 /// Returns the batches of a run up to a tick, with an event every 8 ms and a frame every 16.7 ms.
@@ -54,7 +54,7 @@ fn batches(task: &Task, until: usize) -> Vec<Batch> {
             Event::from((stamp.ceil(), stamp, stamp + 0.4, raw))
         })
         .collect();
-    let inputs: Vec<(usize, f64)> = events.iter().map(|v| (v.tick as usize, MAP.u(v.raw))).collect();
+    let inputs: Vec<(usize, f64)> = events.iter().map(|v| (v.tick as usize, INPUT_MAP.u(v.raw))).collect();
     let u = held_inputs(&inputs, until);
     let signals = task.run(&u);
     let frames: Vec<Frame> = (0..)
@@ -78,9 +78,9 @@ fn batches(task: &Task, until: usize) -> Vec<Batch> {
         .collect()
 }
 
-fn run(session: &mut Session, until: usize) -> (Stem, RunLog) {
-    let number = session.new_number().unwrap();
-    let (run_start, task) = started_run(session, number);
+fn log_run(session: &mut Session, until: usize) -> (Stem, RunLog) {
+    let number = session.next_run_number().unwrap();
+    let (run_start, task) = start_run(session, number);
     let stem = session.stem(&run_start.condition.name, number);
     run_start.write(&stem, &task).unwrap();
     let mut log = RunLog::create(&stem, task.ticks).unwrap();
@@ -90,25 +90,25 @@ fn run(session: &mut Session, until: usize) -> (Stem, RunLog) {
     (stem, log)
 }
 
-fn finished(out: &Path) -> (Session, Stem, Checked) {
-    let mut session = Session::begin(out, &config(), "P01", false).unwrap();
-    let (stem, log) = run(&mut session, usize::MAX);
+fn finished_run(out: &Path) -> (Session, Stem, Verification) {
+    let mut session = Session::create(out, &config(), "P01", false).unwrap();
+    let (stem, log) = log_run(&mut session, usize::MAX);
     drop(log);
-    let checked = session.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
+    let checked = session.end_run(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
     (session, stem, checked)
 }
 
 #[test]
 fn complete_run_is_verified_and_readable() {
     let dir = tempfile::tempdir().unwrap();
-    let (session, stem, checked) = finished(dir.path());
+    let (session, stem, checked) = finished_run(dir.path());
     assert!(checked.is_verified(), "{}", checked.reasons());
     assert_eq!(session.done.len(), 1);
-    assert_eq!(session.next(), Some(1));
+    assert_eq!(session.next_run(), Some(1));
     assert_eq!(checked.measures.ticks, 4000);
     assert!((checked.measures.input_hz - 125.0).abs() < 1.0);
     let run_start = RunStart::read(&stem).unwrap();
-    let logged = hoid_lab::session::Logged::read(&stem).unwrap();
+    let logged = hoid_lab::session::LoggedRun::read(&stem).unwrap();
     let record = hoid_lab::record::record(&run_start, &run_start.task(&stem).unwrap(), &logged).unwrap();
     let path = stem.file("beh.parquet");
     hoid_io::write_record(&path, &record).unwrap();
@@ -138,12 +138,12 @@ fn displayed_target_has_a_role_in_the_recording() {
         ] {
             signal.as_mut().unwrap().interleaved = interleaved;
         }
-        let mut session = Session::begin(dir.path(), &config, "P01", false).unwrap();
-        let (stem, log) = run(&mut session, usize::MAX);
+        let mut session = Session::create(dir.path(), &config, "P01", false).unwrap();
+        let (stem, log) = log_run(&mut session, usize::MAX);
         drop(log);
-        session.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
+        session.end_run(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
         let run_start = RunStart::read(&stem).unwrap();
-        let logged = hoid_lab::session::Logged::read(&stem).unwrap();
+        let logged = hoid_lab::session::LoggedRun::read(&stem).unwrap();
         let record = hoid_lab::record::record(&run_start, &run_start.task(&stem).unwrap(), &logged).unwrap();
         hoid_io::write_record(&stem.file("beh.parquet"), &record).unwrap();
         let read = hoid_io::read(stem.file("beh.parquet")).unwrap();
@@ -181,7 +181,7 @@ fn each_change_gives_its_own_finding() {
     ];
     for (file, cell, with, kind) in cases {
         let dir = tempfile::tempdir().unwrap();
-        let (_, stem, _) = finished(dir.path());
+        let (_, stem, _) = finished_run(dir.path());
         corrupt(&stem, file, 150, cell, with);
         let checked = check(&stem).unwrap();
         let kinds: Vec<&str> = checked.verdict.findings().iter().map(|finding| finding.kind).collect();
@@ -201,7 +201,7 @@ fn changed_target_or_element_is_detected() {
         |run_start: &mut RunStart| run_start.phases[0].plant.b[0] *= 1.001,
     ] {
         let dir = tempfile::tempdir().unwrap();
-        let (_, stem, _) = finished(dir.path());
+        let (_, stem, _) = finished_run(dir.path());
         let mut run_start = RunStart::read(&stem).unwrap();
         let task = run_start.task(&stem).unwrap();
         change(&mut run_start);
@@ -218,8 +218,8 @@ fn changed_target_or_element_is_detected() {
 #[test]
 fn session_continues_after_the_server_was_killed() {
     let dir = tempfile::tempdir().unwrap();
-    let mut session = Session::begin(dir.path(), &config(), "P01", true).unwrap();
-    let (stem, log) = run(&mut session, 1234);
+    let mut session = Session::create(dir.path(), &config(), "P01", true).unwrap();
+    let (stem, log) = log_run(&mut session, 1234);
     drop((log, session));
     // The last line is truncated, as if the process was killed while writing it.
     let path = stem.file("ticks.csv");
@@ -227,7 +227,7 @@ fn session_continues_after_the_server_was_killed() {
     fs::write(&path, &text[..text.len() - 7]).unwrap();
     let folder = Session::folders(dir.path()).unwrap();
     let mut session = Session::open(&folder[0]).unwrap();
-    assert_eq!((session.done.len(), session.next()), (1, Some(0)));
+    assert_eq!((session.done.len(), session.next_run()), (1, Some(0)));
     let lost = &session.done[0];
     assert_eq!((lost.how, lost.verdict.as_str()), (RunEnd::Interrupted, "unverified"));
     assert!(
@@ -237,16 +237,16 @@ fn session_continues_after_the_server_was_killed() {
     );
     // Two runs with different numbers are made.
     for _ in 0..2 {
-        let (stem, log) = run(&mut session, usize::MAX);
+        let (stem, log) = log_run(&mut session, usize::MAX);
         drop(log);
         assert!(
             session
-                .end(&stem, RunEnd::Finished, BTreeMap::new())
+                .end_run(&stem, RunEnd::Finished, BTreeMap::new())
                 .unwrap()
                 .is_verified()
         );
     }
-    assert!(session.facts.finished && session.next().is_none());
+    assert!(session.facts.finished && session.next_run().is_none());
     assert_eq!(Session::read(&folder[0]).unwrap().done, session.done);
     assert_eq!(
         session.done.iter().map(|done| done.number).collect::<Vec<_>>(),
@@ -257,8 +257,8 @@ fn session_continues_after_the_server_was_killed() {
 #[test]
 fn non_contiguous_batches_are_refused() {
     let dir = tempfile::tempdir().unwrap();
-    let mut session = Session::begin(dir.path(), &config(), "P01", false).unwrap();
-    let (_, mut log) = run(&mut session, 100);
+    let mut session = Session::create(dir.path(), &config(), "P01", false).unwrap();
+    let (_, mut log) = log_run(&mut session, 100);
     for (first, u, e) in [
         (99, 1, 1),
         (101, 1, 1),
@@ -274,16 +274,21 @@ fn non_contiguous_batches_are_refused() {
         };
         assert!(log.append(&batch).is_err(), "{first}");
     }
-    assert_eq!(log.ticks(), 100);
+    assert_eq!(log.tick_count(), 100);
 }
 
 #[test]
 fn subjects_are_numbered_and_pseudonyms_checked() {
     let dir = tempfile::tempdir().unwrap();
-    let row = |subject: &str| Session::begin(dir.path(), &config(), subject, false).unwrap().facts.row;
+    let row = |subject: &str| {
+        Session::create(dir.path(), &config(), subject, false)
+            .unwrap()
+            .facts
+            .row
+    };
     assert_eq!(["A", "B", "A", "C"].map(row), [0, 1, 0, 2]);
     for bad in ["", "../x", "P 1", "ü", &"x".repeat(21)] {
-        assert!(Session::begin(dir.path(), &config(), bad, false).is_err(), "{bad}");
+        assert!(Session::create(dir.path(), &config(), bad, false).is_err(), "{bad}");
     }
 }
 
@@ -292,8 +297,8 @@ fn subjects_are_numbered_and_pseudonyms_checked() {
 #[test]
 fn damaged_sessions_still_open() {
     let dir = tempfile::tempdir().unwrap();
-    let (mut session, ..) = finished(dir.path());
-    drop(run(&mut session, 777));
+    let (mut session, ..) = finished_run(dir.path());
+    drop(log_run(&mut session, 777));
     let folder = session.folder.clone();
     let copy = tempfile::tempdir().unwrap();
     let files = hoid_io::file_names(&folder).unwrap();
@@ -322,7 +327,7 @@ fn damaged_sessions_still_open() {
             _ => fs::write(&path, &bytes[..random(bytes.len())]).unwrap(),
         }
         let mut opened = Session::open(copy.path()).unwrap_or_else(|error| panic!("{round}, {name}, {what}: {error}"));
-        for (_, stem) in Stem::all(copy.path()).unwrap() {
+        for (_, stem) in Stem::find_all(copy.path()).unwrap() {
             let checked = check(&stem);
             let damaged = name.starts_with(stem.text()) && name.ends_with(".csv") && what != 1;
             assert!(
@@ -331,11 +336,11 @@ fn damaged_sessions_still_open() {
             );
         }
         if round % 100 == 0 {
-            let (stem, log) = run(&mut opened, usize::MAX);
+            let (stem, log) = log_run(&mut opened, usize::MAX);
             drop(log);
             assert!(
                 opened
-                    .end(&stem, RunEnd::Finished, BTreeMap::new())
+                    .end_run(&stem, RunEnd::Finished, BTreeMap::new())
                     .unwrap()
                     .is_verified()
             );
@@ -350,7 +355,7 @@ fn damaged_sessions_still_open() {
 #[test]
 fn inconsistent_files_give_findings_or_errors() {
     let dir = tempfile::tempdir().unwrap();
-    let (session, stem, _) = finished(dir.path());
+    let (session, stem, _) = finished_run(dir.path());
     let ticks = stem.file("ticks.csv");
     let text = fs::read_to_string(&ticks).unwrap();
     let last = text.lines().last().unwrap().to_owned();
@@ -395,7 +400,7 @@ fn inconsistent_files_give_findings_or_errors() {
 #[test]
 fn reading_a_session_changes_no_file() {
     let dir = tempfile::tempdir().unwrap();
-    let (session, ..) = finished(dir.path());
+    let (session, ..) = finished_run(dir.path());
     let runs = session.folder.join("runs.csv");
     let cut = fs::read_to_string(&runs).unwrap() + "2,1,half a li";
     fs::write(&runs, &cut).unwrap();
@@ -403,9 +408,9 @@ fn reading_a_session_changes_no_file() {
     assert_eq!(fs::read_to_string(&runs).unwrap(), cut);
     // The next line is written after the last complete line.
     let mut session = Session::open(&session.folder).unwrap();
-    let (stem, log) = run(&mut session, usize::MAX);
+    let (stem, log) = log_run(&mut session, usize::MAX);
     drop(log);
-    session.end(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
+    session.end_run(&stem, RunEnd::Finished, BTreeMap::new()).unwrap();
     let text = fs::read_to_string(&runs).unwrap();
     assert!(text.lines().count() == 3 && !text.contains("half"), "{text}");
 }

@@ -57,14 +57,14 @@ mod avx2 {
 
     /// Four numbers in an AVX2 register.
     #[derive(Debug, Clone, Copy)]
-    pub(super) struct Register {
+    pub(super) struct Avx2Register {
         simd: V3,
         numbers: f64x4,
     }
 
     macro_rules! operations {
         ($($name:ident, $method:ident, $of_simd:ident);+) => {$(
-            impl $name for Register {
+            impl $name for Avx2Register {
                 type Output = Self;
 
                 #[inline(always)]
@@ -77,7 +77,7 @@ mod avx2 {
     }
     operations!(Add, add, add_f64s; Sub, sub, sub_f64s; Mul, mul, mul_f64s);
 
-    impl FourLanes for Register {
+    impl FourLanes for Avx2Register {
         #[inline(always)]
         fn splat(self, value: f64) -> Self {
             let numbers = self.simd.splat_f64s(value);
@@ -97,32 +97,32 @@ mod avx2 {
     }
 
     /// Task that runs in AVX2 registers.
-    pub(super) struct InAvx2<T>(pub V3, pub T);
+    pub(super) struct Avx2Task<T>(pub V3, pub T);
 
-    impl<T: FourLaneTask> NullaryFnOnce for InAvx2<T> {
+    impl<T: FourLaneTask> NullaryFnOnce for Avx2Task<T> {
         type Output = T::Output;
 
         #[inline(always)]
         fn call(self) -> T::Output {
             let Self(simd, task) = self;
             let numbers = simd.splat_f64s(0.0);
-            task.run(Register { simd, numbers })
+            task.run(Avx2Register { simd, numbers })
         }
     }
 }
 
 /// Runs a task in AVX2 registers, or returns the task if this processor has none.
-fn in_avx2<T: FourLaneTask>(task: T) -> Result<T::Output, T> {
+fn run_in_avx2<T: FourLaneTask>(task: T) -> Result<T::Output, T> {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {
-        return Ok(simd.vectorize(avx2::InAvx2(simd, task)));
+        return Ok(simd.vectorize(avx2::Avx2Task(simd, task)));
     }
     Err(task)
 }
 
 /// Runs a task on four numbers at a time, in the widest suitable registers of this processor.
 pub fn with_four_lanes<T: FourLaneTask>(task: T) -> T::Output {
-    in_avx2(task).unwrap_or_else(|task| task.run(wide::f64x4::ZERO))
+    run_in_avx2(task).unwrap_or_else(|task| task.run(wide::f64x4::ZERO))
 }
 
 impl InstructionSet {
@@ -135,7 +135,7 @@ impl InstructionSet {
         match self {
             Self::Best => Some(with_four_lanes(task)),
             Self::Scalar => Some(task.run(wide::f64x4::ZERO)),
-            Self::Avx2 | Self::Avx512 => in_avx2(task).ok(),
+            Self::Avx2 | Self::Avx512 => run_in_avx2(task).ok(),
         }
     }
 }

@@ -30,9 +30,9 @@ pub trait LaneTask {
 }
 
 /// Task for [`pulp::Arch`], which selects the registers.
-struct Dispatched<T>(T);
+struct DispatchedTask<T>(T);
 
-impl<T: LaneTask> WithSimd for Dispatched<T> {
+impl<T: LaneTask> WithSimd for DispatchedTask<T> {
     type Output = T::Output;
 
     #[inline(always)]
@@ -42,9 +42,9 @@ impl<T: LaneTask> WithSimd for Dispatched<T> {
 }
 
 /// Task that runs in the registers of `S`.
-struct InRegisters<T, S>(T, S);
+struct RegisterTask<T, S>(T, S);
 
-impl<T: LaneTask, S: Simd> NullaryFnOnce for InRegisters<T, S> {
+impl<T: LaneTask, S: Simd> NullaryFnOnce for RegisterTask<T, S> {
     type Output = T::Output;
 
     #[inline(always)]
@@ -53,16 +53,16 @@ impl<T: LaneTask, S: Simd> NullaryFnOnce for InRegisters<T, S> {
     }
 }
 
-fn in_registers<T: LaneTask, S: Simd>(simd: S, task: T) -> T::Output {
-    simd.vectorize(InRegisters(task, simd))
+fn run_in_registers<T: LaneTask, S: Simd>(simd: S, task: T) -> T::Output {
+    simd.vectorize(RegisterTask(task, simd))
 }
 
 /// Task that processes a single run.
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-struct OneLane<T>(T);
+struct OneLaneTask<T>(T);
 
 #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-impl<T: LaneTask> NullaryFnOnce for OneLane<T> {
+impl<T: LaneTask> NullaryFnOnce for OneLaneTask<T> {
     type Output = T::Output;
 
     #[inline(always)]
@@ -79,7 +79,7 @@ impl<T: LaneTask> NullaryFnOnce for OneLane<T> {
 pub fn with_one_lane<T: LaneTask>(task: T) -> T::Output {
     #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
     if let Some(simd) = pulp::x86::V3::try_new() {
-        return simd.vectorize(OneLane(task));
+        return simd.vectorize(OneLaneTask(task));
     }
     task.run(0.0)
 }
@@ -88,23 +88,23 @@ impl InstructionSet {
     /// Returns all instruction sets that this processor supports, including [`InstructionSet::Best`].
     pub fn available() -> Vec<Self> {
         let all = [Self::Best, Self::Scalar, Self::Avx2, Self::Avx512];
-        all.into_iter().filter(|set| set.lanes().is_some()).collect()
+        all.into_iter().filter(|set| set.lane_count().is_some()).collect()
     }
 
     /// Returns the number of runs computed at a time; `None` if the processor does not support this instruction set.
-    pub fn lanes(self) -> Option<usize> {
+    pub fn lane_count(self) -> Option<usize> {
         self.with_lanes(CountLanes)
     }
 
     /// Runs a task with one run per lane; `None` if the processor does not support this instruction set.
     pub fn with_lanes<T: LaneTask>(self, task: T) -> Option<T::Output> {
         match self {
-            Self::Best => Some(pulp::Arch::new().dispatch(Dispatched(task))),
-            Self::Scalar => Some(in_registers(Scalar, task)),
+            Self::Best => Some(pulp::Arch::new().dispatch(DispatchedTask(task))),
+            Self::Scalar => Some(run_in_registers(Scalar, task)),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Avx2 => Some(in_registers(pulp::x86::V3::try_new()?, task)),
+            Self::Avx2 => Some(run_in_registers(pulp::x86::V3::try_new()?, task)),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Avx512 => Some(in_registers(pulp::x86::V4::try_new()?, task)),
+            Self::Avx512 => Some(run_in_registers(pulp::x86::V4::try_new()?, task)),
             #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
             Self::Avx2 | Self::Avx512 => None,
         }
@@ -118,6 +118,6 @@ impl LaneTask for CountLanes {
 
     #[inline(always)]
     fn run<R: Number>(self, zero: R) -> usize {
-        zero.lanes()
+        zero.lane_count()
     }
 }

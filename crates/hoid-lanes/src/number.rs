@@ -14,7 +14,7 @@ pub trait Number:
     #[must_use]
     fn splat(self, value: f64) -> Self;
     /// Returns the number of lanes.
-    fn lanes(self) -> usize;
+    fn lane_count(self) -> usize;
     /// Returns the number in the given lane.
     fn lane(self, lane: usize) -> f64;
     /// Sets the number in the given lane.
@@ -39,7 +39,7 @@ impl Number for f64 {
     }
 
     #[inline(always)]
-    fn lanes(self) -> usize {
+    fn lane_count(self) -> usize {
         1
     }
 

@@ -69,7 +69,7 @@ impl<S: Simd> Number for TwoRegisters<S> {
     }
 
     #[inline(always)]
-    fn lanes(self) -> usize {
+    fn lane_count(self) -> usize {
         Self::LANES
     }
 

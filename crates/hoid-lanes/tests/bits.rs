@@ -50,7 +50,7 @@ impl LaneTask for Recursion<'_> {
     fn run<R: Number>(self, zero: R) -> Vec<f64> {
         let (mut y1, mut y2, mut p) = (zero, zero, zero.splat(10.0));
         let mut out = vec![0.0; self.0.len()];
-        let lanes = zero.lanes();
+        let lanes = zero.lane_count();
         for (x, out) in self.0.chunks_exact(lanes).zip(out.chunks_exact_mut(lanes)) {
             let x = zero.load(x);
             p = p / (zero.splat(1.0) + x * p * x);
@@ -74,7 +74,7 @@ fn each_lane_is_bit_identical_to_a_scalar_run() {
         (0..500).map(|t| (omega * t as f64).sin() + 0.3 * k as f64).collect()
     };
     for set in InstructionSet::available() {
-        let lanes = set.lanes().unwrap();
+        let lanes = set.lane_count().unwrap();
         let runs: Vec<Vec<f64>> = (0..lanes).map(run).collect();
         let interleaved: Vec<f64> = (0..500 * lanes).map(|i| runs[i % lanes][i / lanes]).collect();
         let found = set.with_lanes(Recursion(&interleaved)).unwrap();
@@ -96,7 +96,7 @@ fn each_lane_is_bit_identical_to_a_scalar_run() {
 fn unavailable_instruction_sets_give_none() {
     for set in [InstructionSet::Avx2, InstructionSet::Avx512] {
         let four = set.with_four_lanes(Horner(&[]));
-        assert!(set.lanes().is_none() || four.is_some(), "{set:?}");
+        assert!(set.lane_count().is_none() || four.is_some(), "{set:?}");
         let available = InstructionSet::available().contains(&set);
         assert_eq!(set.with_lanes(Recursion(&[])).is_some(), available, "{set:?}");
     }

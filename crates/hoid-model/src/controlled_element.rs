@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn integrator_below_the_break_and_double_integrator_above() {
+    fn break_frequency_separates_single_and_double_integrator() {
         // Asymptotes: K_c/omega_b / s far below omega_b, K_c / s^2 far above. The neglected term changes the magnitude
         // by (1e-4)^2/2.
         let low = response(90.0, 6.0, 6e-4);

@@ -27,14 +27,14 @@ pub struct DelayedOperator {
 
 /// Names of the five parameters, in the order of every array of parameters in this module. The units are deg/deg, s,
 /// rad/s, 1 and s.
-pub const DELAYED_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
+pub const DELAYED_PARAMETER_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
 /// Largest distance from an integer number of samples, in samples, that is attributed to rounding; for example,
 /// `0.29 / 0.01` is `28.999999999999996`.
-const ROUNDING: f64 = 1e-12;
+const INTEGER_TOLERANCE: f64 = 1e-12;
 
 /// Converts operator parameters to the array `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`.
-pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
+pub fn delayed_operator_parameters(operator: &OperatorParameters) -> [f64; 5] {
     [
         operator.k_e,
         operator.k_e_dot(),
@@ -52,7 +52,7 @@ pub fn delayed_parameters(operator: &OperatorParameters) -> [f64; 5] {
 /// coefficient is not finite (because a pole is so fast that its exponential overflows).
 pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result<DelayedOperator, ModelError> {
     let whole_samples = whole_samples(parameters[4], sample_time)?;
-    delayed_operator_within(whole_samples, parameters, sample_time)
+    delayed_operator_with_delay_samples(whole_samples, parameters, sample_time)
 }
 
 /// As [`delayed_operator`], for a given number l of whole samples in the delay. Both ends of the interval
@@ -61,12 +61,12 @@ pub fn delayed_operator(parameters: [f64; 5], sample_time: SampleTime) -> Result
 ///
 /// # Errors
 /// As [`delayed_operator`]; also [`ModelError::OutOfRange`] if tau_e is outside this interval.
-pub fn delayed_operator_within(
+pub fn delayed_operator_with_delay_samples(
     whole_samples: usize,
     parameters: [f64; 5],
     sample_time: SampleTime,
 ) -> Result<DelayedOperator, ModelError> {
-    Ok(delayed_operator_and_jacobian_within(whole_samples, parameters, sample_time)?.0)
+    Ok(delayed_operator_and_jacobian_with_delay_samples(whole_samples, parameters, sample_time)?.0)
 }
 
 /// Returns the Jacobian of `[b0, b1, b2, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
@@ -76,31 +76,31 @@ pub fn delayed_operator_within(
 /// As [`delayed_operator`].
 pub fn delayed_operator_jacobian(parameters: [f64; 5], sample_time: SampleTime) -> Result<[[f64; 5]; 5], ModelError> {
     let whole_samples = whole_samples(parameters[4], sample_time)?;
-    delayed_operator_jacobian_within(whole_samples, parameters, sample_time)
+    delayed_operator_jacobian_with_delay_samples(whole_samples, parameters, sample_time)
 }
 
-/// Returns the Jacobian of [`delayed_operator_within`].
+/// Returns the Jacobian of [`delayed_operator_with_delay_samples`].
 ///
 /// # Errors
-/// As [`delayed_operator_within`].
-pub fn delayed_operator_jacobian_within(
+/// As [`delayed_operator_with_delay_samples`].
+pub fn delayed_operator_jacobian_with_delay_samples(
     whole_samples: usize,
     parameters: [f64; 5],
     sample_time: SampleTime,
 ) -> Result<[[f64; 5]; 5], ModelError> {
-    Ok(delayed_operator_and_jacobian_within(whole_samples, parameters, sample_time)?.1)
+    Ok(delayed_operator_and_jacobian_with_delay_samples(whole_samples, parameters, sample_time)?.1)
 }
 
-/// Evaluates [`delayed_operator_within`] and [`delayed_operator_jacobian_within`] together.
+/// Evaluates [`delayed_operator_with_delay_samples`] and [`delayed_operator_jacobian_with_delay_samples`] together.
 ///
 /// # Errors
-/// As [`delayed_operator_within`].
-pub fn delayed_operator_and_jacobian_within(
+/// As [`delayed_operator_with_delay_samples`].
+pub fn delayed_operator_and_jacobian_with_delay_samples(
     whole_samples: usize,
     parameters: [f64; 5],
     sample_time: SampleTime,
 ) -> Result<(DelayedOperator, [[f64; 5]; 5]), ModelError> {
-    let delta = fraction(whole_samples, parameters, sample_time)?;
+    let delta = fractional_delay_s(whole_samples, parameters, sample_time)?;
     let [k_e, k_e_dot, omega, zeta, _] = parameters;
     let (coefficients, jacobian) = held_operator_delayed([k_e, k_e_dot, omega, zeta], delta, sample_time.s());
     let quantities = ["b0", "b1", "b2", "f1", "f2"];
@@ -136,13 +136,13 @@ pub fn whole_samples(tau_e_s: f64, sample_time: SampleTime) -> Result<usize, Mod
         });
     }
     let nearest = samples.round();
-    let near = (samples - nearest).abs() <= ROUNDING * (1.0 + nearest);
+    let near = (samples - nearest).abs() <= INTEGER_TOLERANCE * (1.0 + nearest);
     Ok(if near { nearest } else { samples.floor() } as usize)
 }
 
 /// Checks the parameters and returns `delta = tau - l Ts` in s; a delta that differs from 0 or Ts only by rounding is
 /// set to that value.
-fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime) -> Result<f64, ModelError> {
+fn fractional_delay_s(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime) -> Result<f64, ModelError> {
     let quantities = [
         "error gain K_e",
         "error-rate gain K_e_dot in s",
@@ -162,7 +162,7 @@ fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime)
     let (tau, ts) = (parameters[4], sample_time.s());
     let whole = whole_samples as f64;
     let delta = tau - whole * ts;
-    let rounding = ROUNDING * (1.0 + whole) * ts;
+    let rounding = INTEGER_TOLERANCE * (1.0 + whole) * ts;
     if delta < -rounding || delta > ts + rounding {
         return Err(ModelError::OutOfRange {
             quantity: "delay tau_e in s",
@@ -231,7 +231,7 @@ mod tests {
     }
 
     /// The same response, computed by matrix exponentials in controllable canonical form.
-    fn by_matrix_exponentials(p: [f64; 5], n: usize) -> Vec<f64> {
+    fn response_by_matrix_exponentials(p: [f64; 5], n: usize) -> Vec<f64> {
         let [k_e, k_e_dot, omega, zeta, tau] = p;
         let w2 = omega * omega;
         let extended = |t: f64| {
@@ -259,10 +259,10 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_matrix_exponentials() {
+    fn response_agrees_with_matrix_exponentials() {
         for p in cases() {
             let ours = response(&delayed_operator(p, ts()).unwrap(), 80);
-            let theirs = by_matrix_exponentials(p, 80);
+            let theirs = response_by_matrix_exponentials(p, 80);
             let size = theirs.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
             for (k, (a, b)) in ours.iter().zip(&theirs).enumerate() {
                 // The recursion of the difference equation amplifies rounding errors by at most 1/|1 + f1 + f2|,
@@ -282,13 +282,13 @@ mod tests {
                 zeta_nm: 0.35,
                 tau_e_s: tau,
             };
-            let ours = delayed_operator(delayed_parameters(&operator), ts()).unwrap();
+            let ours = delayed_operator(delayed_operator_parameters(&operator), ts()).unwrap();
             let known = operator.discretise(ts()).unwrap();
             assert_eq!((ours.nk, ours.b[2]), (known.nk, 0.0));
             // The same formulas, but the factors are multiplied in another order.
             assert!((ours.b[0] - known.held.b0).abs() < 1e-16 && (ours.b[1] - known.held.b1).abs() < 1e-16);
             assert_eq!(ours.f, [known.held.f1, known.held.f2]);
-            let jacobian = delayed_operator_jacobian(delayed_parameters(&operator), ts()).unwrap();
+            let jacobian = delayed_operator_jacobian(delayed_operator_parameters(&operator), ts()).unwrap();
             let expected = discretisation_jacobian(&operator, ts());
             for (row, known) in [0, 1, 3, 4].into_iter().zip(expected) {
                 for (a, b) in jacobian[row].iter().zip(known) {
@@ -335,7 +335,7 @@ mod tests {
                     assert!(
                         (exact[i][j] - difference).abs() < 1e-7 * scale + 1e-10,
                         "{p:?} row {i} by {}: {} and {difference}",
-                        DELAYED_NAMES[j],
+                        DELAYED_PARAMETER_NAMES[j],
                         exact[i][j]
                     );
                 }
@@ -378,8 +378,8 @@ mod tests {
     fn adjacent_sample_models_agree_at_their_border() {
         let p = [0.09, 0.036, 11.25, 0.35, 0.28];
         let (above, below) = (
-            delayed_operator_within(28, p, ts()).unwrap(),
-            delayed_operator_within(27, p, ts()).unwrap(),
+            delayed_operator_with_delay_samples(28, p, ts()).unwrap(),
+            delayed_operator_with_delay_samples(27, p, ts()).unwrap(),
         );
         assert_eq!((above.nk, below.nk, below.b[0]), (29, 28, 0.0));
         for i in 0..2 {
@@ -387,21 +387,24 @@ mod tests {
         }
         // For decreasing tau, the derivatives are those of the model with one whole sample less.
         let at = |h: f64| {
-            delayed_operator_within(27, [p[0], p[1], p[2], p[3], p[4] - h], ts())
+            delayed_operator_with_delay_samples(27, [p[0], p[1], p[2], p[3], p[4] - h], ts())
                 .unwrap()
                 .b
         };
-        let exact = delayed_operator_jacobian_within(27, p, ts()).unwrap();
+        let exact = delayed_operator_jacobian_with_delay_samples(27, p, ts()).unwrap();
         let h = 1e-5;
         for i in 0..3 {
             let difference = (3.0 * at(0.0)[i] - 4.0 * at(h)[i] + at(2.0 * h)[i]) / (2.0 * h);
             assert!((exact[i][4] - difference).abs() < 1e-6 * exact[0][4].abs(), "{i}");
         }
-        assert!(delayed_operator_within(29, p, ts()).is_err() && delayed_operator_within(26, p, ts()).is_err());
+        assert!(
+            delayed_operator_with_delay_samples(29, p, ts()).is_err()
+                && delayed_operator_with_delay_samples(26, p, ts()).is_err()
+        );
     }
 
     #[test]
-    fn linear_in_both_gains() {
+    fn coefficients_are_linear_in_both_gains() {
         let at = |k_e, k_e_dot| delayed_operator([k_e, k_e_dot, 11.25, 0.35, 0.2837], ts()).unwrap().b;
         let (a, b, both) = (at(1.0, 0.0), at(0.0, 1.0), at(0.09, 0.036));
         for i in 0..3 {

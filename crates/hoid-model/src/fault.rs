@@ -126,8 +126,8 @@ impl fmt::Display for Fault {
     /// Formats the fault as a phrase without a full stop: "spike in e at 41.2 s, off by 30 (210 robust standard
     /// deviations): bridged".
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let time = |s: f64| short(s, 6);
-        let size = short(self.size, 3);
+        let time = |s: f64| short_number(s, 6);
+        let size = short_number(self.size, 3);
         let span = format!("{} to {} s", time(self.from_s), time(self.to_s));
         let channel = &self.channel;
         match self.kind {
@@ -156,7 +156,7 @@ impl fmt::Display for Fault {
             FaultKind::Sign => f.write_str("the output responds to the input with the wrong sign")?,
         }
         if let Some(deviations) = self.deviations {
-            write!(f, " ({} robust standard deviations)", short(deviations, 3))?;
+            write!(f, " ({} robust standard deviations)", short_number(deviations, 3))?;
         }
         match self.action {
             FaultAction::Reported => write!(f, "; {}", self.remedy()),
@@ -167,7 +167,7 @@ impl fmt::Display for Fault {
 }
 
 /// Formats a number with a given number of significant digits, without trailing zeros.
-fn short(value: f64, digits: usize) -> String {
+fn short_number(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
@@ -185,12 +185,12 @@ fn short(value: f64, digits: usize) -> String {
 }
 
 /// Maximum number of faults of one kind that are described individually; further faults are only counted.
-const LISTED_INDIVIDUALLY: usize = 3;
+const MAX_LISTED_FAULTS: usize = 3;
 /// Largest share of faulty samples (interpolated or cut out) for which no warning is given.
-pub const MOST_MENDED: f64 = 0.2;
+pub const MAX_REPAIRED_SHARE: f64 = 0.2;
 
 /// Returns the findings about faults: a note for repaired faults of a kind, a warning for faults that remain in the
-/// data ([`Finding::undetermined`] for a wrong unit of time), and a warning if more than [`MOST_MENDED`] of the samples
+/// data ([`Finding::undetermined`] for a wrong unit of time), and a warning if more than [`MAX_REPAIRED_SHARE`] of the samples
 /// were interpolated or cut out.
 pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
     let mut all = Vec::new();
@@ -205,18 +205,18 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
             }
             let mut words: Vec<String> = of
                 .iter()
-                .take(LISTED_INDIVIDUALLY)
+                .take(MAX_LISTED_FAULTS)
                 .map(|fault| fault.to_string())
                 .collect();
-            if of.len() > LISTED_INDIVIDUALLY {
-                words.push(format!("and {} more of this kind", of.len() - LISTED_INDIVIDUALLY));
+            if of.len() > MAX_LISTED_FAULTS {
+                words.push(format!("and {} more of this kind", of.len() - MAX_LISTED_FAULTS));
             }
             let words = words.join("; ");
             all.push(match (left, kind) {
                 (false, _) => Finding::note("faults", words),
                 // If the unit of time is wrong, no parameter is valid.
                 (true, FaultKind::TimeUnit) => Finding::undetermined("faults", words),
-                (true, _) => Finding::doubt("faults", words),
+                (true, _) => Finding::warning("faults", words),
             });
         }
     }
@@ -231,8 +231,8 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
         .map(|fault| fault.samples)
         .sum();
     let share = (repaired - idle) as f64 / samples.saturating_sub(idle).max(1) as f64;
-    if share > MOST_MENDED {
-        all.push(Finding::doubt(
+    if share > MAX_REPAIRED_SHARE {
+        all.push(Finding::warning(
             "faults",
             format!(
                 "{:.0} % of the samples are faulty; look at the recording",
@@ -269,14 +269,17 @@ mod tests {
         );
         assert!(spike(FaultAction::Reported).to_string().contains("--faults cut"));
         assert_eq!(
-            (short(0.0123456, 3), short(1234.4, 3)),
+            (short_number(0.0123456, 3), short_number(1234.4, 3)),
             ("0.0123".to_owned(), "1234".to_owned())
         );
-        assert_eq!((short(1e12, 3), short(0.0, 3)), ("1.00e12".to_owned(), "0".to_owned()));
+        assert_eq!(
+            (short_number(1e12, 3), short_number(0.0, 3)),
+            ("1.00e12".to_owned(), "0".to_owned())
+        );
     }
 
     #[test]
-    fn handled_faults_are_notes_and_reported_faults_doubts() {
+    fn handled_faults_are_notes_and_reported_faults_are_warnings() {
         let of = |action| fault_findings(&[spike(action)], 1000)[0].severity;
         assert_eq!(of(FaultAction::Bridged), Severity::Note);
         assert_eq!(of(FaultAction::Cut), Severity::Note);

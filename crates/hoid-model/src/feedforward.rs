@@ -14,10 +14,10 @@ use crate::{FamilyOperator, Form, ModelError, SampleTime, delayed_operator::whol
 /// Longest preview, s.
 const LONGEST_PREVIEW_S: f64 = 60.0;
 /// Largest sum of tau_f and preview, in s, that is attributed to rounding and counts as zero.
-const ROUNDING_S: f64 = 1e-12;
+const ROUNDING_TOLERANCE_S: f64 = 1e-12;
 
 /// Operator at one instant, and its delay as a number of whole samples and a fraction of a sample.
-pub type OperatorAt = (FamilyOperator, (usize, f64));
+pub type OperatorWithDelay = (FamilyOperator, (usize, f64));
 
 /// Response of a person to the displayed target.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +45,7 @@ impl Feedforward {
     ///
     /// # Errors
     /// [`ModelError::Operator`] with the part that is wrong.
-    pub fn of_text(text: &str, neuromuscular: Option<(f64, f64)>) -> Result<Self, ModelError> {
+    pub fn from_text(text: &str, neuromuscular: Option<(f64, f64)>) -> Result<Self, ModelError> {
         let wrong = |reason: String| ModelError::Operator {
             reason: format!(
                 "the response to the target {text:?}: {reason}; expected FORM:GAIN with further parameters by name, such \
@@ -73,7 +73,7 @@ impl Feedforward {
                 None => [number(name, text)?; 2],
             })
         };
-        let (of_gain, _) = form.gain();
+        let (of_gain, _) = form.gain_name_and_unit();
         let mut pairs = vec![(of_gain.to_owned(), both(of_gain, gain)?)];
         let (mut tau_f, mut preview_s) = ([0.0; 2], 0.0);
         for part in parts {
@@ -98,7 +98,7 @@ impl Feedforward {
                 named.extend([("omega_nm".to_owned(), omega), ("zeta_nm".to_owned(), zeta)]);
             }
             named.push(("tau_e".to_owned(), Self::delay_s(tau_f[at], preview_s)?));
-            FamilyOperator::of_names(form, &named).map_err(|error| wrong(error.to_string()))
+            FamilyOperator::from_names(form, &named).map_err(|error| wrong(error.to_string()))
         };
         let (operator, last) = (of(0)?, of(1)?);
         Ok(Self {
@@ -114,7 +114,7 @@ impl Feedforward {
     /// [`ModelError::OutOfRange`] if the person would respond before the target is displayed.
     pub fn delay_s(tau_f_s: f64, preview_s: f64) -> Result<f64, ModelError> {
         let delay_s = tau_f_s + preview_s;
-        if delay_s.abs() < ROUNDING_S {
+        if delay_s.abs() < ROUNDING_TOLERANCE_S {
             return Ok(0.0);
         }
         if delay_s >= 0.0 {
@@ -160,7 +160,7 @@ impl Feedforward {
             return wrong("at most 60 s");
         }
         let last = self.last.as_ref().unwrap_or(&self.operator);
-        if !self.operator.is_like(last) {
+        if !self.operator.has_same_form(last) {
             return Err(ModelError::Operator {
                 reason: format!(
                     "the form of the response to the target changes from {} to {}; expected the same form before and \
@@ -193,10 +193,12 @@ impl Feedforward {
         schedule: &Schedule,
         sample_time: SampleTime,
         neuromuscular: Option<(f64, f64)>,
-    ) -> Result<OperatorAt, ModelError> {
+    ) -> Result<OperatorWithDelay, ModelError> {
         let delays = self.check(schedule, sample_time)?;
         let mut operator = match &self.last {
-            Some(last) => self.operator.between(last, |a, b| schedule.value(a, b, t_s))?,
+            Some(last) => self
+                .operator
+                .with_interpolated_parameters(last, |a, b| schedule.value(a, b, t_s))?,
             None => self.operator.clone(),
         };
         if let Some((omega, zeta)) = neuromuscular {
@@ -223,7 +225,7 @@ impl Feedforward {
 /// the delay tau_f relative to the present input. The neuromuscular parameters are omitted, because the response to the
 /// error has the same ones.
 pub fn response_parameters(operator: &FamilyOperator, preview_s: f64) -> Vec<(&'static str, &'static str, f64)> {
-    let named = operator.named().into_iter();
+    let named = operator.named_parameters().into_iter();
     let own = named.filter(|p| !["omega_nm", "zeta_nm"].contains(&p.name));
     let of = |p: crate::operator_family::NamedParameter| match p.name {
         "tau_e" => ("tau_f", p.unit, p.value - preview_s),
@@ -267,10 +269,10 @@ pub fn delay_at([initial, last]: [(usize, f64); 2], schedule: &Schedule, t_s: f6
 mod tests {
     use super::*;
 
-    const MUSCLES: Option<(f64, f64)> = Some((11.25, 0.35));
+    const NEUROMUSCULAR: Option<(f64, f64)> = Some((11.25, 0.35));
 
     fn of(text: &str) -> Feedforward {
-        Feedforward::of_text(text, MUSCLES).unwrap()
+        Feedforward::from_text(text, NEUROMUSCULAR).unwrap()
     }
 
     #[test]
@@ -307,15 +309,15 @@ mod tests {
             ("lag:0.1", "T_I is missing"),
             ("derivative:0.1,tau_f=-0.1", "before it is displayed"),
         ] {
-            let error = Feedforward::of_text(text, MUSCLES).unwrap_err().to_string();
+            let error = Feedforward::from_text(text, NEUROMUSCULAR).unwrap_err().to_string();
             assert!(error.contains(reason), "{text}: {error}");
         }
-        assert!(Feedforward::of_text("derivative:0.1", None).is_err());
+        assert!(Feedforward::from_text("derivative:0.1", None).is_err());
     }
 
     #[test]
     fn change_follows_schedule_and_shares_neuromuscular_system() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let seen = of("derivative:0.1..0.3,tau_f=0.1..0.2");
         let schedule = Schedule::Sigmoid {
             rate_per_s: 2.0,
@@ -325,7 +327,7 @@ mod tests {
         assert!((operator.coordinates()[0] - 0.2).abs() < 1e-15);
         assert_eq!(delay, (15, 0.0));
         assert!((operator.tau_e_s() - 0.15).abs() < 1e-15);
-        let (omega, zeta) = operator.neuromuscular().unwrap();
+        let (omega, zeta) = operator.neuromuscular_parameters().unwrap();
         assert!((omega - 9.0).abs() < 1e-14 && (zeta - 0.5).abs() < 1e-15);
         let (before, _) = seen.at(-100.0, &schedule, ts, None).unwrap();
         assert_eq!(before.coordinates()[..3], seen.operator.coordinates()[..3]);
@@ -333,7 +335,7 @@ mod tests {
 
     #[test]
     fn previews_and_forms_are_checked() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let check = |seen: &Feedforward| seen.check(&Schedule::Constant, ts);
         assert_eq!(check(&of("derivative:0.1,tau_f=0.105")).unwrap()[0].0, 10);
         for preview_s in [0.255, -0.1, f64::NAN, 61.0] {

@@ -52,7 +52,7 @@ impl Finding {
     }
 
     /// Returns a finding that makes the result doubtful.
-    pub fn doubt(kind: &'static str, message: impl Into<String>) -> Self {
+    pub fn warning(kind: &'static str, message: impl Into<String>) -> Self {
         Self::new(kind, Severity::Doubt, message)
     }
 
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn worst_finding_sets_the_level() {
         let note = Finding::note("prior", "omega_nm is the prior alone");
-        let doubt = Finding::doubt("not-converged", "the search did not converge");
+        let doubt = Finding::warning("not-converged", "the search did not converge");
         let open = Finding::undetermined("lag", "T_I is not determined");
         assert_eq!(Verdict::of(Vec::new()).level, VerdictLevel::Trustworthy);
         assert_eq!(Verdict::of(vec![note.clone()]).level, VerdictLevel::Trustworthy);
@@ -174,7 +174,7 @@ mod tests {
             Verdict::of(vec![note.clone()]).append([doubt.clone(), open.clone()]),
             all
         );
-        let second = Finding::doubt("second", "what follows from it");
+        let second = Finding::warning("second", "what follows from it");
         let led = Verdict::of(vec![note, second.clone()]).prepend([doubt.clone()]);
         assert_eq!(led.findings()[..2], [doubt, second]);
         assert_eq!(all.level, VerdictLevel::NotDetermined);

@@ -35,7 +35,7 @@ pub struct ForcingFunction {
 pub const REFERENCE_PERIOD_S: f64 = 81.92;
 
 /// Rows of Table 1: n_t, A_k in deg, phi_k in rad.
-const TABLE_1: [(f64, f64, f64); 10] = [
+const REFERENCE_LINES: [(f64, f64, f64); 10] = [
     (3.0, 1.186, -0.753),
     (5.0, 1.121, 1.564),
     (8.0, 0.991, 0.588),
@@ -50,7 +50,7 @@ const TABLE_1: [(f64, f64, f64); 10] = [
 
 /// Multiples and phases in rad of the disturbance: one line below each line of the target of Table 1, so the lines of
 /// target and disturbance alternate. With these phases, the largest value is 2.0 times the rms.
-const DISTURBANCE: [(f64, f64); 10] = [
+const DISTURBANCE_LINES: [(f64, f64); 10] = [
     (2.0, 0.7),
     (4.0, -0.3),
     (7.0, -2.9),
@@ -65,7 +65,7 @@ const DISTURBANCE: [(f64, f64); 10] = [
 
 /// Number of samples in one block of the table of angles. A block length near the square root of the record length
 /// requires the fewest sines.
-const BLOCK: usize = 96;
+const BLOCK_SAMPLES: usize = 96;
 
 impl ForcingFunction {
     /// Returns the forcing function with the given sinusoids. Without sinusoids, the target is at rest.
@@ -111,7 +111,7 @@ impl ForcingFunction {
             phase_rad,
         };
         Self {
-            sinusoids: TABLE_1.into_iter().map(term).collect(),
+            sinusoids: REFERENCE_LINES.into_iter().map(term).collect(),
         }
     }
 
@@ -133,12 +133,12 @@ impl ForcingFunction {
             return Ok(Self::default());
         }
         let term = |(k, (multiple, phase_rad)): (usize, (f64, f64))| Sinusoid {
-            amplitude_deg: (TABLE_1[k.saturating_sub(1)].1 * TABLE_1[k].1).sqrt(),
+            amplitude_deg: (REFERENCE_LINES[k.saturating_sub(1)].1 * REFERENCE_LINES[k].1).sqrt(),
             omega_rad_s: multiple * TAU / REFERENCE_PERIOD_S,
             phase_rad,
         };
         let mut all = Self {
-            sinusoids: DISTURBANCE.into_iter().enumerate().map(term).collect(),
+            sinusoids: DISTURBANCE_LINES.into_iter().enumerate().map(term).collect(),
         };
         let scale = rms_deg / all.rms_deg();
         all.sinusoids.iter_mut().for_each(|s| s.amplitude_deg *= scale);
@@ -170,12 +170,12 @@ impl ForcingFunction {
     pub fn samples(&self, start_s: f64, sample_time: SampleTime, n: usize) -> Vec<f64> {
         let mut values = vec![0.0; n];
         for s in &self.sinusoids {
-            let mut table = [(0.0, 0.0); BLOCK];
+            let mut table = [(0.0, 0.0); BLOCK_SAMPLES];
             for (j, angle) in table.iter_mut().enumerate().take(n) {
                 *angle = (s.omega_rad_s * (j as f64 * sample_time.s())).sin_cos();
             }
-            for (i, block) in values.chunks_mut(BLOCK).enumerate() {
-                let t_s = start_s + (i * BLOCK) as f64 * sample_time.s();
+            for (i, block) in values.chunks_mut(BLOCK_SAMPLES).enumerate() {
+                let t_s = start_s + (i * BLOCK_SAMPLES) as f64 * sample_time.s();
                 let (sin, cos) = (s.omega_rad_s * t_s + s.phase_rad).sin_cos();
                 let (sin, cos) = (s.amplitude_deg * sin, s.amplitude_deg * cos);
                 for (value, (sin_on, cos_on)) in block.iter_mut().zip(&table) {

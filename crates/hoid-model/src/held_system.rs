@@ -101,13 +101,13 @@ impl HeldSystem {
     }
 
     /// Returns the transition matrix of the state over one sample, by rows.
-    pub fn transition(&self) -> &[f64] {
+    pub fn transition_matrix(&self) -> &[f64] {
         &self.transition
     }
 
     /// Returns Gamma_0, the contribution of the input v(k) to the next state; if the input is not delayed, it is the
     /// only contribution, since Gamma_1 is zero.
-    pub fn input(&self) -> &[f64] {
+    pub fn input_vector(&self) -> &[f64] {
         &self.now
     }
 
@@ -117,7 +117,7 @@ impl HeldSystem {
     }
 
     /// Returns the direct feedthrough.
-    pub fn direct(&self) -> f64 {
+    pub fn direct_feedthrough(&self) -> f64 {
         self.direct
     }
 
@@ -172,7 +172,7 @@ mod tests {
         inputs
             .iter()
             .map(|v| {
-                let y = system.output(&state) + system.direct() * v;
+                let y = system.output(&state) + system.direct_feedthrough() * v;
                 system.step(&state, *v, before, &mut next);
                 std::mem::swap(&mut state, &mut next);
                 before = *v;
@@ -241,7 +241,10 @@ mod tests {
         }
         assert!(new(&[1.0], &[1.0, -1e9], 0.0).is_err());
         let gain = new(&[3.0], &[1.0], 0.5).unwrap();
-        assert_eq!((gain.order(), gain.direct(), run(&gain, &[2.0])), (0, 3.0, vec![6.0]));
+        assert_eq!(
+            (gain.order(), gain.direct_feedthrough(), run(&gain, &[2.0])),
+            (0, 3.0, vec![6.0])
+        );
         assert_eq!(gain.response(1.0), Some(Complex64::new(0.0, 0.0)));
         // The pole of an integrator is at zero frequency.
         assert_eq!(new(&[1.0], &[1.0, 0.0], 0.0).unwrap().response(0.0), None);

@@ -29,7 +29,7 @@
 //!
 //! // The Box-Jenkins model of this operator and a remnant of first order has five parameters.
 //! let structure: Structure = "bj".parse()?;
-//! assert_eq!(structure.operator_orders(29).parameters(), 5);
+//! assert_eq!(structure.operator_orders(29).parameter_count(), 5);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -100,7 +100,7 @@ pub mod uncertainty;
 pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_jacobian};
 pub use error::{ModelError, NotConvertible};
 pub use family_scenario::{FamilyScenario, FamilyState};
-pub use fault::{Fault, FaultAction, FaultHandling, FaultKind, MOST_MENDED, fault_findings};
+pub use fault::{Fault, FaultAction, FaultHandling, FaultKind, MAX_REPAIRED_SHARE, fault_findings};
 pub use feedforward::Feedforward;
 pub use finding::{Finding, Severity, Verdict, VerdictLevel};
 pub use gain_unit::GainUnit;

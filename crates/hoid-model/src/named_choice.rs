@@ -5,7 +5,7 @@ use thiserror::Error;
 /// A choice with a name that users type. The macro [`named_choice!`](crate::named_choice) implements it.
 pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
     /// Kind of the choice in messages, such as "structure".
-    const WHAT: &'static str;
+    const KIND: &'static str;
     /// All choices, in the order in which they are listed.
     const CHOICES: &'static [Self];
 
@@ -16,7 +16,7 @@ pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
     ///
     /// # Errors
     /// [`UnknownName`], which lists the available names.
-    fn of_name(name: &str) -> Result<Self, UnknownName> {
+    fn from_name(name: &str) -> Result<Self, UnknownName> {
         let name = name.trim();
         let known = |choice: &&Self| choice.choice_name().eq_ignore_ascii_case(name);
         Self::CHOICES.iter().find(known).copied().ok_or_else(|| {
@@ -26,7 +26,7 @@ pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
                 names => names.concat(),
             };
             UnknownName {
-                what: Self::WHAT,
+                what: Self::KIND,
                 found: name.to_owned(),
                 expected,
             }
@@ -80,7 +80,7 @@ macro_rules! named_choice {
         }
 
         impl $crate::NamedChoice for $type {
-            const WHAT: &'static str = $what;
+            const KIND: &'static str = $what;
             const CHOICES: &'static [Self] = &Self::ALL;
 
             fn choice_name(self) -> &'static str {
@@ -100,7 +100,7 @@ macro_rules! named_choice {
             type Err = $crate::UnknownName;
 
             fn from_str(text: &str) -> Result<Self, $crate::UnknownName> {
-                <Self as $crate::NamedChoice>::of_name(text)
+                <Self as $crate::NamedChoice>::from_name(text)
             }
         }
     };

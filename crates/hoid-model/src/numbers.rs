@@ -16,9 +16,9 @@ const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_WITHOUT_ERROR: i32 = 5;
 
 /// Relative standard error below which the standard error is attributed to rounding.
-const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
+const ROUNDING_RELATIVE_ERROR: f64 = 16.0 * f64::EPSILON;
 /// Number of digits of a value whose standard error is only rounding.
-const ALL_DIGITS: i32 = 15;
+const MAX_DIGITS: i32 = 15;
 
 /// Returns value and standard error as text, with as many decimals as two significant digits of the standard error
 /// need. If the standard error is only rounding, the value has all its digits and a dash replaces the standard error. A
@@ -28,12 +28,17 @@ pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, Str
         return (DASH.to_owned(), DASH.to_owned());
     }
     match standard_error.filter(|s| s.is_finite() && *s > 0.0) {
-        None => (plain(value), DASH.to_owned()),
-        Some(error) if error < LAST_DIGITS * value.abs() => (significant(value, ALL_DIGITS), DASH.to_owned()),
+        None => (format_plain(value), DASH.to_owned()),
+        Some(error) if error < ROUNDING_RELATIVE_ERROR * value.abs() => {
+            (format_significant(value, MAX_DIGITS), DASH.to_owned())
+        }
         Some(error) => {
             let last = last_digit(error, DIGITS_OF_ERROR);
             let exponent = exponent_for(value.abs().max(error));
-            (written(value, last, exponent), written(error, last, exponent))
+            (
+                format_digits(value, last, exponent),
+                format_digits(error, last, exponent),
+            )
         }
     }
 }
@@ -47,13 +52,17 @@ pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String 
             let last = last_digit(error, DIGITS_OF_ERROR);
             let (low, high) = (value - factor * error, value + factor * error);
             let exponent = exponent_for(value.abs().max(error));
-            format!("{} to {}", written(low, last, exponent), written(high, last, exponent))
+            format!(
+                "{} to {}",
+                format_digits(low, last, exponent),
+                format_digits(high, last, exponent)
+            )
         }
     }
 }
 
 /// Returns a count with its noun, such as "1 row" or "7 rows".
-pub fn counted<N: PartialEq + From<u8> + fmt::Display>(n: N, noun: &str) -> String {
+pub fn count_with_noun<N: PartialEq + From<u8> + fmt::Display>(n: N, noun: &str) -> String {
     if n == N::from(1) {
         format!("1 {noun}")
     } else {
@@ -62,12 +71,12 @@ pub fn counted<N: PartialEq + From<u8> + fmt::Display>(n: N, noun: &str) -> Stri
 }
 
 /// Returns a number without a standard error, with five significant digits; a dash for non-finite values.
-pub fn plain(value: f64) -> String {
-    significant(value, DIGITS_WITHOUT_ERROR)
+pub fn format_plain(value: f64) -> String {
+    format_significant(value, DIGITS_WITHOUT_ERROR)
 }
 
 /// Returns a number with `digits` significant digits; a dash for non-finite values.
-pub fn significant(value: f64, digits: i32) -> String {
+pub fn format_significant(value: f64, digits: i32) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
     }
@@ -75,7 +84,7 @@ pub fn significant(value: f64, digits: i32) -> String {
         return "0".to_owned();
     }
     let exponent = exponent_for(value.abs());
-    let text = written(value, last_digit(value, digits), exponent);
+    let text = format_digits(value, last_digit(value, digits), exponent);
     match exponent {
         0 => without_trailing_zeros(&text).to_owned(),
         _ => text,
@@ -83,7 +92,7 @@ pub fn significant(value: f64, digits: i32) -> String {
 }
 
 /// Returns a number with a fixed number of decimals; a dash for non-finite values.
-pub fn fixed(value: f64, decimals: usize) -> String {
+pub fn format_fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
     }
@@ -108,7 +117,7 @@ fn exponent_for(size: f64) -> i32 {
     }
 }
 
-fn written(value: f64, last: i32, exponent: i32) -> String {
+fn format_digits(value: f64, last: i32, exponent: i32) -> String {
     let decimals = (exponent - last).clamp(0, 17) as usize;
     if exponent == 0 {
         return without_negative_zero(format!("{value:.decimals$}"));
@@ -145,7 +154,7 @@ fn without_trailing_zeros(text: &str) -> &str {
 mod tests {
     use super::*;
 
-    fn both(value: f64, error: f64) -> (String, String) {
+    fn value_and_error(value: f64, error: f64) -> (String, String) {
         with_uncertainty(value, Some(error))
     }
 
@@ -155,46 +164,49 @@ mod tests {
 
     #[test]
     fn error_sets_the_number_of_digits() {
-        assert_eq!(both(0.090_123_4, 0.001_234), pair("0.0901", "0.0012"));
-        assert_eq!(both(11.2499, 0.0996), pair("11.25", "0.10"));
-        assert_eq!(both(-1.912_113_05, 0.000_52), pair("-1.91211", "0.00052"));
-        assert_eq!(both(1234.5, 120.0), pair("1234", "120"));
-        assert_eq!(both(1.234_56e-7, 2.3e-9), pair("1.235e-7", "0.023e-7"));
-        assert_eq!(both(0.3, 12.3), pair("0", "12"));
-        assert_eq!(both(-0.001, 0.52), pair("0.00", "0.52"));
-        assert_eq!(both(5.0e9, 1.0e8), pair("5.00e9", "0.10e9"));
+        assert_eq!(value_and_error(0.090_123_4, 0.001_234), pair("0.0901", "0.0012"));
+        assert_eq!(value_and_error(11.2499, 0.0996), pair("11.25", "0.10"));
+        assert_eq!(value_and_error(-1.912_113_05, 0.000_52), pair("-1.91211", "0.00052"));
+        assert_eq!(value_and_error(1234.5, 120.0), pair("1234", "120"));
+        assert_eq!(value_and_error(1.234_56e-7, 2.3e-9), pair("1.235e-7", "0.023e-7"));
+        assert_eq!(value_and_error(0.3, 12.3), pair("0", "12"));
+        assert_eq!(value_and_error(-0.001, 0.52), pair("0.00", "0.52"));
+        assert_eq!(value_and_error(5.0e9, 1.0e8), pair("5.00e9", "0.10e9"));
     }
 
     #[test]
     fn rounding_sized_error_is_a_dash() {
-        assert_eq!(both(0.35 - 1e-16, 1e-17), pair("0.35", DASH));
-        assert_eq!(both(-0.499_999_999_999_999_9, 1.2e-16), pair("-0.5", DASH));
-        assert_eq!(both(0.5, 1e-13), pair("0.50000000000000", "0.00000000000010"));
+        assert_eq!(value_and_error(0.35 - 1e-16, 1e-17), pair("0.35", DASH));
+        assert_eq!(value_and_error(-0.499_999_999_999_999_9, 1.2e-16), pair("-0.5", DASH));
+        assert_eq!(
+            value_and_error(0.5, 1e-13),
+            pair("0.50000000000000", "0.00000000000010")
+        );
     }
 
     #[test]
     fn non_finite_numbers_are_a_dash() {
-        assert_eq!(both(f64::NAN, 1.0), pair(DASH, DASH));
+        assert_eq!(value_and_error(f64::NAN, 1.0), pair(DASH, DASH));
         assert_eq!(with_uncertainty(f64::INFINITY, None), pair(DASH, DASH));
-        assert_eq!(both(0.25, f64::NAN), pair("0.25", DASH));
-        assert_eq!(both(0.25, 0.0), pair("0.25", DASH));
-        assert_eq!(plain(f64::NAN), DASH);
-        assert_eq!(fixed(f64::NEG_INFINITY, 1), DASH);
+        assert_eq!(value_and_error(0.25, f64::NAN), pair("0.25", DASH));
+        assert_eq!(value_and_error(0.25, 0.0), pair("0.25", DASH));
+        assert_eq!(format_plain(f64::NAN), DASH);
+        assert_eq!(format_fixed(f64::NEG_INFINITY, 1), DASH);
         assert_eq!(interval(1.0, None, 1.96), DASH);
     }
 
     #[test]
     fn numbers_without_error_have_five_digits() {
-        assert_eq!(plain(0.28), "0.28");
-        assert_eq!(plain(0.0), "0");
-        assert_eq!(plain(13.714_285), "13.714");
-        assert_eq!(plain(1.373_21e-3), "0.0013732");
-        assert_eq!(plain(1.373_21e-4), "1.3732e-4");
-        assert_eq!(plain(1.373_21e-5), "1.3732e-5");
-        assert_eq!(plain(123_456.0), "123456");
-        assert_eq!(plain(-8192.0), "-8192");
-        assert_eq!(plain(f64::MIN_POSITIVE), "2.2251e-308");
-        assert_eq!(fixed(-0.04, 1), "0.0");
+        assert_eq!(format_plain(0.28), "0.28");
+        assert_eq!(format_plain(0.0), "0");
+        assert_eq!(format_plain(13.714_285), "13.714");
+        assert_eq!(format_plain(1.373_21e-3), "0.0013732");
+        assert_eq!(format_plain(1.373_21e-4), "1.3732e-4");
+        assert_eq!(format_plain(1.373_21e-5), "1.3732e-5");
+        assert_eq!(format_plain(123_456.0), "123456");
+        assert_eq!(format_plain(-8192.0), "-8192");
+        assert_eq!(format_plain(f64::MIN_POSITIVE), "2.2251e-308");
+        assert_eq!(format_fixed(-0.04, 1), "0.0");
     }
 
     #[test]

@@ -41,10 +41,10 @@ pub struct DiscreteOperator {
 }
 
 /// Value of `1 + f1 + f2` below which a pole counts as a pole at s = 0: four orders of magnitude above rounding.
-const AT_ORIGIN: f64 = 1e-12;
+const ORIGIN_TOLERANCE: f64 = 1e-12;
 
 /// Names of the physical parameters, in the order of the rows or columns of every Jacobian in this module.
-pub const PHYSICAL_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
+pub const PHYSICAL_PARAMETER_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
 
 impl OperatorParameters {
     /// Creates an operator from named parameters: `K_e`, `T_L` or `K_e_dot`, `omega_nm`, `zeta_nm`, and `tau_e`, which
@@ -52,7 +52,7 @@ impl OperatorParameters {
     ///
     /// # Errors
     /// [`ModelError::Operator`] for a name that is unknown or missing, or if one quantity is given under two names.
-    pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
+    pub fn from_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
         let wrong = |reason: String| ModelError::Operator { reason };
         if let Some((name, _)) = pairs.iter().find(|(name, _)| !NAMES.contains(&name.as_str())) {
@@ -85,8 +85,8 @@ impl OperatorParameters {
         self.k_e * self.t_l_s
     }
 
-    /// Returns the parameters without the delay, in the order of [`PHYSICAL_NAMES`].
-    fn without_delay(&self) -> [f64; 4] {
+    /// Returns the parameters without the delay, in the order of [`PHYSICAL_PARAMETER_NAMES`].
+    fn parameters_without_delay(&self) -> [f64; 4] {
         [self.k_e, self.k_e_dot(), self.omega_nm_rad_s, self.zeta_nm]
     }
 
@@ -140,9 +140,9 @@ impl OperatorParameters {
                 expected: "zero or more, and a whole number of samples: round it or change the sample time",
             });
         };
-        let ([b0, b1, f1, f2], _) = held_operator(self.without_delay(), sample_time.s());
+        let ([b0, b1, f1, f2], _) = held_operator(self.parameters_without_delay(), sample_time.s());
         Ok(DiscreteOperator {
-            held: HeldSecondOrder { b0, b1, f1, f2 }.finite()?,
+            held: HeldSecondOrder { b0, b1, f1, f2 }.check_finite()?,
             nk: delay + 1,
             sample_time,
         })
@@ -162,7 +162,7 @@ impl DiscreteOperator {
         // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1. Below this value the difference
         // consists only of rounding errors.
         let at_one = (1.0 + self.held.f1 + self.held.f2).abs();
-        if c.a2 <= 0.0 || at_one < AT_ORIGIN {
+        if c.a2 <= 0.0 || at_one < ORIGIN_TOLERANCE {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
         }
         let omega = c.a2.sqrt();
@@ -182,7 +182,7 @@ impl DiscreteOperator {
 
 /// Returns the Jacobian of `[b0, b1, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm]` (columns).
 pub fn discretisation_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> [[f64; 4]; 4] {
-    held_operator(operator.without_delay(), sample_time.s()).1
+    held_operator(operator.parameters_without_delay(), sample_time.s()).1
 }
 
 /// Returns the Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]` (columns): the
@@ -219,7 +219,7 @@ mod tests {
         OperatingState::s2().operator
     }
 
-    fn others() -> Vec<OperatorParameters> {
+    fn other_operators() -> Vec<OperatorParameters> {
         let with = |omega, zeta| OperatorParameters {
             omega_nm_rad_s: omega,
             zeta_nm: zeta,
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn parameters_invert_discretise() {
-        for operator in others() {
+        for operator in other_operators() {
             let back = operator.discretise(ts()).unwrap().parameters().unwrap();
             // b0 and b1 cancel in their sum to a fraction of about (omega_nm Ts)^2, and K_e loses this factor in
             // precision.
@@ -274,7 +274,7 @@ mod tests {
 
     #[test]
     fn jacobian_agrees_with_finite_differences() {
-        for operator in others() {
+        for operator in other_operators() {
             let exact = discretisation_jacobian(&operator, ts());
             let at = |p: [f64; 4]| {
                 let d = OperatorParameters {
@@ -308,7 +308,7 @@ mod tests {
                     assert!(
                         (exact[i][j] - difference).abs() < 2e-8 * scale,
                         "{operator:?} d{i}/d{}: {} and {difference}",
-                        PHYSICAL_NAMES[j],
+                        PHYSICAL_PARAMETER_NAMES[j],
                         exact[i][j]
                     );
                 }
@@ -318,7 +318,7 @@ mod tests {
 
     #[test]
     fn retrieval_jacobian_is_the_inverse() {
-        for operator in others() {
+        for operator in other_operators() {
             let forward = discretisation_jacobian(&operator, ts());
             let back = retrieval_jacobian(&operator, ts()).unwrap();
             for i in 0..4 {

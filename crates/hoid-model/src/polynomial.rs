@@ -63,7 +63,7 @@ pub fn roots(p: &[f64]) -> Option<Vec<Complex64>> {
         0 => Vec::new(),
         1 => vec![Complex64::new(-core[1] / core[0], 0.0)],
         2 => quadratic(core[1] / core[0], core[2] / core[0]).to_vec(),
-        _ => by_companion(core)?,
+        _ => roots_by_companion_matrix(core)?,
     };
     found.extend(std::iter::repeat_n(Complex64::new(0.0, 0.0), trailing));
     found.sort_by(|a, b| {
@@ -88,7 +88,7 @@ fn quadratic(p: f64, q: f64) -> [Complex64; 2] {
     }
 }
 
-fn by_companion(p: &[f64]) -> Option<Vec<Complex64>> {
+fn roots_by_companion_matrix(p: &[f64]) -> Option<Vec<Complex64>> {
     let n = p.len() - 1;
     let mut companion = DMatrix::zeros(n, n);
     for j in 0..n {
@@ -128,7 +128,7 @@ fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
 
 /// Returns the coefficients `[p_1, ..., p_n]` of the monic polynomial with each root outside the unit circle replaced
 /// by the inverse of its conjugate, which preserves the shape of the spectrum. `None` if the roots cannot be found.
-pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
+pub fn reflect_roots_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     if roots_inside(coefficients, 1.0) {
         return Some(coefficients.to_vec());
     }
@@ -187,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn degenerate_polynomials() {
+    fn degenerate_polynomials_are_handled() {
         assert_eq!(roots(&[]), Some(vec![]));
         assert_eq!(roots(&[0.0, 0.0]), Some(vec![]));
         assert_eq!(roots(&[2.0]), Some(vec![]));

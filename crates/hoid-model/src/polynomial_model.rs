@@ -51,12 +51,12 @@ impl PolynomialModel {
         theta: Vec<f64>,
     ) -> Result<Self, ModelError> {
         orders.check(structure)?;
-        if theta.len() != orders.parameters() {
+        if theta.len() != orders.parameter_count() {
             return Err(ModelError::Orders {
                 found: orders.to_string(),
                 expected: format!(
                     "expected {} coefficients in theta, found {}",
-                    orders.parameters(),
+                    orders.parameter_count(),
                     theta.len()
                 ),
             });
@@ -121,7 +121,7 @@ impl PolynomialModel {
 
     /// Coefficients `[f1, ..., f_nf]` of F.
     pub fn f(&self) -> &[f64] {
-        self.part(self.orders.parameters() - self.orders.nf, self.orders.nf)
+        self.part(self.orders.parameter_count() - self.orders.nf, self.orders.nf)
     }
 
     /// True if the predictor, with the filters `D A/C` of u and `B D/(F C)` of e, is stable: all roots of C and F are
@@ -208,7 +208,7 @@ impl PolynomialModel {
         let f = if self.orders.nf == 0 {
             0
         } else {
-            self.orders.parameters() - 2
+            self.orders.parameter_count() - 2
         };
         [b, b + 1, f, f + 1]
     }

@@ -72,7 +72,7 @@ impl Record {
     /// [`ModelError::DuplicateChannel`].
     pub fn new(sample_time: SampleTime, input: Channel, output: Channel) -> Result<Self, ModelError> {
         // The record is created from the input first, so that the input determines the length.
-        let record = Self::of_output(sample_time, input)?;
+        let record = Self::from_output(sample_time, input)?;
         record.check(&output)?;
         Ok(Self {
             input: Some(record.output),
@@ -85,7 +85,7 @@ impl Record {
     ///
     /// # Errors
     /// [`ModelError::EmptyRecord`], [`ModelError::NotFinite`].
-    pub fn of_output(sample_time: SampleTime, output: Channel) -> Result<Self, ModelError> {
+    pub fn from_output(sample_time: SampleTime, output: Channel) -> Result<Self, ModelError> {
         if output.values.is_empty() {
             return Err(ModelError::EmptyRecord {
                 label: String::from("(unnamed)"),
@@ -319,7 +319,7 @@ fn check_finite(channel: &Channel) -> Result<(), ModelError> {
 impl Detrend {
     /// Returns the values without the trend.
     #[must_use]
-    pub fn taken_out(self, values: &[f64]) -> Vec<f64> {
+    pub fn detrended_values(self, values: &[f64]) -> Vec<f64> {
         let mut left = values.to_vec();
         subtract_trend(self, &mut left);
         left
@@ -411,20 +411,20 @@ mod tests {
         )
         .unwrap();
         assert!(matches!(first.clone().joined(&slower), Err(ModelError::Joined { .. })));
-        let alone = Record::of_output(first.sample_time(), channel("u", &[1.0])).unwrap();
+        let alone = Record::from_output(first.sample_time(), channel("u", &[1.0])).unwrap();
         assert!(matches!(first.joined(&alone), Err(ModelError::Joined { .. })));
     }
 
     #[test]
     fn output_only_record_is_valid() {
         let ts = SampleTime::new(0.01).unwrap();
-        let alone = Record::of_output(ts, channel("u", &[1.0, 2.0, 3.0])).unwrap();
+        let alone = Record::from_output(ts, channel("u", &[1.0, 2.0, 3.0])).unwrap();
         assert!(alone.input().is_empty() && alone.input_channel().is_none());
         assert_eq!((alone.len(), alone.channels().count()), (3, 1));
         let part = alone.clone().detrended(Detrend::Mean).span(0.01, 1.0).unwrap();
         assert_eq!(part.output(), [0.0, 1.0]);
         assert!(alone.with_channel(channel("x", &[1.0])).is_err());
-        assert!(Record::of_output(ts, channel("u", &[])).is_err());
+        assert!(Record::from_output(ts, channel("u", &[])).is_err());
     }
 
     #[test]
@@ -472,7 +472,7 @@ mod tests {
         let mut order = Vec::new();
         whole.clone().map_signals(|values| order.push(values[0])).unwrap();
         assert_eq!(order, [1.0, 3.0]);
-        let alone = Record::of_output(whole.sample_time(), channel("u", &[1.0])).unwrap();
+        let alone = Record::from_output(whole.sample_time(), channel("u", &[1.0])).unwrap();
         assert_eq!(alone.map_signals(twice).unwrap().output(), [2.0]);
         assert!(matches!(
             whole.map_signals(|values| values[1] /= 0.0),

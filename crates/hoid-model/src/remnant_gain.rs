@@ -49,7 +49,7 @@ pub struct SpectralLine {
 }
 
 /// Relative tolerance of the integral.
-const TOLERANCE: f64 = 1e-10;
+const RELATIVE_TOLERANCE: f64 = 1e-10;
 
 /// Computes the remnant gain K_n for a noise level P_n.
 ///
@@ -261,16 +261,16 @@ const MAX_INTERVALS: usize = 4000;
 
 /// Returns the integral from 0 to `band` of a smooth non-negative f that varies on a logarithmic scale.
 fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
-    const PER_DECADE: usize = 24;
-    const DECADES: usize = 5;
-    let points = PER_DECADE * DECADES;
-    let at = |i: usize| band * 10f64.powf((i as f64 - points as f64) / PER_DECADE as f64);
+    const INTERVALS_PER_DECADE: usize = 24;
+    const DECADE_COUNT: usize = 5;
+    let points = INTERVALS_PER_DECADE * DECADE_COUNT;
+    let at = |i: usize| band * 10f64.powf((i as f64 - points as f64) / INTERVALS_PER_DECADE as f64);
     let values: Vec<f64> = (0..=points).map(|i| f(at(i))).collect();
     let mut edges = vec![0.0];
     for i in 0..points {
         let peak = i > 0 && values[i] >= values[i - 1] && values[i] >= values[i + 1];
         // There is at least one edge of an interval per decade, so that no scale is overlooked.
-        if peak || i % PER_DECADE == 0 {
+        if peak || i % INTERVALS_PER_DECADE == 0 {
             edges.push(at(i));
         }
     }
@@ -280,7 +280,7 @@ fn integrate(f: impl Fn(f64) -> f64, band: f64) -> f64 {
         let total: f64 = intervals.iter().map(|i| i.integral).sum();
         // Each interval may contribute an equal share of the tolerance to the error; intervals that exceed this share
         // are halved.
-        let allowed = TOLERANCE * total / intervals.len() as f64;
+        let allowed = RELATIVE_TOLERANCE * total / intervals.len() as f64;
         let (good, poor): (Vec<Interval>, Vec<Interval>) = intervals.into_iter().partition(|i| i.error <= allowed);
         intervals = good;
         if poor.is_empty() {
@@ -326,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_of_the_response_definition() {
+    fn gains_match_the_response_definition() {
         // Expected K_n with the first definition of P_n, for s1 and then s2 at P_n = .01, .1, .2, .3.
         let table = [
             [0.02302, 0.07636, 0.11453, 0.14996, 0.04212, 0.13971, 0.20956, 0.27438],
@@ -348,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_of_the_remnant_definition() {
+    fn gains_match_the_remnant_definition() {
         // Expected K_n with the second definition at P_n = 0.1, m = 1..4.
         let table = [
             [0.08682, 0.12207, 0.14175, 0.15574],
@@ -386,7 +386,7 @@ mod tests {
     }
 
     #[test]
-    fn unreachable_level_reports_the_largest() {
+    fn unreachable_level_error_gives_the_largest_level() {
         for m in 1..=4 {
             for s in 0..2 {
                 let Err(ModelError::UnreachableNoiseLevel { largest, order, .. }) =
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn without_feedback_both_definitions_follow_from_variances() {
+    fn open_loop_gains_follow_from_variances() {
         // Without a controlled element, u = H_HO f_t + n. Therefore var(u_n) = var(n), and both definitions are equal.
         let [(operator, _), _] = states();
         let none = tf(&[0.0], &[1.0, 1.0]);

@@ -8,7 +8,7 @@
 
 use crate::{
     ModelError, SampleTime,
-    remnant::{Factored, RemnantFilter, denominator},
+    remnant::{FactoredNumerator, RemnantFilter, denominator},
 };
 
 /// C, D and `g = sigma/K_n` of the innovation form, and their derivatives with respect to T_n.
@@ -49,8 +49,8 @@ pub fn remnant_noise(time_constant_s: f64, order: usize, sample_time: SampleTime
         time_constant_s,
         order,
     }
-    .ratio(sample_time)?;
-    let held = Factored::new(order, a);
+    .time_constant_ratio(sample_time)?;
+    let held = FactoredNumerator::new(order, a);
     let a_slope = -a / time_constant_s;
     let d = denominator(order, (-a).exp());
     // If the filter is fast, some zeros vanish; C is then padded with zero coefficients.
@@ -77,12 +77,12 @@ mod tests {
         SampleTime::new(0.01).unwrap()
     }
 
-    const CONSTANTS: [f64; 6] = [0.06, 0.003, 0.0004, 0.012, 0.5, 20.0];
+    const TIME_CONSTANTS_S: [f64; 6] = [0.06, 0.003, 0.0004, 0.012, 0.5, 20.0];
 
     #[test]
-    fn agrees_with_the_noise_model_of_the_filter() {
+    fn remnant_noise_agrees_with_the_filter_noise_model() {
         for m in 1..=4 {
-            for t_n in CONSTANTS {
+            for t_n in TIME_CONSTANTS_S {
                 let ours = remnant_noise(t_n, m, ts()).unwrap();
                 let filter = RemnantFilter::new(0.3, t_n, m).unwrap();
                 let known = filter.noise_model(ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn spectrum_of_second_order_in_closed_form() {
+    fn second_order_spectrum_matches_closed_form() {
         // The hold of 1/(T_n s + 1)^2 has n_1 = 1 - p - a p and n_2 = p (p - 1 + a), and sigma^2 C C* must equal N N*.
         let a: f64 = 1.0 / 6.0;
         let p = (-a).exp();
@@ -109,7 +109,7 @@ mod tests {
     #[test]
     fn slopes_agree_with_finite_differences() {
         for m in 1..=4 {
-            for t_n in CONSTANTS {
+            for t_n in TIME_CONSTANTS_S {
                 let exact = remnant_noise(t_n, m, ts()).unwrap();
                 let h = 1e-5 * t_n;
                 let (up, down) = (

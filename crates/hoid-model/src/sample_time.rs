@@ -23,10 +23,10 @@ impl From<SampleTime> for f64 {
 
 impl SampleTime {
     /// 0.01 s, the sample time of the reference task.
-    pub const HUNDREDTH: Self = Self(0.01);
+    pub const AT_100_HZ: Self = Self(0.01);
 
     /// 1/60 s, the sample time of a typical screen and of recorded experiments.
-    pub const SIXTIETH: Self = Self(1.0 / 60.0);
+    pub const AT_60_HZ: Self = Self(1.0 / 60.0);
 
     /// Creates a sample time in s.
     ///

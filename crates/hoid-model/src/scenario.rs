@@ -19,7 +19,7 @@ use num_complex::Complex64;
 use crate::{
     Feedforward, ModelError, OperatorParameters, SampleTime,
     controlled_element::ControlledElement,
-    feedforward::OperatorAt,
+    feedforward::OperatorWithDelay,
     forcing::{ForcingFunction, REFERENCE_PERIOD_S},
     remnant::RemnantFilter,
     remnant_gain::{NoiseDefinition, SpectralLine, remnant_gain},
@@ -117,7 +117,7 @@ pub enum RemnantStrength {
 impl RemnantStrength {
     /// Returns this strength with another level, another definition of the level, or both. `None` if a definition is
     /// given without a level and this strength is a gain.
-    pub fn changed(self, level: Option<f64>, definition: Option<NoiseDefinition>) -> Option<Self> {
+    pub fn with_level(self, level: Option<f64>, definition: Option<NoiseDefinition>) -> Option<Self> {
         match (self, level, definition) {
             (same, None, None) => Some(same),
             (Self::Level { level, definition }, new_level, new_definition) => Some(Self::Level {
@@ -248,7 +248,7 @@ impl Scenario {
             disturbance: ForcingFunction::default(),
             remnant: RemnantSetting::default(),
             // 0.01 s is the sample time of the thesis.
-            sample_time: SampleTime::HUNDREDTH,
+            sample_time: SampleTime::AT_100_HZ,
             measurement_s: REFERENCE_PERIOD_S,
             run_in_s: 10.0,
             realisation: Realisation::default(),
@@ -453,7 +453,7 @@ impl ResolvedScenario {
     ///
     /// # Errors
     /// As [`Feedforward::at`].
-    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<OperatorAt>, ModelError> {
+    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<OperatorWithDelay>, ModelError> {
         let Some(seen) = &self.scenario.feedforward else {
             return Ok(None);
         };

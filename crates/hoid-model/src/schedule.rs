@@ -32,9 +32,9 @@ pub enum Schedule {
 }
 
 /// Number of time constants 1/G after which a transition is complete: e^-40 is below half a unit in the last place.
-const COMPLETE_AFTER: f64 = 40.0;
+const COMPLETION_TIME_CONSTANTS: f64 = 40.0;
 /// Shortest interval between two changes, in time constants 1/G.
-const MIN_INTERVAL: f64 = 1.0;
+const MIN_INTERVAL_TIME_CONSTANTS: f64 = 1.0;
 
 impl Schedule {
     /// Checks the rate, the time and the interval of the changes.
@@ -67,7 +67,7 @@ impl Schedule {
             });
         }
         let is_single = matches!(self, Self::Sigmoid { .. });
-        let has_time = interval_s.is_finite() && interval_s * rate_per_s >= MIN_INTERVAL;
+        let has_time = interval_s.is_finite() && interval_s * rate_per_s >= MIN_INTERVAL_TIME_CONSTANTS;
         if !(is_single || has_time) {
             return Err(ModelError::OutOfRange {
                 quantity: "time from one change to the next in s",
@@ -95,7 +95,7 @@ impl Schedule {
     }
 
     /// Returns the times t_M + k T of all changes before `end_s`; a single change is always included.
-    pub fn changes_s(&self, end_s: f64) -> Vec<f64> {
+    pub fn change_times_s(&self, end_s: f64) -> Vec<f64> {
         match *self {
             Self::Constant => Vec::new(),
             Self::Sigmoid { midpoint_s, .. } => vec![midpoint_s],
@@ -128,7 +128,7 @@ impl Schedule {
             } => {
                 let (since, reach) = (
                     (t_s - midpoint_s) / interval_s,
-                    COMPLETE_AFTER / (rate_per_s * interval_s),
+                    COMPLETION_TIME_CONSTANTS / (rate_per_s * interval_s),
                 );
                 // Earlier changes are complete, and the sum of their contributions is zero because their number is
                 // even.
@@ -151,11 +151,11 @@ impl Schedule {
 mod tests {
     use super::*;
 
-    const FAST: Schedule = Schedule::Sigmoid {
+    const FAST_SCHEDULE: Schedule = Schedule::Sigmoid {
         rate_per_s: 100.0,
         midpoint_s: 40.96,
     };
-    const SLOW: Schedule = Schedule::Sigmoid {
+    const SLOW_SCHEDULE: Schedule = Schedule::Sigmoid {
         rate_per_s: 0.5,
         midpoint_s: 40.96,
     };
@@ -164,25 +164,25 @@ mod tests {
     fn sigmoid_matches_the_printed_formula() {
         for t in [0.0, 30.0, 40.0, 40.96, 41.5, 60.0, 81.91] {
             let printed = 0.09 + (0.07 - 0.09) / (1.0 + (-0.5 * (t - 40.96f64)).exp());
-            assert!((SLOW.value(0.09, 0.07, t) - printed).abs() < 1e-16);
+            assert!((SLOW_SCHEDULE.value(0.09, 0.07, t) - printed).abs() < 1e-16);
         }
-        assert_eq!(SLOW.value(90.0, 30.0, 40.96), 60.0);
+        assert_eq!(SLOW_SCHEDULE.value(90.0, 30.0, 40.96), 60.0);
     }
 
     #[test]
     fn limits_are_exact_without_overflow() {
         for t in [-1e300, -10.0, 30.0] {
-            assert_eq!(FAST.value(0.09, 0.07, t), 0.09);
+            assert_eq!(FAST_SCHEDULE.value(0.09, 0.07, t), 0.09);
         }
         for t in [50.0, 1e300] {
-            assert_eq!(FAST.value(0.09, 0.07, t), 0.07);
+            assert_eq!(FAST_SCHEDULE.value(0.09, 0.07, t), 0.07);
         }
         assert_eq!(Schedule::Constant.value(0.09, 0.07, 60.0), 0.09);
     }
 
     #[test]
     fn steepest_slope_is_a_quarter_of_the_rate() {
-        let slope = (SLOW.value(0.0, 1.0, 40.961) - SLOW.value(0.0, 1.0, 40.959)) / 0.002;
+        let slope = (SLOW_SCHEDULE.value(0.0, 1.0, 40.961) - SLOW_SCHEDULE.value(0.0, 1.0, 40.959)) / 0.002;
         // The third derivative, G^3/8, causes a truncation error of 2e-9.
         assert!((slope - 0.125).abs() < 1e-8);
     }
@@ -220,7 +220,7 @@ mod tests {
                 "{t}"
             );
         }
-        assert_eq!(often.changes_s(45.0), [20.0, 30.0, 40.0]);
+        assert_eq!(often.change_times_s(45.0), [20.0, 30.0, 40.0]);
         assert_eq!((often.change_s(), often.rate_per_s()), (Some(20.0), Some(5.0)));
         assert!(often.check().is_ok());
         for interval_s in [0.0, 0.1, -3.0, f64::NAN, f64::INFINITY] {
@@ -238,6 +238,6 @@ mod tests {
         for (rate_per_s, midpoint_s) in [(0.0, 1.0), (-1.0, 1.0), (f64::INFINITY, 1.0), (1.0, f64::NAN)] {
             assert!(Schedule::Sigmoid { rate_per_s, midpoint_s }.check().is_err());
         }
-        assert!(FAST.check().is_ok() && Schedule::Constant.check().is_ok());
+        assert!(FAST_SCHEDULE.check().is_ok() && Schedule::Constant.check().is_ok());
     }
 }

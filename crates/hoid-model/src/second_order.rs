@@ -64,13 +64,13 @@ impl SecondOrder {
             f1: -2.0 * poles.mean,
             f2: poles.sum.exp(),
         }
-        .finite()
+        .check_finite()
     }
 }
 
 impl HeldSecondOrder {
     /// Returns the model if its coefficients are finite, that is, if no exponential has overflowed; otherwise an error.
-    pub(crate) fn finite(self) -> Result<Self, ModelError> {
+    pub(crate) fn check_finite(self) -> Result<Self, ModelError> {
         for (quantity, found) in [("b0", self.b0), ("b1", self.b1), ("f1", self.f1), ("f2", self.f2)] {
             if !found.is_finite() {
                 return Err(ModelError::OutOfRange {
@@ -179,7 +179,7 @@ pub fn hold_biproper(
 ///
 /// # Errors
 /// As [`HeldSecondOrder::inverse_zoh`].
-pub fn unhold_biproper(
+pub fn inverse_hold_biproper(
     num: [f64; 3],
     f: [f64; 2],
     sample_time: SampleTime,
@@ -284,7 +284,7 @@ mod tests {
     }
 
     /// The zero-order hold by the extended-matrix exponential of eq. B.7.
-    fn by_matrix_exponential(c: SecondOrder, ts: f64) -> HeldSecondOrder {
+    fn zoh_by_matrix_exponential(c: SecondOrder, ts: f64) -> HeldSecondOrder {
         let m = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, -c.a2, -c.a1, 1.0, 0.0, 0.0, 0.0]) * ts;
         let e = m.exp();
         let (a, b) = (e.view((0, 0), (2, 2)).into_owned(), e.view((0, 2), (2, 1)).into_owned());
@@ -301,10 +301,10 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_the_matrix_exponential_for_all_pole_cases() {
+    fn zoh_agrees_with_the_matrix_exponential_for_all_pole_cases() {
         for case in cases() {
             let exact = case.zoh(ts()).unwrap();
-            let matrix = by_matrix_exponential(case, 0.01);
+            let matrix = zoh_by_matrix_exponential(case, 0.01);
             // The matrix exponential loses digits in b1 and f2 by cancellation, up to 1e-13 of the largest coefficient.
             for (name, a, b) in [
                 ("b0", exact.b0, matrix.b0),
@@ -340,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn agrees_with_the_general_hold() {
+    fn zoh_agrees_with_the_general_hold() {
         for case in cases() {
             let general = ContinuousTransferFunction::new(&[case.b0, case.b1], &[1.0, case.a1, case.a2]).unwrap();
             let general = discretise(&general, ts(), Method::ZeroOrderHold).unwrap();
@@ -408,7 +408,7 @@ mod tests {
     #[test]
     fn feedthrough_round_trip() {
         let (num, f) = hold_biproper([0.7, 3.0, 11.0], [2.0, 4.0, 30.0], ts()).unwrap();
-        let (back, den) = unhold_biproper(num, f, ts()).unwrap();
+        let (back, den) = inverse_hold_biproper(num, f, ts()).unwrap();
         for (a, b) in back.iter().zip([0.35, 1.5, 5.5]) {
             assert!((a - b).abs() < 1e-10);
         }

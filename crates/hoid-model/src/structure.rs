@@ -166,7 +166,7 @@ pub struct Orders {
 
 impl Orders {
     /// Returns each order with its name.
-    pub fn named(&self) -> [(&'static str, usize); 6] {
+    pub fn named_orders(&self) -> [(&'static str, usize); 6] {
         [
             ("na", self.na),
             ("nb", self.nb),
@@ -178,7 +178,7 @@ impl Orders {
     }
 
     /// Returns the number of coefficients, which is the length of theta.
-    pub fn parameters(&self) -> usize {
+    pub fn parameter_count(&self) -> usize {
         self.na + self.nb + self.nc + self.nd + self.nf
     }
 
@@ -242,7 +242,7 @@ impl Orders {
                 "the structure {structure} has no input, so a delay has no meaning; set nk = 0"
             ));
         }
-        if self.parameters() == 0 {
+        if self.parameter_count() == 0 {
             return refuse(format!(
                 "the structure {structure} needs at least one coefficient in {}",
                 structure.polynomials()
@@ -255,7 +255,7 @@ impl Orders {
 impl fmt::Display for Orders {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts: Vec<String> = self
-            .named()
+            .named_orders()
             .iter()
             .filter(|(name, n)| *n > 0 && *name != "nk")
             .map(|(name, n)| format!("{name}={n}"))
@@ -309,7 +309,7 @@ mod tests {
             "no input, no delay"
         );
         assert_eq!(bj.parameter_names(), ["b0", "b1", "d1", "f1", "f2"]);
-        assert_eq!(bj.parameters(), 5);
+        assert_eq!(bj.parameter_count(), 5);
         let arx = Structure::Arx.operator_orders(29);
         assert_eq!(arx.parameter_names(), ["a1", "a2", "b0", "b1"]);
         // This is i0 of eq. 5.33, counted from 0.

@@ -159,7 +159,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn response_of_a_first_order_lag_with_delay() {
+    fn delayed_first_order_lag_has_exact_response() {
         let lag = ContinuousTransferFunction::new(&[0.0, 4.0], &[2.0, 2.0])
             .unwrap()
             .with_delay(0.3)

@@ -177,7 +177,7 @@ pub fn remnant_estimate(
     let found = remnant::retrieve(d, innovation_sd, model.sample_time(), how)?;
     let [by_time, by_gain] = remnant::retrieval_jacobian(d, innovation_sd, model.sample_time(), how)?;
     let orders = model.orders();
-    let (p, m, first) = (orders.parameters(), orders.nd, orders.na + orders.nb + orders.nc);
+    let (p, m, first) = (orders.parameter_count(), orders.nd, orders.na + orders.nb + orders.nc);
     let estimate = |value: f64, gradient: &[f64]| {
         let Some(covariance) = covariance else {
             return Estimate::fixed(value);
@@ -299,7 +299,7 @@ mod tests {
     }
 
     #[test]
-    fn without_covariance_there_is_no_standard_error() {
+    fn missing_covariance_gives_no_standard_error() {
         let nothing = vec![f64::NAN; 25];
         let estimate = operator_estimate(&model(truth()), &nothing).unwrap();
         assert_eq!(estimate.k_e.standard_error, None);

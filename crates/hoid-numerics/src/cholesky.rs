@@ -3,17 +3,17 @@
 //! 2013, section 4.2).
 //!
 //! Matrices are N by N; only the first n rows and columns are used. [`solve`] subtracts each known term as soon as it
-//! is known, whereas [`forward`] and [`backward`] sum the known terms and subtract the sum. Applied one after the
-//! other, [`forward`] and [`backward`] give the result of [`solve`] except for rounding.
+//! is known, whereas [`substitute_forward`] and [`substitute_backward`] sum the known terms and subtract the sum. Applied one after the
+//! other, [`substitute_forward`] and [`substitute_backward`] give the result of [`solve`] except for rounding.
 
 /// Replaces the lower triangle of A by L. Returns false if A is not positive definite.
 pub fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
-    factor_above(a, n, 0.0)
+    factor_with_min_pivot(a, n, 0.0)
 }
 
 /// Replaces the lower triangle of A by L. Returns false if a pivot, the square of a diagonal element of L, is not above
 /// `least`.
-pub fn factor_above<const N: usize>(a: &mut [[f64; N]; N], n: usize, least: f64) -> bool {
+pub fn factor_with_min_pivot<const N: usize>(a: &mut [[f64; N]; N], n: usize, least: f64) -> bool {
     for i in 0..n {
         for j in 0..=i {
             let mut sum = a[i][j];
@@ -61,7 +61,7 @@ pub fn scaled_inverse<const N: usize>(l: &[[f64; N]; N], n: usize, scale: f64) -
 }
 
 /// Replaces b by `L^-1 b`.
-pub fn forward<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
+pub fn substitute_forward<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for i in 0..n {
         let known: f64 = (0..i).map(|k| l[i][k] * b[k]).sum();
         b[i] = (b[i] - known) / l[i][i];
@@ -69,7 +69,7 @@ pub fn forward<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
 }
 
 /// Replaces b by `L'^-1 b`.
-pub fn backward<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
+pub fn substitute_backward<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for i in (0..n).rev() {
         let known: f64 = (i + 1..n).map(|k| l[k][i] * b[k]).sum();
         b[i] = (b[i] - known) / l[i][i];
@@ -99,7 +99,7 @@ mod tests {
     fn small_pivot_is_refused() {
         // The second pivot is 1e-6.
         let a = [[1.0, 1.0], [1.0, 1.0 + 1e-6]];
-        assert!(factor_above(&mut a.clone(), 2, 1e-7) && !factor_above(&mut a.clone(), 2, 1e-5));
+        assert!(factor_with_min_pivot(&mut a.clone(), 2, 1e-7) && !factor_with_min_pivot(&mut a.clone(), 2, 1e-5));
     }
 
     #[test]
@@ -107,9 +107,9 @@ mod tests {
         let (mut l, b) = (A, [1.0, -2.0, 0.5]);
         assert!(factor(&mut l, 3));
         let (mut x, mut expected) = (b, b);
-        forward(&l, 3, &mut x);
+        substitute_forward(&l, 3, &mut x);
         let half = x;
-        backward(&l, 3, &mut x);
+        substitute_backward(&l, 3, &mut x);
         solve(&l, 3, &mut expected);
         for i in 0..3 {
             let of_l: f64 = (0..=i).map(|k| l[i][k] * half[k]).sum();

@@ -6,17 +6,17 @@
 //! equations as soon as the unknown is known, so no step waits for a complete sum. If the factor itself is needed, use
 //! [`crate::cholesky`].
 //!
-//! **General matrices**, several right-hand sides ([`solve_any`]), with row pivoting (G. H. Golub and C. F. Van Loan,
+//! **General matrices**, several right-hand sides ([`solve_general`]), with row pivoting (G. H. Golub and C. F. Van Loan,
 //! *Matrix Computations*, 2013, section 3.4).
 
 /// Number of columns that are computed at a time.
-const WIDE: usize = 4;
+const COLUMNS_PER_CHUNK: usize = 4;
 
 /// Replaces b by the solution of `A x = b` for the first n of N unknowns. Returns false if A is not positive definite.
 /// Only the upper triangle of A is read, and it is overwritten. N must be a multiple of four.
 #[inline(always)]
 pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) -> bool {
-    const { assert!(N.is_multiple_of(WIDE)) };
+    const { assert!(N.is_multiple_of(COLUMNS_PER_CHUNK)) };
     let mut inverse = [0.0; N];
     for i in 0..n {
         let (above, below) = a.split_at_mut(i);
@@ -28,10 +28,16 @@ pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) 
             right -= factors[k] * b[k];
         }
         b[i] = right;
-        for (column, block) in row.as_chunks_mut::<WIDE>().0.iter_mut().enumerate().skip(i / WIDE) {
+        for (column, block) in row
+            .as_chunks_mut::<COLUMNS_PER_CHUNK>()
+            .0
+            .iter_mut()
+            .enumerate()
+            .skip(i / COLUMNS_PER_CHUNK)
+        {
             let mut sums = *block;
             for (other, factor) in above.iter().zip(&factors) {
-                let other = &other.as_chunks::<WIDE>().0[column];
+                let other = &other.as_chunks::<COLUMNS_PER_CHUNK>().0[column];
                 for (sum, u) in sums.iter_mut().zip(other) {
                     *sum -= factor * u;
                 }
@@ -54,7 +60,7 @@ pub fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) 
 }
 
 /// Replaces B by the solution X of `A X = B` and returns `ln |det A|`. If A is singular, the results are not finite.
-pub fn solve_any<const N: usize>(a: &mut [[f64; N]; N], b: &mut [[f64; N]; N]) -> f64 {
+pub fn solve_general<const N: usize>(a: &mut [[f64; N]; N], b: &mut [[f64; N]; N]) -> f64 {
     let mut log_determinant = 0.0;
     for i in 0..N {
         let mut pivot = i;
@@ -128,7 +134,7 @@ mod tests {
         let a = [[0.0, 2.0, 1.0], [1.0, -1.0, 0.0], [3.0, 0.0, -1.0]];
         let b = [[1.0, 0.0, 2.0], [0.0, 1.0, -1.0], [4.0, 0.5, 0.0]];
         let (mut left, mut x) = (a, b);
-        let log_determinant = solve_any(&mut left, &mut x);
+        let log_determinant = solve_general(&mut left, &mut x);
         assert!((log_determinant - 5.0_f64.ln()).abs() < 1e-14);
         for (row, right) in a.iter().zip(b) {
             for c in 0..3 {
@@ -136,6 +142,6 @@ mod tests {
                 assert!((product - right[c]).abs() < 1e-14);
             }
         }
-        assert!(!solve_any(&mut [[0.0; 2]; 2], &mut [[1.0; 2]; 2]).is_finite());
+        assert!(!solve_general(&mut [[0.0; 2]; 2], &mut [[1.0; 2]; 2]).is_finite());
     }
 }

@@ -26,7 +26,7 @@ pub fn mean(values: &[f64]) -> f64 {
 
 /// Returns the sum of the squared deviations from the mean.
 #[inline]
-pub fn squared_deviations(values: &[f64]) -> f64 {
+pub fn sum_of_squared_deviations(values: &[f64]) -> f64 {
     let mean = mean(values);
     values.iter().map(|v| (v - mean) * (v - mean)).sum()
 }
@@ -34,19 +34,19 @@ pub fn squared_deviations(values: &[f64]) -> f64 {
 /// Returns the variance about the mean with the divisor n; NaN for no values.
 #[inline]
 pub fn variance(values: &[f64]) -> f64 {
-    squared_deviations(values) / values.len() as f64
+    sum_of_squared_deviations(values) / values.len() as f64
 }
 
 /// Returns the unbiased variance about the mean with the divisor n - 1; NaN for fewer than two values.
 #[inline]
 pub fn sample_variance(values: &[f64]) -> f64 {
-    squared_deviations(values) / (values.len() as f64 - 1.0)
+    sum_of_squared_deviations(values) / (values.len() as f64 - 1.0)
 }
 
 /// Returns the square root of the variance about the mean with the divisor n; zero for no values, unlike [`variance`].
 #[inline]
 pub fn standard_deviation(values: &[f64]) -> f64 {
-    libm::sqrt(squared_deviations(values) / values.len().max(1) as f64)
+    libm::sqrt(sum_of_squared_deviations(values) / values.len().max(1) as f64)
 }
 
 /// Returns the mean of the squares; NaN for no values.
@@ -96,7 +96,7 @@ fn order_statistic(values: &mut [f64], place: usize) -> Option<f64> {
 
 /// Returns the finite values in ascending order.
 #[cfg(feature = "alloc")]
-pub fn finite_sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+pub fn sorted_finite_values(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let mut finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
     finite.sort_by(f64::total_cmp);
     finite
@@ -105,8 +105,8 @@ pub fn finite_sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
 /// Returns the quantile of the finite values for a fraction from 0 to 1, by linear interpolation; `None` if no value is
 /// finite.
 #[cfg(feature = "alloc")]
-pub fn quantile_of(values: &[f64], fraction: f64) -> Option<f64> {
-    quantile(&finite_sorted(values.iter().copied()), fraction)
+pub fn finite_quantile(values: &[f64], fraction: f64) -> Option<f64> {
+    quantile(&sorted_finite_values(values.iter().copied()), fraction)
 }
 
 #[cfg(test)]
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn moments_match_hand_calculation() {
         let x = [1.0, 2.0, 4.0, 5.0];
-        assert_eq!((mean(&x), squared_deviations(&x)), (3.0, 10.0));
+        assert_eq!((mean(&x), sum_of_squared_deviations(&x)), (3.0, 10.0));
         assert_eq!((variance(&x), sample_variance(&x)), (2.5, 10.0 / 3.0));
         assert_eq!(
             (mean_square(&x), root_mean_square(&[3.0, -4.0, 5.0, 0.0])),
@@ -166,13 +166,13 @@ mod tests {
 
     #[cfg(feature = "alloc")]
     #[test]
-    fn only_finite_values_count() {
+    fn non_finite_values_are_ignored() {
         let values = [3.0, f64::NAN, 1.0, 2.0, f64::INFINITY];
-        assert_eq!(finite_sorted(values), [1.0, 2.0, 3.0]);
+        assert_eq!(sorted_finite_values(values), [1.0, 2.0, 3.0]);
         assert_eq!(
-            (quantile_of(&values, 0.25), quantile_of(&values, 1.0)),
+            (finite_quantile(&values, 0.25), finite_quantile(&values, 1.0)),
             (Some(1.5), Some(3.0))
         );
-        assert_eq!(quantile_of(&[f64::NAN], 0.5), None);
+        assert_eq!(finite_quantile(&[f64::NAN], 0.5), None);
     }
 }

@@ -29,13 +29,13 @@ fn vector(values: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
 
 /// Channels of a record that a call needs in addition to input and output.
 #[derive(Debug, Clone, Copy)]
-pub enum Wanted<'a> {
+pub enum ChannelSelection<'a> {
     All,
     Only(&'a [&'a str]),
 }
 
 /// Converts a `pyhoid.Record` to a record of the library.
-pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
+pub fn record(found: &Bound<'_, PyAny>, wanted: ChannelSelection<'_>) -> Outcome<Record> {
     let text = |name: &str| -> PyResult<String> { found.getattr(name)?.extract() };
     let sample_time = SampleTime::new(found.getattr("sample_time")?.extract()?)?;
     let words_of =
@@ -55,7 +55,7 @@ pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     let output = channel(text("output_name")?, &found.getattr("u")?)?;
     let input = found.getattr("e")?;
     let mut record = if input.is_none() {
-        Record::of_output(sample_time, output)?
+        Record::from_output(sample_time, output)?
     } else {
         Record::new(sample_time, channel(text("input_name")?, &input)?, output)?
     };
@@ -65,8 +65,8 @@ pub fn record(found: &Bound<'_, PyAny>, wanted: Wanted<'_>) -> Outcome<Record> {
     for (name, values) in channels {
         let name: String = name.extract()?;
         let needed = match wanted {
-            Wanted::All => true,
-            Wanted::Only(names) => names.contains(&name.as_str()),
+            ChannelSelection::All => true,
+            ChannelSelection::Only(names) => names.contains(&name.as_str()),
         };
         if needed {
             record = record.with_channel(channel(name, &values)?)?;
@@ -124,7 +124,7 @@ pub fn check(found: &Bound<'_, PyAny>) -> Outcome<()> {
 }
 
 /// Converts one `pyhoid.Record` or several to records of the library.
-pub fn records(found: &[Bound<'_, PyAny>], wanted: Wanted<'_>) -> Outcome<Vec<Record>> {
+pub fn records(found: &[Bound<'_, PyAny>], wanted: ChannelSelection<'_>) -> Outcome<Vec<Record>> {
     if found.is_empty() {
         return Err(bad_option("there is no record; give one or more"));
     }
@@ -132,7 +132,7 @@ pub fn records(found: &[Bound<'_, PyAny>], wanted: Wanted<'_>) -> Outcome<Vec<Re
 }
 
 /// Converts a record of the library to the parts of a `pyhoid.Record` without copying any vector.
-pub fn parts<'py>(py: Python<'py>, record: Record) -> PyResult<Bound<'py, PyDict>> {
+pub fn record_to_dict<'py>(py: Python<'py>, record: Record) -> PyResult<Bound<'py, PyDict>> {
     let parts = PyDict::new(py);
     parts.set_item("sample_time", record.sample_time().s())?;
     parts.set_item("start_time", record.time_s(0))?;

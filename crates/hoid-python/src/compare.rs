@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hoid_design::compare::{
-    Adjustment, CompareError, Comparing, Comparison, Covariate, GroupEstimates, Variation, Weights,
+    Adjustment, CompareError, Comparison, ComparisonOptions, Covariate, GroupEstimates, Variation, Weights,
 };
 use hoid_report::comparison_figure;
 use hoid_study::{
@@ -32,7 +32,7 @@ pub fn compare(
     jobs: Option<usize>,
     progress: Option<Bound<'_, PyAny>>,
 ) -> Outcome<String> {
-    let comparing = Comparing {
+    let comparing = ComparisonOptions {
         factors: factors.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
         variation: variation
             .map(|name| names::choice::<Variation>("variation", name))
@@ -44,7 +44,7 @@ pub fn compare(
         adjustment: names::choice::<Adjustment>("adjust", adjust)?,
         weights: names::choice::<Weights>("weights", weights)?,
     };
-    let Some(path) = GroupEstimates::recordings(&results) else {
+    let Some(path) = GroupEstimates::recordings_path(&results) else {
         return Ok(py.detach(|| comparing.run(&GroupEstimates::read(&results)?))?.to_json());
     };
     let manifest = Manifest::read(&path)?;

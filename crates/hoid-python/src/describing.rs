@@ -1,20 +1,20 @@
 //! `pyhoid.describe` and `pyhoid.describing_function`: response of an operator at the lines of the excitation.
 
-use hoid_analysis::{Described, Describing, Recordings};
+use hoid_analysis::{DescribingFunctionOptions, DescribingFunctionResult, Recordings};
 use hoid_ident::frequency::{
-    Averaging, DescribingFunction, DescribingOptions, DescriptionOptions, Excitation, GainLeadDelayOptions, LineSearch,
-    LineWeights, Realisation, describe as describe_lines,
+    Averaging, DescribingFunction, DescribingOptions, DescriptionOptions, Excitation, GainLeadDelayOptions,
+    LineDetectionOptions, LineWeights, Realisation, describe as describe_lines,
 };
 use hoid_model::{FaultHandling, uncertainty::Estimate};
 use numpy::{Complex64, PyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{self, Wanted, array},
+    arrays::{self, ChannelSelection, array},
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, ValueWithError, VerdictParts, error_or_nan, pair, verdict},
+    figures::{self, ValueWithError, VerdictParts, error_or_nan, value_and_error, verdict},
     files, names,
 };
 
@@ -26,7 +26,7 @@ pub struct PyDescribingFunction {
 
 /// A describing function with its verdict and its settings; the package wraps it in `pyhoid.Description`.
 #[pyclass(name = "Description", module = "pyhoid._pyhoid", frozen)]
-pub struct PyDescription(Described);
+pub struct PyDescription(DescribingFunctionResult);
 
 #[pyfunction]
 #[pyo3(signature = (records, *, excitation, lines, period, controlled_element, start, stop, offset_samples, detrend, faults,
@@ -46,8 +46,8 @@ pub fn describe<'py>(
     faults: &str,
     decimate: &str,
 ) -> Outcome<PyDescription> {
-    let records = arrays::records(&records, Wanted::All)?;
-    let describing = Describing {
+    let records = arrays::records(&records, ChannelSelection::All)?;
+    let describing = DescribingFunctionOptions {
         options: DescriptionOptions {
             excitation,
             lines_rad_s: lines,
@@ -60,9 +60,9 @@ pub fn describe<'py>(
         },
         faults: names::choice::<FaultHandling>("faults", faults)?,
         rate: files::decimation(decimate)?,
-        ..Describing::default()
+        ..DescribingFunctionOptions::default()
     };
-    let found = py.detach(|| describing.run(Recordings::of_records(records)))?;
+    let found = py.detach(|| describing.run(Recordings::from_records(records)))?;
     Ok(PyDescription(found))
 }
 
@@ -111,10 +111,13 @@ impl PyDescription {
             return Ok(None);
         };
         let all = PyDict::new(py);
-        all.set_item("crossover_rad_s", margins.crossover_rad_s.map(pair))?;
-        all.set_item("phase_margin_deg", margins.phase_margin_deg.map(pair))?;
-        all.set_item("gain_margin_db", margins.gain_margin_db.map(pair))?;
-        all.set_item("phase_crossover_rad_s", margins.phase_crossover_rad_s.map(pair))?;
+        all.set_item("crossover_rad_s", margins.crossover_rad_s.map(value_and_error))?;
+        all.set_item("phase_margin_deg", margins.phase_margin_deg.map(value_and_error))?;
+        all.set_item("gain_margin_db", margins.gain_margin_db.map(value_and_error))?;
+        all.set_item(
+            "phase_crossover_rad_s",
+            margins.phase_crossover_rad_s.map(value_and_error),
+        )?;
         Ok(Some(all))
     }
 
@@ -123,7 +126,10 @@ impl PyDescription {
     #[getter]
     fn remnant(&self) -> (ValueWithError, ValueWithError) {
         let function = &self.0.found.function;
-        (pair(function.off_line_share), pair(function.noise_ratio))
+        (
+            value_and_error(function.off_line_share),
+            value_and_error(function.noise_ratio),
+        )
     }
 
     /// Returns the verdict: level, reasons and notes.
@@ -161,16 +167,16 @@ pub fn describing_function<'py>(
     smoothing_bins: usize,
 ) -> Outcome<PyDescribingFunction> {
     let wanted: Vec<&str> = channel.iter().chain(&reference).map(String::as_str).collect();
-    let records = arrays::records(&records, Wanted::Only(&wanted))?;
+    let records = arrays::records(&records, ChannelSelection::Only(&wanted))?;
     let excitation = match (harmonics, omega, channel, period) {
-        (Some(harmonics), None, _, Some(period)) => Excitation::of_harmonics(&harmonics, period)?,
+        (Some(harmonics), None, _, Some(period)) => Excitation::from_harmonics(&harmonics, period)?,
         (None, Some(omega), _, Some(period)) => Excitation::new(&omega, period)?,
         (None, None, Some(channel), period_s) => {
-            let search = LineSearch {
+            let search = LineDetectionOptions {
                 period_s,
                 least_amplitude,
             };
-            Excitation::found_in(&records[0], &channel, &search)?
+            Excitation::detect(&records[0], &channel, &search)?
         }
         (None, None, None, _) => {
             return Err(bad_option(
@@ -181,7 +187,7 @@ pub fn describing_function<'py>(
         (_, _, _, None) => return Err(bad_option("harmonics and omega need the period in s")),
     };
     let words = [("ratios", 0), ("reference", 1), ("same-excitation", 2)];
-    let averaging = match (names::word("averaging", averaging, &words)?, reference) {
+    let averaging = match (names::value_of_name("averaging", averaging, &words)?, reference) {
         (0, _) => Averaging::Ratios,
         (1, Some(channel)) => Averaging::Reference { channel },
         (1, None) => return Err(bad_option("averaging=\"reference\" needs a channel as reference")),
@@ -257,10 +263,10 @@ impl PyDescribingFunction {
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (f, all) = (&self.found, PyDict::new(py));
         all.set_item("runs", f.runs.iter().map(|r| r.label.clone()).collect::<Vec<_>>())?;
-        all.set_item("off_line_share", pair(f.off_line_share))?;
-        all.set_item("noise_ratio", pair(f.noise_ratio))?;
-        all.set_item("rms_e", pair(f.rms_e))?;
-        all.set_item("rms_u", pair(f.rms_u))?;
+        all.set_item("off_line_share", value_and_error(f.off_line_share))?;
+        all.set_item("noise_ratio", value_and_error(f.noise_ratio))?;
+        all.set_item("rms_e", value_and_error(f.rms_e))?;
+        all.set_item("rms_u", value_and_error(f.rms_u))?;
         Ok(all)
     }
 
@@ -280,14 +286,14 @@ impl PyDescribingFunction {
         ];
         let options = GainLeadDelayOptions {
             lead,
-            weights: names::word("weights", weights, &words)?,
+            weights: names::value_of_name("weights", weights, &words)?,
             delay_range_s: delay,
         };
         let found = self.found.fit_gain_lead_delay(&options)?;
         let all = PyDict::new(py);
-        all.set_item("gain", pair(found.gain))?;
-        all.set_item("lead_s", pair(found.lead_s))?;
-        all.set_item("delay_s", pair(found.delay_s))?;
+        all.set_item("gain", value_and_error(found.gain))?;
+        all.set_item("lead_s", value_and_error(found.lead_s))?;
+        all.set_item("delay_s", value_and_error(found.delay_s))?;
         all.set_item("misfit", found.misfit)?;
         Ok(all)
     }
@@ -296,8 +302,8 @@ impl PyDescribingFunction {
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
         let margins = self.found.open_loop(&element.transfer_function()?).margins();
         let all = PyDict::new(py);
-        all.set_item("crossover_rad_s", margins.crossover_rad_s.map(pair))?;
-        all.set_item("phase_margin_deg", margins.phase_margin_deg.map(pair))?;
+        all.set_item("crossover_rad_s", margins.crossover_rad_s.map(value_and_error))?;
+        all.set_item("phase_margin_deg", margins.phase_margin_deg.map(value_and_error))?;
         Ok(all)
     }
 }

@@ -1,7 +1,8 @@
 //! `pyhoid.design`: a forcing function and the expected errors; the package reads the JSON of the result.
 
 use hoid_design::experiment::{
-    Against, DesignRequest, Designing, DifferenceRequest, Enters, ExperimentDesign, People, Remnant, SpreadSource,
+    DesignOptions, DesignRequest, DifferenceRequest, Enters, ExperimentDesign, OtherForcing, People, Remnant,
+    SpreadSource,
 };
 use hoid_model::{Form, family_scenario::Display};
 use hoid_report::{design_figure, runs_figure};
@@ -42,11 +43,11 @@ pub fn design(
             sought: text.parse()?,
             power,
             alpha,
-            between_people: between_people.as_deref().map(SpreadSource::of_text),
+            between_people: between_people.as_deref().map(SpreadSource::from_text),
         })
     };
     let request = DesignRequest {
-        people: People::of_text(people),
+        people: People::from_text(people),
         condition,
         controlled_element: controlled_element
             .map(|element| element.transfer_function())
@@ -62,7 +63,7 @@ pub fn design(
             time_constant_s: remnant.1,
             ..Remnant::default()
         },
-        designing: Designing {
+        designing: DesignOptions {
             wanted: wanted.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
             period_s: length,
             lines,
@@ -71,11 +72,11 @@ pub fn design(
             shelf,
             most_rms: [limits.0, limits.1],
             seed,
-            ..Designing::default()
+            ..DesignOptions::default()
         },
-        run_to_run: run_to_run.as_deref().map(SpreadSource::of_text),
+        run_to_run: run_to_run.as_deref().map(SpreadSource::from_text),
         runs,
-        against: against.map(Against::of_text),
+        against: against.map(OtherForcing::from_text),
         difference: difference.map(sought).transpose()?,
         display: names::choice::<Display>("display", display)?,
     };
@@ -89,7 +90,7 @@ pub fn design_files_of(text: &str, scenario: &str) -> Outcome<(String, String, S
     let found = ExperimentDesign::from_json(text)?;
     Ok((
         found.scenario(),
-        found.lab(scenario).unwrap_or_default(),
+        found.lab_config(scenario).unwrap_or_default(),
         found.forcing_csv(),
     ))
 }

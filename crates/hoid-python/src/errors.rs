@@ -109,7 +109,7 @@ impl From<AnalysisError> for Failure {
             AnalysisError::Model(error) => error.into(),
             AnalysisError::OtherColumns(others) => Self(FormatError::new_err(format!(
                 "{}: {}",
-                others.found(),
+                others.description(),
                 others.as_keys()
             ))),
             AnalysisError::Misplaced { name, of, instead } => {
@@ -193,7 +193,7 @@ impl From<DesignError> for Failure {
             DesignError::Study(error) => (*error).into(),
             DesignError::Model(error) => error.into(),
             DesignError::NoPeople { .. } | DesignError::NoLines { .. } => Self(FormatError::new_err(text)),
-            error if error.is_of_request() => bad_option(text),
+            error if error.is_request_error() => bad_option(text),
             _ => Self(DataError::new_err(text)),
         }
     }

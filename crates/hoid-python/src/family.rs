@@ -2,24 +2,24 @@
 
 use std::{borrow::Cow, path::PathBuf};
 
-use hoid_analysis::{Identified, Recordings};
+use hoid_analysis::{IdentifiedModel, Recordings};
 use hoid_ident::family::{AgreementMethod, ClusterKind, FormFigures, LoopMeasures, LoopShape, Parameter};
 use hoid_report::{Report, write_report};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{self, Wanted, array, matrix},
+    arrays::{self, ChannelSelection, array, matrix},
     controlled_element::ControlledElement,
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, ValueWithError, VerdictParts, pair, response_columns, verdict},
+    figures::{self, ValueWithError, VerdictParts, response_columns, value_and_error, verdict},
     fit::PyFit,
 };
 
 /// The operator of a person; the package wraps it in `pyhoid.OperatorFit`.
 #[pyclass(name = "OperatorFit", module = "pyhoid._pyhoid", frozen)]
-pub struct PyOperatorFit(pub Identified);
+pub struct PyOperatorFit(pub IdentifiedModel);
 
 /// Name, unit, value, standard errors for the runs and for the person, interval, share of the prior, whether the data
 /// determine the parameter, and the forms over which it was averaged.
@@ -49,8 +49,11 @@ fn parameter(p: &Parameter) -> ParameterParts {
 
 fn loop_parts<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
-    all.set_item("crossover_rad_s", measures.map(|m| pair(m.crossover_rad_s)))?;
-    all.set_item("phase_margin_deg", measures.map(|m| pair(m.phase_margin_deg)))?;
+    all.set_item("crossover_rad_s", measures.map(|m| value_and_error(m.crossover_rad_s)))?;
+    all.set_item(
+        "phase_margin_deg",
+        measures.map(|m| value_and_error(m.phase_margin_deg)),
+    )?;
     Ok(all)
 }
 
@@ -65,15 +68,21 @@ fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyRes
 /// Returns all crossovers, the smallest phase margin, the gain margin, and whether the closed loop is stable.
 fn shape_parts<'py>(py: Python<'py>, shape: &LoopShape) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
-    let crossovers: Vec<(ValueWithError, ValueWithError)> =
-        shape.crossovers.iter().map(|(w, m)| (pair(*w), pair(*m))).collect();
+    let crossovers: Vec<(ValueWithError, ValueWithError)> = shape
+        .crossovers
+        .iter()
+        .map(|(w, m)| (value_and_error(*w), value_and_error(*m)))
+        .collect();
     all.set_item("crossovers", crossovers)?;
     all.set_item(
         "smallest_phase_margin_deg",
-        shape.smallest_margin().map(|(_, m)| pair(m)),
+        shape.smallest_margin().map(|(_, m)| value_and_error(m)),
     )?;
-    all.set_item("gain_margin_db", shape.gain_margin.map(|(_, db)| pair(db)))?;
-    all.set_item("phase_crossover_rad_s", shape.gain_margin.map(|(omega, _)| pair(omega)))?;
+    all.set_item("gain_margin_db", shape.gain_margin.map(|(_, db)| value_and_error(db)))?;
+    all.set_item(
+        "phase_crossover_rad_s",
+        shape.gain_margin.map(|(omega, _)| value_and_error(omega)),
+    )?;
     all.set_item("stable", shape.is_stable())?;
     Ok(all)
 }
@@ -163,7 +172,7 @@ impl PyOperatorFit {
         };
         let (all, parameters) = (PyDict::new(py), PyDict::new(py));
         for (name, estimate) in lines.parameters() {
-            parameters.set_item(name, pair(estimate))?;
+            parameters.set_item(name, value_and_error(estimate))?;
         }
         all.set_item("parameters", parameters)?;
         all.set_item("chi2", lines.chi_squared)?;
@@ -191,7 +200,7 @@ impl PyOperatorFit {
         };
         let (all, parameters) = (PyDict::new(py), PyDict::new(py));
         for (name, estimate) in found.parameters() {
-            parameters.set_item(name, pair(estimate))?;
+            parameters.set_item(name, value_and_error(estimate))?;
         }
         all.set_item("parameters", parameters)?;
         all.set_item("nd", found.noise_order)?;
@@ -376,10 +385,10 @@ impl PyOperatorFit {
     ) -> Outcome<PathBuf> {
         let mut found = Cow::Borrowed(&self.0);
         if found.data.is_empty() {
-            found.to_mut().data = Recordings::of_records(arrays::records(&records, Wanted::All)?);
+            found.to_mut().data = Recordings::from_records(arrays::records(&records, ChannelSelection::All)?);
         }
         let page = py.detach(|| {
-            let mut report = Report::of_operator(&found);
+            let mut report = Report::from_operator_fit(&found);
             report.title = title.unwrap_or(report.title);
             write_report(&directory, &report.to_html()?)
         })?;

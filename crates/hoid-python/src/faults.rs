@@ -4,7 +4,7 @@ use hoid_analysis::{FoundFault, Recordings};
 use hoid_io::Step;
 use pyo3::{prelude::*, types::PyDict};
 
-use crate::arrays::parts;
+use crate::arrays::record_to_dict;
 
 /// Index of the given record, and the properties of the fault as a dictionary.
 type Of<'py> = (usize, Bound<'py, PyDict>);
@@ -13,11 +13,11 @@ type Of<'py> = (usize, Bound<'py, PyDict>);
 pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Of<'py>>> {
     let all = data.origins.iter().zip(&data.accounts);
     all.flat_map(|(origin, account)| account.found_faults().into_iter().map(|found| (*origin, found)))
-        .map(|(origin, found)| Ok((origin, parts_of(py, found)?)))
+        .map(|(origin, found)| Ok((origin, fault_to_dict(py, found)?)))
         .collect()
 }
 
-fn parts_of(py: Python<'_>, found: FoundFault) -> PyResult<Bound<'_, PyDict>> {
+fn fault_to_dict(py: Python<'_>, found: FoundFault) -> PyResult<Bound<'_, PyDict>> {
     let one = PyDict::new(py);
     one.set_item("kind", found.kind)?;
     one.set_item("channel", found.channel)?;
@@ -43,7 +43,7 @@ pub fn used_records<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Use
             Step::Rate { input_lead_s, .. } => *input_lead_s,
             _ => 0.0,
         });
-        let parts = parts(py, record.clone())?;
+        let parts = record_to_dict(py, record.clone())?;
         parts.set_item("input_lead", leads.sum::<f64>())?;
         Ok((*origin, parts, steps))
     })

@@ -29,7 +29,7 @@ pub fn track_fault<'py>(py: Python<'py>, fault: &hoid_track::TrackFault) -> PyRe
 /// Value and standard error.
 pub type ValueWithError = (f64, Option<f64>);
 
-pub fn pair(e: Estimate) -> ValueWithError {
+pub fn value_and_error(e: Estimate) -> ValueWithError {
     (e.value, e.standard_error)
 }
 
@@ -57,7 +57,7 @@ pub fn termination<'py>(py: Python<'py>, found: Termination) -> PyResult<Bound<'
 
 pub fn orders<'py>(py: Python<'py>, o: &Orders) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
-    for (name, value) in o.named() {
+    for (name, value) in o.named_orders() {
         all.set_item(name, value)?;
     }
     Ok(all)
@@ -75,7 +75,7 @@ pub fn operator<'py>(
             all.set_item("convertible", true)?;
             all.set_item("stable", o.parameters().is_stable())?;
             for (name, _, e) in o.rows() {
-                all.set_item(name, pair(e))?;
+                all.set_item(name, value_and_error(e))?;
             }
         }
         Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => return Ok(None),
@@ -94,8 +94,8 @@ pub fn remnant<'py>(py: Python<'py>, found: &Result<RemnantEstimate, NotConverti
             all.set_item("convertible", true)?;
             all.set_item("order", r.order)?;
             all.set_item("discretisation", r.discretisation.name())?;
-            all.set_item("T_n", pair(r.t_n_s))?;
-            all.set_item("K_n", pair(r.k_n))?;
+            all.set_item("T_n", value_and_error(r.t_n_s))?;
+            all.set_item("K_n", value_and_error(r.k_n))?;
         }
         Err(reason) => {
             all.set_item("convertible", false)?;
@@ -113,7 +113,7 @@ pub fn margins<'py>(py: Python<'py>, m: &MarginEstimates) -> PyResult<Bound<'py,
         ("gain_margin_db", m.gain_margin_db),
         ("phase_crossover_rad_s", m.phase_crossover_rad_s),
     ] {
-        all.set_item(name, estimate.map(pair))?;
+        all.set_item(name, estimate.map(value_and_error))?;
     }
     Ok(all)
 }

@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{self, Wanted, array, parts},
+    arrays::{self, ChannelSelection, array, record_to_dict},
     errors::{Outcome, bad_option},
     names,
 };
@@ -58,14 +58,14 @@ pub fn read<'py>(
         time: time.map(str::parse).transpose()?,
         sampling_hz: sampling_frequency,
         span_s: (start, stop),
-        sparse: names::sparse(sparse)?,
+        sparse: names::sparse_treatments(sparse)?,
         columns,
         repair: Repair { resample, fill },
     };
     let preparation = Preparation {
         units: unit,
-        scale: parsed(scale)?,
-        offset: parsed(offset)?,
+        scale: parse_values(scale)?,
+        offset: parse_values(offset)?,
         rate: match (decimate, new_sampling_frequency) {
             (Some(_), Some(_)) => return Err(bad_option("give decimate or new_sampling_frequency, not both")),
             (Some(factor), None) => NewRate::Decimated(factor),
@@ -88,9 +88,9 @@ pub fn read<'py>(
     };
     let found = py.detach(|| {
         if all_trials {
-            reading.segments(&path)
+            reading.read_segments(&path)
         } else {
-            reading.one(&path).map(|read| vec![read])
+            reading.single_record(&path).map(|read| vec![read])
         }
     })?;
     found
@@ -103,7 +103,7 @@ pub fn read<'py>(
                 Step::Rate { input_lead_s, .. } => *input_lead_s,
                 _ => 0.0,
             });
-            let (lead, parts) = (leads.sum::<f64>(), parts(py, read.record)?);
+            let (lead, parts) = (leads.sum::<f64>(), record_to_dict(py, read.record)?);
             parts.set_item("input_lead", lead)?;
             Ok((parts, steps, notes))
         })
@@ -111,7 +111,7 @@ pub fn read<'py>(
 }
 
 /// Parses scalings or offsets by channel, written as on the command line.
-fn parsed<T: FromStr<Err = IoError>>(texts: BTreeMap<String, String>) -> Result<BTreeMap<String, T>, IoError> {
+fn parse_values<T: FromStr<Err = IoError>>(texts: BTreeMap<String, String>) -> Result<BTreeMap<String, T>, IoError> {
     texts
         .into_iter()
         .map(|(name, text)| Ok((name, text.parse()?)))
@@ -121,7 +121,7 @@ fn parsed<T: FromStr<Err = IoError>>(texts: BTreeMap<String, String>) -> Result<
 #[pyfunction]
 #[pyo3(signature = (path, record))]
 pub fn write(py: Python<'_>, path: PathBuf, record: &Bound<'_, PyAny>) -> Outcome<()> {
-    let record = arrays::record(record, Wanted::All)?;
+    let record = arrays::record(record, ChannelSelection::All)?;
     py.detach(|| write_record(&path, &record))?;
     Ok(())
 }
@@ -157,8 +157,8 @@ pub fn signal_of(text: &str, names: Vec<String>) -> Outcome<Vec<(f64, usize)>> {
 #[pyo3(signature = (record, how))]
 pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) -> Outcome<Bound<'py, PyDict>> {
     let how = names::detrend(how)?;
-    let record = arrays::record(record, Wanted::All)?;
-    Ok(parts(py, record.detrended(how))?)
+    let record = arrays::record(record, ChannelSelection::All)?;
+    Ok(record_to_dict(py, record.detrended(how))?)
 }
 
 /// Returns the record at a lower rate and a description of the step; `None` if the rate is kept.
@@ -174,10 +174,10 @@ pub fn decimated<'py>(
     if decimation.factor(sample_time) == 1 {
         return Ok(None);
     }
-    let record = arrays::record(record, Wanted::All)?;
+    let record = arrays::record(record, ChannelSelection::All)?;
     let (record, done) = py.detach(|| decimation.of(record))?;
     let Some(done) = done else { return Ok(None) };
-    let parts = parts(py, record)?;
+    let parts = record_to_dict(py, record)?;
     parts.set_item("input_lead", done.lead_s)?;
     Ok(Some((parts, Step::from(done).to_string())))
 }

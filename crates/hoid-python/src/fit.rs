@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hoid_analysis::{Identified, PolynomialFit, Recordings, json::state};
+use hoid_analysis::{IdentifiedModel, PolynomialFit, Recordings, json::state};
 use hoid_ident::{Candidate, Choice, Fit, GreyBoxFit, MarginEstimates, Series, grey_box::OrderCandidate};
 use hoid_model::{Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
@@ -13,11 +13,11 @@ use pyo3::{
 };
 
 use crate::{
-    arrays::{self, Wanted, array, matrix},
+    arrays::{self, ChannelSelection, array, matrix},
     controlled_element::ControlledElement,
     errors::{DataError, Outcome},
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, ValueWithError, VerdictParts, pair},
+    figures::{self, ValueWithError, VerdictParts, value_and_error},
     names,
 };
 
@@ -29,7 +29,7 @@ pub struct PyFit {
     /// Number of records to which the model was fitted.
     records: usize,
     /// The complete result to which the model belongs; `None` if the model is a part of a result of another class.
-    whole: Option<Whole>,
+    whole: Option<FullResult>,
 }
 
 /// A model that is a part of another result, as serialised.
@@ -55,17 +55,17 @@ impl From<PartRead> for PyFit {
 }
 
 /// A result that is presented as polynomials.
-enum Whole {
-    Polynomials(Box<Identified<PolynomialFit>>),
-    Remnant(Box<Identified<GreyBoxFit>>),
+enum FullResult {
+    Polynomials(Box<IdentifiedModel<PolynomialFit>>),
+    Remnant(Box<IdentifiedModel<GreyBoxFit>>),
 }
 
 /// Evaluates an expression for a result of either kind.
 macro_rules! each {
     ($whole:expr, $found:ident => $what:expr) => {
         match $whole {
-            Whole::Polynomials($found) => $what,
-            Whole::Remnant($found) => $what,
+            FullResult::Polynomials($found) => $what,
+            FullResult::Remnant($found) => $what,
         }
     };
 }
@@ -82,28 +82,28 @@ impl PyFit {
     }
 
     /// Creates a model from identified polynomials.
-    pub fn of_polynomials(found: Identified<PolynomialFit>) -> Self {
+    pub fn from_polynomials(found: IdentifiedModel<PolynomialFit>) -> Self {
         Self {
             fit: found.fit.fit.clone(),
             choice: found.fit.choice.clone(),
             records: found.data.names.len(),
-            whole: Some(Whole::Polynomials(Box::new(found))),
+            whole: Some(FullResult::Polynomials(Box::new(found))),
         }
     }
 
     /// Creates a model from an identified operator with its remnant.
-    pub fn of_grey_box(found: Identified<GreyBoxFit>) -> Self {
+    pub fn from_grey_box(found: IdentifiedModel<GreyBoxFit>) -> Self {
         Self {
             fit: found.fit.polynomial_fit(0).clone(),
             choice: None,
             records: found.data.names.len(),
-            whole: Some(Whole::Remnant(Box::new(found))),
+            whole: Some(FullResult::Remnant(Box::new(found))),
         }
     }
 
     fn grey_box(&self) -> Option<&GreyBoxFit> {
         match &self.whole {
-            Some(Whole::Remnant(found)) => Some(&found.fit),
+            Some(FullResult::Remnant(found)) => Some(&found.fit),
             _ => None,
         }
     }
@@ -121,13 +121,13 @@ impl PyFit {
     }
 
     /// Evaluates the fit on a record, without the interpreter lock.
-    fn over<T: Send>(
+    fn evaluate_on_record<T: Send>(
         &self,
         py: Python<'_>,
         record: &Bound<'_, PyAny>,
         work: impl FnOnce(&Fit, &Record) -> Result<T, hoid_ident::IdentError> + Send,
     ) -> Outcome<T> {
-        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let record = arrays::record(record, ChannelSelection::Only(&[]))?;
         let fit = &self.fit;
         Ok(py.detach(|| work(fit, &record))?)
     }
@@ -144,7 +144,7 @@ impl PyFit {
     /// Returns the settings: name, value, and whether the user gave it.
     #[getter]
     fn settings(&self) -> Vec<(String, String, bool)> {
-        let of = |whole: &Whole| each!(whole, found => figures::settings(&found.settings));
+        let of = |whole: &FullResult| each!(whole, found => figures::settings(&found.settings));
         self.whole.as_ref().map(of).unwrap_or_default()
     }
 
@@ -166,7 +166,7 @@ impl PyFit {
         if self.whole.is_some() {
             return None;
         }
-        state::written(&Part {
+        state::serialise(&Part {
             fit: &self.fit,
             choice: &self.choice,
             records: self.records,
@@ -202,7 +202,7 @@ impl PyFit {
         self.fit
             .parameters()
             .into_iter()
-            .map(|(name, e)| (name, pair(e)))
+            .map(|(name, e)| (name, value_and_error(e)))
             .collect()
     }
 
@@ -285,10 +285,10 @@ impl PyFit {
     /// were estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<ValueWithError>> {
-        let without = |whole: &&Whole| each!(whole, found => found.is_without_means());
+        let without = |whole: &&FullResult| each!(whole, found => found.is_without_means());
         let data = self.whole.as_ref().filter(without).and_then(|_| self.data());
         let accounts = data.into_iter().flat_map(|data| &data.accounts);
-        accounts.map(|account| account.level.map(pair)).collect()
+        accounts.map(|account| account.level.map(value_and_error)).collect()
     }
 
     /// Returns the records that were fitted: for each, the index of the given record from which it comes, the record,
@@ -314,7 +314,7 @@ impl PyFit {
     }
 
     fn quality<'py>(&self, py: Python<'py>, records: Vec<Bound<'py, PyAny>>) -> Outcome<Bound<'py, PyDict>> {
-        let records = arrays::records(&records, Wanted::Only(&[]))?;
+        let records = arrays::records(&records, ChannelSelection::Only(&[]))?;
         let fit = &self.fit;
         let quality = py.detach(|| fit.quality(&records))?;
         Ok(figures::quality(py, &quality)?)
@@ -326,13 +326,13 @@ impl PyFit {
         if let Some(whole) = &self.whole {
             return Ok(each!(whole, found => figures::verdict(&found.verdict)));
         }
-        let records = arrays::records(&records, Wanted::Only(&[]))?;
+        let records = arrays::records(&records, ChannelSelection::Only(&[]))?;
         let found = py.detach(|| self.fit.verdict(&records, self.choice.as_ref()))?;
         Ok(figures::verdict(&found))
     }
 
     fn predict<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>, horizon: usize) -> Outcome<SeriesParts<'py>> {
-        let found = self.over(py, record, |fit, record| match horizon {
+        let found = self.evaluate_on_record(py, record, |fit, record| match horizon {
             1 => fit.predict(record),
             k => fit.predict_ahead(record, k),
         })?;
@@ -340,15 +340,15 @@ impl PyFit {
     }
 
     fn simulate<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<SeriesParts<'py>> {
-        Ok(series(py, self.over(py, record, Fit::simulate)?))
+        Ok(series(py, self.evaluate_on_record(py, record, Fit::simulate)?))
     }
 
     fn residuals<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<SeriesParts<'py>> {
-        Ok(series(py, self.over(py, record, Fit::residuals)?))
+        Ok(series(py, self.evaluate_on_record(py, record, Fit::residuals)?))
     }
 
     fn validate<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<Bound<'py, PyDict>> {
-        let v = self.over(py, record, Fit::validate)?;
+        let v = self.evaluate_on_record(py, record, Fit::validate)?;
         let (all, signs) = (PyDict::new(py), v.diagnostics());
         all.set_item("first", v.first)?;
         all.set_item("quality", figures::quality(py, &v.quality)?)?;
@@ -413,7 +413,7 @@ impl PyFit {
         settings: Vec<(String, String)>,
         controlled_element: Option<ControlledElement>,
     ) -> Outcome<PathBuf> {
-        let records = arrays::records(&records, Wanted::All)?;
+        let records = arrays::records(&records, ChannelSelection::All)?;
         let margins = controlled_element
             .map(|element| self.margins_with(&element))
             .transpose()?;

@@ -62,7 +62,7 @@ pub fn group(
 #[pyfunction]
 #[pyo3(signature = (directory, pattern))]
 pub fn group_manifest(directory: PathBuf, pattern: &str) -> Outcome<(String, Vec<String>)> {
-    let (manifest, others) = Manifest::of_directory(&directory, &Pattern::new(pattern)?)?;
+    let (manifest, others) = Manifest::from_directory(&directory, &Pattern::new(pattern)?)?;
     Ok((manifest.text(), others))
 }
 
@@ -114,7 +114,7 @@ fn defects(trouble: &[String]) -> Outcome<Vec<SamplingDefect>> {
     let known = SamplingDefect::ALL.map(|trouble| (trouble.name(), trouble));
     trouble
         .iter()
-        .map(|name| names::word("trouble", name, &known))
+        .map(|name| names::value_of_name("trouble", name, &known))
         .collect()
 }
 

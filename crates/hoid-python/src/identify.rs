@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use hoid_analysis::{
-    AnalysisError, Axis, AxisPair, BatchEstimator, Coupling, Identification, Identified, Recordings, Request,
+    AnalysisError, Axis, AxisPair, BatchEstimator, Coupling, Identification, IdentifiedModel, Recordings, Request,
     ResolvedRequest,
     json::{BatchResult, state},
     registry::estimators,
@@ -13,7 +13,7 @@ use hoid_model::{FaultHandling, Record};
 use pyo3::prelude::*;
 
 use crate::{
-    arrays::{self, Wanted},
+    arrays::{self, ChannelSelection},
     errors::{DataError, Failure, Outcome, bad_option},
     family::PyOperatorFit,
     files,
@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Number of samples times number of models above which a fit runs in a separate thread, so that it can be interrupted.
-const LONG_COMPUTATION: usize = 50_000;
+const MIN_SAMPLES_FOR_THREAD: usize = 50_000;
 
 /// Fits a model to records; returns the fit and notes on the request. The package has already converted all options to
 /// text.
@@ -41,7 +41,7 @@ pub fn identify<'py>(
     decimate: &str,
     progress: Option<Bound<'py, PyAny>>,
 ) -> Outcome<(Bound<'py, PyAny>, Vec<String>)> {
-    let records = arrays::records(&records, Wanted::All)?;
+    let records = arrays::records(&records, ChannelSelection::All)?;
     let request = Request {
         structure,
         method: Some(method),
@@ -60,7 +60,7 @@ pub fn identify<'py>(
             BatchResult::Polynomials(run(py, how, records, models, progress)?)
         }
     };
-    Ok((native(py, fit)?, notes))
+    Ok((to_python_class(py, fit)?, notes))
 }
 
 /// Input of a coupling, p-value of the test for a response to it, whether there is a response, and the reason if it was
@@ -97,8 +97,8 @@ pub fn identify_axes(
     hoid_analysis::check_axes(&how, &pairs)?;
     let mut all = Vec::with_capacity(pairs.len());
     for (pair, records) in pairs.into_iter().zip(&axes) {
-        let records = arrays::records(records, Wanted::All)?;
-        all.push((pair, Recordings::of_records(records)));
+        let records = arrays::records(records, ChannelSelection::All)?;
+        all.push((pair, Recordings::from_records(records)));
     }
     let found = py.detach(|| hoid_analysis::axes(&how, all))?;
     let parts = |coupling: Coupling| {
@@ -118,7 +118,7 @@ pub fn identify_axes(
 /// Restores a result from the text that `to_json` returned.
 #[pyfunction]
 pub fn from_json<'py>(py: Python<'py>, text: &str) -> Outcome<Bound<'py, PyAny>> {
-    Ok(native(py, BatchResult::from_json(text)?)?)
+    Ok(to_python_class(py, BatchResult::from_json(text)?)?)
 }
 
 /// Restores a model that is a part of another result from the text that its `state` returned.
@@ -129,12 +129,12 @@ pub fn from_state(text: &str) -> PyResult<PyFit> {
 }
 
 /// Wraps a result in its Python class.
-fn native(py: Python<'_>, answer: BatchResult) -> PyResult<Bound<'_, PyAny>> {
+fn to_python_class(py: Python<'_>, answer: BatchResult) -> PyResult<Bound<'_, PyAny>> {
     Ok(match answer {
         BatchResult::Operator(found) => Bound::new(py, PyOperatorFit(found))?.into_any(),
-        BatchResult::Remnant(found) => Bound::new(py, PyFit::of_grey_box(found))?.into_any(),
+        BatchResult::Remnant(found) => Bound::new(py, PyFit::from_grey_box(found))?.into_any(),
         BatchResult::Change(found) => Bound::new(py, PyTimeVaryingFit(found))?.into_any(),
-        BatchResult::Polynomials(found) => Bound::new(py, PyFit::of_polynomials(found))?.into_any(),
+        BatchResult::Polynomials(found) => Bound::new(py, PyFit::from_polynomials(found))?.into_any(),
     })
 }
 
@@ -145,16 +145,16 @@ fn run<E>(
     records: Vec<Record>,
     models: usize,
     progress: Option<&Bound<'_, PyAny>>,
-) -> Outcome<Identified<E::Fit>>
+) -> Outcome<IdentifiedModel<E::Fit>>
 where
     E: BatchEstimator + Send + Sync + 'static,
     E::Fit: Send + 'static,
 {
     let samples: usize = records.iter().map(Record::len).sum();
     let work = move |status: &Arc<RunStatus>| -> Result<_, AnalysisError> {
-        interrupt::with_progress(status, || how.run(Recordings::of_records(records)))
+        interrupt::with_progress(status, || how.run(Recordings::from_records(records)))
     };
-    if samples * models < LONG_COMPUTATION && progress.is_none() {
+    if samples * models < MIN_SAMPLES_FOR_THREAD && progress.is_none() {
         py.detach(|| work(&Arc::default())).map_err(Failure::from)
     } else {
         interrupt::run(py, models as u64, progress, false, work)

@@ -2,12 +2,12 @@
 //!
 //! `--new-fs 50` becomes `new_sampling_frequency=50`, `--fill` becomes `fill=True`, and `--trial t=1` becomes
 //! `trial="t=1"`. A word after an option is its value if it is a placeholder (`HZ`), an assignment, or one of
-//! [`VALUES`]; any other word continues the sentence.
+//! [`VALUE_WORDS`]; any other word continues the sentence.
 
 use pyo3::pyfunction;
 
 /// Options whose keyword has a different name.
-const NAMES: [(&str, &str); 6] = [
+const KEYWORD_NAMES: [(&str, &str); 6] = [
     ("fs", "sampling_frequency"),
     ("new-fs", "new_sampling_frequency"),
     ("from", "start"),
@@ -16,11 +16,11 @@ const NAMES: [(&str, &str); 6] = [
     ("orders", "na, nb, nc, nd, nf"),
 ];
 /// Options without a value.
-const FLAGS: [&str; 6] = ["drop-repeated", "fill", "resample", "resume", "robust", "stable"];
+const FLAG_OPTIONS: [&str; 6] = ["drop-repeated", "fill", "resample", "resume", "robust", "stable"];
 /// Options that take a dictionary in Python.
-const DICTIONARIES: [&str; 6] = ["unit", "scale", "offset", "sparse", "fix", "bound"];
+const DICTIONARY_OPTIONS: [&str; 6] = ["unit", "scale", "offset", "sparse", "fix", "bound"];
 /// Words that are recognised as values of options.
-const VALUES: [&str; 17] = [
+const VALUE_WORDS: [&str; 17] = [
     "t",
     "yes",
     "no",
@@ -57,14 +57,14 @@ pub fn in_python(message: &str) -> String {
             text.push_str("--");
             continue;
         }
-        let renamed = NAMES.iter().find(|(typed, _)| *typed == option);
+        let renamed = KEYWORD_NAMES.iter().find(|(typed, _)| *typed == option);
         let keyword = renamed.map_or_else(|| option.replace('-', "_"), |(_, keyword)| (*keyword).to_owned());
         text.push_str(&keyword);
-        if FLAGS.contains(&option) {
+        if FLAG_OPTIONS.contains(&option) {
             text.push_str("=True");
         } else if let Some((value, behind)) = split_value(rest) {
             text.push('=');
-            text.push_str(&written(option, value));
+            text.push_str(&python_argument(option, value));
             rest = behind;
         }
     }
@@ -79,10 +79,10 @@ fn split_value(rest: &str) -> Option<(&str, &str)> {
     let word_end = word[..end].trim_end_matches([',', ':', '.']).len();
     let (value, behind) = word.split_at(word_end);
     let placeholder = !value.is_empty() && value.chars().all(|c| c.is_ascii_uppercase());
-    (placeholder || value.contains('=') || VALUES.contains(&value)).then_some((value, behind))
+    (placeholder || value.contains('=') || VALUE_WORDS.contains(&value)).then_some((value, behind))
 }
 
-fn written(option: &str, value: &str) -> String {
+fn python_argument(option: &str, value: &str) -> String {
     let quoted = |text: &str| match text.parse::<f64>() {
         Ok(_) => text.to_owned(),
         Err(_) => format!("\"{text}\""),
@@ -90,7 +90,7 @@ fn written(option: &str, value: &str) -> String {
     if value.chars().all(|c| c.is_ascii_uppercase()) {
         return value.to_owned();
     }
-    if !DICTIONARIES.contains(&option) {
+    if !DICTIONARY_OPTIONS.contains(&option) {
         return quoted(value);
     }
     let pairs = value.split(',').filter_map(|pair| pair.split_once('='));

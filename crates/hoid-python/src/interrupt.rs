@@ -34,7 +34,7 @@ impl RunStatus {
     }
 
     /// Increments the number of completed units.
-    pub fn inc(&self) {
+    pub fn increment(&self) {
         self.done.fetch_add(1, Ordering::Relaxed);
     }
 
@@ -48,7 +48,7 @@ impl RunStatus {
 /// Runs a computation that reports its progress to the waiting thread.
 pub fn with_progress<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T {
     let status = Arc::clone(status);
-    progress::watched(move |step| status.set(step.done as u64, step.total as u64), work)
+    progress::with_watcher(move |step| status.set(step.done as u64, step.total as u64), work)
 }
 
 /// Runs a computation without the interpreter lock and returns its result.

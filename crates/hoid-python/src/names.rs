@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_ident::{NamedOrders, order_selection::Criterion};
-use hoid_io::{QualityIssueKind, Sparse};
+use hoid_io::{QualityIssueKind, SparseTreatment};
 use hoid_model::{
     Detrend, NamedChoice, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
     scenario::Realisation,
@@ -12,7 +12,7 @@ use hoid_model::{
 use crate::errors::{Outcome, bad_option};
 
 /// Returns the value that belongs to a name in a list.
-pub fn word<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome<T> {
+pub fn value_of_name<T: Clone>(option: &str, found: &str, words: &[(&str, T)]) -> Outcome<T> {
     let lower = found.to_ascii_lowercase().replace('_', "-");
     match words.iter().find(|(word, _)| *word == lower) {
         Some((_, value)) => Ok(value.clone()),
@@ -32,7 +32,7 @@ pub fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
         .iter()
         .map(|choice| (choice.choice_name(), *choice))
         .collect();
-    word(option, found, &words)
+    value_of_name(option, found, &words)
 }
 
 /// Returns the kind of fault that can be excluded from a record, given by its name.
@@ -43,7 +43,7 @@ pub fn quality_issue_kind(found: &str) -> Outcome<QualityIssueKind> {
         QualityIssueKind::Stalled,
         QualityIssueKind::Saturated,
     ];
-    word("mask", found, &kinds.map(|kind| (kind.name(), kind)))
+    value_of_name("mask", found, &kinds.map(|kind| (kind.name(), kind)))
 }
 
 pub fn structure(found: &str) -> Outcome<Structure> {
@@ -59,7 +59,7 @@ pub fn detrend(found: &str) -> Outcome<Detrend> {
 }
 
 /// Parses the treatment of each sparse column.
-pub fn sparse(found: BTreeMap<String, String>) -> Outcome<BTreeMap<String, Sparse>> {
+pub fn sparse_treatments(found: BTreeMap<String, String>) -> Outcome<BTreeMap<String, SparseTreatment>> {
     let of = |(name, how): (String, String)| Ok((name, choice("sparse", &how)?));
     found.into_iter().map(of).collect()
 }
@@ -99,7 +99,7 @@ pub fn discretisation(found: &str, prewarp_rad_s: Option<f64>) -> Outcome<discre
         ("backward-euler", discretise::Method::BackwardEuler),
         ("matched", discretise::Method::Matched),
     ];
-    word("method", found, &words)
+    value_of_name("method", found, &words)
 }
 
 /// Returns the range between two ends, both included.

@@ -80,11 +80,11 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         Some(name) => {
             // A pickle may contain an earlier name of a method.
             let name = renamed_method(&name).map_or(name, |(now, _)| now.to_owned());
-            if let Some(reason) = hoid_thesis::comparators::not_tracked(&name) {
+            if let Some(reason) = hoid_thesis::comparators::untracked_comparator_message(&name) {
                 return Err(bad_option(reason));
             }
             let words = hoid_survey::methods().into_iter().map(|method| (method.name(), method));
-            names::word("method", &name, &words.collect::<Vec<_>>())?
+            names::value_of_name("method", &name, &words.collect::<Vec<_>>())?
         }
         None => Method::default(),
     };
@@ -119,7 +119,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
 /// Returns, for an earlier name of a recursive method, the current name and a sentence that reports the change.
 #[pyfunction]
 pub fn renamed_method(name: &str) -> Option<(&'static str, String)> {
-    hoid_survey::renamed(name)
+    hoid_survey::renamed_method(name)
 }
 
 /// Returns name, help text and literature of each recursive method, and the keywords that it accepts.

@@ -20,7 +20,7 @@ use pyo3::{
 };
 
 use crate::{
-    arrays::{array, parts},
+    arrays::{array, record_to_dict},
     errors::{Outcome, bad_option},
     figures, names,
 };
@@ -82,7 +82,7 @@ pub fn simulate<'py>(
         AnyScenario::Reference(scenario) => Simulator::new(&scenario)?.run(run_seed, keep_run_in),
         AnyScenario::Family(scenario) => FamilySimulator::new(&scenario)?.run_with_truth(run_seed, keep_run_in),
     })?;
-    Ok(parts(py, record)?)
+    Ok(record_to_dict(py, record)?)
 }
 
 /// Returns crossover, margins and remnant gains of a scenario.
@@ -98,7 +98,7 @@ pub fn margins<'py>(
     noise_definition: &str,
 ) -> Outcome<Bound<'py, PyDict>> {
     let scenario = scenario(condition.as_deref(), scenario_file, scenario_text.as_deref())?;
-    let last = names::word("state", state, &[("initial", false), ("last", true)])?;
+    let last = names::value_of_name("state", state, &[("initial", false), ("last", true)])?;
     let scenario = match scenario {
         AnyScenario::Reference(scenario) => *scenario,
         AnyScenario::Family(scenario) => return family_margins(py, &scenario, last),
@@ -204,7 +204,7 @@ pub fn convert_operator<'py>(
     operator: Vec<(String, f64)>,
     sample_time: f64,
 ) -> Outcome<Bound<'py, PyDict>> {
-    let operator = OperatorParameters::of_names(&operator)?;
+    let operator = OperatorParameters::from_names(&operator)?;
     let discrete = operator.discretise(SampleTime::new(sample_time)?)?;
     Ok(conversion(py, discrete, Ok(operator))?)
 }

@@ -93,7 +93,7 @@ impl PyPlan {
 
     #[getter]
     fn estimates(&self) -> u64 {
-        self.plan.estimates()
+        self.plan.estimate_count()
     }
 
     #[getter]
@@ -135,7 +135,7 @@ impl PyPlan {
             p.cells.len(),
             p.estimators.len(),
             p.replications,
-            p.estimates()
+            p.estimate_count()
         )
     }
 
@@ -159,7 +159,7 @@ impl PyPlan {
             csv,
         };
         let plan = self.plan.clone();
-        let total = plan.estimates();
+        let total = plan.estimate_count();
         let outcome = interrupt::run(py, total, progress.as_ref(), true, move |standing| {
             run(&plan, &directory, &options, &|p| standing.set(p.done, p.total), &|| {
                 standing.should_continue()

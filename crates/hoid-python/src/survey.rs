@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hoid_analysis::{Advice, Look, LookOptions, Role};
+use hoid_analysis::{Advice, FileExamination, LookOptions, Role};
 use hoid_io::{ColumnSurvey, QualityIssue, SamplingSurvey, ValueSurvey};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -39,23 +39,23 @@ pub fn info<'py>(
         sampling_hz: sampling_frequency,
         ..LookOptions::default()
     };
-    let look = py.detach(|| Look::at(&path, &known))?;
+    let look = py.detach(|| FileExamination::at(&path, &known))?;
     let found = &look.survey;
     let all = PyDict::new(py);
     all.set_item("format", found.format)?;
-    all.set_item("samplings", each(&found.samplings, |s| sampling(py, s))?)?;
-    all.set_item("columns", each(&found.columns, |c| column(py, c))?)?;
+    all.set_item("samplings", to_dicts(&found.samplings, |s| sampling(py, s))?)?;
+    all.set_item("columns", to_dicts(&found.columns, |c| column(py, c))?)?;
     all.set_item(
         "trouble",
-        each(&found.quality_issues, |issue| quality_issue(py, issue))?,
+        to_dicts(&found.quality_issues, |issue| quality_issue(py, issue))?,
     )?;
     all.set_item("notes", &found.notes)?;
-    all.set_item("look", look_to_dict(py, &look)?)?;
+    all.set_item("look", layout_to_dict(py, &look)?)?;
     Ok(all)
 }
 
 /// Returns the layout of the file, and the keywords with which to read it.
-fn look_to_dict<'py>(py: Python<'py>, look: &Look) -> PyResult<Bound<'py, PyDict>> {
+fn layout_to_dict<'py>(py: Python<'py>, look: &FileExamination) -> PyResult<Bound<'py, PyDict>> {
     let role = |role: &Role| -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         all.set_item("column", &role.column)?;
@@ -141,7 +141,10 @@ fn keywords<'py>(py: Python<'py>, advice: &Advice) -> PyResult<Bound<'py, PyDict
     Ok(all)
 }
 
-fn each<'py, T>(items: &[T], one: impl Fn(&T) -> PyResult<Bound<'py, PyDict>>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+fn to_dicts<'py, T>(
+    items: &[T],
+    one: impl Fn(&T) -> PyResult<Bound<'py, PyDict>>,
+) -> PyResult<Vec<Bound<'py, PyDict>>> {
     items.iter().map(one).collect()
 }
 

@@ -1,26 +1,26 @@
 //! The fit of an operator whose gains change once.
 
-use hoid_analysis::Identified;
-use hoid_ident::{ChangedOperator, GainsAt, SigmoidFit, validation::whiteness};
+use hoid_analysis::IdentifiedModel;
+use hoid_ident::{ChangedOperator, InstantGains, SigmoidFit, validation::whiteness};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{self, Wanted, array, matrix},
+    arrays::{self, ChannelSelection, array, matrix},
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, ValueWithError, VerdictParts, error_or_nan, pair},
+    figures::{self, ValueWithError, VerdictParts, error_or_nan, value_and_error},
 };
 
 /// Fit of an operator whose gains change once; the package wraps it in `pyhoid.TimeVaryingFit`.
 #[pyclass(name = "TimeVaryingFit", module = "pyhoid._pyhoid", frozen)]
-pub struct PyTimeVaryingFit(pub Identified<SigmoidFit>);
+pub struct PyTimeVaryingFit(pub IdentifiedModel<SigmoidFit>);
 
 /// Returns the operator before or after the change. A gain with a lead is returned as for any fit; any other form is
 /// returned with its name and each parameter by name. Operators of the family are stable because of the bounds of their
 /// parameters.
 fn operator<'py>(py: Python<'py>, of: &ChangedOperator) -> PyResult<Option<Bound<'py, PyDict>>> {
-    if let Some(lead) = of.lead() {
+    if let Some(lead) = of.operator_estimate() {
         return figures::operator(py, &Ok(lead));
     }
     let all = PyDict::new(py);
@@ -28,7 +28,7 @@ fn operator<'py>(py: Python<'py>, of: &ChangedOperator) -> PyResult<Option<Bound
     all.set_item("stable", true)?;
     all.set_item("form", of.operator.form().name())?;
     for p in &of.parameters {
-        all.set_item(p.name, pair(p.estimate))?;
+        all.set_item(p.name, value_and_error(p.estimate))?;
     }
     Ok(Some(all))
 }
@@ -54,7 +54,14 @@ impl PyTimeVaryingFit {
     /// Returns name, estimate, unit and remark for each parameter.
     #[getter]
     fn parameters(&self) -> Vec<(String, ValueWithError, &'static str, Option<String>)> {
-        let one = |p: hoid_ident::ChangeParameter| (p.name, pair(p.estimate), p.unit, p.remark.map(|r| r.to_string()));
+        let one = |p: hoid_ident::ChangeParameter| {
+            (
+                p.name,
+                value_and_error(p.estimate),
+                p.unit,
+                p.remark.map(|r| r.to_string()),
+            )
+        };
         self.0.fit.parameters().into_iter().map(one).collect()
     }
 
@@ -89,7 +96,7 @@ impl PyTimeVaryingFit {
     #[getter]
     fn change<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let (c, all) = (self.0.fit.comparison(), PyDict::new(py));
-        all.set_item("found", self.0.fit.change_found())?;
+        all.set_item("found", self.0.fit.has_change())?;
         all.set_item("likelihood_ratio", c.likelihood_ratio)?;
         all.set_item("extra_parameters", c.extra_parameters)?;
         all.set_item("bic_difference", c.bic_difference)?;
@@ -105,7 +112,7 @@ impl PyTimeVaryingFit {
             .data
             .accounts
             .iter()
-            .map(|account| account.level.map(pair))
+            .map(|account| account.level.map(value_and_error))
             .collect()
     }
 
@@ -134,7 +141,7 @@ impl PyTimeVaryingFit {
     /// Returns `t` and the parameters that change (for a gain with a lead: K_e, T_L and K_e_dot) at these times, each
     /// with its standard error.
     fn gains<'py>(&self, py: Python<'py>, times: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
-        let gains: Vec<GainsAt> = times.iter().map(|t| self.0.fit.gains_at(*t)).collect();
+        let gains: Vec<InstantGains> = times.iter().map(|t| self.0.fit.gains_at(*t)).collect();
         let all = PyDict::new(py);
         all.set_item("t", array(py, times))?;
         // The names are defined even if no times are given.
@@ -154,7 +161,7 @@ impl PyTimeVaryingFit {
         py: Python<'py>,
         record: &Bound<'py, PyAny>,
     ) -> Outcome<(usize, Bound<'py, PyArray1<f64>>)> {
-        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let record = arrays::record(record, ChannelSelection::Only(&[]))?;
         let found = py.detach(|| self.0.fit.residuals(&record))?;
         Ok((found.first, array(py, found.values)))
     }
@@ -164,7 +171,7 @@ impl PyTimeVaryingFit {
         py: Python<'py>,
         record: &Bound<'py, PyAny>,
     ) -> Outcome<(usize, Bound<'py, PyArray1<f64>>)> {
-        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let record = arrays::record(record, ChannelSelection::Only(&[]))?;
         let found = py.detach(|| self.0.fit.simulate(&record))?;
         Ok((found.first, array(py, found.values)))
     }
@@ -176,7 +183,7 @@ impl PyTimeVaryingFit {
 
     /// Tests the residuals of a record for whiteness.
     fn ljung_box<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<Option<Bound<'py, PyDict>>> {
-        let record = arrays::record(record, Wanted::Only(&[]))?;
+        let record = arrays::record(record, ChannelSelection::Only(&[]))?;
         let fit = &self.0.fit;
         let test = py.detach(|| {
             fit.residuals(&record)

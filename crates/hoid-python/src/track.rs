@@ -2,14 +2,14 @@
 
 use std::path::PathBuf;
 
-use hoid_analysis::{Recordings, Tracked, Tracking};
+use hoid_analysis::{Recordings, Tracking, TrackingResult};
 use hoid_io::{ColumnValues, OutputTable, write_table};
 use hoid_report::{TrackReport, default_batch_fits, write_report};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{self, Wanted, array},
+    arrays::{self, ChannelSelection, array},
     errors::Outcome,
     faults::{UsedRecord, used_records},
     figures, files,
@@ -35,7 +35,7 @@ pub fn track<'py>(
     progress: Option<Bound<'py, PyAny>>,
 ) -> Outcome<PyTrace> {
     let recording = |one: &Bound<'py, PyAny>| -> Outcome<Recordings> {
-        Ok(Recordings::of_records([arrays::record(one, Wanted::All)?]))
+        Ok(Recordings::from_records([arrays::record(one, ChannelSelection::All)?]))
     };
     let (recordings, validation) = (recording(record)?, validate.as_ref().map(recording).transpose()?);
     let tracking = Tracking {
@@ -49,14 +49,14 @@ pub fn track<'py>(
     };
     let candidates = tracking.plan(&recordings)?.ranges().combinations()?.len() as u64;
     let tracked = interrupt::run(py, candidates, progress.as_ref(), false, move |standing| {
-        tracking.run(recordings, validation, &|| standing.inc())
+        tracking.run(recordings, validation, &|| standing.increment())
     })?;
     Ok(PyTrace(tracked))
 }
 
 /// A trace, with the estimate at each stored sample; the package wraps it in `pyhoid.Trace`.
 #[pyclass(name = "Trace", module = "pyhoid._pyhoid", frozen)]
-pub struct PyTrace(Tracked);
+pub struct PyTrace(TrackingResult);
 
 #[pymethods]
 impl PyTrace {
@@ -134,12 +134,12 @@ impl PyTrace {
             all.set_item("t", t)?;
             all.set_item("seconds_ago", c.seconds_ago)?;
             all.set_item("log_odds", c.odds)?;
-            all.set_item("changed", c.changed())?;
-            all.set_item("K_e", c.k_e.map(figures::pair))?;
-            all.set_item("K_e_dot", c.k_e_dot.map(figures::pair))?;
-            all.set_item("omega_nm", c.omega_nm_rad_s.map(figures::pair))?;
-            all.set_item("zeta_nm", c.zeta_nm.map(figures::pair))?;
-            all.set_item("tau_e", c.tau_e_s.map(figures::pair))?;
+            all.set_item("changed", c.changed_quantities())?;
+            all.set_item("K_e", c.k_e.map(figures::value_and_error))?;
+            all.set_item("K_e_dot", c.k_e_dot.map(figures::value_and_error))?;
+            all.set_item("omega_nm", c.omega_nm_rad_s.map(figures::value_and_error))?;
+            all.set_item("zeta_nm", c.zeta_nm.map(figures::value_and_error))?;
+            all.set_item("tau_e", c.tau_e_s.map(figures::value_and_error))?;
             all.set_item("T_L", c.t_l_s)?;
             all.set_item("innovation_variance", c.innovation_variance)?;
             all.set_item("z", c.z)?;
@@ -193,8 +193,8 @@ impl PyTrace {
     /// element.
     #[getter]
     fn no_crossover(&self) -> Option<(usize, Option<&'static str>)> {
-        let (rows, reason) = self.0.without_crossover()?;
-        Some((rows, reason.map(|reason| reason.words())))
+        let (rows, reason) = self.0.rows_without_crossover()?;
+        Some((rows, reason.map(|reason| reason.as_text())))
     }
 
     /// Returns all columns by name, as in a trace file; whole numbers remain integers.
@@ -232,7 +232,7 @@ impl PyTrace {
     fn report(&self, py: Python<'_>, directory: PathBuf, title: Option<String>) -> Outcome<PathBuf> {
         let page = py.detach(|| {
             let (fits, missing) = default_batch_fits(&self.0.trace, self.0.record());
-            let mut report = TrackReport::of_tracked(&self.0, &fits);
+            let mut report = TrackReport::from_tracked(&self.0, &fits);
             report.title = title.unwrap_or(report.title);
             report.notes = missing
                 .map(|error| format!("There is no batch fit of the last third: {error}."))

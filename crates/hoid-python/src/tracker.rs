@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{self, Wanted, array, matrix},
+    arrays::{self, ChannelSelection, array, matrix},
     errors::{Outcome, bad_option},
     figures, files,
     fit::PyFit,
@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// The saved state of a tracker: its orders, and all changing values as numbers.
-type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
+type SavedParts<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
 
 /// Crossover and margin, or the reason why there are none.
 type OpenLoopParts = (
@@ -70,7 +70,7 @@ impl PyTracker {
         let mut live = Live::new(&asked, sample_time, decimation, warm_up)?;
         let mut choice = None;
         if let Some(record) = record {
-            let record = arrays::record(&record, Wanted::Only(&["f_t"]))?;
+            let record = arrays::record(&record, ChannelSelection::Only(&["f_t"]))?;
             choice = py.detach(|| live.start_from(record))?;
         }
         Ok(Self { live, choice })
@@ -150,7 +150,7 @@ impl PyTracker {
     /// Returns the decimation that a high sampling frequency required; `None` if there is none.
     #[getter]
     fn decimation(&self) -> Option<String> {
-        self.live.decimated().map(|done| done.to_string())
+        self.live.decimation().map(|done| done.to_string())
     }
 
     #[getter]
@@ -191,7 +191,7 @@ impl PyTracker {
     #[getter]
     fn parameters(&self) -> Outcome<Vec<(String, figures::ValueWithError)>> {
         let tracker = self.tracker()?;
-        let estimates = tracker.parameters().into_iter().map(figures::pair);
+        let estimates = tracker.parameters().into_iter().map(figures::value_and_error);
         Ok(tracker.parameter_names().into_iter().zip(estimates).collect())
     }
 
@@ -216,7 +216,12 @@ impl PyTracker {
     /// Returns gain in dB and phase in deg at a frequency in rad/s, each with its standard error.
     fn response(&self, omega: f64) -> Outcome<Option<(figures::ValueWithError, figures::ValueWithError)>> {
         let found = self.tracker()?.response(omega);
-        Ok(found.map(|r| (figures::pair(r.gain_db()), figures::pair(r.phase_deg()))))
+        Ok(found.map(|r| {
+            (
+                figures::value_and_error(r.gain_db()),
+                figures::value_and_error(r.phase_deg()),
+            )
+        }))
     }
 
     /// Returns crossover in rad/s and phase margin in deg, or the reason why there are none; `None` without a
@@ -227,12 +232,12 @@ impl PyTracker {
         Ok(found.map(|found| match found {
             Ok(found) => (
                 Some((
-                    figures::pair(found.crossover_rad_s),
-                    figures::pair(found.phase_margin_deg),
+                    figures::value_and_error(found.crossover_rad_s),
+                    figures::value_and_error(found.phase_margin_deg),
                 )),
                 None,
             ),
-            Err(reason) => (None, Some(reason.words())),
+            Err(reason) => (None, Some(reason.as_text())),
         }))
     }
 
@@ -240,7 +245,7 @@ impl PyTracker {
     #[getter]
     fn determined(&self) -> Outcome<std::collections::BTreeMap<&'static str, bool>> {
         let tracker = self.tracker()?;
-        let found = tracker.operator().map(|operator| tracker.determined(&operator));
+        let found = tracker.operator().map(|operator| tracker.determinations(&operator));
         Ok(found.unwrap_or_default().into_iter().collect())
     }
 
@@ -287,8 +292,8 @@ impl PyTracker {
     }
 
     /// Returns the orders, once the tracker has started, and all changing values as numbers.
-    fn saved<'py>(&mut self, py: Python<'py>) -> PyResult<Saved<'py>> {
-        let (orders, numbers) = self.live.saved();
+    fn saved<'py>(&mut self, py: Python<'py>) -> PyResult<SavedParts<'py>> {
+        let (orders, numbers) = self.live.save();
         let orders = orders.map(|orders| figures::orders(py, &orders)).transpose()?;
         Ok((orders, array(py, numbers)))
     }

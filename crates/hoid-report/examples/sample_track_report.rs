@@ -11,7 +11,7 @@ use hoid_model::{
 };
 use hoid_report::{BatchLine, TraceSection, TrackReport};
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, StartAt, Trace, TrackOptions, track};
+use hoid_track::{Method, StartSource, Trace, TrackOptions, track};
 
 /// Spans of the batch fits, s: before and after the change at 40.96 s.
 const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];
@@ -26,12 +26,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         ..RunSeed::default()
     };
     let record = simulator.run(run_seed, false)?;
-    let arx = batch(Structure::Arx, &record)?;
-    let bj = batch(Structure::BoxJenkins, &record)?;
+    let arx = fit_spans(Structure::Arx, &record)?;
+    let bj = fit_spans(Structure::BoxJenkins, &record)?;
     let traces = [
-        tracked(Method::rls(), &record)?,
-        tracked(Method::rpem(), &record)?,
-        tracked(hoid_survey::physical(), &record)?,
+        track_with(Method::rls(), &record)?,
+        track_with(Method::rpem(), &record)?,
+        track_with(hoid_survey::physical(), &record)?,
     ];
     let section = |name: &str, trace, batch| TraceSection {
         name: name.to_owned(),
@@ -47,8 +47,8 @@ fn main() -> Result<(), Box<dyn Error>> {
         ],
         record: &record,
         traces: vec![
-            section("RLS, ARX", &traces[0], lines(&arx)),
-            section("RPEM, BJ", &traces[1], lines(&bj)),
+            section("RLS, ARX", &traces[0], batch_lines(&arx)),
+            section("RPEM, BJ", &traces[1], batch_lines(&bj)),
             section("physical", &traces[2], Vec::new()),
         ],
         verdict: None,
@@ -58,22 +58,22 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn batch(structure: Structure, record: &Record) -> Result<Vec<Fit>, Box<dyn Error>> {
+fn fit_spans(structure: Structure, record: &Record) -> Result<Vec<Fit>, Box<dyn Error>> {
     let estimator = Estimator::new(structure, structure.operator_orders(29));
     let fit = |(from, to)| -> Result<Fit, Box<dyn Error>> { Ok(estimator.fit(&[record.span(from, to)?])?) };
     SPANS.into_iter().map(fit).collect()
 }
 
-fn lines(fits: &[Fit]) -> Vec<BatchLine<'_>> {
+fn batch_lines(fits: &[Fit]) -> Vec<BatchLine<'_>> {
     let spans = SPANS.into_iter().zip(fits);
     spans
         .map(|((from_s, to_s), fit)| BatchLine { from_s, to_s, fit })
         .collect()
 }
 
-fn tracked(method: Method, record: &Record) -> Result<Trace, Box<dyn Error>> {
+fn track_with(method: Method, record: &Record) -> Result<Trace, Box<dyn Error>> {
     let structure = method.default_structure();
     let mut options = TrackOptions::new(method, structure, structure.operator_orders(29));
-    options.start = StartAt::Span(Some(SPANS[0]));
+    options.start = StartSource::Span(Some(SPANS[0]));
     Ok(track(record, &options, 1)?)
 }

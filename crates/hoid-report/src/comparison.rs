@@ -8,7 +8,7 @@ use crate::figures::{PeopleGrid, PeoplePanel, people_by_condition};
 fn name(quantity: &Quantity) -> String {
     match quantity {
         Quantity::Parameter(_) | Quantity::OfInput { .. } => quantity.to_string(),
-        other => other.words(),
+        other => other.sentence_name(),
     }
 }
 

@@ -2,7 +2,7 @@
 //! functions of the number of runs.
 
 use hoid_design::experiment::{DesignedLine, Enters, Expected, ExpectedResponse, ExperimentDesign, has_absolute_error};
-use hoid_model::{numbers::counted, uncertainty::Estimate};
+use hoid_model::{numbers::count_with_noun, uncertainty::Estimate};
 
 use crate::{
     figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves},
@@ -37,9 +37,9 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
     let (target, error): (Vec<&DesignedLine>, Vec<&DesignedLine>) = design.lines.iter().partition(of_target);
     let of_error = if is_seen { "of B " } else { "" };
     let mut panels = vec![panel("amplitude", "", amplitudes)];
-    panels.extend(responses(of_error, &design.response, &error));
+    panels.extend(response_panels(of_error, &design.response, &error));
     if is_seen {
-        panels.extend(responses("of F ", &design.response_to_target, &target));
+        panels.extend(response_panels("of F ", &design.response_to_target, &target));
     }
     let grid = CurveGrid {
         panels,
@@ -51,7 +51,7 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
     let title = format!(
         "the forcing function, and the response of {} with the errors expected from {} of {} s",
         design.person,
-        counted(design.runs, "run"),
+        count_with_noun(design.runs, "run"),
         design.length_s
     );
     curves("design", &title, &grid)
@@ -59,13 +59,13 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
 
 /// Panels of gain and phase of a response: the operator as a curve with its band, and the response at each line with
 /// its error bar.
-fn responses(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [CurvePanel; 2] {
+fn response_panels(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [CurvePanel; 2] {
     let one = |name: &str, unit: &str, part: fn(&ExpectedResponse) -> Estimate| {
         let band: Vec<Estimate> = between.iter().map(part).collect();
         let points: Vec<Estimate> = at.iter().map(|l| part(&l.response)).collect();
         let values = |all: &[Estimate]| all.iter().map(|e| e.value).collect::<Vec<f64>>();
         let operator = Curve {
-            band: band.iter().map(ends).collect(),
+            band: band.iter().map(interval).collect(),
             ..curve(
                 "operator, band 95 %",
                 1,
@@ -75,7 +75,7 @@ fn responses(of: &str, between: &[ExpectedResponse], at: &[&DesignedLine]) -> [C
         };
         let at_lines = Curve {
             kind: LineKind::Points,
-            bars: points.iter().map(ends).collect(),
+            bars: points.iter().map(interval).collect(),
             ..curve(
                 "single line, bars 95 %",
                 0,
@@ -111,7 +111,7 @@ pub fn runs_figure(design: &ExperimentDesign) -> String {
     );
     for (who, expected, kind) in people {
         let one = of_one(expected);
-        for (k, (name, scale)) in shown(design).iter().enumerate() {
+        for (k, (name, scale)) in scaled_quantities(design).iter().enumerate() {
             let Some(error) = one.error(name).filter(|e| e.is_finite()) else {
                 continue;
             };
@@ -163,7 +163,7 @@ pub fn runs_figure(design: &ExperimentDesign) -> String {
 }
 
 /// The quantities of the figure, each with the factor that scales its error.
-fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
+fn scaled_quantities(design: &ExperimentDesign) -> Vec<(String, f64)> {
     if !design.wanted.is_empty() {
         return design.wanted.iter().map(|w| (w.name.clone(), 1.0 / w.error)).collect();
     }
@@ -174,7 +174,7 @@ fn shown(design: &ExperimentDesign) -> Vec<(String, f64)> {
         .collect()
 }
 
-fn ends(e: &Estimate) -> (f64, f64) {
+fn interval(e: &Estimate) -> (f64, f64) {
     let half = e.standard_error.map_or(f64::NAN, |s| Z_95 * s);
     (e.value - half, e.value + half)
 }

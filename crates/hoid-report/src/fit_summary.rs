@@ -1,7 +1,7 @@
 //! The head of a page: the verdict on the result, a summary in one sentence, and the parameters with their errors. The
 //! remainder of the page supports this summary.
 
-use hoid_model::{Verdict, VerdictLevel, numbers::significant, uncertainty::Estimate};
+use hoid_model::{Verdict, VerdictLevel, numbers::format_significant, uncertainty::Estimate};
 use minijinja::{Value, context};
 
 use crate::cells;
@@ -37,7 +37,7 @@ impl FitSummary {
         let row = |r: &ParameterRow| {
             let end = |v: f64| {
                 if v.is_finite() {
-                    significant(v, 3)
+                    format_significant(v, 3)
                 } else {
                     "open".to_owned()
                 }
@@ -89,7 +89,7 @@ pub fn sentence<'a>(
     let of = |(word, name, unit): &(&str, &str, &str)| {
         let found = known.iter().find(|(known, _)| known == name);
         let found = found.filter(|_| !(has_gain && *name == "K_over_T_I"));
-        found.map(|(_, value)| format!("{word} {}{unit}", significant(*value, 2)))
+        found.map(|(_, value)| format!("{word} {}{unit}", format_significant(*value, 2)))
     };
     let of_person: Vec<String> = WORDS.iter().filter_map(of).collect();
     let measure = |word: &str, e: Option<Estimate>, unit: &str| {
@@ -99,7 +99,7 @@ pub fn sentence<'a>(
                 let (value, error) = crate::numbers::with_uncertainty(e.value, Some(error));
                 format!("{word} {value} \u{b1} {error}{unit}")
             }
-            None => format!("{word} {}{unit}", significant(e.value, 3)),
+            None => format!("{word} {}{unit}", format_significant(e.value, 3)),
         })
     };
     let of_loop: Vec<String> = [

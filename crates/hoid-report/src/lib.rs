@@ -39,7 +39,7 @@
 //! |---|---|
 //! | [`FitSummary`], [`sentence`] | the head of a page: verdict, the result as text, parameters with errors |
 //! | [`Report`], [`ModelSection`], [`model_figure`] | one self-contained HTML page about one or several fitted models |
-//! | [`Report::of_operator`], [`operator_figure`], [`sentence_of_operator`] | the page of the operator of a person |
+//! | [`Report::from_operator_fit`], [`operator_figure`], [`operator_sentence`] | the page of the operator of a person |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one self-contained HTML page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one self-contained HTML page about a group of recorded runs |
 //! | [`comparison_figure`] | people by condition, with the means over people |
@@ -80,7 +80,7 @@ pub use group::{
 pub use hoid_model::numbers;
 pub use model_figure::{model_figure, model_picture};
 pub use model_section::{ModelSection, known_operator};
-pub use operator::{operator_figure, sentence_of_operator, undetermined};
+pub use operator::{operator_figure, operator_sentence, undetermined_remark};
 pub use page::{render_with, write_page, write_report};
 pub use paper_table::PaperTable;
 pub use report::{Picture, Report};

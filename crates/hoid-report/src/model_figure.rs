@@ -17,7 +17,8 @@ pub fn model_figure(fit: &Fit, records: &[Record], described: Option<&Descriptio
     let delay_s = fit.orders().nk as f64 * fit.model().sample_time().s();
     match described {
         Some(described) => {
-            let curve = ModelCurve::over(described, 0.0, &title, delay_s, |omega| fit.model().response(omega));
+            let curve =
+                ModelCurve::over_frequencies(described, 0.0, &title, delay_s, |omega| fit.model().response(omega));
             describing("identified", &title, described, &[curve])
         }
         None => bode(

@@ -1,6 +1,6 @@
 //! The page and the figure of the operator of a person, for `hoid identify` and Python.
 
-use hoid_analysis::Identified;
+use hoid_analysis::IdentifiedModel;
 use hoid_ident::{
     MarginEstimates,
     family::{FamilyFit, Parameter},
@@ -16,7 +16,7 @@ use crate::{
 
 impl<'a> Report<'a> {
     /// Creates the page about the operator of a person.
-    pub fn of_operator(found: &'a Identified) -> Self {
+    pub fn from_operator_fit(found: &'a IdentifiedModel) -> Self {
         let fit = &found.fit;
         let element = found.controlled_element.as_ref();
         Self {
@@ -28,21 +28,21 @@ impl<'a> Report<'a> {
                 truth: None,
                 margins: element.and_then(|element| margins(fit, element)),
             }],
-            answer: Some(answer(found)),
+            answer: Some(operator_summary(found)),
             pictures: (found.described.as_ref())
-                .map(|described| through_describing_function(fit, described))
+                .map(|described| describing_function_picture(fit, described))
                 .into_iter()
                 .chain(responses_figure(found).map(|svg| Picture {
                     svg,
                     caption: "The responses of u to each input, held over a sample, with their 95 % bands.".to_owned(),
                 }))
                 .collect(),
-            ..Self::of_identified(found)
+            ..Self::from_identified(found)
         }
     }
 
     /// Creates a page with the heading and the settings of any result, without models.
-    pub fn of_identified<F>(found: &Identified<F>) -> Self {
+    pub fn from_identified<F>(found: &IdentifiedModel<F>) -> Self {
         let data = &found.data;
         Self {
             title: match data.records.as_slice() {
@@ -61,16 +61,16 @@ impl<'a> Report<'a> {
 /// Draws the figure of an operator. With several inputs the figure shows the response to each input. With a single
 /// input it shows the operator with the describing function of the records, or the frequency response with its bands if
 /// the records have no periodic excitation.
-pub fn operator_figure(found: &Identified) -> String {
+pub fn operator_figure(found: &IdentifiedModel) -> String {
     match (&found.described, responses_figure(found)) {
         (_, Some(all)) => all,
-        (Some(described), None) => picture(&found.fit, described),
+        (Some(described), None) => draw_operator(&found.fit, described),
         (None, None) => model_figure(&found.fit.operator(0).polynomial_fit, &found.data.records, None),
     }
 }
 
 /// The identified operator as a sentence.
-pub fn sentence_of_operator(found: &Identified) -> Option<String> {
+pub fn operator_sentence(found: &IdentifiedModel) -> Option<String> {
     let known = found.fit.operator(0).parameters.iter().filter(|p| p.determined);
     let element = found.controlled_element.as_ref();
     let here = element.and_then(|element| found.fit.loop_measures(0, element));
@@ -82,7 +82,7 @@ pub fn sentence_of_operator(found: &Identified) -> Option<String> {
 }
 
 /// Remark for a parameter that the data do not determine; empty for a parameter that they determine.
-pub fn undetermined(p: &Parameter) -> &'static str {
+pub fn undetermined_remark(p: &Parameter) -> &'static str {
     match (p.determined, p.prior_share > 0.5) {
         (true, _) => "",
         (false, true) => "the prior alone",
@@ -92,7 +92,7 @@ pub fn undetermined(p: &Parameter) -> &'static str {
 
 /// Remark on a parameter: whether the data determine it, and the share of the prior.
 fn remark(p: &Parameter) -> String {
-    let words = undetermined(p);
+    let words = undetermined_remark(p);
     match (words, p.prior_share > 0.01) {
         (_, false) => words.to_owned(),
         ("", true) => format!("{:.0} % from the prior", 100.0 * p.prior_share),
@@ -101,7 +101,7 @@ fn remark(p: &Parameter) -> String {
 }
 
 /// Creates the head of a page.
-fn answer(found: &Identified) -> FitSummary {
+fn operator_summary(found: &IdentifiedModel) -> FitSummary {
     let gain = found.data.records.first().map(GainUnit::of).unwrap_or_default();
     let row = |p: &Parameter| ParameterRow {
         name: p.name.clone(),
@@ -122,7 +122,7 @@ fn answer(found: &Identified) -> FitSummary {
     });
     FitSummary {
         verdict: found.fit.verdict.clone(),
-        sentence: sentence_of_operator(found),
+        sentence: operator_sentence(found),
         parameters: found
             .fit
             .operator(0)
@@ -151,7 +151,7 @@ const CHANNEL_RANGE: (f64, f64) = (0.3, 16.0);
 const CHANNEL_POINTS: usize = 120;
 
 /// The figure of the responses to all inputs; `None` for a fit with a single input.
-fn responses_figure(found: &Identified) -> Option<String> {
+fn responses_figure(found: &IdentifiedModel) -> Option<String> {
     let fit = &found.fit;
     let (low, high) = CHANNEL_RANGE;
     let high = high.min(0.9 * std::f64::consts::PI / fit.sample_time.s());
@@ -178,25 +178,25 @@ fn responses_figure(found: &Identified) -> Option<String> {
 }
 
 /// Highest frequency shown in a figure with a neuromuscular peak, as a multiple of the natural frequency.
-const SHOWN_ABOVE_PEAK: f64 = 1.5;
+const PEAK_MARGIN_RATIO: f64 = 1.5;
 
 /// Frequency up to which the curves extend in order to show the reported neuromuscular peak, even if all lines are
 /// below it; 0 if no peak is reported.
-fn reach_rad_s(fit: &FamilyFit) -> f64 {
+fn max_omega_rad_s(fit: &FamilyFit) -> f64 {
     let all = &fit.operator(0).parameters;
     let peak = all.iter().find(|p| p.name == "omega_nm" && p.determined);
     let nyquist = std::f64::consts::PI / fit.sample_time.s();
-    peak.map_or(0.0, |omega_nm| (SHOWN_ABOVE_PEAK * omega_nm.value).min(0.9 * nyquist))
+    peak.map_or(0.0, |omega_nm| (PEAK_MARGIN_RATIO * omega_nm.value).min(0.9 * nyquist))
 }
 
 /// Curves of the fitted operator: by prediction error with its band, from the fit at the lines, and by instrumental
 /// variables.
-fn curves(fit: &FamilyFit, described: &Description) -> Vec<ModelCurve> {
+fn model_curves(fit: &FamilyFit, described: &Description) -> Vec<ModelCurve> {
     let half = 0.5 * fit.sample_time.s();
-    let reach = reach_rad_s(fit);
+    let reach = max_omega_rad_s(fit);
     let curve = |name: &str, operator: &FamilyOperator| {
         let turn = |omega: f64| Complex64::from_polar(1.0, -omega * half);
-        ModelCurve::over(described, reach, name, operator.tau_e_s() + half, |omega| {
+        ModelCurve::over_frequencies(described, reach, name, operator.tau_e_s() + half, |omega| {
             operator.response(omega) * turn(omega)
         })
     };
@@ -217,9 +217,9 @@ fn curves(fit: &FamilyFit, described: &Description) -> Vec<ModelCurve> {
     all
 }
 
-fn through_describing_function(fit: &FamilyFit, described: &Description) -> Picture {
+fn describing_function_picture(fit: &FamilyFit, described: &Description) -> Picture {
     Picture {
-        svg: picture(fit, described),
+        svg: draw_operator(fit, described),
         caption:
             "The describing function at the lines of the excitation, with 95 % intervals from its scatter, and the \
                   operator: by prediction error (the mean over the forms, with a 95 % band), by a fit of the best form \
@@ -229,7 +229,7 @@ fn through_describing_function(fit: &FamilyFit, described: &Description) -> Pict
 }
 
 /// Draws the operator with the describing function.
-fn picture(fit: &FamilyFit, described: &Description) -> String {
+fn draw_operator(fit: &FamilyFit, described: &Description) -> String {
     let title = format!("{} through the describing function", fit.form);
-    describing("describing", &title, described, &curves(fit, described))
+    describing("describing", &title, described, &model_curves(fit, described))
 }

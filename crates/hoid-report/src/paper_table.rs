@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use hoid_io::{ColumnValues, IoError, OutputColumn, OutputTable, check_table_path, write_atomically, write_table};
-use hoid_model::numbers::{DASH, Z_95, plain, with_uncertainty};
+use hoid_model::numbers::{DASH, Z_95, format_plain, with_uncertainty};
 use serde_json::{Map, Value};
 
 /// A result as a table.
@@ -58,11 +58,11 @@ impl PaperTable {
         )];
         let columns = match (object.get("people"), object.get("lines")) {
             // The `people` of a design are listed in addition to the typical person, whom the table represents.
-            _ if text("kind") == "design" => of_estimates(object),
-            _ if text("kind") == "comparison" => of_differences(object.get("differences")?.as_array()?),
-            (Some(people), _) => of_people(people.as_array()?),
-            (None, Some(lines)) if text("kind") == "description" => of_lines(lines.as_array()?),
-            _ => of_estimates(object),
+            _ if text("kind") == "design" => estimate_columns(object),
+            _ if text("kind") == "comparison" => difference_columns(object.get("differences")?.as_array()?),
+            (Some(people), _) => people_columns(people.as_array()?),
+            (None, Some(lines)) if text("kind") == "description" => line_columns(lines.as_array()?),
+            _ => estimate_columns(object),
         };
         let filled = columns.first().is_some_and(|column| column.cells.len() > 0);
         filled.then_some(Self { comments, columns })
@@ -72,7 +72,7 @@ impl PaperTable {
     ///
     /// # Errors
     /// [`IoError::UnknownFormat`] for any other extension.
-    pub fn check(path: &Path) -> Result<(), IoError> {
+    pub fn check_format(path: &Path) -> Result<(), IoError> {
         match Markup::of(path) {
             Some(_) => Ok(()),
             None => check_table_path(path),
@@ -82,7 +82,7 @@ impl PaperTable {
     /// Writes the table atomically, in the format given by the extension.
     ///
     /// # Errors
-    /// The errors of [`PaperTable::check`], and [`IoError`] if the file cannot be written.
+    /// The errors of [`PaperTable::check_format`], and [`IoError`] if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), IoError> {
         match Markup::of(path) {
             Some(markup) => {
@@ -157,7 +157,7 @@ impl Cells {
     fn cell(&self, row: usize, markup: Markup) -> String {
         match self {
             Self::Text(all) => markup.name(&all[row]),
-            Self::Number(all) => markup.number(&plain(all[row]), DASH),
+            Self::Number(all) => markup.number(&format_plain(all[row]), DASH),
             Self::End(all) => markup.number(&with_uncertainty(all[row][0], Some(all[row][1])).0, DASH),
             Self::Estimate(all, _) => {
                 let (value, error) = with_uncertainty(all[row][0], Some(all[row][1]));
@@ -180,7 +180,7 @@ fn number(value: &Value) -> f64 {
 }
 
 /// Columns for the parameters, including those of the operator, and the quantities of the loop.
-fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
+fn estimate_columns(object: &Map<String, Value>) -> Vec<Column> {
     let none = Value::Null;
     let at = |object: &Map<String, Value>, key: &str| object.get(key).cloned().unwrap_or_default();
     let verdict = &object.get("verdict").unwrap_or(&none)["of"];
@@ -256,7 +256,7 @@ fn row(name: &str, p: &Value, error: &str, verdict: &Value) -> Row {
 }
 
 /// Columns for the lines of a describing function.
-fn of_lines(lines: &[Value]) -> Vec<Column> {
+fn line_columns(lines: &[Value]) -> Vec<Column> {
     let all = |key: &str| lines.iter().map(|line| number(&line[key])).collect::<Vec<f64>>();
     let both = |value: &str, error: &str| {
         let pairs = all(value).into_iter().zip(all(error)).map(|(v, e)| [v, e]);
@@ -271,7 +271,7 @@ fn of_lines(lines: &[Value]) -> Vec<Column> {
 }
 
 /// Columns for the people of a group, one person per row.
-fn of_people(people: &[Value]) -> Vec<Column> {
+fn people_columns(people: &[Value]) -> Vec<Column> {
     let text =
         |of: &dyn Fn(&Value) -> Option<String>| Cells::Text(people.iter().map(|p| of(p).unwrap_or_default()).collect());
     let key = |name: &'static str| move |p: &Value| p[name].as_str().map(str::to_owned);
@@ -316,7 +316,7 @@ fn of_people(people: &[Value]) -> Vec<Column> {
 }
 
 /// Columns for the differences of a comparison, one difference per row.
-fn of_differences(all: &[Value]) -> Vec<Column> {
+fn difference_columns(all: &[Value]) -> Vec<Column> {
     let text = |of: &dyn Fn(&Value) -> String| Cells::Text(all.iter().map(of).collect());
     let word = |d: &Value, key: &str| d[key].as_str().unwrap_or_default().to_owned();
     let ends = |place: usize| {
@@ -394,7 +394,7 @@ impl Markup {
             "phase_margin_deg" => "$\\varphi_\\mathrm{m}$ (deg)",
             "gain_db" => "gain (dB)",
             "phase_deg" => "phase (deg)",
-            _ => return text.chars().fold(String::new(), |all, c| all + &escaped(c)),
+            _ => return text.chars().fold(String::new(), |all, c| all + &escape_latex(c)),
         };
         symbol.to_owned()
     }
@@ -404,8 +404,8 @@ impl Markup {
             (_, _) if value == DASH => DASH.to_owned(),
             (Self::Markdown, DASH) => value.to_owned(),
             (Self::Markdown, _) => format!("{value} ± {error}"),
-            (Self::Latex, DASH) => format!("${}$", power(value)),
-            (Self::Latex, _) => format!("${} \\pm {}$", power(value), power(error)),
+            (Self::Latex, DASH) => format!("${}$", latex_power(value)),
+            (Self::Latex, _) => format!("${} \\pm {}$", latex_power(value), latex_power(error)),
         }
     }
 
@@ -440,7 +440,7 @@ impl Markup {
 }
 
 /// Escapes a special character of LaTeX.
-fn escaped(c: char) -> String {
+fn escape_latex(c: char) -> String {
     match c {
         '\\' => "\\textbackslash{}".to_owned(),
         '~' => "\\textasciitilde{}".to_owned(),
@@ -451,7 +451,7 @@ fn escaped(c: char) -> String {
 }
 
 /// Formats `1.2e-7` as a power of ten.
-fn power(number: &str) -> String {
+fn latex_power(number: &str) -> String {
     match number.split_once('e') {
         Some((mantissa, exponent)) => format!("{mantissa} \\times 10^{{{exponent}}}"),
         None => number.to_owned(),

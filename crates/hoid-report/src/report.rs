@@ -174,11 +174,11 @@ fn section(index: usize, model: &ModelSection<'_>, validations: &[Result<Validat
         coefficients => tables::coefficients(fit),
         operator => tables::operator(fit, model.truth.as_ref(), &tables::gain_unit(model.records)),
         remnant => tables::remnant(fit),
-        no_remnant => tables::no_remnant(fit),
-        course => tables::course(fit, model.records),
+        no_remnant => tables::missing_remnant_reason(fit),
+        course => tables::computation_rows(fit, model.records),
         margins => model.margins.as_ref().map(tables::margins),
         several => model.records.len() > 1,
-        qualities => tables::qualities(model.records, validations),
+        qualities => tables::quality_rows(model.records, validations),
         not_drawn => validations.iter().filter(|v| v.is_ok()).count() - drawn.len(),
         responses => drawn,
         tests,
@@ -198,18 +198,18 @@ fn residual_tests(index: usize, name: &str, record: &Record, validation: &Valida
     context! {
         record => name,
         autocorrelation => own_svg,
-        outside_auto => outside(own, |_| true),
+        outside_auto => count_outside_bounds(own, |_| true),
         lags_auto => own.lags.len(),
         cross_correlation => cross_svg,
-        outside_positive => outside(cross, |k| k >= 0),
+        outside_positive => count_outside_bounds(cross, |k| k >= 0),
         lags_positive => cross.lags.iter().filter(|k| **k >= 0).count(),
-        outside_negative => outside(cross, |k| k < 0),
+        outside_negative => count_outside_bounds(cross, |k| k < 0),
         lags_negative => cross.lags.iter().filter(|k| **k < 0).count(),
     }
 }
 
 /// Number of values outside the bounds at the selected lags.
-fn outside(correlation: &Correlation, of: impl Fn(i64) -> bool) -> usize {
+fn count_outside_bounds(correlation: &Correlation, of: impl Fn(i64) -> bool) -> usize {
     let pairs = correlation.lags.iter().zip(&correlation.values);
     pairs.filter(|(k, v)| of(**k) && v.abs() > correlation.bound_99).count()
 }

@@ -11,7 +11,7 @@ use minijinja::{Value, context};
 use crate::{
     cells::{cell, html, record_name, symbol},
     model_section::ModelSection,
-    numbers::{DASH, Z_95, fixed, interval, plain, with_uncertainty},
+    numbers::{DASH, Z_95, format_fixed, format_plain, interval, with_uncertainty},
 };
 
 /// Maximum number of candidates in a table.
@@ -37,11 +37,13 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
         context! { label, unit, cells, truth => truth.unwrap_or_default() }
     };
     let unit = common_output_unit(models);
-    let each =
-        |f: &dyn Fn(&Fit) -> f64| -> Vec<Value> { models.iter().map(|m| Value::from(plain(f(m.fit)))).collect() };
-    let criterion =
-        |f: &dyn Fn(&Fit) -> f64| -> Vec<Value> { models.iter().map(|m| Value::from(fixed(f(m.fit), 1))).collect() };
-    let mut rows = vec![row(html("loss <i>V</i>"), &squared(&unit), each(&Fit::loss), None)];
+    let each = |f: &dyn Fn(&Fit) -> f64| -> Vec<Value> {
+        models.iter().map(|m| Value::from(format_plain(f(m.fit)))).collect()
+    };
+    let criterion = |f: &dyn Fn(&Fit) -> f64| -> Vec<Value> {
+        models.iter().map(|m| Value::from(format_fixed(f(m.fit), 1))).collect()
+    };
+    let mut rows = vec![row(html("loss <i>V</i>"), &squared_unit(&unit), each(&Fit::loss), None)];
     type Part = fn(&GoodnessOfFit) -> f64;
     let percentages: [(&str, Part); 4] = [
         ("VAF, simulation<sup>1</sup>", |q| q.vaf_simulation),
@@ -53,7 +55,7 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
         let cells = qualities
             .iter()
             .map(|q| match q {
-                Ok(q) => Value::from(fixed(of(q), 2)),
+                Ok(q) => Value::from(format_fixed(of(q), 2)),
                 Err(_) => Value::from(DASH),
             })
             .collect();
@@ -74,7 +76,7 @@ pub fn comparison(models: &[ModelSection<'_>], qualities: &[Result<GoodnessOfFit
             .collect();
         let (label, unit) = symbol(name);
         let unit = gain.unit(name, unit);
-        let truth = truth.and_then(|t| true_value(name, &t)).map(plain);
+        let truth = truth.and_then(|t| true_value(name, &t)).map(format_plain);
         rows.push(row(label, &unit, cells, truth));
     }
     let mut remarks: Vec<String> = Vec::new();
@@ -121,7 +123,7 @@ fn common_output_unit(models: &[ModelSection<'_>]) -> String {
     }
 }
 
-fn squared(unit: &str) -> String {
+fn squared_unit(unit: &str) -> String {
     match unit {
         "" => "-".to_owned(),
         u if u.chars().all(char::is_alphanumeric) => format!("{u}\u{b2}"),
@@ -162,7 +164,7 @@ pub fn operator(fit: &Fit, truth: Option<&OperatorParameters>, gain: &GainUnit) 
             context! {
                 label, unit, value, error,
                 interval => interval(e.value, e.standard_error, Z_95),
-                truth => truth.map(plain),
+                truth => truth.map(format_plain),
                 relative => relative.map(|r| if r.is_finite() { format!("{r:+.1}") } else { DASH.to_owned() }),
             }
         })
@@ -194,7 +196,7 @@ pub fn remnant(fit: &Fit) -> Vec<Value> {
 }
 
 /// The reason why no discretisation gives T_n and K_n, if it is the same for all discretisations.
-pub fn no_remnant(fit: &Fit) -> Option<String> {
+pub fn missing_remnant_reason(fit: &Fit) -> Option<String> {
     if fit.orders().nd == 0 {
         return Some("the model has no polynomial D".to_owned());
     }
@@ -204,7 +206,7 @@ pub fn no_remnant(fit: &Fit) -> Option<String> {
 }
 
 /// Describes how the fit was computed, as pairs of label and text.
-pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
+pub fn computation_rows(fit: &Fit, records: &[Record]) -> Vec<Value> {
     let end = fit.termination();
     let (n, p, s) = (fit.residual_count(), fit.free_count(), fit.state_count());
     let unit = output_unit(records);
@@ -240,16 +242,16 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
             format!(
                 "\u{3c3}\u{b2} = {} {}, the sum of squared residuals divided by n - p - s = {n} - {p} - {s} = \
                  {divisor} (residuals, parameters, initial states)",
-                plain(fit.innovation_variance()),
-                squared(&unit)
+                format_plain(fit.innovation_variance()),
+                squared_unit(&unit)
             ),
         ),
         (
             "loss",
             format!(
                 "V = {} {}, the same sum divided by n = {n}",
-                plain(fit.loss()),
-                squared(&unit)
+                format_plain(fit.loss()),
+                squared_unit(&unit)
             ),
         ),
     ];
@@ -257,7 +259,7 @@ pub fn course(fit: &Fit, records: &[Record]) -> Vec<Value> {
 }
 
 /// VAF and NRMSE for each record.
-pub fn qualities(records: &[Record], validations: &[Result<Validation, String>]) -> Vec<Value> {
+pub fn quality_rows(records: &[Record], validations: &[Result<Validation, String>]) -> Vec<Value> {
     let rows = records
         .iter()
         .zip(validations)
@@ -267,10 +269,10 @@ pub fn qualities(records: &[Record], validations: &[Result<Validation, String>])
             match validation {
                 Ok(v) => context! {
                     label, samples => record.len(),
-                    vaf_simulation => fixed(v.quality.vaf_simulation, 2),
-                    vaf_prediction => fixed(v.quality.vaf_prediction, 2),
-                    nrmse_simulation => fixed(v.quality.nrmse_simulation, 2),
-                    nrmse_prediction => fixed(v.quality.nrmse_prediction, 2),
+                    vaf_simulation => format_fixed(v.quality.vaf_simulation, 2),
+                    vaf_prediction => format_fixed(v.quality.vaf_prediction, 2),
+                    nrmse_simulation => format_fixed(v.quality.nrmse_simulation, 2),
+                    nrmse_prediction => format_fixed(v.quality.nrmse_prediction, 2),
                 },
                 Err(reason) => context! { label, samples => record.len(), reason },
             }
@@ -311,7 +313,7 @@ pub fn margins(margins: &MarginEstimates) -> Vec<Value> {
             let (value, error) = with_uncertainty(e.value, e.standard_error);
             let value = match e.standard_error {
                 Some(_) => format!("{value} (standard error {error})"),
-                None => plain(e.value),
+                None => format_plain(e.value),
             };
             context! { label, unit, value }
         }
@@ -338,22 +340,22 @@ pub fn candidates(choice: &Choice) -> Value {
     let best = fitted.first().map_or(0.0, |f| f.0);
     let all = fitted.len() + failed.len();
     let decimals = |value: f64| match choice.criterion {
-        Criterion::Loss | Criterion::Fpe | Criterion::Mdl => plain(value),
-        _ => fixed(value, 1),
+        Criterion::Loss | Criterion::Fpe | Criterion::Mdl => format_plain(value),
+        _ => format_fixed(value, 1),
     };
     let rows: Vec<Value> = fitted
         .iter()
         .map(|(value, orders, f)| {
             context! {
-                orders => orders.to_string(), parameters => orders.parameters(),
-                loss => plain(f.loss), aic => fixed(f.aic, 1), bic => fixed(f.bic, 1),
+                orders => orders.to_string(), parameters => orders.parameter_count(),
+                loss => format_plain(f.loss), aic => format_fixed(f.aic, 1), bic => format_fixed(f.bic, 1),
                 above => decimals(value - best),
                 remark => if f.converged { "" } else { "search did not converge" },
             }
         })
         .chain(failed.iter().map(|(orders, reason)| {
             context! {
-                orders => orders.to_string(), parameters => orders.parameters(),
+                orders => orders.to_string(), parameters => orders.parameter_count(),
                 loss => DASH, aic => DASH, bic => DASH, above => DASH, remark => reason,
             }
         }))

@@ -32,7 +32,7 @@ fn runs(n: u64) -> Vec<Record> {
     (0..n).map(run).collect()
 }
 
-fn fitted(structure: Structure, records: &[Record]) -> Fit {
+fn fit_records(structure: Structure, records: &[Record]) -> Fit {
     Estimator::new(structure, structure.operator_orders(29))
         .fit(records)
         .unwrap()
@@ -99,8 +99,8 @@ fn check_page(html: &str) {
 fn report_with_two_models_and_truth_is_complete() {
     let records = runs(1);
     let (arx, bj) = (
-        fitted(Structure::Arx, &records),
-        fitted(Structure::BoxJenkins, &records),
+        fit_records(Structure::Arx, &records),
+        fit_records(Structure::BoxJenkins, &records),
     );
     let mut models = vec![section("ARX", &arx, &records), section("BJ", &bj, &records)];
     for model in &mut models {
@@ -143,7 +143,7 @@ fn report_with_two_models_and_truth_is_complete() {
 #[test]
 fn report_is_reproducible() {
     let records = runs(1);
-    let fit = fitted(Structure::BoxJenkins, &records);
+    let fit = fit_records(Structure::BoxJenkins, &records);
     let make = || page(vec![section("BJ", &fit, &records)]);
     assert!(make() == make());
 }
@@ -152,7 +152,7 @@ fn report_is_reproducible() {
 fn user_text_is_escaped() {
     let hostile = "a<script>alert(1)</script> & \"b\" $x^2$";
     let records: Vec<Record> = runs(2).into_iter().map(|r| r.labelled(hostile)).collect();
-    let ts = SampleTime::HUNDREDTH;
+    let ts = SampleTime::AT_100_HZ;
     let renamed = Record::new(
         ts,
         Channel::new("e<0>", "<deg>", records[0].input().to_vec()),
@@ -161,7 +161,7 @@ fn user_text_is_escaped() {
     .unwrap()
     .labelled(hostile);
     let records = [renamed, records[1].clone()];
-    let fit = fitted(Structure::BoxJenkins, &records);
+    let fit = fit_records(Structure::BoxJenkins, &records);
     let report = Report {
         title: hostile.to_owned(),
         settings: vec![(hostile.to_owned(), hostile.to_owned())],
@@ -181,7 +181,7 @@ fn user_text_is_escaped() {
 #[test]
 fn all_records_are_listed_and_at_most_four_drawn() {
     let records = runs(6);
-    let fit = fitted(Structure::BoxJenkins, &records);
+    let fit = fit_records(Structure::BoxJenkins, &records);
     let html = page(vec![section("BJ", &fit, &records)]);
     check_page(&html);
     for k in 0..6 {
@@ -247,7 +247,7 @@ fn exact_fit_explains_missing_standard_errors() {
         u[t] = 0.5 * u[t - 1] + 0.3 * e[t - 1] + 0.1 * e[t - 2];
     }
     let record = Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "", e),
         Channel::new("u", "", u),
     )
@@ -311,7 +311,7 @@ fn a_report_without_models_is_an_error() {
 #[test]
 fn figures_are_reproducible_and_bounded_if_unstable() {
     let records = runs(1);
-    let fit = fitted(Structure::BoxJenkins, &records);
+    let fit = fit_records(Structure::BoxJenkins, &records);
     let mut validation = fit.validate(&records[0]).unwrap();
     let stable = figures::time_response("a", &records[0], &validation);
     assert!(stable == figures::time_response("a", &records[0], &validation));
@@ -334,8 +334,8 @@ fn figures_are_reproducible_and_bounded_if_unstable() {
 fn bode_has_bands_and_a_dashed_truth() {
     let records = runs(1);
     let (arx, bj) = (
-        fitted(Structure::Arx, &records),
-        fitted(Structure::BoxJenkins, &records),
+        fit_records(Structure::Arx, &records),
+        fit_records(Structure::BoxJenkins, &records),
     );
     let model = |name, fit| figures::BodeModel {
         name,
@@ -344,7 +344,7 @@ fn bode_has_bands_and_a_dashed_truth() {
     };
     let truth = figures::TrueResponse {
         operator: truth(),
-        sample_time: SampleTime::HUNDREDTH,
+        sample_time: SampleTime::AT_100_HZ,
     };
     let svg = figures::bode("b", &[model("first", &arx), model("second", &bj)], &[truth]);
     // Each of the two panels has one band per model.
@@ -371,7 +371,7 @@ fn bode_has_bands_and_a_dashed_truth() {
 #[test]
 fn describing_function_is_drawn_over_the_models() {
     let records = runs(5);
-    let fit = fitted(Structure::BoxJenkins, &records);
+    let fit = fit_records(Structure::BoxJenkins, &records);
     let model = figures::BodeModel {
         name: "BJ",
         fit: &fit,
@@ -379,10 +379,10 @@ fn describing_function_is_drawn_over_the_models() {
     };
     let truth = figures::TrueResponse {
         operator: truth(),
-        sample_time: SampleTime::HUNDREDTH,
+        sample_time: SampleTime::AT_100_HZ,
     };
     let forcing = ForcingFunction::reference();
-    let excitation = Excitation::of_forcing_function(&forcing, REFERENCE_PERIOD_S).unwrap();
+    let excitation = Excitation::from_forcing_function(&forcing, REFERENCE_PERIOD_S).unwrap();
     let options = DescribingOptions {
         averaging: Averaging::SameExcitation,
         ..DescribingOptions::default()

@@ -38,14 +38,14 @@ fn orders() -> Vec<String> {
     (1..=6).map(|m| format!("m^0 = {m}")).collect()
 }
 
-fn level(method: usize, level: usize, levels: usize) -> Shade {
+fn shade(method: usize, level: usize, levels: usize) -> Shade {
     Shade { method, level, levels }
 }
 
 fn noise_levels(method: usize) -> Vec<BoxSeries> {
     let series = |k| BoxSeries {
         name: format!("P_n = 0.{k}"),
-        shade: level(method, k, 4),
+        shade: shade(method, k, 4),
     };
     (0..4).map(series).collect()
 }
@@ -145,7 +145,7 @@ fn bode() -> BodeGrid {
                     |(w, h): (&f64, &Complex64)| h * Complex64::from_polar(1.0 + part * w / (3.0 + w), 0.01 * part * w);
                 let of: Vec<Complex64> = omega.iter().zip(&response).map(wrong).collect();
                 let name = format!("n_k^* = {}", 26 + k);
-                let mut curve = BodeCurve::of_response(&name, LineKind::Line, level(0, k, 5), &omega, &of, 0.28);
+                let mut curve = BodeCurve::of_response(&name, LineKind::Line, shade(0, k, 5), &omega, &of, 0.28);
                 if k == 0 {
                     curve.magnitude_band = curve.magnitude_db.iter().map(|v| (v - 2.0, v + 2.0)).collect();
                     curve.phase_band = curve.phase_deg.iter().map(|v| (v - 15.0, v + 15.0)).collect();
@@ -201,7 +201,7 @@ fn curve(name: &str, kind: LineKind, shade: Shade, points: impl IntoIterator<Ite
 }
 
 /// Curves of the obtained noise level over the specified noise level.
-fn obtained() -> CurveGrid {
+fn noise_level_curves() -> CurveGrid {
     let demanded: Vec<f64> = (0..=30).map(|k| 0.01 * f64::from(k)).collect();
     let panel = |m: usize| {
         let bent = |p: f64| p * (1.0 + 0.03 * (m as f64 - 1.5) * (p * 12.0).sin());
@@ -229,7 +229,7 @@ fn obtained() -> CurveGrid {
     }
 }
 
-fn errors() -> CurveGrid {
+fn error_curves() -> CurveGrid {
     let lengths = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0];
     let panel = |name: &str, unit: &str, scale: f64| {
         let of = |method: usize, name: &str| {
@@ -319,7 +319,7 @@ fn schedules() -> CurveGrid {
 }
 
 /// Averages of recursive estimates of two methods at three noise levels.
-fn averages() -> TraceGrid {
+fn average_traces() -> TraceGrid {
     let times: Vec<f64> = (0..8192).map(|k| 0.01 * f64::from(k)).collect();
     let truth = |row: usize, t: f64| [-1.9, 0.92, 0.04, -0.037][row] * if t < 40.96 { 1.0 } else { 0.97 };
     let mut noise = Noise(4);
@@ -415,9 +415,9 @@ fn figures() -> Vec<(&'static str, String)> {
     both.groups = ["nominal", "no hold", "fixed f_s", "a long name here", "short"]
         .map(str::to_owned)
         .to_vec();
-    let mut two_columns = errors();
+    let mut two_columns = error_curves();
     two_columns.columns = 2;
-    let mut shared_averages = averages();
+    let mut shared_averages = average_traces();
     shared_averages.shared_ordinates = true;
     vec![
         ("boxes", box_plots("boxes", "Relative bias", &boxes(BoxRange::Full, 0))),
@@ -450,15 +450,18 @@ fn figures() -> Vec<(&'static str, String)> {
             maps("maps_one", "VAF", &map_grid(MapColours::Sequential, 1, false)),
         ),
         ("bode_grid", bode_grid("bode_grid", "Frequency responses", &bode())),
-        ("obtained", curves("obtained", "Noise levels", &obtained())),
-        ("errors", curves("errors", "Errors over memory", &errors())),
+        ("obtained", curves("obtained", "Noise levels", &noise_level_curves())),
+        ("errors", curves("errors", "Errors over memory", &error_curves())),
         (
             "errors_beside",
             curves("errors_beside", "Errors over memory", &two_columns),
         ),
         ("spectrum", curves("spectrum", "Forcing function", &spectrum())),
         ("schedules", curves("schedules", "Gain over time", &schedules())),
-        ("averages", trace_panels("averages", "Recursive estimates", &averages())),
+        (
+            "averages",
+            trace_panels("averages", "Recursive estimates", &average_traces()),
+        ),
         (
             "averages_shared",
             trace_panels("averages_shared", "Recursive estimates", &shared_averages),

@@ -8,7 +8,7 @@ use hoid_model::{
 };
 use hoid_report::{BatchLine, ReportError, TraceSection, TrackReport, batch_fit};
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, StartAt, Trace, TrackOptions, track};
+use hoid_track::{Method, StartSource, Trace, TrackOptions, track};
 
 const SPANS: [(f64, f64); 2] = [(0.0, 30.72), (51.20, 81.92)];
 
@@ -24,11 +24,11 @@ fn run() -> Record {
 fn options(method: Method) -> TrackOptions {
     let structure = method.default_structure();
     let mut options = TrackOptions::new(method.clone(), structure, structure.operator_orders(29));
-    options.start = StartAt::Span(Some(SPANS[0]));
+    options.start = StartSource::Span(Some(SPANS[0]));
     options
 }
 
-fn tracked(method: Method, record: &Record) -> Trace {
+fn track_record(method: Method, record: &Record) -> Trace {
     track(record, &options(method), 4).unwrap()
 }
 
@@ -102,7 +102,7 @@ fn figure<'a>(html: &'a str, id: &str) -> &'a str {
 fn report_with_three_methods_is_complete() {
     let record = run();
     let (arx, bj) = (fits(Structure::Arx, &record), fits(Structure::BoxJenkins, &record));
-    let traces = [Method::rls(), Method::rpem(), hoid_survey::physical()].map(|m| tracked(m, &record));
+    let traces = [Method::rls(), Method::rpem(), hoid_survey::physical()].map(|m| track_record(m, &record));
     let sections = vec![
         section("RLS", &traces[0], &arx),
         section("RPEM", &traces[1], &bj),
@@ -183,7 +183,7 @@ fn report_of_a_recording_shows_no_truth() {
         Channel::new("u", "<b>", simulated.output().to_vec()),
     )
     .unwrap();
-    let trace = tracked(hoid_survey::physical(), &record);
+    let trace = track_record(hoid_survey::physical(), &record);
     let hostile = "a<script>alert(1)</script> & \"b\" $x^2$";
     let html = report(&record, vec![section(hostile, &trace, &[])]).to_html().unwrap();
     check_page(&html);
@@ -195,10 +195,10 @@ fn report_of_a_recording_shows_no_truth() {
 }
 
 #[test]
-fn start_from_nothing_and_shortened_steps_are_reported() {
+fn start_without_estimate_and_shortened_steps_are_reported() {
     let record = run();
     let mut options = options(Method::rpem());
-    options.start = StartAt::Nothing;
+    options.start = StartSource::Nothing;
     options.method.set("covariance", "1e4").unwrap();
     let trace = track(&record, &options, 1).unwrap();
     assert!(trace.counts().shortened > 0);
@@ -220,7 +220,7 @@ fn non_operator_orders_show_only_coefficients() {
         ..Orders::default()
     };
     let mut options = TrackOptions::new(Method::rls(), Structure::Arx, orders);
-    options.start = StartAt::Span(Some(SPANS[0]));
+    options.start = StartSource::Span(Some(SPANS[0]));
     let trace = track(&record, &options, 1).unwrap();
     let html = report(&record, vec![section("small", &trace, &[])]).to_html().unwrap();
     check_page(&html);
@@ -234,7 +234,7 @@ fn short_records_and_averages_are_reported() {
     let long = run();
     let record = long.span(0.0, 8.0).unwrap();
     let mut options = options(Method::rls());
-    options.start = StartAt::Span(None);
+    options.start = StartSource::Span(None);
     let trace = track(&record, &options, 1).unwrap().moving_average(101);
     let fit = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29))
         .fit(&[record.span(4.0, 8.0).unwrap()])
@@ -298,7 +298,7 @@ fn window_and_instrument_methods_are_reported() {
     window.method.set("refit", "500").unwrap();
     let traces = [
         track(&record, &window, 8).unwrap(),
-        tracked(hoid_survey::rriv(), &record),
+        track_record(hoid_survey::rriv(), &record),
     ];
     let sections = vec![section("window", &traces[0], &[]), section("RRIV", &traces[1], &[])];
     let html = report(&record, sections).to_html().unwrap();
@@ -315,7 +315,7 @@ fn no_trace_or_too_many_traces_are_errors() {
         Err(ReportError::NoTraces { maximum: 4 })
     ));
     let mut options = options(Method::rls());
-    options.start = StartAt::Nothing;
+    options.start = StartSource::Nothing;
     let trace = track(&record, &options, 100).unwrap();
     let five = (0..5).map(|_| section("RLS", &trace, &[])).collect();
     let error = report(&record, five).to_html().unwrap_err();

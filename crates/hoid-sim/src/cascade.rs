@@ -85,7 +85,7 @@ mod tests {
             for (ts, t_n) in [(0.01, 0.06), (0.001, 0.06), (0.05, 0.02)] {
                 let h = RemnantFilter::new(1.0, t_n, order)
                     .unwrap()
-                    .discrete(SampleTime::new(ts).unwrap(), RemnantDiscretisation::ZeroOrderHold)
+                    .discretise(SampleTime::new(ts).unwrap(), RemnantDiscretisation::ZeroOrderHold)
                     .unwrap();
                 let cascade = Cascade::new(order, ts / t_n);
                 let mut z = [0.0; HIGHEST_ORDER];

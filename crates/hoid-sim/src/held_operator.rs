@@ -54,8 +54,8 @@ impl HeldOperator {
         let mut taps = [0.0; 3];
         let late_by = late + 0.5;
         let (whole, part) = (late_by.floor(), late_by.fract());
-        taps[whole as usize] = system.direct() * (1.0 - part);
-        taps[whole as usize + 1] = system.direct() * part;
+        taps[whole as usize] = system.direct_feedthrough() * (1.0 - part);
+        taps[whole as usize + 1] = system.direct_feedthrough() * part;
         Ok(Self {
             system,
             taps,
@@ -65,12 +65,12 @@ impl HeldOperator {
     }
 
     /// Returns the number of whole samples of the delay.
-    pub fn delay(&self) -> usize {
+    pub fn delay_samples(&self) -> usize {
         self.delay
     }
 
     /// Factor by which the current input contributes to the output.
-    pub fn tap(&self) -> f64 {
+    pub fn feedthrough(&self) -> f64 {
         if self.delay == 0 { self.taps[0] } else { 0.0 }
     }
 

@@ -17,19 +17,19 @@ use rand_distr::{Distribution, StandardNormal};
 
 /// Writes standard normal deviates, each computed from the random numbers that [`StandardNormal`] would use for it.
 pub(crate) fn normal_deviates(generator: ChaCha8Rng, deviates: &mut [f64]) {
-    let generator = &mut Buffered::new(generator);
+    let generator = &mut BufferedGenerator::new(generator);
     let edges = EDGES.get_or_init(edges);
     let mut done = 0;
     while done < deviates.len() {
         let mut count = 0;
-        for (value, bytes) in deviates[done..].iter_mut().zip(generator.drawn()) {
-            let Some(deviate) = quick(edges, u64::from_le_bytes(*bytes)) else {
+        for (value, bytes) in deviates[done..].iter_mut().zip(generator.unused_numbers()) {
+            let Some(deviate) = accepted_deviate(edges, u64::from_le_bytes(*bytes)) else {
                 break;
             };
             *value = deviate;
             count += 1;
         }
-        generator.pass(count);
+        generator.advance(count);
         done += count;
         if let Some(value) = deviates.get_mut(done) {
             *value = StandardNormal.sample(generator);
@@ -39,14 +39,14 @@ pub(crate) fn normal_deviates(generator: ChaCha8Rng, deviates: &mut [f64]) {
 }
 
 /// Edges of the layers of the ziggurat, from the widest layer to zero.
-static EDGES: OnceLock<[f64; LAYERS + 1]> = OnceLock::new();
-const LAYERS: usize = 256;
+static EDGES: OnceLock<[f64; LAYER_COUNT + 1]> = OnceLock::new();
+const LAYER_COUNT: usize = 256;
 
 /// Returns the deviate for random bits if it is accepted directly; the lowest bits give the layer, the highest bits the
 /// position in the layer.
 #[inline(always)]
-fn quick(edges: &[f64; LAYERS + 1], bits: u64) -> Option<f64> {
-    let layer = bits as usize % LAYERS;
+fn accepted_deviate(edges: &[f64; LAYER_COUNT + 1], bits: u64) -> Option<f64> {
+    let layer = bits as usize % LAYER_COUNT;
     // The highest 52 bits give a number in the range [2, 4), from which 3 is subtracted.
     let place = f64::from_bits(1024 << 52 | bits >> 12) - 3.0;
     let deviate = place * edges[layer];
@@ -55,19 +55,19 @@ fn quick(edges: &[f64; LAYERS + 1], bits: u64) -> Option<f64> {
 
 /// Returns the edges used by `rand_distr`: each edge is computed as twice the deviate in the middle of its layer, which
 /// is always accepted.
-fn edges() -> [f64; LAYERS + 1] {
-    let mut edges = [0.0; LAYERS + 1];
-    for (layer, edge) in (0..).zip(&mut edges[..LAYERS]) {
-        let middle: f64 = StandardNormal.sample(&mut Middle(layer));
+fn edges() -> [f64; LAYER_COUNT + 1] {
+    let mut edges = [0.0; LAYER_COUNT + 1];
+    for (layer, edge) in (0..).zip(&mut edges[..LAYER_COUNT]) {
+        let middle: f64 = StandardNormal.sample(&mut MidLayerGenerator(layer));
         *edge = 2.0 * middle;
     }
     edges
 }
 
 /// Generator whose first number belongs to the middle of a layer; all further numbers are the largest possible number.
-struct Middle(u64);
+struct MidLayerGenerator(u64);
 
-impl TryRng for Middle {
+impl TryRng for MidLayerGenerator {
     type Error = Infallible;
 
     fn try_next_u32(&mut self) -> Result<u32, Infallible> {
@@ -85,33 +85,33 @@ impl TryRng for Middle {
 }
 
 /// Number of bytes that are drawn at a time.
-const DRAWN_BYTES: usize = 2048;
+const BUFFER_BYTES: usize = 2048;
 
 /// Random numbers of a generator, drawn many at a time: the numbers are the same, but take half the time.
-struct Buffered {
+struct BufferedGenerator {
     generator: ChaCha8Rng,
-    bytes: [u8; DRAWN_BYTES],
+    bytes: [u8; BUFFER_BYTES],
     at: usize,
 }
 
-impl Buffered {
+impl BufferedGenerator {
     fn new(generator: ChaCha8Rng) -> Self {
         Self {
             generator,
-            bytes: [0; DRAWN_BYTES],
-            at: DRAWN_BYTES,
+            bytes: [0; BUFFER_BYTES],
+            at: BUFFER_BYTES,
         }
     }
 
     /// Returns the drawn numbers that have not been used.
     #[inline(always)]
-    fn drawn(&self) -> &[[u8; 8]] {
+    fn unused_numbers(&self) -> &[[u8; 8]] {
         self.bytes[self.at..].as_chunks().0
     }
 
     /// Marks the next drawn numbers as used, as many as given.
     #[inline(always)]
-    fn pass(&mut self, numbers: usize) {
+    fn advance(&mut self, numbers: usize) {
         self.at += 8 * numbers;
     }
 
@@ -123,16 +123,16 @@ impl Buffered {
                 next.copy_from_slice(bytes);
                 self.at += N;
             }
-            None => self.over_the_end(&mut next),
+            None => self.fill_across_end(&mut next),
         }
         next
     }
 
     #[cold]
     #[inline(never)]
-    fn over_the_end(&mut self, next: &mut [u8]) {
+    fn fill_across_end(&mut self, next: &mut [u8]) {
         for byte in next {
-            if self.at == DRAWN_BYTES {
+            if self.at == BUFFER_BYTES {
                 self.generator.fill_bytes(&mut self.bytes);
                 self.at = 0;
             }
@@ -142,7 +142,7 @@ impl Buffered {
     }
 }
 
-impl TryRng for Buffered {
+impl TryRng for BufferedGenerator {
     type Error = Infallible;
 
     #[inline(always)]
@@ -156,7 +156,7 @@ impl TryRng for Buffered {
     }
 
     fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
-        self.over_the_end(bytes);
+        self.fill_across_end(bytes);
         Ok(())
     }
 }
@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn buffered_generator_gives_the_same_numbers() {
         let mut alone = ChaCha8Rng::from_seed([7; 32]);
-        let mut buffered = Buffered::new(ChaCha8Rng::from_seed([7; 32]));
+        let mut buffered = BufferedGenerator::new(ChaCha8Rng::from_seed([7; 32]));
         for round in 0..4000 {
             assert_eq!(alone.next_u64(), buffered.next_u64());
             if round % 5 == 0 {

@@ -39,7 +39,7 @@ impl OperatorRun {
         let after_run_in = (start_s / scenario.scenario().sample_time.s()).round() as isize;
         let k = scenario.run_in_samples().saturating_add_signed(after_run_in);
         let mut run = Self {
-            noise: run.white_noise(simulator.samples()),
+            noise: run.white_noise(simulator.sample_count()),
             run,
             operator: [0.0; 2],
             remnant: [0.0; HIGHEST_ORDER],
@@ -64,21 +64,21 @@ impl OperatorRun {
     }
 
     /// Takes the error e of the sample in deg and advances by one sample.
-    pub fn take(&mut self, e: f64) {
+    pub fn push(&mut self, e: f64) {
         self.operator = self.matrices().operator.step(self.operator, e);
-        let white = self.white();
+        let white = self.next_white_noise();
         self.remnant = match self.simulator.cascade.order() {
-            1 => self.filtered::<1>(white),
-            2 => self.filtered::<2>(white),
-            3 => self.filtered::<3>(white),
-            _ => self.filtered::<HIGHEST_ORDER>(white),
+            1 => self.filtered_noise::<1>(white),
+            2 => self.filtered_noise::<2>(white),
+            3 => self.filtered_noise::<3>(white),
+            _ => self.filtered_noise::<HIGHEST_ORDER>(white),
         };
         self.k += 1;
         self.store_response();
     }
 
     /// Returns the state as numbers.
-    pub fn saved(&self) -> Vec<f64> {
+    pub fn saved_state(&self) -> Vec<f64> {
         let mut numbers = vec![self.k as f64];
         numbers.extend(self.operator);
         numbers.extend(self.remnant);
@@ -86,7 +86,7 @@ impl OperatorRun {
         numbers
     }
 
-    /// Restores the state that [`OperatorRun::saved`] returned for an operator with the same scenario and run, so it
+    /// Restores the state that [`OperatorRun::saved_state`] returned for an operator with the same scenario and run, so it
     /// continues with bit-identical results. Returns false, without any change, if the numbers belong to another
     /// operator.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
@@ -120,14 +120,14 @@ impl OperatorRun {
     }
 
     /// Returns the white noise of the next sample. The noise continues after the end of the scenario.
-    fn white(&mut self) -> f64 {
+    fn next_white_noise(&mut self) -> f64 {
         if self.k >= self.noise.len() {
             self.noise = self.run.white_noise(2 * self.k + 1);
         }
         self.noise[self.k]
     }
 
-    fn filtered<const M: usize>(&self, white: f64) -> [f64; HIGHEST_ORDER] {
+    fn filtered_noise<const M: usize>(&self, white: f64) -> [f64; HIGHEST_ORDER] {
         let mut sections: [f64; M] = [0.0; M];
         sections.copy_from_slice(&self.remnant[..M]);
         let mut next = [0.0; HIGHEST_ORDER];
@@ -170,7 +170,7 @@ mod tests {
                     "{condition} {k}"
                 );
                 assert_eq!(operator.remnant().to_bits(), remnant[k].to_bits());
-                operator.take(*e);
+                operator.push(*e);
             }
         }
     }
@@ -183,16 +183,16 @@ mod tests {
         let new = || OperatorRun::new(Simulator::new(&scenario).unwrap(), RunSeed::default(), 0.0);
         let mut first = new();
         let e = |k: usize| (0.1 * k as f64).sin();
-        (0..700).for_each(|k| first.take(e(k)));
-        let saved = first.saved();
+        (0..700).for_each(|k| first.push(e(k)));
+        let saved = first.saved_state();
         let mut second = new();
         assert!(second.restore(&saved));
         for k in 700..900 {
             assert_eq!(first.control().to_bits(), second.control().to_bits(), "{k}");
-            first.take(e(k));
-            second.take(e(k));
+            first.push(e(k));
+            second.push(e(k));
         }
-        let before = second.saved();
+        let before = second.saved_state();
         let mut other = saved.clone();
         for k in [-1.0, 0.5, f64::NAN, 1e300] {
             other[0] = k;
@@ -201,7 +201,7 @@ mod tests {
         for length in [0, 1, 3, saved.len() - 1] {
             assert!(!second.restore(&saved[..length]));
         }
-        assert_eq!(second.saved(), before);
+        assert_eq!(second.saved_state(), before);
     }
 
     #[test]
@@ -210,7 +210,7 @@ mod tests {
         let long = Simulator::new(&scenario).unwrap();
         scenario.measurement_s = 1.0;
         let short = Simulator::new(&scenario).unwrap();
-        let samples = short.samples() + 500;
+        let samples = short.sample_count() + 500;
         let seed = RunSeed::default();
         let mut of = [long, short].map(|simulator| {
             let start_s = -(simulator.scenario().run_in_samples() as f64) * 0.01;
@@ -220,7 +220,7 @@ mod tests {
             let e = (0.1 * k as f64).sin();
             // The task changes long after both start times.
             assert!((of[0].control() - of[1].control()).abs() < 1e-3, "{k}");
-            of.iter_mut().for_each(|operator| operator.take(e));
+            of.iter_mut().for_each(|operator| operator.push(e));
         }
         // A start time before the run-in is treated as the start of the run-in.
         let simulator = Simulator::new(&scenario).unwrap();

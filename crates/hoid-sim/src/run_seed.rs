@@ -24,8 +24,8 @@ pub struct RunSeed {
 
 /// Last eight bytes of the key of the generator. Other uses of (seed, cell, replication) have another tag and therefore
 /// another stream.
-const REMNANT: u64 = u64::from_le_bytes(*b"remnant\0");
-const UNIFORM: u64 = u64::from_le_bytes(*b"uniform\0");
+const REMNANT_TAG: u64 = u64::from_le_bytes(*b"remnant\0");
+const UNIFORM_TAG: u64 = u64::from_le_bytes(*b"uniform\0");
 
 impl RunSeed {
     /// Returns white Gaussian noise of unit variance.
@@ -37,23 +37,23 @@ impl RunSeed {
 
     /// Writes the first samples of [`RunSeed::white_noise`] into existing memory.
     pub fn white_noise_into(&self, noise: &mut [f64]) {
-        normal_deviates(self.generator(REMNANT), noise);
+        normal_deviates(self.generator(REMNANT_TAG), noise);
     }
 
     /// Returns uniform random numbers in `[0, 1)`, for drawing people or the phases of a run.
-    pub fn uniform(&self, n: usize) -> Vec<f64> {
-        self.uniform_of(UNIFORM, n)
+    pub fn uniform_numbers(&self, n: usize) -> Vec<f64> {
+        self.uniform_with_tag(UNIFORM_TAG, n)
     }
 
     /// Returns white Gaussian noise of unit variance from a separate stream of the run.
-    pub(crate) fn white_noise_of(&self, tag: u64, n: usize) -> Vec<f64> {
+    pub(crate) fn white_noise_with_tag(&self, tag: u64, n: usize) -> Vec<f64> {
         let mut noise = vec![0.0; n];
         normal_deviates(self.generator(tag), &mut noise);
         noise
     }
 
     /// Returns uniform random numbers in `[0, 1)` from a separate stream of the run.
-    pub(crate) fn uniform_of(&self, tag: u64, n: usize) -> Vec<f64> {
+    pub(crate) fn uniform_with_tag(&self, tag: u64, n: usize) -> Vec<f64> {
         let mut generator = self.generator(tag);
         // The 53 highest bits of each random number give a number in [0, 1).
         (0..n)
@@ -128,8 +128,8 @@ mod tests {
             .iter()
             .map(|v| format!("{v:.12}"))
             .collect();
-        assert_eq!(first, PINNED);
+        assert_eq!(first, PINNED_VALUES);
     }
 
-    const PINNED: [&str; 3] = ["0.538334543947", "0.367797666622", "0.599664157656"];
+    const PINNED_VALUES: [&str; 3] = ["0.538334543947", "0.367797666622", "0.599664157656"];
 }

@@ -41,7 +41,7 @@ pub struct Simulator {
     forcing_deg: Vec<f64>,
     /// Response to the target, and disturbance of the controlled element: signals of all runs that do not depend on the
     /// loop; `None` if there is neither.
-    given: Option<Given>,
+    given: Option<ExternalSignals>,
     /// Response to the target as an operator; `None` if the person does not see the target.
     seen: Option<TargetResponse>,
     /// True parameters: one entry if nothing changes, otherwise one entry per sample.
@@ -52,16 +52,16 @@ pub struct Simulator {
 
 /// Signals that do not depend on the loop, in deg, one value per sample.
 #[derive(Debug, Clone)]
-struct Given {
+struct ExternalSignals {
     response: Vec<f64>,
     disturbance: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Matrices {
-    pub operator: Rows,
+    pub operator: TwoStateSystem,
     pub operator_output: [f64; 2],
-    element: Rows,
+    element: TwoStateSystem,
     element_input: f64,
     element_output: f64,
     pub k_n: f64,
@@ -72,12 +72,12 @@ pub(crate) struct Matrices {
 /// both rows were sums, the compiler would pack the states into one register, and each sample would also wait for the
 /// shuffles.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rows {
+pub(crate) struct TwoStateSystem {
     plus: [f64; 3],
     minus: [f64; 3],
 }
 
-impl Rows {
+impl TwoStateSystem {
     fn of(system: &HeldStates) -> Self {
         let ([[a, b], [c, d]], [g, h]) = (system.transition, system.input);
         Self {
@@ -142,7 +142,7 @@ impl Simulator {
         });
         let response = response.transpose()?;
         let is_given = response.is_some() || !scenario.disturbance.sinusoids().is_empty();
-        let given = is_given.then(|| Given {
+        let given = is_given.then(|| ExternalSignals {
             response: response.unwrap_or_else(|| vec![0.0; samples]),
             disturbance: scenario.disturbance.samples(start_s, ts, samples),
         });
@@ -163,7 +163,7 @@ impl Simulator {
     }
 
     /// Returns the number of samples of a run, including the run-in.
-    pub fn samples(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.forcing_deg.len()
     }
 
@@ -173,7 +173,7 @@ impl Simulator {
     /// # Errors
     /// [`SimError::Diverged`] if a signal is not finite.
     pub fn run(&self, run_seed: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
-        let signals = self.signals(&run_seed.white_noise(self.samples()))?;
+        let signals = self.signals(&run_seed.white_noise(self.sample_count()))?;
         self.record(signals, keep_run_in)
     }
 
@@ -193,7 +193,7 @@ impl Simulator {
     /// As [`Simulator::signals`]. After an error the signals are invalid.
     pub fn signals_into(&self, noise: &[f64], signals: &mut Signals) -> Result<(), SimError> {
         self.check_length(noise)?;
-        signals.resize_to(self.samples());
+        signals.resize_to(self.sample_count());
         let one = SingleRun {
             simulator: self,
             noise,
@@ -233,7 +233,7 @@ impl Simulator {
         }
         into.resize_with(noises.len(), Signals::default);
         for signals in into.iter_mut() {
-            signals.resize_to(self.samples());
+            signals.resize_to(self.sample_count());
         }
         let many = BatchedRuns {
             simulator: self,
@@ -253,29 +253,35 @@ impl Simulator {
     }
 
     fn check_length(&self, noise: &[f64]) -> Result<(), SimError> {
-        if noise.len() == self.samples() {
+        if noise.len() == self.sample_count() {
             return Ok(());
         }
         Err(SimError::NoiseLength {
             found: noise.len(),
-            expected: self.samples(),
+            expected: self.sample_count(),
         })
     }
 
     /// Computes the samples of `range` from noise into e, u, x and n. In these arrays the lanes of each sample are
     /// adjacent.
     #[inline(always)]
-    fn pass<R: Number>(&self, state: &mut LoopState<R>, range: Range<usize>, noise: &[f64], out: [&mut [f64]; 4]) {
+    fn simulate_range<R: Number>(
+        &self,
+        state: &mut LoopState<R>,
+        range: Range<usize>,
+        noise: &[f64],
+        out: [&mut [f64]; 4],
+    ) {
         match self.cascade.order() {
-            1 => self.pass_of_order::<R, 1>(state, range, noise, out),
-            2 => self.pass_of_order::<R, 2>(state, range, noise, out),
-            3 => self.pass_of_order::<R, 3>(state, range, noise, out),
-            _ => self.pass_of_order::<R, HIGHEST_ORDER>(state, range, noise, out),
+            1 => self.simulate_range_of_order::<R, 1>(state, range, noise, out),
+            2 => self.simulate_range_of_order::<R, 2>(state, range, noise, out),
+            3 => self.simulate_range_of_order::<R, 3>(state, range, noise, out),
+            _ => self.simulate_range_of_order::<R, HIGHEST_ORDER>(state, range, noise, out),
         }
     }
 
     #[inline(always)]
-    fn pass_of_order<R: Number, const M: usize>(
+    fn simulate_range_of_order<R: Number, const M: usize>(
         &self,
         state: &mut LoopState<R>,
         range: Range<usize>,
@@ -283,17 +289,17 @@ impl Simulator {
         out: [&mut [f64]; 4],
     ) {
         match (self.matrices.len() == 1, &self.given) {
-            (true, None) => self.pass_through::<R, M, false, false>(state, range, noise, out),
-            (false, None) => self.pass_through::<R, M, true, false>(state, range, noise, out),
+            (true, None) => self.simulate_range_generic::<R, M, false, false>(state, range, noise, out),
+            (false, None) => self.simulate_range_generic::<R, M, true, false>(state, range, noise, out),
             // The matrices are read at every sample; one entry is the same for all samples.
-            (_, Some(_)) => self.pass_through::<R, M, true, true>(state, range, noise, out),
+            (_, Some(_)) => self.simulate_range_generic::<R, M, true, true>(state, range, noise, out),
         }
     }
 
-    /// As [`Simulator::pass`], compiled separately for constant and for changing parameters, so constant matrices stay
+    /// As [`Simulator::simulate_range`], compiled separately for constant and for changing parameters, so constant matrices stay
     /// in registers, and for loops with and without given signals.
     #[inline(always)]
-    fn pass_through<R: Number, const M: usize, const CHANGES: bool, const GIVEN: bool>(
+    fn simulate_range_generic<R: Number, const M: usize, const CHANGES: bool, const GIVEN: bool>(
         &self,
         state: &mut LoopState<R>,
         range: Range<usize>,
@@ -301,10 +307,10 @@ impl Simulator {
         [e_out, u_out, x_out, n_out]: [&mut [f64]; 4],
     ) {
         let zero = state.operator[0].splat(0.0);
-        let width = zero.lanes();
+        let width = zero.lane_count();
         let always = self.matrices[0];
         let end = self.matrices.len() - 1;
-        let none = Given {
+        let none = ExternalSignals {
             response: Vec::new(),
             disturbance: Vec::new(),
         };
@@ -364,7 +370,7 @@ impl Simulator {
             values
         };
         let truth = |get: &dyn Fn(&TrueParameters) -> f64| match self.parameters.as_slice() {
-            [only] => vec![get(only); self.samples() - first],
+            [only] => vec![get(only); self.sample_count() - first],
             all => all[first..].iter().map(get).collect(),
         };
         let target = Channel::new("f_t", "deg", self.forcing_deg[first..].to_vec());
@@ -399,7 +405,11 @@ impl Simulator {
         if let Some(given) = self.given.as_ref().filter(|_| disturbed) {
             record = record.with_channel(Channel::new("d", "deg", given.disturbance[first..].to_vec()))?;
         }
-        for channel in self.seen.iter().flat_map(|seen| seen.truth(first, self.samples())) {
+        for channel in self
+            .seen
+            .iter()
+            .flat_map(|seen| seen.true_parameters(first, self.sample_count()))
+        {
             record = record.with_channel(channel)?;
         }
         Ok(record)
@@ -407,12 +417,12 @@ impl Simulator {
 
     /// Returns an error for the first number that is not finite, if there is one.
     fn check_finite(&self, noise: &[f64], signals: &Signals) -> Result<(), SimError> {
-        if let Some(index) = first_not_finite(noise) {
+        if let Some(index) = first_non_finite_index(noise) {
             let value = noise[index];
             return Err(SimError::NoiseNotFinite { index, value });
         }
         for (signal, values) in [("e", &signals.e), ("u", &signals.u)] {
-            if let Some(k) = first_not_finite(values) {
+            if let Some(k) = first_non_finite_index(values) {
                 let ts = self.scenario.scenario().sample_time.s();
                 return Err(SimError::Diverged {
                     signal,
@@ -426,7 +436,7 @@ impl Simulator {
 }
 
 /// Returns the index of the first value that is not finite.
-fn first_not_finite(values: &[f64]) -> Option<usize> {
+fn first_non_finite_index(values: &[f64]) -> Option<usize> {
     values.iter().position(|v| !v.is_finite())
 }
 
@@ -471,7 +481,7 @@ impl Signals {
 }
 
 /// Number of samples whose signals are interleaved between the lanes at a time.
-const BLOCK: usize = 64;
+const BLOCK_SAMPLES: usize = 64;
 
 /// Task that simulates a single run.
 struct SingleRun<'a> {
@@ -489,8 +499,8 @@ impl LaneTask for SingleRun<'_> {
     fn run<R: Number>(self, zero: R) -> bool {
         let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
         let Signals { e, u, x, n } = self.into;
-        let all = 0..self.simulator.samples();
-        self.simulator.pass(&mut state, all, self.noise, [e, u, x, n]);
+        let all = 0..self.simulator.sample_count();
+        self.simulator.simulate_range(&mut state, all, self.noise, [e, u, x, n]);
         state.is_finite(0)
     }
 }
@@ -509,23 +519,24 @@ impl LaneTask for BatchedRuns<'_> {
 
     #[inline(always)]
     fn run<R: Number>(self, zero: R) -> bool {
-        let (width, samples) = (zero.lanes(), self.simulator.samples());
-        let mut noise = vec![0.0; width * BLOCK];
-        let mut out: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; width * BLOCK]);
+        let (width, samples) = (zero.lane_count(), self.simulator.sample_count());
+        let mut noise = vec![0.0; width * BLOCK_SAMPLES];
+        let mut out: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; width * BLOCK_SAMPLES]);
         let mut finite = true;
         for (noises, into) in self.noises.chunks(width).zip(self.into.chunks_mut(width)) {
             let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
             // The noise is set to zero, so unused lanes run without remnant.
             noise.fill(0.0);
-            for begin in (0..samples).step_by(BLOCK) {
-                let range = begin..(begin + BLOCK).min(samples);
+            for begin in (0..samples).step_by(BLOCK_SAMPLES) {
+                let range = begin..(begin + BLOCK_SAMPLES).min(samples);
                 for (lane, values) in noises.iter().enumerate() {
                     for (i, value) in values[range.clone()].iter().enumerate() {
                         noise[i * width + lane] = *value;
                     }
                 }
                 let [e, u, x, n] = &mut out;
-                self.simulator.pass(&mut state, range.clone(), &noise, [e, u, x, n]);
+                self.simulator
+                    .simulate_range(&mut state, range.clone(), &noise, [e, u, x, n]);
                 for (lane, signals) in into.iter_mut().enumerate() {
                     let Signals { e, u, x, n } = signals;
                     for (to, from) in [e, u, x, n].into_iter().zip(&out) {
@@ -553,9 +564,9 @@ impl Matrices {
             Realisation::Output => (1.0, c.k_c),
         };
         Self {
-            operator: Rows::of(&HeldStates::new(2.0 * o.zeta_nm * o.omega_nm_rad_s, w2, ts)),
+            operator: TwoStateSystem::of(&HeldStates::new(2.0 * o.zeta_nm * o.omega_nm_rad_s, w2, ts)),
             operator_output: [w2 * o.k_e, w2 * o.k_e_dot()],
-            element: Rows::of(&HeldStates::new(c.omega_b_rad_s, 0.0, ts)),
+            element: TwoStateSystem::of(&HeldStates::new(c.omega_b_rad_s, 0.0, ts)),
             element_input,
             element_output,
             k_n: p.k_n,

@@ -8,7 +8,7 @@
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
     Channel, FamilyOperator, Feedforward, ModelError, SampleTime,
-    feedforward::{OperatorAt, response_parameters},
+    feedforward::{OperatorWithDelay, response_parameters},
 };
 
 use crate::held_operator::{HeldOperator, OperatorState};
@@ -18,7 +18,7 @@ use crate::held_operator::{HeldOperator, OperatorState};
 pub(crate) struct TargetResponse {
     feedforward: Feedforward,
     /// One entry if nothing changes, otherwise one entry per sample.
-    instants: Vec<OperatorAt>,
+    instants: Vec<OperatorWithDelay>,
     sample_time: SampleTime,
 }
 
@@ -27,7 +27,7 @@ impl TargetResponse {
     pub fn new(
         feedforward: &Feedforward,
         instants: usize,
-        at: impl Fn(usize) -> Result<Option<OperatorAt>, ModelError>,
+        at: impl Fn(usize) -> Result<Option<OperatorWithDelay>, ModelError>,
         sample_time: SampleTime,
     ) -> Result<Self, ModelError> {
         let instants = (0..instants)
@@ -48,12 +48,12 @@ impl TargetResponse {
     /// Returns the response to the displayed values of the target, from rest.
     pub fn of(&self, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
         match self.instants.as_slice() {
-            [(operator, _)] => self.of_constant(operator, shown),
-            _ => self.of_changing(shown),
+            [(operator, _)] => self.constant_response(operator, shown),
+            _ => self.changing_response(shown),
         }
     }
 
-    fn of_constant(&self, operator: &FamilyOperator, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
+    fn constant_response(&self, operator: &FamilyOperator, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
         let held = operator.zoh(self.sample_time)?;
         let mut response = vec![0.0; shown.len()];
         fir(&held.b, held.nk, shown, &mut response);
@@ -61,9 +61,9 @@ impl TargetResponse {
         Ok(response)
     }
 
-    fn of_changing(&self, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
+    fn changing_response(&self, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
         let longest = self.instants.iter().map(|(_, (whole, _))| *whole).max().unwrap_or(0);
-        let mut current: Option<(&OperatorAt, HeldOperator, OperatorState)> = None;
+        let mut current: Option<(&OperatorWithDelay, HeldOperator, OperatorState)> = None;
         let mut response = Vec::with_capacity(shown.len());
         for (instant, f) in self.instants.iter().zip(shown) {
             let (_, held, mut state) = match current.take() {
@@ -92,17 +92,17 @@ impl TargetResponse {
 
     /// Returns the true parameters of the response at each sample from `first` to before `end`, named after the target:
     /// `f_t_K_d`, `f_t_tau_f` and so on. Only parameters that are finite throughout are included.
-    pub fn truth(&self, first: usize, end: usize) -> Vec<Channel> {
+    pub fn true_parameters(&self, first: usize, end: usize) -> Vec<Channel> {
         let preview_s = self.feedforward.preview_s;
-        let of = |(operator, _): &OperatorAt| response_parameters(operator, preview_s);
+        let of = |(operator, _): &OperatorWithDelay| response_parameters(operator, preview_s);
         let named: Vec<_> = self.instants.iter().map(of).collect();
-        truth_of("f_t", (first, end), |k| &named[k.min(named.len() - 1)])
+        true_parameter_channels("f_t", (first, end), |k| &named[k.min(named.len() - 1)])
     }
 }
 
 /// Returns the true parameters of the response to a further input at each sample from `first` to before `end`, named
 /// after the input. Only parameters that are finite throughout are included.
-pub(crate) fn truth_of<'n>(
+pub(crate) fn true_parameter_channels<'n>(
     input: &str,
     (first, end): (usize, usize),
     at: impl Fn(usize) -> &'n [(&'static str, &'static str, f64)],
@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
 
-    fn shown(n: usize) -> Vec<f64> {
+    fn shown_target(n: usize) -> Vec<f64> {
         (0..n)
             .map(|k| (0.03 * k as f64).sin() + 0.4 * (0.11 * k as f64 + 1.0).sin())
             .collect()
@@ -136,9 +136,9 @@ mod tests {
     /// every form and for delays of a whole number of samples and of a fraction of a sample.
     #[test]
     fn batch_and_recursion_give_the_same_response() {
-        let ts = SampleTime::SIXTIETH;
-        let f = shown(900);
-        for form in Form::OF_TARGET {
+        let ts = SampleTime::AT_60_HZ;
+        let f = shown_target(900);
+        for form in Form::TARGET_FORMS {
             for tau in [0.0, 0.1, 0.1437, 0.24] {
                 let kinds = form.coordinates(true);
                 let mut x: Vec<f64> = kinds.iter().map(|_| 0.6).collect();
@@ -161,9 +161,9 @@ mod tests {
     /// it does not.
     #[test]
     fn changing_response_matches_both_constant_responses() {
-        let ts = SampleTime::HUNDREDTH;
-        let f = shown(4000);
-        let seen = Feedforward::of_text("derivative:0.3..0.6,tau_f=0.1..0.2", Some((11.0, 0.3))).unwrap();
+        let ts = SampleTime::AT_100_HZ;
+        let f = shown_target(4000);
+        let seen = Feedforward::from_text("derivative:0.3..0.6,tau_f=0.1..0.2", Some((11.0, 0.3))).unwrap();
         let schedule = Schedule::Sigmoid {
             rate_per_s: 100.0,
             midpoint_s: 20.0,
@@ -191,7 +191,7 @@ mod tests {
             assert!((all[k] - after[k]).abs() < 1e-9, "{k} {} {}", all[k], after[k]);
         }
         assert!((before[3500] - after[3500]).abs() > 1e-2);
-        let truth = response.truth(1000, 4000);
+        let truth = response.true_parameters(1000, 4000);
         let names: Vec<&str> = truth.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["f_t_K_d", "f_t_tau_f"]);
         assert_eq!((truth[0].values[0], truth[0].values[2999]), (0.3, 0.6));

@@ -22,7 +22,7 @@ fn with_level(condition: Condition, level: f64) -> Scenario {
 
 fn silent_run(scenario: &Scenario) -> (Simulator, Signals) {
     let simulator = Simulator::new(scenario).unwrap();
-    let signals = simulator.signals(&vec![0.0; simulator.samples()]).unwrap();
+    let signals = simulator.signals(&vec![0.0; simulator.sample_count()]).unwrap();
     (simulator, signals)
 }
 
@@ -33,7 +33,7 @@ fn noises(simulator: &Simulator, runs: u64) -> Vec<Vec<f64>> {
             replication,
             ..RunSeed::default()
         };
-        run_seed.white_noise(simulator.samples())
+        run_seed.white_noise(simulator.sample_count())
     };
     (0..runs).map(of).collect()
 }
@@ -252,7 +252,7 @@ fn obtained_noise_level_equals_the_requested_level() {
                             cell: order as u64,
                             replication,
                         }
-                        .white_noise(simulator.samples());
+                        .white_noise(simulator.sample_count());
                         let s = simulator.signals(&noise).unwrap();
                         // As in section A.4: the power that the remnant adds to u.
                         let above = match definition {
@@ -339,7 +339,7 @@ fn remnant_has_its_theoretical_variance() {
         // Variance of the exact discrete filter: the sum of the squares of its impulse response.
         let filter = RemnantFilter::new(k_n, 0.06, order).unwrap();
         let h = filter
-            .discrete(scenario.sample_time, RemnantDiscretisation::ZeroOrderHold)
+            .discretise(scenario.sample_time, RemnantDiscretisation::ZeroOrderHold)
             .unwrap();
         let mut response: Vec<f64> = Vec::new();
         for t in 0..2000_usize {
@@ -357,7 +357,7 @@ fn remnant_has_its_theoretical_variance() {
                     cell: order as u64,
                     replication,
                 }
-                .white_noise(simulator.samples());
+                .white_noise(simulator.sample_count());
                 let n = simulator.signals(&noise).unwrap().n;
                 n[1000..].iter().map(|v| v * v).sum::<f64>() / 8192.0
             })
@@ -428,7 +428,7 @@ fn batched_runs_are_bit_identical_to_single_runs() {
 #[test]
 fn invalid_noise_is_refused_in_a_batch() {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
-    let good = vec![0.0; simulator.samples()];
+    let good = vec![0.0; simulator.sample_count()];
     let mut bad = good.clone();
     bad[3] = f64::NAN;
     let short = good[1..].to_vec();

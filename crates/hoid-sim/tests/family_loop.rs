@@ -16,7 +16,7 @@ use hoid_model::{
 };
 use hoid_sim::{FamilySimulator, RunSeed, SimError, Simulator};
 
-fn sixty() -> SampleTime {
+fn sample_time() -> SampleTime {
     SampleTime::new(1.0 / 60.0).unwrap()
 }
 
@@ -38,12 +38,12 @@ fn lead_lag(tau_e_s: f64) -> FamilyOperator {
 }
 
 /// Returns a person who controls a single integrator with a disturbance.
-fn typical() -> FamilyScenario {
+fn typical_scenario() -> FamilyScenario {
     let state = FamilyState {
         operator: lead_lag(0.15),
         controlled_element: element(&[1.0], &[1.0, 0.0]),
     };
-    let mut scenario = FamilyScenario::new(state, sixty());
+    let mut scenario = FamilyScenario::new(state, sample_time());
     scenario.disturbance = MultiSine::default().excitation().unwrap();
     scenario
 }
@@ -54,7 +54,7 @@ fn mean_square(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Returns the reference scenario in terms of the family.
-fn of_family(scenario: &Scenario) -> FamilyScenario {
+fn family_scenario(scenario: &Scenario) -> FamilyScenario {
     let state = |s: &hoid_model::scenario::OperatingState| {
         let o = s.operator;
         let x = [o.k_e, o.t_l_s, o.omega_nm_rad_s.ln(), o.zeta_nm.ln(), o.tau_e_s];
@@ -103,7 +103,7 @@ fn lead_form_matches_the_simulator_of_the_thesis() {
             scenario.last.operator.tau_e_s = 0.32;
         }
         let known = Simulator::new(&scenario).unwrap().run(seed(3), true).unwrap();
-        let family = FamilySimulator::new(&of_family(&scenario)).unwrap();
+        let family = FamilySimulator::new(&family_scenario(&scenario)).unwrap();
         let ours = family.run_with_truth(seed(3), true).unwrap();
         for (a, b) in [
             ("e", "e"),
@@ -124,7 +124,7 @@ fn lead_form_matches_the_simulator_of_the_thesis() {
 }
 
 /// Returns a coordinate of an operator by its kind.
-fn part(operator: &FamilyOperator, wanted: Coordinate) -> f64 {
+fn coordinate_value(operator: &FamilyOperator, wanted: Coordinate) -> f64 {
     let kinds = operator.form().coordinates(operator.has_neuromuscular());
     let at = kinds.iter().position(|kind| *kind == wanted);
     at.map_or(0.0, |i| operator.coordinates()[i])
@@ -140,24 +140,24 @@ fn runge_kutta<const N: usize>(z: [f64; N], h: f64, slope: impl Fn(&[f64; N]) ->
     std::array::from_fn(|i| z[i] + h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]))
 }
 
-const STEPS: usize = 60;
+const STEPS_PER_SAMPLE: usize = 60;
 
 /// Simulates the loop by its differential equations: neuromuscular part
 /// `v'' + 2 zeta omega v' + omega^2 v = omega^2 e(t - tau)`, lag `w' = v - w/T_I`, lead
 /// `u = K/T_I (w + p T_L w' + ...)`; element by `x''' + c_2 x'' + c_1 x' + c_0 x = u + d`. The sampled error is held
 /// and delayed by tau.
-fn by_integration(scenario: &FamilyScenario, d: &[f64]) -> Vec<[f64; 2]> {
+fn simulate_by_integration(scenario: &FamilyScenario, d: &[f64]) -> Vec<[f64; 2]> {
     let FamilyState {
         operator,
         controlled_element,
     } = &scenario.initial;
     let ts = scenario.sample_time.s();
-    let h = ts / STEPS as f64;
-    let (omega, zeta) = operator.neuromuscular().unwrap();
+    let h = ts / STEPS_PER_SAMPLE as f64;
+    let (omega, zeta) = operator.neuromuscular_parameters().unwrap();
     let (gain, t_l, rate) = (
-        part(operator, Coordinate::Gain),
-        part(operator, Coordinate::Lead),
-        part(operator, Coordinate::LagRate),
+        coordinate_value(operator, Coordinate::Gain),
+        coordinate_value(operator, Coordinate::Lead),
+        coordinate_value(operator, Coordinate::LagRate),
     );
     let late = (operator.tau_e_s() / h).round() as usize;
     assert!((late as f64 * h - operator.tau_e_s()).abs() < 1e-12);
@@ -180,9 +180,11 @@ fn by_integration(scenario: &FamilyScenario, d: &[f64]) -> Vec<[f64; 2]> {
         let y: f64 = (0..num.len()).map(|i| num[num.len() - 1 - i] * x[i]).sum();
         errors.push(-y);
         out.push([-y, u]);
-        for step in 0..STEPS {
-            let now = k * STEPS + step;
-            let e = now.checked_sub(late).map_or(0.0, |then| errors[then / STEPS]);
+        for step in 0..STEPS_PER_SAMPLE {
+            let now = k * STEPS_PER_SAMPLE + step;
+            let e = now
+                .checked_sub(late)
+                .map_or(0.0, |then| errors[then / STEPS_PER_SAMPLE]);
             z = runge_kutta(z, h, |[w, v, v_dot]| {
                 [
                     v - rate * w,
@@ -232,7 +234,7 @@ fn loop_matches_numerical_integration() {
             11.0 + 0.2,
         ),
     ] {
-        let mut scenario = typical();
+        let mut scenario = typical_scenario();
         let x = [&head[..], &tail, &[tau_samples * ts]].concat();
         scenario.initial = FamilyState {
             operator: FamilyOperator::new(form, true, &x).unwrap(),
@@ -242,7 +244,7 @@ fn loop_matches_numerical_integration() {
         scenario.measurement_s = 15.0;
         let signals = FamilySimulator::new(&scenario).unwrap().signals(seed(0)).unwrap();
         let size = signals.u.iter().map(|u| u.abs()).fold(0.0, f64::max);
-        for (k, [e, u]) in by_integration(&scenario, &signals.d).into_iter().enumerate() {
+        for (k, [e, u]) in simulate_by_integration(&scenario, &signals.d).into_iter().enumerate() {
             let worst = (signals.e[k] - e).abs().max((signals.u[k] - u).abs());
             // Fourth-order integration in steps of 0.003/omega_nm.
             assert!(worst < 1e-8 * size, "{form} {k}: {worst}");
@@ -264,7 +266,7 @@ fn describing_function_equals_the_operator_with_a_hold() {
     operators.push(FamilyOperator::new(Form::Gain, false, &[2.0, 0.15]).unwrap());
     operators.push(FamilyOperator::new(Form::Gain, false, &[2.0, 0.002]).unwrap());
     for operator in operators {
-        let mut scenario = typical();
+        let mut scenario = typical_scenario();
         scenario.initial.operator = operator.clone();
         scenario.last = scenario.initial.clone();
         scenario.run_in_s = 80.0;
@@ -291,7 +293,7 @@ fn describing_function_equals_the_operator_with_a_hold() {
 fn changed_parameters_take_effect_at_once() {
     // All parameters change in a step: from then on the loop is that of the final state, starting from the states of
     // the initial loop. For comparison, both loops are simulated in one run, each with its own recursion.
-    let mut scenario = typical();
+    let mut scenario = typical_scenario();
     let x = [6.0, 0.4, 0.3, 9.0_f64.ln(), 0.3_f64.ln(), 0.15];
     scenario.last.operator = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
     scenario.schedule = hoid_model::schedule::Schedule::Sigmoid {
@@ -305,7 +307,7 @@ fn changed_parameters_take_effect_at_once() {
     assert!((record.channel("T_I").unwrap()[2399] - 1.0 / 0.3).abs() < 1e-12);
     // The response of the final state continues from the earlier response.
     let only = |state: &FamilyState| {
-        let held = state.operator.zoh(sixty()).unwrap();
+        let held = state.operator.zoh(sample_time()).unwrap();
         (held.nk, held.b, held.f)
     };
     let (nk, b, f) = only(&scenario.last);
@@ -380,7 +382,7 @@ fn parts() -> Vec<Vec<RemnantPart>> {
 #[test]
 fn each_remnant_has_the_requested_share_of_the_variance() {
     // In the last scenario, most of u is the response of the person to a target.
-    let mut seen = typical();
+    let mut seen = typical_scenario();
     let sum = |rms, interleaved| MultiSine {
         rms,
         interleaved,
@@ -393,7 +395,7 @@ fn each_remnant_has_the_requested_share_of_the_variance() {
         FamilyOperator::new(Form::Derivative, true, &x).unwrap(),
         0.25,
     ));
-    let all = parts().into_iter().map(|remnant| (typical(), remnant));
+    let all = parts().into_iter().map(|remnant| (typical_scenario(), remnant));
     let all = all.chain([(seen, parts().swap_remove(0))]);
     for (kind, (mut scenario, remnant)) in all.enumerate() {
         scenario.run_in_s = 20.0;
@@ -433,7 +435,7 @@ fn each_remnant_has_the_requested_share_of_the_variance() {
 fn remnants_have_the_statistics_of_their_kind() {
     let kinds = parts();
     let remnant_of = |parts: &Vec<RemnantPart>| {
-        let mut scenario = typical();
+        let mut scenario = typical_scenario();
         scenario.measurement_s = 400.0;
         scenario.remnant = parts.clone();
         FamilySimulator::new(&scenario).unwrap().run(seed(9), false).unwrap()
@@ -466,7 +468,7 @@ fn remnants_have_the_statistics_of_their_kind() {
 
 #[test]
 fn stick_bias_drift_and_recorder_offsets_are_applied() {
-    let mut scenario = typical();
+    let mut scenario = typical_scenario();
     let plain = FamilySimulator::new(&scenario).unwrap().signals(seed(4)).unwrap();
     scenario.stick = Stick {
         offset_e: 0.3,
@@ -502,7 +504,7 @@ fn stick_bias_drift_and_recorder_offsets_are_applied() {
 
 #[test]
 fn seed_determines_the_run() {
-    let mut scenario = typical();
+    let mut scenario = typical_scenario();
     scenario.remnant = parts().remove(3);
     let simulator = FamilySimulator::new(&scenario).unwrap();
     let again = FamilySimulator::new(&scenario).unwrap();
@@ -524,7 +526,7 @@ fn seed_determines_the_run() {
 #[test]
 fn invalid_scenarios_are_refused() {
     let refused = |change: &dyn Fn(&mut FamilyScenario)| {
-        let mut scenario = typical();
+        let mut scenario = typical_scenario();
         change(&mut scenario);
         FamilySimulator::new(&scenario).unwrap_err()
     };
@@ -564,7 +566,7 @@ fn invalid_scenarios_are_refused() {
 #[test]
 fn feedforward_with_preview_adds_to_the_control() {
     // e = f - y and y = P u, so at each line of f in the steady state U = Y E + F R e^{j omega preview}.
-    let mut scenario = typical();
+    let mut scenario = typical_scenario();
     scenario.disturbance = Excitation::default();
     scenario.target = MultiSine::default().excitation().unwrap();
     scenario.target.random_phases = false;

@@ -9,7 +9,7 @@ use hoid_model::{
 };
 use hoid_sim::{FamilyOperatorRun, FamilySimulator, RunSeed, SimError};
 
-const MUSCLES: (f64, f64) = (11.0, 0.3);
+const NEUROMUSCULAR: (f64, f64) = (11.0, 0.3);
 
 fn seed(replication: u64) -> RunSeed {
     RunSeed {
@@ -20,7 +20,7 @@ fn seed(replication: u64) -> RunSeed {
 }
 
 fn operator(form: Form, head: &[f64], tau_s: f64) -> FamilyOperator {
-    let tail = [MUSCLES.0.ln(), MUSCLES.1.ln(), tau_s];
+    let tail = [NEUROMUSCULAR.0.ln(), NEUROMUSCULAR.1.ln(), tau_s];
     FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()
 }
 
@@ -30,7 +30,7 @@ fn task(motion: Option<FamilyOperator>) -> FamilyScenario {
         operator: operator(Form::Lead, &[0.6, 0.6], 0.2),
         controlled_element: "3/(s(s+1))".parse().unwrap(),
     };
-    let mut scenario = FamilyScenario::new(state, SampleTime::HUNDREDTH);
+    let mut scenario = FamilyScenario::new(state, SampleTime::AT_100_HZ);
     let sum = |rms, interleaved| MultiSine {
         rms,
         interleaved,
@@ -92,7 +92,7 @@ fn motion_response_is_exact_at_every_line() {
         }
         let role = |name: &str| record.channels().find(|c| c.name == name).unwrap().role.clone();
         assert_eq!((role("y").as_str(), role("f_t").as_str()), ("motion", ""));
-        let (name, _) = felt.form().gain();
+        let (name, _) = felt.form().gain_name_and_unit();
         let name = if felt.form() == Form::Lag { "K_over_T_I" } else { name };
         assert_eq!(record.channel(&format!("y_{name}")).unwrap()[0], felt.coordinates()[0]);
     }

@@ -20,7 +20,7 @@ fn drawn_people_lie_within_the_ranges() {
         let found = person(plant, RemnantKind::ALL[number as usize % 5], number);
         let operator = &found.state.operator;
         assert!(plant.forms().contains(&operator.form()));
-        for parameter in operator.named() {
+        for parameter in operator.named_parameters() {
             let (range, value) = match parameter.name {
                 "T_L" => (population.lead_s, parameter.value),
                 "T_I" if parameter.value.is_infinite() => {
@@ -107,7 +107,7 @@ fn run_to_run_spread_has_the_requested_size() {
 #[test]
 fn other_rates_and_forms_can_be_drawn() {
     let task = Task {
-        sample_time: hoid_model::SampleTime::HUNDREDTH,
+        sample_time: hoid_model::SampleTime::AT_100_HZ,
         ..Task::default()
     };
     let kind = RemnantKind::Pulsed;
@@ -204,7 +204,7 @@ fn people_respond_to_a_displayed_target() {
             assert!(plain.feedforward.is_none());
             let of_person = seen.feedforward.clone().unwrap();
             // Near 3 rad/s the machine follows 0.4 to 1 of the target, apart from the neuromuscular system.
-            let (nm, zeta) = seen.state.operator.neuromuscular().unwrap();
+            let (nm, zeta) = seen.state.operator.neuromuscular_parameters().unwrap();
             let z = 3.0 / nm;
             let muscles = Complex64::new(1.0 - z * z, 2.0 * zeta * z).inv();
             let followed =
@@ -214,7 +214,7 @@ fn people_respond_to_a_displayed_target() {
             assert_eq!(run.record, draw(&task).run(1).unwrap().record);
             let of_run = run.feedforward.unwrap();
             assert_ne!(of_run, of_person);
-            let muscles = [&run.state.operator, &of_run.operator].map(|o| o.neuromuscular().unwrap());
+            let muscles = [&run.state.operator, &of_run.operator].map(|o| o.neuromuscular_parameters().unwrap());
             assert!((muscles[0].0 / muscles[1].0 - 1.0).abs() < 1e-12);
             assert!((muscles[0].1 / muscles[1].1 - 1.0).abs() < 1e-12);
             let target = run.record.channels().find(|c| c.name == "f_t").unwrap();

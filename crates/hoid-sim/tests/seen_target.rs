@@ -13,13 +13,13 @@ use hoid_model::{
 };
 use hoid_sim::{FamilySimulator, RunSeed, Simulator};
 
-const TEXT: &str = "derivative:0.012,tau_f=0.1,preview=0.25";
+const FEEDFORWARD_TEXT: &str = "derivative:0.012,tau_f=0.1,preview=0.25";
 
-fn seen(condition: Condition, level: f64) -> Scenario {
+fn scenario_with_displayed_target(condition: Condition, level: f64) -> Scenario {
     let mut scenario = Scenario::condition(condition);
     let operator = scenario.initial.operator;
     let muscles = (operator.omega_nm_rad_s, operator.zeta_nm);
-    scenario.feedforward = Some(Feedforward::of_text(TEXT, Some(muscles)).unwrap());
+    scenario.feedforward = Some(Feedforward::from_text(FEEDFORWARD_TEXT, Some(muscles)).unwrap());
     scenario.disturbance = ForcingFunction::reference_disturbance(0.02).unwrap();
     scenario.remnant.strength = RemnantStrength::Level {
         level,
@@ -46,7 +46,7 @@ fn coefficient(record: &Record, name: &str, omega: f64) -> Complex64 {
 #[test]
 fn both_responses_are_exact_at_every_line() {
     for condition in [Condition::C1, Condition::C2] {
-        let mut scenario = seen(condition, 0.0);
+        let mut scenario = scenario_with_displayed_target(condition, 0.0);
         scenario.run_in_s = 60.0;
         let record = Simulator::new(&scenario).unwrap().run(seed(0), false).unwrap();
         let ts = scenario.sample_time;
@@ -89,14 +89,14 @@ fn both_responses_are_exact_at_every_line() {
 #[test]
 fn loop_matches_the_family_simulator() {
     for condition in [Condition::C1, Condition::C3, Condition::C4, Condition::C6] {
-        let mut scenario = seen(condition, 0.0);
+        let mut scenario = scenario_with_displayed_target(condition, 0.0);
         if scenario.schedule != Schedule::Constant {
             scenario.last.operator.omega_nm_rad_s = 9.0;
             scenario.last.operator.zeta_nm = 0.5;
             let operator = scenario.initial.operator;
             let text = "derivative-lead:0.012..0.02,T_L=0.1..0.3,tau_f=0.1..0.12,preview=0.25";
             let muscles = Some((operator.omega_nm_rad_s, operator.zeta_nm));
-            scenario.feedforward = Some(Feedforward::of_text(text, muscles).unwrap());
+            scenario.feedforward = Some(Feedforward::from_text(text, muscles).unwrap());
         }
         let state = |of: &hoid_model::scenario::OperatingState| {
             let (o, c) = (of.operator, of.controlled_element);
@@ -138,8 +138,8 @@ fn loop_matches_the_family_simulator() {
 #[test]
 fn batched_runs_match_single_runs() {
     for condition in [Condition::C2, Condition::C4] {
-        let simulator = Simulator::new(&seen(condition, 0.1)).unwrap();
-        let noises: Vec<Vec<f64>> = (0..3).map(|r| seed(r).white_noise(simulator.samples())).collect();
+        let simulator = Simulator::new(&scenario_with_displayed_target(condition, 0.1)).unwrap();
+        let noises: Vec<Vec<f64>> = (0..3).map(|r| seed(r).white_noise(simulator.sample_count())).collect();
         for instructions in [InstructionSet::Best, InstructionSet::Scalar] {
             let batch = simulator.batched_signals(&noises, instructions).unwrap();
             for (noise, signals) in noises.iter().zip(&batch) {
@@ -154,15 +154,17 @@ fn batched_runs_match_single_runs() {
 #[test]
 fn noise_level_refers_to_the_variance_of_all_of_u() {
     for (condition, level) in [(Condition::C1, 0.1), (Condition::C2, 0.2)] {
-        let scenario = seen(condition, level);
+        let scenario = scenario_with_displayed_target(condition, level);
         let simulator = Simulator::new(&scenario).unwrap();
         let first = simulator.scenario().run_in_samples();
         let square = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
-        let silent = simulator.signals(&vec![0.0; simulator.samples()]).unwrap();
+        let silent = simulator.signals(&vec![0.0; simulator.sample_count()]).unwrap();
         let (mut own, mut whole) = (0.0, 0.0);
         let runs = 60;
         for r in 0..runs {
-            let noisy = simulator.signals(&seed(r).white_noise(simulator.samples())).unwrap();
+            let noisy = simulator
+                .signals(&seed(r).white_noise(simulator.sample_count()))
+                .unwrap();
             let n: Vec<f64> = noisy.u.iter().zip(&silent.u).map(|(a, b)| a - b).collect();
             own += square(&n[first..]);
             whole += square(&noisy.u[first..]);
@@ -185,7 +187,7 @@ fn zero_feedforward_gives_the_same_signals() {
     assert!(record.channel("d").is_none() && record.channels().all(|c| c.role.is_empty()));
     // A response of zero gives the same signals.
     let mut zero = plain.clone();
-    zero.feedforward = Some(Feedforward::of_text("gain:0", Some((11.25, 0.35))).unwrap());
+    zero.feedforward = Some(Feedforward::from_text("gain:0", Some((11.25, 0.35))).unwrap());
     let of_zero = Simulator::new(&zero).unwrap().run(seed(1), false).unwrap();
     assert_eq!(of_zero.output(), record.output());
 }
@@ -193,7 +195,7 @@ fn zero_feedforward_gives_the_same_signals() {
 #[test]
 fn invalid_target_displays_are_refused() {
     let refused = |change: &dyn Fn(&mut Scenario)| {
-        let mut scenario = seen(Condition::C4, 0.1);
+        let mut scenario = scenario_with_displayed_target(Condition::C4, 0.1);
         change(&mut scenario);
         Simulator::new(&scenario).unwrap_err().to_string()
     };
@@ -202,7 +204,7 @@ fn invalid_target_displays_are_refused() {
     assert!(refused(&preview).contains("preview of the target"));
     let bare = FamilyOperator::new(Form::Gain, false, &[1.0, 0.1]).unwrap();
     assert!(refused(&|s| s.feedforward = Some(Feedforward::new(bare.clone(), 0.0))).contains("neuromuscular"));
-    let changing = Feedforward::of_text("gain:1..2", Some((11.25, 0.35))).unwrap();
+    let changing = Feedforward::from_text("gain:1..2", Some((11.25, 0.35))).unwrap();
     let constant = |s: &mut Scenario| {
         s.schedule = Schedule::Constant;
         s.last = s.initial;

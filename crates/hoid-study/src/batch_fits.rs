@@ -36,7 +36,7 @@ impl BatchFits {
         let mut requests: Vec<FitRequest> = Vec::new();
         let (mut requested, mut fits) = (Vec::with_capacity(estimators.len()), Vec::new());
         for (estimator, task) in estimators {
-            let Some(request) = runs.first().and_then(|run| request(estimator, task, run)) else {
+            let Some(request) = runs.first().and_then(|run| fit_request(estimator, task, run)) else {
                 requested.push(None);
                 continue;
             };
@@ -61,7 +61,7 @@ impl BatchFits {
     }
 }
 
-fn request(estimator: &EstimatorCell, task: &Task, record: &Record) -> Option<FitRequest> {
+fn fit_request(estimator: &EstimatorCell, task: &Task, record: &Record) -> Option<FitRequest> {
     let preparation = Preparation::of(estimator);
     match task {
         Task::Fit(options) => Some(((**options).clone(), preparation)),
@@ -75,7 +75,7 @@ fn request(estimator: &EstimatorCell, task: &Task, record: &Record) -> Option<Fi
 }
 
 fn fit_all((estimator, preparation): &FitRequest, runs: &[&Record]) -> Vec<Result<Fit, String>> {
-    let prepared: Vec<Result<Cow<'_, Record>, String>> = runs.iter().map(|run| preparation.of_record(run)).collect();
+    let prepared: Vec<Result<Cow<'_, Record>, String>> = runs.iter().map(|run| preparation.apply(run)).collect();
     let records: Vec<&Record> = prepared.iter().flatten().map(Cow::as_ref).collect();
     let mut fits = estimator.fit_each(&records).into_iter();
     prepared

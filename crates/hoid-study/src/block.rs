@@ -16,7 +16,7 @@ use crate::{
 
 /// Maximum number of samples between two points of a trace at which its errors are evaluated; it is much shorter than
 /// any memory length.
-const ERRORS_EVERY: usize = 4;
+const MAX_ERROR_SPACING_SAMPLES: usize = 4;
 
 /// Number of replications whose fits are searched in one batch. A run of 82 s at 100 Hz takes 1 MB.
 const BATCH_REPLICATIONS: usize = 50;
@@ -130,7 +130,7 @@ impl<'a> CellRun<'a> {
                 continue;
             }
             let (index, record) = records.next()?;
-            self.rows.begin_replication();
+            self.rows.start_replication();
             for (place, (estimator, task)) in estimators.iter().enumerate() {
                 if !should_continue() {
                     return None;
@@ -138,13 +138,13 @@ impl<'a> CellRun<'a> {
                 self.rows.start_row(estimator, *replication);
                 let fit = fits.fit_of(place, index);
                 let outcome = match task {
-                    Task::Describe => self.describe(simulator, record),
+                    Task::Describe => self.write_noise_levels(simulator, record),
                     task => Preparation::of(estimator)
-                        .of_record(record)
+                        .apply(record)
                         .and_then(|record| self.estimate(task, fit, &record, estimator, *replication)),
                 };
                 if let Err(reason) = outcome {
-                    self.rows.failed(&reason);
+                    self.rows.write_failure(&reason);
                 }
                 done(1);
             }
@@ -170,24 +170,25 @@ impl<'a> CellRun<'a> {
                     None => options.fit(records).map_err(text)?,
                 };
                 let operator = fit.operator().map_err(|reason| reason.to_string());
-                self.rows.fit_row(estimator, &fit, record, operator)?;
+                self.rows.write_fit_row(estimator, &fit, record, operator)?;
             }
             Task::GreyBox(options) => {
                 let grey = options.fit(records).map_err(text)?;
                 let operator = grey.operator(0).map_err(|reason| reason.to_string());
-                self.rows.fit_row(estimator, grey.polynomial_fit(0), record, operator)?;
-                self.rows.termination(grey.termination());
+                self.rows
+                    .write_fit_row(estimator, grey.polynomial_fit(0), record, operator)?;
+                self.rows.write_termination(grey.termination());
             }
             Task::Analysis(asked) => self.analyse(asked, record, estimator)?,
             Task::Track(options) => {
-                let kept = self.plan.trace_every.unwrap_or(ERRORS_EVERY);
-                let every = greatest_common_divisor(kept, ERRORS_EVERY);
+                let kept = self.plan.trace_every.unwrap_or(MAX_ERROR_SPACING_SAMPLES);
+                let every = greatest_common_divisor(kept, MAX_ERROR_SPACING_SAMPLES);
                 // If the start fit failed, the recursion reports the error itself.
                 let start = fit.and_then(|fit| fit.as_ref().ok());
                 let trace = track_from(record, options, every, start).map_err(text)?;
-                self.rows.track_row(&trace, record);
+                self.rows.write_track_row(&trace, record);
                 if self.plan.trace_every.is_some() {
-                    self.rows.trace_rows(&trace, kept / every, estimator, replication);
+                    self.rows.write_trace_rows(&trace, kept / every, estimator, replication);
                 }
             }
         }
@@ -202,56 +203,56 @@ impl<'a> CellRun<'a> {
         estimator: &'a EstimatorCell,
     ) -> Result<(), String> {
         let text = |error: AnalysisError| error.to_string();
-        let recording = Recordings::of_records([record.clone()]);
+        let recording = Recordings::from_records([record.clone()]);
         match asked {
             ResolvedRequest::Operator(how) => {
                 let found = how.run(recording).map_err(text)?;
-                self.rows.operator_row(&found)?;
-                self.rows.verdict(&found.verdict);
+                self.rows.write_operator_row(&found)?;
+                self.rows.write_verdict(&found.verdict);
             }
             ResolvedRequest::Change(how) => {
                 let found = how.run(recording).map_err(text)?;
-                self.rows.change_row(&found)?;
-                self.rows.verdict(&found.verdict);
+                self.rows.write_change_row(&found)?;
+                self.rows.write_verdict(&found.verdict);
             }
             ResolvedRequest::Remnant(how) => {
                 let found = how.run(recording).map_err(text)?;
-                self.polynomial_row(estimator, found.fit.polynomial_fit(0), &found.data.records[0])?;
-                self.rows.verdict(&found.verdict);
+                self.write_polynomial_row(estimator, found.fit.polynomial_fit(0), &found.data.records[0])?;
+                self.rows.write_verdict(&found.verdict);
             }
             ResolvedRequest::Polynomials(how) => {
                 let found = how.run(recording).map_err(text)?;
-                self.polynomial_row(estimator, &found.fit.fit, &found.data.records[0])?;
-                self.rows.verdict(&found.verdict);
+                self.write_polynomial_row(estimator, &found.fit.fit, &found.data.records[0])?;
+                self.rows.write_verdict(&found.verdict);
             }
         }
         Ok(())
     }
 
-    fn polynomial_row(&mut self, estimator: &'a EstimatorCell, fit: &Fit, record: &Record) -> Result<(), String> {
+    fn write_polynomial_row(&mut self, estimator: &'a EstimatorCell, fit: &Fit, record: &Record) -> Result<(), String> {
         let operator = fit.operator().map_err(|reason| reason.to_string());
-        self.rows.fit_row(estimator, fit, record, operator)
+        self.rows.write_fit_row(estimator, fit, record, operator)
     }
 
     fn fail_all(&mut self, replication: u64, reason: &str, done: &(dyn Fn(u64) + Sync)) {
         for (estimator, _) in self.estimators.clone() {
             self.rows.start_row(estimator, replication);
-            self.rows.failed(reason);
+            self.rows.write_failure(reason);
             done(1);
         }
     }
 
     /// Computes the noise levels of a run by comparison with the same run without remnant.
-    fn describe(&mut self, simulator: &Simulator, record: &Record) -> Result<(), String> {
+    fn write_noise_levels(&mut self, simulator: &Simulator, record: &Record) -> Result<(), String> {
         let u0 = match self.without_remnant.take() {
             Some(known) => known,
             None => {
-                let silent = vec![0.0; simulator.samples()];
+                let silent = vec![0.0; simulator.sample_count()];
                 let signals = simulator.signals(&silent).map_err(|error| error.to_string())?;
                 signals.u[signals.u.len() - record.len()..].to_vec()
             }
         };
-        self.rows.noise_row(record, &u0);
+        self.rows.write_noise_row(record, &u0);
         self.without_remnant = Some(u0);
         Ok(())
     }

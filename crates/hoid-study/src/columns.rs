@@ -17,7 +17,7 @@ use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable,
 use crate::plan::{Plan, Task, analysis};
 
 /// Parameters of the operator, in the order used by all tables.
-pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+pub const OPERATOR_PARAMETERS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 /// Quantities evaluated in a trace: the parameters of the operator and the delay, in the order of
 /// [`hoid_model::uncertainty::OperatorEstimate::rows`].
 pub(crate) const TRACED_QUANTITIES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
@@ -66,7 +66,7 @@ impl Rows {
 
     /// Sets a real number of the current row. A column that the table does not have is ignored, since the plan
     /// determines the columns.
-    pub fn real(&mut self, name: &str, value: f64) {
+    pub fn set_real(&mut self, name: &str, value: f64) {
         if let Some(ColumnValues::Real(values)) = self.column(name)
             && let Some(last) = values.last_mut()
         {
@@ -74,7 +74,7 @@ impl Rows {
         }
     }
 
-    pub fn whole(&mut self, name: &str, value: u64) {
+    pub fn set_whole(&mut self, name: &str, value: u64) {
         if let Some(ColumnValues::Whole(values)) = self.column(name)
             && let Some(last) = values.last_mut()
         {
@@ -82,7 +82,7 @@ impl Rows {
         }
     }
 
-    pub fn text(&mut self, name: &str, value: &str) {
+    pub fn set_text(&mut self, name: &str, value: &str) {
         if let Some(ColumnValues::Text(values)) = self.column(name)
             && let Some(last) = values.last_mut()
         {
@@ -100,7 +100,7 @@ impl Rows {
     }
 
     /// Sets a real number of the current row, with the column given by position.
-    pub fn real_at(&mut self, position: usize, value: f64) {
+    pub fn set_real_at(&mut self, position: usize, value: f64) {
         if let Some(OutputColumn {
             values: ColumnValues::Real(values),
             ..
@@ -132,8 +132,8 @@ impl Schemas {
         let theta = theta_names(plan);
         let comments = comments(plan);
         Self {
-            fits: fits(plan, &theta, comments.clone()),
-            traces: traces(plan, &theta, comments),
+            fits: fits_schema(plan, &theta, comments.clone()),
+            traces: traces_schema(plan, &theta, comments),
         }
     }
 }
@@ -206,7 +206,7 @@ impl Columns {
     }
 }
 
-fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
+fn fits_schema(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     use ColumnKind::{Real, Text, Whole};
     let mut c = Columns(Vec::new());
     c.add(Whole, &["cell"]);
@@ -235,7 +235,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
         c.add(Real, &["delta_vaf"]);
     }
     let mut estimated: Vec<&str> = theta.iter().map(String::as_str).collect();
-    estimated.extend(OPERATOR);
+    estimated.extend(OPERATOR_PARAMETERS);
     estimated.extend(["tau_e", "T_n", "K_n"]);
     let of_analyses: Vec<String> = analyses.iter().flat_map(|asked| analysis::parameters(asked)).collect();
     for name in &of_analyses {
@@ -290,7 +290,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     TableSchema { comments, columns: c.0 }
 }
 
-fn traces(plan: &Plan, theta: &[String], comments: Vec<String>) -> Option<TableSchema> {
+fn traces_schema(plan: &Plan, theta: &[String], comments: Vec<String>) -> Option<TableSchema> {
     use ColumnKind::{Real, Text, Whole};
     let tracks = plan.estimators.iter().any(|e| matches!(e.task, Task::Track(_)));
     plan.trace_every.filter(|_| tracks)?;
@@ -298,7 +298,7 @@ fn traces(plan: &Plan, theta: &[String], comments: Vec<String>) -> Option<TableS
     c.add(Whole, &["cell", "replication"]);
     c.add(Text, &["estimator"]);
     c.add(Real, &["t"]);
-    for name in theta.iter().map(String::as_str).chain(OPERATOR) {
+    for name in theta.iter().map(String::as_str).chain(OPERATOR_PARAMETERS) {
         c.add(Real, &[name]);
         if plan.standard_errors {
             c.add(Real, &[&format!("{name}_se")]);

@@ -9,10 +9,10 @@ use hoid_io::IoError;
 
 use crate::{Plan, StudyError};
 
-pub(crate) const PLAN: &str = "plan.toml";
+pub(crate) const PLAN_FILE: &str = "plan.toml";
 
 /// Returns the path of the part that holds one table of a block.
-pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
+pub(crate) fn part_path(directory: &Path, block: u64, table: &str) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-{table}.parquet"))
 }
 
@@ -23,7 +23,7 @@ pub(crate) fn seal_path(directory: &Path, block: u64) -> PathBuf {
 
 /// Writes a copy of the plan to the directory of the results.
 pub(crate) fn write_plan(plan: &Plan, directory: &Path) -> Result<(), StudyError> {
-    write_source(&directory.join(PLAN), plan.text())
+    write_source(&directory.join(PLAN_FILE), plan.text())
 }
 
 /// Writes a copy of a plan or manifest to the directory of the results; a different file of the same name is not
@@ -41,7 +41,7 @@ pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
 }
 
 /// Removes the partial output of a killed run: all files in `parts` that do not have the name of a part or a seal.
-pub(crate) fn sweep(parts: &Path) -> Result<(), StudyError> {
+pub(crate) fn remove_partial_files(parts: &Path) -> Result<(), StudyError> {
     hoid_io::make_directory(parts)?;
     let unwritable = |source| IoError::Unwritable {
         file: parts.display().to_string(),
@@ -84,7 +84,7 @@ pub(crate) fn table_path(directory: &Path, table: &str, csv: bool) -> PathBuf {
 }
 
 /// Returns the paths of the tables that exist.
-pub(crate) fn tables(directory: &Path) -> Vec<PathBuf> {
+pub(crate) fn table_paths(directory: &Path) -> Vec<PathBuf> {
     let all = ["cells", "fits", "summary", "traces", "trace-summary"]
         .into_iter()
         .flat_map(|table| [false, true].map(|csv| table_path(directory, table, csv)));

@@ -24,12 +24,12 @@
 use hoid_ident::Fit;
 use hoid_model::{Complex64, Orders, PolynomialModel, Record, Structure, uncertainty::OperatorEstimate};
 use hoid_numerics::statistics::mean;
-use hoid_track::{StartAt, Trace};
+use hoid_track::{StartSource, Trace};
 
 use crate::{columns::TRACED_QUANTITIES, plan::Cell};
 
 /// Time after which the errors of a trace are evaluated, s.
-const ERRORS_FROM_S: f64 = 10.0;
+const ERROR_START_S: f64 = 10.0;
 /// Magnitude of a coefficient above which a recursion has diverged.
 const DIVERGENCE_LIMIT: f64 = 10.0;
 
@@ -92,7 +92,7 @@ impl TraceErrors {
         for (row, t) in trace.times_s().iter().enumerate() {
             let bad = |v: &f64| !v.is_finite() || v.abs() > DIVERGENCE_LIMIT;
             diverged |= trace.theta(row).iter().any(bad);
-            if *t < ERRORS_FROM_S - 1e-9 {
+            if *t < ERROR_START_S - 1e-9 {
                 continue;
             }
             counted += 1;
@@ -127,9 +127,9 @@ impl TraceErrors {
 /// Time after a change within which a method should declare it, and during which bands are evaluated separately, s.
 const DECLARATION_TIME_S: f64 = 5.0;
 /// Length of the final part of a trace whose mean error is evaluated, s.
-const END_S: f64 = 10.0;
+const FINAL_SPAN_S: f64 = 10.0;
 /// Half width of a 95 % band, in standard errors.
-const BAND: f64 = 1.96;
+const BAND_STANDARD_ERRORS: f64 = 1.96;
 
 /// Measures of how a trace responds to a change: its bias, its bands and its declared changes.
 pub(crate) struct ChangeMeasures {
@@ -165,12 +165,12 @@ impl ChangeMeasures {
         let scenario = cell.resolved.scenario();
         let truth = TRACED_QUANTITIES.map(|name| record.channel(name).unwrap_or_default());
         let end_s = record.time_s(record.len());
-        let changes_s = scenario.schedule.changes_s(end_s);
+        let changes_s = scenario.schedule.change_times_s(end_s);
         let first_s = changes_s.first().copied().unwrap_or(f64::INFINITY);
         // Bands and declared changes are evaluated only after the start fit, also for a two-sided estimate, whose
         // changes are declared by the causal estimate.
         let fitted_s = match trace.options().start {
-            StartAt::Span(Some((_, to))) => to,
+            StartSource::Span(Some((_, to))) => to,
             _ => trace.updated_from_s(),
         };
         let within = |t: f64| changes_s.iter().any(|c| (*c..*c + DECLARATION_TIME_S).contains(&t));
@@ -183,10 +183,10 @@ impl ChangeMeasures {
                 let error = estimate.value - true_value;
                 let inside = estimate
                     .standard_error
-                    .map(|se| f64::from(u8::from(error.abs() <= BAND * se)));
-                if (ERRORS_FROM_S - 1e-9..first_s).contains(t) {
+                    .map(|se| f64::from(u8::from(error.abs() <= BAND_STANDARD_ERRORS * se)));
+                if (ERROR_START_S - 1e-9..first_s).contains(t) {
                     before[i].update(error / true_value);
-                } else if *t >= end_s - END_S {
+                } else if *t >= end_s - FINAL_SPAN_S {
                     after[i].update(error / true_value);
                 }
                 if let Some(inside) = inside.filter(|_| *t > fitted_s) {

@@ -1,6 +1,6 @@
 //! The estimates of a cell, written as rows of the tables of fits and traces.
 
-use hoid_analysis::Identified;
+use hoid_analysis::IdentifiedModel;
 use hoid_ident::{Fit, Series, SigmoidFit, Termination};
 use hoid_io::OutputTable;
 use hoid_model::{
@@ -14,7 +14,7 @@ use hoid_numerics::statistics::{root_mean_square, variance};
 use hoid_track::Trace;
 
 use crate::{
-    columns::{OPERATOR, Rows, Schemas, TRACED_QUANTITIES, extra_axes},
+    columns::{OPERATOR_PARAMETERS, Rows, Schemas, TRACED_QUANTITIES, extra_axes},
     error_measures::{ChangeMeasures, TraceErrors, TrueResponse},
     plan::{Cell, EstimatorCell, Plan},
 };
@@ -62,7 +62,7 @@ impl<'a> EstimateRows<'a> {
     }
 
     /// Starts a replication; `delta_vaf` compares estimators within it.
-    pub fn begin_replication(&mut self) {
+    pub fn start_replication(&mut self) {
         self.vafs.clear();
     }
 
@@ -71,13 +71,13 @@ impl<'a> EstimateRows<'a> {
         let (cell, rows) = (self.cell, &mut self.fits);
         let scenario = cell.resolved.scenario();
         rows.start_row();
-        rows.whole("cell", cell.index);
-        rows.text("scenario", &cell.scenario);
-        rows.text("condition", &cell.condition);
-        rows.whole("remnant_order", scenario.remnant.order as u64);
+        rows.set_whole("cell", cell.index);
+        rows.set_text("scenario", &cell.scenario);
+        rows.set_text("condition", &cell.condition);
+        rows.set_whole("remnant_order", scenario.remnant.order as u64);
         if let RemnantStrength::Level { level, definition } = scenario.remnant.strength {
-            rows.real("noise_level", level);
-            rows.text(
+            rows.set_real("noise_level", level);
+            rows.set_text(
                 "noise_definition",
                 match definition {
                     NoiseDefinition::Response => "response",
@@ -85,60 +85,60 @@ impl<'a> EstimateRows<'a> {
                 },
             );
         }
-        rows.real("T_n_true", scenario.remnant.time_constant_s);
-        rows.real("sample_time_s", scenario.sample_time.s());
+        rows.set_real("T_n_true", scenario.remnant.time_constant_s);
+        rows.set_real("sample_time_s", scenario.sample_time.s());
         for name in &self.extra {
             let axis = cell.axes.iter().chain(&estimator.axes).find(|axis| axis.key == *name);
-            rows.text(name, axis.map_or("", |axis| axis.value.as_str()));
+            rows.set_text(name, axis.map_or("", |axis| axis.value.as_str()));
         }
-        rows.whole("replication", replication);
-        rows.text("estimator", &estimator.label);
-        rows.text("name", &estimator.name);
-        rows.text("method", estimator.method());
+        rows.set_whole("replication", replication);
+        rows.set_text("estimator", &estimator.label);
+        rows.set_text("name", &estimator.name);
+        rows.set_text("method", estimator.method());
         if let Some(structure) = estimator.structure() {
-            rows.text("structure", structure.name());
-            for (name, n) in estimator.orders(&cell.resolved).named() {
-                rows.real(name, n as f64);
+            rows.set_text("structure", structure.name());
+            for (name, n) in estimator.orders(&cell.resolved).named_orders() {
+                rows.set_real(name, n as f64);
             }
         }
-        rows.text("start", &estimator.start);
-        rows.whole("decimate", estimator.decimate as u64);
+        rows.set_text("start", &estimator.start);
+        rows.set_whole("decimate", estimator.decimate as u64);
         let (from, to) = estimator.span_s.unwrap_or((0.0, scenario.measurement_s));
-        rows.real("from_s", from);
-        rows.real("to_s", to);
+        rows.set_real("from_s", from);
+        rows.set_real("to_s", to);
     }
 
     /// Records that the current estimate failed.
-    pub fn failed(&mut self, reason: &str) {
-        self.fits.text("status", "failed");
-        self.fits.text("reason", reason);
+    pub fn write_failure(&mut self, reason: &str) {
+        self.fits.set_text("status", "failed");
+        self.fits.set_text("reason", reason);
     }
 
     /// Writes the noise levels and RMS values of a run; `u0` is the output of the same run without remnant.
-    pub fn noise_row(&mut self, record: &Record, u0: &[f64]) {
+    pub fn write_noise_row(&mut self, record: &Record, u0: &[f64]) {
         let u = record.output();
         let difference: Vec<f64> = u.iter().zip(u0).map(|(u, u0)| u - u0).collect();
         let power = variance(u);
         let n = record.channel("n").unwrap_or_default();
         let rows = &mut self.fits;
-        rows.real("noise_level_obtained", (power - variance(u0)) / power);
-        rows.real("noise_level_response", variance(&difference) / power);
-        rows.real("noise_level_remnant", variance(n) / power);
+        rows.set_real("noise_level_obtained", (power - variance(u0)) / power);
+        rows.set_real("noise_level_response", variance(&difference) / power);
+        rows.set_real("noise_level_remnant", variance(n) / power);
         for (name, values) in [("rms_e", record.input()), ("rms_u", u), ("rms_n", n)] {
-            rows.real(name, root_mean_square(values));
+            rows.set_real(name, root_mean_square(values));
         }
-        rows.text("status", "ok");
+        rows.set_text("status", "ok");
     }
 
     /// Writes how a search ended.
-    pub fn termination(&mut self, termination: Termination) {
+    pub fn write_termination(&mut self, termination: Termination) {
         let rows = &mut self.fits;
-        rows.text("termination", &termination.reason.to_string());
-        rows.whole("converged", u64::from(termination.converged()));
-        rows.whole("iterations", termination.iterations as u64);
+        rows.set_text("termination", &termination.reason.to_string());
+        rows.set_whole("converged", u64::from(termination.converged()));
+        rows.set_whole("iterations", termination.iterations as u64);
     }
 
-    pub fn fit_row(
+    pub fn write_fit_row(
         &mut self,
         estimator: &'a EstimatorCell,
         fit: &Fit,
@@ -153,58 +153,58 @@ impl<'a> EstimateRows<'a> {
             .and_then(|name| self.vafs.iter().find(|v| v.0 == *name && v.1 == nk));
         let delta = other.map_or(f64::NAN, |other| vaf - other.2);
         self.vafs.push((&estimator.name, nk, vaf));
-        self.termination(fit.termination());
+        self.write_termination(fit.termination());
         let rows = &mut self.fits;
-        rows.real("delta_vaf", delta);
-        rows.real("loss", fit.loss());
-        rows.real("innovation_variance", fit.innovation_variance());
-        rows.real("vaf", vaf);
+        rows.set_real("delta_vaf", delta);
+        rows.set_real("loss", fit.loss());
+        rows.set_real("innovation_variance", fit.innovation_variance());
+        rows.set_real("vaf", vaf);
         if let Some(true_response) = &self.true_response {
-            rows.real("response_error", true_response.error_percent(fit));
+            rows.set_real("response_error", true_response.error_percent(fit));
         }
         for (name, estimate) in fit.parameters() {
-            set(rows, &name, estimate);
+            set_estimate(rows, &name, estimate);
         }
         if fit.orders().nd > 0 {
             if let Ok(remnant) = fit.remnant(RemnantDiscretisation::ZeroOrderHold) {
-                set(rows, "T_n", remnant.t_n_s);
-                set(rows, "K_n", remnant.k_n);
+                set_estimate(rows, "T_n", remnant.t_n_s);
+                set_estimate(rows, "K_n", remnant.k_n);
             }
             if let Ok(remnant) = fit.remnant(RemnantDiscretisation::BackwardEuler) {
-                rows.real("T_n_backward_euler", remnant.t_n_s.value);
-                rows.real("K_n_backward_euler", remnant.k_n.value);
+                rows.set_real("T_n_backward_euler", remnant.t_n_s.value);
+                rows.set_real("K_n_backward_euler", remnant.k_n.value);
             }
         }
         match operator {
             Ok(operator) => {
                 for (name, _, estimate) in operator.rows() {
-                    set(rows, name, estimate);
+                    set_estimate(rows, name, estimate);
                 }
-                rows.text("status", "ok");
+                rows.set_text("status", "ok");
             }
             Err(reason) => {
-                rows.text("status", "not convertible");
-                rows.text("reason", &reason);
+                rows.set_text("status", "not convertible");
+                rows.set_text("reason", &reason);
             }
         }
         Ok(())
     }
 
     /// Writes the operator found by an analysis.
-    pub fn operator_row(&mut self, found: &Identified) -> Result<(), String> {
+    pub fn write_operator_row(&mut self, found: &IdentifiedModel) -> Result<(), String> {
         let (fit, record) = (&found.fit, &found.data.records[0]);
         let of = fit.operator(0);
         let simulated = of.polynomial_fit.simulate(record).map_err(|error| error.to_string())?;
-        self.termination(fit.termination);
+        self.write_termination(fit.termination);
         let rows = &mut self.fits;
-        rows.text("form", fit.form.name());
-        rows.real("nc", fit.noise_orders.0 as f64);
-        rows.real("nd", fit.noise_orders.1 as f64);
-        rows.real("loss", fit.loss);
-        rows.real("innovation_variance", fit.innovation_variance);
-        rows.real("vaf", vaf(record, &simulated));
+        rows.set_text("form", fit.form.name());
+        rows.set_real("nc", fit.noise_orders.0 as f64);
+        rows.set_real("nd", fit.noise_orders.1 as f64);
+        rows.set_real("loss", fit.loss);
+        rows.set_real("innovation_variance", fit.innovation_variance);
+        rows.set_real("vaf", vaf(record, &simulated));
         if let Some(true_response) = &self.true_response {
-            rows.real("response_error", true_response.error_percent(&of.polynomial_fit));
+            rows.set_real("response_error", true_response.error_percent(&of.polynomial_fit));
         }
         // An infinite T_I, which represents a pure integration, is not written.
         for p in of.parameters.iter().filter(|p| p.value.is_finite()) {
@@ -212,114 +212,114 @@ impl<'a> EstimateRows<'a> {
                 value: p.value,
                 standard_error: p.standard_error,
             };
-            set(rows, &p.name, estimate);
+            set_estimate(rows, &p.name, estimate);
         }
-        rows.text("status", "ok");
+        rows.set_text("status", "ok");
         Ok(())
     }
 
     /// Writes the fit of an operator with changing gains: the parameters of the operator before (1) and after (2) the
     /// change, and the parameters of the fit.
-    pub fn change_row(&mut self, found: &Identified<SigmoidFit>) -> Result<(), String> {
+    pub fn write_change_row(&mut self, found: &IdentifiedModel<SigmoidFit>) -> Result<(), String> {
         let (fit, record) = (&found.fit, &found.data.records[0]);
         let simulated = fit.simulate(record).map_err(|error| error.to_string())?;
-        self.termination(fit.termination());
+        self.write_termination(fit.termination());
         let rows = &mut self.fits;
-        rows.text("form", fit.form().name());
-        rows.real("nd", fit.d().len() as f64);
-        rows.real("loss", fit.loss());
-        rows.real("innovation_variance", fit.innovation_variance());
-        rows.real("vaf", vaf(record, &simulated));
-        rows.real("change_found", f64::from(u8::from(fit.change_found())));
+        rows.set_text("form", fit.form().name());
+        rows.set_real("nd", fit.d().len() as f64);
+        rows.set_real("loss", fit.loss());
+        rows.set_real("innovation_variance", fit.innovation_variance());
+        rows.set_real("vaf", vaf(record, &simulated));
+        rows.set_real("change_found", f64::from(u8::from(fit.has_change())));
         for (end, operator) in [(1, fit.initial_operator()), (2, fit.last_operator())] {
             for p in &operator.parameters {
-                set(rows, &format!("{}{end}", p.name), p.estimate);
+                set_estimate(rows, &format!("{}{end}", p.name), p.estimate);
             }
         }
         for p in fit.parameters() {
-            set(rows, &p.name, p.estimate);
+            set_estimate(rows, &p.name, p.estimate);
         }
-        rows.text("status", "ok");
+        rows.set_text("status", "ok");
         Ok(())
     }
 
     /// Writes the verdict on the estimate and the kinds of the findings against it; notes are not written.
-    pub fn verdict(&mut self, verdict: &Verdict) {
+    pub fn write_verdict(&mut self, verdict: &Verdict) {
         let against = verdict
             .findings()
             .iter()
             .filter(|finding| finding.severity > Severity::Note);
         let kinds: Vec<&str> = against.map(|finding| finding.kind).collect();
-        self.fits.text("verdict", verdict.level.choice_name());
-        self.fits.text("findings", &kinds.join(", "));
+        self.fits.set_text("verdict", verdict.level.choice_name());
+        self.fits.set_text("findings", &kinds.join(", "));
     }
 
-    pub fn track_row(&mut self, trace: &Trace, record: &Record) {
+    pub fn write_track_row(&mut self, trace: &Trace, record: &Record) {
         if let Some(start) = trace.start() {
-            self.termination(start.termination());
+            self.write_termination(start.termination());
         }
         let errors = TraceErrors::of(trace, record, self.cell);
         let rows = &mut self.fits;
         for (i, name) in TRACED_QUANTITIES.iter().enumerate() {
-            rows.real(&format!("rms_{name}"), errors.rms_percent[i]);
-            rows.real(&format!("settle50_{name}"), errors.settled_s[0][i]);
-            rows.real(&format!("settle90_{name}"), errors.settled_s[1][i]);
+            rows.set_real(&format!("rms_{name}"), errors.rms_percent[i]);
+            rows.set_real(&format!("settle50_{name}"), errors.settled_s[0][i]);
+            rows.set_real(&format!("settle90_{name}"), errors.settled_s[1][i]);
         }
         if self.plan.changes {
             let measures = ChangeMeasures::of(trace, record, self.cell);
             for (i, name) in TRACED_QUANTITIES.iter().enumerate() {
-                rows.real(&format!("before_{name}"), measures.before_percent[i]);
-                rows.real(&format!("after_{name}"), measures.after_percent[i]);
-                rows.real(&format!("covered_{name}"), measures.covered_percent[i]);
-                rows.real(&format!("covered_through_{name}"), measures.covered_through_percent[i]);
+                rows.set_real(&format!("before_{name}"), measures.before_percent[i]);
+                rows.set_real(&format!("after_{name}"), measures.after_percent[i]);
+                rows.set_real(&format!("covered_{name}"), measures.covered_percent[i]);
+                rows.set_real(&format!("covered_through_{name}"), measures.covered_through_percent[i]);
             }
-            rows.real("false_alarms", measures.false_alarms);
-            rows.real("hours", measures.hours);
-            rows.real("found", measures.found_percent);
-            rows.real("lag", measures.lag_s);
+            rows.set_real("false_alarms", measures.false_alarms);
+            rows.set_real("hours", measures.hours);
+            rows.set_real("found", measures.found_percent);
+            rows.set_real("lag", measures.lag_s);
         }
-        rows.whole("diverged", u64::from(errors.diverged));
-        rows.whole("steps_shortened", trace.counts().shortened);
-        rows.real("share_not_convertible", errors.share_not_convertible);
+        rows.set_whole("diverged", u64::from(errors.diverged));
+        rows.set_whole("steps_shortened", trace.counts().shortened);
+        rows.set_real("share_not_convertible", errors.share_not_convertible);
         let Some(last) = trace.len().checked_sub(1) else { return };
-        rows.real("innovation_variance", trace.innovation_variance()[last]);
+        rows.set_real("innovation_variance", trace.innovation_variance()[last]);
         for (name, estimate) in trace.parameter_names().iter().zip(trace.parameters(last)) {
-            set(rows, name, estimate);
+            set_estimate(rows, name, estimate);
         }
         match trace.operator(last) {
             Ok(operator) => {
                 for (name, _, estimate) in operator.rows() {
-                    set(rows, name, estimate);
+                    set_estimate(rows, name, estimate);
                 }
-                rows.text("status", "ok");
+                rows.set_text("status", "ok");
             }
             Err(reason) => {
-                rows.text("status", "not convertible");
-                rows.text("reason", &reason.to_string());
+                rows.set_text("status", "not convertible");
+                rows.set_text("reason", &reason.to_string());
             }
         }
     }
 
-    pub fn trace_rows(&mut self, trace: &Trace, step: usize, estimator: &EstimatorCell, replication: u64) {
+    pub fn write_trace_rows(&mut self, trace: &Trace, step: usize, estimator: &EstimatorCell, replication: u64) {
         let Some(rows) = &mut self.traces else { return };
         let with_errors = self.plan.standard_errors;
         let place = |rows: &Rows, name: &str| (rows.position(name), rows.position(&format!("{name}_se")));
         let theta: Vec<_> = trace.parameter_names().iter().map(|name| place(rows, name)).collect();
-        let operator = OPERATOR.map(|name| place(rows, name));
+        let operator = OPERATOR_PARAMETERS.map(|name| place(rows, name));
         let put = |rows: &mut Rows, (value, error): (Option<usize>, Option<usize>), estimate: Estimate| {
             if let Some(position) = value {
-                rows.real_at(position, estimate.value);
+                rows.set_real_at(position, estimate.value);
             }
             if let (Some(position), Some(se)) = (error, estimate.standard_error) {
-                rows.real_at(position, se);
+                rows.set_real_at(position, se);
             }
         };
         for k in (step - 1..trace.len()).step_by(step) {
             rows.start_row();
-            rows.whole("cell", self.cell.index);
-            rows.whole("replication", replication);
-            rows.text("estimator", &estimator.label);
-            rows.real("t", trace.times_s()[k]);
+            rows.set_whole("cell", self.cell.index);
+            rows.set_whole("replication", replication);
+            rows.set_text("estimator", &estimator.label);
+            rows.set_real("t", trace.times_s()[k]);
             if with_errors {
                 for (places, estimate) in theta.iter().zip(trace.parameters(k)) {
                     put(rows, *places, estimate);
@@ -348,9 +348,9 @@ fn vaf(record: &Record, simulated: &Series) -> f64 {
     hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values)
 }
 
-fn set(rows: &mut Rows, name: &str, estimate: Estimate) {
-    rows.real(name, estimate.value);
+fn set_estimate(rows: &mut Rows, name: &str, estimate: Estimate) {
+    rows.set_real(name, estimate.value);
     if let Some(se) = estimate.standard_error {
-        rows.real(&format!("{name}_se"), se);
+        rows.set_real(&format!("{name}_se"), se);
     }
 }

@@ -8,7 +8,7 @@ use crate::{
     Plan, StudyError,
     block::blocks,
     columns::Schemas,
-    directory::{part, table_path},
+    directory::{part_path, table_path},
     summary::{self, PartsOfCell},
     truth::cells_table,
 };
@@ -43,7 +43,7 @@ pub(crate) fn join(
         let Some(schema) = schema else { continue };
         let mut writer = TableWriter::create(&table_path(directory, table, csv), schema)?;
         for (from, block) in parts {
-            writer.append(&hoid_io::read_table(&part(from, *block, table))?)?;
+            writer.append(&hoid_io::read_table(&part_path(from, *block, table))?)?;
         }
         writer.finish()?;
     }

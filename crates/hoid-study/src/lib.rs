@@ -34,7 +34,7 @@
 //! let results = Results::read(directory.path())?;
 //! let bias = |level| {
 //!     let query = Query::of("bias_b0").name("ARX").noise_level(level);
-//!     results.one(&query).map_or(f64::NAN, |row| row.statistics.median.abs())
+//!     results.find_one(&query).map_or(f64::NAN, |row| row.statistics.median.abs())
 //! };
 //! // Without remnant ARX is exact; with a remnant that is not white its estimates are biased.
 //! assert!(bias(0.0) < 1e-3 && bias(0.1) > 1.0, "{} {}", bias(0.0), bias(0.1));
@@ -83,7 +83,7 @@ mod tables;
 mod true_value;
 mod truth;
 
-pub use columns::OPERATOR;
+pub use columns::OPERATOR_PARAMETERS;
 pub use error::StudyError;
 pub use merge::merge;
 pub use plan::{Plan, plan_schema, plan_schema_of};

@@ -11,11 +11,11 @@ use crate::{
     Plan, StudyError,
     block::{blocks, run_block},
     columns::Schemas,
-    directory::{PLAN, remove_parts, tables, write_plan},
+    directory::{PLAN_FILE, remove_parts, table_paths, write_plan},
     join::join,
     run::{Outcome, write_tables},
     run_record::RunRecord,
-    seal::{OnDisk, notes_on, on_disk},
+    seal::{OnDisk, block_state, damage_notes},
 };
 
 /// Merges the shards of a study.
@@ -45,18 +45,18 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
         let first = match &plan {
             Some((_, first)) => first,
             None => {
-                let found = Plan::read(&shard.join(PLAN))?.with_replications(manifest.replications)?;
+                let found = Plan::read(&shard.join(PLAN_FILE))?.with_replications(manifest.replications)?;
                 &plan.insert((found, manifest.clone())).1
             }
         };
-        if let Some(reason) = first.differs(&manifest) {
+        if let Some(reason) = first.difference(&manifest) {
             return Err(StudyError::OtherStudy {
                 directory: shard.display().to_string(),
                 reason,
             });
         }
         for block in 0..manifest.blocks {
-            match on_disk(shard, &manifest.plan_sha256, block) {
+            match block_state(shard, &manifest.plan_sha256, block) {
                 OnDisk::Missing => continue,
                 OnDisk::Whole => {}
                 OnDisk::Damaged(why) => damaged.push((block, why)),
@@ -77,7 +77,7 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
     };
     let all = blocks(&plan);
     if manifest
-        .differs(&RunRecord::of(&plan, all.len() as u64, None))
+        .difference(&RunRecord::of(&plan, all.len() as u64, None))
         .is_some()
     {
         return Err(StudyError::OtherStudy {
@@ -130,8 +130,8 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
     .write(directory)?;
     Ok(Outcome {
         finished: true,
-        estimates: plan.estimates(),
-        tables: tables(directory),
-        notes: notes_on(&damaged),
+        estimates: plan.estimate_count(),
+        tables: table_paths(directory),
+        notes: damage_notes(&damaged),
     })
 }

@@ -19,7 +19,7 @@ pub const PLANS: &[NamedPlan] = &[NamedPlan {
 
 impl NamedPlan {
     /// Number of replications in each of the included plans.
-    pub const REPLICATIONS: u64 = 100;
+    pub const DEFAULT_REPLICATIONS: u64 = 100;
 
     /// Parses the plan.
     ///
@@ -40,7 +40,7 @@ mod tests {
             let plan = named.plan().unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(plan.name, named.name);
             assert!(!plan.title.is_empty() && !plan.description.is_empty(), "{}", plan.name);
-            assert_eq!(plan.replications, NamedPlan::REPLICATIONS, "{}", plan.name);
+            assert_eq!(plan.replications, NamedPlan::DEFAULT_REPLICATIONS, "{}", plan.name);
         }
     }
 }

@@ -34,7 +34,7 @@ impl Preparation {
     }
 
     /// Returns the prepared record.
-    pub fn of_record<'r>(&self, record: &'r Record) -> Result<Cow<'r, Record>, String> {
+    pub fn apply<'r>(&self, record: &'r Record) -> Result<Cow<'r, Record>, String> {
         let mut record = match self.span_s {
             None => Cow::Borrowed(record),
             Some((from, to)) => Cow::Owned(record.span(from, to).map_err(|error| error.to_string())?),

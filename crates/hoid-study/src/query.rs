@@ -73,12 +73,12 @@ pub(crate) struct RowKey {
 impl Query {
     /// Selects all rows of a quantity.
     pub fn of(quantity: &str) -> Self {
-        Self::default().quantity_of(quantity)
+        Self::default().with_quantity(quantity)
     }
 
     /// Selects the same cells and estimators for another quantity.
     #[must_use]
-    pub fn quantity_of(mut self, quantity: &str) -> Self {
+    pub fn with_quantity(mut self, quantity: &str) -> Self {
         self.quantity = Some(quantity.to_owned());
         self
     }

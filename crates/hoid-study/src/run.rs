@@ -18,11 +18,11 @@ use crate::{
     Plan, StudyError,
     block::{Block, blocks, run_block},
     columns::Schemas,
-    directory::{remove_parts, sweep, tables, write_plan},
+    directory::{remove_partial_files, remove_parts, table_paths, write_plan},
     estimate_rows::BlockTables,
     join::join,
     run_record::RunRecord,
-    seal::{OnDisk, notes_on, on_disk, write_block},
+    seal::{OnDisk, block_state, damage_notes, write_block},
     shard::Shard,
 };
 
@@ -86,7 +86,7 @@ pub fn run(
         return Ok(Outcome {
             finished: true,
             estimates: 0,
-            tables: tables(directory),
+            tables: table_paths(directory),
             notes: Vec::new(),
         });
     }
@@ -95,11 +95,11 @@ pub fn run(
     let mine: Vec<Block> = all
         .iter()
         .copied()
-        .filter(|block| options.shard.is_none_or(|shard| shard.has(block.index)))
+        .filter(|block| options.shard.is_none_or(|shard| shard.contains(block.index)))
         .collect();
     let mut notes: Vec<String> = known.note_on_seals().into_iter().collect();
-    let (there, open, damaged) = sorted(directory, &manifest.plan_sha256, &mine);
-    notes.extend(notes_on(&damaged));
+    let (there, open, damaged) = classify_blocks(directory, &manifest.plan_sha256, &mine);
+    notes.extend(damage_notes(&damaged));
     let known: u64 = there.iter().map(estimates).sum();
     let total: u64 = mine.iter().map(estimates).sum();
     let done = AtomicU64::new(known);
@@ -120,7 +120,7 @@ pub fn run(
         write_tables(directory, &manifest.plan_sha256, block, &tables)?;
         Ok(true)
     };
-    let finished = on_threads(options.jobs, &open, one)?;
+    let finished = run_on_threads(options.jobs, &open, one)?;
     let estimates = done.load(Ordering::Relaxed) - known;
     if !finished || options.shard.is_some() {
         return Ok(Outcome {
@@ -141,7 +141,7 @@ pub fn run(
     Ok(Outcome {
         finished: true,
         estimates,
-        tables: tables(directory),
+        tables: table_paths(directory),
         notes,
     })
 }
@@ -160,10 +160,14 @@ pub(crate) fn write_tables(
 
 /// Returns the complete blocks, the blocks to be computed (including damaged ones), and the number of each damaged
 /// block with the reason.
-fn sorted(directory: &Path, plan_sha256: &str, mine: &[Block]) -> (Vec<Block>, Vec<Block>, Vec<(u64, String)>) {
+fn classify_blocks(
+    directory: &Path,
+    plan_sha256: &str,
+    mine: &[Block],
+) -> (Vec<Block>, Vec<Block>, Vec<(u64, String)>) {
     let (mut there, mut open, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
     for block in mine {
-        match on_disk(directory, plan_sha256, block.index) {
+        match block_state(directory, plan_sha256, block.index) {
             OnDisk::Whole => there.push(*block),
             OnDisk::Missing => open.push(*block),
             OnDisk::Damaged(why) => {
@@ -186,13 +190,13 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
             let of = |shard: Option<Shard>| shard.map_or("the whole study".to_owned(), |s| format!("shard {s}"));
             format!("it is {}, but this run is {}", of(found.shard), of(manifest.shard))
         });
-        if let Some(reason) = found.differs(manifest).or(other_shard) {
+        if let Some(reason) = found.difference(manifest).or(other_shard) {
             return Err(StudyError::OtherStudy {
                 directory: shown(),
                 reason,
             });
         }
-        ready(directory, &found, manifest)?;
+        prepare_continuation(directory, &found, manifest)?;
         return Ok(found);
     }
     hoid_io::make_directory(&directory.join("parts"))?;
@@ -204,11 +208,11 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
 /// Prepares a directory for continuation: removes partial output or, if the study is complete, all parts. An incomplete
 /// directory of an earlier version, which wrote no seals, is marked as sealed, since all of its blocks are computed
 /// again.
-pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
+pub(crate) fn prepare_continuation(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
     if found.complete {
         return remove_parts(directory);
     }
-    sweep(&directory.join("parts"))?;
+    remove_partial_files(&directory.join("parts"))?;
     if !found.sealed {
         record.write(directory)?;
     }
@@ -216,7 +220,7 @@ pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> 
 }
 
 /// Runs the open blocks on `jobs` threads, by default one per core. Returns true if all blocks were finished.
-pub(crate) fn on_threads<T: Sync>(
+pub(crate) fn run_on_threads<T: Sync>(
     jobs: Option<usize>,
     open: &[T],
     one: impl Fn(&T) -> Result<bool, StudyError> + Sync + Send,

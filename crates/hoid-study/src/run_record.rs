@@ -28,7 +28,7 @@ pub(crate) struct RunRecord {
     pub sealed: bool,
 }
 
-const NAME: &str = "study.json";
+const FILE_NAME: &str = "study.json";
 
 impl RunRecord {
     pub fn of(plan: &Plan, blocks: u64, shard: Option<Shard>) -> Self {
@@ -55,7 +55,7 @@ impl RunRecord {
 
     /// Reads the record of a directory; `None` if the directory holds no study.
     pub fn read(directory: &Path) -> Result<Option<Self>, StudyError> {
-        let path = directory.join(NAME);
+        let path = directory.join(FILE_NAME);
         if !path.exists() {
             return Ok(None);
         }
@@ -70,12 +70,12 @@ impl RunRecord {
 
     pub fn write(&self, directory: &Path) -> Result<(), StudyError> {
         let text = serde_json::to_string_pretty(self).unwrap_or_default();
-        let path = directory.join(NAME);
+        let path = directory.join(FILE_NAME);
         Ok(hoid_io::write_atomically(&path, |file| writeln!(file, "{text}"))?)
     }
 
     /// Returns the difference that prevents two parts from being merged into one study; `None` if they match.
-    pub fn differs(&self, other: &Self) -> Option<String> {
+    pub fn difference(&self, other: &Self) -> Option<String> {
         // Settings that a user may have changed are compared first. Each of them also changes the hash of the plan, but
         // a different hash is less informative.
         let pairs = [

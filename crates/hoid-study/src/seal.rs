@@ -12,7 +12,7 @@ use sha2::{Digest, Sha256};
 
 use crate::{
     StudyError,
-    directory::{part, seal_path},
+    directory::{part_path, seal_path},
 };
 
 /// The content of a seal file.
@@ -42,7 +42,7 @@ pub(crate) fn write_block(
 ) -> Result<(), StudyError> {
     let mut sums = BTreeMap::new();
     for (name, table) in tables {
-        let path = part(directory, block, name);
+        let path = part_path(directory, block, name);
         hoid_io::write_table(&path, table)?;
         sums.insert((*name).to_owned(), sha256(&hoid_io::read_bytes(&path)?));
     }
@@ -58,7 +58,7 @@ pub(crate) fn write_block(
 }
 
 /// Returns the state of a block on disk.
-pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
+pub(crate) fn block_state(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
     let path = seal_path(directory, block);
     if !path.exists() {
         return OnDisk::Missing;
@@ -74,7 +74,7 @@ pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk
         return OnDisk::Damaged("it is from another plan".to_owned());
     }
     for (table, sum) in &seal.tables {
-        match hoid_io::read_bytes(&part(directory, block, table)) {
+        match hoid_io::read_bytes(&part_path(directory, block, table)) {
             Ok(bytes) if sha256(&bytes) == *sum => {}
             Ok(_) => return OnDisk::Damaged(format!("its table {table} was changed after it was written")),
             Err(_) => return OnDisk::Damaged(format!("its table {table} cannot be read")),
@@ -89,19 +89,19 @@ pub(crate) fn sha256(bytes: &[u8]) -> String {
 }
 
 /// Maximum number of damaged blocks that are reported individually.
-const MAX_NAMED: usize = 5;
+const MAX_LISTED_BLOCKS: usize = 5;
 
 /// Returns notes on damaged blocks, which are computed again.
-pub(crate) fn notes_on(damaged: &[(u64, String)]) -> Vec<String> {
+pub(crate) fn damage_notes(damaged: &[(u64, String)]) -> Vec<String> {
     let mut notes: Vec<String> = damaged
         .iter()
-        .take(MAX_NAMED)
+        .take(MAX_LISTED_BLOCKS)
         .map(|(block, why)| format!("block {block} is damaged ({why}) and was recomputed"))
         .collect();
-    if damaged.len() > MAX_NAMED {
+    if damaged.len() > MAX_LISTED_BLOCKS {
         notes.push(format!(
             "further damaged blocks that were recomputed: {}",
-            damaged.len() - MAX_NAMED
+            damaged.len() - MAX_LISTED_BLOCKS
         ));
     }
     notes
@@ -127,43 +127,43 @@ mod tests {
                 values: ColumnValues::Real(vec![value; 3]),
             }],
         };
-        assert_eq!(on_disk(d, "plan", 0), OnDisk::Missing);
+        assert_eq!(block_state(d, "plan", 0), OnDisk::Missing);
         write_block(d, "plan", 0, &[("fits", &table(1.0)), ("traces", &table(2.0))]).unwrap();
         write_block(d, "plan", 1, &[("fits", &table(3.0))]).unwrap();
-        assert_eq!(on_disk(d, "plan", 0), OnDisk::Whole);
-        assert_eq!(on_disk(d, "plan", 1), OnDisk::Whole);
+        assert_eq!(block_state(d, "plan", 0), OnDisk::Whole);
+        assert_eq!(block_state(d, "plan", 1), OnDisk::Whole);
         assert_eq!(
-            on_disk(d, "other", 1),
+            block_state(d, "other", 1),
             OnDisk::Damaged("it is from another plan".into())
         );
-        let path = part(d, 0, "fits");
+        let path = part_path(d, 0, "fits");
         let good = fs::read(&path).unwrap();
         for at in 0..good.len() {
             let mut bad = good.clone();
             bad[at] ^= 1;
             fs::write(&path, bad).unwrap();
-            assert!(matches!(on_disk(d, "plan", 0), OnDisk::Damaged(_)), "{at}");
+            assert!(matches!(block_state(d, "plan", 0), OnDisk::Damaged(_)), "{at}");
         }
         fs::write(&path, &good[..good.len() - 1]).unwrap();
-        assert!(matches!(on_disk(d, "plan", 0), OnDisk::Damaged(_)));
+        assert!(matches!(block_state(d, "plan", 0), OnDisk::Damaged(_)));
         fs::remove_file(&path).unwrap();
-        assert!(matches!(on_disk(d, "plan", 0), OnDisk::Damaged(_)));
+        assert!(matches!(block_state(d, "plan", 0), OnDisk::Damaged(_)));
         fs::write(&path, good).unwrap();
-        assert_eq!(on_disk(d, "plan", 0), OnDisk::Whole);
+        assert_eq!(block_state(d, "plan", 0), OnDisk::Whole);
         // Block 1 is replaced by block 0, including its seal.
         for (from, to) in [
-            (part(d, 0, "fits"), part(d, 1, "fits")),
+            (part_path(d, 0, "fits"), part_path(d, 1, "fits")),
             (seal_path(d, 0), seal_path(d, 1)),
         ] {
             fs::copy(from, to).unwrap();
         }
-        assert_eq!(on_disk(d, "plan", 1), OnDisk::Damaged("it is block 0".into()));
+        assert_eq!(block_state(d, "plan", 1), OnDisk::Damaged("it is block 0".into()));
     }
 
     #[test]
     fn many_damaged_blocks_are_counted() {
         let all: Vec<(u64, String)> = (0..9).map(|block| (block, "cut".to_owned())).collect();
-        assert_eq!(notes_on(&all).len(), MAX_NAMED + 1);
-        assert!(notes_on(&[]).is_empty());
+        assert_eq!(damage_notes(&all).len(), MAX_LISTED_BLOCKS + 1);
+        assert!(damage_notes(&[]).is_empty());
     }
 }

@@ -35,7 +35,7 @@ impl std::fmt::Display for Shard {
 impl Shard {
     /// True if a block belongs to the shard. Blocks are assigned to the shards in turn, so that all shards take about
     /// the same time.
-    pub(crate) fn has(self, block: u64) -> bool {
+    pub(crate) fn contains(self, block: u64) -> bool {
         block % self.of == self.index - 1
     }
 }

@@ -9,7 +9,7 @@
 //!   1973); for the median of any distribution, half the distance between the order statistics one binomial standard
 //!   deviation on either side of the middle; for a rate, `sqrt(p (1 - p) / n)`.
 
-use hoid_numerics::statistics::{self, finite_sorted, mean};
+use hoid_numerics::statistics::{self, mean, sorted_finite_values};
 
 /// Statistics of a set of values, for box plots and tables.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -49,12 +49,12 @@ pub struct Statistics {
 impl Statistics {
     /// Computes the statistics of values. If there are no finite values, all statistics except the counts are NaN.
     pub fn of(values: &[f64]) -> Self {
-        let sorted = finite_sorted(values.iter().copied());
+        let sorted = sorted_finite_values(values.iter().copied());
         let (n, missing) = (sorted.len(), values.len() - sorted.len());
         let (Some(&min), Some(&max)) = (sorted.first(), sorted.last()) else {
             return Self {
                 missing,
-                ..Self::nothing()
+                ..Self::empty()
             };
         };
         let mean = mean(&sorted);
@@ -90,7 +90,7 @@ impl Statistics {
         }
     }
 
-    fn nothing() -> Self {
+    fn empty() -> Self {
         Self {
             mean: f64::NAN,
             mean_se: f64::NAN,
@@ -132,7 +132,7 @@ pub fn quantile(sorted: &[f64], p: f64) -> f64 {
 
 /// Returns the median of the finite values; NaN if there are none.
 pub fn median(values: &[f64]) -> f64 {
-    statistics::quantile_of(values, 0.5).unwrap_or(f64::NAN)
+    statistics::finite_quantile(values, 0.5).unwrap_or(f64::NAN)
 }
 
 /// Returns the standard error of the median of sorted values.

@@ -48,7 +48,7 @@ impl Columns {
     }
 
     /// Returns the names of the columns that contain no text.
-    pub(crate) fn numbers(&self) -> impl Iterator<Item = &str> {
+    pub(crate) fn numeric_column_names(&self) -> impl Iterator<Item = &str> {
         let numbers = self.table.columns.iter().filter(|column| match &column.values {
             ColumnValues::Text(values) => values.iter().all(String::is_empty),
             _ => true,
@@ -72,7 +72,7 @@ impl Columns {
         }
     }
 
-    pub(crate) fn pair(
+    pub(crate) fn cell_estimator_index(
         &self,
         at: &HashMap<(u64, String), usize>,
         cell: f64,

@@ -7,7 +7,7 @@ use hoid_model::{
 };
 
 use crate::{
-    columns::OPERATOR,
+    columns::OPERATOR_PARAMETERS,
     plan::{Cell, EstimatorCell, Task},
 };
 
@@ -20,25 +20,25 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
         _ => estimator.span_s.unwrap_or((0.0, scenario.measurement_s)),
     };
     if let Some(ResolvedRequest::Change(_)) = estimator.task.analysis() {
-        return of_change(cell, name);
+        return true_change_value(cell, name);
     }
     let [first, last] = [from, to].map(|t| cell.resolved.parameters_at(t).operator);
-    if !close(first.k_e, last.k_e) || !close(first.t_l_s, last.t_l_s) {
+    if !is_close(first.k_e, last.k_e) || !is_close(first.t_l_s, last.t_l_s) {
         return f64::NAN;
     }
-    let [before, after] = cell.truth();
-    let state = if close(first.k_e_dot(), before.operator[2]) {
+    let [before, after] = cell.true_states();
+    let state = if is_close(first.k_e_dot(), before.operator[2]) {
         before
     } else {
         after
     };
     // The static gain K_e is also the true value of K, the name used by forms without a lead.
     let named = if name == "K" { "K_e" } else { name };
-    if let Some(i) = OPERATOR.iter().position(|p| *p == named) {
+    if let Some(i) = OPERATOR_PARAMETERS.iter().position(|p| *p == named) {
         return state.operator[i];
     }
     let coefficient = match name {
-        "tau_e" if close(first.tau_e_s, last.tau_e_s) => return last.tau_e_s,
+        "tau_e" if is_close(first.tau_e_s, last.tau_e_s) => return last.tau_e_s,
         "tau_e" => return f64::NAN,
         "T_n" | "T_n_backward_euler" => return scenario.remnant.time_constant_s,
         "K_n" | "K_n_backward_euler" => return state.k_n,
@@ -46,7 +46,7 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
         "f2" | "a2" => 1,
         "b0" => 2,
         "b1" => 3,
-        _ => return of_noise_model(cell, estimator, state.k_n, name),
+        _ => return true_noise_model_value(cell, estimator, state.k_n, name),
     };
     if estimator.decimate > 1 {
         return f64::NAN;
@@ -54,17 +54,17 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     state.discrete[coefficient]
 }
 
-fn close(a: f64, b: f64) -> bool {
+fn is_close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-2 * a.abs().max(b.abs())
 }
 
 /// Returns a true value for an operator with changing gains: a parameter before (1) or after (2) the change, or the
 /// time or rate of the change.
-fn of_change(cell: &Cell, name: &str) -> f64 {
+fn true_change_value(cell: &Cell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
-    let ends = cell.truth();
-    let constant = |of: [f64; 2]| if close(of[0], of[1]) { of[0] } else { f64::NAN };
-    let place = |parameter: &str| OPERATOR.iter().position(|p| *p == parameter);
+    let ends = cell.true_states();
+    let constant = |of: [f64; 2]| if is_close(of[0], of[1]) { of[0] } else { f64::NAN };
+    let place = |parameter: &str| OPERATOR_PARAMETERS.iter().position(|p| *p == parameter);
     let end = |digit| name.strip_suffix(digit).and_then(place);
     match (name, &scenario.schedule) {
         // An operator who changes back and forth does not match the model.
@@ -83,7 +83,7 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
 
 /// Returns a coefficient of D or the innovation variance of the noise model of the remnant, which is held over each
 /// sample.
-fn of_noise_model(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
+fn true_noise_model_value(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
     let remnant = cell.resolved.scenario().remnant;
     let by_polynomials = matches!(estimator.task, Task::Fit(_))
         || matches!(estimator.task.analysis(), Some(ResolvedRequest::Polynomials(_)));

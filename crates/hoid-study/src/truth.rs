@@ -8,7 +8,7 @@ use hoid_model::{
 };
 
 use crate::{
-    columns::{OPERATOR, Rows, comments},
+    columns::{OPERATOR_PARAMETERS, Rows, comments},
     plan::{Cell, Plan},
 };
 
@@ -25,7 +25,7 @@ pub struct TrueState {
 
 impl Cell {
     /// Returns the true parameters before and after the change; both are equal if nothing changes.
-    pub fn truth(&self) -> [TrueState; 2] {
+    pub fn true_states(&self) -> [TrueState; 2] {
         let scenario = self.resolved.scenario();
         // The parameters are evaluated long before the change, and long after it or in the middle of the interval until
         // the operator changes back.
@@ -39,12 +39,12 @@ impl Cell {
         let states = [&scenario.initial, &scenario.last];
         [0, 1].map(|i| {
             let at = self.resolved.parameters_at(ends[i]);
-            state(states[i], at.k_n, scenario.sample_time)
+            true_state(states[i], at.k_n, scenario.sample_time)
         })
     }
 }
 
-fn state(of: &OperatingState, k_n: f64, sample_time: hoid_model::SampleTime) -> TrueState {
+fn true_state(of: &OperatingState, k_n: f64, sample_time: hoid_model::SampleTime) -> TrueState {
     let rows = OperatorEstimate::from(of.operator).rows();
     let held = of.operator.discretise(sample_time).ok();
     TrueState {
@@ -93,31 +93,31 @@ pub(crate) fn cells_table(plan: &Plan) -> OutputTable {
     for cell in &plan.cells {
         let scenario = cell.resolved.scenario();
         rows.start_row();
-        rows.whole("cell", cell.index);
-        rows.text("scenario", &cell.scenario);
-        rows.text("condition", &cell.condition);
-        rows.whole("replications", cell.replications);
-        rows.whole("remnant_order", scenario.remnant.order as u64);
+        rows.set_whole("cell", cell.index);
+        rows.set_text("scenario", &cell.scenario);
+        rows.set_text("condition", &cell.condition);
+        rows.set_whole("replications", cell.replications);
+        rows.set_whole("remnant_order", scenario.remnant.order as u64);
         if let RemnantStrength::Level { level, .. } = scenario.remnant.strength {
-            rows.real("noise_level", level);
+            rows.set_real("noise_level", level);
         }
-        rows.real("T_n", scenario.remnant.time_constant_s);
-        rows.real("sample_time_s", scenario.sample_time.s());
-        rows.real("measurement_s", scenario.measurement_s);
+        rows.set_real("T_n", scenario.remnant.time_constant_s);
+        rows.set_real("sample_time_s", scenario.sample_time.s());
+        rows.set_real("measurement_s", scenario.measurement_s);
         if let (Some(change_s), Some(rate_per_s)) = (scenario.schedule.change_s(), scenario.schedule.rate_per_s()) {
-            rows.real("change_s", change_s);
-            rows.real("rate_per_s", rate_per_s);
+            rows.set_real("change_s", change_s);
+            rows.set_real("rate_per_s", rate_per_s);
         }
-        rows.real("tau_e_initial", scenario.initial.operator.tau_e_s);
-        rows.real("tau_e_last", scenario.last.operator.tau_e_s);
-        for (state, when) in cell.truth().iter().zip(["initial", "last"]) {
-            for (name, value) in OPERATOR.iter().zip(state.operator) {
-                rows.real(&format!("{name}_{when}"), value);
+        rows.set_real("tau_e_initial", scenario.initial.operator.tau_e_s);
+        rows.set_real("tau_e_last", scenario.last.operator.tau_e_s);
+        for (state, when) in cell.true_states().iter().zip(["initial", "last"]) {
+            for (name, value) in OPERATOR_PARAMETERS.iter().zip(state.operator) {
+                rows.set_real(&format!("{name}_{when}"), value);
             }
             for (name, value) in STATE_COLUMNS[5..9].iter().zip(state.discrete) {
-                rows.real(&format!("{name}_{when}"), value);
+                rows.set_real(&format!("{name}_{when}"), value);
             }
-            rows.real(&format!("K_n_{when}"), state.k_n);
+            rows.set_real(&format!("K_n_{when}"), state.k_n);
         }
     }
     rows.into_table(schema.comments)

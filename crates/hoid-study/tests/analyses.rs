@@ -2,7 +2,7 @@
 //! changing gains, and instrumental variables.
 #![allow(clippy::unwrap_used)]
 
-use hoid_analysis::{Identification, Identified, Polynomials, Recordings};
+use hoid_analysis::{Identification, IdentifiedModel, Polynomials, Recordings};
 use hoid_ident::{
     IvMethod, SigmoidChange,
     family::{FamilyEstimator, OperatorPrior},
@@ -16,7 +16,7 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 use hoid_study::{Plan, Query, Results, RunOptions, run};
 
-const PLAN: &str = r#"
+const PLAN_TEXT: &str = r#"
 name = "people"
 seed = 3
 replications = 2
@@ -78,7 +78,7 @@ fn text<'a>(table: &'a OutputTable, column: &str, row: usize) -> &'a str {
     }
 }
 
-fn rows(table: &OutputTable) -> usize {
+fn row_count(table: &OutputTable) -> usize {
     match table.column("name") {
         Some(ColumnValues::Text(values)) => values.len(),
         other => panic!("{other:?}"),
@@ -88,7 +88,7 @@ fn rows(table: &OutputTable) -> usize {
 /// Returns the row of an estimator for the first replication of a scenario.
 fn row(table: &OutputTable, scenario: &str, name: &str) -> usize {
     let is = |row: &usize| text(table, "scenario", *row) == scenario && text(table, "name", *row) == name;
-    (0..rows(table)).find(is).unwrap()
+    (0..row_count(table)).find(is).unwrap()
 }
 
 fn record(condition: Condition, cell: u64) -> Record {
@@ -105,7 +105,7 @@ fn record(condition: Condition, cell: u64) -> Record {
     Simulator::new(&scenario).unwrap().run(seed, false).unwrap()
 }
 
-fn has_verdict(table: &OutputTable, row: usize, verdict: &Verdict) {
+fn assert_verdict(table: &OutputTable, row: usize, verdict: &Verdict) {
     assert_eq!(text(table, "status", row), "ok");
     assert_eq!(text(table, "verdict", row), verdict.level.choice_name());
     let against = verdict
@@ -116,8 +116,8 @@ fn has_verdict(table: &OutputTable, row: usize, verdict: &Verdict) {
     assert_eq!(text(table, "findings", row), kinds.join(", "));
 }
 
-fn is_operator(table: &OutputTable, row: usize, found: &Identified) {
-    has_verdict(table, row, &found.verdict);
+fn assert_operator(table: &OutputTable, row: usize, found: &IdentifiedModel) {
+    assert_verdict(table, row, &found.verdict);
     assert_eq!(text(table, "form", row), found.fit.form.name());
     assert_eq!(real(table, "nd", row), found.fit.noise_orders.1 as f64);
     for p in &found.fit.operator(0).parameters {
@@ -134,15 +134,15 @@ fn is_operator(table: &OutputTable, row: usize, found: &Identified) {
 /// Each row is bit-identical to the result of analysing that run with the options of the plan.
 #[test]
 fn rows_match_single_run_analyses() {
-    let (directory, fits) = fits(PLAN);
-    let steady = || Recordings::of_records([record(Condition::C1, 0)]);
-    let changed = || Recordings::of_records([record(Condition::C4, 1)]);
+    let (directory, fits) = fits(PLAN_TEXT);
+    let steady = || Recordings::from_records([record(Condition::C1, 0)]);
+    let changed = || Recordings::from_records([record(Condition::C4, 1)]);
     let operator = FamilyEstimator {
         prior: OperatorPrior::none(),
         ..FamilyEstimator::default()
     };
     let found = Identification::of(operator.clone()).run(steady()).unwrap();
-    is_operator(&fits, row(&fits, "steady", "operator"), &found);
+    assert_operator(&fits, row(&fits, "steady", "operator"), &found);
 
     let lead = Identification {
         excitation: hoid_analysis::Excitation::Nothing,
@@ -154,11 +154,11 @@ fn rows_match_single_run_analyses() {
             ..operator
         })
     };
-    is_operator(&fits, row(&fits, "change", "lead"), &lead.run(changed()).unwrap());
+    assert_operator(&fits, row(&fits, "change", "lead"), &lead.run(changed()).unwrap());
 
     let found = Identification::of(SigmoidChange::default()).run(changed()).unwrap();
     let at = row(&fits, "change", "change");
-    has_verdict(&fits, at, &found.verdict);
+    assert_verdict(&fits, at, &found.verdict);
     for p in found.fit.parameters() {
         assert_eq!(real(&fits, &p.name, at), p.estimate.value, "{}", p.name);
     }
@@ -175,7 +175,7 @@ fn rows_match_single_run_analyses() {
     };
     let found = Identification::of(sriv).run(steady()).unwrap();
     let at = row(&fits, "steady", "SRIV");
-    has_verdict(&fits, at, &found.verdict);
+    assert_verdict(&fits, at, &found.verdict);
     for (name, estimate) in found.fit.fit.parameters() {
         assert_eq!(real(&fits, &name, at), estimate.value, "{name}");
     }
@@ -184,7 +184,7 @@ fn rows_match_single_run_analyses() {
     let results = Results::read(directory.path()).unwrap();
     let one = |quantity: &str, scenario: &str, name: &str| {
         let query = Query::of(quantity).scenario(scenario).name(name);
-        results.one(&query).unwrap().statistics.mean
+        results.find_one(&query).unwrap().statistics.mean
     };
     for (scenario, name) in [("steady", "operator"), ("change", "change"), ("steady", "SRIV")] {
         let levels = ["trustworthy", "doubtful", "not_determined"].map(|level| one(level, scenario, name));
@@ -198,13 +198,13 @@ fn rows_match_single_run_analyses() {
 
 /// The lead of a form with a lag is not an estimate of the simulated lead.
 #[test]
-fn lead_of_another_form_has_no_bias() {
-    let text = PLAN.replace("form = \"lead\"", "form = \"lead-lag\"");
+fn bias_is_not_computed_for_lead_of_another_form() {
+    let text = PLAN_TEXT.replace("form = \"lead\"", "form = \"lead-lag\"");
     let (directory, fits) = fits(&text);
     let at = row(&fits, "steady", "lead");
     assert!(real(&fits, "T_L", at).is_finite() && real(&fits, "K_over_T_I", at).is_finite());
     let results = Results::read(directory.path()).unwrap();
-    let of = |quantity: &str| results.one(&Query::of(quantity).scenario("steady").name("lead"));
+    let of = |quantity: &str| results.find_one(&Query::of(quantity).scenario("steady").name("lead"));
     assert!(of("bias_T_L").is_none());
     assert!(of("bias_K").unwrap().statistics.mean.abs() < 30.0);
 }
@@ -212,22 +212,22 @@ fn lead_of_another_form_has_no_bias() {
 /// A failed fit is a row with its reason, and has no verdict.
 #[test]
 fn failed_fits_are_rows_with_a_reason() {
-    let text = PLAN.replace("method = ", "span_s = [0.0, 0.05]\nmethod = ");
+    let text = PLAN_TEXT.replace("method = ", "span_s = [0.0, 0.05]\nmethod = ");
     let (directory, fits) = fits(&text);
-    assert_eq!(rows(&fits), 2 * (3 + 4));
-    for row in 0..rows(&fits) {
-        let name = shown(&fits, row);
+    assert_eq!(row_count(&fits), 2 * (3 + 4));
+    for row in 0..row_count(&fits) {
+        let name = row_text(&fits, row);
         assert_eq!(self::text(&fits, "status", row), "failed", "{name}");
         assert!(!self::text(&fits, "reason", row).is_empty(), "{name}");
         assert_eq!(self::text(&fits, "verdict", row), "", "{name}");
         assert!(real(&fits, "K_e", row).is_nan(), "{name}");
     }
     let results = Results::read(directory.path()).unwrap();
-    let of = |quantity: &str| results.one(&Query::of(quantity).scenario("steady").name("operator"));
+    let of = |quantity: &str| results.find_one(&Query::of(quantity).scenario("steady").name("operator"));
     assert_eq!(of("failed").unwrap().statistics.mean, 1.0);
     assert_eq!(of("trustworthy").unwrap().statistics.mean, 0.0);
 }
 
-fn shown(table: &OutputTable, row: usize) -> String {
+fn row_text(table: &OutputTable, row: usize) -> String {
     format!("{} {}", text(table, "scenario", row), text(table, "name", row))
 }

@@ -3,7 +3,7 @@
 
 use hoid_study::{PLANS, Plan, Query, Results, RunOptions, run};
 
-const PLAN: &str = r#"
+const PLAN_TEXT: &str = r#"
 name = "changes"
 seed = 5
 replications = 2
@@ -36,12 +36,12 @@ start_span_s = [0.0, 30.72]
 #[test]
 fn alternating_changes_are_found_and_measured() {
     let directory = tempfile::tempdir().unwrap();
-    let plan = Plan::parse(PLAN, "changes.toml").unwrap();
+    let plan = Plan::parse(PLAN_TEXT, "changes.toml").unwrap();
     let finished = run(&plan, directory.path(), &RunOptions::default(), &|_| (), &|| true).unwrap();
     assert!(finished.finished);
     let results = Results::read(directory.path()).unwrap();
     let mean = |quantity: &str, name: &str| {
-        let row = results.one(&Query::of(quantity).name(name)).unwrap();
+        let row = results.find_one(&Query::of(quantity).name(name)).unwrap();
         row.statistics.mean
     };
     // There are changes at 40.96 and 61.44 s; the change at 81.92 s is after the last sample.
@@ -61,7 +61,7 @@ fn alternating_changes_are_found_and_measured() {
         assert!(mean(&format!("before_{p}"), "multiple-model").abs() < 20.0);
     }
     // A recursion that declares nothing has neither hits nor false alarms.
-    let silent = results.one(&Query::of("found").name("RLS"));
+    let silent = results.find_one(&Query::of("found").name("RLS"));
     assert!(silent.is_none_or(|row| row.statistics.count == 0));
 }
 

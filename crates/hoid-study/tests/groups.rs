@@ -19,7 +19,7 @@ use hoid_study::{
 };
 
 /// Writes recordings of two subjects with different gains, in two conditions with two runs each.
-fn recorded() -> tempfile::TempDir {
+fn write_recordings() -> tempfile::TempDir {
     let directory = tempfile::tempdir().unwrap();
     for (subject, gain) in [("A", 1.0), ("B", 1.2)] {
         for (cell, condition) in [Condition::C1, Condition::C4].into_iter().enumerate() {
@@ -46,7 +46,7 @@ fn recorded() -> tempfile::TempDir {
 
 fn manifest(directory: &Path) -> Manifest {
     let pattern = Pattern::new("{subject}_{condition}_{run}.csv").unwrap();
-    let (mut manifest, others) = Manifest::of_directory(directory, &pattern).unwrap();
+    let (mut manifest, others) = Manifest::from_directory(directory, &pattern).unwrap();
     assert_eq!((manifest.runs.len(), others.len()), (8, 1));
     manifest.analysis.delay_s = (0.25, 0.32);
     manifest.analysis.form = "lead".to_owned();
@@ -57,7 +57,7 @@ fn manifest(directory: &Path) -> Manifest {
 
 #[test]
 fn group_recovers_its_people_and_can_be_resumed() {
-    let data = recorded();
+    let data = write_recordings();
     let manifest = manifest(data.path());
     let out = tempfile::tempdir().unwrap();
     let (whole, pieces) = (out.path().join("whole"), out.path().join("pieces"));
@@ -208,7 +208,7 @@ fn group_recovers_its_people_and_can_be_resumed() {
 
 #[test]
 fn only_requested_polynomials_are_in_the_tables() {
-    let data = recorded();
+    let data = write_recordings();
     let mut manifest = manifest(data.path());
     manifest.runs.retain(|run| run.subject == "A" && run.condition == "C1");
     manifest.analysis.methods = vec!["rls".to_owned()];
@@ -237,8 +237,8 @@ fn only_requested_polynomials_are_in_the_tables() {
 }
 
 #[test]
-fn bad_files_are_failed_rows_and_bad_manifests_errors() {
-    let data = recorded();
+fn bad_files_give_failed_rows_and_bad_manifests_give_errors() {
+    let data = write_recordings();
     let mut manifest = manifest(data.path());
     manifest.runs.truncate(2);
     manifest.analysis.methods.clear();
@@ -288,7 +288,7 @@ fn bad_files_are_failed_rows_and_bad_manifests_errors() {
     }
     let empty = tempfile::tempdir().unwrap();
     let pattern = Pattern::new("{run}.csv").unwrap();
-    let error_for = |pattern: &Pattern| match Manifest::of_directory(empty.path(), pattern) {
+    let error_for = |pattern: &Pattern| match Manifest::from_directory(empty.path(), pattern) {
         Err(error @ StudyError::NoRuns { .. }) => error.to_string(),
         other => panic!("{other:?}"),
     };
@@ -307,7 +307,7 @@ fn bad_files_are_failed_rows_and_bad_manifests_errors() {
 /// Runs of two persons are joined, and the fits agree with the describing function.
 #[test]
 fn joined_runs_agree_with_the_describing_function() {
-    let data = recorded();
+    let data = write_recordings();
     let text = r#"
 name = "joined"
 
@@ -408,7 +408,7 @@ run = "2"
 /// with the joint fits to all runs (C4, for which a change is declared).
 #[test]
 fn delay_increases_with_an_output_offset() {
-    let data = recorded();
+    let data = write_recordings();
     let late = tempfile::tempdir().unwrap();
     let mut manifest = manifest(data.path());
     manifest.runs.retain(|run| run.subject == "A");

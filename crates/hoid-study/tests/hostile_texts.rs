@@ -8,7 +8,7 @@ use hoid_io::parse_any_scenario;
 use hoid_study::{Plan, group::Manifest};
 use proptest::{collection::vec, prelude::*, sample::Index, test_runner::RngSeed};
 
-const PLAN: &str = r#"
+const PLAN_TEXT: &str = r#"
 name = "short"
 title = "A plan"
 description = """
@@ -54,7 +54,7 @@ track_delay_s = [0.2, 0.4]
 const MANIFEST: &str = include_str!("../../../fixtures/group/tracking.toml");
 
 /// Values in wrong places.
-const VALUES: [&str; 30] = [
+const MISPLACED_VALUES: [&str; 30] = [
     "",
     "0",
     "-1",
@@ -115,7 +115,7 @@ fn change() -> impl Strategy<Value = Change> {
     ]
 }
 
-fn changed(text: &str, by: &[Change]) -> String {
+fn apply_changes(text: &str, by: &[Change]) -> String {
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for one in by {
         let n = lines.len();
@@ -126,7 +126,7 @@ fn changed(text: &str, by: &[Change]) -> String {
             Change::Value(line, value) => {
                 let line = &mut lines[line.index(n)];
                 let key = line.split('=').next().unwrap_or_default().to_owned();
-                *line = format!("{key}= {}", value.get(&VALUES));
+                *line = format!("{key}= {}", value.get(&MISPLACED_VALUES));
             }
             // A list of many values multiplies the cells of a plan.
             Change::Grow(line, times) => {
@@ -156,7 +156,7 @@ fn changed(text: &str, by: &[Change]) -> String {
 }
 
 /// Checks that a message names its file, is short, and contains no terminal control characters.
-fn message(said: &str) -> Result<(), TestCaseError> {
+fn check_message(said: &str) -> Result<(), TestCaseError> {
     prop_assert!(said.contains("made-up.toml"), "{}", said);
     prop_assert!(said.chars().count() < 4000, "{} characters", said.len());
     let obeyed = |c: char| c.is_control() && c != '\n';
@@ -174,20 +174,20 @@ proptest! {
 
     #[test]
     fn damaged_plans_are_errors_or_round_trip(by in vec(change(), 0..5)) {
-        match Plan::parse(&changed(PLAN, &by), "made-up.toml") {
-            Err(error) => message(&error.to_string())?,
+        match Plan::parse(&apply_changes(PLAN_TEXT, &by), "made-up.toml") {
+            Err(error) => check_message(&error.to_string())?,
             Ok(plan) => {
                 let again = Plan::parse(plan.text(), "made-up.toml").unwrap();
                 prop_assert_eq!(again.hash(), plan.hash());
-                prop_assert!(plan.estimates() > 0 && plan.estimates() <= 10_000_000_000);
+                prop_assert!(plan.estimate_count() > 0 && plan.estimate_count() <= 10_000_000_000);
             }
         }
     }
 
     #[test]
     fn damaged_manifests_are_errors_or_round_trip(by in vec(change(), 0..5)) {
-        match Manifest::parse(&changed(MANIFEST, &by), "made-up.toml") {
-            Err(error) => message(&error.to_string())?,
+        match Manifest::parse(&apply_changes(MANIFEST, &by), "made-up.toml") {
+            Err(error) => check_message(&error.to_string())?,
             Ok(manifest) => {
                 let text = toml::to_string(&manifest).unwrap();
                 prop_assert_eq!(Manifest::parse(&text, "made-up.toml").unwrap(), manifest);
@@ -198,15 +198,15 @@ proptest! {
     #[test]
     fn damaged_scenarios_give_readable_errors(of_a_person in any::<bool>(), by in vec(change(), 0..5)) {
         let text = fixture(if of_a_person { "person.toml" } else { "full.toml" });
-        if let Err(error) = parse_any_scenario(&changed(&text, &by), "made-up.toml", "made-up") {
-            message(&error.to_string())?;
+        if let Err(error) = parse_any_scenario(&apply_changes(&text, &by), "made-up.toml", "made-up") {
+            check_message(&error.to_string())?;
         }
     }
 }
 
 #[test]
 fn unchanged_texts_are_valid() {
-    Plan::parse(PLAN, "plan.toml").unwrap();
+    Plan::parse(PLAN_TEXT, "plan.toml").unwrap();
     Manifest::parse(MANIFEST, "group.toml").unwrap();
     for name in ["person.toml", "full.toml"] {
         parse_any_scenario(&fixture(name), name, "made-up").unwrap();

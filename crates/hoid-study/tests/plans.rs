@@ -237,7 +237,7 @@ fn cells_follow_file_order() {
     // Without remnant all replications are the same, so only one is run.
     let replications: Vec<u64> = plan.cells.iter().map(|c| c.replications).collect();
     assert_eq!(replications, [1, 10, 1, 10]);
-    assert_eq!(plan.estimates(), 2 * 22);
+    assert_eq!(plan.estimate_count(), 2 * 22);
     assert_ne!(plan.hash(), plan.clone().with_replications(11).unwrap().hash());
 }
 

@@ -17,7 +17,7 @@ use hoid_study::{
 
 /// Analyses the runs of a person at a sampling rate; returns the manifest, and crossover, margin and delay with their
 /// errors.
-fn analysed(directory: &Path, sample_time_s: f64) -> (Manifest, [(f64, f64); 3]) {
+fn analyse_people(directory: &Path, sample_time_s: f64) -> (Manifest, [(f64, f64); 3]) {
     let experiment = PeopleExperiment {
         subjects: 1,
         plants: vec![Plant::Integrator],
@@ -44,8 +44,8 @@ fn group_at_1000_hz_matches_100_hz() {
     let (fast, slow) = (directory.path().join("fast"), directory.path().join("slow"));
     fs::create_dir(&fast).unwrap();
     fs::create_dir(&slow).unwrap();
-    let (manifest, found) = analysed(&fast, 0.001);
-    let (_, at_100_hz) = analysed(&slow, 0.01);
+    let (manifest, found) = analyse_people(&fast, 0.001);
+    let (_, at_100_hz) = analyse_people(&slow, 0.01);
     let (files, out) = (fast.join("files"), fast.join("out"));
     let steps = read_table(&out.join("preparation.parquet")).unwrap();
     let expected = "1000 Hz, filtered and decimated by 10 to 100 Hz";
@@ -126,12 +126,16 @@ fn decimation_settings_are_parsed() {
         (of(number(5.0), None), 1),
         (of(None, Some(50.0)), 1),
     ] {
-        assert_eq!(settings.by_rate(None).unwrap().factor(ts), factor, "{settings:?}");
+        assert_eq!(
+            settings.rate_decimation(None).unwrap().factor(ts),
+            factor,
+            "{settings:?}"
+        );
     }
     // A rate given by a condition takes precedence.
     assert_eq!(
         of(text("off"), None)
-            .by_rate(Some(&of(text("auto"), None)))
+            .rate_decimation(Some(&of(text("auto"), None)))
             .unwrap()
             .factor(ts),
         10
@@ -143,5 +147,5 @@ fn decimation_settings_are_parsed() {
     assert!(of(number(2.0), Some(50.0)).preparation(None).is_err());
     let manifest = "name = \"g\"\n[prepare]\ndecimate = \"off\"\n[[runs]]\nsubject = \"a\"\ncondition = \"c\"\nrun = \"1\"\nfile = \"x.csv\"\n";
     let read = Manifest::parse(manifest, "group.toml").unwrap();
-    assert_eq!(read.by_rate("c").unwrap().factor(ts), 1);
+    assert_eq!(read.rate_decimation("c").unwrap().factor(ts), 1);
 }

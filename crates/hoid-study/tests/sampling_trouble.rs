@@ -25,7 +25,7 @@ fn experiment(trouble: &[SamplingDefect]) -> VirtualExperiment {
 }
 
 /// Returns the sampling problems of each run, and the run without defects.
-fn found(trouble: &[SamplingDefect], options: &ReadOptions) -> Vec<(Vec<Found>, Record)> {
+fn sampling_issues(trouble: &[SamplingDefect], options: &ReadOptions) -> Vec<(Vec<Found>, Record)> {
     let (clean, troubled) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     simulate_group(&experiment(&[]), clean.path(), &|| ()).unwrap();
     simulate_group(&experiment(trouble), troubled.path(), &|| ()).unwrap();
@@ -44,7 +44,7 @@ fn found(trouble: &[SamplingDefect], options: &ReadOptions) -> Vec<(Vec<Found>, 
         .into()
 }
 
-fn resampled() -> ReadOptions {
+fn resampling_options() -> ReadOptions {
     ReadOptions {
         repair: Repair {
             resample: true,
@@ -54,19 +54,19 @@ fn resampled() -> ReadOptions {
     }
 }
 
-fn only(found: &[Found], kinds: &[QualityIssueKind]) {
+fn assert_only(found: &[Found], kinds: &[QualityIssueKind]) {
     assert_eq!(found.iter().map(|one| one.kind).collect::<Vec<_>>(), kinds, "{found:?}");
 }
 
 #[test]
 fn jitter_and_clock_errors_have_the_simulated_size() {
-    for (found, _) in found(&[SamplingDefect::Jitter], &resampled()) {
-        only(&found, &[QualityIssueKind::Jitter]);
+    for (found, _) in sampling_issues(&[SamplingDefect::Jitter], &resampling_options()) {
+        assert_only(&found, &[QualityIssueKind::Jitter]);
         // Jitter of 0.2 of a sample, which is clamped at 2.25 standard deviations, has an RMS value of 0.194.
         assert!((found[0].size / 0.01 - 0.194).abs() < 0.006, "{}", found[0]);
     }
-    for (found, _) in found(&[SamplingDefect::SlowClock], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Clock]);
+    for (found, _) in sampling_issues(&[SamplingDefect::SlowClock], &ReadOptions::default()) {
+        assert_only(&found, &[QualityIssueKind::Clock]);
         assert!((found[0].size - (1.0 / 0.998 - 1.0)).abs() < 1e-6, "{}", found[0]);
     }
 }
@@ -77,7 +77,7 @@ fn missing_and_repeated_rows_are_counted_individually() {
         vec![SamplingDefect::Missing],
         vec![SamplingDefect::Missing, SamplingDefect::Jitter],
     ] {
-        for (found, record) in found(&trouble, &resampled()) {
+        for (found, record) in sampling_issues(&trouble, &resampling_options()) {
             let gap = found.iter().find(|one| one.kind == QualityIssueKind::Gap).unwrap();
             // One in two hundred of 8192 rows is missing: 41 on average, with a standard deviation of 6.4.
             assert!((15..70).contains(&gap.rows) && gap.places.len() <= gap.rows, "{gap}");
@@ -91,28 +91,28 @@ fn missing_and_repeated_rows_are_counted_individually() {
             assert_eq!(found.len(), trouble.len(), "{found:?}");
         }
     }
-    for (found, _) in found(&[SamplingDefect::Repeated], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Repeated]);
+    for (found, _) in sampling_issues(&[SamplingDefect::Repeated], &ReadOptions::default()) {
+        assert_only(&found, &[QualityIssueKind::Repeated]);
         assert!((15..70).contains(&found[0].rows), "{}", found[0]);
     }
 }
 
 #[test]
 fn saturation_quantisation_and_stalls_are_located() {
-    for (found, record) in found(&[SamplingDefect::Saturated], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Saturated, QualityIssueKind::Saturated]);
+    for (found, record) in sampling_issues(&[SamplingDefect::Saturated], &ReadOptions::default()) {
+        assert_only(&found, &[QualityIssueKind::Saturated, QualityIssueKind::Saturated]);
         let u = record.output();
         let sd = (u.iter().map(|u| u * u).sum::<f64>() / u.len() as f64).sqrt();
         let beyond = u.iter().filter(|u| u.abs() > 1.5 * sd).count();
         assert_eq!(found.iter().map(|one| one.rows).sum::<usize>(), beyond);
     }
-    for (found, record) in found(&[SamplingDefect::Quantised], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Quantised]);
+    for (found, record) in sampling_issues(&[SamplingDefect::Quantised], &ReadOptions::default()) {
+        assert_only(&found, &[QualityIssueKind::Quantised]);
         let sd = (record.output().iter().map(|u| u * u).sum::<f64>() / record.len() as f64).sqrt();
         assert!((found[0].size / (8.0 * sd / 256.0) - 1.0).abs() < 1e-9, "{}", found[0]);
     }
-    for (found, record) in found(&[SamplingDefect::Stalled], &ReadOptions::default()) {
-        only(&found, &[QualityIssueKind::Stalled]);
+    for (found, record) in sampling_issues(&[SamplingDefect::Stalled], &ReadOptions::default()) {
+        assert_only(&found, &[QualityIssueKind::Stalled]);
         let place = found[0].places[0];
         // Rows are counted from 1; the first row of a stall still has a new value.
         assert_eq!((place.row, place.rows), (record.len() / 3 + 2, 49));
@@ -124,9 +124,9 @@ fn saturation_quantisation_and_stalls_are_located() {
         SamplingDefect::Repeated,
         SamplingDefect::Missing,
     ];
-    for (found, _) in found(&all, &resampled()) {
+    for (found, _) in sampling_issues(&all, &resampling_options()) {
         use QualityIssueKind::{Gap, Quantised, Repeated, Saturated};
-        only(&found, &[Repeated, Gap, Saturated, Saturated, Quantised]);
+        assert_only(&found, &[Repeated, Gap, Saturated, Saturated, Quantised]);
     }
 }
 

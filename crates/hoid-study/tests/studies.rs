@@ -14,7 +14,7 @@ use hoid_model::{Record, scenario::Condition};
 use hoid_sim::{RunSeed, Simulator};
 use hoid_study::{Plan, RunOptions, Shard, StudyError, merge, run};
 
-const PLAN: &str = r#"
+const PLAN_TEXT: &str = r#"
 name = "small"
 seed = 7
 replications = 5
@@ -52,10 +52,10 @@ method = "record"
 "#;
 
 fn plan() -> Plan {
-    Plan::parse(PLAN, "small.toml").unwrap()
+    Plan::parse(PLAN_TEXT, "small.toml").unwrap()
 }
 
-fn quiet(plan: &Plan, directory: &Path, options: RunOptions) -> Result<bool, StudyError> {
+fn run_quietly(plan: &Plan, directory: &Path, options: RunOptions) -> Result<bool, StudyError> {
     run(plan, directory, &options, &|_| (), &|| true).map(|outcome| outcome.finished)
 }
 
@@ -79,7 +79,7 @@ fn run_whole(plan: &Plan, jobs: usize) -> (tempfile::TempDir, BTreeMap<String, V
         jobs: Some(jobs),
         ..RunOptions::default()
     };
-    assert!(quiet(plan, directory.path(), options).unwrap());
+    assert!(run_quietly(plan, directory.path(), options).unwrap());
     let found = content(directory.path());
     (directory, found)
 }
@@ -103,7 +103,7 @@ fn assert_independent_of_division(plan: &Plan, threads: &[usize], shards: &[u64]
                     shard: Some(Shard { index, of }),
                     ..RunOptions::default()
                 };
-                assert!(quiet(plan, &path, options).unwrap());
+                assert!(run_quietly(plan, &path, options).unwrap());
                 path
             })
             .rev()
@@ -168,7 +168,7 @@ fn stopped_study_resumes_without_repetition() {
         resume: true,
         ..RunOptions::default()
     };
-    let total = plan.estimates();
+    let total = plan.estimate_count();
     let (mut made, mut sessions) = (0, 0);
     loop {
         sessions += 1;
@@ -211,13 +211,13 @@ fn incompatible_shards_are_refused() {
         shard: Some(Shard { index, of }),
         ..RunOptions::default()
     };
-    quiet(&plan(), &at("1"), shard(1, 3)).unwrap();
-    quiet(&plan(), &at("2"), shard(2, 3)).unwrap();
-    quiet(&plan(), &at("half"), shard(1, 2)).unwrap();
-    let other = Plan::parse(&PLAN.replace("seed = 7", "seed = 8"), "other.toml").unwrap();
-    quiet(&other, &at("other"), shard(3, 3)).unwrap();
+    run_quietly(&plan(), &at("1"), shard(1, 3)).unwrap();
+    run_quietly(&plan(), &at("2"), shard(2, 3)).unwrap();
+    run_quietly(&plan(), &at("half"), shard(1, 2)).unwrap();
+    let other = Plan::parse(&PLAN_TEXT.replace("seed = 7", "seed = 8"), "other.toml").unwrap();
+    run_quietly(&other, &at("other"), shard(3, 3)).unwrap();
     let fewer = plan().with_replications(4).unwrap();
-    quiet(&fewer, &at("fewer"), shard(3, 3)).unwrap();
+    run_quietly(&fewer, &at("fewer"), shard(3, 3)).unwrap();
 
     let of = |names: &[&str]| merge(&names.iter().map(|n| at(n)).collect::<Vec<_>>(), &at("out"), false).unwrap_err();
     assert!(
@@ -243,7 +243,7 @@ fn incompatible_shards_are_refused() {
     assert!(!at("out").exists(), "nothing is left of what was refused");
 
     // A directory is neither overwritten nor continued with a different study.
-    let again = quiet(&plan(), &at("1"), shard(1, 3)).unwrap_err();
+    let again = run_quietly(&plan(), &at("1"), shard(1, 3)).unwrap_err();
     assert!(matches!(again, StudyError::Occupied { .. }));
     let resume = RunOptions {
         resume: true,
@@ -260,7 +260,7 @@ fn incompatible_shards_are_refused() {
         (&plan(), resume),
         (&other, resume),
     ] {
-        let error = quiet(plan, &at("1"), options).unwrap_err();
+        let error = run_quietly(plan, &at("1"), options).unwrap_err();
         assert!(matches!(error, StudyError::OtherStudy { .. }), "{error}");
     }
     assert!("3/2".parse::<Shard>().is_err() && "0/2".parse::<Shard>().is_err() && "x".parse::<Shard>().is_err());
@@ -339,14 +339,14 @@ fn rows_match_separate_simulation_and_fit() {
 #[test]
 fn failed_estimates_are_rows_with_a_reason() {
     // With a gain far above the gain margin, the loop diverges in every run.
-    let text_of = PLAN.replace(
+    let text_of = PLAN_TEXT.replace(
         "name = \"silent\"\ncondition = \"C1\"",
         "name = \"silent\"\ncondition = \"C1\"\ninitial.K_c = 90000.0",
     );
     let text_of = text_of.replace("remnant.noise_level = 0.0", "remnant.K_n_initial_deg = 0.1");
     let plan = Plan::parse(&text_of, "unstable.toml").unwrap();
     let directory = tempfile::tempdir().unwrap();
-    assert!(quiet(&plan, directory.path(), RunOptions::default()).unwrap());
+    assert!(run_quietly(&plan, directory.path(), RunOptions::default()).unwrap());
     let fits = read_table(&directory.path().join("fits.parquet")).unwrap();
     let failed: Vec<usize> = (0..fits.columns[0].values.len())
         .filter(|r| text(&fits, "scenario", *r) == "silent")
@@ -363,7 +363,7 @@ fn failed_estimates_are_rows_with_a_reason() {
 }
 
 /// Writes a study that was stopped after some of its blocks.
-fn stopped(directory: &Path) {
+fn write_stopped_study(directory: &Path) {
     let left = AtomicU64::new(40);
     let should_continue = || {
         left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| n.checked_sub(1))
@@ -380,7 +380,7 @@ fn stopped(directory: &Path) {
     );
 }
 
-fn parts(directory: &Path) -> Vec<PathBuf> {
+fn part_paths(directory: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(directory.join("parts")).unwrap();
     let mut all: Vec<PathBuf> = entries.map(|entry| entry.unwrap().path()).collect();
     all.sort();
@@ -391,7 +391,7 @@ fn parts(directory: &Path) -> Vec<PathBuf> {
 fn damaged_blocks_are_recomputed() {
     let out = tempfile::tempdir().unwrap();
     let (whole, again) = (out.path().join("whole"), out.path().join("again"));
-    quiet(&plan(), &whole, RunOptions::default()).unwrap();
+    run_quietly(&plan(), &whole, RunOptions::default()).unwrap();
     let resumed = RunOptions {
         resume: true,
         ..RunOptions::default()
@@ -414,8 +414,8 @@ fn damaged_blocks_are_recomputed() {
     ];
     for (kind, damage) in damages.iter().enumerate() {
         let _ = fs::remove_dir_all(&again);
-        stopped(&again);
-        let fits = parts(&again)
+        write_stopped_study(&again);
+        let fits = part_paths(&again)
             .into_iter()
             .find(|path| path.to_string_lossy().contains("fits"))
             .unwrap();
@@ -428,8 +428,8 @@ fn damaged_blocks_are_recomputed() {
     }
     // Block 1 is replaced by block 0, including its seal.
     fs::remove_dir_all(&again).unwrap();
-    stopped(&again);
-    for path in parts(&again) {
+    write_stopped_study(&again);
+    for path in part_paths(&again) {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
         if let Some(rest) = name.strip_prefix("000000") {
             fs::copy(&path, path.with_file_name(format!("000001{rest}"))).unwrap();
@@ -448,15 +448,15 @@ fn damaged_blocks_are_recomputed() {
 fn merge_recomputes_damaged_blocks() {
     let out = tempfile::tempdir().unwrap();
     let place = |name: &str| out.path().join(name);
-    quiet(&plan(), &place("whole"), RunOptions::default()).unwrap();
+    run_quietly(&plan(), &place("whole"), RunOptions::default()).unwrap();
     for index in [1, 2] {
         let options = RunOptions {
             shard: Some(Shard { index, of: 2 }),
             ..RunOptions::default()
         };
-        quiet(&plan(), &place(&format!("s{index}")), options).unwrap();
+        run_quietly(&plan(), &place(&format!("s{index}")), options).unwrap();
     }
-    let fits = parts(&place("s2"))
+    let fits = part_paths(&place("s2"))
         .into_iter()
         .find(|path| path.to_string_lossy().contains("fits"))
         .unwrap();
@@ -474,9 +474,9 @@ fn merge_recomputes_damaged_blocks() {
 fn unsealed_blocks_are_recomputed_or_refused() {
     let out = tempfile::tempdir().unwrap();
     let (whole, old) = (out.path().join("whole"), out.path().join("old"));
-    quiet(&plan(), &whole, RunOptions::default()).unwrap();
-    stopped(&old);
-    for seal in parts(&old)
+    run_quietly(&plan(), &whole, RunOptions::default()).unwrap();
+    write_stopped_study(&old);
+    for seal in part_paths(&old)
         .iter()
         .filter(|path| path.extension().is_some_and(|e| e == "json"))
     {
@@ -505,7 +505,7 @@ fn directory_is_locked_and_plans_are_not_overwritten() {
     let should_continue = || {
         let mut second = second.lock().unwrap();
         if second.is_none() {
-            *second = Some(quiet(
+            *second = Some(run_quietly(
                 &plan(),
                 &directory,
                 RunOptions {
@@ -527,7 +527,7 @@ fn directory_is_locked_and_plans_are_not_overwritten() {
     let own = out.path().join("own");
     fs::create_dir(&own).unwrap();
     fs::write(own.join("plan.toml"), "# mine\n").unwrap();
-    let error = quiet(&plan(), &own, RunOptions::default()).unwrap_err();
+    let error = run_quietly(&plan(), &own, RunOptions::default()).unwrap_err();
     assert!(matches!(error, StudyError::SourceExists { .. }), "{error}");
     assert_eq!(fs::read_to_string(own.join("plan.toml")).unwrap(), "# mine\n");
 }

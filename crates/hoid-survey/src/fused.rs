@@ -11,7 +11,7 @@
 use hoid_core::{
     delay::DelayLine,
     predictor::Regressor,
-    recursion::Stable,
+    recursion::StablePolynomials,
     rls::Rls,
     shape::AnyShape,
     state::{State, visit_all},
@@ -23,8 +23,8 @@ use hoid_ident::{IdentError, settings, settings::Bounds};
 use hoid_track::{
     Memory, MemoryOptions, Sample, StabilityOptions,
     building::{
-        About, DEFAULT_LIMIT, Gain, Kernel, Plan, Recursion, RecursiveMethod, Scaled, Setup, StartState, StepOutcome,
-        bounded, check_operator_orders, error_bars,
+        DEFAULT_LIMIT, Gain, Kernel, MethodDescription, Plan, Recursion, RecursiveMethod, ScaleCovariance, Setup,
+        StartState, StepOutcome, check_operator_orders, error_bars, limit_magnitude,
     },
 };
 
@@ -50,8 +50,8 @@ settings! {
 }
 
 impl RecursiveMethod for FusedOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: "fused",
             help: "least squares for B with the poles of rpem, for comparison",
             source: "the thesis, section VII",
@@ -90,15 +90,15 @@ impl RecursiveMethod for FusedOptions {
         Some(&self.memories)
     }
 
-    fn covariance(&self) -> Option<f64> {
+    fn initial_covariance(&self) -> Option<f64> {
         self.covariance
     }
 
-    fn limit(&self) -> f64 {
+    fn innovation_limit(&self) -> f64 {
         self.limit.unwrap_or(DEFAULT_LIMIT)
     }
 
-    fn stable(&self) -> Stable {
+    fn stable(&self) -> StablePolynomials {
         self.stability.stable
     }
 
@@ -184,13 +184,13 @@ impl FusedRecursion {
     }
 
     /// Returns `F u` with the F of the prediction-error method.
-    fn filtered(&self, u: f64) -> f64 {
+    fn filter_output(&self, u: f64) -> f64 {
         let theta = self.rpem.theta();
         let p = theta.len();
         u + theta[p - 2] * self.past[0] + theta[p - 1] * self.past[1]
     }
 
-    fn join(&mut self) {
+    fn join_estimates(&mut self) {
         self.theta.copy_from_slice(self.rpem.theta());
         self.theta[..B].copy_from_slice(&self.rls.theta()[..B]);
     }
@@ -204,20 +204,20 @@ impl Recursion for FusedRecursion {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         let of_rpem = self.rpem.step(sample);
-        let y = self.filtered(sample.u);
+        let y = self.filter_output(sample.u);
         let of_rls: StepOutcome = self.rls.step(x, y).into();
         self.store(sample.u);
-        self.join();
+        self.join_estimates();
         StepOutcome {
             innovation: of_rls.innovation,
             shortened: of_rpem.shortened,
         }
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
-        self.rpem.follow(sample);
-        let y = self.filtered(sample.u);
+        self.rpem.step_without_update(sample);
+        let y = self.filter_output(sample.u);
         let taken = self.rls.step_without_update(x, y).into();
         self.store(sample.u);
         taken
@@ -227,9 +227,9 @@ impl Recursion for FusedRecursion {
         let x = self.delay.step(sample.e);
         self.rpem.bridge(sample);
         // With an output of zero, eps is the prediction with the opposite sign.
-        let y = self.filtered(0.0);
+        let y = self.filter_output(0.0);
         let predicted = -self.rls.step_without_update(x, y).innovation;
-        self.store(bounded(predicted));
+        self.store(limit_magnitude(predicted));
     }
 
     fn scale_covariance(&mut self, factor: f64) -> bool {

@@ -25,7 +25,10 @@ use hoid_model::{
 };
 use hoid_track::{
     Memory, Sample,
-    building::{About, OPERATOR, Recursion, RecursiveMethod, Reported, Setup, StartState, StepOutcome, bounded},
+    building::{
+        MethodDescription, OPERATOR_PARAMETER_COUNT, Recursion, RecursiveMethod, ReportedModel, Setup, StartState,
+        StepOutcome, limit_magnitude,
+    },
 };
 
 use crate::known_noise::check_first_order;
@@ -42,8 +45,8 @@ settings! {
 }
 
 impl RecursiveMethod for LinearNetworkOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: NAME,
             help: "single linear layer that learns K_e and K_e_dot after a known neuromuscular part, for comparison",
             source: "the thesis, section 2.4; Widrow and Hoff 1960",
@@ -91,7 +94,7 @@ impl RecursiveMethod for LinearNetworkOptions {
             held: HeldStates::new(2.0 * zeta * omega, omega * omega, sample_time),
             state: [0.0; 2],
             delay: DelayLine::new(vec![0.0; setup.orders.nk]),
-            reported: Reported::new(from, setup.orders.nk, sample_time),
+            reported: ReportedModel::new(from, setup.orders.nk, sample_time),
             variance: from.variance,
             restarts: 0,
         }))
@@ -101,7 +104,7 @@ impl RecursiveMethod for LinearNetworkOptions {
         true
     }
 
-    fn is_model_of_change(&self) -> bool {
+    fn models_change(&self) -> bool {
         true
     }
 
@@ -131,7 +134,7 @@ impl Neuron {
     fn update_squares(&mut self, y: [f64; 2]) {
         self.samples += 1.0;
         for (square, y) in self.squares.iter_mut().zip(y) {
-            *square = bounded(*square + (y * y - *square) / self.samples.max(1.0));
+            *square = limit_magnitude(*square + (y * y - *square) / self.samples.max(1.0));
         }
     }
 
@@ -139,7 +142,7 @@ impl Neuron {
         u - self.gains[0] * y[0] - self.gains[1] * y[1]
     }
 
-    fn learn(&mut self, y: [f64; 2], error: f64) {
+    fn update_weights(&mut self, y: [f64; 2], error: f64) {
         for ((gain, y), square) in self.gains.iter_mut().zip(y).zip(self.squares) {
             if square > 0.0 {
                 *gain += self.rate * y / square * error;
@@ -157,7 +160,7 @@ struct LinearNetwork {
     /// y_0 and y_1 divided by omega^2.
     state: [f64; 2],
     delay: DelayLine<Vec<f64>>,
-    reported: Reported,
+    reported: ReportedModel,
     variance: f64,
     restarts: u64,
 }
@@ -180,12 +183,12 @@ impl LinearNetwork {
     fn responses(&mut self, e: f64) -> [f64; 2] {
         let square = self.nms[0] * self.nms[0];
         self.state = self.held.step(self.state, self.delay.step(e));
-        let y = self.state.map(|x| bounded(square * x));
+        let y = self.state.map(|x| limit_magnitude(square * x));
         self.neuron.update_squares(y);
         y
     }
 
-    fn eta(&self) -> [f64; OPERATOR] {
+    fn eta(&self) -> [f64; OPERATOR_PARAMETER_COUNT] {
         let ([k_e, k_e_dot], [omega, zeta]) = (self.neuron.gains, self.nms);
         [k_e, k_e_dot, omega, zeta]
     }
@@ -195,17 +198,17 @@ impl Recursion for LinearNetwork {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let y = self.responses(sample.e);
         let innovation = self.neuron.error(y, sample.u);
-        self.neuron.learn(y, innovation);
+        self.neuron.update_weights(y, innovation);
         let shortened = !self.neuron.gains.iter().all(|gain| gain.is_finite());
         if shortened {
             self.neuron.gains = self.first;
             self.restarts += 1;
         }
-        self.reported.set(self.eta());
+        self.reported.set_operator(self.eta());
         StepOutcome { innovation, shortened }
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         let y = self.responses(sample.e);
         StepOutcome {
             innovation: self.neuron.error(y, sample.u),
@@ -231,7 +234,7 @@ impl Recursion for LinearNetwork {
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let eta = self.eta();
-        let none = [[f64::NAN; OPERATOR]; OPERATOR];
+        let none = [[f64::NAN; OPERATOR_PARAMETER_COUNT]; OPERATOR_PARAMETER_COUNT];
         let operator = self.reported.operator(eta, &none, [eta[1] / eta[0], f64::NAN]);
         let known = |value: f64| Estimate::fixed(value);
         Some(OperatorEstimate {
@@ -253,7 +256,7 @@ mod tests {
         scenario::{Condition, RemnantStrength, Scenario},
     };
     use hoid_sim::{RunSeed, Simulator};
-    use hoid_track::{Method, StartAt, TrackOptions, track};
+    use hoid_track::{Method, StartSource, TrackOptions, track};
 
     use super::*;
 
@@ -270,7 +273,7 @@ mod tests {
             // There are four periods in the 4 s of one time constant.
             let (y_1, y_0) = (std::f64::consts::TAU * 0.01 * f64::from(k)).sin_cos();
             let error = neuron.error([y_0, y_1], 2.0 * y_0 + 0.3 * y_1);
-            neuron.learn([y_0, y_1], error);
+            neuron.update_weights([y_0, y_1], error);
         }
         let [k_e, k_e_dot] = neuron.gains;
         // Averaged over a period, the rule equals its differential equation, except for terms of order Ts/T.
@@ -288,13 +291,13 @@ mod tests {
             zeta_nm: 0.35,
             tau_e_s: 0.28,
         };
-        let discrete = operator.discretise(SampleTime::HUNDREDTH).unwrap();
+        let discrete = operator.discretise(SampleTime::AT_100_HZ).unwrap();
         let (held, nk) = (discrete.held, discrete.nk);
         let e: Vec<f64> = (0..300)
             .map(|k| (0.07 * f64::from(k)).sin() + f64::from(k % 7))
             .collect();
         let mut u = vec![0.0; e.len()];
-        let states = HeldStates::new(2.0 * 0.35 * 11.25, 11.25 * 11.25, SampleTime::HUNDREDTH);
+        let states = HeldStates::new(2.0 * 0.35 * 11.25, 11.25 * 11.25, SampleTime::AT_100_HZ);
         let mut state = [0.0; 2];
         for k in 0..e.len() {
             let at = |signal: &[f64], lag: usize| if k >= lag { signal[k - lag] } else { 0.0 };
@@ -308,7 +311,7 @@ mod tests {
 
     #[test]
     fn gains_after_a_change_are_close_on_average() {
-        const RUNS: u64 = 8;
+        const RUN_COUNT: u64 = 8;
         let mut scenario = Scenario::condition(Condition::C4);
         scenario.remnant.order = 1;
         if let RemnantStrength::Level { level, .. } = &mut scenario.remnant.strength {
@@ -316,18 +319,18 @@ mod tests {
         }
         let simulator = Simulator::new(&scenario).unwrap();
         let options = TrackOptions {
-            start: StartAt::Span(Some((0.0, 30.72))),
+            start: StartSource::Span(Some((0.0, 30.72))),
             ..TrackOptions::default_for(Method::from(LinearNetworkOptions::default()), 29)
         };
         let mut mean = 0.0;
-        for replication in 0..RUNS {
+        for replication in 0..RUN_COUNT {
             let seed = RunSeed {
                 seed: 101,
                 cell: 0,
                 replication,
             };
             let trace = track(&simulator.run(seed, false).unwrap(), &options, 100).unwrap();
-            mean += trace.operator(64).unwrap().k_e_dot.value / 0.084 / RUNS as f64;
+            mean += trace.operator(64).unwrap().k_e_dot.value / 0.084 / RUN_COUNT as f64;
         }
         // The loop biases a direct fit without a noise model; the standard error of the mean is 3 %.
         assert!((mean - 1.0).abs() < 0.25, "{mean}");

@@ -2,7 +2,7 @@
 //! list.
 
 use hoid_ident::{IdentError, settings::MethodSpec};
-use hoid_track::{AdaptiveOptions, Method, RlsOptions, RpemOptions, building::bad};
+use hoid_track::{AdaptiveOptions, Method, RlsOptions, RpemOptions, building::invalid_option};
 
 use crate::{
     DualEkfOptions, EkfOptions, FusedOptions, LinearNetworkOptions, MultipleModelOptions, PhysicalOptions, RrivOptions,
@@ -85,7 +85,7 @@ pub struct ListedMethod {
 }
 
 /// Returns all methods as a list for users, with the default first and the methods of this crate last.
-pub fn listed() -> Vec<ListedMethod> {
+pub fn list_methods() -> Vec<ListedMethod> {
     let default = Method::default();
     let of = |method: &Method| ListedMethod {
         spec: method.spec(),
@@ -98,28 +98,28 @@ pub fn listed() -> Vec<ListedMethod> {
 }
 
 /// Converts a name as typed by the user to the form used in the list.
-fn plain(text: &str) -> String {
+fn normalise_name(text: &str) -> String {
     text.trim().to_ascii_lowercase()
 }
 
 /// Returns the method with this name and its default options. Earlier names, which occur in plans and saved trackers,
-/// are accepted as well; callers that can show messages to the user report them ([`renamed`]).
+/// are accepted as well; callers that can show messages to the user report them ([`renamed_method`]).
 ///
 /// # Errors
 /// [`IdentError::BadOption`] if no method has this name.
 pub fn method(text: &str) -> Result<Method, IdentError> {
-    let plain = plain(text);
-    let name = renamed(&plain).map_or(plain.as_str(), |(now, _)| now);
+    let plain = normalise_name(text);
+    let name = renamed_method(&plain).map_or(plain.as_str(), |(now, _)| now);
     let all = methods();
     let names: Vec<&str> = all.iter().map(Method::name).collect();
     let found = all.iter().find(|method| method.name() == name).cloned();
-    found.ok_or_else(|| bad("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
+    found.ok_or_else(|| invalid_option("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
 }
 
 /// Returns the current name for an earlier name of a method, and the message that reports it; `None` if it is not an
 /// earlier name.
-pub fn renamed(text: &str) -> Option<(&'static str, String)> {
-    let earlier = plain(text);
+pub fn renamed_method(text: &str) -> Option<(&'static str, String)> {
+    let earlier = normalise_name(text);
     let found = methods()
         .into_iter()
         .find(|method| method.earlier_name() == Some(earlier.as_str()))?;
@@ -143,7 +143,7 @@ pub fn set(method: &mut Method, name: &str, text: &str) -> Result<(), IdentError
         .collect();
     match of.as_slice() {
         [] => method.set(name, text),
-        of => Err(bad(
+        of => Err(invalid_option(
             name,
             format!("the method {}", method.name()),
             &format!("the method {}, which has this option", of.join(" or ")),
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn list_starts_with_the_default_and_ends_with_the_survey() {
-        let all = listed();
+        let all = list_methods();
         let names: Vec<&str> = all.iter().map(|one| one.spec.name).collect();
         assert_eq!(names[..4], ["adaptive", "rls", "rpem", "physical"]);
         assert_eq!(all.len(), methods().len());
@@ -182,15 +182,15 @@ mod tests {
     }
 
     #[test]
-    fn former_name_is_accepted_with_a_notice() {
+    fn former_name_is_accepted_with_a_message() {
         assert_eq!(method("population").unwrap(), Method::adaptive());
-        let (name, note) = renamed(" Population").unwrap();
+        let (name, note) = renamed_method(" Population").unwrap();
         assert_eq!(name, "adaptive");
         assert_eq!(note, "the method `population` is now called `adaptive`");
         let refused = method("kalman").unwrap_err().to_string();
         assert!(!refused.contains("population"), "{refused}");
         for method in methods() {
-            assert_eq!(renamed(method.name()), None, "a name belongs to one method");
+            assert_eq!(renamed_method(method.name()), None, "a name belongs to one method");
         }
     }
 

@@ -6,7 +6,7 @@
 //!
 //! **Wrong minima.** A search from the last theta may stay in a local minimum. The estimator therefore also searches
 //! from its own starts if there is no last theta, if the search from the last theta does not converge, if the loss has
-//! risen by a fraction [`LOSS_RISE`] since the last comparison, and otherwise at every [`COMPARISON_INTERVAL`]-th fit.
+//! risen by a fraction [`LOSS_RISE_LIMIT`] since the last comparison, and otherwise at every [`COMPARISON_INTERVAL`]-th fit.
 //! The lower of the two minima is used.
 //!
 //! **Failures.** If a fit fails, for example for a window without excitation, theta and its covariance are unchanged.
@@ -22,18 +22,19 @@ use hoid_ident::{
 };
 
 use hoid_track::{
-    Memory, Sample, StartAt,
+    Memory, Sample, StartSource,
     building::{
-        About, Predictor, Recursion, RecursiveMethod, Setup, StartState, StepOutcome, bad, bounded, short_for_b,
+        MethodDescription, Predictor, Recursion, RecursiveMethod, Setup, StartState, StepOutcome, invalid_option,
+        limit_magnitude, short_memory_for_b,
     },
 };
 
 /// Number of fits after which the search from the last theta is compared with searches from the estimator's own starts.
 const COMPARISON_INTERVAL: usize = 8;
 /// Relative rise of the loss since the last comparison that triggers another comparison.
-const LOSS_RISE: f64 = 0.25;
+const LOSS_RISE_LIMIT: f64 = 0.25;
 /// Window length divided by the smallest number of samples for a first fit.
-const FIRST_SHARE: usize = 4;
+const FIRST_FIT_DIVISOR: usize = 4;
 /// Number of residuals per unknown (coefficient or initial state) that the first fit needs.
 const RESIDUALS_PER_UNKNOWN: usize = 5;
 
@@ -49,8 +50,8 @@ settings! {
 }
 
 impl RecursiveMethod for WindowOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: "window",
             help: "repeated batch fit of a moving window",
             source: "the thesis, section VII",
@@ -61,7 +62,7 @@ impl RecursiveMethod for WindowOptions {
 
     /// The method does not use these memory lengths: its memory is the window.
     fn default_memory(&self, parameter: &str) -> Memory {
-        short_for_b(parameter)
+        short_memory_for_b(parameter)
     }
 
     fn memory_as_text(&self) -> Option<String> {
@@ -71,8 +72,12 @@ impl RecursiveMethod for WindowOptions {
 
     fn check(&self, _setup: &Setup) -> Result<(), IdentError> {
         match (self.window, self.refit) {
-            (Memory::Infinite, _) => Err(bad("the window", "inf".to_owned(), "samples or seconds")),
-            (_, 0) => Err(bad("the samples between two fits", "0".to_owned(), "1 or more")),
+            (Memory::Infinite, _) => Err(invalid_option("the window", "inf".to_owned(), "samples or seconds")),
+            (_, 0) => Err(invalid_option(
+                "the samples between two fits",
+                "0".to_owned(),
+                "1 or more",
+            )),
             _ => Ok(()),
         }
     }
@@ -93,10 +98,10 @@ impl RecursiveMethod for WindowOptions {
     ) -> Result<Box<dyn Recursion>, IdentError> {
         let covariance: Vec<f64> = from.spread.iter().map(|s| s * from.variance).collect();
         let known = match setup.start {
-            StartAt::Nothing => None,
+            StartSource::Nothing => None,
             _ => Some((from.values.as_slice(), from.from_fit.then_some(covariance.as_slice()))),
         };
-        let window = self.window.samples(sample_time)?;
+        let window = self.window.window_samples(sample_time)?;
         let recursion = WindowRecursion::new(setup.start_estimator(), sample_time, window, self.refit, known)?;
         Ok(Box::new(recursion))
     }
@@ -179,9 +184,9 @@ impl WindowRecursion {
         let orders = estimator.orders;
         orders.check(estimator.structure)?;
         estimator.check()?;
-        let p = orders.parameters();
+        let p = orders.parameter_count();
         let unknowns = p + orders.nf + orders.nc;
-        let least = first_residual(&orders, estimator.initial_state_in_use()) + RESIDUALS_PER_UNKNOWN * unknowns;
+        let least = first_residual(&orders, estimator.effective_initial_state()) + RESIDUALS_PER_UNKNOWN * unknowns;
         let refuse = |option: &str, found: String, expected: String| {
             Err(IdentError::BadOption {
                 option: option.to_owned(),
@@ -226,7 +231,7 @@ impl WindowRecursion {
             sample_time,
             window,
             every,
-            min_samples: (window / FIRST_SHARE).max(least),
+            min_samples: (window / FIRST_FIT_DIVISOR).max(least),
             e: VecDeque::with_capacity(window),
             u: VecDeque::with_capacity(window),
             predictor,
@@ -250,28 +255,28 @@ impl WindowRecursion {
 
     /// Number of successful fits.
     #[cfg(test)]
-    pub fn fits(&self) -> usize {
+    pub fn fit_count(&self) -> usize {
         self.fits
     }
 
     /// Adds a sample to the window and updates the predictor. Returns the innovation.
     fn take(&mut self, sample: Sample) -> f64 {
-        self.keep(sample.e, sample.u);
+        self.store_sample(sample.e, sample.u);
         self.predictor.step(&self.theta, sample.e, sample.u)
     }
 
-    fn keep(&mut self, e: f64, u: f64) {
+    fn store_sample(&mut self, e: f64, u: f64) {
         for (kept, value) in [(&mut self.e, e), (&mut self.u, u)] {
             if kept.len() == self.window {
                 kept.pop_front();
             }
-            kept.push_back(bounded(value));
+            kept.push_back(limit_magnitude(value));
         }
     }
 
     fn refit(&mut self) {
         self.since_fit = 0;
-        let found = self.record().and_then(|record| self.fit(&record));
+        let found = self.window_record().and_then(|record| self.fit(&record));
         match found {
             Ok(fit) => {
                 self.fits += 1;
@@ -295,13 +300,13 @@ impl WindowRecursion {
         }
     }
 
-    fn record(&mut self) -> Result<Record, IdentError> {
+    fn window_record(&mut self) -> Result<Record, IdentError> {
         let output = Channel::new("u", "", self.u.make_contiguous().to_vec());
         let record = if self.estimator.structure.has_input() {
             let input = Channel::new("e", "", self.e.make_contiguous().to_vec());
             Record::new(self.sample_time, input, output)?
         } else {
-            Record::of_output(self.sample_time, output)?
+            Record::from_output(self.sample_time, output)?
         };
         Ok(record.labelled("of the window"))
     }
@@ -310,10 +315,10 @@ impl WindowRecursion {
     /// own starts.
     fn fit(&mut self, record: &Record) -> Result<Fit, IdentError> {
         let records = std::slice::from_ref(record);
-        let own = |estimator: &Estimator| estimator.fit(records).and_then(settled);
+        let own = |estimator: &Estimator| estimator.fit(records).and_then(require_convergence);
         if !self.known {
             let fit = own(&self.estimator)?;
-            self.compared(&fit);
+            self.mark_compared(&fit);
             return Ok(fit);
         }
         self.estimator.start = Some(self.theta.clone());
@@ -322,7 +327,7 @@ impl WindowRecursion {
         self.since_comparison += 1;
         if let Ok(fit) = &warm
             && self.since_comparison < COMPARISON_INTERVAL
-            && fit.loss() <= (1.0 + LOSS_RISE) * self.compared_loss
+            && fit.loss() <= (1.0 + LOSS_RISE_LIMIT) * self.compared_loss
         {
             return warm;
         }
@@ -338,11 +343,11 @@ impl WindowRecursion {
             (Ok(fit), Err(_)) | (Err(_), Ok(fit)) => fit,
             (Err(_), Err(failure)) => return Err(failure),
         };
-        self.compared(&fit);
+        self.mark_compared(&fit);
         Ok(fit)
     }
 
-    fn compared(&mut self, fit: &Fit) {
+    fn mark_compared(&mut self, fit: &Fit) {
         self.since_comparison = 0;
         self.compared_loss = fit.loss();
     }
@@ -350,7 +355,7 @@ impl WindowRecursion {
 
 /// Returns the fit if its search converged. A fit that did not converge reflects the limit of iterations rather than
 /// the data of the window.
-fn settled(fit: Fit) -> Result<Fit, IdentError> {
+fn require_convergence(fit: Fit) -> Result<Fit, IdentError> {
     if fit.termination().converged() {
         Ok(fit)
     } else {
@@ -366,7 +371,8 @@ impl Recursion for WindowRecursion {
         self.since_fit = self.since_fit.saturating_add(1);
         if self.fits == 0 {
             self.innovations += 1.0;
-            self.variance = bounded(self.variance + (innovation * innovation - self.variance) / self.innovations);
+            self.variance =
+                limit_magnitude(self.variance + (innovation * innovation - self.variance) / self.innovations);
         }
         if self.u.len() >= self.min_samples && self.since_fit >= self.every {
             self.refit();
@@ -377,7 +383,7 @@ impl Recursion for WindowRecursion {
         }
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         StepOutcome {
             innovation: self.take(sample),
             shortened: false,
@@ -386,7 +392,7 @@ impl Recursion for WindowRecursion {
 
     fn bridge(&mut self, sample: Sample) {
         let predicted = self.predictor.bridge(&self.theta, sample.e);
-        self.keep(sample.e, predicted);
+        self.store_sample(sample.e, predicted);
     }
 
     fn theta(&self) -> &[f64] {

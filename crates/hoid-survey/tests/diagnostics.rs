@@ -7,7 +7,7 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 use hoid_survey::{multiple_model, physical};
-use hoid_track::{Method, StartAt, TrackOptions, Tracker, track};
+use hoid_track::{Method, StartSource, TrackOptions, Tracker, track};
 
 fn simulated(condition: Condition) -> Record {
     let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
@@ -18,17 +18,17 @@ fn kinds(verdict: &Verdict) -> Vec<&'static str> {
     verdict.findings().iter().map(|f| f.kind).collect()
 }
 
-fn judged(record: &Record, options: &TrackOptions) -> Verdict {
+fn verdict_of(record: &Record, options: &TrackOptions) -> Verdict {
     track(record, options, 10).unwrap().verdict(record, None).unwrap()
 }
 
 #[test]
 fn clean_run_is_trustworthy_and_bad_start_is_reported() {
     let record = simulated(Condition::C4);
-    let verdict = judged(&record, &TrackOptions::default_for(physical(), 29));
+    let verdict = verdict_of(&record, &TrackOptions::default_for(physical(), 29));
     assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{verdict}");
     let arx = TrackOptions::default_for(Method::rls(), 29);
-    let verdict = judged(&record, &arx);
+    let verdict = verdict_of(&record, &arx);
     assert!(verdict.reasons().any(|r| r.starts_with("start fit: ")), "{verdict}");
 }
 
@@ -39,10 +39,10 @@ fn change_inside_the_start_span_is_reported() {
     for (span, changes) in [((10.0, 36.0), false), ((25.0, 60.0), true)] {
         for (method, severity) in [(multiple_model(), Severity::Doubt), (physical(), Severity::Note)] {
             let options = TrackOptions {
-                start: StartAt::Span(Some(span)),
+                start: StartSource::Span(Some(span)),
                 ..TrackOptions::default_for(method, 29)
             };
-            let verdict = judged(&record, &options);
+            let verdict = verdict_of(&record, &options);
             let found = verdict.findings().iter().find(|f| f.kind == "not-constant");
             assert_eq!(found.map(|f| f.severity), changes.then_some(severity), "{verdict}");
         }
@@ -78,12 +78,12 @@ fn jump_of_a_fixed_delay_is_reported() {
         Record::new(record.sample_time(), e, u).unwrap()
     };
     let options = TrackOptions::default_for(physical(), 29);
-    let is_reported = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
+    let is_reported = |record: &Record| kinds(&verdict_of(record, &options)).contains(&"not-followed");
     assert!(is_reported(&late(5000, 20)));
     assert!(!is_reported(&late(5000, 0)));
     // The trace is shorter than the examined span.
     assert!(
-        judged(&record.span(0.0, 12.0).unwrap(), &options)
+        verdict_of(&record.span(0.0, 12.0).unwrap(), &options)
             .findings()
             .iter()
             .all(|f| f.kind != "not-followed")
@@ -93,13 +93,13 @@ fn jump_of_a_fixed_delay_is_reported() {
 #[test]
 fn instantaneous_level_follows_the_estimate() {
     let options = TrackOptions {
-        start: StartAt::Nothing,
+        start: StartSource::Nothing,
         ..TrackOptions::default_for(physical(), 29)
     };
     let record = simulated(Condition::C1);
     let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
     // With a start that is not a fit, no parameter is determined at first.
-    assert_ne!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
+    assert_ne!(tracker.verdict_level(&tracker.operator()), VerdictLevel::Trustworthy);
     let default = TrackOptions::default_for(physical(), 29);
     let mut known = Tracker::new(&default, Some(&record), record.sample_time()).unwrap();
     for (e, u) in record.input().iter().zip(record.output()) {
@@ -107,12 +107,15 @@ fn instantaneous_level_follows_the_estimate() {
         known.step(*e, *u);
     }
     let mut operator = known.operator().unwrap();
-    assert_eq!(known.level(&Ok(operator)), VerdictLevel::Trustworthy);
+    assert_eq!(known.verdict_level(&Ok(operator)), VerdictLevel::Trustworthy);
     operator.zeta_nm.value = 4.0;
-    assert_eq!(known.level(&Ok(operator)), VerdictLevel::Doubtful);
+    assert_eq!(known.verdict_level(&Ok(operator)), VerdictLevel::Doubtful);
     for gain in [&mut operator.k_e, &mut operator.k_e_dot] {
         gain.standard_error = Some(gain.value.abs());
     }
-    assert_eq!(known.level(&Ok(operator)), VerdictLevel::NotDetermined);
-    assert_eq!(known.level(&Err(NotConvertible::ZeroGain)), VerdictLevel::Doubtful);
+    assert_eq!(known.verdict_level(&Ok(operator)), VerdictLevel::NotDetermined);
+    assert_eq!(
+        known.verdict_level(&Err(NotConvertible::ZeroGain)),
+        VerdictLevel::Doubtful
+    );
 }

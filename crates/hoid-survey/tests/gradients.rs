@@ -4,8 +4,8 @@
 #[path = "../../hoid-core/tests/common/mod.rs"]
 mod common;
 
-use common::{Noise, bars, box_jenkins, covariance};
-use hoid_core::{adaptation::Forgetting, covariance::Covariance, recursion::Stable, shape::AnyShape};
+use common::{Noise, box_jenkins, covariance, error_bars};
+use hoid_core::{adaptation::Forgetting, covariance::Covariance, recursion::StablePolynomials, shape::AnyShape};
 use hoid_survey::kernel::physical::{PhysicalModel, PhysicalRpem};
 
 /// A Box-Jenkins model in physical parameters with one noise pole (and a zero), with or without the delay.
@@ -31,13 +31,13 @@ fn physical<const N: usize, const L: usize>(
         smallest_nk,
         sample_time: 0.01,
         bounds,
-        stable: Stable::Predictor,
+        stable: StablePolynomials::Predictor,
     };
     PhysicalRpem::new(
         model,
         eta,
         covariance::<N>(1.0, Forgetting::Exponential { lambda: [1.0; N] }),
-        bars::<N, 4>(1.0),
+        error_bars::<N, 4>(1.0),
     )
     .unwrap()
 }

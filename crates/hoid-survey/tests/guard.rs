@@ -8,7 +8,9 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 
 use hoid_survey::{methods, multiple_model, physical};
-use hoid_track::{GuardAction, GuardEvent, GuardKind, Method, Outcome, StartAt, Trace, TrackOptions, Tracker, track};
+use hoid_track::{
+    GuardAction, GuardEvent, GuardKind, Method, Outcome, StartSource, Trace, TrackOptions, Tracker, track,
+};
 
 fn record(seed: u64) -> Record {
     let seed = RunSeed {
@@ -31,11 +33,11 @@ fn tracker(options: &TrackOptions, record: &Record) -> Tracker {
     Tracker::new(options, Some(&span), record.sample_time()).unwrap()
 }
 
-const GUARDED: [fn() -> Method; 5] = [physical, multiple_model, Method::adaptive, Method::rls, Method::rpem];
+const GUARDED_METHODS: [fn() -> Method; 5] = [physical, multiple_model, Method::adaptive, Method::rls, Method::rpem];
 
 #[test]
 fn inactive_guard_changes_no_digit() {
-    for method in GUARDED {
+    for method in GUARDED_METHODS {
         for seed in 0..3 {
             let record = record(seed);
             let with = track(&record, &options(method(), "yes"), 16).unwrap();
@@ -94,7 +96,7 @@ fn permanent_jump_leaves_the_result_unchanged_after_the_wait() {
 }
 
 /// Faulty input: e and u of sample k, with faults from sample 4000 on.
-fn hostile(record: &Record, k: usize) -> (f64, f64) {
+fn faulty_input(record: &Record, k: usize) -> (f64, f64) {
     let (e, u) = (record.input()[k], record.output()[k]);
     match k {
         4000 => (100.0, u),
@@ -109,20 +111,20 @@ fn hostile(record: &Record, k: usize) -> (f64, f64) {
 #[test]
 fn restored_guard_is_bit_identical() {
     let record = record(6);
-    for method in GUARDED {
+    for method in GUARDED_METHODS {
         let options = options(method(), "yes");
         // Stops are within an outlier, a gap and a pause, and after the pause.
         for stop in [3000, 4102, 4200, 4900, 5300, 5900] {
             let mut first = tracker(&options, &record);
             (0..stop).for_each(|k| {
-                let (e, u) = hostile(&record, k);
+                let (e, u) = faulty_input(&record, k);
                 first.step(e, u);
             });
-            let numbers = first.saved();
-            let mut second = Tracker::restored(&options, record.sample_time(), &numbers).unwrap();
+            let numbers = first.save();
+            let mut second = Tracker::restore(&options, record.sample_time(), &numbers).unwrap();
             assert_eq!(first.is_paused(), second.is_paused());
             for k in stop..6700 {
-                let (e, u) = hostile(&record, k);
+                let (e, u) = faulty_input(&record, k);
                 // An innovation is never NaN, so outcomes can be compared.
                 let of =
                     |tracker: &mut Tracker| -> (Outcome, Option<GuardEvent>) { (tracker.step(e, u), tracker.event()) };
@@ -130,7 +132,7 @@ fn restored_guard_is_bit_identical() {
             }
             assert_eq!(first.theta(), second.theta());
             assert_eq!(first.counts(), second.counts());
-            assert!(Tracker::restored(&options, record.sample_time(), &numbers[1..]).is_err());
+            assert!(Tracker::restore(&options, record.sample_time(), &numbers[1..]).is_err());
         }
     }
 }
@@ -141,7 +143,7 @@ fn faults_and_actions_are_reported_with_their_times() {
     let mut tracker = tracker(&options(physical(), "yes"), &record);
     let mut reported = Vec::new();
     for k in 0..record.len() {
-        let (e, u) = hostile(&record, k);
+        let (e, u) = faulty_input(&record, k);
         let outcome = tracker.step(e, u);
         assert_eq!(outcome.innovation.is_none(), outcome.held || outcome.skipped, "{k}");
         if let Some(event) = tracker.event() {
@@ -159,7 +161,7 @@ fn faults_and_actions_are_reported_with_their_times() {
     let counts = tracker.counts();
     assert_eq!(counts.restarts, 2, "{reported:?}");
     assert!(counts.held > 700 && counts.skipped > 190, "{counts:?}");
-    assert!(!tracker.is_paused() && tracker.since_restart_s().is_some());
+    assert!(!tracker.is_paused() && tracker.time_since_restart_s().is_some());
 }
 
 #[test]
@@ -182,10 +184,10 @@ fn estimates_stay_finite_for_any_stream() {
         for stream in streams {
             let known = tracker(&options(method.clone(), "yes"), &record);
             let nothing = TrackOptions {
-                start: StartAt::Nothing,
+                start: StartSource::Nothing,
                 ..options(method.clone(), "yes")
             };
-            let unknown = Tracker::new(&nothing, None, SampleTime::HUNDREDTH).unwrap();
+            let unknown = Tracker::new(&nothing, None, SampleTime::AT_100_HZ).unwrap();
             for mut tracker in [known, unknown] {
                 for k in 0..20_000 {
                     let (e, u) = stream(k);

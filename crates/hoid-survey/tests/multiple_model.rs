@@ -18,22 +18,22 @@ use operator::{S1, TS, diagonal};
 
 const S2: [f64; 4] = [0.07, 0.084, 11.25, 0.35];
 
-fn prior_of() -> ChangePrior {
-    operator::prior_of(DelayPrior::KNOWN)
+fn known_delay_prior() -> ChangePrior {
+    operator::prior_with_delay(DelayPrior::KNOWN_DELAY)
 }
 
 /// A prior of an operator that never changes.
-fn steady() -> ChangePrior {
+fn steady_prior() -> ChangePrior {
     ChangePrior {
         birth_interval: u32::MAX,
         hazard: 1e-12,
         gain_drift: 0.0,
         outlier_limit: f64::INFINITY,
-        ..prior_of()
+        ..known_delay_prior()
     }
 }
 
-const WIDE: [f64; 4] = [1e-4, 1e-4, 0.5, 1e-3];
+const WIDE_COVARIANCE: [f64; 4] = [1e-4, 1e-4, 0.5, 1e-3];
 
 fn bank(
     eta: [f64; 4],
@@ -46,17 +46,17 @@ fn bank(
     MultipleModelFilter::new(first, d, s).unwrap()
 }
 
-fn level(deviation: f64) -> InnovationVariance {
+fn innovation_variance(deviation: f64) -> InnovationVariance {
     InnovationVariance::new(deviation * deviation, 2000.0, 1.0 - 1.0 / 2000.0)
 }
 
 /// Delayed error and control of an operator with AR(1) noise, whose gains act at the output and are given by `eta` at
 /// each sample.
-fn operator(samples: usize, seed: u64, deviation: f64, eta: impl Fn(usize) -> [f64; 4]) -> Vec<(f64, f64)> {
-    with_noise(samples, seed, |_| deviation, eta)
+fn simulate_operator(samples: usize, seed: u64, deviation: f64, eta: impl Fn(usize) -> [f64; 4]) -> Vec<(f64, f64)> {
+    simulate_with_noise(samples, seed, |_| deviation, eta)
 }
 
-fn with_noise(
+fn simulate_with_noise(
     samples: usize,
     seed: u64,
     deviation: impl Fn(usize) -> f64,
@@ -144,7 +144,7 @@ fn moved_linearisation_point_updates_past_states() {
 #[test]
 fn one_hypothesis_is_weighted_least_squares() {
     let d = [-0.85];
-    let data = operator(3000, 3, 0.02, |_| S1);
+    let data = simulate_operator(3000, 3, 0.02, |_| S1);
     let prior = [1e-4, 1e-4];
     // With many prior residuals sigma^2 stays constant.
     let sigma2 = 4e-4;
@@ -154,7 +154,7 @@ fn one_hypothesis_is_weighted_least_squares() {
         [prior[0], prior[1], 0.0, 0.0],
         fixed,
         &d,
-        steady(),
+        steady_prior(),
     );
     let mut response = Response::new([S1[2], S1[3]], TS);
     let (mut r, mut y) = ([[0.0; 2]; 2], 0.0);
@@ -193,9 +193,15 @@ fn one_hypothesis_is_weighted_least_squares() {
 
 #[test]
 fn neuromuscular_system_converges_from_25_percent_off() {
-    let data = operator(20_000, 8, 0.002, |_| S1);
+    let data = simulate_operator(20_000, 8, 0.002, |_| S1);
     let start = [0.1, 0.03, 14.0, 0.45];
-    let mut bank = bank(start, [1e-3, 1e-3, 10.0, 0.02], level(0.002), &[-0.85], steady());
+    let mut bank = bank(
+        start,
+        [1e-3, 1e-3, 10.0, 0.02],
+        innovation_variance(0.002),
+        &[-0.85],
+        steady_prior(),
+    );
     for &(x, u) in &data {
         bank.step(x, u);
     }
@@ -211,8 +217,14 @@ fn neuromuscular_system_converges_from_25_percent_off() {
 #[test]
 fn change_is_declared_once_with_time_and_gains() {
     let change_at = 6000;
-    let data = operator(10_000, 21, 0.02, |k| if k < change_at { S1 } else { S2 });
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
+    let data = simulate_operator(10_000, 21, 0.02, |k| if k < change_at { S1 } else { S2 });
+    let mut bank = bank(
+        S1,
+        WIDE_COVARIANCE,
+        innovation_variance(0.02),
+        &[-0.85],
+        known_delay_prior(),
+    );
     let mut declared = Vec::new();
     for (k, &(x, u)) in data.iter().enumerate() {
         bank.step(x, u);
@@ -238,8 +250,14 @@ fn change_is_declared_once_with_time_and_gains() {
 #[test]
 fn a_steady_operator_raises_no_alarm_and_memory_grows() {
     // The run lasts ten minutes.
-    let data = operator(60_000, 33, 0.02, |_| S1);
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
+    let data = simulate_operator(60_000, 33, 0.02, |_| S1);
+    let mut bank = bank(
+        S1,
+        WIDE_COVARIANCE,
+        innovation_variance(0.02),
+        &[-0.85],
+        known_delay_prior(),
+    );
     for &(x, u) in &data {
         bank.step(x, u);
         assert!(bank.bank().change().is_none());
@@ -249,8 +267,14 @@ fn a_steady_operator_raises_no_alarm_and_memory_grows() {
 
 #[test]
 fn change_of_remnant_variance_is_declared() {
-    let data = with_noise(8000, 2, |k| if k < 4000 { 0.02 } else { 0.06 }, |_| S1);
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
+    let data = simulate_with_noise(8000, 2, |k| if k < 4000 { 0.02 } else { 0.06 }, |_| S1);
+    let mut bank = bank(
+        S1,
+        WIDE_COVARIANCE,
+        innovation_variance(0.02),
+        &[-0.85],
+        known_delay_prior(),
+    );
     let mut declared = Vec::new();
     for (k, &(x, u)) in data.iter().enumerate() {
         bank.step(x, u);
@@ -263,11 +287,17 @@ fn change_of_remnant_variance_is_declared() {
 
 #[test]
 fn outliers_are_not_declared_as_changes() {
-    let mut data = operator(8000, 12, 0.02, |_| S1);
+    let mut data = simulate_operator(8000, 12, 0.02, |_| S1);
     for k in (500..8000).step_by(700) {
         data[k].1 += 5.0;
     }
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
+    let mut bank = bank(
+        S1,
+        WIDE_COVARIANCE,
+        innovation_variance(0.02),
+        &[-0.85],
+        known_delay_prior(),
+    );
     for &(x, u) in &data {
         bank.step(x, u);
         assert!(bank.bank().change().is_none());
@@ -281,8 +311,14 @@ fn outliers_are_not_declared_as_changes() {
 
 #[test]
 fn extreme_signals_leave_everything_finite() {
-    let data = operator(2000, 4, 0.02, |_| S1);
-    let mut bank = bank(S1, WIDE, level(0.02), &[-1.6, 0.7], prior_of());
+    let data = simulate_operator(2000, 4, 0.02, |_| S1);
+    let mut bank = bank(
+        S1,
+        WIDE_COVARIANCE,
+        innovation_variance(0.02),
+        &[-1.6, 0.7],
+        known_delay_prior(),
+    );
     let finite = |bank: &mut MultipleModelFilter<8, 4>, x: f64, u: f64| {
         bank.step(x, u);
         assert!(bank.bank().mixture().eta.iter().all(|e| e.is_finite()));
@@ -312,8 +348,14 @@ fn extreme_signals_leave_everything_finite() {
 
 #[test]
 fn gap_in_the_output_is_bridged() {
-    let data = operator(9000, 14, 0.02, |_| S1);
-    let mut bank = bank(S1, WIDE, level(0.02), &[-0.85], prior_of());
+    let data = simulate_operator(9000, 14, 0.02, |_| S1);
+    let mut bank = bank(
+        S1,
+        WIDE_COVARIANCE,
+        innovation_variance(0.02),
+        &[-0.85],
+        known_delay_prior(),
+    );
     for (k, &(x, u)) in data.iter().enumerate() {
         if (3000..3050).contains(&k) || k % 97 == 0 {
             bank.bridge(x);
@@ -331,8 +373,14 @@ fn gap_in_the_output_is_bridged() {
 
 #[test]
 fn t_l_stays_finite_as_k_e_becomes_zero() {
-    let data = operator(3000, 6, 0.02, |_| [0.0, 0.05, S1[2], S1[3]]);
-    let mut bank = bank([0.0, 0.05, S1[2], S1[3]], WIDE, level(0.02), &[-0.85], prior_of());
+    let data = simulate_operator(3000, 6, 0.02, |_| [0.0, 0.05, S1[2], S1[3]]);
+    let mut bank = bank(
+        [0.0, 0.05, S1[2], S1[3]],
+        WIDE_COVARIANCE,
+        innovation_variance(0.02),
+        &[-0.85],
+        known_delay_prior(),
+    );
     for &(x, u) in &data {
         bank.step(x, u);
         let covariance = bank.bank().covariance();
@@ -345,31 +393,31 @@ fn t_l_stays_finite_as_k_e_becomes_zero() {
 
 #[test]
 fn invalid_starts_are_refused() {
-    let first = |eta| Hypothesis::new(eta, &diagonal(WIDE), level(0.02)).unwrap();
+    let first = |eta| Hypothesis::new(eta, &diagonal(WIDE_COVARIANCE), innovation_variance(0.02)).unwrap();
     let new = |eta, d: &[f64], s| MultipleModelFilter::<8, 4>::new(first(eta), d, s);
-    assert!(new(S1, &[-0.85], prior_of()).is_some());
-    assert!(new(S1, &[0.0; 5], prior_of()).is_none());
-    assert!(new([0.09, 0.036, 200.0, 0.35], &[], prior_of()).is_none());
-    assert!(new([f64::NAN, 0.036, 11.0, 0.35], &[], prior_of()).is_none());
-    assert!(MultipleModelFilter::<1, 4>::new(first(S1), &[], prior_of()).is_none());
+    assert!(new(S1, &[-0.85], known_delay_prior()).is_some());
+    assert!(new(S1, &[0.0; 5], known_delay_prior()).is_none());
+    assert!(new([0.09, 0.036, 200.0, 0.35], &[], known_delay_prior()).is_none());
+    assert!(new([f64::NAN, 0.036, 11.0, 0.35], &[], known_delay_prior()).is_none());
+    assert!(MultipleModelFilter::<1, 4>::new(first(S1), &[], known_delay_prior()).is_none());
     for wrong in [
         ChangePrior {
             birth_interval: 0,
-            ..prior_of()
+            ..known_delay_prior()
         },
         ChangePrior {
             hazard: 0.1,
-            ..prior_of()
+            ..known_delay_prior()
         },
         ChangePrior {
             sample_time: 0.0,
-            ..prior_of()
+            ..known_delay_prior()
         },
     ] {
         assert!(new(S1, &[], wrong).is_none(), "{wrong:?}");
     }
     let negative = diagonal([1e-4, -1e-4, 0.5, 1e-3]);
-    assert!(Hypothesis::new(S1, &negative, level(0.02)).is_none());
+    assert!(Hypothesis::new(S1, &negative, innovation_variance(0.02)).is_none());
 }
 
 #[test]
@@ -379,8 +427,8 @@ fn change_of_the_neuromuscular_system_is_tracked() {
     let mut noise = Noise(17);
     let (mut slow, mut fast, mut n) = (0.0, 0.0, 0.0);
     let (mut before, mut w) = (0.0, [0.0; 2]);
-    let first = Hypothesis::new(S1, &diagonal(WIDE), level(0.003)).unwrap();
-    let mut bank: MultipleModelFilter<16, 4> = MultipleModelFilter::new(first, &[-0.85], prior_of()).unwrap();
+    let first = Hypothesis::new(S1, &diagonal(WIDE_COVARIANCE), innovation_variance(0.003)).unwrap();
+    let mut bank: MultipleModelFilter<16, 4> = MultipleModelFilter::new(first, &[-0.85], known_delay_prior()).unwrap();
     let mut changes = Vec::new();
     for k in 0..9000 {
         let ([b0, b1, f1, f2], _) = held_operator(if k < at { S1 } else { slower }, TS);

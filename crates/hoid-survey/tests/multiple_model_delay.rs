@@ -15,17 +15,17 @@ use hoid_survey::kernel::multiple_model::{
     prior::{ChangePrior, DelayPrior},
     response::{Response, Signals},
 };
-use operator::{S1, TS, diagonal, prior_of};
+use operator::{S1, TS, diagonal, prior_with_delay};
 
 /// Number of candidate delays.
-const COUNT: usize = 16;
+const DELAY_COUNT: usize = 16;
 const D: [f64; 1] = [-0.85];
-const DEVIATION: f64 = 0.02;
+const NOISE_DEVIATION: f64 = 0.02;
 
 type Bank = MultipleModelFilter<48, 4, Vec<Signals>>;
 
 const OPEN_DELAY: DelayPrior = DelayPrior {
-    count: COUNT,
+    count: DELAY_COUNT,
     propose_every: 4,
     change_odds: 0.5,
     proposals: 8,
@@ -34,18 +34,18 @@ const OPEN_DELAY: DelayPrior = DelayPrior {
     error_per_sample: [0.01, 0.03, 0.04, 0.08],
 };
 
-const SPREAD: [f64; 4] = [1e-5, 1e-5, 0.05, 1e-4];
+const INITIAL_COVARIANCE: [f64; 4] = [1e-5, 1e-5, 0.05, 1e-4];
 
-fn first(spread: [f64; 4]) -> Hypothesis {
-    let level = InnovationVariance::new(DEVIATION * DEVIATION, 2000.0, 1.0 - 1.0 / 2000.0);
+fn first_hypothesis(spread: [f64; 4]) -> Hypothesis {
+    let level = InnovationVariance::new(NOISE_DEVIATION * NOISE_DEVIATION, 2000.0, 1.0 - 1.0 / 2000.0);
     Hypothesis::new(S1, &diagonal(spread), level).unwrap()
 }
 
 fn bank(later: usize, delay: DelayPrior) -> Bank {
     MultipleModelFilter::with_delays(
-        first(SPREAD).with_extra_delay(later),
+        first_hypothesis(INITIAL_COVARIANCE).with_extra_delay(later),
         &D,
-        prior_of(delay),
+        prior_with_delay(delay),
         vec![[0.0; 6]; delay.count],
     )
     .unwrap()
@@ -53,7 +53,7 @@ fn bank(later: usize, delay: DelayPrior) -> Bank {
 
 /// Error and control of an operator whose delay is given at each sample, in samples, with AR(1)
 /// noise.
-fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f64, f64)> {
+fn simulate_operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f64, f64)> {
     let mut noise = Noise(seed);
     let mut response = Response::new([S1[2], S1[3]], TS);
     let (mut slow, mut fast, mut n, mut w) = (0.0, 0.0, 0.0, Vec::new());
@@ -64,7 +64,7 @@ fn operator(samples: usize, seed: u64, delay: impl Fn(usize) -> usize) -> Vec<(f
             let x = slow + fast;
             let signals = response.step(x);
             w.push(S1[0] * signals[0] + S1[1] * signals[1]);
-            n = -D[0] * n + DEVIATION * noise.next();
+            n = -D[0] * n + NOISE_DEVIATION * noise.next();
             (x, n + k.checked_sub(delay(k)).map_or(0.0, |past| w[past]))
         })
         .collect()
@@ -76,20 +76,20 @@ fn known_delay_acts_as_a_delay_line() {
     // are still in the delay line differ to second order.
     let prior_of = |delay| ChangePrior {
         neuromuscular_every: 0,
-        ..prior_of(delay)
+        ..prior_with_delay(delay)
     };
-    let first = first([1e-5, 1e-5, 0.0, 0.0]);
+    let first = first_hypothesis([1e-5, 1e-5, 0.0, 0.0]);
     let silent = DelayPrior {
         propose_every: u32::MAX,
         neighbour_probability: 0.0,
         ..OPEN_DELAY
     };
-    let memory = vec![[0.0; 6]; COUNT];
+    let memory = vec![[0.0; 6]; DELAY_COUNT];
     let mut one: Bank =
         MultipleModelFilter::with_delays(first.with_extra_delay(5), &D, prior_of(silent), memory).unwrap();
     let mut other: MultipleModelFilter<48, 4> =
-        MultipleModelFilter::new(first, &D, prior_of(DelayPrior::KNOWN)).unwrap();
-    let data = operator(4000, 3, |k| if k < 2000 { 5 } else { 6 });
+        MultipleModelFilter::new(first, &D, prior_of(DelayPrior::KNOWN_DELAY)).unwrap();
+    let data = simulate_operator(4000, 3, |k| if k < 2000 { 5 } else { 6 });
     for (k, &(x, u)) in data.iter().enumerate() {
         let delayed = k.checked_sub(5).map_or(0.0, |past| data[past].0);
         // Rounding errors may differ, because the two filters are compiled separately.
@@ -105,7 +105,7 @@ fn known_delay_acts_as_a_delay_line() {
 #[test]
 fn change_of_delay_is_found_and_named() {
     for (seed, from, to) in [(11, 4, 10), (12, 10, 5), (13, 2, 4)] {
-        let data = operator(10_000, seed, |k| if k < 6000 { from } else { to });
+        let data = simulate_operator(10_000, seed, |k| if k < 6000 { from } else { to });
         let mut bank = bank(from, OPEN_DELAY);
         let mut declared = Vec::new();
         for (k, &(x, u)) in data.iter().enumerate() {
@@ -136,7 +136,7 @@ fn change_of_delay_is_found_and_named() {
 #[test]
 fn wrong_initial_delay_is_corrected_without_an_alarm() {
     for (seed, wrong) in [(5, 7), (6, 9)] {
-        let data = operator(6000, seed, |_| 8);
+        let data = simulate_operator(6000, seed, |_| 8);
         let mut bank = bank(wrong, OPEN_DELAY);
         for (k, &(x, u)) in data.iter().enumerate() {
             bank.step(x, u);
@@ -149,7 +149,7 @@ fn wrong_initial_delay_is_corrected_without_an_alarm() {
 #[test]
 fn a_steady_operator_raises_no_alarm() {
     // The run lasts ten minutes.
-    let data = operator(60_000, 34, |_| 8);
+    let data = simulate_operator(60_000, 34, |_| 8);
     let mut bank = bank(8, OPEN_DELAY);
     for &(x, u) in &data {
         bank.step(x, u);
@@ -165,7 +165,7 @@ fn a_steady_operator_raises_no_alarm() {
 #[test]
 fn extreme_signals_stay_finite_and_bad_memory_is_refused() {
     let mut bank = bank(8, OPEN_DELAY);
-    for (k, (x, u)) in operator(3000, 7, |_| 8).into_iter().enumerate() {
+    for (k, (x, u)) in simulate_operator(3000, 7, |_| 8).into_iter().enumerate() {
         match k {
             500 => _ = bank.step(1e200, u),
             800 => _ = bank.step(x, -1e200),
@@ -178,10 +178,16 @@ fn extreme_signals_stay_finite_and_bad_memory_is_refused() {
         assert!(bank.bank().delay().iter().all(|d| d.is_finite()));
     }
     let with = |delay: DelayPrior, memory: usize| {
-        Bank::with_delays(first(SPREAD), &D, prior_of(delay), vec![[0.0; 6]; memory]).is_some()
+        Bank::with_delays(
+            first_hypothesis(INITIAL_COVARIANCE),
+            &D,
+            prior_with_delay(delay),
+            vec![[0.0; 6]; memory],
+        )
+        .is_some()
     };
-    assert!(with(OPEN_DELAY, COUNT));
-    assert!(!with(OPEN_DELAY, COUNT - 1) && !with(OPEN_DELAY, 0));
+    assert!(with(OPEN_DELAY, DELAY_COUNT));
+    assert!(!with(OPEN_DELAY, DELAY_COUNT - 1) && !with(OPEN_DELAY, 0));
     assert!(!with(DelayPrior { count: 0, ..OPEN_DELAY }, 0));
     assert!(
         !with(
@@ -189,13 +195,13 @@ fn extreme_signals_stay_finite_and_bad_memory_is_refused() {
                 proposals: 0,
                 ..OPEN_DELAY
             },
-            COUNT
+            DELAY_COUNT
         ) && !with(
             DelayPrior {
                 propose_every: 0,
                 ..OPEN_DELAY
             },
-            COUNT
+            DELAY_COUNT
         )
     );
     assert!(!with(
@@ -203,6 +209,6 @@ fn extreme_signals_stay_finite_and_bad_memory_is_refused() {
             neighbour_probability: f64::NAN,
             ..OPEN_DELAY
         },
-        COUNT
+        DELAY_COUNT
     ));
 }

@@ -8,9 +8,9 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{GuardKind, Method, Sample, TrackOptions, Tracker, track};
 
-const DELAY: usize = 29;
+const DELAY_SAMPLES: usize = 29;
 /// Duration of tracking before the rest, s.
-const BEFORE_S: f64 = 41.0;
+const TRACKING_S: f64 = 41.0;
 
 fn record(condition: Condition) -> Record {
     let seed = RunSeed {
@@ -58,7 +58,7 @@ impl ConstantSpan {
     }
 }
 
-fn bars(tracker: &Tracker) -> Vec<(String, f64)> {
+fn error_bars(tracker: &Tracker) -> Vec<(String, f64)> {
     let names = tracker.parameter_names();
     let theta = names.into_iter().zip(tracker.parameters());
     let theta = theta.map(|(name, estimate)| (name, estimate.standard_error.unwrap_or(0.0)));
@@ -72,7 +72,7 @@ fn bars(tracker: &Tracker) -> Vec<(String, f64)> {
 const GUARD_MEMORY_S: f64 = 10.0;
 
 /// Keeps the smaller of both error bars for each parameter.
-fn smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
+fn keep_smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
     for ((_, one), (_, other)) in of.iter_mut().zip(others) {
         *one = one.min(other);
     }
@@ -80,7 +80,7 @@ fn smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
 
 /// Returns a tracker after the constant span, and the error bars before this span. A guard may restore earlier numbers,
 /// so these are the smallest error bars that it may have kept.
-fn after_constant_span(
+fn track_through_constant_span(
     options: &TrackOptions,
     record: &Record,
     span_kind: ConstantSpan,
@@ -93,7 +93,7 @@ fn after_constant_span(
         _ => false,
     };
     let ts = record.sample_time().s();
-    let first = (BEFORE_S / ts) as usize;
+    let first = (TRACKING_S / ts) as usize;
     let span = record.span(0.0, 20.0).unwrap();
     let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
     let at = |k: usize| Sample {
@@ -103,17 +103,17 @@ fn after_constant_span(
     };
     let mut kept: Option<Vec<(String, f64)>> = None;
     for k in 0..first {
-        tracker.update(at(k), options.method.starts_itself() || k as f64 * ts >= 20.0);
-        if goes_back && (k as f64 * ts) >= BEFORE_S - GUARD_MEMORY_S {
-            smallest(kept.get_or_insert_with(|| bars(&tracker)), bars(&tracker));
+        tracker.update(at(k), options.method.is_self_starting() || k as f64 * ts >= 20.0);
+        if goes_back && (k as f64 * ts) >= TRACKING_S - GUARD_MEMORY_S {
+            keep_smallest(kept.get_or_insert_with(|| error_bars(&tracker)), error_bars(&tracker));
         }
     }
-    let (mut initial_bars, before) = (kept.unwrap_or_else(|| bars(&tracker)), at(first - 1));
+    let (mut initial_bars, before) = (kept.unwrap_or_else(|| error_bars(&tracker)), at(first - 1));
     let mut reported = Vec::new();
     for k in 0..(length_s / ts) as usize {
         // After a step of e, the response contains information as long as it is not constant.
         if span_kind == ConstantSpan::ConstantE && k as f64 * ts <= RESPONSE_S {
-            initial_bars = bars(&tracker);
+            initial_bars = error_bars(&tracker);
         }
         tracker.update(span_kind.sample(&before, &at(first + k), k), true);
         reported.extend(tracker.event().map(|event| event.kind));
@@ -131,16 +131,16 @@ fn after_constant_span(
 fn all_options() -> Vec<TrackOptions> {
     let mut all: Vec<TrackOptions> = hoid_survey::methods()
         .into_iter()
-        .map(|method| TrackOptions::default_for(method, DELAY))
+        .map(|method| TrackOptions::default_for(method, DELAY_SAMPLES))
         .collect();
-    all.extend(TrackOptions::default_for(Method::adaptive(), DELAY).with(&[("replay", "0")]));
+    all.extend(TrackOptions::default_for(Method::adaptive(), DELAY_SAMPLES).with(&[("replay", "0")]));
     for (name, text) in [
         ("memory", "100"),
         ("forgetting", "directional"),
         ("forgetting", "variable"),
     ] {
         for method in [Method::rls(), Method::rpem()] {
-            all.extend(TrackOptions::default_for(method, DELAY).with(&[(name, text)]));
+            all.extend(TrackOptions::default_for(method, DELAY_SAMPLES).with(&[(name, text)]));
         }
     }
     all
@@ -150,8 +150,8 @@ fn assert_no_bar_shrinks(span_kind: ConstantSpan, lengths_s: &[f64]) {
     let record = record(Condition::C1);
     for options in all_options() {
         for length in lengths_s {
-            let (tracker, initial_bars) = after_constant_span(&options, &record, span_kind, *length);
-            let end = bars(&tracker);
+            let (tracker, initial_bars) = track_through_constant_span(&options, &record, span_kind, *length);
+            let end = error_bars(&tracker);
             assert_eq!(initial_bars.len(), end.len());
             for ((name, before), (_, after)) in initial_bars.iter().zip(&end) {
                 assert!(
@@ -198,12 +198,12 @@ fn no_error_bar_shrinks_through_a_constant_error() {
 fn tracking_resumes_after_a_long_rest() {
     let record = record(Condition::C1);
     for options in all_options() {
-        let (mut tracker, initial_bars) = after_constant_span(&options, &record, ConstantSpan::Rest, 1000.0);
-        for ((name, before), (_, after)) in initial_bars.iter().zip(bars(&tracker)) {
+        let (mut tracker, initial_bars) = track_through_constant_span(&options, &record, ConstantSpan::Rest, 1000.0);
+        for ((name, before), (_, after)) in initial_bars.iter().zip(error_bars(&tracker)) {
             assert!(after >= before * (1.0 - 1e-9), "{}: {name}", options.method.name());
         }
         let theta = tracker.theta().to_vec();
-        let first = (BEFORE_S / record.sample_time().s()) as usize;
+        let first = (TRACKING_S / record.sample_time().s()) as usize;
         for k in first..record.len() {
             tracker.step(record.input()[k], record.output()[k]);
         }
@@ -213,7 +213,7 @@ fn tracking_resumes_after_a_long_rest() {
             options.method.name()
         );
         // The error bars must not decrease to a hundredth after a few seconds of information.
-        for ((name, before), (_, after)) in initial_bars.iter().zip(bars(&tracker)) {
+        for ((name, before), (_, after)) in initial_bars.iter().zip(error_bars(&tracker)) {
             assert!(
                 after >= 0.05 * before,
                 "{}: {name} {before:e} {after:e}",
@@ -245,7 +245,7 @@ fn time_without_excitation_is_reported() {
         hoid_survey::window(),
         hoid_survey::fused(),
     ] {
-        let options = TrackOptions::default_for(method.clone(), DELAY);
+        let options = TrackOptions::default_for(method.clone(), DELAY_SAMPLES);
         let trace = track(&with_rest, &options, 50).unwrap();
         let said = trace.verdict(&with_rest, None).unwrap();
         let said: Vec<&str> = said.reasons().collect();
@@ -255,7 +255,7 @@ fn time_without_excitation_is_reported() {
         );
         assert_eq!(track(&whole, &options, 50).unwrap().faults(), [], "{method}");
     }
-    let as_it_comes = TrackOptions::default_for(Method::rls(), DELAY)
+    let as_it_comes = TrackOptions::default_for(Method::rls(), DELAY_SAMPLES)
         .with(&[("guard", "no")])
         .unwrap();
     assert_eq!(track(&with_rest, &as_it_comes, 50).unwrap().faults(), []);

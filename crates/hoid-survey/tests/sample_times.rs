@@ -4,9 +4,9 @@
 
 use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion};
 use hoid_model::{Channel, Record, SampleTime};
-use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, Tracker, ranges_of};
+use hoid_track::{Method, StartSource, TrackOptions, TrackPlan, Tracker, search_ranges};
 
-const LONGEST_S: f64 = std::f64::consts::PI;
+const MAX_SAMPLE_TIME_S: f64 = std::f64::consts::PI;
 
 fn sample_times() -> impl Iterator<Item = f64> {
     (-24..=24).map(|quarter| 10_f64.powf(f64::from(quarter) / 4.0))
@@ -21,16 +21,16 @@ fn signals(k: usize) -> (f64, f64) {
     )
 }
 
-fn starts(options: &TrackOptions) -> Vec<TrackOptions> {
-    let of = |start: StartAt| TrackOptions {
+fn options_with_all_starts(options: &TrackOptions) -> Vec<TrackOptions> {
+    let of = |start: StartSource| TrackOptions {
         start,
         ..options.clone()
     };
     let p = options.orders.parameter_names().len();
     vec![
-        of(StartAt::Span(None)),
-        of(StartAt::Nothing),
-        of(StartAt::Theta(vec![0.1; p])),
+        of(StartSource::Span(None)),
+        of(StartSource::Nothing),
+        of(StartSource::Theta(vec![0.1; p])),
     ]
 }
 
@@ -44,9 +44,9 @@ fn too_long_sample_times_are_refused() {
     for method in hoid_survey::methods() {
         for ts in sample_times() {
             let sample_time = SampleTime::new(ts).unwrap();
-            for options in starts(&TrackOptions::without_prior(method.clone(), sample_time)) {
+            for options in options_with_all_starts(&TrackOptions::without_prior(method.clone(), sample_time)) {
                 let made = Tracker::new(&options, None, sample_time);
-                if ts >= LONGEST_S {
+                if ts >= MAX_SAMPLE_TIME_S {
                     assert!(is_expected_refusal(&made.unwrap_err(), ts), "{method} at {ts} s");
                     continue;
                 }
@@ -64,7 +64,7 @@ fn too_long_sample_times_are_refused() {
 
 #[test]
 fn too_long_sample_times_are_refused_in_plans() {
-    for ts in sample_times().filter(|ts| *ts >= LONGEST_S) {
+    for ts in sample_times().filter(|ts| *ts >= MAX_SAMPLE_TIME_S) {
         let sample_time = SampleTime::new(ts).unwrap();
         let (e, u) = (0..400).map(signals).unzip();
         let record = Record::new(sample_time, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap();
@@ -72,7 +72,7 @@ fn too_long_sample_times_are_refused_in_plans() {
             let options = TrackOptions::default_for(method.clone(), 2);
             let made = Tracker::new(&options, Some(&record), sample_time);
             assert!(is_expected_refusal(&made.unwrap_err(), ts), "{method} at {ts} s");
-            let ranges = ranges_of(&method, options.structure, &NamedOrders::new(), &[], sample_time).unwrap();
+            let ranges = search_ranges(&method, options.structure, &NamedOrders::new(), &[], sample_time).unwrap();
             let planned = TrackPlan::new(options, ranges, Criterion::Bic, sample_time);
             assert!(is_expected_refusal(&planned.unwrap_err(), ts), "{method} at {ts} s");
         }
@@ -85,7 +85,7 @@ fn every_method_refuses_sample_times_below_a_microsecond() {
     for method in hoid_survey::methods() {
         for ts in [9e-7, 1e-12, f64::MIN_POSITIVE] {
             let sample_time = SampleTime::new(ts).unwrap();
-            for options in starts(&TrackOptions::without_prior(method.clone(), sample_time)) {
+            for options in options_with_all_starts(&TrackOptions::without_prior(method.clone(), sample_time)) {
                 let error = Tracker::new(&options, None, sample_time).unwrap_err().to_string();
                 assert!(error.contains("sample time of a tracker"), "{method}: {error}");
             }

@@ -72,8 +72,8 @@ fn restored_tracker_is_bit_identical() {
         (0..3000).for_each(|k| {
             first.update(sample(k), true);
         });
-        let numbers = first.saved();
-        let mut second = Tracker::restored(&options, record.sample_time(), &numbers).unwrap();
+        let numbers = first.save();
+        let mut second = Tracker::restore(&options, record.sample_time(), &numbers).unwrap();
         let name = format!("{:?}", options.method);
         for k in 3000..5000 {
             assert_eq!(
@@ -87,7 +87,7 @@ fn restored_tracker_is_bit_identical() {
         assert_eq!(first.counts(), second.counts(), "{name}");
         assert_eq!(first.operator(), second.operator(), "{name}");
         assert!(
-            Tracker::restored(&options, record.sample_time(), &numbers[1..]).is_err(),
+            Tracker::restore(&options, record.sample_time(), &numbers[1..]).is_err(),
             "{name}"
         );
     }
@@ -149,7 +149,7 @@ fn resealed_changed_state_never_panics() {
         (2000..2700).for_each(|k| {
             tracker.update(sample(k), true);
         });
-        let numbers = tracker.saved();
+        let numbers = tracker.save();
         for _ in 0..600 {
             let mut changed = numbers[..numbers.len() - 1].to_vec();
             for _ in 0..=random(3) {
@@ -157,7 +157,7 @@ fn resealed_changed_state_never_panics() {
                 changed[at] = extremes[random(extremes.len())];
             }
             let changed = sealed(changed);
-            if let Ok(mut restored) = Tracker::restored(&options, record.sample_time(), &changed) {
+            if let Ok(mut restored) = Tracker::restore(&options, record.sample_time(), &changed) {
                 for k in 2700..2760 {
                     let missing = Sample {
                         u: f64::NAN,
@@ -165,7 +165,7 @@ fn resealed_changed_state_never_panics() {
                     };
                     restored.update(if k % 20 < 2 { missing } else { sample(k) }, true);
                 }
-                let numbers = restored.saved();
+                let numbers = restored.save();
                 let results = (restored.operator(), restored.covariance(), restored.response(3.0));
                 assert!(numbers.len() > 1 || results.1.is_none());
             }

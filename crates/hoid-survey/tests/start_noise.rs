@@ -12,7 +12,7 @@ use hoid_sim::{RunSeed, Simulator};
 use hoid_survey::MultipleModelOptions;
 use hoid_track::{TrackOptions, Tracker};
 
-fn span() -> Record {
+fn start_span() -> Record {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     simulator
         .run(RunSeed::default(), false)
@@ -22,7 +22,7 @@ fn span() -> Record {
 }
 
 /// Bounds that the Box-Jenkins fit cannot satisfy lead to the grey box.
-fn outside() -> TrackOptions {
+fn options_outside_bounds() -> TrackOptions {
     let mut own = MultipleModelOptions::default();
     own.bounds.bound = BTreeMap::from([("omega_nm".to_owned(), Constraint::Between(20.0, 30.0))]);
     TrackOptions::default_for(own.into(), 29)
@@ -30,8 +30,8 @@ fn outside() -> TrackOptions {
 
 #[test]
 fn start_outside_the_bounds_keeps_the_noise_order() {
-    let (span, options) = (span(), outside());
-    let tracker = Tracker::new(&options, Some(&span), SampleTime::HUNDREDTH).unwrap();
+    let (span, options) = (start_span(), options_outside_bounds());
+    let tracker = Tracker::new(&options, Some(&span), SampleTime::AT_100_HZ).unwrap();
     let names = tracker.parameter_names();
     let d: Vec<f64> = names
         .iter()

@@ -9,11 +9,11 @@ use hoid_model::{
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, Sample, Stage, TrackOptions, Tracker, WarmUp, opened, sealed};
+use hoid_track::{Method, Sample, Stage, TrackOptions, Tracker, WarmUp, sealed, unsealed};
 use proptest::{collection::vec, prelude::*, sample::Index, test_runner::RngSeed};
 
 /// Options and numbers of a tracker after a run, for each method, and the numbers of a warm-up.
-struct Saved {
+struct SavedStates {
     sample_time: SampleTime,
     trackers: Vec<(TrackOptions, Vec<f64>)>,
     warm_up: Vec<f64>,
@@ -28,8 +28,8 @@ fn record() -> Record {
     simulator.run(seed, false).unwrap()
 }
 
-fn saved() -> &'static Saved {
-    static SAVED: OnceLock<Saved> = OnceLock::new();
+fn saved_states() -> &'static SavedStates {
+    static SAVED: OnceLock<SavedStates> = OnceLock::new();
     SAVED.get_or_init(|| {
         let record = record();
         let span = record.span(0.0, 20.0).unwrap();
@@ -53,7 +53,7 @@ fn saved() -> &'static Saved {
             (2000..2300).for_each(|k| {
                 tracker.update(sample(k), true);
             });
-            let numbers = tracker.saved();
+            let numbers = tracker.save();
             (options, numbers)
         };
         let mut live = Stage::new(&of(hoid_survey::physical()), 2000, record.sample_time()).unwrap();
@@ -64,10 +64,10 @@ fn saved() -> &'static Saved {
         let Stage::Collecting(mut warm_up) = live else {
             panic!("the warm-up is over")
         };
-        Saved {
+        SavedStates {
             sample_time: record.sample_time(),
             trackers: all.into_iter().map(run).collect(),
-            warm_up: warm_up.saved(),
+            warm_up: warm_up.save(),
         }
     })
 }
@@ -123,7 +123,7 @@ fn tamper(numbers: &mut Vec<f64>, by: &Tampering) {
     }
 }
 
-fn same(a: &[f64], b: &[f64]) -> bool {
+fn is_bit_identical(a: &[f64], b: &[f64]) -> bool {
     let both_nan = |a: &f64, b: &f64| a.is_nan() && b.is_nan();
     a.len() == b.len()
         && a.iter()
@@ -134,13 +134,13 @@ fn same(a: &[f64], b: &[f64]) -> bool {
 /// Changes each number in turn and writes a valid checksum: no index, length or difference of counters causes a panic.
 #[test]
 fn changing_any_number_never_panics() {
-    let (saved, record) = (saved(), record());
+    let (saved, record) = (saved_states(), record());
     for (options, numbers) in &saved.trackers {
-        let numbers = opened(numbers).unwrap();
+        let numbers = unsealed(numbers).unwrap();
         for (at, number) in (0..numbers.len()).flat_map(|at| [(at, 0.0), (at, 1e18)]) {
             let mut changed = numbers.to_vec();
             changed[at] = number;
-            let restored = Tracker::restored(options, saved.sample_time, &sealed(changed));
+            let restored = Tracker::restore(options, saved.sample_time, &sealed(changed));
             let Ok(mut tracker) = restored else { continue };
             for k in 2300..2340 {
                 tracker.step(record.input()[k], record.output()[k]);
@@ -155,40 +155,40 @@ proptest! {
 
     #[test]
     fn changed_numbers_are_refused(which in any::<Index>(), by in vec(tampering(), 1..4)) {
-        let saved = saved();
+        let saved = saved_states();
         let (options, numbers) = which.get(&saved.trackers);
         let mut changed = numbers.clone();
         by.iter().for_each(|one| tamper(&mut changed, one));
-        let restored = Tracker::restored(options, saved.sample_time, &changed);
-        prop_assert_eq!(restored.is_ok(), same(numbers, &changed));
+        let restored = Tracker::restore(options, saved.sample_time, &changed);
+        prop_assert_eq!(restored.is_ok(), is_bit_identical(numbers, &changed));
         if let Err(error) = restored {
             prop_assert!(error.to_string().contains("save it again"), "{}", error);
         }
         let mut changed = saved.warm_up.clone();
         by.iter().for_each(|one| tamper(&mut changed, one));
-        prop_assert_eq!(WarmUp::restored(saved.sample_time, &changed).is_some(), same(&saved.warm_up, &changed));
+        prop_assert_eq!(WarmUp::restore(saved.sample_time, &changed).is_some(), is_bit_identical(&saved.warm_up, &changed));
     }
 
     #[test]
     fn state_of_another_tracker_is_refused(a in any::<Index>(), b in any::<Index>(), nk in 1..60_usize) {
-        let saved = saved();
+        let saved = saved_states();
         let (options, numbers) = a.get(&saved.trackers);
         let (others, of_others) = b.get(&saved.trackers);
         if options != others && numbers.len() != of_others.len() {
-            prop_assert!(Tracker::restored(options, saved.sample_time, of_others).is_err());
+            prop_assert!(Tracker::restore(options, saved.sample_time, of_others).is_err());
         }
         // Numbers of the right length are accepted as numbers of that tracker, and no values cause a panic.
         let orders = options.structure.operator_orders(nk);
         let other = TrackOptions { orders, ..options.clone() };
-        let _ = Tracker::restored(&other, saved.sample_time, numbers);
-        prop_assert!(WarmUp::restored(saved.sample_time, numbers).is_none());
+        let _ = Tracker::restore(&other, saved.sample_time, numbers);
+        prop_assert!(WarmUp::restore(saved.sample_time, numbers).is_none());
     }
 
     #[test]
     fn arbitrary_numbers_are_refused_as_a_state(which in any::<Index>(), numbers in vec(any::<f64>(), 0..50)) {
-        let saved = saved();
+        let saved = saved_states();
         let (options, _) = which.get(&saved.trackers);
-        prop_assert!(Tracker::restored(options, saved.sample_time, &numbers).is_err());
-        prop_assert!(WarmUp::restored(saved.sample_time, &numbers).is_none());
+        prop_assert!(Tracker::restore(options, saved.sample_time, &numbers).is_err());
+        prop_assert!(WarmUp::restore(saved.sample_time, &numbers).is_none());
     }
 }

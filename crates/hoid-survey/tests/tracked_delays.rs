@@ -8,7 +8,7 @@ use hoid_model::{
     schedule::Schedule,
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, StartAt, TrackOptions, track};
+use hoid_track::{Method, StartSource, TrackOptions, track};
 
 const NK: usize = 29;
 const CHANGE_S: f64 = 40.96;
@@ -33,7 +33,7 @@ fn run(after_s: f64, noise_level: f64) -> Record {
 
 fn options(range: Option<&str>) -> TrackOptions {
     let options = TrackOptions {
-        start: StartAt::Span(Some((0.0, 30.72))),
+        start: StartSource::Span(Some((0.0, 30.72))),
         at_rad_s: vec![2.5],
         ..TrackOptions::default_for(Method::rpem(), NK)
     };
@@ -98,7 +98,7 @@ fn changing_and_constant_delays_are_tracked() {
 fn physical_response_has_the_delay_of_its_row() {
     let record = run(0.34, 0.1);
     let physical = TrackOptions {
-        start: StartAt::Span(Some((0.0, 30.72))),
+        start: StartSource::Span(Some((0.0, 30.72))),
         at_rad_s: vec![2.5],
         ..TrackOptions::default_for(hoid_survey::physical(), NK)
     };
@@ -148,13 +148,13 @@ fn estimates_stay_finite_without_excitation() {
         })
         .collect();
     let record = Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "", e),
         Channel::new("u", "", u),
     )
     .unwrap();
     let options = TrackOptions {
-        start: StartAt::Span(Some((0.0, 14.0))),
+        start: StartSource::Span(Some((0.0, 14.0))),
         ..options(Some("0.2..0.4"))
     };
     let trace = track(&record, &options, 16).unwrap();

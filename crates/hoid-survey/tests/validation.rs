@@ -9,7 +9,8 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{
-    COVARIANCES, CovarianceUpdates, Method, StartAt, TrackOptions, choose_covariance, track, track_validated,
+    CANDIDATE_COVARIANCES, CovarianceUpdates, Method, StartSource, TrackOptions, choose_covariance, track,
+    track_validated,
 };
 
 const NK: usize = 29;
@@ -28,7 +29,7 @@ fn run(noise_level: f64, seed: u64) -> Record {
 
 fn options(method: Method) -> TrackOptions {
     TrackOptions {
-        start: StartAt::Span(Some((0.0, 30.72))),
+        start: StartSource::Span(Some((0.0, 30.72))),
         ..TrackOptions::default_for(method, NK)
     }
 }
@@ -39,7 +40,7 @@ fn vaf_of_a_constant_trace_matches_its_model() {
     let (record, other) = (run(0.1, 1), run(0.1, 2));
     let theta = vec![0.075, -0.074, -0.8, -1.912, 0.924];
     let stays = TrackOptions {
-        start: StartAt::Theta(theta.clone()),
+        start: StartSource::Theta(theta.clone()),
         update_from_s: Some(1e6),
         ..options(Method::rpem())
     };
@@ -66,8 +67,8 @@ fn best_covariance_of_the_grid_is_chosen() {
     let (record, other) = (run(0.1, 3), run(0.1, 4));
     for method in [Method::rls(), Method::rpem(), hoid_survey::physical()] {
         let (chosen, choice) = choose_covariance(&record, &other, &options(method.clone())).unwrap();
-        assert_eq!(choice.candidates.len(), COVARIANCES.len());
-        assert_eq!(chosen.method.covariance(), Some(choice.covariance));
+        assert_eq!(choice.candidates.len(), CANDIDATE_COVARIANCES.len());
+        assert_eq!(chosen.method.initial_covariance(), Some(choice.covariance));
         let most = choice.candidates.iter().map(|(_, vaf)| *vaf).fold(0.0, f64::max);
         assert_eq!(choice.vaf(), most, "{method}");
         // The output of the model equals that of the trace.
@@ -84,7 +85,10 @@ fn best_covariance_of_the_grid_is_chosen() {
     let clean = choose_covariance(&run(0.0, 5), &run(0.0, 6), &options(Method::rpem()))
         .unwrap()
         .1;
-    let ends = [clean.candidates[0].1, clean.candidates[COVARIANCES.len() - 1].1];
+    let ends = [
+        clean.candidates[0].1,
+        clean.candidates[CANDIDATE_COVARIANCES.len() - 1].1,
+    ];
     assert!(clean.vaf() > 98.0 && ends.iter().all(|end| *end < 90.0), "{clean:?}");
 }
 
@@ -133,7 +137,7 @@ fn invalid_choices_are_refused_with_advice() {
     assert!(found.contains("VAF of 0 %") && found.contains("signs"), "{found}");
     let found = refusal(&of(0.01, &e, vec![0.0; e.len()]), &options(Method::rpem()));
     assert!(found.contains("VAF of 0 %"), "{found}");
-    let alone = Record::of_output(record.sample_time(), Channel::new("u", "", u)).unwrap();
+    let alone = Record::from_output(record.sample_time(), Channel::new("u", "", u)).unwrap();
     assert!(refusal(&alone, &options(Method::rls())).contains("no input"));
 }
 

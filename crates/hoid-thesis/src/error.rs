@@ -13,7 +13,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum ThesisError {
     /// A name that belongs to no table, figure, appendix or study of the reproduction.
-    #[error("{name}: there is no table, figure or study with this name; expected {CLAIMS}, or a name, study or appendix from: {known}", CLAIMS = crate::CLAIMS)]
+    #[error("{name}: there is no table, figure or study with this name; expected {CLAIMS}, or a name, study or appendix from: {known}", CLAIMS = crate::CLAIMS_NAME)]
     UnknownItem {
         /// The unknown name.
         name: String,

@@ -45,4 +45,4 @@ pub mod reproduction;
 pub mod survey;
 
 pub use error::ThesisError;
-pub use reproduction::{CLAIMS, Reproduction, ReproductionEvent, ReproductionSummary, reproduce};
+pub use reproduction::{CLAIMS_NAME, Reproduction, ReproductionEvent, ReproductionSummary, reproduce};

@@ -53,7 +53,7 @@ mod tests {
             let plan = named.plan().unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(plan.name, named.name);
             assert!(!plan.title.is_empty() && !plan.description.is_empty(), "{}", plan.name);
-            assert_eq!(plan.replications, NamedPlan::REPLICATIONS, "{}", plan.name);
+            assert_eq!(plan.replications, NamedPlan::DEFAULT_REPLICATIONS, "{}", plan.name);
         }
         assert!(find("adaptation").is_some() && find("none").is_none());
         let survey = find("survey").map(|named| named.plan().unwrap_or_else(|error| panic!("{error}")));

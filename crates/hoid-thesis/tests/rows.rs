@@ -4,7 +4,7 @@
 
 use std::{collections::BTreeSet, path::Path};
 
-use hoid_thesis::{CLAIMS, reproduction::items};
+use hoid_thesis::{CLAIMS_NAME, reproduction::items};
 
 /// Returns the cells of the rows of the tables under a heading.
 fn rows<'a>(page: &'a str, heading: &str) -> Vec<Vec<&'a str>> {
@@ -17,30 +17,30 @@ fn rows<'a>(page: &'a str, heading: &str) -> Vec<Vec<&'a str>> {
 }
 
 /// Expands ranges such as `C.1` to `C.16`; any other text is returned unchanged.
-fn each(first: &str, last: &str) -> Vec<String> {
+fn expand_range(first: &str, last: &str) -> Vec<String> {
     let (letter, from) = first.rsplit_once('.').unwrap_or(("", first));
     let to: u32 = last.rsplit_once('.').map_or(last, |(_, n)| n).parse().unwrap();
     (from.parse().unwrap()..=to).map(|n| format!("{letter}.{n}")).collect()
 }
 
 /// Returns the number of rows of the thesis in a cell such as `Figs. 1, 2.1` or `Figs. C.1 to C.16`.
-fn count(cell: &str) -> usize {
+fn row_count(cell: &str) -> usize {
     let (_, numbers) = cell.split_once(' ').unwrap();
     let of = |part: &str| {
         part.split_once(" to ")
-            .map_or(1, |(first, last)| each(first, last).len())
+            .map_or(1, |(first, last)| expand_range(first, last).len())
     };
     numbers.split(", ").map(of).sum()
 }
 
 /// Returns the texts between backticks, with ranges expanded.
-fn quoted(cell: &str) -> Vec<String> {
+fn quoted_names(cell: &str) -> Vec<String> {
     let parts: Vec<&str> = cell.split('`').collect();
     let mut names = Vec::new();
     for at in (1..parts.len()).step_by(2) {
         if at >= 2 && parts[at - 1] == " to " {
             names.pop();
-            names.extend(each(parts[at - 2], parts[at]));
+            names.extend(expand_range(parts[at - 2], parts[at]));
         } else {
             names.push(parts[at].to_owned());
         }
@@ -54,7 +54,7 @@ fn documented_rows_match_the_program() {
     let page = std::fs::read_to_string(root.join("docs/src/thesis/rows.md")).unwrap();
     let [tables, figures, formulas, proposals] = ["Tables", "Figures", "Formulas", "Proposals"].map(|h| rows(&page, h));
 
-    let total = |rows: &[Vec<&str>]| rows.iter().map(|row| count(row[0])).sum::<usize>();
+    let total = |rows: &[Vec<&str>]| rows.iter().map(|row| row_count(row[0])).sum::<usize>();
     let numbers = [total(&tables), total(&figures), formulas.len(), proposals.len()];
     let [t, f, g, p] = numbers;
     let all = numbers.iter().sum::<usize>();
@@ -64,11 +64,15 @@ fn documented_rows_match_the_program() {
 
     let made: BTreeSet<String> = items().into_iter().map(|item| item.name).collect();
     let plans: BTreeSet<&str> = hoid_thesis::plans::TEXT_PLANS.iter().map(|plan| plan.name).collect();
-    let mut named: BTreeSet<String> = tables.iter().chain(&figures).flat_map(|row| quoted(row[1])).collect();
+    let mut named: BTreeSet<String> = tables
+        .iter()
+        .chain(&figures)
+        .flat_map(|row| quoted_names(row[1]))
+        .collect();
     for name in &named {
         assert!(made.contains(name), "{name} is named and not made");
     }
-    for name in formulas.iter().chain(&proposals).flat_map(|row| quoted(row[2])) {
+    for name in formulas.iter().chain(&proposals).flat_map(|row| quoted_names(row[2])) {
         if name.starts_with("hoid-") {
             assert!(root.join("crates").join(&name).is_file(), "{name} is not a file");
         } else if made.contains(&name) || plans.contains(name.as_str()) {
@@ -76,7 +80,7 @@ fn documented_rows_match_the_program() {
         } else {
             // The listed options and methods exist in the program.
             let options = include_str!("../../../docs/src/reference/command-line.md");
-            assert!(name == CLAIMS || options.contains(&name), "{name} is nothing");
+            assert!(name == CLAIMS_NAME || options.contains(&name), "{name} is nothing");
         }
     }
     let own = "lead-change".to_owned();

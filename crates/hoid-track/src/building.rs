@@ -3,15 +3,15 @@
 //! [`Recursion`]; `Method::from(options)` is then used like any other method.
 
 pub use crate::{
-    gain::{Gain, ROOM_WITHOUT_FIT, Scaled, error_bars},
-    history::{History, bounded, weighted},
-    kernel::{Kernel, Plan, scaled, too_many},
-    method::{About, Boxed, RecursiveMethod, bad, check_delay, check_operator_orders},
-    methods::{DEFAULT_LIMIT, short_for_b},
+    gain::{Gain, ScaleCovariance, VARIANCE_GROWTH_WITHOUT_FIT, error_bars},
+    history::{History, limit_magnitude, weighted_sum},
+    kernel::{Kernel, Plan, too_many_parameters, write_scaled},
+    method::{MethodDescription, MethodObject, RecursiveMethod, check_delay, check_operator_orders, invalid_option},
+    methods::{DEFAULT_LIMIT, short_memory_for_b},
     predictor::Predictor,
     recursion::{Delay, Recursion, StepOutcome},
-    reported::{OPERATOR, Reported},
+    reported::{OPERATOR_PARAMETER_COUNT, ReportedModel},
     setup::Setup,
     start::{StartState, physical_bounds},
-    two_sided::{Causal, TwoSided},
+    two_sided::{CausalRun, TwoSidedEstimate},
 };

@@ -41,7 +41,7 @@ pub struct Change {
 /// Change of a quantity, in standard errors, beyond which the quantity counts as changed.
 const SIGNIFICANT_CHANGE: f64 = 2.0;
 /// Names of the quantities of [`Change::z`].
-const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
+const QUANTITY_NAMES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
 const REMNANT: &str = "remnant";
 
 impl Change {
@@ -54,9 +54,9 @@ impl Change {
     /// Returns the names of the quantities that changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`,
     /// `zeta_nm`, `remnant`, `tau_e`. If the operator was tested as a whole and none of its quantities changed by so
     /// much, its response is named: `response`.
-    pub fn changed(&self) -> Vec<&'static str> {
+    pub fn changed_quantities(&self) -> Vec<&'static str> {
         let each = || {
-            QUANTITIES
+            QUANTITY_NAMES
                 .into_iter()
                 .zip(self.z)
                 .filter(|(_, z)| z.abs() > SIGNIFICANT_CHANGE)
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn threshold_statistic_is_the_distance_in_standard_deviations() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         // Mean of the error 0, variance 8/7; its rates are +-200.
         let error = [1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0];
         let mut baseline = ErrorThreshold::new(&error, ts).unwrap();
@@ -146,12 +146,12 @@ mod tests {
             of_operator,
         };
         let louder = [0.5, -1.7, 0.0, 0.0, 6.0, 0.0];
-        assert_eq!(of(true, louder).changed(), ["response", "remnant"]);
-        assert_eq!(of(false, louder).changed(), ["remnant"]);
+        assert_eq!(of(true, louder).changed_quantities(), ["response", "remnant"]);
+        assert_eq!(of(false, louder).changed_quantities(), ["remnant"]);
         assert_eq!(
-            of(true, [0.0, 2.5, 1.9, 0.0, 0.0, -3.0]).changed(),
+            of(true, [0.0, 2.5, 1.9, 0.0, 0.0, -3.0]).changed_quantities(),
             ["K_e_dot", "tau_e"]
         );
-        assert_eq!(of(true, [0.0; 6]).changed(), ["response"]);
+        assert_eq!(of(true, [0.0; 6]).changed_quantities(), ["response"]);
     }
 }

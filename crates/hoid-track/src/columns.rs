@@ -20,7 +20,7 @@ impl Trace {
     pub fn operator_columns(&self) -> Vec<&'static str> {
         let mut names = OPERATOR_COLUMNS.to_vec();
         let method = &self.options().method;
-        if method.track_delay_s().is_some() || method.starts_itself() {
+        if method.track_delay_s().is_some() || method.is_self_starting() {
             names.push("tau_e");
         }
         names
@@ -45,7 +45,7 @@ impl Trace {
             add(name, &each);
         }
         for name in self.operator_columns() {
-            let each: Vec<Option<Estimate>> = operators.iter().map(|o| value_of(o, name)).collect();
+            let each: Vec<Option<Estimate>> = operators.iter().map(|o| operator_parameter(o, name)).collect();
             add(name, &each);
         }
         for (place, omega) in self.options().at_rad_s.iter().enumerate() {
@@ -78,7 +78,7 @@ impl Trace {
 }
 
 /// Returns a parameter of an operator by its name; `None` if there is no operator or no parameter of this name.
-pub fn value_of(operator: &Result<OperatorEstimate, NotConvertible>, name: &str) -> Option<Estimate> {
+pub fn operator_parameter(operator: &Result<OperatorEstimate, NotConvertible>, name: &str) -> Option<Estimate> {
     let rows = operator.as_ref().ok()?.rows();
     rows.into_iter().find(|(n, _, _)| *n == name).map(|(_, _, e)| e)
 }

@@ -27,7 +27,7 @@ use hoid_model::{MAX_DELAY, Orders, SampleTime, uncertainty::Estimate};
 use hoid_ident::IdentError;
 
 use crate::{
-    method::bad,
+    method::invalid_option,
     recursion::{Delay, Recursion, Sample, StepOutcome},
     setup::Setup,
 };
@@ -35,13 +35,13 @@ use crate::{
 /// Memory length of the evidence, s.
 const MEMORY_S: f64 = 10.0;
 /// Lead in the logarithm of the evidence from which another delay is reported.
-const MIN_EVIDENCE_LEAD: f64 = 2.0;
+const MIN_EVIDENCE_MARGIN: f64 = 2.0;
 /// Divisor of the evidence in the weights of the delays.
 const EVIDENCE_DIVISOR: f64 = 3.0;
 /// Limit on the magnitude of an innovation in the evidence, in standard deviations.
 const INNOVATION_LIMIT: f64 = 5.0;
 /// Prior standard deviation of the delay about the delay of the start, s.
-const BEFORE_S: f64 = 0.03;
+const PRIOR_DEVIATION_S: f64 = 0.03;
 /// Largest number of tracked delays.
 const MAX_DELAYS: usize = 128;
 
@@ -84,14 +84,14 @@ impl DelayBank {
         let (first_nk, last_nk) = (sample_time.nk(low_s), sample_time.nk(high_s));
         let count = last_nk.saturating_sub(first_nk).saturating_add(1);
         if count > MAX_DELAYS {
-            return Err(bad(
+            return Err(invalid_option(
                 "the range of the delay",
                 format!("{low_s} to {high_s} s, {count} samples"),
                 &format!("at most {MAX_DELAYS} samples; narrow the range, or sample more slowly"),
             ));
         }
         if last_nk > MAX_DELAY {
-            return Err(bad(
+            return Err(invalid_option(
                 "the range of the delay",
                 format!("{low_s} to {high_s} s, {last_nk} samples"),
                 &format!("delays of at most {MAX_DELAY} samples"),
@@ -107,7 +107,7 @@ impl DelayBank {
         let members = (first_nk..=last_nk).map(of).collect::<Result<Vec<_>, _>>()?;
         // The delay of the start fit, limited to the range.
         let best = setup.orders.nk.clamp(first_nk, last_nk).saturating_sub(first_nk);
-        let before = |k: usize| -0.5 * ((k as f64 - best as f64) * sample_time.s() / BEFORE_S).powi(2);
+        let before = |k: usize| -0.5 * ((k as f64 - best as f64) * sample_time.s() / PRIOR_DEVIATION_S).powi(2);
         Ok(Self {
             members,
             first_nk,
@@ -124,12 +124,12 @@ impl DelayBank {
         clippy::indexing_slicing,
         reason = "`best` is the index of a member, also after a restore"
     )]
-    fn reported(&self) -> &dyn Recursion {
+    fn reported_recursion(&self) -> &dyn Recursion {
         &*self.members[self.best]
     }
 
-    fn weigh(&mut self) {
-        let variance = self.reported().innovation_variance();
+    fn update_weights(&mut self) {
+        let variance = self.reported_recursion().innovation_variance();
         if !(variance > 0.0 && variance.is_finite()) {
             return;
         }
@@ -149,7 +149,7 @@ impl DelayBank {
         if self
             .evidence
             .get(self.best)
-            .is_some_and(|evidence| *evidence < -MIN_EVIDENCE_LEAD)
+            .is_some_and(|evidence| *evidence < -MIN_EVIDENCE_MARGIN)
         {
             let leads = |(_, evidence): &(usize, &f64)| **evidence >= 0.0;
             self.best = self
@@ -175,17 +175,17 @@ impl Recursion for DelayBank {
                 outcome = of;
             }
         }
-        self.weigh();
+        self.update_weights();
         outcome
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         let mut outcome = StepOutcome {
             innovation: 0.0,
             shortened: false,
         };
         for (k, member) in self.members.iter_mut().enumerate() {
-            let of = member.follow(sample);
+            let of = member.step_without_update(sample);
             if k == self.best {
                 outcome = of;
             }
@@ -198,15 +198,15 @@ impl Recursion for DelayBank {
     }
 
     fn theta(&self) -> &[f64] {
-        self.reported().theta()
+        self.reported_recursion().theta()
     }
 
     fn covariance(&self, into: &mut [f64]) -> bool {
-        self.reported().covariance(into)
+        self.reported_recursion().covariance(into)
     }
 
     fn innovation_variance(&self) -> f64 {
-        self.reported().innovation_variance()
+        self.reported_recursion().innovation_variance()
     }
 
     fn delay(&self) -> Option<Delay> {

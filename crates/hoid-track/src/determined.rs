@@ -8,15 +8,15 @@ use hoid_model::uncertainty::OperatorEstimate;
 use crate::{Trace, Tracker, methods::Method};
 
 /// Smallest distance of a determined parameter from zero, in standard errors.
-const SMALLEST_DISTANCE: f64 = 2.0;
+const MIN_DISTANCE: f64 = 2.0;
 /// Largest remaining share of the prior variance of a determined parameter.
-const LARGEST_REMAINING_SHARE: f64 = 0.5;
+const MAX_REMAINING_SHARE: f64 = 0.5;
 
 /// Name of a parameter, and true if the parameter is determined.
-pub type Determined = (&'static str, bool);
+pub type Determination = (&'static str, bool);
 
-fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
-    let before = method.spread_before();
+fn determinations(method: &Method, operator: &OperatorEstimate) -> Vec<Determination> {
+    let before = method.prior_deviations();
     let supposed = |name: &str| {
         let [omega, zeta, tau] = before?;
         match name {
@@ -28,8 +28,8 @@ fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
     };
     let of = |(name, _, estimate): (&'static str, _, hoid_model::uncertainty::Estimate)| {
         let error = estimate.standard_error?;
-        let learnt = supposed(name).is_none_or(|before| error * error < LARGEST_REMAINING_SHARE * before * before);
-        Some((name, learnt && estimate.value.abs() > SMALLEST_DISTANCE * error))
+        let learnt = supposed(name).is_none_or(|before| error * error < MAX_REMAINING_SHARE * before * before);
+        Some((name, learnt && estimate.value.abs() > MIN_DISTANCE * error))
     };
     operator.rows().into_iter().filter_map(of).collect()
 }
@@ -37,16 +37,16 @@ fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
 impl Tracker {
     /// Returns each parameter of the current operator, and whether it is determined; parameters without a standard
     /// error are omitted.
-    pub fn determined(&self, operator: &OperatorEstimate) -> Vec<Determined> {
-        determined(&self.options().method, operator)
+    pub fn determinations(&self, operator: &OperatorEstimate) -> Vec<Determination> {
+        determinations(&self.options().method, operator)
     }
 }
 
 impl Trace {
     /// Returns each parameter of the operator of a row, and whether it is determined; parameters without a standard
     /// error are omitted.
-    pub fn determined(&self, operator: &OperatorEstimate) -> Vec<Determined> {
-        determined(&self.options().method, operator)
+    pub fn determinations(&self, operator: &OperatorEstimate) -> Vec<Determination> {
+        determinations(&self.options().method, operator)
     }
 
     /// Returns for each parameter of the operator a column, such as `K_e_determined`, with 1 in each row in which the
@@ -55,15 +55,15 @@ impl Trace {
         &self,
         operators: &[Result<OperatorEstimate, hoid_model::NotConvertible>],
     ) -> Vec<(String, Vec<u64>)> {
-        if !self.options().method.starts_itself() {
+        if !self.options().method.is_self_starting() {
             return Vec::new();
         }
-        let rows: Vec<Vec<Determined>> = operators
+        let rows: Vec<Vec<Determination>> = operators
             .iter()
-            .map(|operator| operator.as_ref().map(|o| self.determined(o)).unwrap_or_default())
+            .map(|operator| operator.as_ref().map(|o| self.determinations(o)).unwrap_or_default())
             .collect();
         let column = |name: &str| {
-            let of = |row: &Vec<Determined>| u64::from(row.iter().any(|(known, yes)| *known == name && *yes));
+            let of = |row: &Vec<Determination>| u64::from(row.iter().any(|(known, yes)| *known == name && *yes));
             (format!("{name}_determined"), rows.iter().map(of).collect())
         };
         self.operator_columns().into_iter().map(column).collect()
@@ -89,7 +89,7 @@ mod tests {
             tau_e_s: Estimate::fixed(0.2),
         };
         // Before the first sample the standard deviations are 3.3 rad/s for omega and .125 for zeta.
-        let found = determined(&Method::adaptive(), &operator);
+        let found = determinations(&Method::adaptive(), &operator);
         let expected = [
             ("K_e", false),
             ("T_L", true),
@@ -98,7 +98,7 @@ mod tests {
             ("zeta_nm", true),
         ];
         assert_eq!(found, expected);
-        let other = determined(&Method::rpem(), &operator);
+        let other = determinations(&Method::rpem(), &operator);
         assert!(other.contains(&("omega_nm", true)));
     }
 }

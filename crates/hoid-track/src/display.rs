@@ -3,7 +3,7 @@
 use hoid_model::SampleTime;
 
 use crate::{
-    forgetting::ForgettingRule, memory::Memory, options::TrackOptions, setup::StartAt, shared_options::WindupGuard,
+    forgetting::ForgettingRule, memory::Memory, options::TrackOptions, setup::StartSource, shared_options::WindupGuard,
 };
 
 impl TrackOptions {
@@ -59,15 +59,15 @@ impl TrackOptions {
         if let Some(prior) = self.method.person_prior() {
             return prior.as_text();
         }
-        let covariance = match self.method.covariance() {
+        let covariance = match self.method.initial_covariance() {
             None => "its covariance".to_owned(),
             Some(p) => format!("P = {p} I"),
         };
         match &self.start {
-            StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s, {covariance}"),
-            StartAt::Span(None) => format!("batch fit of the first third, {covariance}"),
-            StartAt::Theta(_) => "from the given coefficients".to_owned(),
-            StartAt::Nothing => "from nothing".to_owned(),
+            StartSource::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s, {covariance}"),
+            StartSource::Span(None) => format!("batch fit of the first third, {covariance}"),
+            StartSource::Theta(_) => "from the given coefficients".to_owned(),
+            StartSource::Nothing => "from nothing".to_owned(),
         }
     }
 }
@@ -93,7 +93,7 @@ mod tests {
 
     #[test]
     fn every_method_describes_its_memory() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         for method in [Method::rls(), Method::rpem(), Method::adaptive()] {
             let (structure, orders) = (method.default_structure(), method.default_orders(29));
             assert!(

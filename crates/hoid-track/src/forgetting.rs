@@ -11,7 +11,7 @@ use hoid_ident::{
 const DEFAULT_RATE: f64 = 0.1;
 
 /// Names of the rules.
-const WORDS: [&str; 6] = [
+const RULE_NAMES: [&str; 6] = [
     "exponential",
     "random-walk",
     "window",
@@ -41,7 +41,7 @@ pub enum ForgettingRule {
 
 /// Reads the rule from its name, without the options that belong to it.
 impl Value for ForgettingRule {
-    const KIND: Kind = Kind::Choice(&WORDS);
+    const KIND: Kind = Kind::Choice(&RULE_NAMES);
 
     fn read(text: &str) -> Result<Self, String> {
         match text.to_ascii_lowercase().replace('_', "-").as_str() {
@@ -51,7 +51,7 @@ impl Value for ForgettingRule {
             "variable" => Ok(Self::Variable),
             "directional" => Ok(Self::Directional),
             "gradient" => Ok(Self::Gradient(DEFAULT_RATE)),
-            _ => Err(format!("one of {}", WORDS.join(", "))),
+            _ => Err(format!("one of {}", RULE_NAMES.join(", "))),
         }
     }
 
@@ -64,17 +64,17 @@ impl Value for ForgettingRule {
             Self::Directional => 4,
             Self::Gradient(_) => 5,
         };
-        Some(WORDS[word].to_owned())
+        Some(RULE_NAMES[word].to_owned())
     }
 }
 
 impl ForgettingRule {
-    fn rule() -> Setting {
+    fn rule_setting() -> Setting {
         Setting::of("forgetting", &Self::Exponential)
             .help(&["Type of forgetting; window, variable and directional use the shortest memory"])
     }
 
-    fn drift() -> Setting {
+    fn drift_setting() -> Setting {
         Setting::of("drift", &BTreeMap::<String, f64>::new())
             .bounds(Bounds::NonNegative)
             .help(&[
@@ -83,13 +83,13 @@ impl ForgettingRule {
             ])
     }
 
-    fn rate() -> Setting {
+    fn rate_setting() -> Setting {
         Setting::of("rate", &DEFAULT_RATE)
             .bounds(Bounds::Between(0.0, 2.0))
             .help(&["For gradient: step size"])
     }
 
-    fn belongs(name: &str, rule: &str) -> IdentError {
+    fn wrong_rule_error(name: &str, rule: &str) -> IdentError {
         IdentError::BadOption {
             option: name.to_owned(),
             found: "the option with another type of forgetting".to_owned(),
@@ -108,10 +108,10 @@ impl ForgettingRule {
                 found: "random-walk without drift".to_owned(),
                 expected: "the standard deviation of the drift in one second, such as drift K_e=.01".to_owned(),
             }),
-            Self::Gradient(rate) if !Self::rate().bounds.hold(*rate) => Err(IdentError::BadOption {
+            Self::Gradient(rate) if !Self::rate_setting().bounds.contains(*rate) => Err(IdentError::BadOption {
                 option: "the rate of the gradient".to_owned(),
                 found: rate.to_string(),
-                expected: Self::rate().bounds.to_string(),
+                expected: Self::rate_setting().bounds.to_string(),
             }),
             _ => Ok(()),
         }
@@ -121,16 +121,16 @@ impl ForgettingRule {
 /// `forgetting` must be set first, because the options of one rule are refused by the others.
 impl Settings for ForgettingRule {
     fn list(&self) -> Vec<Setting> {
-        vec![Self::rule(), Self::drift(), Self::rate()]
+        vec![Self::rule_setting(), Self::drift_setting(), Self::rate_setting()]
     }
 
     fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError> {
         match (name, &mut *self) {
-            ("forgetting", rule) => *rule = Self::rule().read(text)?,
-            ("drift", Self::RandomWalk(drift)) => *drift = Self::drift().read(text)?,
-            ("drift", _) => return Err(Self::belongs(name, WORDS[1])),
-            ("rate", Self::Gradient(rate)) => *rate = Self::rate().read(text)?,
-            ("rate", _) => return Err(Self::belongs(name, WORDS[5])),
+            ("forgetting", rule) => *rule = Self::rule_setting().read(text)?,
+            ("drift", Self::RandomWalk(drift)) => *drift = Self::drift_setting().read(text)?,
+            ("drift", _) => return Err(Self::wrong_rule_error(name, RULE_NAMES[1])),
+            ("rate", Self::Gradient(rate)) => *rate = Self::rate_setting().read(text)?,
+            ("rate", _) => return Err(Self::wrong_rule_error(name, RULE_NAMES[5])),
             _ => return Ok(false),
         }
         Ok(true)

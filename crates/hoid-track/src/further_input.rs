@@ -36,7 +36,7 @@ impl fmt::Display for TrackedInput {
 
 impl TrackedInput {
     /// Returns the number of coefficients.
-    pub fn parameters(&self) -> usize {
+    pub fn parameter_count(&self) -> usize {
         self.orders.nb + self.orders.nf
     }
 
@@ -83,11 +83,11 @@ impl TrackedInput {
             nf: self.orders.nf,
             nk: self.orders.nk,
         };
-        let first = orders.parameters();
-        let places: Vec<usize> = (0..orders.na).chain(first..first + self.parameters()).collect();
+        let first = orders.parameter_count();
+        let places: Vec<usize> = (0..orders.na).chain(first..first + self.parameter_count()).collect();
         let theta_of_input: Vec<f64> = places.iter().map(|&i| theta[i]).collect();
-        let block = covariance.map(|c| block(c, theta.len(), &places));
-        Response::of_polynomials(&own, &theta_of_input, block.as_deref(), omega_rad_s, sample_time)
+        let block = covariance.map(|c| submatrix(c, theta.len(), &places));
+        Response::from_polynomials(&own, &theta_of_input, block.as_deref(), omega_rad_s, sample_time)
     }
 }
 
@@ -99,7 +99,7 @@ pub(crate) fn coefficient_names(orders: &Orders, further: Option<&TrackedInput>)
 }
 
 /// Returns the rows and columns at `places` of a matrix of `width` rows.
-pub(crate) fn block(matrix: &[f64], width: usize, places: &[usize]) -> Vec<f64> {
+pub(crate) fn submatrix(matrix: &[f64], width: usize, places: &[usize]) -> Vec<f64> {
     let rows = places.iter().flat_map(|i| places.iter().map(move |j| i * width + j));
     rows.map(|place| matrix[place]).collect()
 }
@@ -136,7 +136,7 @@ mod tests {
                 }
             })
             .collect();
-        let found = input.response(&orders, &theta, Some(&covariance), 3.0, SampleTime::HUNDREDTH);
+        let found = input.response(&orders, &theta, Some(&covariance), 3.0, SampleTime::AT_100_HZ);
         let alone = Orders {
             na: 1,
             nb: 2,
@@ -151,9 +151,9 @@ mod tests {
             .iter()
             .flat_map(|i| places.map(|j| covariance[i * p + j]))
             .collect();
-        let expected = Response::of_polynomials(&alone, &own, Some(&of_own), 3.0, SampleTime::HUNDREDTH);
+        let expected = Response::from_polynomials(&alone, &own, Some(&of_own), 3.0, SampleTime::AT_100_HZ);
         assert_eq!(found, expected);
-        let e = Response::of_polynomials(&orders, &theta[..6], None, 3.0, SampleTime::HUNDREDTH);
+        let e = Response::from_polynomials(&orders, &theta[..6], None, 3.0, SampleTime::AT_100_HZ);
         assert_ne!(found.value, e.value);
     }
 }

@@ -17,20 +17,20 @@ use crate::{forgetting::ForgettingRule, setup::Setup, shared_options::WindupGuar
 
 /// Limit of the variance of an unexcited parameter in P, as a multiple of its level with the excitation of the start
 /// span: after a silence, the gain corresponds to about three times the typical standard error.
-const LARGEST_VARIANCE_GROWTH: f64 = 10.0;
+const MAX_VARIANCE_GROWTH: f64 = 10.0;
 /// Limit of the variance of an unexcited parameter in P if the start covariance does not come from a fit, as a multiple
 /// of its start value.
-pub const ROOM_WITHOUT_FIT: f64 = 1e4;
+pub const VARIANCE_GROWTH_WITHOUT_FIT: f64 = 1e4;
 /// Growing memory of a start without a fit: additional forgetting at the first sample, and the factor by which the
 /// additional forgetting decays per sample.
 const EARLY_FORGETTING: f64 = 0.01;
-const EARLY_SHARE: f64 = 0.9993;
+const EARLY_DECAY: f64 = 0.9993;
 /// Smallest factor of variable forgetting: a memory of ten samples.
-const SMALLEST_FACTOR: f64 = 0.9;
+const MIN_FORGETTING_FACTOR: f64 = 0.9;
 /// Longest sliding window, samples; each sample takes as many numbers as there are parameters, plus one.
-const LONGEST_WINDOW: f64 = 1e7;
+const MAX_WINDOW_SAMPLES: f64 = 1e7;
 /// Memory length of the innovation variance, as a multiple of the shortest memory of a parameter.
-const LEVEL_MEMORIES: f64 = 4.0;
+const VARIANCE_MEMORY_RATIO: f64 = 4.0;
 
 /// The gains of the kernel as one type, so each recursion is compiled once.
 pub enum Gain<const N: usize> {
@@ -76,7 +76,7 @@ impl<const N: usize> Gain<N> {
                 lambda: padded(&lambda, 1.0),
             },
             ForgettingRule::RandomWalk(drift) => {
-                let names = setup.names();
+                let names = setup.parameter_names();
                 if let Some(unknown) = drift.keys().find(|k| !names.contains(k)) {
                     return Err(IdentError::UnknownParameter {
                         name: unknown.clone(),
@@ -91,7 +91,7 @@ impl<const N: usize> Gain<N> {
             }
             ForgettingRule::Window => {
                 let samples = (1.0 / (1.0 - shortest)).round();
-                if samples.is_nan() || samples > LONGEST_WINDOW {
+                if samples.is_nan() || samples > MAX_WINDOW_SAMPLES {
                     return Err(IdentError::BadOption {
                         option: "the sliding window".to_owned(),
                         found: match shortest < 1.0 {
@@ -113,7 +113,7 @@ impl<const N: usize> Gain<N> {
             }
             ForgettingRule::Variable => Forgetting::Variable {
                 memory: 1.0 / (1.0 - shortest),
-                smallest: SMALLEST_FACTOR,
+                smallest: MIN_FORGETTING_FACTOR,
             },
             ForgettingRule::Directional => Forgetting::Directional { lambda: shortest },
             ForgettingRule::Gradient(rate) => Forgetting::Gradient { rate: *rate },
@@ -130,9 +130,9 @@ impl<const N: usize> Gain<N> {
                 (Some(WindupGuard::Bound(multiple)), _) => multiple,
                 // P is proportional to 1/N after a start of N samples, and to 1 - lambda with forgetting.
                 (None, None) if from.from_fit && i < p => {
-                    LARGEST_VARIANCE_GROWTH * (from.residuals * (1.0 - lambda[i])).max(1.0)
+                    MAX_VARIANCE_GROWTH * (from.residuals * (1.0 - lambda[i])).max(1.0)
                 }
-                _ => ROOM_WITHOUT_FIT,
+                _ => VARIANCE_GROWTH_WITHOUT_FIT,
             };
             room * matrix[i][i]
         });
@@ -140,18 +140,18 @@ impl<const N: usize> Gain<N> {
         Ok(Self::Covariance(if from.from_fit || !growing {
             covariance
         } else {
-            covariance.with_growing_memory(EARLY_FORGETTING, EARLY_SHARE)
+            covariance.with_growing_memory(EARLY_FORGETTING, EARLY_DECAY)
         }))
     }
 }
 
 /// A gain whose covariance P can be scaled.
-pub trait Scaled {
+pub trait ScaleCovariance {
     /// Multiplies P by a factor; returns false if the gain has no P.
     fn scale(&mut self, factor: f64) -> bool;
 }
 
-impl<const N: usize> Scaled for Gain<N> {
+impl<const N: usize> ScaleCovariance for Gain<N> {
     fn scale(&mut self, factor: f64) -> bool {
         match self {
             Self::Covariance(c) => c.scale(factor),
@@ -213,7 +213,11 @@ pub fn error_bars<const N: usize, const K: usize>(
     for (_, memory) in &setup.memories {
         shortest = shortest.min(memory.lambda(sample_time)?);
     }
-    let level = InnovationVariance::new(from.variance, from.residuals, 1.0 - (1.0 - shortest) / LEVEL_MEMORIES);
+    let level = InnovationVariance::new(
+        from.variance,
+        from.residuals,
+        1.0 - (1.0 - shortest) / VARIANCE_MEMORY_RATIO,
+    );
     let p = from.values.len();
     let start: [[f64; N]; N] =
         std::array::from_fn(|i| std::array::from_fn(|j| if i < p && j < p { from.spread[i * p + j] } else { 0.0 }));

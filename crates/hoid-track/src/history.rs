@@ -7,7 +7,7 @@ use hoid_core::state::{State, visit_all};
 const MAX_MAGNITUDE: f64 = 1e60;
 
 /// Limits the magnitude of a value to 1e60; NaN, which products of large numbers may give, becomes zero.
-pub fn bounded(x: f64) -> f64 {
+pub fn limit_magnitude(x: f64) -> f64 {
     if x.is_nan() {
         0.0
     } else {
@@ -46,20 +46,20 @@ impl History {
         self.at = self.at.checked_sub(1).unwrap_or(last);
         for at in [self.at, self.at.saturating_add(self.n)] {
             if let Some(place) = self.values.get_mut(at) {
-                *place = bounded(x);
+                *place = limit_magnitude(x);
             }
         }
     }
 
     /// Returns `[x(t), x(t-1), ..., x(t-n+1)]`, where x(t) is the latest value.
-    pub fn newest(&self) -> &[f64] {
+    pub fn newest_first(&self) -> &[f64] {
         let from = self.values.get(self.at..).unwrap_or_default();
         from.get(..self.n).unwrap_or_default()
     }
 }
 
 /// Returns `sum c_i x(t-i)` over as many terms as there are coefficients.
-pub fn weighted(coefficients: &[f64], past: &[f64]) -> f64 {
+pub fn weighted_sum(coefficients: &[f64], past: &[f64]) -> f64 {
     coefficients.iter().zip(past).map(|(c, x)| c * x).sum()
 }
 
@@ -68,13 +68,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn holds_the_last_values_newest_first() {
+    fn history_holds_the_last_values_newest_first() {
         for n in 0..4 {
             let mut past = History::new(n);
             for t in 1..=9 {
                 past.push(f64::from(t));
                 let expected: Vec<f64> = (0..n).map(|i| f64::from((t - i as i32).max(0))).collect();
-                assert_eq!(past.newest(), expected);
+                assert_eq!(past.newest_first(), expected);
             }
         }
     }
@@ -84,16 +84,16 @@ mod tests {
     fn newest_values_stay_within_the_buffer() {
         let mut past = History::new(3);
         past.visit(&mut |number| *number = 1e18);
-        assert_eq!(past.newest().len(), 3);
+        assert_eq!(past.newest_first().len(), 3);
         past.push(1.0);
-        assert_eq!(past.newest()[0], 1.0);
+        assert_eq!(past.newest_first()[0], 1.0);
     }
 
     #[test]
     fn stored_values_are_finite_and_limited() {
         let mut past = History::new(3);
         [f64::NAN, f64::INFINITY, -1e300].into_iter().for_each(|x| past.push(x));
-        assert_eq!(past.newest(), [-MAX_MAGNITUDE, MAX_MAGNITUDE, 0.0]);
-        assert_eq!(weighted(&[1.0, 1.0], past.newest()), 0.0);
+        assert_eq!(past.newest_first(), [-MAX_MAGNITUDE, MAX_MAGNITUDE, 0.0]);
+        assert_eq!(weighted_sum(&[1.0, 1.0], past.newest_first()), 0.0);
     }
 }

@@ -17,9 +17,9 @@ const MIN_HEAD_S: f64 = 1.0;
 /// Quantile of the distance from the median that defines the size of a signal.
 const SIZE_QUANTILE: f64 = 0.9;
 /// Largest distance, in steps of the resolution, of an idle value from the median of the first second.
-const MAX_STEPS: f64 = 1.01;
+const MAX_RESOLUTION_STEPS: f64 = 1.01;
 /// Largest step of a resolution, as a share of the size of the signal.
-const MAX_STEP_SHARE: f64 = 0.2;
+const MAX_RESOLUTION_SHARE: f64 = 0.2;
 
 /// Returns the number of samples at the start of a record in which neither e nor u moves; 0 if they last less than a
 /// second, and all samples if neither signal ever moves.
@@ -34,9 +34,9 @@ pub fn idle_head(record: &Record) -> usize {
         let step = steps().fold(f64::INFINITY, f64::min);
         // Noise has no resolution: its differences are not multiples of the smallest difference.
         let multiple = |d: f64| (d / step - (d / step).round()).abs() < 1e-3;
-        let coarse = step <= MAX_STEP_SHARE * size && steps().all(multiple);
+        let coarse = step <= MAX_RESOLUTION_SHARE * size && steps().all(multiple);
         let room = if coarse {
-            (MAX_STEPS * step).max(IDLE_SHARE * size)
+            (MAX_RESOLUTION_STEPS * step).max(IDLE_SHARE * size)
         } else {
             IDLE_SHARE * size
         };
@@ -116,7 +116,7 @@ mod tests {
     #[test]
     fn constant_record_is_idle_throughout() {
         let still = |name: &str, x: f64| Channel::new(name, "", vec![x; 500]);
-        let record = Record::new(hoid_model::SampleTime::HUNDREDTH, still("e", 0.0), still("u", 2.0)).unwrap();
+        let record = Record::new(hoid_model::SampleTime::AT_100_HZ, still("e", 0.0), still("u", 2.0)).unwrap();
         assert_eq!(idle_head(&record), 500);
         assert_eq!(default_start_span(&record).0, 0.0);
     }

@@ -21,8 +21,8 @@ use hoid_model::SampleTime;
 
 use crate::{
     further_input::TrackedInput,
-    gain::{self, Gain, Scaled},
-    method::bad,
+    gain::{self, Gain, ScaleCovariance},
+    method::invalid_option,
     recursion::{Recursion, Sample, StepOutcome},
     setup::Setup,
     start::StartState,
@@ -38,7 +38,7 @@ pub enum Kernel {
 }
 
 /// Returns the error for more parameters than the kernel has capacity for.
-pub fn too_many(parameters: usize) -> IdentError {
+pub fn too_many_parameters(parameters: usize) -> IdentError {
     IdentError::BadOption {
         option: "the orders of a recursion".to_owned(),
         found: format!("{parameters} parameters"),
@@ -83,33 +83,33 @@ impl<'a> Plan<'a> {
         };
         if let Some(further) = &self.setup.further {
             return match p {
-                0..=8 => self.two_inputs::<8>(any, further, kernel),
-                9..=16 => self.two_inputs::<16>(any, further, kernel),
-                17..=64 => self.two_inputs::<64>(any, further, kernel),
-                _ => Err(too_many(p)),
+                0..=8 => self.build_two_inputs::<8>(any, further, kernel),
+                9..=16 => self.build_two_inputs::<16>(any, further, kernel),
+                17..=64 => self.build_two_inputs::<64>(any, further, kernel),
+                _ => Err(too_many_parameters(p)),
             };
         }
         let of_operator = (o.na, o.nb, o.nc, o.nd, o.nf) == (0, 2, 0, 1, 2);
         match kernel {
             Kernel::LeastSquares => match p {
-                4 if o.na == 2 => self.linear::<_, 4>(FixedShape::<2, 2, 0, 0, 0>),
-                0..=8 => self.linear::<_, 8>(any),
-                9..=16 => self.linear::<_, 16>(any),
-                17..=64 => self.linear::<_, 64>(any),
-                _ => Err(too_many(p)),
+                4 if o.na == 2 => self.build_linear::<_, 4>(FixedShape::<2, 2, 0, 0, 0>),
+                0..=8 => self.build_linear::<_, 8>(any),
+                9..=16 => self.build_linear::<_, 16>(any),
+                17..=64 => self.build_linear::<_, 64>(any),
+                _ => Err(too_many_parameters(p)),
             },
             Kernel::PredictionError(regressor) => match p {
-                5 if of_operator => self.polynomials::<_, 5, 2>(FixedShape::<0, 2, 0, 1, 2>, regressor),
-                0..=8 => self.polynomials::<_, 8, 8>(any, regressor),
-                9..=16 => self.polynomials::<_, 16, 16>(any, regressor),
-                17..=64 => self.polynomials::<_, 64, 64>(any, regressor),
-                _ => Err(too_many(p)),
+                5 if of_operator => self.build_polynomials::<_, 5, 2>(FixedShape::<0, 2, 0, 1, 2>, regressor),
+                0..=8 => self.build_polynomials::<_, 8, 8>(any, regressor),
+                9..=16 => self.build_polynomials::<_, 16, 16>(any, regressor),
+                17..=64 => self.build_polynomials::<_, 64, 64>(any, regressor),
+                _ => Err(too_many_parameters(p)),
             },
         }
     }
 
     /// Returns the start values, with capacity for N parameters.
-    pub fn values<const N: usize>(&self) -> [f64; N] {
+    pub fn start_values<const N: usize>(&self) -> [f64; N] {
         std::array::from_fn(|i| self.from.values.get(i).copied().unwrap_or(0.0))
     }
 
@@ -125,34 +125,38 @@ impl<'a> Plan<'a> {
     ///
     /// # Errors
     /// Same as [`gain::error_bars`].
-    pub fn bars<const N: usize, const K: usize>(&self) -> Result<ErrorBars<N, K>, IdentError> {
+    pub fn error_bars<const N: usize, const K: usize>(&self) -> Result<ErrorBars<N, K>, IdentError> {
         gain::error_bars(self.setup, self.from, self.sample_time)
     }
 
     /// Returns the number of parameters.
-    pub fn parameters(&self) -> usize {
+    pub fn parameter_count(&self) -> usize {
         self.from.values.len()
     }
 
-    fn linear<S: Shape + Send + Sync + 'static, const N: usize>(
+    fn build_linear<S: Shape + Send + Sync + 'static, const N: usize>(
         &self,
         shape: S,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        let rls = Rls::new(shape, self.values(), self.gain::<N>(false)?, self.bars::<N, 0>()?).ok_or_else(|| {
-            IdentError::BadOption {
-                option: "the orders".to_owned(),
-                found: self.setup.orders.to_string(),
-                expected: "at least one parameter in A or B".to_owned(),
-            }
+        let rls = Rls::new(
+            shape,
+            self.start_values(),
+            self.gain::<N>(false)?,
+            self.error_bars::<N, 0>()?,
+        )
+        .ok_or_else(|| IdentError::BadOption {
+            option: "the orders".to_owned(),
+            found: self.setup.orders.to_string(),
+            expected: "at least one parameter in A or B".to_owned(),
         })?;
-        Ok(Box::new(Linear {
+        Ok(Box::new(LinearRecursion {
             rls,
-            delay: delay(self.setup.orders.nk),
-            parameters: self.parameters(),
+            delay: delay_line(self.setup.orders.nk),
+            parameters: self.parameter_count(),
         }))
     }
 
-    fn polynomials<S: Shape + Send + Sync + 'static, const N: usize, const K: usize>(
+    fn build_polynomials<S: Shape + Send + Sync + 'static, const N: usize, const K: usize>(
         &self,
         shape: S,
         regressor: Regressor,
@@ -161,20 +165,20 @@ impl<'a> Plan<'a> {
             shape,
             regressor,
             self.setup.stable,
-            self.values(),
+            self.start_values(),
             self.gain::<N>(true)?,
-            self.bars::<N, K>()?,
+            self.error_bars::<N, K>()?,
         )
-        .ok_or_else(unstable_start)?;
-        Ok(Box::new(Polynomials {
+        .ok_or_else(unstable_start_error)?;
+        Ok(Box::new(PolynomialRecursion {
             rpem,
-            delay: delay(self.setup.orders.nk),
+            delay: delay_line(self.setup.orders.nk),
             further: Vec::new(),
-            parameters: self.parameters(),
+            parameters: self.parameter_count(),
         }))
     }
 
-    fn two_inputs<const N: usize>(
+    fn build_two_inputs<const N: usize>(
         &self,
         shape: AnyShape,
         further: &TrackedInput,
@@ -185,47 +189,47 @@ impl<'a> Plan<'a> {
             Kernel::PredictionError(regressor) => (regressor, true),
         };
         if regressor == Regressor::Cascade {
-            return Err(bad(
+            return Err(invalid_option(
                 "regressor",
                 "cascade with a further input".to_owned(),
                 "gradient or pseudo-linear",
             ));
         }
         let orders = further.orders;
-        let rpem = Rpem::with_further(
+        let rpem = Rpem::with_further_inputs(
             shape,
             [FurtherInput::new(orders.nb, orders.nf)],
             regressor,
             self.setup.stable,
-            self.values(),
+            self.start_values(),
             self.gain::<N>(growing)?,
-            self.bars::<N, 0>()?,
+            self.error_bars::<N, 0>()?,
         )
-        .ok_or_else(unstable_start)?;
-        Ok(Box::new(Polynomials {
+        .ok_or_else(unstable_start_error)?;
+        Ok(Box::new(PolynomialRecursion {
             rpem,
-            delay: delay(self.setup.orders.nk),
-            further: vec![FurtherLine {
-                delay: delay(orders.nk),
+            delay: delay_line(self.setup.orders.nk),
+            further: vec![FurtherInputLine {
+                delay: delay_line(orders.nk),
                 last: 0.0,
             }],
-            parameters: self.parameters(),
+            parameters: self.parameter_count(),
         }))
     }
 }
 
-fn unstable_start() -> IdentError {
+fn unstable_start_error() -> IdentError {
     IdentError::BadStart {
         reason: "it is not stable; give another start, or a structure with fewer poles".to_owned(),
     }
 }
 
-fn delay(nk: usize) -> DelayLine<Vec<f64>> {
+fn delay_line(nk: usize) -> DelayLine<Vec<f64>> {
     DelayLine::new(vec![0.0; nk])
 }
 
 /// Writes the covariance in the units of the parameters, `variance` times `spread`, by rows.
-pub fn scaled<const N: usize>(spread: &[[f64; N]; N], variance: f64, parameters: usize, into: &mut [f64]) {
+pub fn write_scaled<const N: usize>(spread: &[[f64; N]; N], variance: f64, parameters: usize, into: &mut [f64]) {
     for i in 0..parameters {
         for j in 0..parameters {
             into[i * parameters + j] = variance * spread[i][j];
@@ -233,8 +237,8 @@ pub fn scaled<const N: usize>(spread: &[[f64; N]; N], variance: f64, parameters:
     }
 }
 
-hoid_core::state!([S, const N: usize, A: State] Linear<S, N, A> { rls, delay });
-impl<S, const N: usize, const K: usize, A: State, I: State> State for Polynomials<S, N, K, A, I> {
+hoid_core::state!([S, const N: usize, A: State] LinearRecursion<S, N, A> { rls, delay });
+impl<S, const N: usize, const K: usize, A: State, I: State> State for PolynomialRecursion<S, N, K, A, I> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let further = self.further.as_mut_slice();
         visit_all(&mut [&mut self.rpem, &mut self.delay], each);
@@ -242,23 +246,23 @@ impl<S, const N: usize, const K: usize, A: State, I: State> State for Polynomial
     }
 }
 
-hoid_core::state!([] FurtherLine { delay, last });
+hoid_core::state!([] FurtherInputLine { delay, last });
 
-struct Linear<S, const N: usize, A> {
+struct LinearRecursion<S, const N: usize, A> {
     rls: Rls<S, N, A>,
     delay: DelayLine<Vec<f64>>,
     parameters: usize,
 }
 
-impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + Scaled + State + Send + Sync> Recursion
-    for Linear<S, N, A>
+impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + ScaleCovariance + State + Send + Sync> Recursion
+    for LinearRecursion<S, N, A>
 {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         self.rls.step(x, sample.u).into()
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         self.rls.step_without_update(x, sample.u).into()
     }
@@ -277,7 +281,7 @@ impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + Scaled + State +
     }
 
     fn covariance(&self, into: &mut [f64]) -> bool {
-        scaled(
+        write_scaled(
             &self.rls.normalised_covariance(),
             self.rls.innovation_variance(),
             self.parameters,
@@ -292,27 +296,29 @@ impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + Scaled + State +
 }
 
 /// Delay line of a further input, and its last known value.
-struct FurtherLine {
+struct FurtherInputLine {
     delay: DelayLine<Vec<f64>>,
     last: f64,
 }
 
-struct Polynomials<S, const N: usize, const K: usize, A, I = NoFurtherInputs> {
+struct PolynomialRecursion<S, const N: usize, const K: usize, A, I = NoFurtherInputs> {
     rpem: Rpem<S, N, K, A, ErrorBars<N, K>, I>,
     delay: DelayLine<Vec<f64>>,
-    further: Vec<FurtherLine>,
+    further: Vec<FurtherInputLine>,
     parameters: usize,
 }
 
-impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, I: FurtherInputs<N>> Polynomials<S, N, K, A, I> {
+impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, I: FurtherInputs<N>>
+    PolynomialRecursion<S, N, K, A, I>
+{
     /// Passes the inputs of a sample through the delay lines. Returns the input of the first response, and whether the
     /// further input is known.
-    fn enter(&mut self, sample: &Sample) -> (f64, bool) {
+    fn delay_inputs(&mut self, sample: &Sample) -> (f64, bool) {
         let mut known = true;
         if let [line] = self.further.as_mut_slice() {
             known = sample.reference.is_some();
             line.last = sample.reference.unwrap_or(line.last);
-            self.rpem.further_mut().set(&[line.delay.step(line.last)]);
+            self.rpem.further_inputs_mut().set(&[line.delay.step(line.last)]);
         }
         (self.delay.step(sample.e), known)
     }
@@ -322,24 +328,24 @@ impl<
     S: Shape + Send + Sync,
     const N: usize,
     const K: usize,
-    A: Adaptation<N> + Scaled + State + Send + Sync,
+    A: Adaptation<N> + ScaleCovariance + State + Send + Sync,
     I: FurtherInputs<N> + Send + Sync,
-> Recursion for Polynomials<S, N, K, A, I>
+> Recursion for PolynomialRecursion<S, N, K, A, I>
 {
     fn step(&mut self, sample: Sample) -> StepOutcome {
-        match self.enter(&sample) {
+        match self.delay_inputs(&sample) {
             (x, true) => self.rpem.step(x, sample.u).into(),
             (x, false) => self.rpem.step_without_update(x, sample.u).into(),
         }
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
-        let (x, _) = self.enter(&sample);
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
+        let (x, _) = self.delay_inputs(&sample);
         self.rpem.step_without_update(x, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
-        let (x, _) = self.enter(&sample);
+        let (x, _) = self.delay_inputs(&sample);
         self.rpem.bridge(x);
     }
 
@@ -352,7 +358,7 @@ impl<
     }
 
     fn covariance(&self, into: &mut [f64]) -> bool {
-        scaled(
+        write_scaled(
             &self.rpem.normalised_covariance(),
             self.rpem.innovation_variance(),
             self.parameters,

@@ -111,8 +111,8 @@ mod two_sided;
 mod validation;
 
 pub use change::{Change, ErrorThreshold};
-pub use columns::{Columns, value_of};
-pub use determined::Determined;
+pub use columns::{Columns, operator_parameter};
+pub use determined::Determination;
 pub use forgetting::ForgettingRule;
 pub use further_input::TrackedInput;
 pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, GuardOptions, TrackFault};
@@ -126,17 +126,17 @@ pub use options::TrackOptions;
 pub use outcome::{Counts, Outcome};
 pub use over_record::{track, track_from};
 pub use person_prior::PersonPrior;
-pub use plan::{TrackPlan, ranges_of};
+pub use plan::{TrackPlan, search_ranges};
 pub use recursion::Sample;
 pub use request::{RequestedStart, TrackRequest};
 pub use response::Response;
-pub use seal::{opened, sealed};
-pub use setup::StartAt;
+pub use seal::{sealed, unsealed};
+pub use setup::StartSource;
 pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions, WindupGuard};
-pub use stage::{Choose, LiveOutcome, Stage, WarmUp};
+pub use stage::{ChooseOptions, LiveOutcome, Stage, WarmUp};
 pub use trace::{OPERATOR_COLUMNS, Trace};
 pub use tracker::Tracker;
-pub use validation::{COVARIANCES, CovarianceChoice, CovarianceUpdates, choose_covariance, track_validated};
+pub use validation::{CANDIDATE_COVARIANCES, CovarianceChoice, CovarianceUpdates, choose_covariance, track_validated};
 
 /// Regressors of the recursions and choice of the polynomials that are kept stable, both from the kernel.
-pub use hoid_core::{predictor::Regressor, recursion::Stable};
+pub use hoid_core::{predictor::Regressor, recursion::StablePolynomials};

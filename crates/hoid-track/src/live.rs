@@ -8,14 +8,14 @@ use hoid_model::{Decimated, Decimation, Decimator, Orders, Record, SampleTime};
 
 use crate::{
     Counts, LiveOutcome, Sample, Stage, TrackOptions, TrackPlan, TrackRequest, Tracker,
-    seal::{opened, sealed},
+    seal::{sealed, unsealed},
 };
 use hoid_ident::{Choice, IdentError};
 
 /// Default length of the warm-up of methods that have one, s.
 pub const DEFAULT_WARM_UP_S: f64 = 20.0;
 /// Longest warm-up, samples.
-const LONGEST_WARM_UP: f64 = 1e7;
+const MAX_WARM_UP_SAMPLES: f64 = 1e7;
 
 /// Searches the open orders of a plan on the record of the warm-up.
 pub type ChooseOrders<'a> = &'a dyn Fn(&TrackPlan, &Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
@@ -44,7 +44,7 @@ impl Live {
         warm_up_s: f64,
     ) -> Result<Self, IdentError> {
         let decimation = if asked.counts_samples() {
-            decimation.when_named()
+            decimation.explicit_only()
         } else {
             decimation
         };
@@ -56,7 +56,7 @@ impl Live {
         Ok(Self {
             sample_time,
             decimator,
-            ..Self::of_plan(asked.plan(tracked)?, warm_up_s)?
+            ..Self::from_plan(asked.plan(tracked)?, warm_up_s)?
         })
     }
 
@@ -64,13 +64,13 @@ impl Live {
     ///
     /// # Errors
     /// Same as [`Live::new`].
-    pub fn of_plan(plan: TrackPlan, warm_up_s: f64) -> Result<Self, IdentError> {
+    pub fn from_plan(plan: TrackPlan, warm_up_s: f64) -> Result<Self, IdentError> {
         let bad = |option: &str, found: String, expected: &str| IdentError::BadOption {
             option: option.to_owned(),
             found,
             expected: expected.to_owned(),
         };
-        if plan.options().method.smooths() {
+        if plan.options().method.requests_two_sided() {
             return Err(bad(
                 "smooth",
                 "a stream, which has no future samples".to_owned(),
@@ -79,7 +79,7 @@ impl Live {
         }
         let sample_time = plan.sample_time();
         let samples = (warm_up_s / sample_time.s()).round();
-        if !(1.0..=LONGEST_WARM_UP).contains(&samples) {
+        if !(1.0..=MAX_WARM_UP_SAMPLES).contains(&samples) {
             return Err(bad("warm_up", format!("{warm_up_s} s"), "1 to 10 million samples"));
         }
         Ok(Self {
@@ -106,7 +106,7 @@ impl Live {
             });
         }
         let record = match &self.decimator {
-            Some(decimator) => record.decimated(decimator.done().factor)?.0,
+            Some(decimator) => record.decimated(decimator.applied_decimation().factor)?.0,
             None => record,
         };
         let (options, choice) = self.plan.choose(&record, &|| {})?;
@@ -130,7 +130,7 @@ impl Live {
         let sample = match &mut self.decimator {
             None => sample,
             Some(decimator) => {
-                let Some([e, u, f_t]) = decimator.take([sample.e, sample.u, sample.reference.unwrap_or(f64::NAN)])
+                let Some([e, u, f_t]) = decimator.push([sample.e, sample.u, sample.reference.unwrap_or(f64::NAN)])
                 else {
                     return LiveOutcome {
                         between: true,
@@ -183,8 +183,8 @@ impl Live {
     }
 
     /// Returns the decimation, if there is one.
-    pub fn decimated(&self) -> Option<Decimated> {
-        self.decimator.as_ref().map(Decimator::done)
+    pub fn decimation(&self) -> Option<Decimated> {
+        self.decimator.as_ref().map(Decimator::applied_decimation)
     }
 
     /// Returns the time from the last sample that the tracker received to the last sample of the stream, s.
@@ -195,18 +195,18 @@ impl Live {
 
     /// Returns the complete state as numbers, and the orders once there is a tracker, for [`Live::restore`]. The
     /// recursion does not change.
-    pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
-        let (orders, mut numbers) = self.stage.saved();
+    pub fn save(&mut self) -> (Option<Orders>, Vec<f64>) {
+        let (orders, mut numbers) = self.stage.save();
         if let Some(decimator) = &mut self.decimator {
             let of_stage = numbers.len();
-            numbers.extend(decimator.saved());
+            numbers.extend(decimator.saved_state());
             numbers.push(of_stage as f64);
             numbers = sealed(numbers);
         }
         (orders, numbers)
     }
 
-    /// Restores the state that [`Live::saved`] returned; the recursion must have been built from the same request.
+    /// Restores the state that [`Live::save`] returned; the recursion must have been built from the same request.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were altered or truncated.
@@ -218,14 +218,14 @@ impl Live {
                          it again"
                     .to_owned(),
             };
-            let (length, all) = opened(numbers).and_then(<[f64]>::split_last).ok_or_else(wrong)?;
+            let (length, all) = unsealed(numbers).and_then(<[f64]>::split_last).ok_or_else(wrong)?;
             let (stage, of_decimator) = all.split_at_checked(*length as usize).ok_or_else(wrong)?;
             if !decimator.restore(of_decimator) {
                 return Err(wrong());
             }
             of_stage = stage;
         }
-        self.stage = Stage::restored(&self.plan, orders, of_stage, self.plan.sample_time())?;
+        self.stage = Stage::restore(&self.plan, orders, of_stage, self.plan.sample_time())?;
         Ok(())
     }
 }
@@ -243,7 +243,7 @@ mod tests {
     use crate::Method;
 
     /// Returns the first seconds of a run of C1 at 1000 Hz, with each sample of the run repeated.
-    fn fast(length_s: f64) -> Record {
+    fn fast_record(length_s: f64) -> Record {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let record = record.span(0.0, length_s).unwrap();
@@ -264,7 +264,7 @@ mod tests {
         })
     }
 
-    fn live(asked: &TrackRequest) -> Live {
+    fn build_live(asked: &TrackRequest) -> Live {
         let ts = SampleTime::new(0.001).unwrap();
         Live::new(asked, ts, Decimation::Auto, DEFAULT_WARM_UP_S).unwrap()
     }
@@ -275,13 +275,13 @@ mod tests {
 
     #[test]
     fn fast_stream_is_tracked_like_its_decimated_recording() {
-        let record = fast(12.0);
-        let mut live = live(&TrackRequest::default());
+        let record = fast_record(12.0);
+        let mut live = build_live(&TrackRequest::default());
         let advanced = (samples(&record))
             .filter(|sample| !live.update(*sample, true, &choose).between)
             .count();
         assert!((live.lag_s() - 0.15).abs() < 0.02, "{}", live.lag_s());
-        assert_eq!(live.decimated().map(|done| done.factor), Some(10));
+        assert_eq!(live.decimation().map(|done| done.factor), Some(10));
 
         let (lower, _) = record.decimated(10).unwrap();
         let mut tracker = Tracker::new(live.plan().options(), None, lower.sample_time()).unwrap();
@@ -295,20 +295,20 @@ mod tests {
 
     #[test]
     fn sample_based_settings_keep_the_rate() {
-        assert!(live(&TrackRequest::of(Method::rpem())).decimated().is_none());
+        assert!(build_live(&TrackRequest::of(Method::rpem())).decimation().is_none());
     }
 
     #[test]
     fn restored_stream_continues_between_decimated_samples() {
-        let record = fast(6.0);
+        let record = fast_record(6.0);
         let all: Vec<Sample> = samples(&record).collect();
         let (before, after) = all.split_at(3005);
-        let mut first = live(&TrackRequest::default());
+        let mut first = build_live(&TrackRequest::default());
         for sample in before {
             first.update(*sample, true, &choose);
         }
-        let (orders, numbers) = first.saved();
-        let mut second = live(&TrackRequest::default());
+        let (orders, numbers) = first.save();
+        let mut second = build_live(&TrackRequest::default());
         second.restore(orders, &numbers).unwrap();
         for sample in after {
             let pair = [&mut first, &mut second].map(|live| live.update(*sample, true, &choose));
@@ -325,21 +325,21 @@ mod tests {
     /// process.
     #[test]
     fn decimator_restores_arbitrary_numbers_safely() {
-        let record = fast(1.0);
+        let record = fast_record(1.0);
         let all: Vec<Sample> = samples(&record).collect();
         for before in [100, 600] {
-            let mut first = live(&TrackRequest::default());
+            let mut first = build_live(&TrackRequest::default());
             for sample in &all[..before] {
                 first.update(*sample, true, &choose);
             }
-            let (orders, numbers) = first.saved();
-            let (of_stage, numbers) = opened(&numbers).unwrap().split_last().unwrap();
+            let (orders, numbers) = first.save();
+            let (of_stage, numbers) = unsealed(&numbers).unwrap().split_last().unwrap();
             for at in *of_stage as usize..numbers.len() {
                 for number in [0.0, 1e300, -1e300] {
                     let mut changed = numbers.to_vec();
                     changed[at] = number;
                     changed.push(*of_stage);
-                    let mut restored = live(&TrackRequest::default());
+                    let mut restored = build_live(&TrackRequest::default());
                     if restored.restore(orders, &sealed(changed)).is_ok() {
                         for sample in &all[before..before + 300] {
                             restored.update(*sample, true, &choose);
@@ -358,8 +358,8 @@ mod tests {
             let error = Live::new(&asked, ts, Decimation::Off, warm_up_s).unwrap_err();
             assert!(error.to_string().contains("warm_up"), "{error}");
         }
-        let mut live = live(&asked);
-        let error = live.start_from(fast(2.0).decimated(10).unwrap().0).unwrap_err();
+        let mut live = build_live(&asked);
+        let error = live.start_from(fast_record(2.0).decimated(10).unwrap().0).unwrap_err();
         assert!(error.to_string().contains("0.001 s"), "{error}");
     }
 }

@@ -35,7 +35,7 @@ impl Memory {
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for an infinite memory, or one not longer than one sample.
-    pub fn samples(self, sample_time: SampleTime) -> Result<usize, IdentError> {
+    pub fn window_samples(self, sample_time: SampleTime) -> Result<usize, IdentError> {
         Ok(self.length(sample_time)?.round() as usize)
     }
 
@@ -100,14 +100,14 @@ impl FromStr for Memory {
 pub struct CommonMemory(pub Option<Memory>);
 
 impl CommonMemory {
-    fn memory() -> Setting {
+    fn memory_setting() -> Setting {
         Setting::of("memory", &None::<Memory>).help(&[
             "Memory of all parameters, after which the weight of a sample is 1/e:",
             "samples (256), seconds (2.56s) or inf",
         ])
     }
 
-    fn factor() -> Setting {
+    fn factor_setting() -> Setting {
         Setting::of("lambda", &None::<f64>)
             .bounds(Bounds::UpTo(0.0, 1.0))
             .help(&["Forgetting factor instead of a memory: lambda = 1 - 1/N for a memory of N samples"])
@@ -116,13 +116,13 @@ impl CommonMemory {
 
 impl Settings for CommonMemory {
     fn list(&self) -> Vec<Setting> {
-        vec![Self::memory(), Self::factor()]
+        vec![Self::memory_setting(), Self::factor_setting()]
     }
 
     fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError> {
         let memory = match name {
-            "memory" => Self::memory().read(text)?,
-            "lambda" => match Self::factor().read::<f64>(text)? {
+            "memory" => Self::memory_setting().read(text)?,
+            "lambda" => match Self::factor_setting().read::<f64>(text)? {
                 1.0 => Memory::Infinite,
                 lambda => Memory::Samples(1.0 / (1.0 - lambda)),
             },
@@ -158,7 +158,7 @@ settings! {
 
 impl MemoryOptions {
     /// Returns options with the same memory for all parameters.
-    pub fn of_all(memory: Memory) -> Self {
+    pub fn common(memory: Memory) -> Self {
         Self {
             memory: CommonMemory(Some(memory)),
             ..Self::default()
@@ -167,14 +167,14 @@ impl MemoryOptions {
 
     /// Returns the given memory of a parameter: by its name, by the letter of its polynomial, or for all parameters.
     /// `None` if no memory was given.
-    pub(crate) fn given(&self, name: &str) -> Option<Memory> {
+    pub(crate) fn given_memory(&self, name: &str) -> Option<Memory> {
         let by_letter = self.memory_of.iter().find(|(key, _)| is_named(name, key));
         let by_letter = by_letter.map(|(_, memory)| *memory);
         self.memory_of.get(name).copied().or(by_letter).or(self.memory.0)
     }
 
     /// Returns the first name with a memory that is neither a parameter nor the letter of a polynomial.
-    pub(crate) fn unknown(&self, names: &[String]) -> Option<&String> {
+    pub(crate) fn unknown_name(&self, names: &[String]) -> Option<&String> {
         let known = |key: &String| names.iter().any(|name| is_named(name, key));
         self.memory_of.keys().find(|key| !known(key))
     }
@@ -202,7 +202,11 @@ mod tests {
         let mut options = MemoryOptions::default();
         assert!(options.set("memory_of", "b=256, f1=inf").unwrap());
         assert_eq!(
-            (options.given("b1"), options.given("f1"), options.given("f2")),
+            (
+                options.given_memory("b1"),
+                options.given_memory("f1"),
+                options.given_memory("f2")
+            ),
             (Some(Memory::Samples(256.0)), Some(Memory::Infinite), None)
         );
     }

@@ -6,7 +6,7 @@
 
 use std::{any::Any, collections::BTreeMap, fmt};
 
-use hoid_core::recursion::Stable;
+use hoid_core::recursion::StablePolynomials;
 use hoid_ident::{
     Constraint, IdentError,
     settings::{MethodSpec, Setting, Settings},
@@ -22,11 +22,11 @@ use crate::{
     setup::Setup,
     shared_options::{GainOptions, WindupGuard},
     start::StartState,
-    two_sided::{Causal, TwoSided},
+    two_sided::{CausalRun, TwoSidedEstimate},
 };
 
 /// Name and description of a method.
-pub struct About {
+pub struct MethodDescription {
     /// Name as typed by users.
     pub name: &'static str,
     /// Definition, in one line without a full stop.
@@ -40,17 +40,17 @@ pub struct About {
 }
 
 /// Object-safe operations of a method: clone and comparison.
-pub trait Boxed: fmt::Debug + Send + Sync {
+pub trait MethodObject: fmt::Debug + Send + Sync {
     /// Returns a copy.
-    fn boxed(&self) -> Box<dyn RecursiveMethod>;
+    fn clone_boxed(&self) -> Box<dyn RecursiveMethod>;
     /// True if the other method is the same method with the same options.
     fn is_same(&self, other: &dyn RecursiveMethod) -> bool;
     /// Returns the method as [`Any`], for comparison with other methods.
     fn as_any(&self) -> &dyn Any;
 }
 
-impl<M: RecursiveMethod + Clone + PartialEq + 'static> Boxed for M {
-    fn boxed(&self) -> Box<dyn RecursiveMethod> {
+impl<M: RecursiveMethod + Clone + PartialEq + 'static> MethodObject for M {
+    fn clone_boxed(&self) -> Box<dyn RecursiveMethod> {
         Box::new(self.clone())
     }
 
@@ -64,9 +64,9 @@ impl<M: RecursiveMethod + Clone + PartialEq + 'static> Boxed for M {
 }
 
 /// A recursive method with its options.
-pub trait RecursiveMethod: Settings + Boxed + 'static {
+pub trait RecursiveMethod: Settings + MethodObject + 'static {
     /// Returns name and description of the method.
-    fn about(&self) -> About;
+    fn description(&self) -> MethodDescription;
 
     /// Returns the earlier name of the method; `None` if no earlier name is accepted.
     fn earlier_name(&self) -> Option<&'static str> {
@@ -113,22 +113,22 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
 
     /// True for a method that models how the person changes and has no memory length: it estimates physical parameters
     /// and keeps the noise model of a batch fit.
-    fn is_model_of_change(&self) -> bool {
+    fn models_change(&self) -> bool {
         false
     }
 
     /// True for a method that needs no start fit and updates its estimate from the first sample on.
-    fn starts_itself(&self) -> bool {
+    fn is_self_starting(&self) -> bool {
         false
     }
 
     /// Lag of the basis in which the gains are estimated, s; `None` without a basis.
-    fn lag_of_basis_s(&self) -> Option<f64> {
+    fn basis_lag_s(&self) -> Option<f64> {
         None
     }
 
     /// True if the two-sided estimate of a recorded run is requested.
-    fn smooths(&self) -> bool {
+    fn requests_two_sided(&self) -> bool {
         false
     }
 
@@ -136,7 +136,12 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for a start that cannot be used.
-    fn two_sided(&self, _record: &Record, _causal: &Causal, _from: &StartState) -> Result<Vec<TwoSided>, IdentError> {
+    fn two_sided(
+        &self,
+        _record: &Record,
+        _causal: &CausalRun,
+        _from: &StartState,
+    ) -> Result<Vec<TwoSidedEstimate>, IdentError> {
         Ok(Vec::new())
     }
 
@@ -167,12 +172,12 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// Returns the multiple of the unit matrix that is P at the start; `None` if P comes from the start fit.
-    fn covariance(&self) -> Option<f64> {
+    fn initial_covariance(&self) -> Option<f64> {
         self.gain().and_then(|gain| gain.covariance)
     }
 
     /// Returns the limit on an innovation in the update, in standard deviations of the innovation.
-    fn limit(&self) -> f64 {
+    fn innovation_limit(&self) -> f64 {
         f64::INFINITY
     }
 
@@ -193,8 +198,8 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// Returns the polynomials that are kept stable.
-    fn stable(&self) -> Stable {
-        Stable::Predictor
+    fn stable(&self) -> StablePolynomials {
+        StablePolynomials::Predictor
     }
 
     /// Returns the bounds of the physical parameters.
@@ -213,7 +218,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// True for a method that tracks the responses to two inputs ([`crate::TrackedInput`]).
-    fn takes_further_input(&self) -> bool {
+    fn supports_further_input(&self) -> bool {
         false
     }
 
@@ -228,7 +233,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// Prior standard deviations of omega_nm in rad/s, zeta_nm and tau_e in s, for methods with a prior.
-    fn spread_before(&self) -> Option<[f64; 3]> {
+    fn prior_deviations(&self) -> Option<[f64; 3]> {
         None
     }
 
@@ -246,7 +251,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
 
 /// Returns name, description and options of a method.
 pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
-    let about = method.about();
+    let about = method.description();
     let own = |setting: Setting| match about.defaults.iter().find(|(name, _)| *name == setting.name) {
         Some((_, words)) => setting.default(words),
         None => setting,
@@ -261,7 +266,7 @@ pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
 }
 
 /// Builds an error about an option.
-pub fn bad(option: &str, found: String, expected: &str) -> IdentError {
+pub fn invalid_option(option: &str, found: String, expected: &str) -> IdentError {
     IdentError::BadOption {
         option: option.to_owned(),
         found,
@@ -276,7 +281,7 @@ pub fn bad(option: &str, found: String, expected: &str) -> IdentError {
 pub fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), IdentError> {
     let o = &setup.orders;
     if !(o.na == 0 && o.nb == 2 && o.nf == 2) {
-        return Err(bad(
+        return Err(invalid_option(
             &format!("the orders of {name}"),
             format!("{} with {o}", setup.structure),
             "the structure of the operator, bj with nb = 2 and nf = 2; nc and nd are free",
@@ -291,7 +296,7 @@ pub fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), IdentError
 /// [`IdentError::BadOption`].
 pub fn check_delay(orders: &Orders) -> Result<(), IdentError> {
     match orders.nk {
-        0 => Err(bad(
+        0 => Err(invalid_option(
             "the delay",
             "nk = 0".to_owned(),
             "nk of 1 or more: the hold alone delays by one sample",

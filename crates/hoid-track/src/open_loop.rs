@@ -37,7 +37,7 @@ pub enum NoCrossover {
 
 impl NoCrossover {
     /// Returns the reason as text.
-    pub fn words(self) -> &'static str {
+    pub fn as_text(self) -> &'static str {
         match self {
             Self::NoEstimate => "there is no estimate yet",
             Self::NeverFalls => "the gain of the open loop does not cross 1 from above between .05 and 60 rad/s",
@@ -48,7 +48,7 @@ impl NoCrossover {
 
 impl OpenLoop {
     /// Number of values in a packed crossover and margin.
-    pub(crate) const NUMBERS: usize = 4;
+    pub(crate) const PACKED_LEN: usize = 4;
 
     /// Computes crossover and phase margin of an estimate; `value` returns its response at a frequency, and `whole` the
     /// response with its covariance.
@@ -66,12 +66,12 @@ impl OpenLoop {
             return Err(NoCrossover::NoEstimate);
         }
         let open_loop = |omega: f64| response(omega) * element.response(omega);
-        let found = Crossover::lowest(open_loop, sample_time).ok_or(NoCrossover::NeverFalls)?;
+        let found = Crossover::find_lowest(open_loop, sample_time).ok_or(NoCrossover::NeverFalls)?;
         let there = whole(found.omega_rad_s).ok_or(NoCrossover::NoEstimate)?;
         let [re, im] = there.value;
         // dY/Y for a unit change of the real part of Y, and for one of the imaginary part.
         let moved =
-            [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| found.moved_by(d / Complex64::new(re, im)));
+            [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| found.shift_for(d / Complex64::new(re, im)));
         let estimate = |value: f64, of: usize| {
             let [a, b] = [moved[0][of], moved[1][of]];
             let c = &there.covariance;
@@ -88,17 +88,17 @@ impl OpenLoop {
     }
 
     /// Packs the values and variances of crossover and margin, for averaging; NaN if there is no crossover.
-    pub(crate) fn packed(found: Result<Self, NoCrossover>) -> [f64; Self::NUMBERS] {
+    pub(crate) fn pack(found: Result<Self, NoCrossover>) -> [f64; Self::PACKED_LEN] {
         let Ok(found) = found else {
-            return [f64::NAN; Self::NUMBERS];
+            return [f64::NAN; Self::PACKED_LEN];
         };
         let pair = |e: Estimate| [e.value, e.standard_error.map_or(f64::NAN, |s| s * s)];
         let ([a, b], [c, d]) = (pair(found.crossover_rad_s), pair(found.phase_margin_deg));
         [a, b, c, d]
     }
 
-    /// Unpacks the numbers of [`OpenLoop::packed`]; `None` if there is no crossover.
-    pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
+    /// Unpacks the numbers of [`OpenLoop::pack`]; `None` if there is no crossover.
+    pub(crate) fn unpack(numbers: &[f64]) -> Option<Self> {
         let &[a, b, c, d] = numbers else { return None };
         a.is_finite().then_some(Self {
             crossover_rad_s: Estimate::with_variance(a, b),
@@ -115,9 +115,9 @@ mod tests {
 
     use super::*;
 
-    const TS: SampleTime = SampleTime::HUNDREDTH;
+    const TS: SampleTime = SampleTime::AT_100_HZ;
 
-    fn held(operator: &FamilyOperator, omega: f64) -> Complex64 {
+    fn held_response(operator: &FamilyOperator, omega: f64) -> Complex64 {
         let half = 0.5 * omega * TS.s();
         operator.response(omega) * Complex64::from_polar((half.sin() / half).powi(2), -half)
     }
@@ -135,7 +135,7 @@ mod tests {
         let parts = |h: Complex64| [h.re, h.im];
         let whole = |omega: f64| {
             let found = operator.response_and_gradient(omega);
-            let hold = held(&operator, omega) / found.value;
+            let hold = held_response(&operator, omega) / found.value;
             let rows = [0, 1].map(|part| -> Vec<f64> {
                 let along = found.gradient.iter().map(|g| parts(g * hold)[part]);
                 along.collect()
@@ -144,11 +144,11 @@ mod tests {
             let [a, b, both] = [&rows[0], &rows[1], &sum].map(|row| variance_along(row, &covariance));
             let cross = 0.5 * (both - a - b);
             Some(Response {
-                value: parts(held(&operator, omega)),
+                value: parts(held_response(&operator, omega)),
                 covariance: [[a, cross], [cross, b]],
             })
         };
-        let value = |omega: f64| Some(parts(held(&operator, omega)));
+        let value = |omega: f64| Some(parts(held_response(&operator, omega)));
         let found = OpenLoop::of(value, whole, &element, TS).unwrap();
         for (found, expected) in [
             (found.crossover_rad_s, expected.crossover_rad_s),
@@ -164,7 +164,7 @@ mod tests {
             assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
         }
         assert_eq!(
-            OpenLoop::unpacked(&OpenLoop::packed(Ok(found)))
+            OpenLoop::unpack(&OpenLoop::pack(Ok(found)))
                 .unwrap()
                 .crossover_rad_s
                 .value,
@@ -195,7 +195,7 @@ mod tests {
             OpenLoop::of(|_| None, |_| None, &element, TS),
             Err(NoCrossover::NoEstimate)
         );
-        assert!(OpenLoop::unpacked(&OpenLoop::packed(Err(NoCrossover::NeverFalls))).is_none());
+        assert!(OpenLoop::unpack(&OpenLoop::pack(Err(NoCrossover::NeverFalls))).is_none());
         // Without a covariance, the crossover has a value but no standard error.
         assert_eq!(with(2.0, f64::NAN).unwrap().crossover_rad_s.standard_error, None);
     }

@@ -7,12 +7,12 @@ use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structu
 
 use crate::{
     forgetting::ForgettingRule,
-    further_input::{TrackedInput, block, coefficient_names},
+    further_input::{TrackedInput, coefficient_names, submatrix},
     idle::default_start_span,
     memory::Memory,
-    method::bad,
+    method::invalid_option,
     methods::Method,
-    setup::{DEFAULT_DELAY_S, Setup, StartAt, parameter_names, polynomial_orders},
+    setup::{DEFAULT_DELAY_S, Setup, StartSource, parameter_names, polynomial_orders},
     start::check_sample_time,
 };
 
@@ -28,7 +28,7 @@ pub struct TrackOptions {
     /// A further input of the model, for the methods `rls` and `rpem`. Default none.
     pub further: Option<TrackedInput>,
     /// Start of the recursion. Default: a batch fit of the first third of the record.
-    pub start: StartAt,
+    pub start: StartSource,
     /// Time from which the estimate is updated, s; before it, only the filters are updated. Default: the end of the
     /// start span if P comes from the fit of this span, otherwise the start of the record.
     pub update_from_s: Option<f64>,
@@ -44,7 +44,7 @@ pub struct TrackOptions {
 
 impl TrackOptions {
     /// Default magnitude beyond which a sample counts as faulty.
-    pub const LARGEST: f64 = 1e6;
+    pub const DEFAULT_MAX_MAGNITUDE: f64 = 1e6;
 
     /// Returns the default options for the given orders.
     pub fn new(method: Method, structure: Structure, orders: Orders) -> Self {
@@ -53,10 +53,10 @@ impl TrackOptions {
             structure,
             orders,
             further: None,
-            start: StartAt::Span(None),
+            start: StartSource::Span(None),
             update_from_s: None,
             search: SearchOptions::default(),
-            largest: Self::LARGEST,
+            largest: Self::DEFAULT_MAX_MAGNITUDE,
             at_rad_s: Vec::new(),
             controlled_element: None,
         }
@@ -94,19 +94,21 @@ impl TrackOptions {
 
     /// Returns the span of the start fit in a record, s; `None` without a start fit.
     pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
-        let StartAt::Span(span) = self.start else { return None };
+        let StartSource::Span(span) = self.start else {
+            return None;
+        };
         Some(span.unwrap_or_else(|| default_start_span(record)))
     }
 
     /// Returns the range of tau_e in s; `None` unless tau_e is one of the estimated parameters.
-    pub(crate) fn delay_parameter_s(&self) -> Option<(f64, f64)> {
+    pub(crate) fn delay_range_s(&self) -> Option<(f64, f64)> {
         let method = &self.method;
         method.track_delay_s().filter(|_| method.delay_is_parameter())
     }
 
     /// Returns the names of the estimated parameters: coefficients of theta, or physical parameters.
     pub fn parameter_names(&self) -> Vec<String> {
-        let with_delay = self.delay_parameter_s().is_some();
+        let with_delay = self.delay_range_s().is_some();
         let mut names = parameter_names(&self.orders, self.method.is_physical(), with_delay);
         names.extend(self.further.iter().flat_map(TrackedInput::names));
         names
@@ -118,7 +120,7 @@ impl TrackOptions {
     }
 
     /// Returns the coefficients of the model of the first input and their covariance, by rows.
-    pub(crate) fn of_first_input<'t>(
+    pub(crate) fn first_input_part<'t>(
         &self,
         theta: &'t [f64],
         covariance: Option<&'t [f64]>,
@@ -126,20 +128,20 @@ impl TrackOptions {
         if self.further.is_none() {
             return (theta, covariance.map(Cow::Borrowed));
         }
-        let first = self.polynomial_orders().parameters();
+        let first = self.polynomial_orders().parameter_count();
         let places: Vec<usize> = (0..first).collect();
-        let own = covariance.map(|c| Cow::Owned(block(c, theta.len(), &places)));
+        let own = covariance.map(|c| Cow::Owned(submatrix(c, theta.len(), &places)));
         (&theta[..first], own)
     }
 
     /// Returns the number of reported coefficients.
-    pub(crate) fn coefficients(&self) -> usize {
-        self.polynomial_orders().parameters() + self.further.as_ref().map_or(0, TrackedInput::parameters)
+    pub(crate) fn coefficient_count(&self) -> usize {
+        self.polynomial_orders().parameter_count() + self.further.as_ref().map_or(0, TrackedInput::parameter_count)
     }
 
     /// Returns the orders of the reported polynomials.
     pub(crate) fn polynomial_orders(&self) -> Orders {
-        polynomial_orders(self.orders, self.delay_parameter_s().is_some())
+        polynomial_orders(self.orders, self.delay_range_s().is_some())
     }
 
     /// Returns the memory of each parameter, in the order of [`TrackOptions::parameter_names`].
@@ -149,14 +151,14 @@ impl TrackOptions {
     pub fn memories(&self) -> Result<Vec<Memory>, IdentError> {
         let (names, method) = (self.parameter_names(), &self.method);
         let given = method.memories();
-        if let Some(unknown) = given.and_then(|given| given.unknown(&names)) {
+        if let Some(unknown) = given.and_then(|given| given.unknown_name(&names)) {
             return Err(IdentError::UnknownParameter {
                 name: unknown.clone(),
                 available: names.join(", "),
             });
         }
         let of = |name: &String| {
-            let own = given.and_then(|given| given.given(name));
+            let own = given.and_then(|given| given.given_memory(name));
             own.unwrap_or_else(|| method.default_memory(name))
         };
         Ok(names.iter().map(of).collect())
@@ -176,15 +178,15 @@ impl TrackOptions {
             search: self.search,
             memories: self.parameter_names().into_iter().zip(self.memories()?).collect(),
             forgetting: method.forgetting(),
-            covariance: method.covariance(),
+            covariance: method.initial_covariance(),
             windup_guard: method.windup_guard(self.structure),
-            limit: method.limit(),
+            limit: method.innovation_limit(),
             stable: method.stable(),
-            starts_itself: method.starts_itself(),
+            starts_itself: method.is_self_starting(),
             is_physical: method.is_physical(),
             bounds: method.bounds(),
             track_delay_s: method.track_delay_s(),
-            delay_parameter_s: self.delay_parameter_s(),
+            delay_parameter_s: self.delay_range_s(),
         })
     }
 
@@ -203,13 +205,13 @@ impl TrackOptions {
     }
 
     /// Checks a further input against method and options.
-    fn check_further(&self, setup: &Setup) -> Result<(), IdentError> {
+    fn check_further_input(&self, setup: &Setup) -> Result<(), IdentError> {
         let Some(further) = &self.further else {
             return Ok(());
         };
-        let refused = |found: String, expected: &str| Err(bad("a further input", found, expected));
+        let refused = |found: String, expected: &str| Err(invalid_option("a further input", found, expected));
         let name = self.method.name();
-        if !self.method.takes_further_input() {
+        if !self.method.supports_further_input() {
             return refused(
                 format!("{} with the method {name}", further.channel),
                 "the method rls or rpem; the other methods track the response to one input",
@@ -237,13 +239,13 @@ impl TrackOptions {
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let (setup, method) = (self.setup()?, &self.method);
-        self.check_further(&setup)?;
+        self.check_further_input(&setup)?;
         method.check(&setup)?;
         setup.forgetting.check()?;
         if let Some((low, high)) = setup.track_delay_s
             && !(0.0 <= low && low <= high && high.is_finite())
         {
-            return Err(bad(
+            return Err(invalid_option(
                 "the range of the delay",
                 format!("{:?} s", (low, high)),
                 "two finite nonnegative times, the shorter time first",
@@ -252,7 +254,7 @@ impl TrackOptions {
         if let Some(p) = setup.covariance
             && !(p > 0.0 && p.is_finite())
         {
-            return Err(bad(
+            return Err(invalid_option(
                 "the start covariance",
                 p.to_string(),
                 "a positive number, such as 0.1",
@@ -260,21 +262,21 @@ impl TrackOptions {
         }
         if let (Some(_), ForgettingRule::Window | ForgettingRule::Gradient(_)) = (setup.windup_guard, &setup.forgetting)
         {
-            return Err(bad(
+            return Err(invalid_option(
                 "windup_guard",
                 "window or gradient forgetting, in which P does not grow".to_owned(),
                 "forgetting = exponential, random-walk, variable or directional; or omit windup_guard",
             ));
         }
         if setup.limit.is_nan() || setup.limit <= 0.0 {
-            return Err(bad(
+            return Err(invalid_option(
                 "the limit on innovations",
                 setup.limit.to_string(),
                 "a positive multiple of sigma, or inf",
             ));
         }
         if self.largest.is_nan() || self.largest <= 0.0 {
-            return Err(bad(
+            return Err(invalid_option(
                 "the largest magnitude",
                 self.largest.to_string(),
                 "a positive number",
@@ -282,7 +284,7 @@ impl TrackOptions {
         }
         let wrong = self.at_rad_s.iter().find(|w| !(w.is_finite() && **w > 0.0));
         if let Some(wrong) = wrong {
-            return Err(bad(
+            return Err(invalid_option(
                 "a frequency of the response",
                 format!("{wrong} rad/s"),
                 "positive frequencies in rad/s, such as 0.5,1,2.5",

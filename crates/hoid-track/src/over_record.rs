@@ -11,7 +11,7 @@ use crate::{
     response::Response,
     trace::{self, Trace, pack},
     tracker::Tracker,
-    two_sided::Causal,
+    two_sided::CausalRun,
 };
 
 /// Tracks a record and returns the trace, which has a row for every `every`-th sample.
@@ -64,9 +64,9 @@ pub(crate) fn track_with(
     let mut options = options.clone();
     options.method.inner_mut().prepare(record);
     let options = &options;
-    let reference = reference(record, options)?;
+    let reference = reference_signal(record, options)?;
     let mut tracker = Tracker::from_fit(options, span.as_ref(), start, sample_time)?;
-    let known = span.is_some() && options.method.covariance().is_none() && !options.method.starts_itself();
+    let known = span.is_some() && options.method.initial_covariance().is_none() && !options.method.is_self_starting();
     let from_s = options
         .update_from_s
         .unwrap_or(if known { end_s } else { f64::NEG_INFINITY })
@@ -76,7 +76,7 @@ pub(crate) fn track_with(
     trace.start = tracker.start.fit.clone();
     trace.updated_from_s = from_s;
     let (input, output) = (record.input(), record.output());
-    let p = options.coefficients();
+    let p = options.coefficient_count();
     let mut covariance = vec![0.0; p * p];
     // The limit is half a sample earlier, so rounding of the times has no effect.
     let first_update = from_s - sample_time.s() / 2.0;
@@ -106,14 +106,14 @@ pub(crate) fn track_with(
         pack(&covariance, p, &mut trace.covariance);
         trace.operator.extend(tracker.recursion.operator());
         trace.delays.extend(tracker.recursion.delay());
-        if options.method.starts_itself() {
+        if options.method.is_self_starting() {
             for omega in &options.at_rad_s {
-                let told = tracker.response(*omega).map(|response| response.packed());
-                trace.responses.extend(told.unwrap_or([f64::NAN; Response::NUMBERS]));
+                let told = tracker.response(*omega).map(|response| response.pack());
+                trace.responses.extend(told.unwrap_or([f64::NAN; Response::PACKED_LEN]));
             }
             if let Some(found) = tracker.open_loop() {
                 trace.no_crossover.push(found.err());
-                trace.open_loops.extend(OpenLoop::packed(found));
+                trace.open_loops.extend(OpenLoop::pack(found));
             }
         }
         trace.innovation.push(outcome.innovation.unwrap_or(f64::NAN));
@@ -132,14 +132,14 @@ pub(crate) fn track_with(
     }
     trace.idle_s = idle_head(record) as f64 * sample_time.s();
     trace.failures = tracker.failures();
-    if options.method.smooths() {
-        let causal = Causal {
+    if options.method.requests_two_sided() {
+        let causal = CausalRun {
             setup: options.setup()?,
             largest: options.largest,
             rows: kept_rows(record.len(), every),
             last: trace.operator.last().copied(),
         };
-        trace.replace(options.method.two_sided(record, &causal, &tracker.start)?);
+        trace.replace_rows(options.method.two_sided(record, &causal, &tracker.start)?);
         trace.updated_from_s = record.time_s(0);
     }
     Ok(trace)
@@ -152,7 +152,7 @@ fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
 }
 
 /// Returns the further input, or the external signal for methods that use one.
-fn reference<'r>(record: &'r Record, options: &TrackOptions) -> Result<Option<&'r [f64]>, IdentError> {
+fn reference_signal<'r>(record: &'r Record, options: &TrackOptions) -> Result<Option<&'r [f64]>, IdentError> {
     let further = options.further.as_ref().map(|further| further.channel.as_str());
     let Some(name) = further.or_else(|| options.method.reference_channel()) else {
         return Ok(None);

@@ -60,12 +60,12 @@ impl PersonPrior {
     pub(crate) fn delay_s(&self) -> Option<f64> {
         match self.fit() {
             Some(fit) => Some(fit.operator.tau_e_s()),
-            None => self.named("tau_e").map(|(centre, _)| centre),
+            None => self.named_parameter("tau_e").map(|(centre, _)| centre),
         }
     }
 
     /// Returns the centre and the spread of a named parameter; `None` if the prior does not name it.
-    pub(crate) fn named(&self, parameter: &str) -> Option<(f64, f64)> {
+    pub(crate) fn named_parameter(&self, parameter: &str) -> Option<(f64, f64)> {
         let Self::Named(prior) = self else { return None };
         let entry = prior.entries().iter().find(|entry| entry.parameter == parameter)?;
         Some((entry.centre, entry.spread))
@@ -120,7 +120,7 @@ mod tests {
         }
         let named = PersonPrior::read("omega_nm=9:0.2").unwrap();
         assert_eq!(
-            (named.named("omega_nm"), named.named("tau_e")),
+            (named.named_parameter("omega_nm"), named.named_parameter("tau_e")),
             (Some((9.0, 0.2)), None)
         );
         assert!(PersonPrior::read("T_L=1:0.1").unwrap_err().contains("T_L"));

@@ -9,7 +9,7 @@ use crate::{
     methods::Method,
     options::TrackOptions,
     person_prior::PersonPrior,
-    setup::{DEFAULT_DELAY_S, StartAt},
+    setup::{DEFAULT_DELAY_S, StartSource},
 };
 use hoid_ident::{
     Choice, IdentError, NamedOrders, OrderRanges,
@@ -38,13 +38,13 @@ impl TrackPlan {
         criterion: Criterion,
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
-        let ranges = match options.method.starts_itself() {
+        let ranges = match options.method.is_self_starting() {
             true => default_ranges(&options.method, &ranges, sample_time),
             false => ranges,
         };
         let combinations = ranges.combinations()?;
-        if matches!(options.start, StartAt::Theta(_)) && combinations.len() > 1 {
-            return Err(of_one_model());
+        if matches!(options.start, StartSource::Theta(_)) && combinations.len() > 1 {
+            return Err(several_models_error());
         }
         let options = TrackOptions {
             // A name that is unknown for the largest orders is unknown for all orders.
@@ -61,7 +61,7 @@ impl TrackPlan {
     }
 
     /// True if no order has to be searched.
-    pub fn is_settled(&self) -> bool {
+    pub fn has_fixed_orders(&self) -> bool {
         self.ranges.combinations().is_ok_and(|all| all.len() == 1)
     }
 
@@ -90,7 +90,7 @@ impl TrackPlan {
         span: &Record,
         each: &(dyn Fn() + Sync),
     ) -> Result<(TrackOptions, Option<Choice>), IdentError> {
-        if self.is_settled() {
+        if self.has_fixed_orders() {
             return Ok((self.options.clone(), None));
         }
         let template = self.options.start_estimator();
@@ -113,7 +113,7 @@ impl TrackPlan {
 }
 
 /// Returns the error for start coefficients that are given while orders are searched.
-pub fn of_one_model() -> IdentError {
+pub fn several_models_error() -> IdentError {
     IdentError::BadStart {
         reason: "a start applies to a single model, but a range of orders or delays is searched; give nk and the \
                  orders as single numbers"
@@ -147,7 +147,7 @@ fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that is not an order.
-pub fn ranges_of(
+pub fn search_ranges(
     method: &Method,
     structure: Structure,
     named: &NamedOrders,
@@ -164,11 +164,16 @@ pub fn ranges_of(
     } else {
         &[]
     };
-    Ok(narrowed(default.with(named)?, delay, of_start, sample_time))
+    Ok(narrow_ranges(
+        default.with_named_orders(named)?,
+        delay,
+        of_start,
+        sample_time,
+    ))
 }
 
 /// Narrows the ranges to the tracked delay and to the orders that follow from the names of the start coefficients.
-fn narrowed(
+fn narrow_ranges(
     mut ranges: OrderRanges,
     track_delay_s: Option<(f64, f64)>,
     start_names: &[String],
@@ -246,21 +251,21 @@ mod tests {
 
     #[test]
     fn start_and_delay_range_narrow_the_orders() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let default = default_operator_ranges(Structure::BoxJenkins, ts);
         let start: Vec<String> = ["b0", "b1", "d1", "d2", "f1", "f2"].map(str::to_owned).to_vec();
-        let found = narrowed(default.clone(), Some((0.2, 0.3)), &start, ts);
+        let found = narrow_ranges(default.clone(), Some((0.2, 0.3)), &start, ts);
         assert_eq!((found.nd.clone(), found.nk.clone()), (2..=2, 21..=31));
-        assert_eq!(narrowed(default.clone(), None, &[], ts), default);
+        assert_eq!(narrow_ranges(default.clone(), None, &[], ts), default);
     }
 
     #[test]
     fn named_orders_replace_the_defaults() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let of = |method: &Method, named: &[(&str, RangeInclusive<usize>)], start: &[&str]| {
             let named = named.iter().map(|(name, range)| ((*name).to_owned(), range.clone()));
             let start: Vec<String> = start.iter().map(|name| (*name).to_owned()).collect();
-            ranges_of(method, Structure::BoxJenkins, &named.collect(), &start, ts)
+            search_ranges(method, Structure::BoxJenkins, &named.collect(), &start, ts)
         };
         let tracked = Method::rpem().with("track_delay", "0.2..0.3").unwrap();
         let found = of(&tracked, &[], &[]).unwrap();
@@ -280,14 +285,14 @@ mod tests {
 
     #[test]
     fn self_starting_method_needs_no_search() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let ranges = OrderRanges {
             nd: 16..=16,
             ..default_operator_ranges(Structure::BoxJenkins, ts)
         };
         let options = TrackOptions::default_for(Method::adaptive(), 29);
         let plan = TrackPlan::new(options.clone(), ranges.clone(), Criterion::Bic, ts).unwrap();
-        assert!(plan.is_settled());
+        assert!(plan.has_fixed_orders());
         assert_eq!((plan.options().orders.nk, plan.options().orders.nd), (21, 16));
         let known = OrderRanges { nk: 29..=29, ..ranges };
         let plan = TrackPlan::new(options, known, Criterion::Bic, ts).unwrap();
@@ -296,10 +301,10 @@ mod tests {
 
     #[test]
     fn start_is_refused_for_several_models() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let default = default_operator_ranges(Structure::BoxJenkins, ts);
         let options = TrackOptions {
-            start: StartAt::Theta(vec![0.0; 5]),
+            start: StartSource::Theta(vec![0.0; 5]),
             ..TrackOptions::new(
                 Method::rpem(),
                 Structure::BoxJenkins,

@@ -12,7 +12,7 @@ use hoid_core::{
 };
 use hoid_model::Orders;
 
-use crate::history::bounded;
+use crate::history::limit_magnitude;
 
 /// Maximum number of coefficients.
 const MAX_COEFFICIENTS: usize = 64;
@@ -69,7 +69,7 @@ impl Predictor {
 
     fn predict(&mut self, theta: &[f64; MAX_COEFFICIENTS], e: f64, u: f64) -> f64 {
         let x = self.delay.step(e);
-        bounded(self.kernel.predict(theta, x, u).1)
+        limit_magnitude(self.kernel.predict(theta, x, u).1)
     }
 
     fn correct(&mut self, theta: &[f64; MAX_COEFFICIENTS]) {

@@ -49,8 +49,8 @@ pub trait Recursion: State + Send + Sync {
     /// Takes a sample: filters and estimate are updated.
     fn step(&mut self, sample: Sample) -> StepOutcome;
     /// Takes a sample into the filters only; the estimate stays constant.
-    fn follow(&mut self, sample: Sample) -> StepOutcome;
-    /// As `follow`, for a missing output, which the one-step prediction replaces.
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome;
+    /// As `step_without_update`, for a missing output, which the one-step prediction replaces.
     fn bridge(&mut self, sample: Sample);
     /// Returns theta in the order of [`hoid_model::Orders::parameter_names`].
     fn theta(&self) -> &[f64];

@@ -10,8 +10,8 @@ use crate::{
     further_input::{TrackedInput, coefficient_names},
     methods::Method,
     options::TrackOptions,
-    plan::{TrackPlan, of_one_model, ranges_of},
-    setup::StartAt,
+    plan::{TrackPlan, search_ranges, several_models_error},
+    setup::StartSource,
 };
 
 /// Requested start of the recursion.
@@ -68,7 +68,7 @@ impl TrackRequest {
             further: None,
             start: RequestedStart::Default,
             criterion: Criterion::Bic,
-            largest: TrackOptions::LARGEST,
+            largest: TrackOptions::DEFAULT_MAX_MAGNITUDE,
             at_rad_s: Vec::new(),
             controlled_element: None,
         }
@@ -108,7 +108,7 @@ impl TrackRequest {
                     expected: "0 s or more".to_owned(),
                 });
             }
-            orders.insert("nk".to_owned(), delay.samples(sample_time));
+            orders.insert("nk".to_owned(), delay.nk_range(sample_time));
         }
         let names: Vec<String> = match &self.start {
             // The coefficients of a further input do not count for the orders of the first.
@@ -116,7 +116,7 @@ impl TrackRequest {
             _ => Vec::new(),
         };
         let structure = self.structure();
-        let ranges = ranges_of(&self.method, structure, &orders, &names, sample_time)?;
+        let ranges = search_ranges(&self.method, structure, &orders, &names, sample_time)?;
         let combinations = ranges.combinations()?;
         // These are the largest values of each order: a name that is unknown for them is unknown for all orders.
         let largest = combinations[combinations.len() - 1];
@@ -134,10 +134,10 @@ impl TrackRequest {
             });
         }
         let start = match &self.start {
-            RequestedStart::Default => StartAt::Span(None),
-            RequestedStart::Nothing => StartAt::Nothing,
-            RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(of_one_model()),
-            RequestedStart::Coefficients(named) => StartAt::Theta(
+            RequestedStart::Default => StartSource::Span(None),
+            RequestedStart::Nothing => StartSource::Nothing,
+            RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(several_models_error()),
+            RequestedStart::Coefficients(named) => StartSource::Theta(
                 theta_of(&coefficient_names(&largest, self.further.as_ref()), named).map_err(|reason| {
                     IdentError::BadStart {
                         reason: format!("it {reason}"),
@@ -177,7 +177,7 @@ mod tests {
             orders: [("nk".to_owned(), 29..=29)].into(),
             ..asked
         };
-        let refused = twice.plan(SampleTime::HUNDREDTH).unwrap_err().to_string();
+        let refused = twice.plan(SampleTime::AT_100_HZ).unwrap_err().to_string();
         assert!(refused.contains("one of them"), "{refused}");
     }
 
@@ -192,14 +192,14 @@ mod tests {
             start: RequestedStart::Coefficients(named),
             ..TrackRequest::of(Method::rpem())
         };
-        let plan = of(named.clone()).plan(SampleTime::HUNDREDTH).unwrap();
+        let plan = of(named.clone()).plan(SampleTime::AT_100_HZ).unwrap();
         let names = plan.options().parameter_names();
-        let StartAt::Theta(theta) = &plan.options().start else {
+        let StartSource::Theta(theta) = &plan.options().start else {
             panic!("{:?}", plan.options().start)
         };
         assert!(names.iter().zip(theta).all(|(name, value)| named[name] == *value));
         let lacking: BTreeMap<String, f64> = named.into_iter().filter(|(name, _)| name != "f2").collect();
-        let refused = of(lacking).plan(SampleTime::HUNDREDTH).unwrap_err().to_string();
+        let refused = of(lacking).plan(SampleTime::AT_100_HZ).unwrap_err().to_string();
         assert!(refused.contains("lacks f2"), "{refused}");
     }
 }

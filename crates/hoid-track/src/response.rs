@@ -24,16 +24,16 @@ pub struct Response {
 
 impl Response {
     /// Number of values of a packed response.
-    pub(crate) const NUMBERS: usize = 5;
+    pub(crate) const PACKED_LEN: usize = 5;
 
     /// Packs the real and imaginary part, and the upper triangle of their covariance.
-    pub(crate) fn packed(&self) -> [f64; Self::NUMBERS] {
+    pub(crate) fn pack(&self) -> [f64; Self::PACKED_LEN] {
         let ([re, im], [[a, b], [_, c]]) = (self.value, self.covariance);
         [re, im, a, b, c]
     }
 
-    /// Unpacks the numbers of [`Response::packed`]; `None` if there is no response.
-    pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
+    /// Unpacks the numbers of [`Response::pack`]; `None` if there is no response.
+    pub(crate) fn unpack(numbers: &[f64]) -> Option<Self> {
         let &[re, im, a, b, c] = numbers else { return None };
         let sound = re.is_finite() && im.is_finite();
         sound.then_some(Self {
@@ -45,19 +45,22 @@ impl Response {
     /// |H| in dB.
     pub fn gain_db(&self) -> Estimate {
         let [re, im] = self.value;
-        Estimate::with_variance(DB * re.hypot(im).ln(), DB * DB * self.along([re, im]))
+        Estimate::with_variance(DB * re.hypot(im).ln(), DB * DB * self.variance_along([re, im]))
     }
 
     /// Phase in degrees, between -180 and 180.
     pub fn phase_deg(&self) -> Estimate {
         let [re, im] = self.value;
         let degrees = 180.0 / std::f64::consts::PI;
-        Estimate::with_variance(degrees * im.atan2(re), degrees * degrees * self.along([-im, re]))
+        Estimate::with_variance(
+            degrees * im.atan2(re),
+            degrees * degrees * self.variance_along([-im, re]),
+        )
     }
 
     /// Returns the variance of the response along the direction `[a, b]`, a vector with the magnitude of H, divided
     /// by |H|^4.
-    fn along(&self, [a, b]: [f64; 2]) -> f64 {
+    fn variance_along(&self, [a, b]: [f64; 2]) -> f64 {
         let c = &self.covariance;
         let square = self.value[0] * self.value[0] + self.value[1] * self.value[1];
         (a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]) / (square * square)
@@ -66,9 +69,9 @@ impl Response {
     /// Covariance of the real and imaginary part of `dH/H`; `None` if there is none.
     pub(crate) fn relative_covariance(&self) -> Option<[[f64; 2]; 2]> {
         let [re, im] = self.value;
-        let (real, imaginary) = (self.along([re, im]), self.along([-im, re]));
+        let (real, imaginary) = (self.variance_along([re, im]), self.variance_along([-im, re]));
         // The variance along the sum of both directions contains twice the covariance.
-        let both = self.along([re - im, im + re]);
+        let both = self.variance_along([re - im, im + re]);
         let cross = 0.5 * (both - real - imaginary);
         [real, imaginary, cross]
             .iter()
@@ -77,7 +80,7 @@ impl Response {
     }
 
     /// Returns the real and imaginary part of the response of polynomials with the coefficients theta and these orders.
-    pub(crate) fn value_of_polynomials(
+    pub(crate) fn polynomial_response_value(
         orders: &Orders,
         theta: &[f64],
         omega_rad_s: f64,
@@ -88,10 +91,10 @@ impl Response {
         let sum = |first: [f64; 2], of: &[f64]| {
             // Horner's scheme in q^-1, with the constant coefficient `first`.
             let inner = of.iter().rev().fold([0.0; 2], |sum, c| {
-                let [re, im] = times(sum, [cos, sin]);
+                let [re, im] = complex_product(sum, [cos, sin]);
                 [re + c, im]
             });
-            let [re, im] = times(inner, [cos, sin]);
+            let [re, im] = complex_product(inner, [cos, sin]);
             [first[0] + re, first[1] + im]
         };
         let (first_b, first_f) = (o.na, o.na + o.nb + o.nc + o.nd);
@@ -102,12 +105,12 @@ impl Response {
         // B has no constant coefficient of its own: b_0 is multiplied by q^-nk.
         let b = sum([0.0; 2], &theta[first_b..first_b + o.nb]);
         let (sin, cos) = (-omega_rad_s * sample_time.s() * (o.nk as f64 - 1.0)).sin_cos();
-        over(times(b, [cos, sin]), times(a, f))
+        complex_quotient(complex_product(b, [cos, sin]), complex_product(a, f))
     }
 
     /// Returns the response of polynomials with the coefficients theta and these orders; `covariance` is the covariance
     /// of theta by rows.
-    pub(crate) fn of_polynomials(
+    pub(crate) fn from_polynomials(
         orders: &Orders,
         theta: &[f64],
         covariance: Option<&[f64]>,
@@ -128,22 +131,22 @@ impl Response {
             })
         };
         let (a, f) = (monic(0, o.na), monic(first_f, o.nf));
-        let poles = times(a, f);
+        let poles = complex_product(a, f);
         let b = (0..o.nb).fold([0.0; 2], |[re, im], j| {
             let [c, s] = power(o.nk + j);
             [re + theta[first_b + j] * c, im + theta[first_b + j] * s]
         });
-        let value = over(b, poles);
+        let value = complex_quotient(b, poles);
         let mut gradient = vec![[0.0; 2]; theta.len()];
         let minus = [-value[0], -value[1]];
         for j in 0..o.nb {
-            gradient[first_b + j] = over(power(o.nk + j), poles);
+            gradient[first_b + j] = complex_quotient(power(o.nk + j), poles);
         }
         for j in 0..o.na {
-            gradient[j] = over(times(minus, power(j + 1)), a);
+            gradient[j] = complex_quotient(complex_product(minus, power(j + 1)), a);
         }
         for j in 0..o.nf {
-            gradient[first_f + j] = over(times(minus, power(j + 1)), f);
+            gradient[first_f + j] = complex_quotient(complex_product(minus, power(j + 1)), f);
         }
         let mut spread = [[f64::NAN; 2]; 2];
         if let Some(c) = covariance {
@@ -165,13 +168,13 @@ impl Response {
     }
 }
 
-fn times(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+fn complex_product(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }
 
-fn over(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+fn complex_quotient(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let square = b[0] * b[0] + b[1] * b[1];
-    let [re, im] = times(a, [b[0], -b[1]]);
+    let [re, im] = complex_product(a, [b[0], -b[1]]);
     [re / square, im / square]
 }
 
@@ -191,7 +194,7 @@ mod tests {
     const THETA: [f64; 6] = [-0.3, 0.05, -0.04, -0.8, -1.7, 0.74];
 
     fn at(theta: &[f64], covariance: Option<&[f64]>) -> Response {
-        Response::of_polynomials(&ORDERS, theta, covariance, 4.0, SampleTime::HUNDREDTH)
+        Response::from_polynomials(&ORDERS, theta, covariance, 4.0, SampleTime::AT_100_HZ)
     }
 
     #[test]
@@ -232,7 +235,7 @@ mod tests {
     #[test]
     fn value_without_covariance_is_the_same() {
         let whole = at(&THETA, None).value;
-        let alone = Response::value_of_polynomials(&ORDERS, &THETA, 4.0, SampleTime::HUNDREDTH);
+        let alone = Response::polynomial_response_value(&ORDERS, &THETA, 4.0, SampleTime::AT_100_HZ);
         assert!(
             (0..2).all(|i| (whole[i] - alone[i]).abs() < 1e-14),
             "{whole:?} {alone:?}"

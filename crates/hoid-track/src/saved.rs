@@ -10,9 +10,9 @@ use hoid_model::SampleTime;
 use crate::{
     Counts, Tracker,
     options::TrackOptions,
-    seal::{opened, sealed},
+    seal::{sealed, unsealed},
     start::StartState,
-    tracker::{guard_of, stationary_watch},
+    tracker::{build_guard, build_stationary_watch},
 };
 use hoid_ident::IdentError;
 
@@ -62,8 +62,8 @@ impl State for StartState {
 }
 
 impl Tracker {
-    /// Returns the tracker as numbers, for [`Tracker::restored`]. The tracker does not change.
-    pub fn saved(&mut self) -> Vec<f64> {
+    /// Returns the tracker as numbers, for [`Tracker::restore`]. The tracker does not change.
+    pub fn save(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         let mut save = |number: &mut f64| numbers.push(*number);
         self.start.visit(&mut save);
@@ -71,18 +71,18 @@ impl Tracker {
         sealed(numbers)
     }
 
-    /// Restores a tracker from its options and the numbers that [`Tracker::saved`] returned.
+    /// Restores a tracker from its options and the numbers that [`Tracker::save`] returned.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for numbers of another tracker, and for numbers that were altered or truncated; the
     /// errors of [`Tracker::new`].
-    pub fn restored(options: &TrackOptions, sample_time: SampleTime, numbers: &[f64]) -> Result<Self, IdentError> {
+    pub fn restore(options: &TrackOptions, sample_time: SampleTime, numbers: &[f64]) -> Result<Self, IdentError> {
         options.check_at(sample_time)?;
         let wrong = || IdentError::BadStart {
             reason: "the state was saved by a tracker with other options; use the same options, or save it again"
                 .to_owned(),
         };
-        let numbers = opened(numbers).ok_or_else(|| IdentError::BadStart {
+        let numbers = unsealed(numbers).ok_or_else(|| IdentError::BadStart {
             reason: "the saved tracker was changed or truncated after it was saved; save it again".to_owned(),
         })?;
         let p = options.parameter_names().len();
@@ -105,8 +105,8 @@ impl Tracker {
         start.visit(&mut restore);
         let mut recursion = options.method.build(&options.setup()?, &start, sample_time)?;
         let mut tracker = Self {
-            guard: guard_of(options, &mut *recursion, None, sample_time),
-            stationary: stationary_watch(options, sample_time),
+            guard: build_guard(options, &mut *recursion, None, sample_time),
+            stationary: build_stationary_watch(options, sample_time),
             moved: false,
             recursion,
             options: options.clone(),
@@ -148,17 +148,17 @@ mod tests {
         for k in 2000..saved_at {
             step(&mut tracker, k);
         }
-        let numbers = tracker.saved();
+        let numbers = tracker.save();
         for at in 0..numbers.len() - 1 {
             for number in [0.0, 1e18] {
                 let mut changed = numbers[..numbers.len() - 1].to_vec();
                 changed[at] = number;
-                let restored = Tracker::restored(&options, record.sample_time(), &sealed(changed));
+                let restored = Tracker::restore(&options, record.sample_time(), &sealed(changed));
                 let Ok(mut restored) = restored else { continue };
                 for k in saved_at..to {
                     step(&mut restored, k);
                 }
-                assert!(restored.since_restart_s().is_none_or(|s| s < 1e18), "number {at}");
+                assert!(restored.time_since_restart_s().is_none_or(|s| s < 1e18), "number {at}");
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_core::recursion::Stable;
+use hoid_core::recursion::StablePolynomials;
 use hoid_ident::{Constraint, Estimator, SearchOptions};
 use hoid_model::{Orders, Structure};
 
@@ -16,7 +16,7 @@ pub(crate) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zet
 
 /// Start of the recursion.
 #[derive(Debug, Clone, PartialEq)]
-pub enum StartAt {
+pub enum StartSource {
     /// From a batch fit of this span of the record, s; `None` for the first third.
     Span(Option<(f64, f64)>),
     /// From this theta, in the order of [`Orders::parameter_names`].
@@ -35,7 +35,7 @@ pub struct Setup {
     /// The further input, if the model has one.
     pub further: Option<TrackedInput>,
     /// Start of the recursion.
-    pub start: StartAt,
+    pub start: StartSource,
     /// Limits of the search in start fits and in fits of windows.
     pub search: SearchOptions,
     /// Names of the estimated parameters, each with its memory.
@@ -49,7 +49,7 @@ pub struct Setup {
     /// Limit on an innovation in the update, in standard deviations of the innovation.
     pub limit: f64,
     /// Polynomials that are kept stable.
-    pub stable: Stable,
+    pub stable: StablePolynomials,
     /// True for a method that needs no start fit.
     pub starts_itself: bool,
     /// True if the parameters of the operator are estimated.
@@ -64,7 +64,7 @@ pub struct Setup {
 
 impl Setup {
     /// Returns the names of the estimated parameters.
-    pub fn names(&self) -> Vec<String> {
+    pub fn parameter_names(&self) -> Vec<String> {
         self.memories.iter().map(|(name, _)| name.clone()).collect()
     }
 

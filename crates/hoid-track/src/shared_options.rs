@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_core::recursion::Stable;
+use hoid_core::recursion::StablePolynomials;
 use hoid_ident::{
     Constraint, settings,
     settings::{Bounds, Kind, Value},
@@ -100,7 +100,7 @@ settings! {
     /// Options for the stability of the polynomials.
     pub struct StabilityOptions {
         /// Polynomials kept stable: predictor (C and F), or noise (D too)
-        pub stable: Stable = Stable::Predictor,
+        pub stable: StablePolynomials = StablePolynomials::Predictor,
     }
 }
 

@@ -6,21 +6,21 @@ use hoid_core::state::{State, visit_all};
 use hoid_model::{Channel, Orders, Record, SampleTime};
 
 use crate::{
-    Outcome, Sample, StartAt, TrackOptions, TrackPlan, Tracker,
+    Outcome, Sample, StartSource, TrackOptions, TrackPlan, Tracker,
     idle::idle_head,
-    seal::{opened, sealed},
+    seal::{sealed, unsealed},
 };
 use hoid_ident::{Choice, IdentError};
 
 /// Chooses the options for a record of the warm-up; also returns the result of the search for orders, if there was one.
-pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
+pub type ChooseOptions<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
 
 /// After a failed fit, the warm-up is extended by its length divided by this number.
 const RETRY_DIVISOR: usize = 4;
 /// Maximum number of samples that an extended warm-up keeps, as a multiple of the length of the warm-up.
 const MAX_KEPT_LENGTHS: usize = 2;
 /// Index, in the numbers of a saved warm-up, of the number of kept samples.
-const COUNT: usize = 4;
+const COUNT_INDEX: usize = 4;
 /// Longest run of faulty samples within a warm-up, s; after a longer one the warm-up restarts.
 const LONGEST_FAULT_S: f64 = 1.0;
 
@@ -52,45 +52,47 @@ impl Stage {
     /// [`IdentError`] for a start that cannot be used.
     pub fn new(options: &TrackOptions, warm_up: usize, sample_time: SampleTime) -> Result<Self, IdentError> {
         Ok(match options.start {
-            StartAt::Span(_) if !options.method.starts_itself() => Self::Collecting(WarmUp::new(warm_up, sample_time)),
+            StartSource::Span(_) if !options.method.is_self_starting() => {
+                Self::Collecting(WarmUp::new(warm_up, sample_time))
+            }
             _ => Self::Tracking(Box::new(Tracker::new(options, None, sample_time)?)),
         })
     }
 
-    /// Returns the complete state as numbers, and the orders once there is a tracker, for [`Stage::restored`]. The
+    /// Returns the complete state as numbers, and the orders once there is a tracker, for [`Stage::restore`]. The
     /// recursion does not change.
-    pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
+    pub fn save(&mut self) -> (Option<Orders>, Vec<f64>) {
         match self {
-            Self::Tracking(tracker) => (Some(tracker.options().orders), tracker.saved()),
-            Self::Collecting(warm_up) => (None, warm_up.saved()),
+            Self::Tracking(tracker) => (Some(tracker.options().orders), tracker.save()),
+            Self::Collecting(warm_up) => (None, warm_up.save()),
         }
     }
 
-    /// Restores a recursion from its plan and the state that [`Stage::saved`] returned.
+    /// Restores a recursion from its plan and the state that [`Stage::save`] returned.
     ///
     /// # Errors
     /// [`IdentError::BadStart`] for numbers of another recursion, and for numbers that were altered or truncated; the
     /// errors of [`Tracker::new`].
-    pub fn restored(
+    pub fn restore(
         plan: &TrackPlan,
         orders: Option<Orders>,
         numbers: &[f64],
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
         let Some(orders) = orders else {
-            let warm_up = WarmUp::restored(sample_time, numbers).ok_or_else(|| IdentError::BadStart {
+            let warm_up = WarmUp::restore(sample_time, numbers).ok_or_else(|| IdentError::BadStart {
                 reason: "the saved warm-up was changed or truncated after it was saved; save it again".to_owned(),
             })?;
             return Ok(Self::Collecting(warm_up));
         };
-        let tracker = Tracker::restored(&plan.with_orders(orders), sample_time, numbers)?;
+        let tracker = Tracker::restore(&plan.with_orders(orders), sample_time, numbers)?;
         Ok(Self::Tracking(Box::new(tracker)))
     }
 
     /// Takes a sample; NaN marks faulty or missing values. If `moves` is false, the tracker only updates its filters.
     /// The start fit is made at the last sample of the warm-up, with the options that `choose` returns for the record
     /// of the warm-up.
-    pub fn update(&mut self, sample: Sample, moves: bool, choose: Choose<'_>) -> LiveOutcome {
+    pub fn update(&mut self, sample: Sample, moves: bool, choose: ChooseOptions<'_>) -> LiveOutcome {
         let warm_up = match self {
             Self::Tracking(tracker) => {
                 return LiveOutcome {
@@ -104,7 +106,7 @@ impl Stage {
         if warm_up.collected < warm_up.needed {
             return LiveOutcome::default();
         }
-        if warm_up.leave_out_idle() {
+        if warm_up.exclude_idle_head() {
             return LiveOutcome::default();
         }
         match warm_up.start(choose) {
@@ -172,20 +174,20 @@ impl State for WarmUp {
 }
 
 impl WarmUp {
-    /// Returns the warm-up as numbers, for [`WarmUp::restored`], but without the reason for the last failure.
-    pub fn saved(&mut self) -> Vec<f64> {
+    /// Returns the warm-up as numbers, for [`WarmUp::restore`], but without the reason for the last failure.
+    pub fn save(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         self.visit(&mut |number| numbers.push(*number));
         sealed(numbers)
     }
 
-    /// Restores a warm-up from the numbers that [`WarmUp::saved`] returned. `None` for other numbers, and for numbers
+    /// Restores a warm-up from the numbers that [`WarmUp::save`] returned. `None` for other numbers, and for numbers
     /// that were altered or truncated.
-    pub fn restored(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
+    pub fn restore(sample_time: SampleTime, numbers: &[f64]) -> Option<Self> {
         let mut warm_up = Self::new(0, sample_time);
-        let numbers = opened(numbers)?;
+        let numbers = unsealed(numbers)?;
         // Memory for the samples is allocated before they are read; there cannot be more samples than numbers.
-        numbers.get(COUNT).filter(|kept| **kept <= numbers.len() as f64)?;
+        numbers.get(COUNT_INDEX).filter(|kept| **kept <= numbers.len() as f64)?;
         let mut left = numbers.iter();
         let mut lacking = false;
         warm_up.visit(&mut |number| match left.next() {
@@ -230,7 +232,7 @@ impl WarmUp {
 
     /// Excludes the idle head of the collected samples and extends the warm-up by as many samples; returns false if
     /// there is no idle head.
-    fn leave_out_idle(&mut self) -> bool {
+    fn exclude_idle_head(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };
         let idle = idle_head(&record);
         if idle == 0 {
@@ -246,7 +248,7 @@ impl WarmUp {
     }
 
     /// Builds the tracker with the batch fit of the collected samples and with settled filters.
-    fn start(&self, choose: Choose<'_>) -> Result<(Tracker, Option<Choice>), IdentError> {
+    fn start(&self, choose: ChooseOptions<'_>) -> Result<(Tracker, Option<Choice>), IdentError> {
         let record = self.record()?;
         let (options, choice) = choose(&record)?;
         let mut tracker = Tracker::new(&options, Some(&record), self.sample_time)?;
@@ -292,19 +294,19 @@ mod tests {
             reference: Some(3.0),
         };
         (0..3).for_each(|_| warm_up.collect(sample));
-        let numbers = warm_up.saved();
-        assert_eq!(WarmUp::restored(sample_time, &numbers).unwrap().saved(), numbers);
+        let numbers = warm_up.save();
+        assert_eq!(WarmUp::restore(sample_time, &numbers).unwrap().save(), numbers);
         // The number of kept samples is changed, and the numbers are sealed again: memory for 1e15 samples would end
         // the process.
         for kept in [4.0, 1e15, f64::INFINITY, f64::NAN] {
-            let mut changed = opened(&numbers).unwrap().to_vec();
-            (changed[0], changed[COUNT]) = (1e15, kept);
-            assert!(WarmUp::restored(sample_time, &sealed(changed)).is_none());
+            let mut changed = unsealed(&numbers).unwrap().to_vec();
+            (changed[0], changed[COUNT_INDEX]) = (1e15, kept);
+            assert!(WarmUp::restore(sample_time, &sealed(changed)).is_none());
         }
         // A warm-up length of any size is accepted, although it may never be reached.
-        let mut changed = opened(&numbers).unwrap().to_vec();
+        let mut changed = unsealed(&numbers).unwrap().to_vec();
         changed[0] = f64::INFINITY;
-        let mut restored = WarmUp::restored(sample_time, &sealed(changed)).unwrap();
+        let mut restored = WarmUp::restore(sample_time, &sealed(changed)).unwrap();
         restored.collect(sample);
         assert_eq!(restored.samples.len(), 4);
     }

@@ -7,14 +7,14 @@
 
 use std::collections::BTreeMap;
 
-use hoid_core::{bounds::within, recursion::Stable, stability::roots_inside};
+use hoid_core::{bounds::clamp, recursion::StablePolynomials, stability::roots_inside};
 use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 
 use hoid_ident::{Constraint, Fit, GreyBox, IdentError};
 
 use crate::{
     further_input::{TrackedInput, coefficient_names},
-    setup::{PHYSICAL_NAMES, Setup, StartAt},
+    setup::{PHYSICAL_NAMES, Setup, StartSource},
     start_noise::StartNoise,
 };
 
@@ -26,11 +26,11 @@ const TYPICAL_OPERATOR: [f64; 5] = [0.1, 0.05, 10.0, 0.4, 0.25];
 /// Coefficient d1 of a start without knowledge: a noise pole at 0.8.
 const TYPICAL_D1: f64 = -0.8;
 /// Bounds of omega_nm, the lower in rad/s and the upper as a share of the Nyquist frequency, and bounds of zeta_nm.
-const SLOWEST_OMEGA: f64 = 0.5;
-const FASTEST_SHARE: f64 = 0.5;
-const DAMPING: [f64; 2] = [0.02, 5.0];
+const MIN_OMEGA_RAD_S: f64 = 0.5;
+const MAX_OMEGA_NYQUIST_SHARE: f64 = 0.5;
+const DAMPING_RANGE: [f64; 2] = [0.02, 5.0];
 /// Longest sample time of a tracker, s: with a longer one, the upper bound of omega_nm would be below the lower bound.
-const LONGEST_SAMPLE_TIME_S: f64 = FASTEST_SHARE * std::f64::consts::PI / SLOWEST_OMEGA;
+const LONGEST_SAMPLE_TIME_S: f64 = MAX_OMEGA_NYQUIST_SHARE * std::f64::consts::PI / MIN_OMEGA_RAD_S;
 /// Shortest sample time of a tracker, s: with a shorter one, the samples that a tracker stores would not fit in memory.
 const SHORTEST_SAMPLE_TIME_S: f64 = 1e-6;
 /// Factor by which the roots of an unstable noise model are moved inwards until it is stable.
@@ -99,14 +99,14 @@ impl StartState {
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
         match (&setup.start, span) {
-            (StartAt::Theta(theta), _) => Self::given(setup, theta, sample_time),
-            (StartAt::Span(_), Some(record)) if !setup.starts_itself => Self::fitted(setup, record, known),
-            _ => Self::nothing(setup, sample_time),
+            (StartSource::Theta(theta), _) => Self::from_theta(setup, theta, sample_time),
+            (StartSource::Span(_), Some(record)) if !setup.starts_itself => Self::from_record(setup, record, known),
+            _ => Self::without_knowledge(setup, sample_time),
         }
     }
 
     /// Computes the start from a given theta.
-    fn given(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
+    fn from_theta(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Result<Self, IdentError> {
         let names = coefficient_names(&setup.orders, setup.further.as_ref());
         if theta.len() != names.len() || theta.iter().any(|t| !t.is_finite()) {
             return Err(IdentError::BadStart {
@@ -124,18 +124,18 @@ impl StartState {
         Ok(Self::without_fit(setup, values))
     }
 
-    fn nothing(setup: &Setup, sample_time: SampleTime) -> Result<Self, IdentError> {
+    fn without_knowledge(setup: &Setup, sample_time: SampleTime) -> Result<Self, IdentError> {
         let o = &setup.orders;
-        let mut values = vec![0.0; setup.names().len()];
+        let mut values = vec![0.0; setup.parameter_names().len()];
         if setup.is_physical {
             let first = if setup.delay_parameter_s.is_some() { 5 } else { 4 };
             values[..first].copy_from_slice(&TYPICAL_OPERATOR[..first]);
             if let Some((low, high)) = setup.delay_parameter_s {
-                values[4] = within(TYPICAL_OPERATOR[4], [low, high]);
+                values[4] = clamp(TYPICAL_OPERATOR[4], [low, high]);
             }
-            let limits = bounds(setup, sample_time)?;
+            let limits = parameter_bounds(setup, sample_time)?;
             for (value, limits) in values.iter_mut().zip(limits) {
-                *value = within(*value, limits);
+                *value = clamp(*value, limits);
             }
             if o.nd > 0 {
                 values[first + o.nc] = TYPICAL_D1;
@@ -146,7 +146,7 @@ impl StartState {
 
     fn without_fit(setup: &Setup, values: Vec<f64>) -> Self {
         let size = setup.covariance.unwrap_or(UNKNOWN_VARIANCE);
-        let covariance = multiple(size, values.len());
+        let covariance = scaled_identity(size, values.len());
         Self {
             spread: covariance.clone(),
             covariance,
@@ -159,7 +159,7 @@ impl StartState {
     }
 
     /// Computes the start from the batch fit of a record.
-    fn fitted(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
+    fn from_record(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
         let FittedStart {
             values,
             covariance,
@@ -167,7 +167,7 @@ impl StartState {
             variance,
             residuals,
         } = match &setup.further {
-            Some(further) => FittedStart::of_several_inputs(setup, further, record)?,
+            Some(further) => FittedStart::from_several_inputs(setup, further, record)?,
             None if setup.is_physical => fit_physical(setup, record, known)?,
             None => {
                 let fit = polynomial_fit(setup, record, known)?;
@@ -176,15 +176,15 @@ impl StartState {
                 FittedStart::of(fit, values, covariance, variance)
             }
         };
-        let values = stabilised(setup, values);
+        let values = stabilise(setup, values);
         let p = values.len();
         let spread = match &covariance {
             Some(c) if variance > 0.0 => c.iter().map(|c| c / variance).collect(),
-            _ => multiple(UNKNOWN_VARIANCE, p),
+            _ => scaled_identity(UNKNOWN_VARIANCE, p),
         };
         let covariance = match setup.covariance {
             None => spread.clone(),
-            Some(size) => multiple(size, p),
+            Some(size) => scaled_identity(size, p),
         };
         Ok(Self {
             values,
@@ -203,7 +203,7 @@ impl StartState {
 /// # Errors
 /// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
 pub fn physical_bounds<const N: usize>(setup: &Setup, sample_time: SampleTime) -> Result<[[f64; 2]; N], IdentError> {
-    let limits = bounds(setup, sample_time)?;
+    let limits = parameter_bounds(setup, sample_time)?;
     let free = [f64::NEG_INFINITY, f64::INFINITY];
     Ok(std::array::from_fn(|i| limits.get(i).copied().unwrap_or(free)))
 }
@@ -212,8 +212,8 @@ pub fn physical_bounds<const N: usize>(setup: &Setup, sample_time: SampleTime) -
 ///
 /// # Errors
 /// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
-pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64; 2]>, IdentError> {
-    let names = setup.names();
+pub(crate) fn parameter_bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64; 2]>, IdentError> {
+    let names = setup.parameter_names();
     if let Some(unknown) = setup.bounds.keys().find(|k| !names.contains(k)) {
         return Err(IdentError::UnknownParameter {
             name: unknown.clone(),
@@ -221,8 +221,8 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
         });
     }
     let default = |name: &str| match name {
-        "omega_nm" => [SLOWEST_OMEGA, FASTEST_SHARE * sample_time.nyquist_rad_s()],
-        "zeta_nm" => DAMPING,
+        "omega_nm" => [MIN_OMEGA_RAD_S, MAX_OMEGA_NYQUIST_SHARE * sample_time.nyquist_rad_s()],
+        "zeta_nm" => DAMPING_RANGE,
         "tau_e" => setup.delay_parameter_s.map_or([0.0, 0.0], |(low, high)| [low, high]),
         _ => [f64::NEG_INFINITY, f64::INFINITY],
     };
@@ -235,7 +235,7 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
             };
             let (a, b) = constraint.limits();
             let both = [a.max(low), b.min(high)];
-            if constraint.is_sound() && both[0] <= both[1] {
+            if constraint.is_valid() && both[0] <= both[1] {
                 Ok(both)
             } else {
                 Err(IdentError::BadOption {
@@ -248,16 +248,16 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
         .collect()
 }
 
-fn multiple(size: f64, p: usize) -> Vec<f64> {
+fn scaled_identity(size: f64, p: usize) -> Vec<f64> {
     let mut matrix = vec![0.0; p * p];
     matrix.iter_mut().step_by(p + 1).for_each(|m| *m = size);
     matrix
 }
 
 /// Moves the roots of the noise model inwards until it is as stable as the options require.
-fn stabilised(setup: &Setup, mut values: Vec<f64>) -> Vec<f64> {
+fn stabilise(setup: &Setup, mut values: Vec<f64>) -> Vec<f64> {
     let o = &setup.orders;
-    if setup.stable == Stable::Predictor || o.nd == 0 {
+    if setup.stable == StablePolynomials::Predictor || o.nd == 0 {
         return values;
     }
     let first = match setup.is_physical {
@@ -321,7 +321,7 @@ impl FittedStart {
     }
 
     /// Computes the start of a model with a further input from the batch fit of that model.
-    fn of_several_inputs(setup: &Setup, further: &TrackedInput, record: &Record) -> Result<Self, IdentError> {
+    fn from_several_inputs(setup: &Setup, further: &TrackedInput, record: &Record) -> Result<Self, IdentError> {
         let model = further.batch_model(setup.structure, &setup.orders, setup.search);
         let fit = model.fit(std::slice::from_ref(record))?;
         let values: Vec<f64> = fit
@@ -366,7 +366,7 @@ fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Resu
     let Ok(eta) = physical_values(setup, fit.model().theta(), sample_time) else {
         return Ok(None);
     };
-    let limits = bounds(setup, sample_time)?;
+    let limits = parameter_bounds(setup, sample_time)?;
     let inside = eta.iter().zip(&limits).all(|(e, [low, high])| low < e && e < high);
     let operator = fit.model().discrete_operator().and_then(|o| o.parameters());
     let inverse = operator.ok().and_then(|o| retrieval_jacobian(&o, sample_time));
@@ -405,8 +405,8 @@ fn congruence(rows: &[Vec<(usize, f64)>], c: &[f64], width: usize) -> Vec<f64> {
 fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentError> {
     let ts = record.sample_time().s();
     let o = &setup.orders;
-    let names = setup.names();
-    let limits = bounds(setup, record.sample_time())?;
+    let names = setup.parameter_names();
+    let limits = parameter_bounds(setup, record.sample_time())?;
     let mut constraints: BTreeMap<String, Constraint> = BTreeMap::new();
     for (name, [low, high]) in names.iter().zip(&limits).take(4) {
         if low.is_finite() || high.is_finite() {
@@ -451,7 +451,7 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentErr
                 reason: format!("the grey-box fit has no {name}"),
             });
         };
-        eta.push(within(parameters[place].1.value, *limits));
+        eta.push(clamp(parameters[place].1.value, *limits));
         rows.push(vec![(place, 1.0)]);
     }
     for i in 0..o.nc + o.nd {
@@ -504,9 +504,9 @@ mod tests {
     use super::*;
     use crate::{Method, TrackOptions, Tracker};
 
-    fn refused(method: Method, with: &[(&str, &str)], ts_s: f64) -> String {
+    fn refusal_message(method: Method, with: &[(&str, &str)], ts_s: f64) -> String {
         let options = TrackOptions::default_for(method, 29).with(with).unwrap();
-        let start = StartAt::Theta(vec![0.0; options.parameter_names().len()]);
+        let start = StartSource::Theta(vec![0.0; options.parameter_names().len()]);
         let options = TrackOptions { start, ..options }.with(&[("covariance", "1")]).unwrap();
         let made = Tracker::new(&options, None, SampleTime::new(ts_s).unwrap());
         made.unwrap_err().to_string()
@@ -516,7 +516,7 @@ mod tests {
     fn requests_that_exceed_the_memory_are_refused() {
         for ts_s in [1e-7, 1e-12, f64::MIN_POSITIVE] {
             for guard in ["yes", "no"] {
-                let error = refused(Method::rpem(), &[("guard", guard)], ts_s);
+                let error = refusal_message(Method::rpem(), &[("guard", guard)], ts_s);
                 assert!(error.contains("at least 1e-6 s"), "{error}");
             }
             let options = TrackOptions::default_for(Method::adaptive(), 29);
@@ -524,11 +524,11 @@ mod tests {
             assert!(made.is_err(), "{ts_s}");
         }
         for range in ["1e5..1e5", "1e15..1e15", "1e300..1e300"] {
-            let error = refused(Method::rpem(), &[("track_delay", range)], 0.01);
+            let error = refusal_message(Method::rpem(), &[("track_delay", range)], 0.01);
             assert!(error.contains("at most 1000000 samples"), "{error}");
         }
         for memory in ["1e9", "inf"] {
-            let error = refused(Method::rpem(), &[("forgetting", "window"), ("memory", memory)], 0.01);
+            let error = refusal_message(Method::rpem(), &[("forgetting", "window"), ("memory", memory)], 0.01);
             assert!(error.contains("at most 10 million samples"), "{error}");
         }
     }

@@ -24,7 +24,7 @@ impl StartNoise {
         let simulated = fit.simulate(record).ok()?;
         let output = record.output().get(simulated.first..)?;
         let left = output.iter().zip(&simulated.values).map(|(u, w)| u - w).collect();
-        let left = Record::of_output(record.sample_time(), Channel::new("v", "", left)).ok()?;
+        let left = Record::from_output(record.sample_time(), Channel::new("v", "", left)).ok()?;
         let orders = Orders {
             na: nd,
             nb: 0,

@@ -13,8 +13,8 @@
 //!   start of the stationary span. The typical size is the geometric mean, over blocks of one second, of the largest
 //!   distance from the value at the start of the block. Before ten blocks are known, a span is stationary only if all
 //!   its values are equal.
-//! - There is **no information** if both e and u are stationary for [`MIN_BOTH_S`], or one of the two for
-//!   [`MIN_ONE_S`]: a frozen channel, or a resting hand, whose response cannot be distinguished from no response.
+//! - There is **no information** if both e and u are stationary for [`MIN_STATIONARY_BOTH_S`], or one of the two for
+//!   [`MIN_STATIONARY_ONE_S`]: a frozen channel, or a resting hand, whose response cannot be distinguished from no response.
 //! - The recursion is then restored exactly to its state before the first sample of the span (or before a jump to the
 //!   value of the span): a stored state is restored, and the recursion takes the samples from then on again. Estimate,
 //!   covariance and innovation variance keep their values of that time for the whole span.
@@ -27,7 +27,7 @@ use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
 
 use crate::{
-    guard::{GuardAction, GuardChannel, GuardEvent, GuardKind, Guarded, SETTLE_S, Snapshot},
+    guard::{GuardAction, GuardChannel, GuardDecision, GuardEvent, GuardKind, SETTLING_S, Snapshot},
     recursion::{Recursion, Sample, StepOutcome},
 };
 
@@ -35,21 +35,21 @@ use crate::{
 const STATIONARY_SHARE: f64 = 0.02;
 /// Shortest stationary span of both signals, and of one signal, that carries no information, s, and the smallest number
 /// of samples of a stationary span.
-pub(crate) const MIN_BOTH_S: f64 = 1.0;
-const MIN_ONE_S: f64 = 5.0;
+pub(crate) const MIN_STATIONARY_BOTH_S: f64 = 1.0;
+const MIN_STATIONARY_ONE_S: f64 = 5.0;
 const MIN_SAMPLES: u64 = 20;
 /// Number of blocks after which the typical size of a signal is known, and largest number of blocks over which the size
 /// is averaged.
-const KNOWN_AFTER_BLOCKS: u32 = 10;
-const AVERAGED_BLOCKS: u32 = 60;
+const MIN_BLOCKS: u32 = 10;
+const MAX_AVERAGED_BLOCKS: u32 = 60;
 /// Largest number of samples between two stored states.
-const MAX_SAMPLES: u64 = 1 << 17;
+const MAX_STATE_AGE_SAMPLES: u64 = 1 << 17;
 /// e and u.
-const CHANNELS: usize = 2;
+const CHANNEL_COUNT: usize = 2;
 
 /// Way in which a recursion uses a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Act {
+pub(crate) enum RecursionCall {
     /// Filters and estimate are updated.
     Step,
     /// Only the filters are updated.
@@ -58,7 +58,7 @@ pub(crate) enum Act {
     Bridge,
 }
 
-impl Act {
+impl RecursionCall {
     const ALL: [Self; 3] = [Self::Step, Self::Follow, Self::Bridge];
 
     /// Passes the sample to the recursion; returns `None` if u is missing.
@@ -66,7 +66,7 @@ impl Act {
     pub fn on(self, recursion: &mut dyn Recursion, sample: Sample) -> Option<StepOutcome> {
         match self {
             Self::Step => Some(recursion.step(sample)),
-            Self::Follow => Some(recursion.follow(sample)),
+            Self::Follow => Some(recursion.step_without_update(sample)),
             Self::Bridge => {
                 recursion.bridge(sample);
                 None
@@ -78,7 +78,7 @@ impl Act {
 /// A sample that may have to be taken again.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct BufferedSample {
-    values: [f64; CHANNELS],
+    values: [f64; CHANNEL_COUNT],
     /// External signal; NaN if there is none.
     reference: f64,
     act: usize,
@@ -122,7 +122,7 @@ hoid_core::state!([] Channel { value, stationary_samples, same, last, steps, jum
 
 impl Channel {
     /// A channel before the first sample.
-    const NEW: Self = Self {
+    const INITIAL: Self = Self {
         value: f64::NAN,
         stationary_samples: 0,
         same: 0,
@@ -137,7 +137,7 @@ impl Channel {
     };
 
     #[inline]
-    fn take(&mut self, x: f64, missing: bool) {
+    fn update(&mut self, x: f64, missing: bool) {
         let step = (x - self.last).abs();
         let jumped = step > self.steps[0].max(self.steps[1]);
         if !missing && step == 0.0 {
@@ -175,8 +175,8 @@ impl Channel {
             return;
         }
         self.blocks = self.blocks.saturating_add(1);
-        self.size += (distance.ln() - self.size) / f64::from(self.blocks.min(AVERAGED_BLOCKS));
-        if self.blocks >= KNOWN_AFTER_BLOCKS {
+        self.size += (distance.ln() - self.size) / f64::from(self.blocks.min(MAX_AVERAGED_BLOCKS));
+        if self.blocks >= MIN_BLOCKS {
             self.tolerance = STATIONARY_SHARE * self.size.exp();
         }
     }
@@ -192,7 +192,7 @@ pub(crate) struct StationaryWatch {
     block: u64,
     settle: u64,
     samples: u64,
-    channels: [Channel; CHANNELS],
+    channels: [Channel; CHANNEL_COUNT],
     /// State of the recursion before the first stored sample, and before the stored sample with index `since`.
     kept: [Snapshot; 2],
     since: usize,
@@ -238,14 +238,14 @@ impl StationaryWatch {
     /// Builds the watch for a recursion with a delay of nk samples; `None` if the sample time is too short.
     pub fn new(nk: usize, sample_time: SampleTime) -> Option<Self> {
         let samples = |seconds: f64| ((seconds / sample_time.s()).round() as u64).max(MIN_SAMPLES);
-        let one = samples(MIN_ONE_S);
-        (one <= MAX_SAMPLES).then(|| Self {
-            both: samples(MIN_BOTH_S),
+        let one = samples(MIN_STATIONARY_ONE_S);
+        (one <= MAX_STATE_AGE_SAMPLES).then(|| Self {
+            both: samples(MIN_STATIONARY_BOTH_S),
             one,
             block: ((1.0 / sample_time.s()).round() as u64).max(4),
-            settle: (nk as u64).saturating_add((SETTLE_S / sample_time.s()).round() as u64),
+            settle: (nk as u64).saturating_add((SETTLING_S / sample_time.s()).round() as u64),
             samples: 0,
-            channels: [Channel::NEW; CHANNELS],
+            channels: [Channel::INITIAL; CHANNEL_COUNT],
             kept: [Snapshot::default(), Snapshot::default()],
             since: 0,
             ring: Vec::new(),
@@ -258,11 +258,11 @@ impl StationaryWatch {
 
     /// Passes a sample to the recursion.
     #[inline]
-    pub fn take(&mut self, recursion: &mut dyn Recursion, sample: Sample, act: Act) -> Guarded {
+    pub fn process(&mut self, recursion: &mut dyn Recursion, sample: Sample, act: RecursionCall) -> GuardDecision {
         self.event = None;
         let x = [sample.e, sample.u];
         for (channel, x) in self.channels.iter_mut().zip(x) {
-            channel.take(x, act == Act::Bridge);
+            channel.update(x, act == RecursionCall::Bridge);
         }
         self.samples = self.samples.saturating_add(1);
         if self.samples.is_multiple_of(self.block) {
@@ -271,22 +271,22 @@ impl StationaryWatch {
             }
         }
         if self.paused > 0 {
-            return self.pause(recursion, sample, act);
+            return self.process_paused(recursion, sample, act);
         }
         if self.ring.is_empty() || self.ring.len().saturating_sub(self.since) >= self.one as usize {
-            self.keep(recursion);
+            self.store_state(recursion);
         }
         self.ring.push(BufferedSample {
             values: x,
             reference: sample.reference.unwrap_or(f64::NAN),
-            act: Act::ALL.iter().position(|a| *a == act).unwrap_or(0),
+            act: RecursionCall::ALL.iter().position(|a| *a == act).unwrap_or(0),
         });
-        if act == Act::Step
+        if act == RecursionCall::Step
             && let Some((channel, stood)) = self.stationary_channel()
         {
             return self.start_pause(recursion, channel, stood, sample);
         }
-        Guarded {
+        GuardDecision {
             outcome: act.on(recursion, sample),
             held: false,
         }
@@ -313,7 +313,7 @@ impl StationaryWatch {
 
     /// Stores the state of the recursion before the next sample, and drops the older of two stored states with its
     /// samples.
-    fn keep(&mut self, recursion: &mut dyn Recursion) {
+    fn store_state(&mut self, recursion: &mut dyn Recursion) {
         self.ring.drain(..self.since);
         self.since = self.ring.len();
         self.kept.swap(0, 1);
@@ -331,7 +331,7 @@ impl StationaryWatch {
         channel: GuardChannel,
         stood: u64,
         sample: Sample,
-    ) -> Guarded {
+    ) -> GuardDecision {
         let last = self.ring.len().saturating_sub(1);
         let begin = last.checked_sub(stood.saturating_sub(1) as usize);
         // If the span starts before the stored samples, nothing is undone, because the earlier samples did not change
@@ -344,29 +344,37 @@ impl StationaryWatch {
             };
             kept.restore(recursion);
             for (at, taken) in self.ring.iter().enumerate().take(last).skip(first) {
-                let act = match Act::ALL.get(taken.act).copied().unwrap_or(Act::Bridge) {
-                    Act::Step if at >= begin => Act::Follow,
+                let act = match RecursionCall::ALL
+                    .get(taken.act)
+                    .copied()
+                    .unwrap_or(RecursionCall::Bridge)
+                {
+                    RecursionCall::Step if at >= begin => RecursionCall::Follow,
                     act => act,
                 };
                 act.on(recursion, taken.sample());
             }
         }
-        let outcome = Act::Follow.on(recursion, sample);
+        let outcome = RecursionCall::Follow.on(recursion, sample);
         self.ring.clear();
         self.since = 0;
         self.paused = stood.max(1);
         self.moving = 0;
         self.channel = GuardChannel::ALL.iter().position(|c| *c == channel).unwrap_or(0);
         self.report(GuardAction::Paused);
-        Guarded { outcome, held: true }
+        GuardDecision { outcome, held: true }
     }
 
     #[cold]
-    fn pause(&mut self, recursion: &mut dyn Recursion, sample: Sample, act: Act) -> Guarded {
-        let act = if act == Act::Bridge { act } else { Act::Follow };
+    fn process_paused(&mut self, recursion: &mut dyn Recursion, sample: Sample, act: RecursionCall) -> GuardDecision {
+        let act = if act == RecursionCall::Bridge {
+            act
+        } else {
+            RecursionCall::Follow
+        };
         let outcome = act.on(recursion, sample);
         self.paused = self.paused.saturating_add(1);
-        self.moving = match self.stationary_soon() {
+        self.moving = match self.may_become_stationary() {
             true => 0,
             false => self.moving.saturating_add(1),
         };
@@ -374,11 +382,11 @@ impl StationaryWatch {
             self.report(GuardAction::Resumed);
             self.paused = 0;
         }
-        Guarded { outcome, held: true }
+        GuardDecision { outcome, held: true }
     }
 
     /// True while one or both signals have been stationary for half of the time after which they carry no information.
-    fn stationary_soon(&self) -> bool {
+    fn may_become_stationary(&self) -> bool {
         let [e, u] = self
             .channels
             .map(|channel| channel.stationary_samples.saturating_mul(2));

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use hoid_model::numbers::plain;
+use hoid_model::numbers::format_plain;
 
 use crate::trace::Trace;
 
@@ -30,9 +30,14 @@ impl fmt::Display for Trace {
             return write!(f, "no rows");
         };
         for (t, change) in self.changes() {
-            writeln!(f, "change declared at {} s, log odds {}", plain(*t), plain(change.odds))?;
+            writeln!(
+                f,
+                "change declared at {} s, log odds {}",
+                format_plain(*t),
+                format_plain(change.odds)
+            )?;
         }
-        writeln!(f, "at {} s", plain(self.times_s()[last]))?;
+        writeln!(f, "at {} s", format_plain(self.times_s()[last]))?;
         match self.operator(last) {
             Ok(operator) => write!(f, "{operator}"),
             Err(reason) => write!(f, "not convertible: {reason}"),

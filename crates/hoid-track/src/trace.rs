@@ -11,7 +11,7 @@ use crate::{
     options::TrackOptions,
     recursion::Delay,
     response::Response,
-    two_sided::TwoSided,
+    two_sided::TwoSidedEstimate,
 };
 use hoid_ident::{Fit, IdentError, family::LoopShape};
 
@@ -76,7 +76,7 @@ pub const OPERATOR_COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "z
 impl Trace {
     /// Returns an empty trace, with capacity for `rows` rows.
     pub(crate) fn empty(options: TrackOptions, sample_time: SampleTime, rows: usize, every: usize) -> Self {
-        let p = options.coefficients();
+        let p = options.coefficient_count();
         Self {
             options,
             sample_time,
@@ -110,8 +110,8 @@ impl Trace {
     }
 
     /// Replaces the estimate of each row by a two-sided estimate.
-    pub(crate) fn replace(&mut self, rows: Vec<TwoSided>) {
-        let p = self.options.coefficients();
+    pub(crate) fn replace_rows(&mut self, rows: Vec<TwoSidedEstimate>) {
+        let p = self.options.coefficient_count();
         self.theta.clear();
         self.covariance.clear();
         self.covariance.reserve(rows.len() * packed_len(p));
@@ -157,7 +157,7 @@ impl Trace {
     }
 
     fn width(&self) -> usize {
-        self.options.coefficients()
+        self.options.coefficient_count()
     }
 
     /// Returns theta of a row.
@@ -178,8 +178,8 @@ impl Trace {
     }
 
     /// True for a row before the first estimate of a method that needs no start fit; such a row contains no estimate.
-    pub fn is_before_the_first(&self, row: usize) -> bool {
-        self.options.method.starts_itself() && self.covariance(row).is_none()
+    pub fn is_before_first_estimate(&self, row: usize) -> bool {
+        self.options.method.is_self_starting() && self.covariance(row).is_none()
     }
 
     /// Returns each coefficient of a row with its standard error.
@@ -219,8 +219,8 @@ impl Trace {
         row: usize,
         covariance: Option<&[f64]>,
     ) -> Result<OperatorEstimate, NotConvertible> {
-        let (theta, covariance) = self.options.of_first_input(self.theta(row), covariance);
-        operator_of(
+        let (theta, covariance) = self.options.first_input_part(self.theta(row), covariance);
+        operator_from_theta(
             self.options.structure,
             self.options.orders,
             self.delays.get(row),
@@ -231,7 +231,7 @@ impl Trace {
     }
 
     /// Returns the orders of the polynomials of a row, with the delay of the row.
-    fn orders_of(&self, row: usize) -> Orders {
+    fn orders_at(&self, row: usize) -> Orders {
         let orders = self.options.polynomial_orders();
         self.delays
             .get(row)
@@ -259,16 +259,16 @@ impl Trace {
         if self.responses.is_empty() {
             return Some(self.response_at(row, omega_rad_s));
         }
-        let from = (row * count + place) * Response::NUMBERS;
-        Response::unpacked(&self.responses[from..from + Response::NUMBERS])
+        let from = (row * count + place) * Response::PACKED_LEN;
+        Response::unpack(&self.responses[from..from + Response::PACKED_LEN])
     }
 
     /// Returns the response of the polynomials of a row at a frequency in rad/s, for methods that have no other response.
     pub fn response_at(&self, row: usize, omega_rad_s: f64) -> Response {
         let covariance = self.covariance(row);
-        let (theta, whole) = self.options.of_first_input(self.theta(row), covariance.as_deref());
-        Response::of_polynomials(
-            &self.orders_of(row),
+        let (theta, whole) = self.options.first_input_part(self.theta(row), covariance.as_deref());
+        Response::from_polynomials(
+            &self.orders_at(row),
             theta,
             whole.as_deref(),
             omega_rad_s,
@@ -279,7 +279,7 @@ impl Trace {
     /// Returns the response to the further input in a row, at a frequency in rad/s; `None` without a further input.
     pub fn further_response(&self, row: usize, omega_rad_s: f64) -> Option<Response> {
         let further = self.options.further.as_ref()?;
-        let (orders, covariance) = (self.orders_of(row), self.covariance(row));
+        let (orders, covariance) = (self.orders_at(row), self.covariance(row));
         let (theta, ts) = (self.theta(row), self.sample_time);
         Some(further.response(&orders, theta, covariance.as_deref(), omega_rad_s, ts))
     }
@@ -295,12 +295,12 @@ impl Trace {
     pub fn open_loop(&self, row: usize) -> Option<Result<OpenLoop, NoCrossover>> {
         let element = self.options.controlled_element.as_ref()?;
         if !self.open_loops.is_empty() {
-            let from = row * OpenLoop::NUMBERS;
-            let found = OpenLoop::unpacked(&self.open_loops[from..from + OpenLoop::NUMBERS]);
+            let from = row * OpenLoop::PACKED_LEN;
+            let found = OpenLoop::unpack(&self.open_loops[from..from + OpenLoop::PACKED_LEN]);
             return Some(found.ok_or(self.no_crossover[row].unwrap_or(NoCrossover::NotDetermined)));
         }
-        let (orders, ts) = (self.orders_of(row), self.sample_time);
-        let value = |omega: f64| Some(Response::value_of_polynomials(&orders, self.theta(row), omega, ts));
+        let (orders, ts) = (self.orders_at(row), self.sample_time);
+        let value = |omega: f64| Some(Response::polynomial_response_value(&orders, self.theta(row), omega, ts));
         let whole = |omega: f64| Some(self.response_at(row, omega));
         Some(OpenLoop::of(value, whole, element, ts))
     }
@@ -344,7 +344,7 @@ impl Trace {
 
     /// Returns for each row the number of samples up to this row that the guard held back, or during which it kept the
     /// estimate constant.
-    pub fn held(&self) -> &[u64] {
+    pub fn held_counts(&self) -> &[u64] {
         &self.held
     }
 
@@ -374,12 +374,12 @@ impl Trace {
     }
 
     /// Returns the number of samples between two rows.
-    pub fn every(&self) -> usize {
+    pub fn row_interval(&self) -> usize {
         self.every
     }
 
     /// Returns the length of the moving average in rows; 1 if there is no moving average.
-    pub fn averaged(&self) -> usize {
+    pub fn averaging_rows(&self) -> usize {
         self.averaged
     }
 
@@ -401,12 +401,12 @@ impl Trace {
         }
         self.theta = causal_mean(&self.theta, p, rows);
         self.covariance = causal_mean(&self.covariance, packed_len(p), rows);
-        let width = Response::NUMBERS * self.options.at_rad_s.len();
+        let width = Response::PACKED_LEN * self.options.at_rad_s.len();
         if !self.responses.is_empty() {
             self.responses = causal_mean(&self.responses, width, rows);
         }
         if !self.open_loops.is_empty() {
-            self.open_loops = causal_mean(&self.open_loops, OpenLoop::NUMBERS, rows);
+            self.open_loops = causal_mean(&self.open_loops, OpenLoop::PACKED_LEN, rows);
         }
         let taus: Vec<f64> = (self.delays.iter())
             .flat_map(|delay| {
@@ -445,7 +445,7 @@ impl Trace {
 }
 
 /// Returns the operator with the coefficients theta, with standard errors if there is a covariance.
-pub(crate) fn operator_of(
+pub(crate) fn operator_from_theta(
     structure: Structure,
     orders: Orders,
     delay: Option<&Delay>,

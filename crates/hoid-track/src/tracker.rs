@@ -12,30 +12,30 @@ use hoid_model::{
 
 use crate::{
     change::Change,
-    guard::{Guard, GuardEvent, Guarded},
+    guard::{Guard, GuardDecision, GuardEvent},
     open_loop::{NoCrossover, OpenLoop},
     options::TrackOptions,
     outcome::{Counts, Outcome},
     recursion::{Recursion, Sample},
     response::Response,
-    setup::StartAt,
+    setup::StartSource,
     start::StartState,
-    stationary::{Act, StationaryWatch},
-    trace::operator_of,
+    stationary::{RecursionCall, StationaryWatch},
+    trace::operator_from_theta,
 };
 
 /// Frequency at which the sign of a response is examined, rad/s.
-const LOW_RAD_S: f64 = 0.5;
+const SIGN_CHECK_RAD_S: f64 = 0.5;
 /// Frequencies at which the error of the response is examined, rad/s, and the standard error in dB below which a
 /// response is known.
-const KNOWN_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
-const KNOWN_DB: f64 = 2.0;
-/// Range of the phase of people's responses at [`LOW_RAD_S`], deg: a lag and a delay give -110, two leads 70.
-const PHASES_DEG: (f64, f64) = (-120.0, 75.0);
+const ERROR_CHECK_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+const MAX_KNOWN_ERROR_DB: f64 = 2.0;
+/// Range of the phase of people's responses at [`SIGN_CHECK_RAD_S`], deg: a lag and a delay give -110, two leads 70.
+const PHASE_RANGE_DEG: (f64, f64) = (-120.0, 75.0);
 /// Smallest distance, in standard errors, of an implausible phase from the range of people's phases.
 const IMPLAUSIBLE_DISTANCE: f64 = 2.0;
 /// Quantile of the normal distribution for 95 %.
-const NORMAL: f64 = 1.96;
+const NORMAL_QUANTILE: f64 = 1.96;
 
 /// A recursive estimate that takes one sample at a time.
 pub struct Tracker {
@@ -83,8 +83,8 @@ impl Tracker {
         let start = StartState::new(&setup, span, known, sample_time)?;
         let mut recursion = options.method.build(&setup, &start, sample_time)?;
         Ok(Self {
-            guard: guard_of(options, &mut *recursion, span, sample_time),
-            stationary: stationary_watch(options, sample_time),
+            guard: build_guard(options, &mut *recursion, span, sample_time),
+            stationary: build_stationary_watch(options, sample_time),
             moved: false,
             recursion,
             options: options.clone(),
@@ -113,13 +113,13 @@ impl Tracker {
                 u: if u_sound { sample.u } else { f64::NAN },
                 reference: sample.reference.filter(|r| sound(*r)),
             };
-            let before = guard.restarts();
-            let guarded = guard.take(&mut *self.recursion, sample, moves);
+            let before = guard.restart_count();
+            let guarded = guard.process(&mut *self.recursion, sample, moves);
             self.counts.restarts = self
                 .counts
                 .restarts
-                .saturating_add(guard.restarts().saturating_sub(before));
-            return self.guarded(guarded, !(e_sound && u_sound));
+                .saturating_add(guard.restart_count().saturating_sub(before));
+            return self.guarded_outcome(guarded, !(e_sound && u_sound));
         }
         let sample = Sample {
             e: if e_sound { sample.e } else { self.last_e },
@@ -129,18 +129,18 @@ impl Tracker {
         self.last_e = sample.e;
         let skipped = !(e_sound && u_sound);
         let act = match (u_sound, moves && e_sound) {
-            (false, _) => Act::Bridge,
-            (true, true) => Act::Step,
-            (true, false) => Act::Follow,
+            (false, _) => RecursionCall::Bridge,
+            (true, true) => RecursionCall::Step,
+            (true, false) => RecursionCall::Follow,
         };
-        let Guarded { outcome, held } = match &mut self.stationary {
-            Some(stationary) => stationary.take(&mut *self.recursion, sample, act),
-            None => Guarded {
+        let GuardDecision { outcome, held } = match &mut self.stationary {
+            Some(stationary) => stationary.process(&mut *self.recursion, sample, act),
+            None => GuardDecision {
                 outcome: act.on(&mut *self.recursion, sample),
                 held: false,
             },
         };
-        self.moved = act == Act::Step && !held;
+        self.moved = act == RecursionCall::Step && !held;
         let taken = outcome.filter(|_| !skipped && !held);
         let shortened = outcome.is_some_and(|outcome| outcome.shortened);
         self.counts.skipped = self.counts.skipped.saturating_add(u64::from(skipped));
@@ -157,7 +157,7 @@ impl Tracker {
     /// Updates the counts and returns the outcome of a sample that a guard or the watch for constant signals has
     /// examined.
     #[inline]
-    fn guarded(&mut self, guarded: Guarded, skipped: bool) -> Outcome {
+    fn guarded_outcome(&mut self, guarded: GuardDecision, skipped: bool) -> Outcome {
         let taken = guarded.outcome.filter(|_| !guarded.held);
         let shortened = taken.is_some_and(|taken| taken.shortened);
         self.moved = taken.is_some();
@@ -189,8 +189,8 @@ impl Tracker {
     }
 
     /// Returns the time since the last restart by the guard, s; `None` if there was none.
-    pub fn since_restart_s(&self) -> Option<f64> {
-        self.guard.as_ref()?.since_restart_s()
+    pub fn time_since_restart_s(&self) -> Option<f64> {
+        self.guard.as_ref()?.time_since_restart_s()
     }
 
     /// Returns theta in the order of [`Tracker::parameter_names`].
@@ -233,8 +233,8 @@ impl Tracker {
             Some(_) => Err(NotConvertible::ZeroGain),
             None => {
                 let covariance = self.covariance();
-                let (theta, covariance) = self.options.of_first_input(self.theta(), covariance.as_deref());
-                operator_of(
+                let (theta, covariance) = self.options.first_input_part(self.theta(), covariance.as_deref());
+                operator_from_theta(
                     self.options.structure,
                     self.options.orders,
                     self.recursion.delay().as_ref(),
@@ -255,15 +255,15 @@ impl Tracker {
 
     /// Returns the response of the estimate at a frequency in rad/s; `None` while there is no estimate.
     pub fn response(&self, omega_rad_s: f64) -> Option<Response> {
-        if self.options.method.starts_itself() {
+        if self.options.method.is_self_starting() {
             return self.recursion.response(omega_rad_s);
         }
         let orders = self.orders();
         let covariance = self.covariance();
         let ts = self.sample_time;
-        let (theta, whole) = self.options.of_first_input(self.theta(), covariance.as_deref());
+        let (theta, whole) = self.options.first_input_part(self.theta(), covariance.as_deref());
         let whole = whole.as_deref();
-        Some(Response::of_polynomials(&orders, theta, whole, omega_rad_s, ts))
+        Some(Response::from_polynomials(&orders, theta, whole, omega_rad_s, ts))
     }
 
     /// Returns crossover and phase margin with the controlled element of the options; `None` without a controlled
@@ -271,28 +271,28 @@ impl Tracker {
     pub fn open_loop(&self) -> Option<Result<OpenLoop, NoCrossover>> {
         let element = self.options.controlled_element.as_ref()?;
         let whole = |omega: f64| self.response(omega);
-        if self.options.method.starts_itself() {
+        if self.options.method.is_self_starting() {
             let value = |omega: f64| self.recursion.response_value(omega);
             return Some(OpenLoop::of(value, whole, element, self.sample_time));
         }
         let orders = self.orders();
         let value = |omega: f64| {
-            let alone = Response::value_of_polynomials(&orders, self.theta(), omega, self.sample_time);
+            let alone = Response::polynomial_response_value(&orders, self.theta(), omega, self.sample_time);
             Some(alone)
         };
         Some(OpenLoop::of(value, whole, element, self.sample_time))
     }
 
     /// True if the method has a basis with more forms than gain and lead, and determines the current response within 2
-    /// dB at one of the frequencies [`KNOWN_AT_RAD_S`]: gain and lead may then be undetermined.
+    /// dB at one of the frequencies [`ERROR_CHECK_RAD_S`]: gain and lead may then be undetermined.
     pub(crate) fn response_is_known(&self) -> bool {
         let known = |omega: &f64| {
             let gain = self
                 .response(*omega)
                 .and_then(|response| response.gain_db().standard_error);
-            gain.is_some_and(|error| error < KNOWN_DB)
+            gain.is_some_and(|error| error < MAX_KNOWN_ERROR_DB)
         };
-        self.options.method.lag_of_basis_s().is_some() && KNOWN_AT_RAD_S.iter().any(known)
+        self.options.method.basis_lag_s().is_some() && ERROR_CHECK_RAD_S.iter().any(known)
     }
 
     /// Returns every crossing of the current open loop with the controlled element of the options; `None` without a
@@ -323,15 +323,15 @@ impl Tracker {
     pub(crate) fn response_finding(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
             let reach = match self.open_loop()? {
-                Ok(found) => NORMAL * found.phase_margin_deg.standard_error.unwrap_or(0.0),
+                Ok(found) => NORMAL_QUANTILE * found.phase_margin_deg.standard_error.unwrap_or(0.0),
                 Err(NoCrossover::NeverFalls) => 0.0,
                 Err(_) => return None,
             };
             return self.loop_shape(element).finding(reach);
         }
-        let phase = self.response(LOW_RAD_S)?.phase_deg();
+        let phase = self.response(SIGN_CHECK_RAD_S)?.phase_deg();
         let reach = IMPLAUSIBLE_DISTANCE * phase.standard_error?;
-        let (farthest, most) = PHASES_DEG;
+        let (farthest, most) = PHASE_RANGE_DEG;
         let ahead = if phase.value < farthest {
             phase.value + 360.0
         } else {
@@ -339,10 +339,10 @@ impl Tracker {
         };
         let backwards = ahead - reach > most && ahead + reach < farthest + 360.0;
         backwards.then(|| {
-            Finding::doubt(
+            Finding::warning(
                 "sign",
                 format!(
-                    "the response at {LOW_RAD_S} rad/s has a phase of {:.0} deg: the person would increase the error; \
+                    "the response at {SIGN_CHECK_RAD_S} rad/s has a phase of {:.0} deg: the person would increase the error; \
                      reverse the sign of e or u, or, if the controlled element has a negative gain, give it with \
                      --controlled-element",
                     phase.value
@@ -398,7 +398,7 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
 }
 
 /// Builds the watch for constant signals; `None` if the option `guard` is given, whether yes or no.
-pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<StationaryWatch>> {
+pub(crate) fn build_stationary_watch(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<StationaryWatch>> {
     if options.method.guard().is_some() {
         return None;
     }
@@ -406,7 +406,7 @@ pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) 
 }
 
 /// Builds the guard of a recursion at its start; `None` if the options do not require one.
-pub(crate) fn guard_of(
+pub(crate) fn build_guard(
     options: &TrackOptions,
     recursion: &mut dyn Recursion,
     span: Option<&Record>,
@@ -419,8 +419,8 @@ pub(crate) fn guard_of(
     let nk = largest_nk(options, sample_time);
     let mut guard = Guard::new(recursion, nk, span, sample_time);
     let o = options.orders;
-    if matches!(options.start, StartAt::Span(_))
-        && !method.starts_itself()
+    if matches!(options.start, StartSource::Span(_))
+        && !method.is_self_starting()
         && method.track_delay_s().is_none()
         && let Some(model) = ReferenceModel::new([o.na, o.nb, o.nc, o.nd, o.nf], recursion.theta())
     {

@@ -6,7 +6,7 @@ use crate::setup::Setup;
 
 /// The causal run, and the samples at which two-sided estimates are needed.
 #[derive(Debug, Clone)]
-pub struct Causal {
+pub struct CausalRun {
     /// Components of the recursion.
     pub setup: Setup,
     /// Magnitude of e or u beyond which a sample counts as faulty.
@@ -19,7 +19,7 @@ pub struct Causal {
 
 /// The operator at one sample, estimated from the whole run.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TwoSided {
+pub struct TwoSidedEstimate {
     /// The coefficients.
     pub theta: Vec<f64>,
     /// Covariance of the coefficients, by rows.

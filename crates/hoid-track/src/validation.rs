@@ -32,20 +32,20 @@ use hoid_model::{Orders, Record, SampleTime};
 
 use crate::{
     forgetting::ForgettingRule,
-    method::bad,
+    method::invalid_option,
     options::TrackOptions,
     over_record::{track_from, track_with},
     trace::Trace,
 };
 
 /// Values of p that are tried, in units of the innovation variance; the thesis uses 0.1.
-pub const COVARIANCES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
+pub const CANDIDATE_COVARIANCES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
 /// Time after which the initial state of the simulation has decayed, s.
 const SETTLING_S: f64 = 2.0;
 /// Shortest span of the second run that is compared, s.
-const SHORTEST_S: f64 = 5.0;
+const MIN_SPAN_S: f64 = 5.0;
 /// Name of the option that the second run determines.
-const COVARIANCE: &str = "covariance";
+const COVARIANCE_OPTION: &str = "covariance";
 
 /// An initial covariance that was chosen by prediction of a second run.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,30 +78,30 @@ impl Trace {
     /// a trace with a tracked delay.
     pub fn vaf_of(&self, other: &Record) -> Result<(f64, (f64, f64)), IdentError> {
         let ts = self.sample_time();
-        check(other, self.options(), ts)?;
+        check_second_run(other, self.options(), ts)?;
         let o = self.options().polynomial_orders();
-        let rows = (self.len() * self.every()).min(other.len());
+        let rows = (self.len() * self.row_interval()).min(other.len());
         let first = o.nk + (SETTLING_S / ts.s()).ceil() as usize;
         let span_s = (first as f64 * ts.s(), rows as f64 * ts.s());
-        if span_s.1 - span_s.0 < SHORTEST_S {
-            return Err(bad(
+        if span_s.1 - span_s.0 < MIN_SPAN_S {
+            return Err(invalid_option(
                 "the run for validation",
                 format!("{} s in common with the tracked run", span_s.1),
                 &format!(
                     "at least {} s: a longer run of the same person in the same task",
-                    span_s.0 + SHORTEST_S
+                    span_s.0 + MIN_SPAN_S
                 ),
             ));
         }
-        let row_at = |k: usize| ((k + 1) / self.every()).saturating_sub(1).min(self.len() - 1);
-        let response = simulated(&o, &other.input()[..rows], 0, |k| self.theta(row_at(k)));
+        let row_at = |k: usize| ((k + 1) / self.row_interval()).saturating_sub(1).min(self.len() - 1);
+        let response = simulate(&o, &other.input()[..rows], 0, |k| self.theta(row_at(k)));
         let found = vaf(&other.output()[first..rows], &response[first..]);
         Ok((if found.is_finite() { found } else { 0.0 }, span_s))
     }
 }
 
 /// Checks a second run and its trace.
-fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), IdentError> {
+fn check_second_run(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), IdentError> {
     let found = other.sample_time();
     if !found.matches(ts) {
         return Err(IdentError::MixedSampling {
@@ -116,8 +116,8 @@ fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), I
             label: other.label().to_owned(),
         });
     }
-    if options.method.track_delay_s().is_some() || options.method.starts_itself() {
-        return Err(bad(
+    if options.method.track_delay_s().is_some() || options.method.is_self_starting() {
+        return Err(invalid_option(
             "the validation of a trace",
             "a tracked delay".to_owned(),
             "a method with a fixed delay, without track_delay",
@@ -127,7 +127,7 @@ fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), I
 }
 
 /// Simulates the response to an input from sample `first` on, at rest before it, with the coefficients of each sample.
-fn simulated<'t>(o: &Orders, e: &[f64], first: usize, theta_at: impl Fn(usize) -> &'t [f64]) -> Vec<f64> {
+fn simulate<'t>(o: &Orders, e: &[f64], first: usize, theta_at: impl Fn(usize) -> &'t [f64]) -> Vec<f64> {
     let mut w = vec![0.0; e.len()];
     for k in first..e.len() {
         let theta = theta_at(k);
@@ -158,10 +158,10 @@ fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
         .settings()
         .list()
         .iter()
-        .any(|setting| setting.name == COVARIANCE);
+        .any(|setting| setting.name == COVARIANCE_OPTION);
     let forgets = method.forgetting();
     if !has_p || matches!(forgets, ForgettingRule::Window | ForgettingRule::Gradient(_)) {
-        return Err(bad(
+        return Err(invalid_option(
             "the run for validation",
             format!("{method}, whose gain has no start covariance to choose"),
             "a method with the option covariance, such as rls or rpem, and a type of forgetting that has P",
@@ -183,9 +183,9 @@ pub fn choose_covariance(
 ) -> Result<(TrackOptions, CovarianceChoice), IdentError> {
     check_method(options)?;
     let method = &options.method;
-    if let Some(given) = method.covariance() {
-        return Err(bad(
-            COVARIANCE,
+    if let Some(given) = method.initial_covariance() {
+        return Err(invalid_option(
+            COVARIANCE_OPTION,
             format!("{given}, and a run for validation, which chooses the covariance"),
             "only one of the two",
         ));
@@ -194,8 +194,8 @@ pub fn choose_covariance(
     let mut best: Option<(f64, f64, TrackOptions)> = None;
     let mut start = None;
     let mut span_s = (0.0, 0.0);
-    for p in COVARIANCES {
-        let options = options.clone().with(&[(COVARIANCE, &p.to_string())])?;
+    for p in CANDIDATE_COVARIANCES {
+        let options = options.clone().with(&[(COVARIANCE_OPTION, &p.to_string())])?;
         let trace = track_from(record, &options, 1, start.as_ref())?;
         let (found, of) = trace.vaf_of(validation)?;
         start = trace.start().cloned();
@@ -206,7 +206,7 @@ pub fn choose_covariance(
         }
     }
     let Some((_, covariance, options)) = best.filter(|(most, ..)| *most > 0.0) else {
-        return Err(bad(
+        return Err(invalid_option(
             "the run for validation",
             format!("a VAF of 0 % for {} with every covariance", validation.label()),
             "a run of the same person in the same task, with the same columns, signs and units",
@@ -261,9 +261,9 @@ pub fn track_validated(
 ) -> Result<Trace, IdentError> {
     let ts = record.sample_time();
     check_method(options)?;
-    check(validation, options, ts)?;
+    check_second_run(validation, options, ts)?;
     if validation.len() < record.len() {
-        return Err(bad(
+        return Err(invalid_option(
             "the run for validation",
             format!("{} samples", validation.len()),
             &format!("at least {}, as in the tracked run", record.len()),
@@ -278,7 +278,7 @@ pub fn track_validated(
         let from = first.saturating_sub(settling);
         // The simulation also needs the input before this span that still acts within it.
         let begin = from.saturating_sub(o.nk + o.nb);
-        let w = simulated(&o, &e[begin..end], from - begin, |_| theta);
+        let w = simulate(&o, &e[begin..end], from - begin, |_| theta);
         let error: f64 = (first..end).map(|k| (u[k] - w[k - begin]).powi(2)).sum();
         error / (first..end).map(|k| u[k] * u[k]).sum::<f64>()
     };

@@ -5,16 +5,16 @@ use hoid_model::uncertainty::Estimate;
 use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
 use hoid_track::{Method, TrackOptions, Tracker};
 
-const PEOPLE: u64 = 45;
+const PERSON_COUNT: u64 = 45;
 /// Times in s: in the first second of an estimate, during the trials from other starting points, and after them.
-const AT_S: [f64; 3] = [2.0, 15.0, 30.0];
+const TIMES_S: [f64; 3] = [2.0, 15.0, 30.0];
 
 #[test]
 fn poles_and_delay_are_within_their_errors() {
-    let mut beyond = AT_S.map(|_| [0.0; 3]);
-    let mut inside = AT_S.map(|_| [0.0; 3]);
+    let mut beyond = TIMES_S.map(|_| [0.0; 3]);
+    let mut inside = TIMES_S.map(|_| [0.0; 3]);
     let mut people = 0.0;
-    for number in 0..PEOPLE {
+    for number in 0..PERSON_COUNT {
         let (plant, kind) = (
             Plant::ALL[number as usize % 3],
             RemnantKind::ALL[number as usize / 3 % 5],
@@ -23,7 +23,7 @@ fn poles_and_delay_are_within_their_errors() {
         let run = person.run(1).unwrap();
         let ts = run.record.sample_time();
         let operator = &run.state.operator;
-        let Some((omega, zeta)) = operator.neuromuscular() else {
+        let Some((omega, zeta)) = operator.neuromuscular_parameters() else {
             continue;
         };
         people += 1.0;
@@ -31,7 +31,7 @@ fn poles_and_delay_are_within_their_errors() {
         for k in 0..run.record.len() {
             tracker.step(run.record.input()[k], run.record.output()[k]);
             let t = run.record.time_s(k) - run.record.time_s(0);
-            let Some(at) = AT_S.iter().position(|at| (t - at).abs() < 0.5 * ts.s()) else {
+            let Some(at) = TIMES_S.iter().position(|at| (t - at).abs() < 0.5 * ts.s()) else {
                 continue;
             };
             let Ok(found) = tracker.operator() else { continue };

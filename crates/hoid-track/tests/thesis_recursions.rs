@@ -19,7 +19,7 @@ use hoid_model::{
     scenario::{Condition, Realisation, RemnantStrength, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, StartAt, Trace, TrackOptions, track};
+use hoid_track::{Method, StartSource, Trace, TrackOptions, track};
 
 const NK: usize = 29;
 const LAMBDA: f64 = 1.0 - 1.0 / 256.0;
@@ -44,7 +44,7 @@ fn run(condition: Condition, order: usize, noise_level: f64, replication: u64) -
 fn thesis_options(method: Method, additional: &[(&str, &str)]) -> TrackOptions {
     let rpem = method == Method::rpem();
     let options = TrackOptions {
-        start: StartAt::Span(Some((0.0, 30.72))),
+        start: StartSource::Span(Some((0.0, 30.72))),
         ..TrackOptions::default_for(method, NK)
     };
     let options = options.with(&[("memory", "256"), ("covariance", "0.1")]).unwrap();
@@ -57,9 +57,9 @@ fn thesis_options(method: Method, additional: &[(&str, &str)]) -> TrackOptions {
 }
 
 /// P as a plain matrix, with its update.
-struct Plain<const N: usize>([[f64; N]; N]);
+struct PlainCovariance<const N: usize>([[f64; N]; N]);
 
-impl<const N: usize> Plain<N> {
+impl<const N: usize> PlainCovariance<N> {
     fn new() -> Self {
         Self(std::array::from_fn(|i| {
             std::array::from_fn(|j| if i == j { P0 } else { 0.0 })
@@ -84,7 +84,7 @@ fn delayed(record: &Record, k: usize) -> f64 {
 
 fn rls(record: &Record, start: &[f64]) -> Vec<Vec<f64>> {
     let mut theta = <[f64; 4]>::try_from(start).unwrap();
-    let (mut p, u) = (Plain::new(), record.output());
+    let (mut p, u) = (PlainCovariance::new(), record.output());
     let before = |k: usize, lag: usize| if k >= lag { u[k - lag] } else { 0.0 };
     let step = |k: usize| {
         let x_1 = if k > 0 { delayed(record, k - 1) } else { 0.0 };
@@ -105,7 +105,7 @@ fn is_stable(theta: &[f64; 5]) -> bool {
 
 fn rpem(record: &Record, start: &[f64]) -> Vec<Vec<f64>> {
     let mut theta = <[f64; 5]>::try_from(start).unwrap();
-    let (mut p, u) = (Plain::new(), record.output());
+    let (mut p, u) = (PlainCovariance::new(), record.output());
     // x, v, w, and their values filtered by D/F, at the last two samples.
     let (mut x_1, mut v_1, mut w, mut x_f, mut w_f) = (0.0, 0.0, [0.0; 2], [0.0; 2], [0.0; 2]);
     let step = |k: usize| {
@@ -139,7 +139,7 @@ fn difference(trace: &Trace, twin: &[Vec<f64>]) -> f64 {
 }
 
 /// Returns the largest difference between the recursion of the program and the equations of the thesis.
-fn from_equations(method: &Method, record: &Record, additional: &[(&str, &str)]) -> f64 {
+fn difference_from_equations(method: &Method, record: &Record, additional: &[(&str, &str)]) -> f64 {
     let trace = track(record, &thesis_options(method.clone(), additional), 1).unwrap();
     let start = trace.start().unwrap().model().theta();
     let twin = match *method == Method::rls() {
@@ -160,12 +160,12 @@ fn thesis_settings_reproduce_the_thesis_equations() {
     ] {
         let record = run(condition, order, level, 0);
         for (method, most) in [Method::rls(), Method::rpem()].into_iter().zip(&mut with_a_guard) {
-            let found = from_equations(&method, &record, &[]);
+            let found = difference_from_equations(&method, &record, &[]);
             assert!(found < 1e-8, "{method} {condition:?} {order} {level}: {found:e}");
-            let given = from_equations(&method, &record, &[("windup_guard", "off")]);
+            let given = difference_from_equations(&method, &record, &[("windup_guard", "off")]);
             assert!(given < 1e-8, "{method}: {given:e}");
             println!("{method} {condition:?} {order} {level}: {found:.1e}");
-            *most = most.max(from_equations(&method, &record, &[("windup_guard", "1e4")]));
+            *most = most.max(difference_from_equations(&method, &record, &[("windup_guard", "1e4")]));
         }
     }
     println!(
@@ -248,7 +248,7 @@ fn invalid_windup_guard_is_refused_with_advice() {
 /// innovations, and structures that the thesis does not have.
 #[test]
 fn settings_other_than_the_thesis_keep_the_guard() {
-    let words = |options: TrackOptions| options.memory_as_text(hoid_model::SampleTime::HUNDREDTH);
+    let words = |options: TrackOptions| options.memory_as_text(hoid_model::SampleTime::AT_100_HZ);
     let is_off = |options: TrackOptions| words(options).ends_with("without a windup guard");
     assert!(is_off(thesis_options(Method::rls(), &[])));
     assert!(is_off(thesis_options(Method::rpem(), &[])));

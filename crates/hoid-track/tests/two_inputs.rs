@@ -7,7 +7,7 @@ use hoid_ident::{
     several_inputs::{InputOrders, SeveralInputs},
 };
 use hoid_model::{Channel, Orders, Record, SampleTime, Structure};
-use hoid_track::{Method, Sample, StartAt, Trace, TrackOptions, TrackedInput, Tracker, track};
+use hoid_track::{Method, Sample, StartSource, Trace, TrackOptions, TrackedInput, Tracker, track};
 
 /// Standard normal random numbers.
 struct Noise(u64);
@@ -31,11 +31,11 @@ const F: [f64; 2] = [-1.6, 0.68];
 const D: f64 = -0.8;
 const NK: usize = 10;
 const NK_R: usize = 5;
-const SAMPLES: usize = 4000;
+const SAMPLE_COUNT: usize = 4000;
 
 /// Returns the coefficient b0 of the response to r at a sample; it doubles in the middle of the record.
 fn gain(k: usize, changes: bool) -> f64 {
-    if changes && k >= SAMPLES / 2 { 0.06 } else { 0.03 }
+    if changes && k >= SAMPLE_COUNT / 2 { 0.06 } else { 0.03 }
 }
 
 /// Returns a record of `u = (B/F) q^-10 e + (B_r/F) q^-5 r + n`, `n = eps/D`, where e and r are sums of sines with
@@ -48,13 +48,13 @@ fn record(seed: u64, level: f64, changes: bool) -> Record {
             let each = lines.iter().zip(&phases);
             each.map(|(w, p)| (w * k as f64 * TS + p).sin() / w.sqrt()).sum()
         };
-        (0..SAMPLES).map(at).collect()
+        (0..SAMPLE_COUNT).map(at).collect()
     };
     let e = sines(&[0.4, 0.9, 1.6, 2.9, 4.7, 7.3, 11.0, 17.0]);
     let r = sines(&[0.6, 1.2, 2.1, 3.8, 6.1, 9.2, 14.0, 21.0]);
     let (mut of_e, mut of_r, mut n) = ([0.0; 2], [0.0; 2], 0.0);
     let past = |x: &[f64], k: usize, by: usize| k.checked_sub(by).map_or(0.0, |k| x[k]);
-    let u = (0..SAMPLES)
+    let u = (0..SAMPLE_COUNT)
         .map(|k| {
             let w = 0.05 * past(&e, k, NK) - 0.03 * past(&e, k, NK + 1) - F[0] * of_e[0] - F[1] * of_e[1];
             let w_r = gain(k, changes) * past(&r, k, NK_R) - F[0] * of_r[0] - F[1] * of_r[1];
@@ -100,7 +100,7 @@ fn box_jenkins() -> TrackOptions {
     }
 }
 
-fn value(trace: &Trace, row: usize, name: &str) -> (f64, f64) {
+fn coefficient(trace: &Trace, row: usize, name: &str) -> (f64, f64) {
     let place = trace.parameter_names().iter().position(|known| known == name).unwrap();
     let estimate = trace.parameters(row)[place];
     (estimate.value, estimate.standard_error.unwrap())
@@ -112,7 +112,7 @@ fn rls_with_infinite_memory_matches_the_batch_fit() {
     let method = Method::rls();
     let options = TrackOptions {
         further: input(2, 0, NK_R),
-        start: StartAt::Nothing,
+        start: StartSource::Nothing,
         ..TrackOptions::new(method, Structure::Arx, orders(2, 0, 0))
     }
     .with(&[("memory", "inf"), ("covariance", "1e10")])
@@ -161,14 +161,17 @@ fn change_of_one_response_leaves_the_other_unchanged() {
         for (t, truth, into) in [(38.0, 0.03, &mut before), (78.0, 0.06, &mut after)] {
             let response = |t: f64| trace.further_response(row(t), 2.0).unwrap().gain_db();
             let gain = response(t);
-            let expected = 20.0 * (truth / 0.03_f64).log10() + level_db();
+            let expected = 20.0 * (truth / 0.03_f64).log10() + r_gain_db();
             into.push((gain.value - expected) / gain.standard_error.unwrap());
             // The response to e does not change.
             let own = trace.response_at(row(t), 2.0).gain_db();
-            let expected = own_db();
+            let expected = e_gain_db();
             into.push((own.value - expected) / own.standard_error.unwrap());
         }
-        assert_eq!(value(&trace, row(20.0), "b0[r]").0, value(&trace, row(10.0), "b0[r]").0);
+        assert_eq!(
+            coefficient(&trace, row(20.0), "b0[r]").0,
+            coefficient(&trace, row(10.0), "b0[r]").0
+        );
         let record = record(seed, 0.02, true);
         let named = note(&trace, &record);
         changed += usize::from(named.contains("response to r changed") && named.contains("response to e was found"));
@@ -205,11 +208,11 @@ fn db(b: &[f64], nk: usize) -> f64 {
 }
 
 /// Gain in dB of the response to r before the change, and of the response to e, at 2 rad/s.
-fn level_db() -> f64 {
+fn r_gain_db() -> f64 {
     db(&[0.03], NK_R)
 }
 
-fn own_db() -> f64 {
+fn e_gain_db() -> f64 {
     db(&[0.05, -0.03], NK)
 }
 
@@ -234,7 +237,7 @@ fn omitting_the_further_input_biases_the_response_to_e() {
         let trace = track(&joined, &options, 100).unwrap();
         trace.response_at(trace.len() - 1, 2.0).gain_db().value
     };
-    let expected = own_db() - 20.0 * 0.3_f64.log10();
+    let expected = e_gain_db() - 20.0 * 0.3_f64.log10();
     assert!((gain(input(7, 2, NK_R)) - expected).abs() < 0.5);
     assert!((gain(None) - expected).abs() > 3.0);
 }
@@ -246,7 +249,7 @@ fn samples_without_the_further_input_do_not_update() {
     let mut tracker = Tracker::new(&box_jenkins(), Some(&span), record.sample_time()).unwrap();
     let r = record.channel("r").unwrap();
     let mut before = Vec::new();
-    for k in 0..SAMPLES {
+    for k in 0..SAMPLE_COUNT {
         let known = !(3000..3100).contains(&k);
         let (e, u) = (record.input()[k], record.output()[k]);
         let sample = Sample {

@@ -10,13 +10,13 @@ fn batch(c: &mut Criterion) {
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let changing = Simulator::new(&Scenario::condition(Condition::C3)).unwrap();
     let run_seed = RunSeed::default();
-    let noise = run_seed.white_noise(simulator.samples());
+    let noise = run_seed.white_noise(simulator.sample_count());
     let record = [simulator.run(run_seed, false).unwrap()];
     let estimator = |structure: Structure| Estimator::new(structure, structure.operator_orders(29));
     let (arx, bj) = (estimator(Structure::Arx), estimator(Structure::BoxJenkins));
 
     c.bench_function("noise of a run", |b| {
-        b.iter(|| run_seed.white_noise(simulator.samples()))
+        b.iter(|| run_seed.white_noise(simulator.sample_count()))
     });
     c.bench_function("loop, C1, noise given", |b| {
         b.iter(|| simulator.signals(&noise).unwrap())

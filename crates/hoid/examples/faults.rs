@@ -17,19 +17,19 @@ use std::{path::PathBuf, time::Instant};
 use fault_corpus::{
     bases::OperatorKind,
     kinds::{Fault, faults},
-    program::{Outcome, Way, outcomes},
-    summary::{by_fault, by_way, clean, recovery, to_csv},
+    program::{EvaluationMethod, Outcome, evaluate_case},
+    summary::{clean_run_table, recovery_table, table_by_fault, table_by_method, to_csv},
 };
 use rayon::prelude::*;
 
 /// Seed of the page; the tests have other seeds.
 const SEED: u64 = 2121;
 /// First number of the clean runs; no case with a fault has such a number.
-const FIRST_CLEAN: u64 = 100_000;
+const FIRST_CLEAN_NUMBER: u64 = 100_000;
 
 fn main() {
     let (mut part, mut number, mut rows, mut program, mut seed) = (1, 1000, None, built_program_path(), SEED);
-    let mut ways = Way::ALL.to_vec();
+    let mut ways = EvaluationMethod::ALL.to_vec();
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         let mut value = || arguments.next().unwrap();
@@ -54,7 +54,7 @@ fn main() {
         .collect();
     let faulty: Vec<Outcome> = cases
         .into_par_iter()
-        .flat_map_iter(|(case, fault, who)| outcomes(&program, seed, case, fault, who, &ways).unwrap())
+        .flat_map_iter(|(case, fault, who)| evaluate_case(&program, seed, case, fault, who, &ways).unwrap())
         .collect();
     // Half of the clean runs are of people, a quarter of C1 and a quarter of C2.
     let sound: Vec<Outcome> = (0..number)
@@ -70,28 +70,33 @@ fn main() {
                 OperatorKind::Person,
             ][i as usize % 4];
             // The kinds of people are used in turn, according to the number of the case.
-            let case = FIRST_CLEAN + i / 2;
-            let tracker = [Way::MultipleModel, Way::Physical, Way::Rpem, Way::Rls][i as usize / 4 % 4];
-            let batch = [Way::GreyBox, Way::BoxJenkins][i as usize / 4 % 2];
-            let such: Vec<Way> = ways
+            let case = FIRST_CLEAN_NUMBER + i / 2;
+            let tracker = [
+                EvaluationMethod::MultipleModel,
+                EvaluationMethod::Physical,
+                EvaluationMethod::Rpem,
+                EvaluationMethod::Rls,
+            ][i as usize / 4 % 4];
+            let batch = [EvaluationMethod::GreyBox, EvaluationMethod::BoxJenkins][i as usize / 4 % 2];
+            let such: Vec<EvaluationMethod> = ways
                 .iter()
                 .copied()
                 .filter(|way| who == OperatorKind::Person || [tracker, batch].contains(way))
                 .collect();
-            outcomes(&program, seed, case, Fault::NONE, who, &such).unwrap()
+            evaluate_case(&program, seed, case, Fault::NO_FAULT, who, &such).unwrap()
         })
         .collect();
     if let Some(file) = rows {
         let all: Vec<Outcome> = faulty.iter().chain(&sound).cloned().collect();
         std::fs::write(file, to_csv(&all)).unwrap();
     }
-    println!("## With a fault\n\n{}", by_way(&faulty));
+    println!("## With a fault\n\n{}", table_by_method(&faulty));
     println!(
         "Wrong, wrong and not flagged, right and flagged, of how many:\n\n{}",
-        by_fault(&faulty)
+        table_by_fault(&faulty)
     );
-    println!("## How long trackers take\n\n{}", recovery(&faulty));
-    println!("## Clean runs\n\n{}", clean(&sound));
+    println!("## How long trackers take\n\n{}", recovery_table(&faulty));
+    println!("## Clean runs\n\n{}", clean_run_table(&sound));
     let longest = faulty.iter().chain(&sound).map(|o| o.seconds).fold(0.0, f64::max);
     println!(
         "{} faults, {} results with a fault, {} without; {:.0} s in all, {longest:.1} s the longest",

@@ -13,9 +13,9 @@ use std::{collections::BTreeSet, fmt::Write as _, path::PathBuf};
 
 use hoid::model::VerdictLevel;
 use people_coverage::{
-    fits::{Outcome, Variant, outcomes},
+    fits::{Outcome, Variant, fit_person},
     people::Spread,
-    tables::{QUANTITIES, Share, coverage, median, of_quantity},
+    tables::{Proportion, QUANTITIES, coverage, median, values_of_quantity},
 };
 use rayon::prelude::*;
 
@@ -37,18 +37,18 @@ fn main() {
     let first = numbers.get(1).copied().unwrap_or(0);
     let all: Vec<Outcome> = (first..first + people)
         .into_par_iter()
-        .flat_map_iter(|number| outcomes(SEED, number, &variants).unwrap())
+        .flat_map_iter(|number| fit_person(SEED, number, &variants).unwrap())
         .collect();
     if let Some(file) = rows {
-        std::fs::write(file, as_rows(&all)).unwrap();
+        std::fs::write(file, to_csv(&all)).unwrap();
     }
     for variant in variants {
         let of: Vec<&Outcome> = all.iter().filter(|o| o.variant == variant).collect();
-        report(variant, &of);
+        print_report(variant, &of);
     }
 }
 
-fn report(variant: Variant, of: &[&Outcome]) {
+fn print_report(variant: Variant, of: &[&Outcome]) {
     println!("\n## {} ({} people)\n", variant.name(), of.len());
     let failed = of.iter().filter(|o| o.found.is_err()).count();
     let seconds: Vec<f64> = of.iter().map(|o| o.seconds).collect();
@@ -57,7 +57,7 @@ fn report(variant: Variant, of: &[&Outcome]) {
         seconds.iter().sum::<f64>() / seconds.len() as f64,
         seconds.iter().copied().fold(0.0, f64::max)
     );
-    let right = Share::over(
+    let right = Proportion::count(
         of.iter()
             .filter_map(|o| Some(o.found.as_ref().ok()?.form == o.true_form)),
     );
@@ -72,11 +72,11 @@ fn report(variant: Variant, of: &[&Outcome]) {
         .filter(|o| o.found.as_ref().is_ok_and(|f| f.form == o.true_form))
         .collect();
     for name in QUANTITIES {
-        let all = of_quantity(of, name);
+        let all = values_of_quantity(of, name);
         if all.is_empty() {
             continue;
         }
-        let determined = Share::over(all.iter().map(|q| q.determined));
+        let determined = Proportion::count(all.iter().map(|q| q.determined));
         let errors: Vec<f64> = all
             .iter()
             .filter(|q| q.determined)
@@ -91,12 +91,12 @@ fn report(variant: Variant, of: &[&Outcome]) {
                 .filter(|q| q.determined)
                 .filter_map(|q| q.interval.map(|(l, h)| (h - l) / q.truth.abs())),
         );
-        let open = Share::over(all.iter().filter(|q| !q.determined).filter_map(|q| q.holds()));
+        let open = Proportion::count(all.iter().filter(|q| !q.determined).filter_map(|q| q.contains_truth()));
         println!(
             "| {name} | {} | {} | {} | {:.2} | {bias:+.2} ± {:.2} | {rms:.2} | {} |",
             determined.text(),
             coverage(&all).text(),
-            coverage(&of_quantity(&with_right_form, name)).text(),
+            coverage(&values_of_quantity(&with_right_form, name)).text(),
             width.unwrap_or(f64::NAN),
             1.0 / n.sqrt(),
             open.text(),
@@ -145,7 +145,7 @@ fn report(variant: Variant, of: &[&Outcome]) {
         };
         println!(
             "| {level} | {} | {} | {} | {} |",
-            Share {
+            Proportion {
                 of: such.len(),
                 all: of.len()
             }
@@ -155,28 +155,28 @@ fn report(variant: Variant, of: &[&Outcome]) {
             overall_coverage(&such).text()
         );
     }
-    findings(of);
+    print_findings(of);
 }
 
 /// Prints the number of occurrences of each finding, including notes.
-fn findings(of: &[&Outcome]) {
+fn print_findings(of: &[&Outcome]) {
     let made: Vec<&Vec<String>> = of.iter().filter_map(|o| Some(&o.found.as_ref().ok()?.kinds)).collect();
     let kinds: BTreeSet<&String> = made.iter().copied().flatten().collect();
     println!("\n| finding | share |");
     println!("|---|---|");
     for kind in kinds {
-        let share = Share::over(made.iter().map(|all| all.contains(kind)));
+        let share = Proportion::count(made.iter().map(|all| all.contains(kind)));
         println!("| {kind} | {} |", share.text());
     }
 }
 
 /// Returns the coverage over all determined quantities, each counted once.
-fn overall_coverage(of: &[&Outcome]) -> Share {
+fn overall_coverage(of: &[&Outcome]) -> Proportion {
     let each = QUANTITIES
         .iter()
         .filter(|n| !n.contains("1.96"))
-        .map(|name| coverage(&of_quantity(of, name)));
-    each.fold(Share::default(), |a, b| Share {
+        .map(|name| coverage(&values_of_quantity(of, name)));
+    each.fold(Proportion::default(), |a, b| Proportion {
         of: a.of + b.of,
         all: a.all + b.all,
     })
@@ -185,26 +185,26 @@ fn overall_coverage(of: &[&Outcome]) -> Share {
 fn by(what: &str, of: &[&Outcome], values: &[String], key: impl Fn(&Outcome) -> String) {
     let names: Vec<&str> = QUANTITIES
         .into_iter()
-        .filter(|name| !of_quantity(of, name).is_empty())
+        .filter(|name| !values_of_quantity(of, name).is_empty())
         .collect();
     println!("\n| {what} | right form | {} |", names.join(" | "));
     println!("|---|---|{}", "---|".repeat(names.len()));
     for value in values {
         let such: Vec<&Outcome> = of.iter().copied().filter(|o| key(o) == *value).collect();
-        let right = Share::over(
+        let right = Proportion::count(
             such.iter()
                 .filter_map(|o| Some(o.found.as_ref().ok()?.form == o.true_form)),
         );
         let cells: Vec<String> = names
             .iter()
-            .map(|name| coverage(&of_quantity(&such, name)).text())
+            .map(|name| coverage(&values_of_quantity(&such, name)).text())
             .collect();
         println!("| {value} | {} | {} |", right.text(), cells.join(" | "));
     }
 }
 
 /// Returns one row for each quantity of each fit.
-fn as_rows(all: &[Outcome]) -> String {
+fn to_csv(all: &[Outcome]) -> String {
     let mut text = "person,plant,kind,rate,runs,spread,lines,given,true_form,form,level,kinds,response_error,inflation,nd,seconds,name,truth,value,se,low,high,prior_share,determined,error\n".to_owned();
     for o in all {
         let head = format!(

@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let plan = Plan::parse(PLAN, "example.toml")?;
     let folder = std::env::temp_dir().join(format!("hoid-study-{}", std::process::id()));
     let outcome = run_study(&plan, &folder, &RunOptions::default(), &|_| (), &|| true)?;
-    println!("{} estimates, finished: {}", plan.estimates(), outcome.finished);
+    println!("{} estimates, finished: {}", plan.estimate_count(), outcome.finished);
     let results = hoid::study::Results::read(&folder)?;
     for row in results.find(&hoid::study::Query::of("bias_omega_nm")) {
         println!(

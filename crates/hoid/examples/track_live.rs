@@ -15,7 +15,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     for (k, (e, u)) in run.input().iter().zip(run.output()).enumerate() {
         tracker.step(*e, *u);
         if let Some(change) = tracker.change() {
-            println!("{:5.1} s  {} changed", run.time_s(k), change.changed().join(", "));
+            println!(
+                "{:5.1} s  {} changed",
+                run.time_s(k),
+                change.changed_quantities().join(", ")
+            );
         }
         if k % 1000 == 999 {
             let t = run.time_s(k);

@@ -19,7 +19,7 @@ use tracker_faults::{Effect, Reference, Run, faults};
 
 /// Length of a run, and times of the faults, s.
 const LENGTH_S: f64 = 330.0;
-const PLACES_S: [f64; 2] = [100.3, 121.77];
+const FAULT_TIMES_S: [f64; 2] = [100.3, 121.77];
 
 fn main() {
     let (mut numbers, mut methods, mut bare, mut cost) = (Vec::new(), Vec::new(), false, false);
@@ -46,7 +46,7 @@ fn main() {
         let run = Run::new(Condition::C1, 1, first, 81.92);
         for method in methods {
             let options = TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(29));
-            run.taken(&options.with(&[("guard", guard)]).unwrap(), seeds);
+            run.process_repeatedly(&options.with(&[("guard", guard)]).unwrap(), seeds);
         }
         return;
     }
@@ -80,7 +80,7 @@ fn main() {
         for fault in faults() {
             let effects: Vec<Effect> = runs
                 .par_iter()
-                .flat_map_iter(|(run, reference)| PLACES_S.map(|at| reference.effect(run, &fault, at)))
+                .flat_map_iter(|(run, reference)| FAULT_TIMES_S.map(|at| reference.effect(run, &fault, at)))
                 .collect();
             let mut shifts: Vec<f64> = effects.iter().map(|e| e.shift).collect();
             let mut times: Vec<f64> = effects.iter().map(|e| e.recovery_s.unwrap_or(f64::INFINITY)).collect();

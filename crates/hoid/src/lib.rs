@@ -95,7 +95,7 @@ pub use hoid_track as track;
 /// Items that most programs need, for reading, identification, validation, tracking, reports and simulation.
 pub mod prelude {
     #[cfg(feature = "io")]
-    pub use hoid_analysis::{Identification, Identified, Recordings, identify};
+    pub use hoid_analysis::{Identification, IdentifiedModel, Recordings, identify};
     pub use hoid_ident::{
         Choice, Constraint, Estimator, Fit, GreyBox, IdentError, InitialState, OrderRanges, choose_orders,
         family::{FamilyEstimator, FamilyFit, OperatorPrior},
@@ -113,7 +113,7 @@ pub mod prelude {
     pub use hoid_sim::{RunSeed, Simulator};
     #[cfg(feature = "study")]
     pub use hoid_study::{Plan, RunOptions, run as run_study};
-    pub use hoid_track::{Memory, Method, Sample, StartAt, Trace, TrackOptions, Tracker, track};
+    pub use hoid_track::{Memory, Method, Sample, StartSource, Trace, TrackOptions, Tracker, track};
 }
 
 /// The Rust examples of the book; `python/tests/test_book.py` runs the other code blocks of the book.

@@ -4,7 +4,7 @@
 
 use hoid::{model::remnant_gain::NoiseDefinition, model::scenario::RemnantStrength, prelude::*};
 
-const RUNS: u64 = 100;
+const RUN_COUNT: u64 = 100;
 const NK: usize = 29;
 
 fn scenario(condition: Condition, m0: usize, level: f64) -> Scenario {
@@ -19,7 +19,7 @@ fn scenario(condition: Condition, m0: usize, level: f64) -> Scenario {
 
 fn records(condition: Condition, m0: usize, level: f64) -> Vec<Record> {
     let simulator = Simulator::new(&scenario(condition, m0, level)).unwrap();
-    (0..RUNS)
+    (0..RUN_COUNT)
         .map(|replication| {
             let cell = (m0 as u64) << 8 | (level * 100.0).round() as u64;
             simulator
@@ -41,7 +41,7 @@ fn truth(condition: Condition) -> [f64; 4] {
     let d = Scenario::condition(condition)
         .initial
         .operator
-        .discretise(SampleTime::HUNDREDTH)
+        .discretise(SampleTime::AT_100_HZ)
         .unwrap()
         .held;
     [d.f1, d.f2, d.b0, d.b1]
@@ -283,7 +283,7 @@ fn default_starts_reach_the_minimum_from_the_truth() {
                     here += usize::from(ours.loss() > theirs.loss() * (1.0 + 1e-6));
                 }
                 if here > 0 {
-                    println!("{condition} m0={m0} Pn={level}: {here} of {RUNS} end above");
+                    println!("{condition} m0={m0} Pn={level}: {here} of {RUN_COUNT} end above");
                 }
                 worse += here;
             }

@@ -5,11 +5,11 @@
 use hoid::{
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
     prelude::*,
-    track::{Method, StartAt, TrackOptions, track},
+    track::{Method, StartSource, TrackOptions, track},
 };
 
-const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
-const START_S: f64 = 30.72;
+const OPERATOR_PARAMETERS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+const START_SPAN_S: f64 = 30.72;
 
 fn run(condition: Condition, remnant_order: usize, noise_level: f64, replication: u64) -> Record {
     let mut scenario = Scenario::condition(condition);
@@ -28,24 +28,24 @@ fn run(condition: Condition, remnant_order: usize, noise_level: f64, replication
 
 fn options(method: Method) -> TrackOptions {
     TrackOptions {
-        start: StartAt::Span(Some((0.0, START_S))),
+        start: StartSource::Span(Some((0.0, START_SPAN_S))),
         ..TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(29))
     }
 }
 
 /// Returns the RMS relative errors of K_e, T_L and so on after the start fit, and the share of samples within 1.96
 /// standard errors.
-fn errors(record: &Record, options: &TrackOptions) -> [[f64; 5]; 2] {
+fn errors_and_coverage(record: &Record, options: &TrackOptions) -> [[f64; 5]; 2] {
     let trace = track(record, options, 8).unwrap();
     let (mut squares, mut covered, mut count) = ([0.0; 5], [0.0; 5], 0.0);
     for row in 0..trace.len() {
         let t = trace.times_s()[row];
-        if t <= START_S {
+        if t <= START_SPAN_S {
             continue;
         }
         count += 1.0;
         let operator = trace.operator(row).unwrap();
-        for (i, name) in OPERATOR.iter().enumerate() {
+        for (i, name) in OPERATOR_PARAMETERS.iter().enumerate() {
             let truth = record.channel(name).unwrap()[8 * row + 7];
             let (_, _, estimate) = operator.rows()[i];
             let error = estimate.value - truth;
@@ -57,7 +57,7 @@ fn errors(record: &Record, options: &TrackOptions) -> [[f64; 5]; 2] {
 }
 
 /// Returns the root mean square over the runs.
-fn mean(all: &[[[f64; 5]; 2]], what: usize, i: usize) -> f64 {
+fn rms_over_runs(all: &[[[f64; 5]; 2]], what: usize, i: usize) -> f64 {
     let values = all.iter().map(|of| of[what][i]);
     values.sum::<f64>() / all.len() as f64
 }
@@ -71,13 +71,13 @@ fn two_sided_estimate_is_closer_with_correct_bands() {
     for condition in [Condition::C3, Condition::C4, Condition::C5, Condition::C6] {
         for replication in 0..3 {
             let record = run(condition, 2, 0.1, replication);
-            causal.push(errors(&record, &options(hoid::survey::multiple_model())));
-            smooth.push(errors(&record, &two_sided));
+            causal.push(errors_and_coverage(&record, &options(hoid::survey::multiple_model())));
+            smooth.push(errors_and_coverage(&record, &two_sided));
         }
     }
-    for (i, name) in OPERATOR.iter().enumerate() {
-        let [before, after] = [&causal, &smooth].map(|all| mean(all, 0, i));
-        let covered = mean(&smooth, 1, i);
+    for (i, name) in OPERATOR_PARAMETERS.iter().enumerate() {
+        let [before, after] = [&causal, &smooth].map(|all| rms_over_runs(all, 0, i));
+        let covered = rms_over_runs(&smooth, 1, i);
         println!("{name}: {before:.4} {after:.4}, covered {covered:.3}");
         // The page gives a ratio of .7 for K_e, T_L and K_e_dot; with twelve runs its standard error is a tenth.
         assert!(after < if i < 3 { 0.85 } else { 1.1 } * before, "{name}");
@@ -91,9 +91,9 @@ fn two_sided_estimate_is_closer_with_correct_bands() {
 fn literature_methods_track_a_change() {
     for method in [hoid::survey::fused(), hoid::survey::ekf(), hoid::survey::ukf()] {
         let all: Vec<_> = (0..4)
-            .map(|replication| errors(&run(Condition::C3, 2, 0.1, replication), &options(method.clone())))
+            .map(|replication| errors_and_coverage(&run(Condition::C3, 2, 0.1, replication), &options(method.clone())))
             .collect();
-        let found: [f64; 5] = std::array::from_fn(|i| mean(&all, 0, i));
+        let found: [f64; 5] = std::array::from_fn(|i| rms_over_runs(&all, 0, i));
         println!("{}: {found:.3?}", method.name());
         // A constant estimate at the start values would have errors of .2, .5 and .4 in the gains.
         assert!(
@@ -140,7 +140,9 @@ fn change_of_delay_is_tracked_and_named() {
         assert_eq!((delay[0], delay[8191]), (0.28, 0.34));
         let trace = track(&record, &tracked, 8).unwrap();
         assert_eq!(trace.operator_columns()[5], "tau_e");
-        let named = |(t, c): &&(f64, hoid::track::Change)| (40.96..46.0).contains(t) && c.changed().contains(&"tau_e");
+        let named = |(t, c): &&(f64, hoid::track::Change)| {
+            (40.96..46.0).contains(t) && c.changed_quantities().contains(&"tau_e")
+        };
         let (_, change) = trace.changes().iter().find(named).unwrap();
         assert!(change.tau_e_s[1].value - change.tau_e_s[0].value > 0.04, "{change:?}");
         for t in [35.0, 60.0, 81.0] {

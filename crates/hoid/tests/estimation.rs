@@ -40,7 +40,7 @@ fn error_bars_cover_the_truth() {
         let truth = Scenario::condition(Condition::C1)
             .initial
             .operator
-            .discretise(SampleTime::HUNDREDTH)
+            .discretise(SampleTime::AT_100_HZ)
             .unwrap()
             .held;
         let fit = bj().fit(std::slice::from_ref(&record)).unwrap();
@@ -194,7 +194,7 @@ fn undetermined_models_are_refused_by_name() {
     let sine = |t: usize| (0.2 * t as f64).sin();
     let lagged = |t: usize| (0.2 * t as f64 - 0.9).sin();
     let record = Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "", (0..n).map(sine).collect()),
         Channel::new("u", "", (0..n).map(lagged).collect()),
     )

@@ -4,7 +4,7 @@
 use std::process::Command;
 
 /// Returns the output of an example; cargo has built it next to this test.
-fn printed(name: &str) -> String {
+fn example_output(name: &str) -> String {
     let here = std::env::current_exe().unwrap();
     let built = here.parent().unwrap().parent().unwrap().join("examples").join(name);
     let output = Command::new(built.with_extension(std::env::consts::EXE_EXTENSION))
@@ -16,13 +16,13 @@ fn printed(name: &str) -> String {
 
 #[test]
 fn identify_file_example_runs() {
-    let text = printed("identify_file");
+    let text = example_output("identify_file");
     assert!(text.contains("omega_nm") && text.contains("report.html"), "{text}");
 }
 
 #[test]
 fn track_live_example_runs() {
-    let text = printed("track_live");
+    let text = example_output("track_live");
     assert!(
         text.contains("80.0 s") && text.contains("8192 samples, 0 skipped"),
         "{text}"
@@ -31,7 +31,7 @@ fn track_live_example_runs() {
 
 #[test]
 fn study_example_runs() {
-    let text = printed("simulate_and_study");
+    let text = example_output("simulate_and_study");
     assert!(text.contains("finished: true") && text.contains("median"), "{text}");
 }
 

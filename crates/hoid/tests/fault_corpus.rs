@@ -9,11 +9,11 @@ mod fault_corpus;
 use fault_corpus::{
     bases::{OperatorKind, Truth, base},
     inject::inject,
-    judge::{CaseOutcome, CaseTruth, Row, of_fit, of_trace},
-    kinds::{Change, Channels, Fault, FaultPosition, Kind, WHOLE, faults},
-    program::{Way, outcomes, rows},
-    summary::{Numbers, by_way, median},
-    table::{Table, spread},
+    judge::{CaseOutcome, CaseTruth, Row, judge_fit, judge_trace},
+    kinds::{Change, Channels, Fault, FaultPosition, Kind, WHOLE_LENGTH_S, faults},
+    program::{EvaluationMethod, evaluate_case, parse_rows},
+    summary::{Numbers, median, table_by_method},
+    table::{Table, standard_deviation},
 };
 use serde_json::json;
 
@@ -70,7 +70,7 @@ fn faults_change_only_their_rows_and_channels() {
         let added = table.len() as isize - clean.len() as isize;
         let end_row = table.len() - (clean.len() - to);
         assert!(
-            found.from_s <= found.to_s && found.to_s <= table.seconds() + 1e-9,
+            found.from_s <= found.to_s && found.to_s <= table.duration_s() + 1e-9,
             "{fault:?}"
         );
         assert_eq!(table.e.len(), table.t.len());
@@ -96,7 +96,7 @@ fn faults_change_only_their_rows_and_channels() {
             _ => 0,
         };
         assert_eq!(added, expected, "{fault:?}");
-        let share = found.from_s / table.seconds();
+        let share = found.from_s / table.duration_s();
         match fault.place {
             FaultPosition::Start => assert!(share < 0.08, "{fault:?}: {share}"),
             FaultPosition::Middle => assert!((0.3..0.6).contains(&share), "{fault:?}: {share}"),
@@ -110,7 +110,7 @@ fn faults_change_only_their_rows_and_channels() {
 fn faults_have_the_stated_size() {
     let (clean, second) = two_runs();
     let with = |what, on, size| inject(&fault(what, on, size, FaultPosition::Middle), &clean, &second, SEED, 9);
-    let (of_e, of_u) = (spread(&clean.e), spread(&clean.u));
+    let (of_e, of_u) = (standard_deviation(&clean.e), standard_deviation(&clean.u));
 
     let spike = with(Change::Spike, Channels::Both, 30.0);
     let k = spike.rows.0;
@@ -148,7 +148,7 @@ fn faults_have_the_stated_size() {
     assert_eq!(lost.table.t, clean.t[..clean.len() - 100]);
 
     let swapped = inject(
-        &fault(Change::Swapped, Channels::Both, WHOLE, FaultPosition::Whole),
+        &fault(Change::Swapped, Channels::Both, WHOLE_LENGTH_S, FaultPosition::Whole),
         &clean,
         &second,
         SEED,
@@ -168,7 +168,7 @@ fn faults_have_the_stated_size() {
     );
 }
 
-fn known(span_s: Option<(f64, f64)>) -> CaseTruth {
+fn known_case(span_s: Option<(f64, f64)>) -> CaseTruth {
     let truth: Truth = vec![("K_e".to_owned(), 1.0), ("tau_e".to_owned(), 0.2)];
     CaseTruth {
         truth,
@@ -188,24 +188,24 @@ fn fit(value: f64, error: Option<f64>, level: &str) -> serde_json::Value {
 
 #[test]
 fn wrong_fits_are_detected() {
-    let judged = |json: &serde_json::Value| of_fit(json, &known(Some((10.0, 11.0))));
+    let judged = |json: &serde_json::Value| judge_fit(json, &known_case(Some((10.0, 11.0))));
     let silent = judged(&fit(1.5, Some(0.1), "trustworthy"));
-    assert!(silent.wrong && !silent.flagged() && silent.silently_wrong());
+    assert!(silent.wrong && !silent.is_flagged() && silent.is_silently_wrong());
     assert!(matches!(&silent.worst, Some((name, z)) if name == "K_e" && (z - 5.0).abs() < 1e-9));
     let flagged = judged(&fit(1.5, Some(0.1), "doubtful"));
-    assert!(flagged.wrong && flagged.flagged() && !flagged.silently_wrong());
+    assert!(flagged.wrong && flagged.is_flagged() && !flagged.is_silently_wrong());
     assert!(!judged(&fit(1.39, Some(0.1), "trustworthy")).wrong);
     // A value without a standard error is not judged, except for a delay in whole samples.
     let open = judged(&fit(9.0, None, "trustworthy"));
     assert!(!open.wrong && matches!(&open.worst, Some((name, z)) if name == "tau_e" && (z - 1.0).abs() < 1e-9));
     let mut late = fit(1.0, Some(0.1), "trustworthy");
     late["operator"]["tau_e"]["value"] = json!(0.05);
-    assert!(judged(&late).silently_wrong());
+    assert!(judged(&late).is_silently_wrong());
     let mut undetermined = fit(9.0, Some(0.1), "trustworthy");
     undetermined["operator"]["K_e"]["determined"] = json!(false);
     assert!(!judged(&undetermined).wrong);
     let refused = CaseOutcome::refused();
-    assert!(refused.flagged() && !refused.wrong);
+    assert!(refused.is_flagged() && !refused.wrong);
 }
 
 #[test]
@@ -213,18 +213,18 @@ fn only_faults_at_their_place_count_as_flagged() {
     let with = |from: f64, to: f64, record: &str| {
         let mut json = fit(1.5, Some(0.1), "trustworthy");
         json["faults"] = json!([{"kind": "spike", "from": from, "to": to, "record": record}]);
-        of_fit(&json, &known(Some((10.0, 11.0))))
+        judge_fit(&json, &known_case(Some((10.0, 11.0))))
     };
-    assert!(with(11.9, 12.0, "/a/faulty.csv").flagged());
+    assert!(with(11.9, 12.0, "/a/faulty.csv").is_flagged());
     assert!(with(2.0, 9.1, "faulty.csv").placed);
-    assert!(!with(12.1, 13.0, "faulty.csv").flagged());
-    assert!(!with(10.0, 11.0, "run0.csv").flagged());
+    assert!(!with(12.1, 13.0, "faulty.csv").is_flagged());
+    assert!(!with(10.0, 11.0, "run0.csv").is_flagged());
     let mut json = fit(1.0, Some(0.1), "doubtful");
     json["verdict"]["findings"] = json!([{"kind": "faults", "severity": "doubt", "words": ""}]);
-    let clean = of_fit(&json, &known(None));
+    let clean = judge_fit(&json, &known_case(None));
     assert!(clean.of_faults && !clean.placed && clean.kinds == ["faults"]);
     json["verdict"]["findings"][0]["severity"] = json!("note");
-    assert!(!of_fit(&json, &known(None)).of_faults);
+    assert!(!judge_fit(&json, &known_case(None)).of_faults);
 }
 
 #[test]
@@ -242,16 +242,16 @@ fn traces_are_judged_at_the_end_and_during_recovery() {
         };
         (0..600).map(row).collect()
     };
-    let known = known(Some((10.0, 11.0)));
-    let back = of_trace(&json, &off_until(19.0), &known);
+    let known = known_case(Some((10.0, 11.0)));
+    let back = judge_trace(&json, &off_until(19.0), &known);
     assert!(!back.wrong);
     assert!((back.recovery_s.unwrap() - 7.9).abs() < 0.11, "{back:?}");
     assert!((back.lasting.unwrap() - 10.0).abs() < 1e-6);
-    let slow = of_trace(&json, &off_until(40.0), &known);
-    assert!(slow.silently_wrong() && slow.recovery_s.unwrap() > 28.0);
-    let never = of_trace(&json, &off_until(100.0), &known);
+    let slow = judge_trace(&json, &off_until(40.0), &known);
+    assert!(slow.is_silently_wrong() && slow.recovery_s.unwrap() > 28.0);
+    let never = judge_trace(&json, &off_until(100.0), &known);
     assert!(never.wrong && never.recovery_s.unwrap().is_infinite());
-    let short = of_trace(&json, &off_until(13.0), &known);
+    let short = judge_trace(&json, &off_until(13.0), &known);
     assert!(short.lasting.unwrap() < 2.0, "{short:?}");
     // Another person acts from 10 s on, and a trace that tracks this person is correct.
     let other = CaseTruth {
@@ -259,14 +259,14 @@ fn traces_are_judged_at_the_end_and_during_recovery() {
         span_s: Some((10.0, 10.0)),
         ..known
     };
-    assert!(!of_trace(&json, &off_until(100.0), &other).wrong);
-    assert!(of_trace(&json, &off_until(12.0), &other).wrong);
+    assert!(!judge_trace(&json, &off_until(100.0), &other).wrong);
+    assert!(judge_trace(&json, &off_until(12.0), &other).wrong);
 }
 
 #[test]
 fn trace_rows_are_parsed() {
     let text = "# of hoid\nt,b0,b0_se,K_e,K_e_se,convertible\n0.1,1,0.5,2,0.25,1\n0.2,1,0.5,,,0\n";
-    let found = rows(text);
+    let found = parse_rows(text);
     assert_eq!(found.len(), 2);
     assert_eq!(found[0].t, 0.1);
     assert_eq!(found[0].claims[1], ("K_e".to_owned(), 2.0, 0.25));
@@ -278,7 +278,7 @@ fn tables_count_the_results() {
     assert_eq!(median(vec![3.0, f64::INFINITY, 1.0]), Some(3.0));
     assert_eq!(median(Vec::new()), None);
     assert_eq!(Numbers::of(&[]), Numbers::default());
-    assert!(by_way(&[]).contains("| C1, C2 | grey-box | 0 | – |"));
+    assert!(table_by_method(&[]).contains("| C1, C2 | grey-box | 0 | – |"));
 }
 
 /// Acceptance test: every wrong result is flagged.
@@ -293,7 +293,7 @@ fn every_wrong_result_is_flagged() {
         .step_by(29)
         .flat_map(|(case, fault)| {
             let who = OperatorKind::ALL[case as usize % 3];
-            outcomes(&program, SEED, case, fault, who, &Way::ALL).unwrap()
+            evaluate_case(&program, SEED, case, fault, who, &EvaluationMethod::ALL).unwrap()
         })
         .collect();
     let silent: Vec<String> = all
@@ -301,8 +301,8 @@ fn every_wrong_result_is_flagged() {
         // Methods that are also wrong on clean runs are excluded, because the fault is not the cause: rls has its own
         // noise model, and trackers with a start span of 13 s are wrong on some clean runs of people (the page gives
         // the frequency).
-        .filter(|o| o.way != Way::Rls && (o.who != OperatorKind::Person || !o.way.tracks()))
-        .filter(|o| o.judged.silently_wrong())
+        .filter(|o| o.way != EvaluationMethod::Rls && (o.who != OperatorKind::Person || !o.way.is_tracker()))
+        .filter(|o| o.judged.is_silently_wrong())
         .map(|o| {
             let (kind, size, way) = (o.fault.kind.name(), o.fault.size_text(), o.way.name());
             format!("{kind} {size} in {}, {way}: {:?}", o.label, o.judged.worst)

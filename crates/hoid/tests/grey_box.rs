@@ -11,7 +11,7 @@ use hoid::{
     prelude::*,
 };
 
-const NAMES: [&str; 8] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e", "T_n", "K_n"];
+const PARAMETER_NAMES: [&str; 8] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e", "T_n", "K_n"];
 
 fn runs(condition: Condition, m0: usize, n: u64) -> Vec<Record> {
     let mut scenario = Scenario::condition(condition);
@@ -37,8 +37,8 @@ fn grey_box(m: usize) -> GreyBox {
     GreyBox::new(m..=m)
 }
 
-/// Returns the estimates with their true values, in the order of [`NAMES`].
-fn pairs(fit: &GreyBoxFit, record: &Record, condition: Condition) -> [(Estimate, f64); 8] {
+/// Returns the estimates with their true values, in the order of [`PARAMETER_NAMES`].
+fn estimates_with_truth(fit: &GreyBoxFit, record: &Record, condition: Condition) -> [(Estimate, f64); 8] {
     let truth = Scenario::condition(condition).initial.operator;
     let (o, r) = (fit.operator(0).unwrap(), fit.remnant(0).unwrap());
     [
@@ -62,7 +62,7 @@ fn median(values: &[f64]) -> f64 {
 
 /// Fits with known m in both conditions: the medians are within 5 %, the spread agrees with the information matrix, and
 /// the intervals have the nominal coverage.
-fn unbiased_and_efficient(m0: usize) {
+fn check_bias_and_efficiency(m0: usize) {
     let n = 100;
     let mut inside = [0; 8];
     for condition in [Condition::C1, Condition::C2] {
@@ -72,7 +72,7 @@ fn unbiased_and_efficient(m0: usize) {
         for record in runs(condition, m0, n) {
             let fit = grey_box(m0).fit(std::slice::from_ref(&record)).unwrap();
             assert!(fit.termination().converged(), "{:?}", fit.termination());
-            for (i, (e, truth)) in pairs(&fit, &record, condition).into_iter().enumerate() {
+            for (i, (e, truth)) in estimates_with_truth(&fit, &record, condition).into_iter().enumerate() {
                 let se = e.standard_error.unwrap();
                 relative[i].push(e.value / truth - 1.0);
                 variance[i] += (e.value - truth).powi(2) / n as f64;
@@ -81,7 +81,7 @@ fn unbiased_and_efficient(m0: usize) {
                 inside[i] += u64::from((e.value - truth).abs() < 1.96 * se);
             }
         }
-        for (i, name) in NAMES.iter().enumerate() {
+        for (i, name) in PARAMETER_NAMES.iter().enumerate() {
             let (bias, ratio) = (median(&relative[i]), variance[i] / expected[i]);
             println!(
                 "{condition:?} m={m0} {name:8} median bias {:+.2} %  spread {:.2} %  mean square error / bound {ratio:.2}",
@@ -94,29 +94,29 @@ fn unbiased_and_efficient(m0: usize) {
         }
     }
     let shares = inside.map(|c| c as f64 / (2 * n) as f64);
-    println!("m={m0}: coverage of nominal 95 % intervals {shares:.3?} for {NAMES:?}");
+    println!("m={m0}: coverage of nominal 95 % intervals {shares:.3?} for {PARAMETER_NAMES:?}");
     // With 200 runs the standard error is 1.5 %; the tolerance is four standard errors.
     assert!(shares.iter().all(|s| (0.89..=1.0).contains(s)), "{shares:?}");
 }
 
 #[test]
-fn unbiased_with_a_remnant_of_first_order() {
-    unbiased_and_efficient(1);
+fn first_order_remnant_fits_are_unbiased() {
+    check_bias_and_efficiency(1);
 }
 
 #[test]
-fn unbiased_with_a_remnant_of_second_order() {
-    unbiased_and_efficient(2);
+fn second_order_remnant_fits_are_unbiased() {
+    check_bias_and_efficiency(2);
 }
 
 #[test]
-fn unbiased_with_a_remnant_of_third_order() {
-    unbiased_and_efficient(3);
+fn third_order_remnant_fits_are_unbiased() {
+    check_bias_and_efficiency(3);
 }
 
 #[test]
-fn unbiased_with_a_remnant_of_fourth_order() {
-    unbiased_and_efficient(4);
+fn fourth_order_remnant_fits_are_unbiased() {
+    check_bias_and_efficiency(4);
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn remnant_order_is_found() {
 
 #[test]
 fn white_remnant_is_distinguished_from_coloured() {
-    let signals = delayed(0.3, 4000, 0.004);
+    let signals = simulate_delay(0.3, 4000, 0.004);
     let fit = GreyBox::new(0..=2).fit(&[signals]).unwrap();
     assert_eq!(fit.order(), 0);
     assert!(fit.remnant(0).is_none());
@@ -149,12 +149,12 @@ fn white_remnant_is_distinguished_from_coloured() {
 
 /// The operator with a delay of `tau` in open loop. The held input is integrated exactly over the parts of each sample
 /// before and after a new value reaches the system, so the simulation does not use the discrete model under test.
-fn delayed(tau: f64, n: usize, noise: f64) -> Record {
-    respond([0.09, 0.036, 11.25, 0.35, tau], n, noise, 0)
+fn simulate_delay(tau: f64, n: usize, noise: f64) -> Record {
+    simulate_operator([0.09, 0.036, 11.25, 0.35, tau], n, noise, 0)
 }
 
-/// As [`delayed`], for `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`.
-fn respond([k_e, k_e_dot, omega, zeta, tau]: [f64; 5], n: usize, noise: f64, replication: u64) -> Record {
+/// As [`simulate_delay`], for `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`.
+fn simulate_operator([k_e, k_e_dot, omega, zeta, tau]: [f64; 5], n: usize, noise: f64, replication: u64) -> Record {
     let l = (tau / 0.01 + 1e-9).floor() as usize;
     let delta = tau - 0.01 * l as f64;
     let over =
@@ -184,7 +184,7 @@ fn respond([k_e, k_e_dot, omega, zeta, tau]: [f64; 5], n: usize, noise: f64, rep
         }
     }
     Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "deg", e),
         Channel::new("u", "deg", u),
     )
@@ -199,7 +199,7 @@ fn every_delay_is_exact_without_noise() {
                 initial_state,
                 ..grey_box(0)
             }
-            .fit(&[delayed(tau, 3000, 0.0)])
+            .fit(&[simulate_delay(tau, 3000, 0.0)])
             .unwrap();
             assert_eq!(fit.termination().reason, Reason::ExactFit, "{tau}");
             let o = fit.operator_parameters(0).unwrap();
@@ -241,8 +241,8 @@ fn every_operator_is_found_from_default_starts() {
             0.08 + 1.2 * share(z[3]),
             0.08 + 0.4 * share(z[4]),
         ];
-        let record = respond(parameters, 3000, 0.01, i as u64);
-        let silent = respond(parameters, 3000, 0.0, i as u64);
+        let record = simulate_operator(parameters, 3000, 0.01, i as u64);
+        let silent = simulate_operator(parameters, 3000, 0.0, i as u64);
         let fit = match grey_box(0).fit(std::slice::from_ref(&record)) {
             Ok(fit) => fit,
             Err(IdentError::SingularInformation { .. }) => {
@@ -273,7 +273,7 @@ fn every_operator_is_found_from_default_starts() {
 
 #[test]
 fn delay_between_samples_is_found_in_noise() {
-    let fit = grey_box(0).fit(&[delayed(0.2837, 6000, 0.02)]).unwrap();
+    let fit = grey_box(0).fit(&[simulate_delay(0.2837, 6000, 0.02)]).unwrap();
     let tau = fit.operator(0).unwrap().tau_e_s;
     let error = tau.standard_error.unwrap();
     println!("tau_e {:.5} s, standard error {error:.5} s", tau.value);
@@ -416,7 +416,7 @@ fn invalid_data_and_options_are_errors() {
         }
     }
     let still = Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "", vec![0.0; 500]),
         Channel::new("u", "", (0..500).map(f64::from).collect()),
     )

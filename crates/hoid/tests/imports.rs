@@ -62,7 +62,7 @@ fn attributes(item: &Item) -> &[Attribute] {
 }
 
 /// Returns the name that an item defines in its module.
-fn name(item: &Item) -> Option<String> {
+fn item_name(item: &Item) -> Option<String> {
     let name = match item {
         Item::Const(i) => &i.ident,
         Item::Enum(i) => &i.ident,
@@ -78,11 +78,11 @@ fn name(item: &Item) -> Option<String> {
 }
 
 impl Module {
-    fn use_tree(&mut self, tree: &UseTree, mut before: Vec<String>, again: bool) {
+    fn add_imports(&mut self, tree: &UseTree, mut before: Vec<String>, again: bool) {
         match tree {
             UseTree::Path(path) => {
                 before.push(path.ident.to_string());
-                self.use_tree(&path.tree, before, again);
+                self.add_imports(&path.tree, before, again);
             }
             UseTree::Name(name) if name.ident == "self" => {
                 let local = before.last().unwrap().clone();
@@ -102,7 +102,7 @@ impl Module {
             UseTree::Glob(_) => self.globs.push((before, again)),
             UseTree::Group(group) => {
                 for tree in &group.items {
-                    self.use_tree(tree, before.clone(), again);
+                    self.add_imports(tree, before.clone(), again);
                 }
             }
         }
@@ -122,17 +122,17 @@ impl<'ast> Visit<'ast> for Paths<'_> {
 
     fn visit_macro(&mut self, used: &'ast syn::Macro) {
         self.visit_path(&used.path);
-        tokens(used.tokens.clone(), &mut self.0.paths);
+        collect_paths(used.tokens.clone(), &mut self.0.paths);
     }
 
     fn visit_item_use(&mut self, item: &'ast syn::ItemUse) {
         // An import may be within a function.
-        self.0.use_tree(&item.tree, Vec::new(), false);
+        self.0.add_imports(&item.tree, Vec::new(), false);
     }
 }
 
 /// Returns the names of the types that a macro declares, or would declare if it was used.
-fn declared(stream: TokenStream, found: &mut BTreeSet<String>) {
+fn collect_declared_types(stream: TokenStream, found: &mut BTreeSet<String>) {
     let mut declares = false;
     for token in stream {
         match token {
@@ -141,14 +141,14 @@ fn declared(stream: TokenStream, found: &mut BTreeSet<String>) {
                 declares = false;
             }
             TokenTree::Ident(ident) => declares = ident == "struct" || ident == "enum",
-            TokenTree::Group(group) => declared(group.stream(), found),
+            TokenTree::Group(group) => collect_declared_types(group.stream(), found),
             _ => declares = false,
         }
     }
 }
 
 /// Returns sequences of names that are joined by `::`.
-fn tokens(stream: TokenStream, found: &mut Vec<Vec<String>>) {
+fn collect_paths(stream: TokenStream, found: &mut Vec<Vec<String>>) {
     let (mut run, mut colons) = (Vec::new(), 0);
     for token in stream {
         match token {
@@ -163,7 +163,7 @@ fn tokens(stream: TokenStream, found: &mut Vec<Vec<String>>) {
             other => {
                 found.push(std::mem::take(&mut run));
                 if let TokenTree::Group(group) = other {
-                    tokens(group.stream(), found);
+                    collect_paths(group.stream(), found);
                 }
             }
         }
@@ -176,12 +176,12 @@ impl Crate {
     fn read(root: &Path) -> Self {
         let mut all = Self::default();
         let code = syn::parse_file(&fs::read_to_string(root).unwrap()).unwrap();
-        all.module(root, root.parent().unwrap(), None, &code.items);
+        all.add_module(root, root.parent().unwrap(), None, &code.items);
         all
     }
 
     /// `folder` is the folder of the files of child modules.
-    fn module(&mut self, file: &Path, folder: &Path, parent: Option<usize>, items: &[Item]) -> usize {
+    fn add_module(&mut self, file: &Path, folder: &Path, parent: Option<usize>, items: &[Item]) -> usize {
         let at = self.modules.len();
         self.modules.push(Module {
             file: file.to_owned(),
@@ -189,28 +189,28 @@ impl Crate {
             ..Module::default()
         });
         for item in items.iter().filter(|item| !is_test(attributes(item))) {
-            self.modules[at].items.extend(name(item));
+            self.modules[at].items.extend(item_name(item));
             match item {
                 Item::Use(import) => {
                     let again = !matches!(import.vis, Visibility::Inherited);
-                    self.modules[at].use_tree(&import.tree, Vec::new(), again);
+                    self.modules[at].add_imports(&import.tree, Vec::new(), again);
                 }
                 Item::Mod(child) => {
                     let name = child.ident.to_string();
                     let inner = folder.join(&name);
                     let index = if let Some((_, items)) = &child.content {
-                        self.module(file, &inner, Some(at), items)
+                        self.add_module(file, &inner, Some(at), items)
                     } else {
                         let paths = [folder.join(format!("{name}.rs")), inner.join("mod.rs")];
                         let path = paths.iter().find(|path| path.exists()).unwrap();
                         let code = syn::parse_file(&fs::read_to_string(path).unwrap()).unwrap();
-                        self.module(path, &inner, Some(at), &code.items)
+                        self.add_module(path, &inner, Some(at), &code.items)
                     };
                     self.modules[at].children.insert(name, index);
                 }
                 other => {
                     if let Item::Macro(used) = other {
-                        declared(used.mac.tokens.clone(), &mut self.modules[at].items);
+                        collect_declared_types(used.mac.tokens.clone(), &mut self.modules[at].items);
                     }
                     Paths(&mut self.modules[at]).visit_item(other);
                 }

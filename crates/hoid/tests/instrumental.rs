@@ -20,11 +20,11 @@ fn operator_iv(method: IvMethod, instruments: Instruments, nk: usize) -> Instrum
     iv(method, instruments, method.structure().operator_orders(nk))
 }
 
-fn external() -> Instruments {
+fn external_instruments() -> Instruments {
     Instruments::External("f_t".to_owned())
 }
 
-fn one(record: &Record) -> &[Record] {
+fn single_record(record: &Record) -> &[Record] {
     std::slice::from_ref(record)
 }
 
@@ -58,7 +58,7 @@ impl Sample {
     }
 
     /// Returns the distance of the mean from the true value in standard errors of the mean.
-    fn bias(&self, truth: f64) -> f64 {
+    fn bias_in_errors(&self, truth: f64) -> f64 {
         (self.mean() - truth) / (self.spread() / (self.values.len() as f64).sqrt())
     }
 
@@ -124,10 +124,12 @@ fn open_loop_is_unbiased_with_correct_errors() {
     for replication in 0..runs {
         let record = open_loop(&[], 1.0, 1000, replication);
         let orders = textbook_orders(IvMethod::RivBj);
-        let pem = Estimator::new(Structure::BoxJenkins, orders).fit(one(&record)).unwrap();
+        let pem = Estimator::new(Structure::BoxJenkins, orders)
+            .fit(single_record(&record))
+            .unwrap();
         let others = IvMethod::ALL.map(|method| {
             iv(method, Instruments::Simulated, textbook_orders(method))
-                .fit(one(&record))
+                .fit(single_record(&record))
                 .unwrap()
         });
         for (fit, samples) in [pem].iter().chain(&others).zip(&mut of_methods) {
@@ -146,12 +148,12 @@ fn open_loop_is_unbiased_with_correct_errors() {
             println!(
                 "{method:6} {}: bias {:+.2} standard errors, spread {:.5}, standard error / spread {ratio:.2}, spread / PEM {:.2}",
                 names[i],
-                sample.bias(truth[i]),
+                sample.bias_in_errors(truth[i]),
                 sample.spread(),
                 sample.spread() / of_methods[0][i].spread()
             );
             // The largest of 16 normal numbers exceeds 3.3 for 1.5 % of all seeds.
-            assert!(sample.bias(truth[i]).abs() < 3.3, "{method} {}", names[i]);
+            assert!(sample.bias_in_errors(truth[i]).abs() < 3.3, "{method} {}", names[i]);
             // A standard deviation from 100 runs has a standard error of 7 %; the tolerance is four standard errors.
             assert!((0.75..1.35).contains(&ratio), "{method} {}: {ratio}", names[i]);
         }
@@ -216,17 +218,17 @@ fn runs(delay_s: f64, time_constant_s: f64, m0: usize, level: f64, n: u64) -> Ve
         .collect()
 }
 
-const NAMES: [&str; 6] = ["b0", "f1", "K_e", "T_L", "omega_nm", "zeta_nm"];
+const PARAMETER_NAMES: [&str; 6] = ["b0", "f1", "K_e", "T_L", "omega_nm", "zeta_nm"];
 
 fn truth() -> [f64; 6] {
     let operator = Scenario::condition(Condition::C1).initial.operator;
-    let held = operator.discretise(SampleTime::HUNDREDTH).unwrap().held;
+    let held = operator.discretise(SampleTime::AT_100_HZ).unwrap().held;
     [held.b0, held.f1, 0.09, 0.4, 11.25, 0.35]
 }
 
 /// Fits all runs, and prints bias, spread and median standard error in % of the true value.
 fn fit_all(label: &str, records: &[Record], fit: impl Fn(&Record) -> Result<Fit, IdentError>) -> Vec<Sample> {
-    let mut samples: Vec<Sample> = NAMES.iter().map(|_| Sample::new()).collect();
+    let mut samples: Vec<Sample> = PARAMETER_NAMES.iter().map(|_| Sample::new()).collect();
     let mut left_out = 0;
     for record in records {
         let fit = fit(record).unwrap();
@@ -263,13 +265,15 @@ fn fit_all(label: &str, records: &[Record], fit: impl Fn(&Record) -> Result<Fit,
     samples
 }
 
-fn pem(nk: usize) -> impl Fn(&Record) -> Result<Fit, IdentError> {
-    move |record| Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk)).fit(one(record))
+fn pem_fit(nk: usize) -> impl Fn(&Record) -> Result<Fit, IdentError> {
+    move |record| {
+        Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk)).fit(single_record(record))
+    }
 }
 
 /// Checks that the mean is within a given number of its standard errors plus a share of the true value.
 fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
-    for ((sample, truth), name) in samples.iter().zip(truth()).zip(NAMES) {
+    for ((sample, truth), name) in samples.iter().zip(truth()).zip(PARAMETER_NAMES) {
         let distance = (sample.mean() - truth).abs();
         let allowed = errors * sample.spread() / (sample.values.len() as f64).sqrt() + share * truth.abs();
         assert!(distance < allowed, "{label} {name}: {distance} {allowed}");
@@ -282,29 +286,31 @@ fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
 fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
     let nk = 6;
     let records = runs(0.05, 0.3, 1, 0.3, 40);
-    println!("bias ± spread (median standard error) in % of {NAMES:?}");
-    let by_pem = fit_all("pem", &records, pem(nk));
+    println!("bias ± spread (median standard error) in % of {PARAMETER_NAMES:?}");
+    let by_pem = fit_all("pem", &records, pem_fit(nk));
     for method in [IvMethod::Iv4, IvMethod::Sriv] {
         let from_e = fit_all(&format!("{method} simulated"), &records, |r| {
-            operator_iv(method, Instruments::Simulated, nk).fit(one(r))
+            operator_iv(method, Instruments::Simulated, nk).fit(single_record(r))
         });
         // b0 is too small by about 30 %, with a standard error of the mean of 2 %.
-        assert!(from_e[0].bias(truth()[0]) < -8.0, "{method}");
+        assert!(from_e[0].bias_in_errors(truth()[0]) < -8.0, "{method}");
     }
     for method in IvMethod::ALL {
         let label = format!("{method} from f_t");
-        let samples = fit_all(&label, &records, |r| operator_iv(method, external(), nk).fit(one(r)));
+        let samples = fit_all(&label, &records, |r| {
+            operator_iv(method, external_instruments(), nk).fit(single_record(r))
+        });
         // The estimate is not linear in the data, so a second-order bias of a few per cent is expected if the spread is
         // 13 %.
         assert_unbiased(&label, &samples, 3.5, 0.02);
         for (i, (ours, theirs)) in samples.iter().zip(&by_pem).enumerate() {
             let ratio = (ours.spread() / theirs.spread()).powi(2);
-            println!("    {}: variance / PEM {ratio:.2}", NAMES[i]);
+            println!("    {}: variance / PEM {ratio:.2}", PARAMETER_NAMES[i]);
             // PEM also uses the excitation by the noise. Standard deviations from 40 runs have a standard error of 11
             // %.
-            assert!((0.6..5.0).contains(&ratio), "{label} {}: {ratio}", NAMES[i]);
+            assert!((0.6..5.0).contains(&ratio), "{label} {}: {ratio}", PARAMETER_NAMES[i]);
             let known = ours.median_error() / ours.spread();
-            assert!((0.6..1.5).contains(&known), "{label} {}: {known}", NAMES[i]);
+            assert!((0.6..1.5).contains(&known), "{label} {}: {known}", PARAMETER_NAMES[i]);
         }
     }
 }
@@ -314,9 +320,9 @@ fn refined_method_with_the_right_noise_model_is_pem() {
     let records = runs(0.28, 0.06, 1, 0.3, 12);
     for record in &records {
         let a = operator_iv(IvMethod::RivBj, Instruments::Simulated, 29)
-            .fit(one(record))
+            .fit(single_record(record))
             .unwrap();
-        let b = pem(29)(record).unwrap();
+        let b = pem_fit(29)(record).unwrap();
         assert!(a.termination().converged());
         for ((name, a), (_, b)) in a.parameters().into_iter().zip(b.parameters()) {
             assert!(
@@ -327,15 +333,15 @@ fn refined_method_with_the_right_noise_model_is_pem() {
     }
 }
 
-fn reference_cell(m0: usize, level: f64, n: u64) {
+fn check_reference_cell(m0: usize, level: f64, n: u64) {
     let records = runs(0.28, 0.06, m0, level, n);
     println!("m0 = {m0}, P_n = {level}, {n} runs");
-    let by_pem = fit_all("pem", &records, pem(29));
-    for instruments in [Instruments::Simulated, external()] {
+    let by_pem = fit_all("pem", &records, pem_fit(29));
+    for instruments in [Instruments::Simulated, external_instruments()] {
         for method in IvMethod::ALL {
             let label = format!("{method} {instruments}");
             let samples = fit_all(&label, &records, |r| {
-                operator_iv(method, instruments.clone(), 29).fit(one(r))
+                operator_iv(method, instruments.clone(), 29).fit(single_record(r))
             });
             if instruments == Instruments::Simulated {
                 continue;
@@ -356,16 +362,16 @@ fn reference_cell(m0: usize, level: f64, n: u64) {
 
 #[test]
 fn reference_loop_is_unbiased_from_f_t() {
-    reference_cell(1, 0.1, 16);
-    reference_cell(4, 0.1, 16);
+    check_reference_cell(1, 0.1, 16);
+    check_reference_cell(4, 0.1, 16);
 }
 
 #[test]
 #[ignore = "prints the table of the book; minutes"]
-fn reference_loop_table() {
+fn reference_loop_table_is_printed() {
     for m0 in 1..=4 {
         for level in [0.1, 0.3] {
-            reference_cell(m0, level, 60);
+            check_reference_cell(m0, level, 60);
         }
     }
 }
@@ -375,7 +381,7 @@ fn missing_or_useless_channel_is_an_error() {
     let record = runs(0.28, 0.06, 1, 0.1, 1).remove(0);
     let fit = |channel: &str, record: &Record| {
         let instruments = Instruments::External(channel.to_owned());
-        operator_iv(IvMethod::Sriv, instruments, 29).fit(one(record))
+        operator_iv(IvMethod::Sriv, instruments, 29).fit(single_record(record))
     };
     match fit("forcing", &record) {
         Err(error @ IdentError::NoChannel { .. }) => {
@@ -403,7 +409,7 @@ fn instruments_without_power_in_the_span_are_reported() {
     let record = record.with_channel(Channel::new("late", "", late)).unwrap();
     for method in IvMethod::ALL {
         let instruments = Instruments::External("late".to_owned());
-        match iv(method, instruments, textbook_orders(method)).fit(one(&record)) {
+        match iv(method, instruments, textbook_orders(method)).fit(single_record(&record)) {
             Err(IdentError::SingularInstruments { dependence }) => {
                 assert!(dependence.contains("is zero"), "{dependence}")
             }
@@ -417,7 +423,7 @@ fn noise_free_record_gives_the_truth() {
     let record = open_loop(&[], 0.0, 400, 3);
     for method in IvMethod::ALL {
         let fit = iv(method, Instruments::Simulated, textbook_orders(method))
-            .fit(one(&record))
+            .fit(single_record(&record))
             .unwrap();
         assert_eq!(fit.termination().reason, Reason::ExactFit, "{method}");
         assert!(fit.covariance().is_none());
@@ -436,7 +442,7 @@ fn one_sample_too_few_is_an_error_and_no_length_panics() {
     for samples in [1, 2, 29, 30, 31, 33, 35, 36, 37, 38, 39, 40, 45, 60, 90, 150, 400] {
         let record = [whole.span(0.0, 0.01 * f64::from(samples)).unwrap()];
         for method in IvMethod::ALL {
-            for instruments in [Instruments::Simulated, external()] {
+            for instruments in [Instruments::Simulated, external_instruments()] {
                 match operator_iv(method, instruments, 29).fit(&record) {
                     Ok(fit) => {
                         // There are 30 samples before the first row, and 4 parameters.
@@ -476,27 +482,33 @@ fn options_are_checked_and_the_iteration_limit_reported() {
             ..sound.clone()
         },
     ] {
-        assert!(matches!(wrong.fit(one(&record)), Err(IdentError::BadOption { .. })));
+        assert!(matches!(
+            wrong.fit(single_record(&record)),
+            Err(IdentError::BadOption { .. })
+        ));
     }
     let other = iv(IvMethod::Iv4, Instruments::Simulated, textbook_orders(method));
-    assert!(matches!(other.fit(one(&record)), Err(IdentError::Model(_))));
+    assert!(matches!(other.fit(single_record(&record)), Err(IdentError::Model(_))));
     assert!(matches!(sound.fit(&[]), Err(IdentError::NoRecords)));
     let cut = InstrumentalVariable {
         max_iterations: 1,
         ..sound.clone()
     }
-    .fit(one(&record))
+    .fit(single_record(&record))
     .unwrap();
     assert_eq!(cut.termination().reason, Reason::IterationLimit);
     assert!(!cut.termination().converged());
-    assert_eq!(sound.fit(one(&record)).unwrap().start(), "sriv, simulated instruments");
+    assert_eq!(
+        sound.fit(single_record(&record)).unwrap().start(),
+        "sriv, simulated instruments"
+    );
 }
 
 #[test]
 fn several_records_reduce_the_standard_errors() {
     let records = runs(0.28, 0.06, 1, 0.1, 4);
     for method in IvMethod::ALL {
-        let estimator = operator_iv(method, external(), 29);
+        let estimator = operator_iv(method, external_instruments(), 29);
         let (one, four) = (estimator.fit(&records[..1]).unwrap(), estimator.fit(&records).unwrap());
         for ((name, a), (_, b)) in one.parameters().into_iter().zip(four.parameters()) {
             let ratio = a.standard_error.unwrap() / b.standard_error.unwrap();

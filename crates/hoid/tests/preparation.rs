@@ -18,7 +18,7 @@ fn run(replication: u64) -> Record {
 }
 
 /// Returns a record of e and u only, with the output `late` samples late.
-fn bare(record: &Record, late: usize) -> Record {
+fn delayed_record(record: &Record, late: usize) -> Record {
     let n = record.len();
     let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
     Record::new(
@@ -29,7 +29,7 @@ fn bare(record: &Record, late: usize) -> Record {
     .unwrap()
 }
 
-fn prepared(record: Record, change: impl FnOnce(&mut Preparation)) -> Record {
+fn prepare(record: Record, change: impl FnOnce(&mut Preparation)) -> Record {
     let mut preparation = Preparation::default();
     change(&mut preparation);
     preparation.apply(record).unwrap().0
@@ -39,8 +39,8 @@ fn prepared(record: Record, change: impl FnOnce(&mut Preparation)) -> Record {
 fn offset_gives_the_aligned_record() {
     let whole = run(1);
     // u is recorded three samples late in the file.
-    let late = bare(&whole, 3);
-    let aligned = prepared(late, |p| {
+    let late = delayed_record(&whole, 3);
+    let aligned = prepare(late, |p| {
         p.offset.insert("u".into(), Offset::Samples(3.0));
     });
     let n = aligned.len();
@@ -52,8 +52,8 @@ fn offset_gives_the_aligned_record() {
 fn units_change_only_the_gains() {
     let orders = Structure::BoxJenkins.operator_orders(29);
     let fit = |record: Record| Estimator::new(Structure::BoxJenkins, orders).fit(&[record]).unwrap();
-    let plain = fit(bare(&run(1), 0)).operator().unwrap();
-    let volts = fit(prepared(bare(&run(1), 0), |p| {
+    let plain = fit(delayed_record(&run(1), 0)).operator().unwrap();
+    let volts = fit(prepare(delayed_record(&run(1), 0), |p| {
         p.scale.insert("u".into(), Scaling::by(0.25, Some("V")).unwrap());
     }))
     .operator()
@@ -79,7 +79,9 @@ fn decimated_record_gives_the_same_operator() {
     let mut sums = [[0.0; 2]; 5];
     let mut worst = 0.0_f64;
     for replication in 0..RUNS {
-        let record = prepared(bare(&run(replication), 0), |p| p.rate = NewRate::Decimated(FACTOR));
+        let record = prepare(delayed_record(&run(replication), 0), |p| {
+            p.rate = NewRate::Decimated(FACTOR)
+        });
         assert!((record.sample_time().s() - 0.04).abs() < 1e-15);
         let fit = GreyBox::new(1..=4).fit(&[record]).unwrap();
         let o = fit.operator(0).unwrap();

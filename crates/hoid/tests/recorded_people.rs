@@ -19,7 +19,7 @@ use hoid::{
 
 /// Person, plant, crossover in rad/s by Fourier coefficients at the disturbance lines, averaged
 /// over ten trials (published with the recordings; computed independently).
-const CROSSOVER: [(&str, &str, f64); 6] = [
+const CROSSOVERS_RAD_S: [(&str, &str, f64); 6] = [
     ("P03", "fo", 1.99),
     ("P03", "so", 1.21),
     ("P05", "fo", 3.95),
@@ -59,7 +59,7 @@ fn crossover_agrees_with_the_describing_function() {
         return;
     };
     let mut failures = Vec::new();
-    for (person, plant, expected) in CROSSOVER {
+    for (person, plant, expected) in CROSSOVERS_RAD_S {
         let records = trials(&directory, person, plant);
         assert_eq!(records.len(), 10, "{person} {plant}");
         assert!(records.iter().all(|r| r.len() == 2400));

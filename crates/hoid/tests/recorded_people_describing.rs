@@ -9,7 +9,7 @@ use std::{env, path::Path};
 
 use hoid::{
     ident::frequency::{
-        Averaging, DescribingOptions, Excitation, GainLeadDelayOptions, LineSearch, MeasuredElement, describe,
+        Averaging, DescribingOptions, Excitation, GainLeadDelayOptions, LineDetectionOptions, MeasuredElement, describe,
     },
     io::{ReadOptions, read_record},
     model::ContinuousTransferFunction,
@@ -83,7 +83,7 @@ fn describing_functions_match_the_table() {
         assert_eq!(records.len(), 10);
         let first_order = row.plant == "fo";
         let harmonics = if first_order { &PRIMES[..] } else { &PRIMES[..7] };
-        let excitation = Excitation::of_harmonics(harmonics, 20.0).unwrap();
+        let excitation = Excitation::from_harmonics(harmonics, 20.0).unwrap();
         // The span contains two periods of the disturbance after the ramp. The u of a row was read one row before the
         // error of the row was displayed.
         let options = DescribingOptions {
@@ -100,7 +100,7 @@ fn describing_functions_match_the_table() {
             ..DescribingOptions::default()
         };
         let span = records[0].span(5.0, 45.0).unwrap();
-        let found = Excitation::found_in(&span, "d", &LineSearch::default()).unwrap();
+        let found = Excitation::detect(&span, "d", &LineDetectionOptions::default()).unwrap();
         assert_eq!(found.harmonics(), harmonics);
 
         let h = describe(&records, &excitation, &options).unwrap();

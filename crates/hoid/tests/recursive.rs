@@ -5,11 +5,11 @@
 use hoid::{
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
     prelude::*,
-    track::{Method, StartAt, TrackOptions, Tracker, track},
+    track::{Method, StartSource, TrackOptions, Tracker, track},
 };
 
 const NK: usize = 29;
-const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
+const OPERATOR_PARAMETERS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 
 fn scenario(condition: Condition, remnant_order: usize, noise_level: f64) -> Scenario {
     let mut scenario = Scenario::condition(condition);
@@ -33,13 +33,13 @@ fn run(simulator: &Simulator, replication: u64) -> Record {
 fn options(method: Method) -> TrackOptions {
     let structure = method.default_structure();
     TrackOptions {
-        start: StartAt::Span(Some((0.0, 30.72))),
+        start: StartSource::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(method, structure, structure.operator_orders(NK))
     }
 }
 
 /// Computes the results of the runs on all cores and returns them in order.
-fn on_all_cores<T: Send>(runs: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
+fn run_on_all_cores<T: Send>(runs: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
     let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u64);
     let mut results: Vec<(u64, T)> = std::thread::scope(|scope| {
         let one = &one;
@@ -58,13 +58,13 @@ fn on_all_cores<T: Send>(runs: u64, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
 /// Returns the standard deviations of the z-scores of the operator at the end of runs of C1 with m = 1 and P_n = .1.
 fn z_scores(options: &TrackOptions, runs: u64) -> [f64; 5] {
     let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap();
-    let squares = on_all_cores(runs, |r| {
+    let squares = run_on_all_cores(runs, |r| {
         let record = run(&simulator, r);
         let trace = track(&record, options, record.len()).unwrap();
         let operator = trace.operator(trace.len() - 1).unwrap();
         std::array::from_fn::<f64, 5, _>(|i| {
             let (_, _, estimate) = operator.rows()[i];
-            let truth = record.channel(OPERATOR[i]).unwrap()[0];
+            let truth = record.channel(OPERATOR_PARAMETERS[i]).unwrap()[0];
             ((estimate.value - truth) / estimate.standard_error.unwrap()).powi(2)
         })
     });
@@ -73,7 +73,7 @@ fn z_scores(options: &TrackOptions, runs: u64) -> [f64; 5] {
     deviations
 }
 
-fn with_memory(method: Method, memory: &str) -> TrackOptions {
+fn options_with_memory(method: Method, memory: &str) -> TrackOptions {
     options(method.clone()).with(&[("memory", memory)]).unwrap()
 }
 
@@ -83,8 +83,8 @@ fn error_bars_are_correct_with_infinite_memory() {
         // The start fit uses half of the record, so its errors are nearly normal. The standard error of a standard
         // deviation from 6000 runs is 1/sqrt(12000) = .009.
         let half = TrackOptions {
-            start: StartAt::Span(Some((0.0, 40.96))),
-            ..with_memory(method.clone(), "inf")
+            start: StartSource::Span(Some((0.0, 40.96))),
+            ..options_with_memory(method.clone(), "inf")
         };
         for deviation in z_scores(&half, 6000) {
             assert!((0.95..=1.05).contains(&deviation), "{method:?}: {deviation}");
@@ -95,7 +95,7 @@ fn error_bars_are_correct_with_infinite_memory() {
 #[test]
 fn error_bars_are_correct_with_256_samples_of_memory() {
     for method in [Method::rpem(), hoid::survey::physical()] {
-        for deviation in z_scores(&with_memory(method.clone(), "256"), 2000) {
+        for deviation in z_scores(&options_with_memory(method.clone(), "256"), 2000) {
             assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
         }
     }
@@ -128,14 +128,14 @@ fn infinite_memory_converges_to_the_batch_fit() {
     let from = |start, update_from_s| TrackOptions {
         start,
         update_from_s,
-        ..with_memory(Method::rpem(), "inf")
+        ..options_with_memory(Method::rpem(), "inf")
     };
-    let span = |to: f64| from(StartAt::Span(Some((0.0, to))), None);
+    let span = |to: f64| from(StartSource::Span(Some((0.0, to))), None);
     // The filters have settled. The memory length grows at the start, so the initial steps are forgotten. The
     // covariance is ten times the value of the thesis. With a covariance of 10 the first steps move the estimate to the
     // limit of stability, and two of these starts still differ by .6 standard errors at the end.
     let theta = |theta: Vec<f64>| {
-        let from = from(StartAt::Theta(theta), Some(4.0));
+        let from = from(StartSource::Theta(theta), Some(4.0));
         from.with(&[("covariance", "1")]).unwrap()
     };
     let starts = [
@@ -177,7 +177,7 @@ fn rls_with_infinite_memory_is_the_batch_fit() {
     };
     let batch = batch.fit(std::slice::from_ref(&record)).unwrap();
     let recursive = TrackOptions {
-        start: StartAt::Nothing,
+        start: StartSource::Nothing,
         ..options(Method::rls())
     };
     let recursive = recursive.with(&[("covariance", "1e12"), ("memory", "inf")]).unwrap();
@@ -195,7 +195,7 @@ fn rls_with_infinite_memory_is_the_batch_fit() {
 }
 
 /// Signals that change every few thousand samples: the loop, zeros, constants, saturation.
-fn alternating(k: usize, record: &Record) -> (f64, f64) {
+fn alternating_sample(k: usize, record: &Record) -> (f64, f64) {
     let (e, u) = (record.input()[k % record.len()], record.output()[k % record.len()]);
     match (k / 20_000) % 5 {
         0 | 2 => (e, u),
@@ -226,12 +226,12 @@ fn covariance_stays_bounded_for_a_million_samples() {
         options(hoid::survey::physical()),
         options(hoid::survey::rriv()),
     ]);
-    on_all_cores(all.len() as u64, |i| {
+    run_on_all_cores(all.len() as u64, |i| {
         let options = &all[i as usize];
         let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
         let name = format!("{:?}", options.method);
         for k in 0..1_000_000 {
-            let (e, u) = alternating(k, &record);
+            let (e, u) = alternating_sample(k, &record);
             tracker.step(e, u);
             if k % 1000 == 0 {
                 assert!(
@@ -268,7 +268,10 @@ fn recovery_after_silence_is_as_fast_as_at_the_start() {
         for _ in 0..100_000 {
             silent.step(0.0, 0.0);
         }
-        let truth: Vec<f64> = OPERATOR.iter().map(|name| second.channel(name).unwrap()[0]).collect();
+        let truth: Vec<f64> = OPERATOR_PARAMETERS
+            .iter()
+            .map(|name| second.channel(name).unwrap()[0])
+            .collect();
         let mut errors = [[0.0; 5]; 2];
         for k in 0..second.len() {
             for (tracker, errors) in [&mut fresh, &mut silent].into_iter().zip(&mut errors) {
@@ -345,7 +348,7 @@ fn defaults_do_not_diverge_in_the_reference_conditions() {
     for condition in Condition::ALL {
         for m in [1, 4] {
             let simulator = Simulator::new(&scenario(condition, m, 0.2)).unwrap();
-            on_all_cores(4, |r| {
+            run_on_all_cores(4, |r| {
                 let record = run(&simulator, r);
                 for method in methods.clone() {
                     let trace = track(&record, &options(method.clone()), 1).unwrap();
@@ -406,15 +409,15 @@ fn contradictory_options_are_refused() {
     assert!(message.contains("arx or fir"), "{message}");
     let message = refused(options(Method::rpem()).with(&[("memory_of", "q7=inf")]).unwrap());
     assert!(message.contains("q7") && message.contains("f2"), "{message}");
-    let message = refused(with_memory(Method::rpem(), "0.001s"));
+    let message = refused(options_with_memory(Method::rpem(), "0.001s"));
     assert!(message.contains("more than one sample"), "{message}");
     let message = refused(TrackOptions {
-        start: StartAt::Theta(vec![0.1, 0.1, -0.5, -2.5, 1.6]),
+        start: StartSource::Theta(vec![0.1, 0.1, -0.5, -2.5, 1.6]),
         ..options(Method::rpem())
     });
     assert!(message.contains("stable"), "{message}");
     let message = refused(TrackOptions {
-        start: StartAt::Span(Some((90.0, 95.0))),
+        start: StartSource::Span(Some((90.0, 95.0))),
         ..options(Method::rpem())
     });
     assert!(message.contains("90"), "{message}");

@@ -15,7 +15,7 @@ fn estimator(structure: Structure) -> Estimator {
 }
 
 /// Returns the distance of each coefficient from the true value in standard errors.
-fn distances(fit: &Fit, truth: &[f64]) -> Vec<f64> {
+fn errors_in_standard_errors(fit: &Fit, truth: &[f64]) -> Vec<f64> {
     let parameters = fit.parameters();
     parameters
         .iter()
@@ -49,7 +49,7 @@ fn every_structure_finds_the_truth_with_any_initial_state() {
             .fit(std::slice::from_ref(record))
             .unwrap();
             assert!(fit.termination().converged(), "{structure} {rule:?}");
-            let far = distances(&fit, &truth.theta());
+            let far = errors_in_standard_errors(&fit, &truth.theta());
             assert_eq!(far.len(), truth.theta().len());
             assert!(far.iter().all(|d| d.abs() < 4.0), "{structure} {rule:?}: {far:.1?}");
             let variance = fit.innovation_variance();
@@ -68,7 +68,7 @@ fn standard_errors_of_every_structure_cover_the_truth() {
         for seed in 0..runs {
             let record = truth.record(400, 0.5, 1000 + seed);
             let fit = estimator(structure).fit(&[record]).unwrap();
-            for (count, d) in inside.iter_mut().zip(distances(&fit, &truth.theta())) {
+            for (count, d) in inside.iter_mut().zip(errors_in_standard_errors(&fit, &truth.theta())) {
                 *count += u32::from(d.abs() < 1.96);
             }
         }
@@ -217,7 +217,7 @@ fn robust_loss_limits_the_effect_of_outliers() {
         // With white noise and no outliers, the robust error bars also have the nominal coverage.
         let white = Truth::of(Structure::OutputError).record(600, 0.5, 500 + seed);
         let fit = e.fit(&[white]).unwrap();
-        inside += distances(&fit, &Truth::of(Structure::OutputError).theta())
+        inside += errors_in_standard_errors(&fit, &Truth::of(Structure::OutputError).theta())
             .iter()
             .filter(|d| d.abs() < 1.96)
             .count();
@@ -261,7 +261,7 @@ fn simulation_focus_minimises_the_simulation_error() {
         let mut e = estimator(Structure::BoxJenkins);
         e.focus = Focus::Simulation;
         let fit = e.fit(&[truth.record(600, 0.5, 3000 + seed)]).unwrap();
-        for (count, d) in inside.iter_mut().zip(distances(&fit, &truth.theta())) {
+        for (count, d) in inside.iter_mut().zip(errors_in_standard_errors(&fit, &truth.theta())) {
             *count += u32::from(d.abs() < 1.96);
         }
     }
@@ -279,7 +279,7 @@ fn simulation_focus_minimises_the_simulation_error() {
 #[test]
 fn stability_can_be_required() {
     // The output grows: least squares reports an unstable model, and with `stable` the best stable model is returned.
-    let ts = SampleTime::HUNDREDTH;
+    let ts = SampleTime::AT_100_HZ;
     let mut draw = Draw(5);
     let e: Vec<f64> = (0..120).map(|_| draw.normal()).collect();
     let mut u = vec![0.0];

@@ -12,18 +12,18 @@ use serde_json::Value;
 
 /// Half a unit in the fifth digit of a number that starts with 9; for all other numbers this is stricter than five
 /// digits.
-const FIVE_DIGITS: f64 = 5e-6;
+const FIVE_DIGIT_TOLERANCE: f64 = 5e-6;
 /// Tolerance for the reference, which is exact up to rounding; the search of hoid must then have the tolerance
 /// `TIGHT_TOLERANCE`.
-const REFERENCE: f64 = 1e-6;
+const REFERENCE_TOLERANCE: f64 = 1e-6;
 /// Tolerance of the search with which it ends `sqrt(tolerance n)` = 2e-7 standard errors from the minimum.
 const TIGHT_TOLERANCE: f64 = 1e-16;
 /// Distance from the minimum with the default tolerance, in standard errors: `sqrt(1e-12 n)` = 3e-5 for 1000 samples.
-const DEFAULT_DISTANCE: f64 = 1e-4;
+const MAX_DEFAULT_DISTANCE: f64 = 1e-4;
 /// Relative difference of the loss: the square of this distance divided by n.
-const LOSS: f64 = 1e-10;
+const LOSS_TOLERANCE: f64 = 1e-10;
 /// Four digits of a standard error.
-const ERRORS: f64 = 5e-5;
+const STANDARD_ERROR_TOLERANCE: f64 = 5e-5;
 
 const REFERENCE_NAME: &str = "scipy";
 
@@ -75,11 +75,11 @@ fn record(case: &Value, sample_time: SampleTime) -> Record {
     let first = channels.next().unwrap();
     match channels.next() {
         Some(output) => Record::new(sample_time, first, output).unwrap(),
-        None => Record::of_output(sample_time, first).unwrap(),
+        None => Record::from_output(sample_time, first).unwrap(),
     }
 }
 
-fn rule(name: &str) -> Option<InitialState> {
+fn parse_rule(name: &str) -> Option<InitialState> {
     match name {
         "zero" => Some(InitialState::Zero),
         "estimate" => Some(InitialState::Estimate),
@@ -102,7 +102,7 @@ fn fit(case: &Value, rule: InitialState) -> Fit {
         .unwrap()
 }
 
-fn fit_to_the_end(case: &Value, rule: InitialState) -> Fit {
+fn converged_fit(case: &Value, rule: InitialState) -> Fit {
     let mut estimator = estimator(case, rule);
     estimator.search.tolerance = TIGHT_TOLERANCE;
     estimator.fit(&[record(case, SampleTime::new(1.0).unwrap())]).unwrap()
@@ -123,7 +123,7 @@ fn estimates(case: &Value) -> impl Iterator<Item = (&str, InitialState, &Value)>
         .as_array()
         .unwrap()
         .iter()
-        .filter_map(|e| Some((e["by"].as_str()?, rule(e["rule"].as_str()?)?, e)))
+        .filter_map(|e| Some((e["by"].as_str()?, parse_rule(e["rule"].as_str()?)?, e)))
 }
 
 /// J of the rule backcast depends on the square root of Sigma^-1 from which the residuals are computed. Another square
@@ -159,7 +159,7 @@ fn estimates_agree_with_independent_implementations() {
                 .map_or(0.0, |e| (found.loss() / e - 1.0).abs());
             let line = format!("{:9} {rule:?}, {by}: theta {theta:.1e}, loss {loss:.1e}", name(&case));
             println!("{line}");
-            if theta > FIVE_DIGITS || loss > LOSS || !found.termination().converged() {
+            if theta > FIVE_DIGIT_TOLERANCE || loss > LOSS_TOLERANCE || !found.termination().converged() {
                 failures.push(format!("{line}; from {}, {:?}", found.start(), found.termination()));
             }
         }
@@ -172,7 +172,7 @@ fn estimates_agree_with_the_reference_for_each_rule() {
     let mut failures = Vec::new();
     for case in cases() {
         for (_, rule, expected) in estimates(&case).filter(|(by, _, _)| *by == REFERENCE_NAME) {
-            let (found, sooner) = (fit_to_the_end(&case, rule), fit(&case, rule));
+            let (found, sooner) = (converged_fit(&case, rule), fit(&case, rule));
             let theta = largest_difference(found.model().theta(), &numbers(&expected["theta"]));
             let loss = (found.loss() / expected["loss"].as_f64().unwrap() - 1.0).abs();
             let left = (sooner.model().theta().iter())
@@ -186,7 +186,7 @@ fn estimates_agree_with_the_reference_for_each_rule() {
             );
             println!("{line}");
             let converged = found.termination().converged() && sooner.termination().converged();
-            if theta > REFERENCE || loss > LOSS || left > DEFAULT_DISTANCE || !converged {
+            if theta > REFERENCE_TOLERANCE || loss > LOSS_TOLERANCE || left > MAX_DEFAULT_DISTANCE || !converged {
                 failures.push(format!("{line}; from {}, {:?}", found.start(), found.termination()));
             }
             assert_eq!(
@@ -211,8 +211,8 @@ fn standard_errors_agree_with_independent_implementations() {
             if expected["standard_errors"].is_null() {
                 continue;
             }
-            let found = fit_to_the_end(&case, rule);
-            let freedom = found.residual_count() - found.orders().parameters() - found.state_count();
+            let found = converged_fit(&case, rule);
+            let freedom = found.residual_count() - found.orders().parameter_count() - found.state_count();
             let divisor = expected["divisor"].as_f64().unwrap_or(freedom as f64);
             let other: Vec<f64> = numbers(&expected["standard_errors"])
                 .iter()
@@ -223,7 +223,7 @@ fn standard_errors_agree_with_independent_implementations() {
             let allowed = if rule == InitialState::Backcast {
                 square_root_effect(&found)
             } else {
-                ERRORS
+                STANDARD_ERROR_TOLERANCE
             };
             assert!(difference < allowed, "{} {by} {rule:?}: {difference:.1e}", name(&case));
         }
@@ -237,9 +237,13 @@ fn estimates_do_not_depend_on_the_sample_time() {
     for case in cases() {
         let slow = fit(&case, InitialState::Estimate);
         let fast = estimator(&case, InitialState::Estimate)
-            .fit(&[record(&case, SampleTime::HUNDREDTH)])
+            .fit(&[record(&case, SampleTime::AT_100_HZ)])
             .unwrap();
-        assert!((slow.loss() / fast.loss() - 1.0).abs() < LOSS, "{}", name(&case));
+        assert!(
+            (slow.loss() / fast.loss() - 1.0).abs() < LOSS_TOLERANCE,
+            "{}",
+            name(&case)
+        );
     }
 }
 
@@ -283,7 +287,7 @@ fn default_starts_end_no_higher_than_the_truth() {
             };
             let other = from_truth.fit(&[record(&case, SampleTime::new(1.0).unwrap())]).unwrap();
             assert!(
-                own.loss() < other.loss() * (1.0 + LOSS),
+                own.loss() < other.loss() * (1.0 + LOSS_TOLERANCE),
                 "{} {rule:?}: {} against {}",
                 name(&case),
                 own.loss(),
@@ -336,7 +340,7 @@ fn noise_pole_stays_in_d() {
         };
         let (own, other) = (own.fit(&record).unwrap(), from_truth.fit(&record).unwrap());
         assert!(
-            own.loss() < other.loss() * (1.0 + LOSS),
+            own.loss() < other.loss() * (1.0 + LOSS_TOLERANCE),
             "run {run}: {:?} {} against {}",
             own.model().theta(),
             own.loss(),

@@ -28,7 +28,7 @@ fn run() -> Result<(), String> {
         runs: 4,
         cases: Vec::new(),
         methods: Vec::new(),
-        portion: Portion::ALL,
+        portion: Portion::WHOLE,
     };
     let (mut file, mut measured) = (None, None);
     let mut arguments = std::env::args().skip(1);

@@ -29,7 +29,7 @@ fn run() -> Result<(), String> {
         runs: usize::MAX,
         kinds: Vec::new(),
         methods: Vec::new(),
-        portion: Portion::ALL,
+        portion: Portion::WHOLE,
     };
     let mut arguments = std::env::args().skip(1);
     while let Some(name) = arguments.next() {

@@ -212,12 +212,12 @@ impl Case {
     }
 
     /// Start span for every method, s: the first third, at most 30 s.
-    pub fn start_s(&self) -> (f64, f64) {
+    pub fn start_span_s(&self) -> (f64, f64) {
         (0.0, (self.length_s / 3.0).min(30.0))
     }
 
     /// Times at which the changes start, s.
-    pub fn changes_s(&self) -> Vec<f64> {
+    pub fn change_times_s(&self) -> Vec<f64> {
         let mut times: Vec<f64> = self.operator_changes.iter().map(|shift| shift.at_s).collect();
         if let Imperfection::Polarity(at_s) = self.imperfection {
             times.push(at_s);
@@ -227,7 +227,7 @@ impl Case {
     }
 
     /// True if every change takes at most two seconds, so the changes have definite times.
-    pub fn changes_at_once(&self) -> bool {
+    pub fn has_sudden_changes(&self) -> bool {
         self.operator_changes.iter().all(|shift| shift.takes_s <= 2.0)
     }
 }

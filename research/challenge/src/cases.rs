@@ -10,12 +10,12 @@ use super::{
 };
 
 /// Default start of a change, s; `CHANGE_DURATION_S` is its default duration.
-const AT_S: f64 = 45.0;
+const DEFAULT_CHANGE_S: f64 = 45.0;
 const CHANGE_DURATION_S: f64 = 0.5;
 
-fn shift(parameter: Parameter, factor: f64) -> OperatorChange {
+fn operator_change(parameter: Parameter, factor: f64) -> OperatorChange {
     OperatorChange {
-        at_s: AT_S,
+        at_s: DEFAULT_CHANGE_S,
         takes_s: CHANGE_DURATION_S,
         parameter,
         factor,
@@ -163,7 +163,7 @@ const KINDS: [Kind; 21] = {
     ]
 };
 
-fn of_kind(theme: Theme, name: String, (_, meaning, spectrum, course, imperfection): Kind) -> Case {
+fn case_of_kind(theme: Theme, name: String, (_, meaning, spectrum, course, imperfection): Kind) -> Case {
     Case {
         spectrum,
         course,
@@ -174,7 +174,7 @@ fn of_kind(theme: Theme, name: String, (_, meaning, spectrum, course, imperfecti
 
 fn remnants() -> Vec<Case> {
     let mut all: Vec<Case> = (KINDS.into_iter())
-        .map(|kind| of_kind(Theme::Remnants, format!("none-{}", kind.0), kind))
+        .map(|kind| case_of_kind(Theme::Remnants, format!("none-{}", kind.0), kind))
         .collect();
     all.push(Case {
         length_s: 330.0,
@@ -213,7 +213,7 @@ fn changes() -> Vec<Case> {
             };
             let meaning = format!("{name} of the operator alone times {factor:.2}");
             all.push(Case {
-                operator_changes: vec![shift(parameter, factor)],
+                operator_changes: vec![operator_change(parameter, factor)],
                 ..Case::baseline(Theme::Changes, format!("change-{name}-{percent}"), meaning)
             });
         }
@@ -223,7 +223,7 @@ fn changes() -> Vec<Case> {
 
 fn courses() -> Vec<Case> {
     let default = |name, meaning| Case::baseline(Theme::Courses, name, meaning);
-    let twice = shift(Parameter::KEDot, 2.0);
+    let twice = operator_change(Parameter::KEDot, 2.0);
     let six = (0..6)
         .map(|i| OperatorChange {
             at_s: 40.0 + 12.0 * f64::from(i),
@@ -254,7 +254,7 @@ fn courses() -> Vec<Case> {
             ..default("near-end", "K_e_dot doubles 10 s before the end")
         },
         Case {
-            imperfection: Imperfection::Polarity(AT_S),
+            imperfection: Imperfection::Polarity(DEFAULT_CHANGE_S),
             ..default("polarity", "u is recorded with the wrong sign from 45 s on")
         },
         Case {
@@ -275,10 +275,10 @@ fn courses() -> Vec<Case> {
 }
 
 fn changes_in_remnants() -> Vec<Case> {
-    let twice = shift(Parameter::KEDot, 2.0);
+    let twice = operator_change(Parameter::KEDot, 2.0);
     let with_change = |kind: Kind| Case {
         operator_changes: vec![twice],
-        ..of_kind(Theme::ChangesInRemnants, format!("change-in-{}", kind.0), kind)
+        ..case_of_kind(Theme::ChangesInRemnants, format!("change-in-{}", kind.0), kind)
     };
     (KINDS.into_iter())
         .filter(|kind| !["lag-1", "missing", "silent"].contains(&kind.0))
@@ -294,7 +294,7 @@ fn changes_in_remnants() -> Vec<Case> {
 
 fn delays() -> Vec<Case> {
     let default = |name, meaning| Case {
-        operator_changes: vec![shift(Parameter::KEDot, 1.5)],
+        operator_changes: vec![operator_change(Parameter::KEDot, 1.5)],
         ..Case::baseline(Theme::Delays, name, meaning)
     };
     vec![
@@ -337,7 +337,7 @@ fn loops() -> Vec<Case> {
     let default = |name, meaning, plant, form| Case {
         plant,
         form,
-        operator_changes: vec![shift(Parameter::Gain, 1.0 / 1.6)],
+        operator_changes: vec![operator_change(Parameter::Gain, 1.0 / 1.6)],
         ..Case::baseline(Theme::Loops, name, meaning)
     };
     let mut all = vec![
@@ -371,7 +371,7 @@ fn loops() -> Vec<Case> {
     ];
     // With an unstable plant the gain may only increase: at too low a gain the loop is unstable.
     for case in all.iter_mut().filter(|case| case.plant == Plant::Unstable) {
-        case.operator_changes = vec![shift(Parameter::Gain, 1.4)];
+        case.operator_changes = vec![operator_change(Parameter::Gain, 1.4)];
     }
     for (name, meaning, forcing) in [
         ("target", "1/s^2, a target in place of the disturbance", Forcing::Target),
@@ -379,7 +379,7 @@ fn loops() -> Vec<Case> {
     ] {
         all.push(Case {
             forcing,
-            operator_changes: vec![shift(Parameter::KEDot, 1.6)],
+            operator_changes: vec![operator_change(Parameter::KEDot, 1.6)],
             ..Case::baseline(Theme::Loops, name, meaning)
         });
     }
@@ -389,7 +389,7 @@ fn loops() -> Vec<Case> {
 fn rates() -> Vec<Case> {
     let of = |rate: u32| Case {
         rate_hz: f64::from(rate),
-        operator_changes: vec![shift(Parameter::KEDot, 1.6)],
+        operator_changes: vec![operator_change(Parameter::KEDot, 1.6)],
         ..Case::baseline(
             Theme::Rates,
             format!("rate-{rate}"),
@@ -409,7 +409,7 @@ mod tests {
         for (i, case) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|other| other.name != case.name), "{}", case.name);
             assert!(!case.meaning.is_empty());
-            let changes = case.changes_s();
+            let changes = case.change_times_s();
             assert!(
                 changes.is_sorted() && changes.iter().all(|t| *t > 0.0 && *t < case.length_s),
                 "{}",

@@ -38,14 +38,14 @@ impl Seeds {
 
 /// A run of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RunOf {
+pub struct CaseRun {
     /// Set of seeds.
     pub seeds: Seeds,
     /// Number of the run.
     pub number: u64,
 }
 
-impl RunOf {
+impl CaseRun {
     /// Returns a random stream of the run. The streams depend only on the name of the case, so cases can be added.
     pub(super) fn stream(self, case: &Case, tag: u64) -> RunSeed {
         // FNV-1a hash of the name.
@@ -69,10 +69,10 @@ pub struct Portion {
 
 impl Portion {
     /// The whole work.
-    pub const ALL: Self = Self { index: 1, of: 1 };
+    pub const WHOLE: Self = Self { index: 1, of: 1 };
 
     /// True if item i belongs to the part.
-    pub fn holds(self, i: usize) -> bool {
+    pub fn contains(self, i: usize) -> bool {
         i % self.of + 1 == self.index
     }
 }
@@ -97,17 +97,19 @@ impl fmt::Display for Portion {
 
 /// Maximum number of draws for a run; if they do not suffice, no person can stabilise the case.
 const MAX_DRAWS: usize = 2000;
-const NUMBERS: usize = 10;
+const NUMBERS_PER_DRAW: usize = 10;
 /// Largest permitted value of `|1/(1 + Y P)|`.
-const LARGEST_SENSITIVITY: f64 = 3.5;
-const PERSON: u64 = 1;
+const MAX_SENSITIVITY: f64 = 3.5;
+const PERSON_STREAM: u64 = 1;
 
 /// Returns the person of a run; `attempt` is the number of earlier people who lost control in the simulation.
-pub(super) fn person(case: &Case, run: RunOf, ts: SampleTime, attempt: usize) -> Result<Operator, SimError> {
-    let numbers = run.stream(case, PERSON).uniform(NUMBERS * MAX_DRAWS);
+pub(super) fn draw_person(case: &Case, run: CaseRun, ts: SampleTime, attempt: usize) -> Result<Operator, SimError> {
+    let numbers = run
+        .stream(case, PERSON_STREAM)
+        .uniform_numbers(NUMBERS_PER_DRAW * MAX_DRAWS);
     let mut left = attempt;
-    for draw in numbers.chunks_exact(NUMBERS) {
-        let Some(operator) = drawn(case, ts, draw)? else {
+    for draw in numbers.chunks_exact(NUMBERS_PER_DRAW) {
+        let Some(operator) = operator_from_draw(case, ts, draw)? else {
             continue;
         };
         if left == 0 {
@@ -122,7 +124,7 @@ pub(super) fn person(case: &Case, run: RunOf, ts: SampleTime, attempt: usize) ->
     })
 }
 
-fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, SimError> {
+fn operator_from_draw(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, SimError> {
     let between = |(low, high): (f64, f64), i: usize| low + (high - low) * draw[i];
     let (lead, delay, crossover) = match case.plant {
         Plant::Integrator => ((0.3, 0.7), (0.12, 0.22), (2.0, 4.0)),
@@ -169,8 +171,8 @@ fn drawn(case: &Case, ts: SampleTime, draw: &[f64]) -> Result<Option<Operator>, 
     let mut states = vec![first];
     for shift in &case.operator_changes {
         let before = states[states.len() - 1];
-        states.push(before.times(shift.parameter, shift.factor.sqrt()));
-        states.push(before.times(shift.parameter, shift.factor));
+        states.push(before.with_scaled_parameter(shift.parameter, shift.factor.sqrt()));
+        states.push(before.with_scaled_parameter(shift.parameter, shift.factor));
     }
     // There are two holds; each adds half a sample of delay.
     let late = if case.sampling == Sampling::Held { ts.s() } else { 0.0 };
@@ -193,7 +195,7 @@ fn is_stable_and_damped(operator: &Operator, plant: Plant) -> Result<bool, Model
         let open_loop = operator.response(omega) * plant.response(omega);
         1.0 / (Complex64::from(1.0) + open_loop).norm()
     };
-    if (0..=100).any(|i| sensitivity(i) > LARGEST_SENSITIVITY) {
+    if (0..=100).any(|i| sensitivity(i) > MAX_SENSITIVITY) {
         return Ok(false);
     }
     Ok(closed_loop_is_stable(&operator.open_loop(plant)?))
@@ -209,7 +211,7 @@ mod tests {
         for case in cases() {
             let ts = SampleTime::new(1.0 / case.rate_hz).unwrap();
             let of = |seeds, number| {
-                let person = person(&case, RunOf { seeds, number }, ts, 0);
+                let person = draw_person(&case, CaseRun { seeds, number }, ts, 0);
                 person.unwrap_or_else(|e| panic!("{}: {e}", case.name))
             };
             let (a, b) = (of(Seeds::Open, 0), of(Seeds::Open, 1));
@@ -222,7 +224,7 @@ mod tests {
     fn portions_divide_the_work() {
         let parts: Vec<Portion> = ["1/3", "2/3", "3/3"].map(|t| t.parse().unwrap()).into();
         for i in 0..20 {
-            assert_eq!(parts.iter().filter(|part| part.holds(i)).count(), 1);
+            assert_eq!(parts.iter().filter(|part| part.contains(i)).count(), 1);
         }
         for bad in ["0/3", "4/3", "x", "1"] {
             assert!(bad.parse::<Portion>().is_err());

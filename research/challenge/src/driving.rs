@@ -12,14 +12,14 @@ use hoid_sim::SimError;
 
 use super::{
     case::{Case, Course, Forcing},
-    draw::RunOf,
+    draw::CaseRun,
     operator::{Operator, Plant},
 };
 
-const PHASES: u64 = 3;
+const PHASE_STREAM: u64 = 3;
 
 /// The time course of the remnant's strength.
-pub(super) struct Strength {
+pub(super) struct RemnantStrength {
     course: Course,
     sizes: [f64; 2],
     phase: f64,
@@ -30,7 +30,7 @@ pub(super) struct Strength {
 /// Period of [`Course::Wander`], and length of two spans of [`Course::Steps`], s.
 const PERIOD_S: f64 = 30.0;
 
-impl Strength {
+impl RemnantStrength {
     pub fn new(case: &Case, sizes: [f64; 2], number: f64, ts: f64) -> Self {
         Self {
             course: case.course,
@@ -59,7 +59,7 @@ impl Strength {
 }
 
 /// Returns the target or disturbance of a run, with unit rms.
-pub(super) fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimError> {
+pub(super) fn forcing(case: &Case, run: CaseRun) -> Result<ForcingFunction, SimError> {
     let lines: Vec<Sinusoid> = match case.forcing {
         Forcing::McRuer => MCRUER_RAD_S
             .iter()
@@ -84,7 +84,7 @@ pub(super) fn forcing(case: &Case, run: RunOf) -> Result<ForcingFunction, SimErr
         }
     };
     let rms = lines.iter().map(|l| l.amplitude_deg.powi(2) / 2.0).sum::<f64>().sqrt();
-    let phases = run.stream(case, PHASES).uniform(lines.len());
+    let phases = run.stream(case, PHASE_STREAM).uniform_numbers(lines.len());
     let with = |(line, phase): (&Sinusoid, f64)| Sinusoid {
         amplitude_deg: line.amplitude_deg / rms,
         phase_rad: TAU * phase,
@@ -97,7 +97,7 @@ const MCRUER_RAD_S: [f64; 10] = [0.157, 0.262, 0.393, 0.602, 0.969, 1.49, 2.54, 
 const MCRUER_SHELF_RAD_S: f64 = 3.0;
 
 /// Returns the rms of u and e without remnant.
-pub(super) fn sizes(operator: &Operator, case: &Case, lines: &ForcingFunction) -> [f64; 2] {
+pub(super) fn rms_without_remnant(operator: &Operator, case: &Case, lines: &ForcingFunction) -> [f64; 2] {
     let mut squares = [0.0; 2];
     for line in lines.sinusoids() {
         let (y, p) = (

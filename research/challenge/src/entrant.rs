@@ -44,7 +44,7 @@ impl Task {
     }
 
     /// Index of the last sample at or before a time.
-    pub fn sample(&self, t_s: f64) -> usize {
+    pub fn sample_index(&self, t_s: f64) -> usize {
         ((t_s / self.sample_time.s() + 1e-6) as usize).min(self.e.len().saturating_sub(1))
     }
 
@@ -55,7 +55,7 @@ impl Task {
 
     /// The start span as a record; `None` if samples are missing.
     pub fn start_record(&self) -> Option<Record> {
-        self.span(self.sample(self.start_s.0), self.sample(self.start_s.1))
+        self.span(self.sample_index(self.start_s.0), self.sample_index(self.start_s.1))
     }
 
     /// The samples of a span as a record; `None` if samples are missing.
@@ -123,7 +123,7 @@ pub trait Entrant: Send + Sync {
 
 /// Covariance of a complex sum `sum g_i theta_i`: variance of the real part, variance of the imaginary part, and their
 /// covariance.
-pub(super) fn of_complex(gradient: &[Complex64], covariance: &[f64]) -> [f64; 3] {
+pub(super) fn complex_covariance(gradient: &[Complex64], covariance: &[f64]) -> [f64; 3] {
     let p = gradient.len();
     let mut sums = [0.0; 3];
     for (i, a) in gradient.iter().enumerate() {

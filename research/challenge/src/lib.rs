@@ -44,7 +44,7 @@ mod world;
 
 pub use case::{Case, Course, DelayKnown, Forcing, Form, Imperfection, OperatorChange, Sampling, Spectrum, Theme};
 pub use cases::cases;
-pub use draw::{Portion, RunOf, Seeds};
+pub use draw::{CaseRun, Portion, Seeds};
 pub use entrant::{Alarm, Entrant, EntrantResult, ReportedResponse, Seam, Task};
 pub use entrants::entrants;
 pub use error::ChallengeError;

@@ -13,33 +13,33 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     case::{Case, Imperfection},
-    draw::RunOf,
+    draw::CaseRun,
     entrant::{Entrant, EntrantResult, ReportedResponse, Task},
-    oracle::{batch, evidence},
+    oracle::{batch, log_likelihood_ratio},
     simulate::{Run, Truth, simulate},
 };
 
 /// Times after a change at which the response is requested, s.
-pub const AFTER_S: [f64; 6] = [2.0, 4.0, 8.0, 13.0, 18.0, 28.0];
+pub const TIMES_AFTER_CHANGE_S: [f64; 6] = [2.0, 4.0, 8.0, 13.0, 18.0, 28.0];
 /// Number of lines; they are evenly spaced on a logarithmic scale over `LINES_RAD_S`.
-const LINES: usize = 7;
+const LINE_COUNT: usize = 7;
 const LINES_RAD_S: (f64, f64) = (0.5, 6.0);
 /// Time before the first change at which the response is requested, s.
-const BEFORE_S: f64 = 0.5;
-/// Interval between requests if there is no change, s; `LONG_S` are the times for the long case.
-const STEADY_S: f64 = 10.0;
-const LONG_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
+const TIME_BEFORE_CHANGE_S: f64 = 0.5;
+/// Interval between requests if there is no change, s; `LONG_CASE_TIMES_S` are the times for the long case.
+const STEADY_INTERVAL_S: f64 = 10.0;
+const LONG_CASE_TIMES_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
 /// Largest error, to which larger errors are limited.
 const MAX_ERROR: f64 = 10.0;
 const CRITICAL_VALUE: f64 = 1.96;
-/// Time after a change within which an alarm is not counted as false, s. An alarm within [`FOUND_S`] has found the
+/// Time after a change within which an alarm is not counted as false, s. An alarm within [`DETECTION_LIMITS_S`] has found the
 /// change.
 const ALARM_WINDOW_S: f64 = 12.0;
 /// Times after a change within which it should be found, s.
-pub const FOUND_S: [f64; 2] = [5.0, 8.0];
+pub const DETECTION_LIMITS_S: [f64; 2] = [5.0, 8.0];
 
 /// Name of the batch fit with known changes.
-pub const BATCH: &str = "batch (oracle)";
+pub const BATCH_NAME: &str = "batch (oracle)";
 
 /// Results of an entrant in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -95,26 +95,28 @@ pub struct ChangeOutcome {
 /// Frequencies of the lines at which the response is requested, rad/s.
 pub(super) fn lines_rad_s() -> Vec<f64> {
     let (low, high) = LINES_RAD_S;
-    let of = |i: usize| low * (high / low).powf(i as f64 / (LINES - 1) as f64);
-    (0..LINES).map(of).collect()
+    let of = |i: usize| low * (high / low).powf(i as f64 / (LINE_COUNT - 1) as f64);
+    (0..LINE_COUNT).map(of).collect()
 }
 
 /// Times at which the response is requested, with their labels.
 pub(super) fn requested_times(changes_s: &[f64], start_s: f64, length_s: f64, is_long: bool) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     let steady = |from: f64| {
-        let count = ((length_s - from) / STEADY_S + 1e-9) as usize;
-        (1..=count).map(move |i| ("steady".to_owned(), from + STEADY_S * i as f64))
+        let count = ((length_s - from) / STEADY_INTERVAL_S + 1e-9) as usize;
+        (1..=count).map(move |i| ("steady".to_owned(), from + STEADY_INTERVAL_S * i as f64))
     };
     match changes_s.first() {
-        None if is_long => all.extend(LONG_S.map(|t| (format!("{t:.0} s"), t))),
+        None if is_long => all.extend(LONG_CASE_TIMES_S.map(|t| (format!("{t:.0} s"), t))),
         None => all.extend(steady(start_s)),
-        Some(first) if first - BEFORE_S >= start_s => all.push(("before".to_owned(), first - BEFORE_S)),
+        Some(first) if first - TIME_BEFORE_CHANGE_S >= start_s => {
+            all.push(("before".to_owned(), first - TIME_BEFORE_CHANGE_S))
+        }
         Some(_) => {}
     }
     for (i, change) in changes_s.iter().enumerate() {
         let next = changes_s.get(i + 1).copied().unwrap_or(length_s);
-        let times = AFTER_S.map(|after| (format!("+{after:.0}"), change + after));
+        let times = TIMES_AFTER_CHANGE_S.map(|after| (format!("+{after:.0}"), change + after));
         all.extend(times.into_iter().filter(|(_, t)| *t <= next && *t >= start_s));
     }
     all
@@ -136,20 +138,20 @@ impl EvaluationRun {
     ///
     /// # Errors
     /// The reason, if no person can stabilise the case.
-    pub fn new(case: &Case, of: RunOf) -> Result<Self, String> {
+    pub fn new(case: &Case, of: CaseRun) -> Result<Self, String> {
         let run = simulate(case, of).map_err(|e| e.to_string())?;
-        let changes_s = if case.changes_at_once() {
-            case.changes_s()
+        let changes_s = if case.has_sudden_changes() {
+            case.change_times_s()
         } else {
             Vec::new()
         };
-        let start_s = case.start_s();
+        let start_s = case.start_span_s();
         let asked = requested_times(&changes_s, start_s.1, case.length_s, case.length_s > 200.0);
         let (labels, asked_s) = asked.into_iter().unzip();
         let changes = (changes_s.iter().enumerate())
             .map(|(i, at_s)| ChangeOutcome {
                 at_s: *at_s,
-                evidence: FOUND_S.map(|seconds| evidence(case, &run, i, seconds)),
+                evidence: DETECTION_LIMITS_S.map(|seconds| log_likelihood_ratio(case, &run, i, seconds)),
                 after_s: None,
             })
             .collect();
@@ -176,8 +178,8 @@ impl EvaluationRun {
 
     /// Evaluates an entrant in the run.
     pub fn line(&self, entrant: &dyn Entrant) -> Line {
-        let mut line = self.measured(entrant.name(), entrant.follow(&self.task));
-        if !self.case.changes_at_once() {
+        let mut line = self.evaluate(entrant.name(), entrant.follow(&self.task));
+        if !self.case.has_sudden_changes() {
             // An alarm during a slow change is neither false nor late.
             (line.false_alarms, line.exposed_s, line.of_remnant) = (None, 0.0, 0);
         }
@@ -192,19 +194,19 @@ impl EvaluationRun {
             estimates: batch(&self.task, &changes_s, tau_e_s),
             ..EntrantResult::default()
         };
-        self.measured(BATCH.to_owned(), Ok(answer))
+        self.evaluate(BATCH_NAME.to_owned(), Ok(answer))
     }
 
-    fn measured(&self, method: String, answer: Result<EntrantResult, String>) -> Line {
+    fn evaluate(&self, method: String, answer: Result<EntrantResult, String>) -> Line {
         let truth = &self.run.truth;
         let at = |omega: f64, t_s: f64| truth.response(omega, t_s);
-        let mut line = scored(&self.task, &self.labels, &at, method, answer, &self.changes);
+        let mut line = evaluate_result(&self.task, &self.labels, &at, method, answer, &self.changes);
         (line.case, line.run) = (self.case.name.clone(), self.number);
         // Parameters are evaluated only if the recorded operator has the form of the thesis.
         let named = truth.operator(0.0).is_lead() && !matches!(self.case.imperfection, Imperfection::Polarity(_));
         for moment in &mut line.moments {
             match named {
-                true => with_truth(&mut moment.parameters, truth, moment.t_s),
+                true => compare_parameters(&mut moment.parameters, truth, moment.t_s),
                 false => moment.parameters.clear(),
             }
         }
@@ -212,11 +214,11 @@ impl EvaluationRun {
     }
 }
 
-/// Converts parameter values to errors and coverage. [`scored`] stores a value as `(value, None)` and its standard
+/// Converts parameter values to errors and coverage. [`evaluate_result`] stores a value as `(value, None)` and its standard
 /// error under the name with ` se` appended.
-fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Truth, t_s: f64) {
+fn compare_parameters(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Truth, t_s: f64) {
     let said = std::mem::take(parameters);
-    for (name, value) in truth.operator(t_s).named() {
+    for (name, value) in truth.operator(t_s).named_parameters() {
         let Some((found, _)) = said.get(name) else { continue };
         let covered = said
             .get(&format!("{name} se"))
@@ -229,7 +231,7 @@ fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Tr
 }
 
 /// Evaluates a result against the true response; the parameters are copied without evaluation.
-pub(super) fn scored(
+pub(super) fn evaluate_result(
     task: &Task,
     labels: &[String],
     truth: &dyn Fn(f64, f64) -> Complex64,
@@ -246,7 +248,7 @@ pub(super) fn scored(
         .map(|(i, (label, t_s))| {
             let said = answer.estimates.get(i).unwrap_or(&nothing);
             let truths: Vec<Complex64> = task.lines_rad_s.iter().map(|omega| truth(*omega, *t_s)).collect();
-            let (error, covered) = of_response(said, &truths);
+            let (error, covered) = response_error(said, &truths);
             let mut parameters = BTreeMap::new();
             for (name, value, standard_error) in &said.parameters {
                 parameters.insert((*name).to_owned(), (*value, None));
@@ -271,7 +273,7 @@ pub(super) fn scored(
     let exposed_s = exposed.count() as f64 * step;
     let mut found = changes.to_vec();
     for change in &mut found {
-        let own = |t: f64| t >= change.at_s && t <= change.at_s + FOUND_S[1];
+        let own = |t: f64| t >= change.at_s && t <= change.at_s + DETECTION_LIMITS_S[1];
         let first = (answer.alarms.iter().flatten()).find(|alarm| !alarm.of_remnant && own(alarm.t_s));
         change.after_s = first.map(|alarm| alarm.t_s - change.at_s);
     }
@@ -296,7 +298,7 @@ pub(super) fn scored(
 }
 
 /// Returns the mean of |dH|/|H|, the number of bands that cover the truth, and the number of all bands.
-fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2]) {
+fn response_error(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2]) {
     if said.response.len() != truths.len() {
         return (1.0, [0, 0]);
     }
@@ -320,7 +322,7 @@ fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2
 
 /// Returns the task of a run, for tests of entrants.
 #[cfg(test)]
-pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
+pub(super) fn test_task(case: &Case, of: CaseRun) -> Task {
     EvaluationRun::new(case, of).unwrap_or_else(|e| panic!("{e}")).task
 }
 
@@ -366,7 +368,7 @@ mod tests {
             .unwrap();
         let posed = EvaluationRun::new(
             &case,
-            RunOf {
+            CaseRun {
                 seeds: crate::Seeds::Open,
                 number: 0,
             },

@@ -78,7 +78,7 @@ pub(super) struct Noise {
 /// Length of the computed impulse responses, s; the slowest part is a drift with a time constant of 10 s.
 const MEMORY_S: f64 = 60.0;
 /// Order of the autoregressive model that whitens a remnant.
-const WHITENING: usize = 30;
+const WHITENING_ORDER: usize = 30;
 
 impl Noise {
     /// Creates the remnant of a run of the given length. `numbers` from `[0, 1)` determine the time constants and
@@ -117,7 +117,7 @@ impl Noise {
             })
             .collect();
         let driving = (0..parts.len() as u64)
-            .map(|i| driven(course, streams(10 + 2 * i), streams(11 + 2 * i), ts_s, samples))
+            .map(|i| driving_noise(course, streams(10 + 2 * i), streams(11 + 2 * i), ts_s, samples))
             .collect();
         Self { parts, driving, ts_s }
     }
@@ -132,7 +132,7 @@ impl Noise {
     /// recursion on the autocovariance.
     pub fn whitening(&self) -> (Vec<f64>, f64) {
         let length = (MEMORY_S / self.ts_s) as usize;
-        let mut covariance = vec![0.0; WHITENING + 1];
+        let mut covariance = vec![0.0; WHITENING_ORDER + 1];
         for part in &self.parts {
             let g = part.filter.impulse(length);
             for (lag, sum) in covariance.iter_mut().enumerate() {
@@ -165,10 +165,10 @@ pub(super) fn levinson(covariance: &[f64]) -> (Vec<f64>, f64) {
     (a, variance)
 }
 
-/// Number of pulses per second; `PULSES_PART` is their share of the variance, and `IMPULSES` the probability and the
+/// Number of pulses per second; `PULSE_VARIANCE_SHARE` is their share of the variance, and `IMPULSES` the probability and the
 /// size of impulses.
 const PULSES_PER_S: f64 = 2.0;
-const PULSES_PART: f64 = 0.8;
+const PULSE_VARIANCE_SHARE: f64 = 0.8;
 const IMPULSES: (f64, f64) = (0.02, 7.0);
 const ON_OFF_S: f64 = 2.0;
 const ON_OFF: [f64; 2] = [0.2, 1.8];
@@ -184,18 +184,18 @@ pub(super) fn density(course: Course, ts_s: f64) -> Vec<(f64, f64)> {
         }
         Course::Pulsed => {
             let chance = (PULSES_PER_S * ts_s).min(1.0);
-            let small = 1.0 - PULSES_PART;
-            vec![(1.0 - chance, small), (chance, small + PULSES_PART / chance)]
+            let small = 1.0 - PULSE_VARIANCE_SHARE;
+            vec![(1.0 - chance, small), (chance, small + PULSE_VARIANCE_SHARE / chance)]
         }
         Course::Intermittent => ON_OFF.iter().map(|variance| (0.5, *variance)).collect(),
         _ => vec![(1.0, 1.0)],
     }
 }
 
-fn driven(course: Course, normal: RunSeed, uniform: RunSeed, ts_s: f64, samples: usize) -> Vec<f64> {
+fn driving_noise(course: Course, normal: RunSeed, uniform: RunSeed, ts_s: f64, samples: usize) -> Vec<f64> {
     let mut w = normal.white_noise(samples);
     let density = density(course, ts_s);
-    let draws = uniform.uniform(samples);
+    let draws = uniform.uniform_numbers(samples);
     match course {
         Course::Impulsive | Course::Pulsed => {
             for (w, draw) in w.iter_mut().zip(draws) {

@@ -59,7 +59,7 @@ const STICK_DAMPING: f64 = 0.7;
 impl Operator {
     /// The operator with one parameter multiplied by a factor.
     #[must_use]
-    pub fn times(mut self, parameter: Parameter, factor: f64) -> Self {
+    pub fn with_scaled_parameter(mut self, parameter: Parameter, factor: f64) -> Self {
         match parameter {
             Parameter::KE => {
                 self.gain *= factor;
@@ -106,7 +106,7 @@ impl Operator {
 
     /// Names and values of the parameters as in the operator of the thesis: K_e, K_e_dot in s, omega_nm in rad/s,
     /// zeta_nm, tau_e in s.
-    pub fn named(&self) -> [(&'static str, f64); 5] {
+    pub fn named_parameters(&self) -> [(&'static str, f64); 5] {
         [
             ("K_e", self.gain),
             ("K_e_dot", self.gain * self.lead_s),
@@ -286,7 +286,10 @@ mod tests {
             Parameter::Delay,
         ];
         for (i, parameter) in parameters.into_iter().enumerate() {
-            let (before, after) = (lead.named(), lead.times(parameter, 2.0).named());
+            let (before, after) = (
+                lead.named_parameters(),
+                lead.with_scaled_parameter(parameter, 2.0).named_parameters(),
+            );
             for k in 0..5 {
                 let factor = if k == i { 2.0 } else { 1.0 };
                 assert!((after[k].1 / before[k].1 - factor).abs() < 1e-14, "{}", before[k].0);

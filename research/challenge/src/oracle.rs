@@ -16,13 +16,13 @@ use hoid_model::{Orders, Structure};
 
 use super::{
     case::Case,
-    entrant::{ReportedResponse, Task, of_complex},
+    entrant::{ReportedResponse, Task, complex_covariance},
     noise::density,
     simulate::Run,
 };
 
 /// Logarithm of the likelihood ratio above which a change is certain.
-pub const CERTAIN: f64 = 12.0;
+pub const CERTAIN_LOG_RATIO: f64 = 12.0;
 /// Lower limit of the strength; without it the remnant would vanish where the error is zero and reveal the response.
 const MIN_LEVEL: f64 = 0.05;
 /// Order of the noise model of the batch fit; `MIN_SPAN_S` is the shortest span of the fit, s.
@@ -30,7 +30,7 @@ const ND: usize = 4;
 const MIN_SPAN_S: f64 = 7.5;
 
 /// Returns the logarithm of the likelihood ratio over the first `seconds` after the change with this index.
-pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
+pub fn log_likelihood_ratio(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
     let hidden = &run.hidden;
     let Some((first, before)) = hidden.before.get(change) else {
         return 0.0;
@@ -80,12 +80,12 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedRespon
             return None;
         }
         let fit = estimator
-            .fit(&[task.span(task.sample(from), task.sample(*t_s))?])
+            .fit(&[task.span(task.sample_index(from), task.sample_index(*t_s))?])
             .ok()?;
         let each: Vec<_> = (task.lines_rad_s.iter())
             .map(|omega| fit.model().response_and_gradient(*omega))
             .collect();
-        let covariance = (fit.covariance()).map(|c| each.iter().map(|(_, g)| of_complex(g, c)).collect());
+        let covariance = (fit.covariance()).map(|c| each.iter().map(|(_, g)| complex_covariance(g, c)).collect());
         let operator = fit.operator().ok();
         let parameters = operator.map_or_else(Vec::new, |o| {
             [
@@ -109,25 +109,31 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedRespon
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{RunOf, Seeds, cases, simulate};
+    use crate::{CaseRun, Seeds, cases, simulate};
 
-    fn found(name: &str, seconds: f64) -> f64 {
+    fn evidence_of_case(name: &str, seconds: f64) -> f64 {
         let case = cases().into_iter().find(|case| case.name == name).unwrap();
         let run = simulate(
             &case,
-            RunOf {
+            CaseRun {
                 seeds: Seeds::Open,
                 number: 1,
             },
         )
         .unwrap();
-        evidence(&case, &run, 0, seconds)
+        log_likelihood_ratio(&case, &run, 0, seconds)
     }
 
     #[test]
     fn only_a_large_change_is_certain() {
-        let (large, small) = (found("change-K_e_dot-100", 8.0), found("change-zeta-10", 8.0));
-        assert!(large > CERTAIN && small < CERTAIN && large > small, "{large} {small}");
+        let (large, small) = (
+            evidence_of_case("change-K_e_dot-100", 8.0),
+            evidence_of_case("change-zeta-10", 8.0),
+        );
+        assert!(
+            large > CERTAIN_LOG_RATIO && small < CERTAIN_LOG_RATIO && large > small,
+            "{large} {small}"
+        );
     }
 
     /// The mean of the log ratio is the divergence: half the power of the whitened difference divided by the variance.
@@ -139,7 +145,7 @@ mod tests {
         for number in 0..6 {
             let run = simulate(
                 &case,
-                RunOf {
+                CaseRun {
                     seeds: Seeds::Open,
                     number,
                 },
@@ -153,7 +159,7 @@ mod tests {
                     run.hidden.response[k] - before[k - first]
                 }
             };
-            sum += evidence(&case, &run, 0, 8.0);
+            sum += log_likelihood_ratio(&case, &run, 0, 8.0);
             for k in *first..first + 800 {
                 let each = run.hidden.whitening.iter().enumerate();
                 let w: f64 = each.map(|(lag, a)| a * delta(k - lag)).sum();

@@ -19,8 +19,8 @@ use rayon::prelude::*;
 use super::{
     draw::Portion,
     entrant::{Entrant, Seam, Task},
-    measure::{ChangeOutcome, Line, requested_times, scored},
-    run::{chosen_entrants, kept, refused},
+    measure::{ChangeOutcome, Line, evaluate_result, requested_times},
+    run::{chosen_entrants, read_or_compute_lines, refusal},
 };
 use crate::ChallengeError;
 
@@ -30,7 +30,7 @@ const RAMP_S: f64 = 5.0;
 const TRIAL_S: f64 = 40.0;
 const PERIOD_S: f64 = 20.0;
 /// Frequencies of the lines as multiples of 1/period.
-const MULTIPLES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
+const LINE_MULTIPLES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
 const RATE_HZ: f64 = 60.0;
 /// Start span of joined trials, s; `SINGLE_START_S` is the start span of single trials.
 const START_S: (f64, f64) = (5.0, 30.0);
@@ -65,7 +65,7 @@ struct Trial {
 }
 
 /// Trials by person and plant.
-type Cells = BTreeMap<(String, String), Vec<Trial>>;
+type TrialsByCell = BTreeMap<(String, String), Vec<Trial>>;
 
 /// Computes the missing results and returns the lines of all selected runs.
 ///
@@ -81,17 +81,17 @@ pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -
         let others = cells.get(&(person.clone(), other.to_owned())).map_or(0, Vec::len);
         for i in 0..count {
             if i < others {
-                all.push(Joined::new(person, plant, i, Some((other, i))));
+                all.push(JoinedTrials::new(person, plant, i, Some((other, i))));
             }
             if i % 2 == 0 && i + 1 < count {
-                all.push(Joined::new(person, plant, i, Some((plant, i + 1))));
+                all.push(JoinedTrials::new(person, plant, i, Some((plant, i + 1))));
             }
-            all.push(Joined::new(person, plant, i, None));
+            all.push(JoinedTrials::new(person, plant, i, None));
         }
     }
-    all.retain(|j| (options.kinds.is_empty() || options.kinds.contains(&j.kind())) && j.number() < options.runs);
-    let own: Vec<Joined> = (all.into_iter().enumerate())
-        .filter(|(i, _)| options.portion.holds(*i))
+    all.retain(|j| (options.kinds.is_empty() || options.kinds.contains(&j.kind())) && j.index_in_kind() < options.runs);
+    let own: Vec<JoinedTrials> = (all.into_iter().enumerate())
+        .filter(|(i, _)| options.portion.contains(*i))
         .map(|(_, joined)| joined)
         .collect();
     let lines: Vec<Vec<Line>> = own
@@ -102,7 +102,7 @@ pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -
                 .join("people")
                 .join(&joined.person)
                 .join(joined.kind());
-            let lines = kept(&folder, joined.first.1 as u64, &entrants, false, &mut || {
+            let lines = read_or_compute_lines(&folder, joined.first.1 as u64, &entrants, false, &mut || {
                 let posed = joined.evaluation_run(&cells)?;
                 Ok(Box::new(move |entrant: Option<&dyn Entrant>| posed.line(entrant)))
             });
@@ -113,12 +113,12 @@ pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -
     Ok(lines.concat())
 }
 
-fn read_all(directory: &Path) -> Result<Cells, ChallengeError> {
+fn read_all(directory: &Path) -> Result<TrialsByCell, ChallengeError> {
     let mut names = hoid_io::file_names(directory)?;
     names.sort();
-    let mut cells = Cells::new();
+    let mut cells = TrialsByCell::new();
     let options = ReadOptions {
-        input: Some("r-y".parse().map_err(|e| refused(format!("{e}")))?),
+        input: Some("r-y".parse().map_err(|e| refusal(format!("{e}")))?),
         ..ReadOptions::default()
     };
     for name in names.iter().filter(|name| name.ends_with("_d_only.csv")) {
@@ -128,7 +128,7 @@ fn read_all(directory: &Path) -> Result<Cells, ChallengeError> {
         };
         let record = read_record(&directory.join(name), &options)?.record;
         let own = Trial::new(record.input(), record.output(), record.channel("d")).ok_or_else(|| {
-            refused(format!(
+            refusal(format!(
                 "{name} is not a trial of {} s with the column d",
                 RAMP_S + TRIAL_S
             ))
@@ -139,7 +139,7 @@ fn read_all(directory: &Path) -> Result<Cells, ChallengeError> {
             .push(own);
     }
     if cells.is_empty() {
-        return Err(refused(format!(
+        return Err(refusal(format!(
             "{} holds no trials; expected PERSON_PLANT_NUMBER_d_only.csv",
             directory.display()
         )));
@@ -154,7 +154,7 @@ impl Trial {
             return None;
         }
         let (e, u, d) = (e[..end].to_vec(), u[1..=end].to_vec(), &d?[..end]);
-        let products = MULTIPLES
+        let products = LINE_MULTIPLES
             .iter()
             .map(|multiple| {
                 let turn = |x: &[f64]| -> Complex64 {
@@ -171,13 +171,13 @@ impl Trial {
 }
 
 /// The trials of a joined record: plant and index of the first trial and, if there is one, of the second.
-struct Joined {
+struct JoinedTrials {
     person: String,
     first: (String, usize),
     second: Option<(String, usize)>,
 }
 
-impl Joined {
+impl JoinedTrials {
     fn new(person: &str, plant: &str, i: usize, second: Option<(&str, usize)>) -> Self {
         Self {
             person: person.to_owned(),
@@ -194,15 +194,15 @@ impl Joined {
     }
 
     /// Returns the index of the record among the records of its kind.
-    fn number(&self) -> usize {
+    fn index_in_kind(&self) -> usize {
         match &self.second {
             Some((second, _)) if *second == self.first.0 => self.first.1 / 2,
             _ => self.first.1,
         }
     }
 
-    fn evaluation_run(&self, cells: &Cells) -> Result<EvaluationRun, ChallengeError> {
-        let sample_time = SampleTime::new(1.0 / RATE_HZ).map_err(|e| refused(e.to_string()))?;
+    fn evaluation_run(&self, cells: &TrialsByCell) -> Result<EvaluationRun, ChallengeError> {
+        let sample_time = SampleTime::new(1.0 / RATE_HZ).map_err(|e| refusal(e.to_string()))?;
         let ramp = (RAMP_S * RATE_HZ) as usize;
         let cell = |plant: &str| &cells[&(self.person.clone(), plant.to_owned())];
         let of = |(plant, i): &(String, usize)| &cell(plant)[*i];
@@ -228,7 +228,7 @@ impl Joined {
                 .map(|(_, i)| *i)
                 .collect();
             let others = cell(plant).iter().enumerate().filter(|(i, _)| !used.contains(i));
-            let mut sums = [[Complex64::from(0.0); 2]; MULTIPLES.len()];
+            let mut sums = [[Complex64::from(0.0); 2]; LINE_MULTIPLES.len()];
             for (_, trial) in others {
                 for (sum, own) in sums.iter_mut().zip(&trial.products) {
                     *sum = [sum[0] + own[0], sum[1] + own[1]];
@@ -262,7 +262,7 @@ impl Joined {
                 label: format!("{} {} {}", self.person, self.kind(), self.first.1),
                 start_s,
                 nk: None,
-                lines_rad_s: MULTIPLES.map(|m| m * TAU / PERIOD_S).into(),
+                lines_rad_s: LINE_MULTIPLES.map(|m| m * TAU / PERIOD_S).into(),
                 asked_s,
                 seam,
             },
@@ -296,7 +296,7 @@ impl EvaluationRun {
             Some(entrant) => (entrant.name(), entrant.follow(&self.task)),
             None => (String::new(), Err("nobody".to_owned())),
         };
-        let mut line = scored(&self.task, &self.labels, &truth, name, answer, &self.changes);
+        let mut line = evaluate_result(&self.task, &self.labels, &truth, name, answer, &self.changes);
         (line.case, line.run) = (self.case.clone(), self.number);
         line.moments.iter_mut().for_each(|moment| moment.parameters.clear());
         line
@@ -314,7 +314,7 @@ mod tests {
         let n = 2702;
         let sines = |k: usize, shift: f64| -> f64 {
             let t = (k as f64 - shift) / RATE_HZ;
-            MULTIPLES.iter().map(|m| (m * TAU / PERIOD_S * t + m).sin()).sum()
+            LINE_MULTIPLES.iter().map(|m| (m * TAU / PERIOD_S * t + m).sin()).sum()
         };
         let d: Vec<f64> = (0..n).map(|k| sines(k, 0.0)).collect();
         let e: Vec<f64> = (0..n).map(|k| 0.5 * sines(k, 7.0)).collect();

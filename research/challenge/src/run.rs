@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use super::{
     case::Case,
     cases::cases,
-    draw::{Portion, RunOf, Seeds},
+    draw::{CaseRun, Portion, Seeds},
     entrant::Entrant,
     entrants::entrants,
-    measure::{BATCH, EvaluationRun, Line},
+    measure::{BATCH_NAME, EvaluationRun, Line},
 };
 use crate::ChallengeError;
 
@@ -43,7 +43,7 @@ pub(super) fn chosen_entrants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>
     let mut all = entrants();
     let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
     if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
-        return Err(refused(format!(
+        return Err(refusal(format!(
             "no entrant is called {unknown}; there is {}",
             known.join(", ")
         )));
@@ -63,7 +63,7 @@ pub fn chosen_cases(names: &[String]) -> Result<Vec<Case>, ChallengeError> {
     };
     if let Some(unknown) = names.iter().find(|name| !all.iter().any(|case| is(case, name))) {
         let known: Vec<&str> = all.iter().map(|case| case.name.as_str()).collect();
-        return Err(refused(format!(
+        return Err(refusal(format!(
             "no case is called {unknown}; there is {}",
             known.join(", ")
         )));
@@ -74,7 +74,7 @@ pub fn chosen_cases(names: &[String]) -> Result<Vec<Case>, ChallengeError> {
     Ok(chosen.collect())
 }
 
-pub(super) fn refused(reason: String) -> ChallengeError {
+pub(super) fn refusal(reason: String) -> ChallengeError {
     ChallengeError::Refused { reason }
 }
 
@@ -90,19 +90,19 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
         .flat_map(|case| (0..options.runs).map(move |number| (case, number)))
         .collect();
     let own: Vec<_> = (all.into_iter().enumerate())
-        .filter(|(i, _)| options.portion.holds(*i))
+        .filter(|(i, _)| options.portion.contains(*i))
         .map(|(_, item)| item)
         .collect();
     let lines: Vec<Vec<Line>> = own
         .into_par_iter()
         .map(|(case, number)| {
             let folder = options.directory.join(options.seeds.to_string()).join(&case.name);
-            let lines = kept(&folder, number, &entrants, batch, &mut || {
-                let of = RunOf {
+            let lines = read_or_compute_lines(&folder, number, &entrants, batch, &mut || {
+                let of = CaseRun {
                     seeds: options.seeds,
                     number,
                 };
-                let posed = EvaluationRun::new(case, of).map_err(refused)?;
+                let posed = EvaluationRun::new(case, of).map_err(refusal)?;
                 Ok(Box::new(move |entrant: Option<&dyn Entrant>| match entrant {
                     Some(entrant) => posed.line(entrant),
                     None => posed.batch(),
@@ -116,22 +116,22 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
 }
 
 /// Function that computes the line of an entrant, or of the batch fit if there is no entrant.
-pub(super) type LineOf = Box<dyn Fn(Option<&dyn Entrant>) -> Line>;
+pub(super) type ComputeLine = Box<dyn Fn(Option<&dyn Entrant>) -> Line>;
 
 /// Returns the lines of a run. Lines that are not in the file are computed and added to it.
-pub(super) fn kept(
+pub(super) fn read_or_compute_lines(
     folder: &Path,
     number: u64,
     entrants: &[Box<dyn Entrant>],
     batch: bool,
-    pose: &mut dyn FnMut() -> Result<LineOf, ChallengeError>,
+    pose: &mut dyn FnMut() -> Result<ComputeLine, ChallengeError>,
 ) -> Result<Vec<Line>, ChallengeError> {
     let path = folder.join(format!("{number}.jsonl"));
     let mut lines = if path.exists() { read(&path)? } else { Vec::new() };
     let mut wanted: Vec<(String, Option<&dyn Entrant>)> =
         entrants.iter().map(|c| (c.name(), Some(c.as_ref()))).collect();
     if batch {
-        wanted.push((BATCH.to_owned(), None));
+        wanted.push((BATCH_NAME.to_owned(), None));
     }
     let missing: Vec<_> = (wanted.iter())
         .filter(|(name, _)| !lines.iter().any(|line| line.method == *name))
@@ -151,7 +151,7 @@ fn read(path: &Path) -> Result<Vec<Line>, ChallengeError> {
     let text = hoid_io::read_text(path)?;
     let line = |line: &str| {
         serde_json::from_str(line).map_err(|e| {
-            refused(format!(
+            refusal(format!(
                 "{}: {e}; remove the file, and the run is computed again",
                 path.display()
             ))
@@ -164,7 +164,7 @@ fn write(path: &Path, folder: &Path, lines: &[Line]) -> Result<(), ChallengeErro
     hoid_io::make_directory(folder)?;
     let mut text = String::new();
     for line in lines {
-        text += &serde_json::to_string(line).map_err(|e| refused(e.to_string()))?;
+        text += &serde_json::to_string(line).map_err(|e| refusal(e.to_string()))?;
         text.push('\n');
     }
     hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?;
@@ -182,7 +182,7 @@ mod tests {
             runs: 2,
             cases: vec!["change-K_e_dot-100".to_owned()],
             methods: vec!["basis-kalman".to_owned(), "chow".to_owned()],
-            portion: Portion::ALL,
+            portion: Portion::WHOLE,
         }
     }
 

@@ -15,8 +15,8 @@ use hoid_sim::SimError;
 
 use super::{
     case::{Case, DelayKnown, Forcing, Imperfection, Sampling},
-    draw::{RunOf, person},
-    driving::{Strength, forcing, sizes},
+    draw::{CaseRun, draw_person},
+    driving::{RemnantStrength, forcing, rms_without_remnant},
     noise::Noise,
     operator::{Canonical, Operator, hold},
     world::{LoopState, OperatorPolynomials},
@@ -52,7 +52,7 @@ impl Truth {
     pub fn operator(&self, t_s: f64) -> Operator {
         self.case.operator_changes.iter().fold(self.first, |operator, shift| {
             let part = ((t_s - shift.at_s) / shift.takes_s).clamp(0.0, 1.0);
-            operator.times(shift.parameter, shift.factor.powf(part))
+            operator.with_scaled_parameter(shift.parameter, shift.factor.powf(part))
         })
     }
 
@@ -60,7 +60,7 @@ impl Truth {
     pub fn response(&self, omega_rad_s: f64, t_s: f64) -> Complex64 {
         let operator = self.operator(t_s);
         let response = match self.case.sampling {
-            Sampling::Held => held(&operator, omega_rad_s, self.sample_time),
+            Sampling::Held => held_response(&operator, omega_rad_s, self.sample_time),
             Sampling::Continuous => operator.response(omega_rad_s),
         };
         response * self.sign(t_s)
@@ -88,8 +88,8 @@ impl Truth {
 
 /// Returns the response at the sample times for a held error: `sum over m of (Y H)(omega + m 2 pi/Ts)`, where H is the
 /// hold (Poisson's sum; A. V. Oppenheim and R. W. Schafer, *Discrete-Time Signal Processing*, section 4.2).
-fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
-    let each = (-ALIASES..=ALIASES).map(|m| {
+fn held_response(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
+    let each = (-ALIAS_COUNT..=ALIAS_COUNT).map(|m| {
         let omega = omega_rad_s + f64::from(m) * TAU / sample_time.s();
         operator.response(omega) * hold(omega, sample_time)
     });
@@ -97,7 +97,7 @@ fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Compl
 }
 
 /// Number of aliases on either side; they decrease at least with the square of their index.
-const ALIASES: i32 = 100;
+const ALIAS_COUNT: i32 = 100;
 
 /// True values at each sample.
 #[derive(Debug, Clone)]
@@ -122,15 +122,15 @@ const MAX_ATTEMPTS: usize = 20;
 /// Limit of u beyond which control is lost, standard deviations of u.
 const LOSS_LIMIT: f64 = 30.0;
 
-const NUMBERS: u64 = 2;
-const GLITCHES: u64 = 4;
-const WALK: u64 = 5;
+const NOISE_STREAM: u64 = 2;
+const GLITCH_STREAM: u64 = 4;
+const WALK_STREAM: u64 = 5;
 
 /// Simulates a run of a case.
 ///
 /// # Errors
 /// [`SimError`] if no person can control the case.
-pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
+pub fn simulate(case: &Case, run: CaseRun) -> Result<Run, SimError> {
     let sample_time = SampleTime::new(1.0 / case.rate_hz)?;
     let mut outcome = Err(SimError::Diverged {
         signal: "u",
@@ -138,8 +138,8 @@ pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
         scenario: case.name.clone(),
     });
     for attempt in 0..MAX_ATTEMPTS {
-        let operator = person(case, run, sample_time, attempt)?;
-        outcome = of_person(case, run, operator, sample_time);
+        let operator = draw_person(case, run, sample_time, attempt)?;
+        outcome = simulate_person(case, run, operator, sample_time);
         if !matches!(outcome, Err(SimError::Diverged { .. })) {
             break;
         }
@@ -147,7 +147,7 @@ pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
     outcome
 }
 
-fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTime) -> Result<Run, SimError> {
+fn simulate_person(case: &Case, run: CaseRun, operator: Operator, sample_time: SampleTime) -> Result<Run, SimError> {
     let ts = sample_time.s();
     let run_in = (RUN_IN_S / ts).round() as usize;
     let samples = (case.length_s / ts).round() as usize;
@@ -170,9 +170,9 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
             *value = 0.0;
         }
     }
-    let [sigma_u, sigma_e] = sizes(&operator, case, &lines);
+    let [sigma_u, sigma_e] = rms_without_remnant(&operator, case, &lines);
     let sigma_n = case.ratio * sigma_u;
-    let numbers = run.stream(case, NUMBERS).uniform(4);
+    let numbers = run.stream(case, NOISE_STREAM).uniform_numbers(4);
     let streams = |tag| run.stream(case, tag);
     let band = [numbers[0], numbers[1], numbers[2]];
     let mut noise = Noise::new(
@@ -186,7 +186,7 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
     );
     let (whitening, variance) = noise.whitening();
     let steps = match case.imperfection {
-        Imperfection::Drift(_) => run.stream(case, WALK).white_noise(total),
+        Imperfection::Drift(_) => run.stream(case, WALK_STREAM).white_noise(total),
         _ => Vec::new(),
     };
     let stick = |u: f64| match case.imperfection {
@@ -194,8 +194,8 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         Imperfection::Saturated(at) => u.clamp(-at * sigma_u, at * sigma_u),
         _ => u,
     };
-    let mut strength = Strength::new(case, [sigma_u, sigma_e], numbers[3], ts);
-    let changes: Vec<usize> = (case.changes_s().iter())
+    let mut strength = RemnantStrength::new(case, [sigma_u, sigma_e], numbers[3], ts);
+    let changes: Vec<usize> = (case.change_times_s().iter())
         .map(|at_s| run_in + (at_s / ts).round() as usize)
         .collect();
     let mut hidden = OracleData {
@@ -279,13 +279,13 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         truth,
         hidden,
     };
-    result.recorded(case, run, [sigma_u, sigma_e]);
+    result.apply_recorder_imperfections(case, run, [sigma_u, sigma_e]);
     Ok(result)
 }
 
 impl Run {
     /// Applies the imperfections of the recorder.
-    fn recorded(&mut self, case: &Case, run: RunOf, [sigma_u, sigma_e]: [f64; 2]) {
+    fn apply_recorder_imperfections(&mut self, case: &Case, run: CaseRun, [sigma_u, sigma_e]: [f64; 2]) {
         let ts = self.sample_time.s();
         let at = |t_s: f64| ((t_s / ts).round() as usize).min(self.e.len());
         let gap = at(60.0)..at(63.0);
@@ -295,7 +295,7 @@ impl Run {
                 self.u.iter_mut().for_each(|u| *u -= part * sigma_u);
             }
             Imperfection::Glitches(size) => {
-                let draws = run.stream(case, GLITCHES).uniform(2 * self.u.len());
+                let draws = run.stream(case, GLITCH_STREAM).uniform_numbers(2 * self.u.len());
                 for (u, draw) in self.u.iter_mut().zip(draws.chunks_exact(2)) {
                     if draw[0] < ts / 50.0 {
                         *u += size * self.hidden.innovation * if draw[1] < 0.5 { -1.0 } else { 1.0 };
@@ -340,7 +340,7 @@ mod tests {
         cases().into_iter().find(|case| case.name == name).unwrap()
     }
 
-    const RUN: RunOf = RunOf {
+    const RUN: CaseRun = CaseRun {
         seeds: Seeds::Open,
         number: 0,
     };

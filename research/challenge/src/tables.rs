@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::{
-    measure::{AFTER_S, FOUND_S, Line},
-    oracle::CERTAIN,
+    measure::{DETECTION_LIMITS_S, Line, TIMES_AFTER_CHANGE_S},
+    oracle::CERTAIN_LOG_RATIO,
 };
 
 /// Number of methods in one table of numbers on a page 1200 pixels wide; `METHODS_PER_WORD_TABLE` is the number in a
@@ -16,13 +16,13 @@ const METHODS_PER_WORD_TABLE: usize = 5;
 /// parameters, findings.
 pub fn tables(lines: &[Line]) -> String {
     let mut text = String::new();
-    let methods = in_order(lines.iter().map(|line| line.method.as_str()));
-    let cases = in_order(lines.iter().map(|line| line.case.as_str()));
+    let methods = unique_names(lines.iter().map(|line| line.method.as_str()));
+    let cases = unique_names(lines.iter().map(|line| line.case.as_str()));
     text += &overview(lines, &methods, &cases);
 
     text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or without a change; median over the runs.\n\n";
-    by_case(&mut text, &cases, &methods, METHODS_PER_TABLE, |case, method| {
-        let of = own(lines, case, method).flat_map(|line| &line.moments);
+    write_rows_by_case(&mut text, &cases, &methods, METHODS_PER_TABLE, |case, method| {
+        let of = lines_of(lines, case, method).flat_map(|line| &line.moments);
         let settled = of.filter(|m| is_settled(&m.label)).map(|m| m.error);
         median(settled.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
     });
@@ -30,9 +30,9 @@ pub fn tables(lines: &[Line]) -> String {
     text += "\n### Course of the error of H\n\nMedian over all runs in which someone changes at once.\n\n";
     let labels: Vec<String> = ["before".to_owned()]
         .into_iter()
-        .chain(AFTER_S.map(|s| format!("+{s:.0}")))
+        .chain(TIMES_AFTER_CHANGE_S.map(|s| format!("+{s:.0}")))
         .collect();
-    head(
+    write_head(
         &mut text,
         "method",
         &labels.iter().map(String::as_str).collect::<Vec<_>>(),
@@ -48,7 +48,7 @@ pub fn tables(lines: &[Line]) -> String {
                 .map(|m| m.error);
             median(errors.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
         };
-        row(&mut text, method, labels.iter().map(cell));
+        write_row(&mut text, method, labels.iter().map(cell));
     }
 
     let declaring: Vec<&str> = (methods.iter().copied())
@@ -59,11 +59,11 @@ pub fn tables(lines: &[Line]) -> String {
         })
         .collect();
     text += "\n### Alarms an hour without a change\n\nThose that are reported to be of the remnant alone are after the plus sign.\n\n";
-    head(&mut text, "case", &[&["hours"], declaring.as_slice()].concat());
+    write_head(&mut text, "case", &[&["hours"], declaring.as_slice()].concat());
     for case in &cases {
-        let hours = |method: &str| own(lines, case, method).map(|line| line.exposed_s).sum::<f64>() / 3600.0;
+        let hours = |method: &str| lines_of(lines, case, method).map(|line| line.exposed_s).sum::<f64>() / 3600.0;
         let cell = |method: &&str| {
-            let of = || own(lines, case, method);
+            let of = || lines_of(lines, case, method);
             let alarms: usize = of().filter_map(|line| line.false_alarms).sum();
             let of_remnant: usize = of().map(|line| line.of_remnant).sum();
             let rate = |n: usize| n as f64 / hours(method);
@@ -74,7 +74,7 @@ pub fn tables(lines: &[Line]) -> String {
         };
         let all = declaring.first().map_or(0.0, |m| hours(m));
         if all > 0.0 {
-            row(
+            write_row(
                 &mut text,
                 case,
                 [format!("{all:.2}")].into_iter().chain(declaring.iter().map(cell)),
@@ -83,14 +83,14 @@ pub fn tables(lines: &[Line]) -> String {
     }
 
     text += "\n### Changes found\n\nOf the changes that the oracle finds with certainty (log likelihood ratio of the true models over 12) within 5 and 8 s, those that were declared in that time; median delay.\n\n";
-    head(
+    write_head(
         &mut text,
         "case",
         &[&["changes", "certain 5 s, 8 s"], declaring.as_slice()].concat(),
     );
     for case in &cases {
         let of = |method: &str| {
-            own(lines, case, method)
+            lines_of(lines, case, method)
                 .flat_map(|line| line.changes.clone())
                 .collect::<Vec<_>>()
         };
@@ -98,33 +98,34 @@ pub fn tables(lines: &[Line]) -> String {
         if all.is_empty() {
             continue;
         }
-        let certain = |i: usize| all.iter().filter(|c| c.evidence[i] > CERTAIN).count();
+        let certain = |i: usize| all.iter().filter(|c| c.evidence[i] > CERTAIN_LOG_RATIO).count();
         let cell = |method: &&str| {
             let found = |i: usize| {
                 let own = of(method);
-                let such = own.iter().filter(|c| c.evidence[i] > CERTAIN);
-                such.filter(|c| c.after_s.is_some_and(|s| s <= FOUND_S[i])).count()
+                let such = own.iter().filter(|c| c.evidence[i] > CERTAIN_LOG_RATIO);
+                such.filter(|c| c.after_s.is_some_and(|s| s <= DETECTION_LIMITS_S[i]))
+                    .count()
             };
             let delay = median(of(method).iter().filter_map(|c| c.after_s).collect());
             let delay = delay.map_or(String::new(), |s| format!(" ({s:.1} s)"));
             format!("{}, {}{delay}", found(0), found(1))
         };
         let head = [all.len().to_string(), format!("{}, {}", certain(0), certain(1))];
-        row(&mut text, case, head.into_iter().chain(declaring.iter().map(cell)));
+        write_row(&mut text, case, head.into_iter().chain(declaring.iter().map(cell)));
     }
 
     text += "\n### Coverage\n\nBands of 1.96 standard errors of real and imaginary part of H that hold the truth, in percent; from 8 s after a change on or without a change.\n\n";
-    by_case(&mut text, &cases, &methods, METHODS_PER_TABLE, |case, method| {
-        let of = own(lines, case, method)
+    write_rows_by_case(&mut text, &cases, &methods, METHODS_PER_TABLE, |case, method| {
+        let of = lines_of(lines, case, method)
             .flat_map(|line| &line.moments)
             .filter(|m| is_settled(&m.label));
         let [inside, all] = of.fold([0, 0], |sum, m| [sum[0] + m.covered[0], sum[1] + m.covered[1]]);
-        share(inside, all)
+        percentage(inside, all)
     });
 
     text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the thesis; from 8 s after a change on or without a change.\n\n";
     let names = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
-    head(&mut text, "method", &names);
+    write_head(&mut text, "method", &names);
     let named = |m: &&&str| {
         lines
             .iter()
@@ -140,11 +141,11 @@ pub fn tables(lines: &[Line]) -> String {
                 .filter_map(|m| m.parameters.get(*name).copied())
                 .collect();
             let bands: Vec<bool> = said.iter().filter_map(|(_, inside)| *inside).collect();
-            let covered = share(bands.iter().filter(|inside| **inside).count(), bands.len());
+            let covered = percentage(bands.iter().filter(|inside| **inside).count(), bands.len());
             median(said.iter().map(|(e, _)| *e).collect())
                 .map_or("–".to_owned(), |e| format!("{:.0} ({covered})", 100.0 * e))
         };
-        row(&mut text, method, names.iter().map(cell));
+        write_row(&mut text, method, names.iter().map(cell));
     }
 
     let judged: Vec<&str> = (methods.iter().copied())
@@ -152,8 +153,8 @@ pub fn tables(lines: &[Line]) -> String {
         .collect();
     if !judged.is_empty() {
         text += "\n### What their verdicts report\n\nThe two findings that a verdict has most often, with the runs that have them.\n\n";
-        by_case(&mut text, &cases, &judged, METHODS_PER_WORD_TABLE, |case, method| {
-            commonest(own(lines, case, method))
+        write_rows_by_case(&mut text, &cases, &judged, METHODS_PER_WORD_TABLE, |case, method| {
+            most_frequent_findings(lines_of(lines, case, method))
         });
     }
 
@@ -164,7 +165,7 @@ pub fn tables(lines: &[Line]) -> String {
 /// Table with one row for each entrant.
 fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
     let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or without a change: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone after the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
-    head(
+    write_head(
         &mut text,
         "method",
         &[
@@ -186,7 +187,14 @@ fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
                 .collect::<Vec<_>>()
         };
         let by_case: Vec<f64> = (cases.iter())
-            .filter_map(|case| median(own(lines, case, method).flat_map(settled).map(|m| m.error).collect()))
+            .filter_map(|case| {
+                median(
+                    lines_of(lines, case, method)
+                        .flat_map(settled)
+                        .map(|m| m.error)
+                        .collect(),
+                )
+            })
             .collect();
         let [inside, all] = of()
             .flat_map(settled)
@@ -204,8 +212,13 @@ fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
         };
         let declares = of().any(|line| line.false_alarms.is_some());
         let found = |i: usize| {
-            let certain = || of().flat_map(|line| &line.changes).filter(|c| c.evidence[i] > CERTAIN);
-            let found = certain().filter(|c| c.after_s.is_some_and(|s| s <= FOUND_S[i])).count();
+            let certain = || {
+                of().flat_map(|line| &line.changes)
+                    .filter(|c| c.evidence[i] > CERTAIN_LOG_RATIO)
+            };
+            let found = certain()
+                .filter(|c| c.after_s.is_some_and(|s| s <= DETECTION_LIMITS_S[i]))
+                .count();
             if declares {
                 format!("{found} of {}", certain().count())
             } else {
@@ -217,12 +230,12 @@ fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
         let cells = [
             number(median(by_case)),
             number(largest),
-            share(inside, all),
+            percentage(inside, all),
             alarms,
             found(0),
             found(1),
         ];
-        row(&mut text, method, cells.into_iter());
+        write_row(&mut text, method, cells.into_iter());
     }
     text
 }
@@ -234,14 +247,14 @@ fn failures(lines: &[Line]) -> String {
     if failed().next().is_some() {
         text += "\n### Runs that could not be followed\n\n| method | runs | why | cases |\n|---|---|---|---|\n";
     }
-    for method in in_order(failed().map(|(line, _)| line.method.as_str())) {
-        for reason in in_order(
+    for method in unique_names(failed().map(|(line, _)| line.method.as_str())) {
+        for reason in unique_names(
             failed()
                 .filter(|(line, _)| line.method == method)
                 .map(|(_, reason)| reason),
         ) {
             let of = || failed().filter(|(line, why)| line.method == method && *why == reason);
-            let cases = in_order(of().map(|(line, _)| line.case.as_str()));
+            let cases = unique_names(of().map(|(line, _)| line.case.as_str()));
             let _ = writeln!(
                 text,
                 "| {method} | {} | {reason} | {} |",
@@ -254,9 +267,9 @@ fn failures(lines: &[Line]) -> String {
 }
 
 /// Returns the two most frequent findings.
-fn commonest<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> String {
+fn most_frequent_findings<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> String {
     let mut counts: Vec<(&str, usize)> = Vec::new();
-    for kind in in_order(lines.clone().flat_map(|line| &line.findings).map(String::as_str)) {
+    for kind in unique_names(lines.clone().flat_map(|line| &line.findings).map(String::as_str)) {
         let count = lines
             .clone()
             .filter(|line| line.findings.iter().any(|f| f == kind))
@@ -281,13 +294,13 @@ fn is_settled(label: &str) -> bool {
     !matches!(label, "+2" | "+4" | "before")
 }
 
-fn own<'a>(lines: &'a [Line], case: &'a str, method: &'a str) -> impl Iterator<Item = &'a Line> + Clone {
+fn lines_of<'a>(lines: &'a [Line], case: &'a str, method: &'a str) -> impl Iterator<Item = &'a Line> + Clone {
     lines
         .iter()
         .filter(move |line| line.case == case && line.method == method)
 }
 
-fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+fn unique_names<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut all: Vec<&str> = Vec::new();
     for name in names {
         if !all.contains(&name) {
@@ -298,20 +311,26 @@ fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 }
 
 /// Writes a row for each case and a column for each method, split into tables with at most `beside` methods.
-fn by_case(text: &mut String, cases: &[&str], methods: &[&str], beside: usize, cell: impl Fn(&str, &str) -> String) {
+fn write_rows_by_case(
+    text: &mut String,
+    cases: &[&str],
+    methods: &[&str],
+    beside: usize,
+    cell: impl Fn(&str, &str) -> String,
+) {
     let each = methods.len().div_ceil(methods.len().div_ceil(beside).max(1)).max(1);
     for (i, some) in methods.chunks(each).enumerate() {
         if i > 0 {
             text.push('\n');
         }
-        head(text, "case", some);
+        write_head(text, "case", some);
         for case in cases {
-            row(text, case, some.iter().map(|method| cell(case, method)));
+            write_row(text, case, some.iter().map(|method| cell(case, method)));
         }
     }
 }
 
-fn head(text: &mut String, first: &str, others: &[&str]) {
+fn write_head(text: &mut String, first: &str, others: &[&str]) {
     let _ = writeln!(
         text,
         "| {first} | {} |\n|---|{}",
@@ -320,11 +339,11 @@ fn head(text: &mut String, first: &str, others: &[&str]) {
     );
 }
 
-fn row(text: &mut String, first: &str, cells: impl Iterator<Item = String>) {
+fn write_row(text: &mut String, first: &str, cells: impl Iterator<Item = String>) {
     let _ = writeln!(text, "| {first} | {} |", cells.collect::<Vec<_>>().join(" | "));
 }
 
-fn share(of: usize, all: usize) -> String {
+fn percentage(of: usize, all: usize) -> String {
     match all {
         0 => "–".to_owned(),
         _ => format!("{:.0}", 100.0 * of as f64 / all as f64),

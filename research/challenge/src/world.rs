@@ -108,13 +108,13 @@ impl LoopState {
     /// Returns the input of the operator at the start, middle and end of the step that starts at `place`, in steps.
     fn input(&self, place: f64) -> [f64; 3] {
         match self.sampling {
-            Sampling::Held => [self.mean_held(place); 3],
+            Sampling::Held => [self.mean_held_error(place); 3],
             Sampling::Continuous => [0.0, 0.5, 1.0].map(|part| self.interpolated_error(place + part)),
         }
     }
 
     /// Returns the mean of the held error over the step that starts at `place`, in steps.
-    fn mean_held(&self, place: f64) -> f64 {
+    fn mean_held_error(&self, place: f64) -> f64 {
         let n = self.steps as f64;
         let (first, last) = (place / n, (place + 1.0) / n);
         let value = |sample: f64| {

@@ -36,7 +36,7 @@ impl Cell {
     }
 
     /// Returns the start of the change: 1.8 % of a sigmoid are completed 4/G before its middle.
-    fn change_start_s(&self) -> f64 {
+    fn change_time_s(&self) -> f64 {
         match self.condition {
             Condition::C3 | Condition::C5 => CHANGE_S - 8.0,
             _ => CHANGE_S - 0.04,
@@ -56,7 +56,7 @@ struct RunResult {
 
 fn tracker(name: &str, record: &Record) -> Tracker {
     let method = hoid_survey::method(name).unwrap();
-    if method.starts_itself() {
+    if method.is_self_starting() {
         let options = TrackOptions::without_prior(method, record.sample_time());
         return Tracker::new(&options, None, record.sample_time()).unwrap();
     }
@@ -88,7 +88,7 @@ fn follow(name: &str, cell: &Cell, record: &Record) -> RunResult {
         };
         tracker.update(sample, t >= moves_from);
         if tracker.change().is_some() && t > START_S {
-            let after = cell.changes() && (cell.change_start_s()..CHANGE_S + 10.0).contains(&t);
+            let after = cell.changes() && (cell.change_time_s()..CHANGE_S + 10.0).contains(&t);
             if after && delay_s.is_nan() {
                 delay_s = t - CHANGE_S;
             }
@@ -123,7 +123,7 @@ fn follow(name: &str, cell: &Cell, record: &Record) -> RunResult {
     }
 }
 
-fn listed(values: impl Iterator<Item = f64>, digits: usize) -> String {
+fn join_values(values: impl Iterator<Item = f64>, digits: usize) -> String {
     values.map(|v| format!("{v:.digits$}")).collect::<Vec<_>>().join("/")
 }
 
@@ -180,7 +180,7 @@ fn main() {
             let errors: [[f64; 5]; 2] = core::array::from_fn(|f| core::array::from_fn(|i| error(f, i)));
             let mean = |of: &dyn Fn(&RunResult) -> f64| found.iter().map(of).sum::<f64>() / runs as f64;
             let covered: Vec<String> = (0..3)
-                .map(|s| listed((0..5).map(|i| mean(&|f| f.covered[s][i])), 2))
+                .map(|s| join_values((0..5).map(|i| mean(&|f| f.covered[s][i])), 2))
                 .collect();
             let hours = if cell.changes() { 41.2 } else { 51.2 } / 3600.0;
             println!(
@@ -189,7 +189,7 @@ fn main() {
                 cell.order,
                 cell.level,
                 cell.realisation,
-                listed(errors[0].into_iter(), 1),
+                join_values(errors[0].into_iter(), 1),
                 covered.join(", "),
                 mean(&|f| f.alarms) / hours,
                 median(found.iter().map(|f| f.delay_s)),

@@ -20,7 +20,7 @@ use hoid_sim::{
 use rayon::prelude::*;
 
 /// Delays u by a given number of samples from a share of the record on.
-fn late(record: &Record, share: f64, by: usize) -> Record {
+fn delay_output(record: &Record, share: f64, by: usize) -> Record {
     let at = (share * record.len() as f64) as usize;
     let late = |t: usize| record.output()[if t >= at { t.saturating_sub(by) } else { t }];
     with_output(record, (0..record.len()).map(late).collect())
@@ -32,7 +32,7 @@ fn with_output(record: &Record, output: Vec<f64>) -> Record {
 }
 
 /// Replaces the last third of a record by the last third of another run.
-fn joined(record: &Record, other: &Record) -> Record {
+fn join_records(record: &Record, other: &Record) -> Record {
     let from = 2 * record.len() / 3;
     let of = |a: &[f64], b: &[f64]| [&a[..from], &b[from..]].concat();
     let e = Channel::new("e", "", of(record.input(), other.input()));
@@ -65,18 +65,18 @@ fn rows(what: &str, runs: &[Record], other: &Record, fit: &dyn Fn(&[Record]) -> 
     for by in [1, 5, 20] {
         for share in [0.06, 0.5, 0.9] {
             let name = format!("late by {by} at {:.0} %", 100.0 * share);
-            all.push((what.to_owned(), name, with(&|r| late(r, share, by))));
+            all.push((what.to_owned(), name, with(&|r| delay_output(r, share, by))));
         }
     }
     all.push((
         what.to_owned(),
         "second operator".to_owned(),
-        with(&|r| joined(r, other)),
+        with(&|r| join_records(r, other)),
     ));
     all
 }
 
-fn of_text(condition: Condition, other: Condition, seed: u64) -> Vec<Row> {
+fn condition_rows(condition: Condition, other: Condition, seed: u64) -> Vec<Row> {
     let run = |condition, replication| {
         let streams = RunSeed {
             seed,
@@ -103,7 +103,7 @@ fn of_text(condition: Condition, other: Condition, seed: u64) -> Vec<Row> {
     all
 }
 
-fn of_person(kind: RemnantKind, plant: Plant, seed: u64) -> Vec<Row> {
+fn person_rows(kind: RemnantKind, plant: Plant, seed: u64) -> Vec<Row> {
     let (population, task) = (Population::default(), Task::default());
     let draw = |form: Option<Form>, number| Person::draw(&population, &task, plant, form, kind, seed, number).unwrap();
     let person = draw(None, 1);
@@ -131,11 +131,11 @@ fn main() {
     let all: Vec<Row> = (first..first + runs)
         .into_par_iter()
         .flat_map_iter(|seed| {
-            let mut rows = of_text(Condition::C1, Condition::C2, seed);
-            rows.extend(of_text(Condition::C2, Condition::C1, seed));
+            let mut rows = condition_rows(Condition::C1, Condition::C2, seed);
+            rows.extend(condition_rows(Condition::C2, Condition::C1, seed));
             for kind in RemnantKind::ALL {
                 for plant in Plant::ALL {
-                    rows.extend(of_person(kind, plant, seed));
+                    rows.extend(person_rows(kind, plant, seed));
                 }
             }
             rows

@@ -10,11 +10,11 @@ use hoid_model::{
     schedule::Schedule,
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, StartAt, TrackOptions, track};
+use hoid_track::{Method, StartSource, TrackOptions, track};
 
 const COLUMNS: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 const LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
-const FOUND_WITHIN_S: f64 = 5.0;
+const MAX_DETECTION_TIME_S: f64 = 5.0;
 /// nk of the start fit, and the tracked delays, s.
 const NK: usize = 29;
 const RANGE_S: (f64, f64) = (0.2, 0.4);
@@ -67,7 +67,7 @@ fn main() {
         for condition in conditions {
             for &order in orders {
                 for (l, level) in LEVELS.into_iter().enumerate() {
-                    let simulator = Simulator::new(&with_delay(condition, order, level, delays)).unwrap();
+                    let simulator = Simulator::new(&scenario_with_delay(condition, order, level, delays)).unwrap();
                     let changes = simulator.scenario().scenario().schedule != Schedule::Constant;
                     let each = on_all_cores(runs, |replication| {
                         let run_seed = RunSeed {
@@ -93,7 +93,7 @@ fn main() {
                 sum / count
             };
             let row = |of: &dyn Fn(&RunResult, usize) -> f64, digits: usize| {
-                let text = |i: usize| format!("{:.digits$}", of_all(found, &|f| of(f, i)));
+                let text = |i: usize| format!("{:.digits$}", median_over_runs(found, &|f| of(f, i)));
                 (0..6).map(text).collect::<Vec<_>>().join(" / ")
             };
             let means = |of: &dyn Fn(&RunResult, usize) -> f64| {
@@ -106,7 +106,7 @@ fn main() {
                 means(&|f, i| f.covered[i]),
                 means(&|f, i| f.through[i]),
                 mean(&|f| f.found),
-                of_all(found, &|f| f.lag_s),
+                median_over_runs(found, &|f| f.lag_s),
                 mean(&|f| f.named),
                 mean(&|f| f.false_alarms) / mean(&|f| f.hours),
             );
@@ -114,7 +114,7 @@ fn main() {
     }
 }
 
-fn of_all(found: &[RunResult], of: &dyn Fn(&RunResult) -> f64) -> f64 {
+fn median_over_runs(found: &[RunResult], of: &dyn Fn(&RunResult) -> f64) -> f64 {
     median(found.iter().map(of))
 }
 
@@ -124,12 +124,12 @@ fn options(method: Method, track_delay_s: Option<(f64, f64)>) -> TrackOptions {
         None => method,
     };
     TrackOptions {
-        start: StartAt::Span(Some((0.0, START_S))),
+        start: StartSource::Span(Some((0.0, START_S))),
         ..TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(NK))
     }
 }
 
-fn with_delay(condition: Condition, order: usize, level: f64, [before, after]: [f64; 2]) -> Scenario {
+fn scenario_with_delay(condition: Condition, order: usize, level: f64, [before, after]: [f64; 2]) -> Scenario {
     let mut scenario = scenario(condition, order, level);
     scenario.initial.operator.tau_e_s = before;
     scenario.last.operator.tau_e_s = after;
@@ -157,7 +157,7 @@ struct RunResult {
 fn follow(record: &Record, options: &TrackOptions, changes: bool) -> RunResult {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let trace = track(record, options, 4).unwrap();
-    let soon = |t: f64| changes && (CHANGE_S..CHANGE_S + FOUND_WITHIN_S).contains(&t);
+    let soon = |t: f64| changes && (CHANGE_S..CHANGE_S + MAX_DETECTION_TIME_S).contains(&t);
     let (mut squares, mut covered, mut through, mut counts) = ([0.0; 6], [0.0; 6], [0.0; 6], [0.0; 2]);
     for (row, t) in trace.times_s().iter().enumerate().filter(|(_, t)| **t > START_S) {
         let k = 4 * row + 3;
@@ -179,7 +179,7 @@ fn follow(record: &Record, options: &TrackOptions, changes: bool) -> RunResult {
     let named = trace
         .changes()
         .iter()
-        .any(|(t, c)| soon(*t) && c.changed().contains(&"tau_e"));
+        .any(|(t, c)| soon(*t) && c.changed_quantities().contains(&"tau_e"));
     let share = |hit: bool| if changes { 100.0 * f64::from(hit) } else { f64::NAN };
     RunResult {
         errors: squares.map(|s: f64| 100.0 * (s / counts[0]).sqrt()),
@@ -189,6 +189,6 @@ fn follow(record: &Record, options: &TrackOptions, changes: bool) -> RunResult {
         named: share(named),
         lag_s: first.map_or(f64::NAN, |(t, _)| t - CHANGE_S),
         false_alarms: trace.changes().iter().filter(|(t, _)| !soon(*t)).count() as f64,
-        hours: (51.2 - if changes { FOUND_WITHIN_S } else { 0.0 }) / 3600.0,
+        hours: (51.2 - if changes { MAX_DETECTION_TIME_S } else { 0.0 }) / 3600.0,
     }
 }

@@ -28,13 +28,13 @@ fn main() {
     let runs = arguments.get(1).map(|n| n.parse().unwrap());
     match arguments.first().map(String::as_str) {
         Some("coverage") => {
-            textbook_coverage(runs.unwrap_or(2000));
-            closed_loop(runs.unwrap_or(2000));
+            print_textbook_coverage(runs.unwrap_or(2000));
+            print_closed_loop_coverage(runs.unwrap_or(2000));
         }
-        Some("efficiency") => closed_loop(runs.unwrap_or(2000)),
-        Some("starts") => starts(runs.unwrap_or(100)),
-        Some("delay") => delay(runs.unwrap_or(100)),
-        Some("speed") => speed(runs.unwrap_or(50), arguments.get(2).map_or("python3", String::as_str)),
+        Some("efficiency") => print_closed_loop_coverage(runs.unwrap_or(2000)),
+        Some("starts") => compare_starts(runs.unwrap_or(100)),
+        Some("delay") => print_delay_choice(runs.unwrap_or(100)),
+        Some("speed") => compare_speed(runs.unwrap_or(50), arguments.get(2).map_or("python3", String::as_str)),
         _ => println!("coverage, efficiency, starts, delay or speed, and a number of runs"),
     }
 }
@@ -60,7 +60,7 @@ fn run(simulator: &Simulator, cell: u64, replication: u64) -> Record {
 
 /// Estimates of one quantity over the runs.
 #[derive(Default)]
-struct Tally {
+struct EstimateTally {
     name: String,
     truth: f64,
     values: Vec<f64>,
@@ -70,7 +70,7 @@ struct Tally {
 }
 
 #[derive(Default)]
-struct Tallies(Vec<Tally>);
+struct Tallies(Vec<EstimateTally>);
 
 impl Tallies {
     /// Adds an estimate, and its variance by the Cramer-Rao bound (not a number if it is not
@@ -79,10 +79,10 @@ impl Tallies {
         let at = match self.0.iter().position(|t| t.name == name) {
             Some(at) => at,
             None => {
-                self.0.push(Tally {
+                self.0.push(EstimateTally {
                     name: name.to_owned(),
                     truth,
-                    ..Tally::default()
+                    ..EstimateTally::default()
                 });
                 self.0.len() - 1
             }
@@ -123,7 +123,7 @@ impl Tallies {
     }
 }
 
-fn textbook_coverage(runs: u64) {
+fn print_textbook_coverage(runs: u64) {
     for structure in Structure::ALL {
         let truth = Truth::of(structure);
         let mut tallies = Tallies::default();
@@ -139,13 +139,13 @@ fn textbook_coverage(runs: u64) {
     }
 }
 
-fn closed_loop(runs: u64) {
+fn print_closed_loop_coverage(runs: u64) {
     for (condition, state) in [
         (Condition::C1, OperatingState::s1()),
         (Condition::C2, OperatingState::s2()),
     ] {
         let simulator = simulator(condition, 1, 0.1);
-        let held = state.operator.discretise(SampleTime::HUNDREDTH).unwrap().held;
+        let held = state.operator.discretise(SampleTime::AT_100_HZ).unwrap().held;
         let theta = [held.b0, held.b1, -(-0.01_f64 / 0.06).exp(), held.f1, held.f2];
         let o = state.operator;
         let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));
@@ -206,7 +206,7 @@ fn closed_loop(runs: u64) {
 }
 
 /// Table 6.1: every initial condition leads to the same minimum.
-fn starts(runs: u64) {
+fn compare_starts(runs: u64) {
     let gains = [0.075, 0.05, 0.1];
     let poles = [[-1.912, 0.924], [-1.812, 0.824], [-1.962, 0.974]];
     for m0 in 1..=4 {
@@ -244,7 +244,7 @@ fn starts(runs: u64) {
 }
 
 /// Share of runs in which the loss is smallest at the true delay.
-fn delay(runs: u64) {
+fn print_delay_choice(runs: u64) {
     for m0 in 1..=4 {
         for noise_level in [0.01, 0.1, 0.3] {
             let simulator = simulator(Condition::C1, m0, noise_level);
@@ -279,7 +279,7 @@ fn delay(runs: u64) {
 
 /// Compares the Box-Jenkins fit without a start with the same fit in SciPy, in one session on one thread; the smallest
 /// time of each counts.
-fn speed(runs: u64, python: &str) {
+fn compare_speed(runs: u64, python: &str) {
     let record = [run(&simulator(Condition::C1, 1, 0.1), 0, 0)];
     let estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));
     let fastest = |estimator: &Estimator| {

@@ -9,13 +9,13 @@ use std::path::Path;
 use hoid_model::scenario::Condition;
 use hoid_study::statistics::median;
 use hoid_thesis::{
-    experiment::{EXPERIMENT, EvaluatedRun, ExperimentPlan, experiment, procedure::Truth},
+    experiment::{EXPERIMENT_PLAN, EvaluatedRun, ExperimentPlan, experiment, procedure::Truth},
     reproduction::{Studies, items},
 };
 
 /// Spans before the change and at the end, s.
-const BEFORE_S: (f64, f64) = (30.72, 40.96);
-const AFTER_S: (f64, f64) = (61.44, 81.93);
+const SPAN_BEFORE_S: (f64, f64) = (30.72, 40.96);
+const SPAN_AFTER_S: (f64, f64) = (61.44, 81.93);
 
 fn main() {
     let directory = std::env::args().nth(1).unwrap_or_else(|| "experiment".to_owned());
@@ -33,7 +33,7 @@ fn main() {
     let text = std::env::args()
         .nth(2)
         .map(|path| std::fs::read_to_string(path).unwrap());
-    let plan = ExperimentPlan::parse(text.as_deref().unwrap_or(EXPERIMENT)).unwrap();
+    let plan = ExperimentPlan::parse(text.as_deref().unwrap_or(EXPERIMENT_PLAN)).unwrap();
     let found = experiment(&plan, &|| (), &|| true);
     assert!(found.failed.is_empty(), "{:?}", found.failed);
     let runs = found.runs;
@@ -55,16 +55,20 @@ fn main() {
         let own = of(&runs, subject, Condition::C4);
         let true_of = |i: usize, end: usize| mean(own.iter().map(|run| truth(run).states[end].operator[i]));
         let of_method = |method: usize, i: usize, span: (f64, f64)| {
-            median(&own.iter().map(|run| middle(run, method, i, span)).collect::<Vec<_>>())
+            median(
+                &own.iter()
+                    .map(|run| mean_within(run, method, i, span))
+                    .collect::<Vec<_>>(),
+            )
         };
         let ratio = |a: f64, b: f64| format!("{:.2}", a / b);
         let simulated = ratio(true_of(2, 1), true_of(2, 0));
-        let found = [0, 1].map(|m| ratio(of_method(m, 2, AFTER_S), of_method(m, 2, BEFORE_S)));
+        let found = [0, 1].map(|m| ratio(of_method(m, 2, SPAN_AFTER_S), of_method(m, 2, SPAN_BEFORE_S)));
         println!(
             "| {subject} | K_ė after over before | {simulated} | {} | {} |",
             found[0], found[1]
         );
-        let level = [0, 1].map(|m| format!("{:.1}", of_method(m, 3, AFTER_S)));
+        let level = [0, 1].map(|m| format!("{:.1}", of_method(m, 3, SPAN_AFTER_S)));
         println!(
             "| {subject} | ω_nm, rad/s | {:.1} | {} | {} |",
             true_of(3, 1),
@@ -98,7 +102,7 @@ fn main() {
         for (method, name) in ["RLS", "RPEM"].into_iter().enumerate() {
             let cell = |i: usize| {
                 let error = |run: &&EvaluatedRun| {
-                    100.0 * (middle(run, method, i, AFTER_S) / truth(run).states[1].operator[i] - 1.0)
+                    100.0 * (mean_within(run, method, i, SPAN_AFTER_S) / truth(run).states[1].operator[i] - 1.0)
                 };
                 let all: Vec<f64> = own.iter().map(error).filter(|x| x.is_finite()).collect();
                 // Avoids -0.
@@ -127,7 +131,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Returns the values of an operator parameter within a span.
-fn within(run: &EvaluatedRun, method: usize, i: usize, (from_s, to_s): (f64, f64)) -> Vec<f64> {
+fn values_within(run: &EvaluatedRun, method: usize, i: usize, (from_s, to_s): (f64, f64)) -> Vec<f64> {
     let course = &run.outcome.courses[method];
     let all = course.times_s.iter().zip(&course.states);
     all.filter(|(t, _)| (from_s..to_s).contains(*t))
@@ -136,13 +140,13 @@ fn within(run: &EvaluatedRun, method: usize, i: usize, (from_s, to_s): (f64, f64
         .collect()
 }
 
-fn middle(run: &EvaluatedRun, method: usize, i: usize, span_s: (f64, f64)) -> f64 {
-    mean(within(run, method, i, span_s).into_iter())
+fn mean_within(run: &EvaluatedRun, method: usize, i: usize, span_s: (f64, f64)) -> f64 {
+    mean(values_within(run, method, i, span_s).into_iter())
 }
 
 /// Returns the standard deviation over time at the end, relative to the true value.
 fn fluctuation(run: &EvaluatedRun, method: usize, i: usize) -> f64 {
-    let values = within(run, method, i, AFTER_S);
+    let values = values_within(run, method, i, SPAN_AFTER_S);
     let middle = mean(values.iter().copied());
     mean(values.iter().map(|value| (value - middle).powi(2))).sqrt() / truth(run).states[1].operator[i].abs()
 }
@@ -156,5 +160,5 @@ fn variance_growth(run: &EvaluatedRun) -> f64 {
                 .map(|(_, variances)| variances[2]),
         )
     };
-    of(AFTER_S) / of(BEFORE_S)
+    of(SPAN_AFTER_S) / of(SPAN_BEFORE_S)
 }

@@ -30,13 +30,13 @@ const PREVIEW_S: f64 = 0.25;
 
 /// Number of intervals that cover the truth, number of determined intervals, and number of all intervals.
 #[derive(Default)]
-struct Held {
+struct CoverageCounts {
     held: usize,
     determined: usize,
     all: usize,
 }
 
-fn count(all: &mut BTreeMap<String, Held>, name: &str, parameter: Option<&Parameter>, truth: f64) {
+fn count_interval(all: &mut BTreeMap<String, CoverageCounts>, name: &str, parameter: Option<&Parameter>, truth: f64) {
     let held = all.entry(name.to_owned()).or_default();
     held.all += 1;
     if let Some((low, high)) = parameter.filter(|p| p.determined).and_then(|p| p.interval) {
@@ -81,7 +81,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         // The inverse of K/(s + a) has the gain a/K and the lead 1/a; for two integrators it is an acceleration with a
         // small rate.
         let rate = element.den().get(1).copied().unwrap_or(0.0).max(0.3);
-        let (omega, zeta) = person.state.operator.neuromuscular().unwrap_or((11.0, 0.3));
+        let (omega, zeta) = person.state.operator.neuromuscular_parameters().unwrap_or((11.0, 0.3));
         let muscles = [omega.ln(), zeta.ln()];
         let k_d = match form {
             Form::Derivative => g / gain,
@@ -110,7 +110,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             preview_s: PREVIEW_S,
             ..SeenChannel::new("f_t", ChannelRole::Feedforward)
         };
-        let with = |channels| identification(channels).run(Recordings::of_records(records.iter().cloned()));
+        let with = |channels| identification(channels).run(Recordings::from_records(records.iter().cloned()));
         let Ok(two) = with(vec![seen]) else {
             println!("{k}: no result");
             continue;
@@ -134,14 +134,18 @@ fn main() -> Result<(), Box<dyn Error>> {
         trustworthy += usize::from(two.verdict.level == VerdictLevel::Trustworthy);
         let of = |all: &[Parameter], name: &str| all.iter().find(|p| p.name == name).cloned();
         let own = &two.fit.operators[0].parameters;
-        for truth in person.state.operator.named() {
-            count(&mut held, truth.name, of(own, truth.name).as_ref(), truth.value);
+        for truth in person.state.operator.named_parameters() {
+            count_interval(&mut held, truth.name, of(own, truth.name).as_ref(), truth.value);
         }
         if let (true, Some(response)) = (sees, response) {
             if response.operator.form() == form {
-                for truth in target.named().iter().filter(|p| matches!(p.name, "K_d" | "T_L")) {
+                for truth in target
+                    .named_parameters()
+                    .iter()
+                    .filter(|p| matches!(p.name, "K_d" | "T_L"))
+                {
                     let name = format!("{} of F", truth.name);
-                    count(
+                    count_interval(
                         &mut held,
                         &name,
                         of(&response.parameters, truth.name).as_ref(),
@@ -150,7 +154,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 }
             }
             let all = of(&response.parameters, "tau_f");
-            count(&mut held, "tau_f", all.as_ref(), tau_f);
+            count_interval(&mut held, "tau_f", all.as_ref(), tau_f);
         }
         if let Some(measures) = two.fit.loop_measures(0, element) {
             for (name, interval, truth) in [

@@ -27,7 +27,7 @@ use hoid_model::{
 };
 use simulated_operator::{Uniform, response_to};
 
-const SHARES: [f64; 5] = [0.0, 1e-12, 1e-9, 1e-6, 1e-3];
+const NOISE_SHARES: [f64; 5] = [0.0, 1e-12, 1e-9, 1e-6, 1e-3];
 
 /// Frequencies at which a response is evaluated, rad/s.
 const OMEGA_RAD_S: [f64; 5] = [0.5, 1.0, 2.0, 5.0, 10.0];
@@ -49,7 +49,7 @@ fn operator(form: Form, random: &mut Uniform) -> Result<FamilyOperator, Box<dyn 
 }
 
 /// Returns the discrete model for a held or a linear error.
-fn discrete(operator: &FamilyOperator, course: Intersample, ts: SampleTime) -> Result<HeldFamily, Box<dyn Error>> {
+fn discretise(operator: &FamilyOperator, course: Intersample, ts: SampleTime) -> Result<HeldFamily, Box<dyn Error>> {
     if course == Intersample::Zoh {
         return Ok(operator.zoh(ts)?);
     }
@@ -86,10 +86,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     let number = |i: usize, otherwise: u64| env::args().nth(i).map_or(Ok(otherwise), |text| text.parse());
     let forms_of_default = FamilyEstimator::default().forms;
     let (people, seed) = (number(1, 1000)?, number(2, 1)?);
-    for share in SHARES {
+    for share in NOISE_SHARES {
         let mut random = Uniform(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
         let (mut forms, mut courses, mut wrong, mut failed, mut outside) = (0, 0, 0, 0, 0);
-        let each = (people / SHARES.len() as u64).max(1);
+        let each = (people / NOISE_SHARES.len() as u64).max(1);
         for k in 0..each {
             let form = forms_of_default[k as usize % forms_of_default.len()];
             let course = if (k / forms_of_default.len() as u64).is_multiple_of(2) {
@@ -100,7 +100,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let truth = operator(form, &mut random)?;
             let rate = [20.0, 50.0, 100.0, 200.0][(random.between(0.0, 1.0) * 4.0) as usize];
             let ts = SampleTime::new(1.0 / rate)?;
-            let record = record(&discrete(&truth, course, ts)?, ts, share, &mut random)?;
+            let record = record(&discretise(&truth, course, ts)?, ts, share, &mut random)?;
             let what = format!(
                 "share {share:e}, {course}, {rate} Hz, {form} {:.4?}",
                 truth.coordinates()

@@ -18,19 +18,19 @@ use hoid_track::{ErrorThreshold, Method, Sample, TrackOptions, Tracker};
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 const LEVELS: [f64; 4] = [0.01, 0.1, 0.2, 0.3];
 /// End of the search for a change, s.
-const FOUND_UNTIL_S: f64 = CHANGE_S + 5.0;
+const SEARCH_END_S: f64 = CHANGE_S + 5.0;
 /// Further alarms within this time belong to the same event and are not counted, s.
-const ONE_EVENT_S: f64 = 4.0;
+const EVENT_DURATION_S: f64 = 4.0;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let runs = arguments.get(1).and_then(|n| n.parse().ok()).unwrap_or(100);
     match arguments.first().map(String::as_str) {
-        Some("detection") => detection(runs),
-        Some("tune") => tune(runs),
-        Some("joined") => joined(&arguments[1..]),
-        Some("set") => set(runs),
-        Some("cost") => cost(runs),
+        Some("detection") => print_detection(runs),
+        Some("tune") => print_tuning_errors(runs),
+        Some("joined") => print_junction_changes(&arguments[1..]),
+        Some("set") => print_tuning_cells(runs),
+        Some("cost") => print_step_time(runs),
         _ => println!("detection, tune, set or cost, and a number of runs; joined and pairs of files"),
     }
 }
@@ -67,7 +67,7 @@ fn follow(record: &Record, options: &TrackOptions) -> RunResult {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let span = record.span(0.0, START_S).unwrap();
     let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
-    let from = if options.method.covariance().is_none() {
+    let from = if options.method.initial_covariance().is_none() {
         START_S - 0.005
     } else {
         -1.0
@@ -86,7 +86,7 @@ fn follow(record: &Record, options: &TrackOptions) -> RunResult {
         tracker.update(sample, t >= from);
         if tracker.change().is_some() {
             declared[usize::from(t >= CHANGE_S)] += 1.0;
-            if (CHANGE_S..FOUND_UNTIL_S).contains(&t) {
+            if (CHANGE_S..SEARCH_END_S).contains(&t) {
                 declared[2] = 1.0;
             }
         }
@@ -96,7 +96,7 @@ fn follow(record: &Record, options: &TrackOptions) -> RunResult {
         let Ok(operator) = tracker.operator() else { continue };
         rows += 1.0;
         let after_start = t > START_S;
-        let changing = (CHANGE_S..FOUND_UNTIL_S).contains(&t);
+        let changing = (CHANGE_S..SEARCH_END_S).contains(&t);
         counts[0] += f64::from(after_start);
         counts[1] += f64::from(changing);
         for (i, (_, _, e)) in operator.rows()[..5].iter().enumerate() {
@@ -147,20 +147,20 @@ fn alarms(statistic: &Statistic, threshold: f64, changes: bool) -> (Option<f64>,
             continue;
         }
         let fresh = t >= quiet_from;
-        if changes && (CHANGE_S..FOUND_UNTIL_S).contains(&t) {
+        if changes && (CHANGE_S..SEARCH_END_S).contains(&t) {
             if lag.is_none() {
                 lag = Some(t - CHANGE_S);
             }
-        } else if fresh && !(changes && t >= FOUND_UNTIL_S) {
+        } else if fresh && !(changes && t >= SEARCH_END_S) {
             events += 1;
         }
-        quiet_from = t + ONE_EVENT_S;
+        quiet_from = t + EVENT_DURATION_S;
     }
     (lag, events)
 }
 
 /// Prints the detections in C4 and C6 against the false alarms in C1 and C2, for the odds and for the baseline.
-fn detection(runs: usize) {
+fn print_detection(runs: usize) {
     let statistics = |record: &Record| -> [Statistic; 2] {
         let span = record.span(0.0, START_S).unwrap();
         let options = options(hoid_survey::multiple_model());
@@ -242,7 +242,7 @@ fn detection(runs: usize) {
 
 /// Prints the errors relative to the better of RLS and RPEM on the cells used for tuning: C3 and C5, m0 = 2 and 3,
 /// seed 9000.
-fn tune(runs: usize) {
+fn print_tuning_errors(runs: usize) {
     let methods = [
         thesis_settings(Method::rls()),
         thesis_settings(Method::rpem()),
@@ -291,7 +291,7 @@ fn tune(runs: usize) {
 
 /// Prints the results for the cells for tuning `multiple-model`: C3 and C5, C1 and C2, and changes of the neuromuscular
 /// system other than those of the plan. The errors are geometric means over the cells of the median run.
-fn set(runs: usize) {
+fn print_tuning_cells(runs: usize) {
     let options = options(hoid_survey::multiple_model());
     let neuromuscular = |omega: f64, zeta: f64| {
         move |scenario: &mut Scenario| {
@@ -393,7 +393,7 @@ fn set(runs: usize) {
 }
 
 /// Reads error and control for t in [5, 45) s.
-fn recording(path: &str) -> [Vec<f64>; 2] {
+fn read_recording(path: &str) -> [Vec<f64>; 2] {
     let text = std::fs::read_to_string(path).unwrap();
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -412,7 +412,7 @@ fn recording(path: &str) -> [Vec<f64>; 2] {
 
 /// Prints the changes declared around the junction of two recordings of a person: the first 30 s are the start span,
 /// and nothing changes until 40 s.
-fn joined(files: &[String]) {
+fn print_junction_changes(files: &[String]) {
     let (start_s, seam_s) = (30.0, 40.0);
     let sample_time = SampleTime::new(1.0 / 60.0).unwrap();
     let thresholds = [[3.0, 6.0, 10.0, 20.0], [2.5, 3.0, 4.0, 5.0]];
@@ -420,7 +420,7 @@ fn joined(files: &[String]) {
     let mut events = [[0; 4]; 2];
     let (mut pairs, mut failed) = (0, 0);
     for pair in files.chunks_exact(2) {
-        let [[mut e, mut u], [e2, u2]] = [&pair[0], &pair[1]].map(|path| recording(path));
+        let [[mut e, mut u], [e2, u2]] = [&pair[0], &pair[1]].map(|path| read_recording(path));
         e.extend(e2);
         u.extend(u2);
         let record = Record::new(sample_time, Channel::new("e", "1", e), Channel::new("u", "1", u)).unwrap();
@@ -481,7 +481,7 @@ fn joined(files: &[String]) {
 }
 
 /// Prints the time of a step with its estimate, ns: the smallest mean of a given number of runs.
-fn cost(runs: usize) {
+fn print_step_time(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);
     let span = record.span(0.0, START_S).unwrap();

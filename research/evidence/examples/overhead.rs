@@ -10,7 +10,7 @@ use std::{hint::black_box, time::Instant};
 
 use hoid::{
     prelude::*,
-    track::{Method, StartAt, TrackOptions, Tracker},
+    track::{Method, StartSource, TrackOptions, Tracker},
 };
 
 fn main() {
@@ -41,7 +41,7 @@ fn main() {
         .unwrap();
     for method in [Method::rpem(), hoid_survey::physical()] {
         let options = TrackOptions {
-            start: StartAt::Theta(start.model().theta().to_vec()),
+            start: StartSource::Theta(start.model().theta().to_vec()),
             ..TrackOptions::new(method.clone(), Structure::BoxJenkins, orders)
         };
         let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();

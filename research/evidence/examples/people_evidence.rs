@@ -12,10 +12,10 @@
 
 use std::{env, f64::consts::PI, fs, path::PathBuf};
 
-use hoid_evidence::oracle::{self, Rows};
+use hoid_evidence::oracle::{self, TrialRows};
 use hoid_evidence::task::{median, on_all_cores};
 use hoid_model::{Channel, Record, SampleTime};
-use hoid_track::{StartAt, TrackOptions, Tracker};
+use hoid_track::{StartSource, TrackOptions, Tracker};
 
 const PEOPLE: [&str; 3] = ["P03", "P05", "P09"];
 const ELEMENTS: [&str; 2] = ["fo", "so"];
@@ -23,13 +23,13 @@ const ELEMENTS: [&str; 2] = ["fo", "so"];
 const LINES: [f64; 7] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0];
 /// Analysed rows of a trial: whole periods.
 const FIRST_ROW: usize = 300;
-const ROWS: usize = 2400;
+const ROW_COUNT: usize = 2400;
 const RATE_HZ: f64 = 60.0;
-const AT_S: [usize; 6] = [2, 4, 8, 13, 18, 28];
+const EVALUATION_TIMES_S: [usize; 6] = [2, 4, 8, 13, 18, 28];
 const NK: usize = 13;
 const SETTLING_S: f64 = 12.0;
-const WITHIN_S: f64 = 8.0;
-const CERTAIN: f64 = 12.0;
+const MAX_DETECTION_TIME_S: f64 = 8.0;
+const CERTAIN_LOG_RATIO: f64 = 12.0;
 
 /// Error, output and disturbance of a trial, and error and output of the ramp before it.
 struct Trial {
@@ -63,7 +63,7 @@ fn read(folder: &PathBuf, person: &str, element: &str) -> Vec<Trial> {
         let later = [0, 1, 0];
         let of = |c: usize, from: usize, rows: usize| all[c][from + later[c]..from + later[c] + rows].to_vec();
         Trial {
-            signals: [0, 1, 2].map(|c| of(c, FIRST_ROW, ROWS)),
+            signals: [0, 1, 2].map(|c| of(c, FIRST_ROW, ROW_COUNT)),
             ramp: [0, 1].map(|c| of(c, 0, FIRST_ROW)),
         }
     };
@@ -81,7 +81,7 @@ fn coefficient(values: &[f64], line: f64) -> [f64; 2] {
     })
 }
 
-fn over(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+fn quotient(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     let square = b[0] * b[0] + b[1] * b[1];
     [
         (a[0] * b[0] + a[1] * b[1]) / square,
@@ -89,15 +89,15 @@ fn over(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
     ]
 }
 
-fn describing(trials: &[Trial]) -> [[f64; 2]; 7] {
+fn describing_function(trials: &[Trial]) -> [[f64; 2]; 7] {
     LINES.map(|line| {
         let mean = |channel: usize| {
             trials.iter().fold([0.0; 2], |[re, im], t| {
-                let [a, b] = over(coefficient(&t.signals[channel], line), coefficient(&t.signals[2], line));
+                let [a, b] = quotient(coefficient(&t.signals[channel], line), coefficient(&t.signals[2], line));
                 [re + a, im + b]
             })
         };
-        over(mean(1), mean(0))
+        quotient(mean(1), mean(0))
     })
 }
 
@@ -124,13 +124,13 @@ struct Run {
 fn is_certain(before: &[Trial], joined: usize, after: &[Trial], second: usize) -> bool {
     let rows = |trial: &Trial| {
         let of = |c: usize| [trial.ramp[c].as_slice(), &trial.signals[c]].concat();
-        Rows::new(&of(0), &of(1), FIRST_ROW, 1.0 / RATE_HZ)
+        TrialRows::new(&of(0), &of(1), FIRST_ROW, 1.0 / RATE_HZ)
     };
-    let [before, after] = [before, after].map(|trials| trials.iter().map(rows).collect::<Vec<Rows>>());
-    let others: Vec<&Rows> = (0..after.len()).filter(|i| *i != second).map(|i| &after[i]).collect();
-    let before: Vec<&Rows> = before.iter().collect();
-    let samples = (WITHIN_S * RATE_HZ) as usize;
-    oracle::log_ratio(&before, joined, &others, &after[second], samples) > CERTAIN
+    let [before, after] = [before, after].map(|trials| trials.iter().map(rows).collect::<Vec<TrialRows>>());
+    let others: Vec<&TrialRows> = (0..after.len()).filter(|i| *i != second).map(|i| &after[i]).collect();
+    let before: Vec<&TrialRows> = before.iter().collect();
+    let samples = (MAX_DETECTION_TIME_S * RATE_HZ) as usize;
+    oracle::log_ratio(&before, joined, &others, &after[second], samples) > CERTAIN_LOG_RATIO
 }
 
 fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2], change: bool) -> Option<Run> {
@@ -143,10 +143,10 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
     }
     let ts = SampleTime::new(1.0 / RATE_HZ).unwrap();
     let mut options = TrackOptions::default_for(method, NK);
-    options.start = StartAt::Span(Some((5.0, 30.0)));
+    options.start = StartSource::Span(Some((5.0, 30.0)));
     let joined = |c: usize| [first.signals[c].clone(), second.signals[c].clone()].concat();
     let record = Record::new(ts, Channel::new("e", "", joined(0)), Channel::new("u", "", joined(1))).unwrap();
-    let starts_itself = options.method.starts_itself();
+    let starts_itself = options.method.is_self_starting();
     let span = record.span(5.0, 30.0).unwrap();
     let mut tracker = Tracker::new(&options, (!starts_itself).then_some(&span), ts).ok()?;
     let mut run = Run {
@@ -163,7 +163,7 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
             u: record.output()[k],
             reference: None,
         };
-        if k == ROWS {
+        if k == ROW_COUNT {
             for (e, u) in second.ramp[0].iter().zip(&second.ramp[1]) {
                 let sample = hoid_track::Sample {
                     e: *e,
@@ -177,11 +177,11 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
         if tracker.change().is_some() {
             run.alarms_s.push(t);
         }
-        if k + 1 == ROWS {
+        if k + 1 == ROW_COUNT {
             run.before = error(&tracker, truths[0]);
         }
-        for (place, at) in run.after.iter_mut().zip(AT_S) {
-            if k == ROWS + at * RATE_HZ as usize {
+        for (place, at) in run.after.iter_mut().zip(EVALUATION_TIMES_S) {
+            if k == ROW_COUNT + at * RATE_HZ as usize {
                 *place = error(&tracker, truths[1]);
             }
         }
@@ -206,7 +206,7 @@ fn main() {
         .iter()
         .flat_map(|p| ELEMENTS.map(|e| read(&folder, p, e)))
         .collect();
-    let truths: Vec<[[f64; 2]; 7]> = cells.iter().map(|c| describing(c)).collect();
+    let truths: Vec<[[f64; 2]; 7]> = cells.iter().map(|c| describing_function(c)).collect();
     for person in 0..PEOPLE.len() {
         for [a, b] in [[0, 1], [1, 0], [0, 0], [1, 1]] {
             for trial in 0..10 {
@@ -220,7 +220,7 @@ fn main() {
         a != b && is_certain(&cells[a], i0, &cells[b], i1)
     });
     println!(
-        "{} of {} changes are certain within {WITHIN_S} s\n",
+        "{} of {} changes are certain within {MAX_DETECTION_TIME_S} s\n",
         certain.iter().filter(|c| **c).count(),
         pairs.iter().filter(|([a, _], [b, _])| a != b).count()
     );
@@ -243,7 +243,7 @@ fn main() {
         let of = |change: bool, at: usize| median(runs.iter().filter(|r| r.change == change).map(|r| r.after[at]));
         let curve: Vec<f64> = (0..6).map(|at| of(true, at)).collect();
         let still: Vec<String> = (0..6).map(|at| format!("{:.2}", of(false, at))).collect();
-        let seam = ROWS as f64 / RATE_HZ;
+        let seam = ROW_COUNT as f64 / RATE_HZ;
         let found = |of: &dyn Fn(&Run) -> bool, within: f64| {
             let these: Vec<&Run> = runs.iter().filter(|r| of(r)).collect();
             let hit = |r: &&&Run| r.alarms_s.iter().any(|t| (seam..seam + within).contains(t));
@@ -261,9 +261,9 @@ fn main() {
             curve[2..].iter().sum::<f64>() / 4.0,
             still.join(" "),
             found(&|r| r.change, 5.0),
-            found(&|r| r.change, WITHIN_S),
-            found(&|r| r.certain, WITHIN_S),
-            found(&|r| !r.change, WITHIN_S),
+            found(&|r| r.change, MAX_DETECTION_TIME_S),
+            found(&|r| r.certain, MAX_DETECTION_TIME_S),
+            found(&|r| !r.change, MAX_DETECTION_TIME_S),
             alarms as f64 / hours
         );
     }

@@ -13,18 +13,18 @@
 
 use std::{collections::BTreeMap, env, f64::consts::PI, fs, path::Path};
 
-use hoid_evidence::pilots::{self, FROM_S};
+use hoid_evidence::pilots::{self, MEASUREMENT_START_S};
 use hoid_track::{Sample, TrackOptions, Tracker};
 use rayon::prelude::*;
 
-const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
+const EVALUATION_OMEGA_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 const CHANGE_S: f64 = 50.0;
 /// Times at which errors are evaluated, s.
-const READ_S: [f64; 3] = [45.0, 60.0, 70.0];
+const EVALUATION_TIMES_S: [f64; 3] = [45.0, 60.0, 70.0];
 /// Times at which bands are evaluated, s after the change.
-const BANDS_S: [f64; 6] = [-10.0, -5.0, 5.0, 10.0, 20.0, 39.0];
+const BAND_TIMES_S: [f64; 6] = [-10.0, -5.0, 5.0, 10.0, 20.0, 39.0];
 /// Time within which alarms belong to one event, s.
-const ONE_EVENT_S: f64 = 8.0;
+const EVENT_DURATION_S: f64 = 8.0;
 
 type Response = [[f64; 2]; 3];
 type References = BTreeMap<(String, String, String, String), Response>;
@@ -35,28 +35,28 @@ fn references(folder: &Path) -> References {
     for line in text.lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
         let omega: f64 = cells[4].parse().unwrap();
-        let place = AT_RAD_S.iter().position(|w| *w == omega).unwrap();
+        let place = EVALUATION_OMEGA_RAD_S.iter().position(|w| *w == omega).unwrap();
         let key = [0, 1, 2, 3].map(|i| cells[i].to_owned()).into();
         all.entry(key).or_insert([[0.0; 2]; 3])[place] = [5, 6].map(|i| cells[i].parse().unwrap());
     }
     all
 }
 
-fn turned(phase: f64) -> f64 {
+fn wrap_phase(phase: f64) -> f64 {
     (phase + PI).rem_euclid(2.0 * PI) - PI
 }
 
 /// Returns the logarithm of the gain, and the phase, minus those of a reference.
-fn away(h: [f64; 2], reference: [f64; 2]) -> [f64; 2] {
+fn deviation(h: [f64; 2], reference: [f64; 2]) -> [f64; 2] {
     [
         h[0].hypot(h[1]).ln() - reference[0],
-        turned(h[1].atan2(h[0]) - reference[1]),
+        wrap_phase(h[1].atan2(h[0]) - reference[1]),
     ]
 }
 
 fn error(h: &[[f64; 2]; 3], reference: &Response) -> f64 {
     let squares = h.iter().zip(reference).map(|(h, r)| {
-        let [gain, phase] = away(*h, *r);
+        let [gain, phase] = deviation(*h, *r);
         gain * gain + phase * phase
     });
     (squares.sum::<f64>() / 3.0).sqrt()
@@ -135,8 +135,8 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
         settings.extend((name == "rpem").then_some(("stable", "noise")));
         options = options.with(&settings).unwrap();
     }
-    let span = record.span(FROM_S, FROM_S + 27.3).unwrap();
-    let starts = options.method.starts_itself();
+    let span = record.span(MEASUREMENT_START_S, MEASUREMENT_START_S + 27.3).unwrap();
+    let starts = options.method.is_self_starting();
     let mut tracker = Tracker::new(&options, (!starts).then_some(&span), record.sample_time()).unwrap();
     let kind = kind(condition, axis);
     let mut run = Run {
@@ -167,18 +167,21 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
             run.changed_at_s.push(t - change.seconds_ago);
         }
         let is_at = |s: f64| (t - s).abs() < 0.004;
-        if k % 10 != 0 && !READ_S.iter().any(|s| is_at(*s)) && !BANDS_S.iter().any(|s| is_at(CHANGE_S + s)) {
+        if k % 10 != 0
+            && !EVALUATION_TIMES_S.iter().any(|s| is_at(*s))
+            && !BAND_TIMES_S.iter().any(|s| is_at(CHANGE_S + s))
+        {
             continue;
         }
-        let responses: Option<Vec<_>> = AT_RAD_S.iter().map(|w| tracker.response(*w)).collect();
+        let responses: Option<Vec<_>> = EVALUATION_OMEGA_RAD_S.iter().map(|w| tracker.response(*w)).collect();
         let Some(responses) = responses else { continue };
         let h = [0, 1, 2].map(|i| responses[i].value);
-        for (i, at) in READ_S.iter().enumerate() {
+        for (i, at) in EVALUATION_TIMES_S.iter().enumerate() {
             if is_at(*at) {
                 run.errors[i] = error(&h, &of(condition, if i == 0 { "pre" } else { "post" }));
             }
         }
-        for (i, after) in BANDS_S.iter().enumerate() {
+        for (i, after) in BAND_TIMES_S.iter().enumerate() {
             if is_at(CHANGE_S + after) {
                 let reference = of(condition, if *after < 0.0 { "pre" } else { "post" });
                 let mut held = [0.0; 2];
@@ -188,7 +191,7 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
                     // Along the response and across it.
                     let along = [[re / size, im / size], [-im / size, re / size]];
                     let c = &response.covariance;
-                    let d = away(response.value, reference);
+                    let d = deviation(response.value, reference);
                     for (part, a) in along.iter().enumerate() {
                         let v = a[0] * a[0] * c[0][0] + 2.0 * a[0] * a[1] * c[0][1] + a[1] * a[1] * c[1][1];
                         held[part] += f64::from(d[part].abs() <= 1.96 * v.max(0.0).sqrt() / size) / 3.0;
@@ -219,7 +222,7 @@ fn alarms(run: &Run, from: f64, to: f64) -> usize {
     let mut last = f64::MIN;
     let mut count = 0;
     for t in run.alarms_s.iter().filter(|t| (from..to).contains(*t)) {
-        count += usize::from(t - last > ONE_EVENT_S);
+        count += usize::from(t - last > EVENT_DURATION_S);
         last = *t;
     }
     count
@@ -248,7 +251,7 @@ fn main() {
             .to_vec();
     }
     let references = references(folder);
-    let names = pilots::names(folder, &runs);
+    let names = pilots::recording_names(folder, &runs);
     println!(
         "| method | sudden: 5 s before, +10, +20 s | gradual | constant | nearer to H2 before, sudden, gradual | after | bands of \
          gain at -10, -5, +5, +10, +20, +39 s | of phase | alarms an hour | sudden found in 5, 10, 15 s | gradual | instant off, s | K_e, T_L, \

@@ -9,16 +9,16 @@
 //! and the share of the remnant in the variance of u, which is the share at non-excited frequencies; `hoid design`
 //! predicts the errors of a run of this length. The scatter is the standard deviation of the estimates of the other runs,
 //! divided by `c_4 = 1 - 1/(4 (n - 1))`. It contains the person's variation from run to run, so it is also compared with
-//! the error for the person, which includes the default variation [`RUN_TO_RUN`]. This default is the median over the
+//! the error for the person, which includes the default variation [`RUN_TO_RUN_DEVIATION`]. This default is the median over the
 //! people with a disturbance of the variation of the crossover, `sqrt(scatter^2 - error^2)`; the pilots are an independent
 //! test. Quantities with an error above half of their value are excluded.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{env, fs, path::Path};
 
-use hoid::design::experiment::{Enters, Forcing, RUN_TO_RUN, Remnant, Task, expected};
+use hoid::design::experiment::{Enters, Forcing, RUN_TO_RUN_DEVIATION, Remnant, Task, expected};
 use hoid_evidence::{
-    pilots::{self, FROM_S},
+    pilots::{self, MEASUREMENT_START_S},
     task::median,
 };
 use hoid_ident::family::{FamilyEstimator, OperatorPrior};
@@ -114,7 +114,7 @@ impl Cell {
             let Ok(found) = expected(&task, &forcing, length_s) else {
                 continue;
             };
-            let found = found.with_run_to_run(RUN_TO_RUN, 1);
+            let found = found.with_run_to_run(RUN_TO_RUN_DEVIATION, 1);
             let others = values
                 .iter()
                 .enumerate()
@@ -179,7 +179,7 @@ fn deviation(values: Vec<f64>) -> f64 {
 }
 
 /// People with a disturbance: two periods of 20 s at 60 Hz, u one row later.
-fn people(folder: &Path) -> Vec<Cell> {
+fn people_cells(folder: &Path) -> Vec<Cell> {
     const PRIMES: [f64; 11] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0];
     let mut cells = Vec::new();
     for (kind, element, form, lines) in [("fo", "1/s", Form::Gain, 11), ("so", "1/(s(s+1))", Form::Lead, 7)] {
@@ -221,7 +221,7 @@ fn people(folder: &Path) -> Vec<Cell> {
 }
 
 /// Pilots without a change: one period of 81.92 s of a target; the elements as they ran.
-fn pilots_of(folder: &Path) -> Vec<Cell> {
+fn pilot_cells(folder: &Path) -> Vec<Cell> {
     const LINES: [f64; 10] = [3.0, 5.0, 8.0, 13.0, 22.0, 34.0, 53.0, 86.0, 139.0, 229.0];
     let omegas = LINES.map(|m| m * std::f64::consts::TAU / 81.92);
     let mut cells = Vec::new();
@@ -230,7 +230,7 @@ fn pilots_of(folder: &Path) -> Vec<Cell> {
             for axis in ["roll", "pitch"] {
                 let runs = (1..=6).map(|k| {
                     let (record, first) = pilots::read(folder, &format!("{pilot}_{condition}_{axis}_{k}"));
-                    assert!((record.time_s(first) - FROM_S).abs() < 1e-6);
+                    assert!((record.time_s(first) - MEASUREMENT_START_S).abs() < 1e-6);
                     let record = record.span(record.time_s(first), record.time_s(first) + 81.92).unwrap();
                     let target = record.channel("r").unwrap().to_vec();
                     Run::new(record, &target, &omegas)
@@ -254,8 +254,8 @@ fn main() {
         println!("HOID_HUMAN_DATA does not name the folder of the recorded people");
     }
     let groups = [
-        ("people", human.map(|folder| people(Path::new(&folder)))),
-        ("pilots", pilots::folder().map(|folder| pilots_of(&folder))),
+        ("people", human.map(|folder| people_cells(Path::new(&folder)))),
+        ("pilots", pilots::folder().map(|folder| pilot_cells(&folder))),
     ];
     println!("medians of scatter/error of the run (scatter/error for the person, variation from run to run)");
     for (name, cells) in groups {

@@ -22,7 +22,7 @@ use rayon::prelude::*;
 
 /// Places of the inserted faults, s after the start, and the largest length of a fault.
 const FAULT_TIMES_S: [f64; 2] = [33.3, 47.77];
-const LONGEST_S: f64 = 20.0;
+const MAX_LENGTH_S: f64 = 20.0;
 /// Time after a fault in which it may be reported, s.
 const REPORT_WINDOW_S: f64 = 3.0;
 
@@ -54,24 +54,24 @@ fn all_faults() -> Vec<Fault> {
     let short = |fault: &Fault| match *fault {
         Fault::Scaled { factor, .. } => Fault::Scaled {
             factor,
-            seconds: LONGEST_S,
+            seconds: MAX_LENGTH_S,
         },
         Fault::ScaledOne { signal, factor, .. } => Fault::ScaledOne {
             signal,
             factor,
-            seconds: LONGEST_S,
+            seconds: MAX_LENGTH_S,
         },
-        Fault::Swapped { .. } => Fault::Swapped { seconds: LONGEST_S },
-        Fault::Silence { .. } => Fault::Silence { seconds: LONGEST_S },
-        Fault::NoisySilence { .. } => Fault::NoisySilence { seconds: LONGEST_S },
-        Fault::FrozenBoth { .. } => Fault::FrozenBoth { seconds: LONGEST_S },
-        Fault::MissingBoth { .. } => Fault::MissingBoth { seconds: LONGEST_S },
+        Fault::Swapped { .. } => Fault::Swapped { seconds: MAX_LENGTH_S },
+        Fault::Silence { .. } => Fault::Silence { seconds: MAX_LENGTH_S },
+        Fault::NoisySilence { .. } => Fault::NoisySilence { seconds: MAX_LENGTH_S },
+        Fault::FrozenBoth { .. } => Fault::FrozenBoth { seconds: MAX_LENGTH_S },
+        Fault::MissingBoth { .. } => Fault::MissingBoth { seconds: MAX_LENGTH_S },
         Fault::Saturated { signal, at, .. } => Fault::Saturated {
             signal,
             at,
-            seconds: LONGEST_S,
+            seconds: MAX_LENGTH_S,
         },
-        Fault::Flipped { .. } => Fault::Flipped { seconds: LONGEST_S },
+        Fault::Flipped { .. } => Fault::Flipped { seconds: MAX_LENGTH_S },
         other => other,
     };
     let mut all: Vec<Fault> = Vec::new();
@@ -110,7 +110,7 @@ fn main() {
     let mut arguments = env::args().skip(1);
     let runs = arguments.next().unwrap_or_else(|| "all".to_owned());
     let method = arguments.next().unwrap_or_else(|| "adaptive".to_owned());
-    let names = pilots::names(folder, &runs);
+    let names = pilots::recording_names(folder, &runs);
     let recordings: Vec<Recording> = names
         .iter()
         .map(|name| {
@@ -153,7 +153,7 @@ fn main() {
                     let per_second = 1.0 / r.sample_time.s();
                     let at = (at_s * per_second) as usize;
                     let (mut e, mut u) = (r.e.clone(), r.u.clone());
-                    let end = fault.put(&mut e, &mut u, at, per_second, 0.0);
+                    let end = fault.insert(&mut e, &mut u, at, per_second, 0.0);
                     let until = end.min(e.len()) + (REPORT_WINDOW_S * per_second) as usize;
                     let within = |k: usize| k >= at && k < until;
                     let without: Vec<_> = clean.iter().filter(|(k, _)| within(*k)).collect();

@@ -14,7 +14,7 @@ use hoid::{
         scenario::{Realisation, RemnantStrength},
     },
     prelude::*,
-    track::{Method, StartAt, Trace, TrackOptions, Tracker, track},
+    track::{Method, StartSource, Trace, TrackOptions, Tracker, track},
 };
 use rayon::prelude::*;
 
@@ -25,9 +25,9 @@ fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let runs = arguments.get(1).map(|n| n.parse().unwrap());
     match arguments.first().map(String::as_str) {
-        Some("table") => table(runs.unwrap_or(30)),
-        Some("divergence") => divergence(runs.unwrap_or(100)),
-        Some("endurance") => endurance(runs.unwrap_or(100_000_000)),
+        Some("table") => print_errors(runs.unwrap_or(30)),
+        Some("divergence") => print_divergence(runs.unwrap_or(100)),
+        Some("endurance") => print_endurance(runs.unwrap_or(100_000_000)),
         _ => println!("table or divergence and a number of runs, endurance and a number of samples"),
     }
 }
@@ -60,7 +60,7 @@ fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
 fn options(method: Method) -> TrackOptions {
     let structure = method.default_structure();
     TrackOptions {
-        start: StartAt::Span(Some((0.0, 30.72))),
+        start: StartSource::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(method, structure, structure.operator_orders(NK))
     }
 }
@@ -121,7 +121,7 @@ fn settling_time_s(traces: &[&[f64]]) -> f64 {
     f64::INFINITY
 }
 
-fn table(runs: usize) {
+fn print_errors(runs: usize) {
     println!("C4, RMS relative error in %, K_e / T_L / K_e_dot / omega_nm / zeta_nm, median of {runs} runs");
     let cells = [
         (1, 0.01),
@@ -173,7 +173,7 @@ fn table(runs: usize) {
     }
 }
 
-fn divergence(runs: usize) {
+fn print_divergence(runs: usize) {
     let mut diverged: BTreeMap<&str, usize> = BTreeMap::new();
     let mut total = 0;
     for (c, condition) in Condition::ALL.into_iter().enumerate() {
@@ -210,7 +210,7 @@ fn divergence(runs: usize) {
 }
 
 /// Returns alternating signals: the loop, silence, constants, saturation.
-fn alternating(k: usize, record: &Record) -> (f64, f64) {
+fn alternating_signals(k: usize, record: &Record) -> (f64, f64) {
     let (e, u) = (record.input()[k % record.len()], record.output()[k % record.len()]);
     match (k / 20_000) % 5 {
         0 | 2 => (e, u),
@@ -220,7 +220,7 @@ fn alternating(k: usize, record: &Record) -> (f64, f64) {
     }
 }
 
-fn endurance(samples: usize) {
+fn print_endurance(samples: usize) {
     let record = run(&simulator(Condition::C1, 1, 0.1), 0, 0);
     let span = record.span(0.0, 30.72).unwrap();
     let methods = [
@@ -235,7 +235,7 @@ fn endurance(samples: usize) {
         let begin = std::time::Instant::now();
         let (mut largest, mut largest_variance) = (0.0_f64, 0.0_f64);
         for k in 0..samples {
-            let (e, u) = alternating(k, &record);
+            let (e, u) = alternating_signals(k, &record);
             tracker.step(e, u);
             if k % 1000 == 999 {
                 largest = tracker

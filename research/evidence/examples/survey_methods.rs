@@ -8,7 +8,7 @@
 
 use hoid_thesis::{
     plans::SURVEY,
-    survey::{COMPARATORS, SurveyPlan, survey, survey_tables},
+    survey::{COMPARATOR_PLAN, SurveyPlan, survey, survey_tables},
 };
 
 fn main() {
@@ -17,7 +17,7 @@ fn main() {
         path.map_or_else(|| default.to_owned(), |path| std::fs::read_to_string(path).unwrap())
     };
     let path = std::env::args().nth(1);
-    let (study, comparators) = (text(1, SURVEY.text), text(2, COMPARATORS));
+    let (study, comparators) = (text(1, SURVEY.text), text(2, COMPARATOR_PLAN));
     let plan = match SurveyPlan::parse(&study, &comparators, path.as_deref().unwrap_or("survey.toml")) {
         Ok(plan) => plan,
         Err(error) => {

@@ -31,8 +31,8 @@ use rayon::prelude::*;
 
 const LENGTH_S: f64 = 82.0;
 const RUN_IN_S: f64 = 15.0;
-const RATE: usize = 100;
-const INNER: usize = 10;
+const RATE_HZ: usize = 100;
+const STEPS_PER_SAMPLE: usize = 10;
 const PRIMES: [f64; 11] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0];
 
 /// The simulated operator, `K (T_L s + 1)/(T_I s + 1) e^{-tau s}` in series with the neuromuscular system; T_I = 0 for
@@ -147,14 +147,14 @@ fn simulate(
     level: f64,
     at: &dyn Fn(f64) -> Operator,
 ) -> Option<[Vec<f64>; 2]> {
-    let h = 1.0 / (RATE * INNER) as f64;
-    let count = ((RUN_IN_S + LENGTH_S) * RATE as f64) as usize;
-    let mut past = vec![0.0; count * INNER + 1];
+    let h = 1.0 / (RATE_HZ * STEPS_PER_SAMPLE) as f64;
+    let count = ((RUN_IN_S + LENGTH_S) * RATE_HZ as f64) as usize;
+    let mut past = vec![0.0; count * STEPS_PER_SAMPLE + 1];
     let (mut lagged, mut z, mut dz, mut y, mut dy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut n, mut running) = (0.0, 0.0_f64);
     let time_constant = 0.1;
     let (pole, drive) = {
-        let pole = (-1.0 / (RATE as f64 * time_constant)).exp();
+        let pole = (-1.0 / (RATE_HZ as f64 * time_constant)).exp();
         (pole, (1.0 - pole * pole).sqrt())
     };
     let (mut e_all, mut u_all) = (Vec::with_capacity(count), Vec::with_capacity(count));
@@ -171,8 +171,8 @@ fn simulate(
             _ => pole * n + drive * w,
         };
         let mut u = 0.0;
-        for j in 0..INNER {
-            let step = k * INNER + j;
+        for j in 0..STEPS_PER_SAMPLE {
+            let step = k * STEPS_PER_SAMPLE + j;
             let t = step as f64 * h - RUN_IN_S;
             let operator_now = at(t);
             let f = forcing.at(t);
@@ -212,12 +212,12 @@ fn simulate(
                 }
             }
         }
-        running += (u * u / (level / person.share.sqrt().max(1e-9)).powi(2).max(1e-9) - running) / RATE as f64;
+        running += (u * u / (level / person.share.sqrt().max(1e-9)).powi(2).max(1e-9) - running) / RATE_HZ as f64;
         if !(y.abs() < 1e3 && u.abs() < 1e4) {
             return None;
         }
     }
-    let from = (RUN_IN_S * RATE as f64) as usize;
+    let from = (RUN_IN_S * RATE_HZ as f64) as usize;
     Some([e_all[from..].to_vec(), u_all[from..].to_vec()])
 }
 
@@ -280,7 +280,7 @@ impl Modification {
         }
     }
 
-    fn changes_once(self) -> bool {
+    fn has_single_change(self) -> bool {
         matches!(self, Self::Halved | Self::Late)
     }
 }
@@ -289,7 +289,7 @@ impl Modification {
 fn run(kind: Kind, modification: Modification, seed: u64, number: u64) -> Option<(Record, Element)> {
     let stream = |of: u64, n: usize| uniform([seed, kind as u64, number, of], n);
     let numbers = stream(0, 4000);
-    let samples = ((RUN_IN_S + LENGTH_S) * RATE as f64) as usize;
+    let samples = ((RUN_IN_S + LENGTH_S) * RATE_HZ as f64) as usize;
     let normals = |of: u64| {
         let pairs = stream(of, 4 * samples);
         let normal = |p: &[f64]| (-2.0 * (1.0 - p[0]).ln()).sqrt() * (TAU * p[1]).cos();
@@ -350,7 +350,7 @@ fn run(kind: Kind, modification: Modification, seed: u64, number: u64) -> Option
         let sign = if modification == Modification::Sign { -1.0 } else { 1.0 };
         let e = e.into_iter().map(|e| sign * e).collect();
         let channel = |name: &str, values: Vec<f64>| Channel::new(name, "", values);
-        let record = Record::new(SampleTime::HUNDREDTH, channel("e", e), channel("u", u)).unwrap();
+        let record = Record::new(SampleTime::AT_100_HZ, channel("e", e), channel("u", u)).unwrap();
         return Some((record, person.element));
     }
     None
@@ -461,7 +461,7 @@ fn main() {
                 &record,
                 element,
                 &method,
-                modification.changes_once(),
+                modification.has_single_change(),
             ))
         })
         .collect();
@@ -488,7 +488,7 @@ fn main() {
     let simulates = |what: &str| folder.is_none() && only.as_deref().is_none_or(|only| only == what);
     if simulates("people") {
         let task = Task {
-            sample_time: SampleTime::HUNDREDTH,
+            sample_time: SampleTime::AT_100_HZ,
             measurement_s: LENGTH_S,
             run_in_s: RUN_IN_S,
             ..Task::default()

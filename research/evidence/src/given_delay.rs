@@ -1,6 +1,6 @@
 //! Methods with a given delay, for the examples that compare them.
 
-use hoid_track::{Method, StartAt, TrackOptions};
+use hoid_track::{Method, StartSource, TrackOptions};
 
 use crate::task::START_S;
 
@@ -10,7 +10,7 @@ const NK: usize = 29;
 /// Options of a method with a given delay and a start fit to the first 30.72 s.
 pub fn options(method: Method) -> TrackOptions {
     TrackOptions {
-        start: StartAt::Span(Some((0.0, START_S))),
+        start: StartSource::Span(Some((0.0, START_S))),
         ..TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(NK))
     }
 }

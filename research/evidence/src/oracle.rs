@@ -17,13 +17,13 @@ const DELAY_S: f64 = 0.2;
 const RESIDUAL_LIMIT: f64 = 3.5;
 
 /// Regressors and output of a trial, with the first row that is analysed.
-pub struct Rows {
+pub struct TrialRows {
     x: Vec<Vector3<f64>>,
     u: Vec<f64>,
     from: usize,
 }
 
-impl Rows {
+impl TrialRows {
     /// Computes the regressors from the error; the first `from` rows are a ramp and are not analysed.
     pub fn new(e: &[f64], u: &[f64], from: usize, ts: f64) -> Self {
         let point = DefaultOperator::with_delay(DELAY_S + 0.5 * ts).point;
@@ -57,7 +57,7 @@ impl Rows {
         )
     }
 
-    fn left(&self, gains: &Vector3<f64>) -> Vec<f64> {
+    fn residuals(&self, gains: &Vector3<f64>) -> Vec<f64> {
         let left: Vec<f64> = (self.from..self.u.len())
             .map(|k| self.u[k] - self.x[k].dot(gains))
             .collect();
@@ -66,7 +66,7 @@ impl Rows {
     }
 }
 
-fn gains(trials: &[&Rows], d: &[f64]) -> Vector3<f64> {
+fn gains(trials: &[&TrialRows], d: &[f64]) -> Vector3<f64> {
     let (mut products, mut with_output) = (Matrix3::zeros(), Vector3::zeros());
     for trial in trials {
         let (x, y) = trial.whitened(d);
@@ -91,13 +91,19 @@ fn autoregression(v: &[f64]) -> Vec<f64> {
 /// Returns `log Lambda` over the first `samples` of the second trial. `before` are the trials with the first operator;
 /// the trial `joined` of these precedes the second trial. `after` are the trials with the second operator, without the
 /// examined trial.
-pub fn log_ratio(before: &[&Rows], joined: usize, after: &[&Rows], second: &Rows, samples: usize) -> f64 {
+pub fn log_ratio(
+    before: &[&TrialRows],
+    joined: usize,
+    after: &[&TrialRows],
+    second: &TrialRows,
+    samples: usize,
+) -> f64 {
     let first = before[joined];
     let mut d: Vec<f64> = (0..=ORDER).map(|j| f64::from(j == 0)).collect();
     for _ in 0..4 {
-        d = autoregression(&first.left(&gains(&[first], &d)));
+        d = autoregression(&first.residuals(&gains(&[first], &d)));
     }
-    let of = |rows: &Rows, gains: &Vector3<f64>| {
+    let of = |rows: &TrialRows, gains: &Vector3<f64>| {
         let (x, y) = rows.whitened(&d);
         x.iter().zip(&y).map(|(x, y)| y - x.dot(gains)).collect::<Vec<f64>>()
     };

@@ -8,7 +8,7 @@ use std::{
 use hoid::{io::ReadOptions, model::Record};
 
 /// Start of the measurements, s; earlier data belong to the run-in.
-pub const FROM_S: f64 = 8.08;
+pub const MEASUREMENT_START_S: f64 = 8.08;
 
 /// Returns the folder given by `HOID_PILOT_DATA`; if the variable is not set, prints a message and returns `None`.
 pub fn folder() -> Option<PathBuf> {
@@ -20,7 +20,7 @@ pub fn folder() -> Option<PathBuf> {
 }
 
 /// Returns the names of the recordings of the given runs, such as `1,4` or `all`, in alphabetical order.
-pub fn names(folder: &Path, runs: &str) -> Vec<String> {
+pub fn recording_names(folder: &Path, runs: &str) -> Vec<String> {
     let mut names: Vec<String> = fs::read_dir(folder)
         .unwrap()
         .map(|f| f.unwrap().file_name().to_string_lossy().into_owned())
@@ -31,10 +31,12 @@ pub fn names(folder: &Path, runs: &str) -> Vec<String> {
     names
 }
 
-/// Reads a recording; returns it with the index of its first sample from [`FROM_S`] on.
+/// Reads a recording; returns it with the index of its first sample from [`MEASUREMENT_START_S`] on.
 pub fn read(folder: &Path, name: &str) -> (Record, usize) {
     let path = folder.join(format!("{name}.parquet"));
     let record = hoid::io::read_record(&path, &ReadOptions::default()).unwrap().record;
-    let first = (0..record.len()).find(|k| record.time_s(*k) >= FROM_S - 1e-6).unwrap();
+    let first = (0..record.len())
+        .find(|k| record.time_s(*k) >= MEASUREMENT_START_S - 1e-6)
+        .unwrap();
     (record, first)
 }

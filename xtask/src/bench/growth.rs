@@ -16,7 +16,7 @@ use std::{
 
 use serde_json::Value;
 
-use super::table::{plain, time};
+use super::table::{format_number, format_time};
 use crate::process::output;
 
 /// A measured point.
@@ -58,7 +58,7 @@ orders.nk = 29
 ///
 /// # Errors
 /// The reason, if a point cannot be measured.
-pub fn tables(tasks: &Path, hoid: &Path, work: &Path, quick: bool) -> Result<String, String> {
+pub fn measure_tables(tasks: &Path, hoid: &Path, work: &Path, quick: bool) -> Result<String, String> {
     let data = work.join("data");
     let largest = if quick { 5 } else { 7 };
     let powers = |to: u32| (3..=to).map(|k| 10_usize.pow(k)).collect::<Vec<_>>();
@@ -105,27 +105,27 @@ pub fn tables(tasks: &Path, hoid: &Path, work: &Path, quick: bool) -> Result<Str
         eprintln!("{name}");
         let points = values
             .into_iter()
-            .map(|n| of_tasks(tasks, &data, name, n))
+            .map(|n| measure_task(tasks, &data, name, n))
             .collect::<Result<Vec<_>, _>>()?;
-        section(&mut text, title, unit, &points);
+        write_section(&mut text, title, unit, &points);
     }
     let plan = work.join("growth.toml");
     fs::write(&plan, PLAN).map_err(|e| format!("{}: {e}", plan.display()))?;
     for threads in [1, 2] {
         eprintln!("replications, {threads} threads");
         let points = (0..=if quick { 3 } else { 5 })
-            .map(|k| replications(hoid, &plan, work, 10_usize.pow(k), threads))
+            .map(|k| measure_study(hoid, &plan, work, 10_usize.pow(k), threads))
             .collect::<Result<Vec<_>, _>>()?;
         let title =
             format!("`hoid study run`: runs of C1 simulated and fitted by ARX and Box-Jenkins, threads: {threads}");
-        section(&mut text, &title, "replications", &points);
+        write_section(&mut text, &title, "replications", &points);
     }
-    text += &identify(tasks, hoid, work, 10_usize.pow(largest))?;
+    text += &measure_identify(tasks, hoid, work, 10_usize.pow(largest))?;
     Ok(text)
 }
 
 /// Measures a point with the example `tasks`.
-fn of_tasks(tasks: &Path, data: &Path, name: &str, n: usize) -> Result<Point, String> {
+fn measure_task(tasks: &Path, data: &Path, name: &str, n: usize) -> Result<Point, String> {
     let mut command = Command::new(tasks);
     command
         .arg(data)
@@ -142,7 +142,7 @@ fn of_tasks(tasks: &Path, data: &Path, name: &str, n: usize) -> Result<Point, St
     })
 }
 
-fn replications(hoid: &Path, plan: &Path, work: &Path, n: usize, threads: usize) -> Result<Point, String> {
+fn measure_study(hoid: &Path, plan: &Path, work: &Path, n: usize, threads: usize) -> Result<Point, String> {
     let out = work.join("growth-study");
     let _ = fs::remove_dir_all(&out);
     let mut command = Command::new(hoid);
@@ -152,12 +152,12 @@ fn replications(hoid: &Path, plan: &Path, work: &Path, n: usize, threads: usize)
         "--jobs",
         &threads.to_string(),
     ]);
-    let (seconds, memory) = watched(&mut command)?;
+    let (seconds, memory) = run_measured(&mut command)?;
     Ok(Point { n, seconds, memory })
 }
 
 /// Measures `hoid identify` on a Parquet file of n samples (t, e, u).
-fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, String> {
+fn measure_identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, String> {
     let file = work.join("growth.parquet");
     let mut write = Command::new(tasks);
     write
@@ -169,7 +169,7 @@ fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, 
     let data = 16 * n as u64;
     let mut text = format!(
         "\n`hoid identify` on a Parquet file of {n} samples (e and u: {}):\n\n| fit | time | peak memory | times e and u |\n|---|---:|---:|---:|\n",
-        bytes(data)
+        format_bytes(data)
     );
     for (name, structure, options) in [
         ("ARX", "arx", &["--orders", "na=2,nb=2", "--nk", "29"][..]),
@@ -184,18 +184,18 @@ fn identify(tasks: &Path, hoid: &Path, work: &Path, n: usize) -> Result<String, 
             .arg(&file)
             .args(["--structure", structure])
             .args(options);
-        let (seconds, memory) = watched(&mut command)?;
+        let (seconds, memory) = run_measured(&mut command)?;
         let (peak, factor) = memory.map_or(("-".to_owned(), "-".to_owned()), |m| {
-            (bytes(m), plain(m as f64 / data as f64))
+            (format_bytes(m), format_number(m as f64 / data as f64))
         });
-        let _ = writeln!(text, "| {name} | {} | {peak} | {factor} |", time(seconds));
+        let _ = writeln!(text, "| {name} | {} | {peak} | {factor} |", format_time(seconds));
     }
     let _ = fs::remove_file(&file);
     Ok(text)
 }
 
 /// Runs a command and returns its time and the largest resident memory that was measured.
-fn watched(command: &mut Command) -> Result<(f64, Option<u64>), String> {
+fn run_measured(command: &mut Command) -> Result<(f64, Option<u64>), String> {
     let shown = format!("{command:?}");
     let begun = Instant::now();
     let mut child = command
@@ -206,7 +206,7 @@ fn watched(command: &mut Command) -> Result<(f64, Option<u64>), String> {
     let status = format!("/proc/{}/status", child.id());
     let mut peak = None;
     loop {
-        peak = peak.max(fs::read_to_string(&status).ok().and_then(|text| high_water(&text)));
+        peak = peak.max(fs::read_to_string(&status).ok().and_then(|text| peak_memory(&text)));
         match child.try_wait().map_err(|e| format!("{shown}: {e}"))? {
             Some(ended) if ended.success() => return Ok((begun.elapsed().as_secs_f64(), peak)),
             Some(ended) => return Err(format!("failed ({ended}): {shown}")),
@@ -216,7 +216,7 @@ fn watched(command: &mut Command) -> Result<(f64, Option<u64>), String> {
 }
 
 /// Returns `VmHWM` from the text of a status file, bytes.
-fn high_water(status: &str) -> Option<u64> {
+fn peak_memory(status: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     line.split_whitespace()
         .next()?
@@ -225,19 +225,19 @@ fn high_water(status: &str) -> Option<u64> {
         .map(|kib| 1024 * kib)
 }
 
-fn section(text: &mut String, title: &str, unit: &str, points: &[Point]) {
+fn write_section(text: &mut String, title: &str, unit: &str, points: &[Point]) {
     let _ = write!(
         text,
         "\n{title}:\n\n| {unit} | time | a unit | memory |\n|---:|---:|---:|---:|\n"
     );
     for point in points {
-        let memory = point.memory.map_or("-".to_owned(), bytes);
+        let memory = point.memory.map_or("-".to_owned(), format_bytes);
         let _ = writeln!(
             text,
             "| {} | {} | {} | {memory} |",
             point.n,
-            time(point.seconds),
-            each(point.seconds / point.n as f64)
+            format_time(point.seconds),
+            format_unit_time(point.seconds / point.n as f64)
         );
     }
     let _ = writeln!(
@@ -247,11 +247,11 @@ fn section(text: &mut String, title: &str, unit: &str, points: &[Point]) {
     );
 }
 
-fn each(seconds: f64) -> String {
+fn format_unit_time(seconds: f64) -> String {
     if seconds < 1e-6 {
-        format!("{} ns", plain(seconds * 1e9))
+        format!("{} ns", format_number(seconds * 1e9))
     } else {
-        time(seconds)
+        format_time(seconds)
     }
 }
 
@@ -266,10 +266,10 @@ fn slope(points: &[Point]) -> f64 {
     along / across
 }
 
-fn bytes(n: u64) -> String {
+fn format_bytes(n: u64) -> String {
     match n as f64 / f64::from(1 << 20) {
-        m if m >= 1024.0 => format!("{} GiB", plain(m / 1024.0)),
-        m => format!("{} MiB", plain(m)),
+        m if m >= 1024.0 => format!("{} GiB", format_number(m / 1024.0)),
+        m => format!("{} MiB", format_number(m)),
     }
 }
 
@@ -293,10 +293,10 @@ mod tests {
 
     #[test]
     fn peak_memory_is_parsed_and_formatted() {
-        assert_eq!(high_water("VmPeak:\t 9 kB\nVmHWM:\t  2048 kB\n"), Some(2 << 20));
-        assert_eq!(high_water(""), None);
-        assert_eq!(bytes(2 << 20), "2.00 MiB");
-        assert_eq!(bytes(3 << 30), "3.00 GiB");
+        assert_eq!(peak_memory("VmPeak:\t 9 kB\nVmHWM:\t  2048 kB\n"), Some(2 << 20));
+        assert_eq!(peak_memory(""), None);
+        assert_eq!(format_bytes(2 << 20), "2.00 MiB");
+        assert_eq!(format_bytes(3 << 30), "3.00 GiB");
     }
 
     #[test]
@@ -307,7 +307,7 @@ mod tests {
             seconds: 1e-8 * n as f64,
             memory: Some(1 << 20),
         };
-        section(&mut text, "Fit", "samples", &[at(10), at(100), at(1000), at(10_000)]);
+        write_section(&mut text, "Fit", "samples", &[at(10), at(100), at(1000), at(10_000)]);
         assert!(text.contains("| 1000 | 10.0 us | 10.0 ns | 1.00 MiB |"), "{text}");
         assert!(text.contains("Slope: 1.00."), "{text}");
     }

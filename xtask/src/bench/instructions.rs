@@ -26,7 +26,7 @@ const TASKS: [&str; 6] = ["arx", "bj", "rls", "rpem", "loop", "loop with noise"]
 ///
 /// # Errors
 /// The reason, if a task needs more instructions than permitted or Valgrind fails.
-pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
+pub fn check_instruction_counts(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     if Command::new("valgrind")
         .arg("--version")
         .stdout(Stdio::null())
@@ -36,13 +36,16 @@ pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
         println!("instructions were not counted: valgrind is not installed (apt install valgrind)");
         return Ok(());
     }
-    let compiler = compiler()?;
+    let compiler = compiler_version()?;
     let mut found = BTreeMap::new();
     for task in TASKS {
-        let (one, three) = (count(program, data, task, 1)?, count(program, data, task, 3)?);
+        let (one, three) = (
+            count_instructions(program, data, task, 1)?,
+            count_instructions(program, data, task, 3)?,
+        );
         found.insert(task.to_owned(), three.saturating_sub(one) / 2);
     }
-    let kept = read();
+    let kept = read_stored_counts();
     let same_compiler = kept.as_ref().is_some_and(|kept| kept.compiler == compiler);
     let known = kept.map(|kept| kept.tasks).unwrap_or_default();
     let (text, over) = compare(&found, &known);
@@ -65,15 +68,15 @@ pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     }
 }
 
-struct Kept {
+struct StoredCounts {
     compiler: String,
     tasks: BTreeMap<String, u64>,
 }
 
-fn read() -> Option<Kept> {
+fn read_stored_counts() -> Option<StoredCounts> {
     let value: Value = serde_json::from_str(&fs::read_to_string(STORED_COUNTS).ok()?).ok()?;
     let tasks = value.get("tasks")?.as_object()?;
-    Some(Kept {
+    Some(StoredCounts {
         compiler: value.get("compiler")?.as_str()?.to_owned(),
         tasks: tasks
             .iter()
@@ -102,7 +105,7 @@ fn compare(found: &BTreeMap<String, u64>, kept: &BTreeMap<String, u64>) -> (Stri
     (lines.join("\n"), over)
 }
 
-fn count(program: &Path, data: &Path, task: &str, times: usize) -> Result<u64, String> {
+fn count_instructions(program: &Path, data: &Path, task: &str, times: usize) -> Result<u64, String> {
     let output = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null"])
         .arg(program)
@@ -112,16 +115,16 @@ fn count(program: &Path, data: &Path, task: &str, times: usize) -> Result<u64, S
         .output()
         .map_err(|error| format!("cannot run valgrind: {error}"))?;
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    collected(&said).ok_or_else(|| format!("valgrind did not count {task}:\n{said}"))
+    parse_instruction_count(&said).ok_or_else(|| format!("valgrind did not count {task}:\n{said}"))
 }
 
 /// Returns the number after `Collected :`.
-fn collected(said: &str) -> Option<u64> {
+fn parse_instruction_count(said: &str) -> Option<u64> {
     let line = said.lines().find(|line| line.contains("Collected :"))?;
     line.rsplit(' ').next()?.parse().ok()
 }
 
-fn compiler() -> Result<String, String> {
+fn compiler_version() -> Result<String, String> {
     let output = Command::new("rustc").arg("--version").output();
     let output = output.map_err(|error| format!("cannot run rustc: {error}"))?;
     Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
@@ -134,10 +137,10 @@ mod tests {
     #[test]
     fn instruction_counts_are_parsed_and_compared() {
         assert_eq!(
-            collected("==7== Events    : Ir\n==7== Collected : 4711\n==7=="),
+            parse_instruction_count("==7== Events    : Ir\n==7== Collected : 4711\n==7=="),
             Some(4711)
         );
-        assert_eq!(collected("==7== no such program"), None);
+        assert_eq!(parse_instruction_count("==7== no such program"), None);
         let kept: BTreeMap<String, u64> = [("arx".to_owned(), 1000)].into();
         let with = |n| compare(&[("arx".to_owned(), n), ("bj".to_owned(), 5)].into(), &kept);
         assert!(!with(1050).1 && !with(900).1);

@@ -23,7 +23,7 @@ pub enum Outcome {
 }
 
 impl Line {
-    fn read(line: &str) -> Option<Self> {
+    fn parse(line: &str) -> Option<Self> {
         let object: Value = serde_json::from_str(line).ok()?;
         let text = |key: &str| object.get(key)?.as_str().map(str::to_owned);
         let outcome = match text("skipped") {
@@ -54,11 +54,11 @@ impl Line {
 
 /// Extracts the lines from the printed output; libraries print other text as well.
 pub fn of(printed: &str) -> Vec<Line> {
-    printed.lines().filter_map(Line::read).collect()
+    printed.lines().filter_map(Line::parse).collect()
 }
 
 /// Returns one line for each task and peer, the fastest of all rounds, in the order of appearance.
-pub fn best(lines: Vec<Line>) -> Vec<Line> {
+pub fn fastest_lines(lines: Vec<Line>) -> Vec<Line> {
     let mut kept: Vec<Line> = Vec::new();
     for line in lines {
         let Some(other) = kept.iter_mut().find(|k| k.task == line.task && k.peer == line.peer) else {
@@ -94,7 +94,7 @@ mod tests {
             {\"task\": \"arx\", \"peer\": \"numba 1\", \"seconds\": 1e-5, \"answer\": [1.0, -2.0]}\n\
             {\"task\": \"bj\", \"peer\": \"x 2\", \"skipped\": \"not there\"}\n\
             {\"task\": \"bj\", \"peer\": \"y\", \"seconds\": 0, \"answer\": []}\n[1, 2]\n";
-        let lines = best(of(printed));
+        let lines = fastest_lines(of(printed));
         assert_eq!(lines.len(), 2);
         assert!(
             matches!(&lines[0].outcome, Outcome::Measured { seconds, answer, differs: None } if *seconds == 1e-5 && answer.len() == 2)

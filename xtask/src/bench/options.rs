@@ -25,7 +25,7 @@ pub struct Options {
 }
 
 impl Options {
-    pub fn read(arguments: &[String]) -> Result<Self, String> {
+    pub fn parse_arguments(arguments: &[String]) -> Result<Self, String> {
         let mut options = Self {
             only: Vec::new(),
             peers: Peers::Installed,
@@ -68,7 +68,7 @@ impl Options {
     }
 
     /// True if the task is selected.
-    pub fn chooses(&self, task: &str) -> bool {
+    pub fn selects(&self, task: &str) -> bool {
         self.only.is_empty() || self.only.iter().any(|name| name == task)
     }
 }
@@ -77,22 +77,22 @@ impl Options {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Options, String> {
-        Options::read(&text.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
+    fn parse(text: &str) -> Result<Options, String> {
+        Options::parse_arguments(&text.split_whitespace().map(str::to_owned).collect::<Vec<_>>())
     }
 
     #[test]
     fn options_are_parsed_and_invalid_ones_refused() {
-        let options = read("--only arx,bj --peers none --rounds 3 --dry").unwrap();
+        let options = parse("--only arx,bj --peers none --rounds 3 --dry").unwrap();
         assert_eq!((options.peers, options.rounds, options.dry), (Peers::None, 3, true));
-        assert!(options.chooses("arx") && !options.chooses("rls"));
-        assert!(read("").unwrap().chooses("rls"));
+        assert!(options.selects("arx") && !options.selects("rls"));
+        assert!(parse("").unwrap().selects("rls"));
         assert!(
-            read("--peers some")
+            parse("--peers some")
                 .unwrap_err()
                 .contains("expected none, installed or install")
         );
-        assert!(read("--rounds").unwrap_err().contains("needs a value"));
-        assert!(read("--what").unwrap_err().contains("usage"));
+        assert!(parse("--rounds").unwrap_err().contains("needs a value"));
+        assert!(parse("--what").unwrap_err().contains("usage"));
     }
 }

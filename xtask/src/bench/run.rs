@@ -17,23 +17,23 @@ use crate::{
     process::{cargo_command, output, run},
 };
 
-const PAGE: &str = "../../research/notes/speed-peers.md";
+const PAGE_PATH: &str = "../../research/notes/speed-peers.md";
 
-const PEERS: &str = "crates/hoid/benches/peers";
+const PEER_FOLDER: &str = "crates/hoid/benches/peers";
 /// A script that belongs to the example `evidence` and prints no lines.
-const OF_EVIDENCE: &str = "scipy_bj.py";
-const WORK: &str = "target/bench";
+const EVIDENCE_SCRIPT: &str = "scipy_bj.py";
+const WORK_FOLDER: &str = "target/bench";
 
 /// Runs the benchmark.
 ///
 /// # Errors
 /// The reason, if building, running or writing fails.
 pub fn bench(arguments: &[String]) -> Result<(), String> {
-    let options = Options::read(arguments)?;
+    let options = Options::parse_arguments(arguments)?;
     if options.instructions {
         // The whole workspace is built, as for the tests: with other features the same crates would be built twice.
         let ours = build(&["--workspace", "--example", "tasks"], "examples/tasks", Profile::Tests)?;
-        return instructions::gate(&ours, &data(), options.keep);
+        return instructions::check_instruction_counts(&ours, &data_folder(), options.keep);
     }
     let ours = build(
         &["-p", "hoid", "--example", "tasks"],
@@ -42,26 +42,26 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
     )?;
     if options.growth {
         let hoid = build(&["-p", "hoid-cli"], "hoid", Profile::Release)?;
-        let text = growth::tables(&ours, &hoid, Path::new(WORK), options.quick)?;
+        let text = growth::measure_tables(&ours, &hoid, Path::new(WORK_FOLDER), options.quick)?;
         println!("\n{text}");
-        return page::write(PAGE, "growth", &text, options.dry);
+        return page::update_section(PAGE_PATH, "growth", &text, options.dry);
     }
     let interpreter = interpreter(options.peers)?;
     let mut lines = Vec::new();
     for round in 0..options.rounds {
         eprintln!("round {} of {}", round + 1, options.rounds);
-        lines.extend(run_ours(&ours, &options, round == 0)?);
+        lines.extend(run_hoid(&ours, &options, round == 0)?);
         if options.peers != Peers::None {
-            for script in scripts()? {
+            for script in peer_scripts()? {
                 lines.extend(run_peer(&script, &interpreter, &options));
             }
         }
     }
-    lines.retain(|line| options.chooses(&line.task));
-    let text = table::ratios(&lines::best(lines), &machine());
+    lines.retain(|line| options.selects(&line.task));
+    let text = table::ratio_table(&lines::fastest_lines(lines), &machine_description());
     println!("\n{text}");
     // If only some tasks are selected, the table is printed but not written to the page.
-    page::write(PAGE, "ratios", &text, options.dry || !options.only.is_empty())
+    page::update_section(PAGE_PATH, "ratios", &text, options.dry || !options.only.is_empty())
 }
 
 /// Build profile.
@@ -90,9 +90,9 @@ fn build(arguments: &[&str], program: &str, profile: Profile) -> Result<PathBuf,
     Ok(target.join(folder).join(name))
 }
 
-fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>, String> {
+fn run_hoid(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>, String> {
     let mut command = Command::new(program);
-    command.arg(data()).env("RAYON_NUM_THREADS", "1");
+    command.arg(data_folder()).env("RAYON_NUM_THREADS", "1");
     if !options.only.is_empty() {
         command.args(["--task", &options.only.join(",")]);
     }
@@ -101,7 +101,7 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
     if let (true, Some(replications)) = (first, options.reproduce) {
         let mut command = Command::new(program);
         command
-            .arg(data())
+            .arg(data_folder())
             .args(["--task", "none", "--reproduce", &replications.to_string()]);
         lines.extend(lines::of(&output(&mut command)?).into_iter().map(|line| Line {
             task: format!("reproduce, M = {replications}"),
@@ -113,7 +113,7 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
 
 /// Runs a peer; if the program cannot be started, the result is a line that reports it.
 fn run_peer(script: &Path, python: &str, options: &Options) -> Vec<Line> {
-    let record = data().join("record.csv");
+    let record = data_folder().join("record.csv");
     let (program, before, behind): (&str, &[&str], &[&str]) = match script.extension().and_then(|e| e.to_str()) {
         Some("m") => ("octave-cli", &[], &[]),
         Some("sce") => ("scilab-cli", &["-nb", "-f"], &["-args"]),
@@ -140,18 +140,18 @@ fn run_peer(script: &Path, python: &str, options: &Options) -> Vec<Line> {
     }
 }
 
-fn data() -> PathBuf {
-    Path::new(WORK).join("data")
+fn data_folder() -> PathBuf {
+    Path::new(WORK_FOLDER).join("data")
 }
 
 /// Returns the peers: scripts in the folder whose names do not start with an underscore.
-fn scripts() -> Result<Vec<PathBuf>, String> {
-    let entries = fs::read_dir(PEERS).map_err(|e| format!("{PEERS}: {e}"))?;
+fn peer_scripts() -> Result<Vec<PathBuf>, String> {
+    let entries = fs::read_dir(PEER_FOLDER).map_err(|e| format!("{PEER_FOLDER}: {e}"))?;
     let mut found: Vec<PathBuf> = entries
         .filter_map(|entry| Some(entry.ok()?.path()))
         .filter(|path| path.extension().is_some_and(|e| e == "py" || e == "m" || e == "sce"))
         .filter(|path| {
-            !path.ends_with(OF_EVIDENCE) && !path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('_'))
+            !path.ends_with(EVIDENCE_SCRIPT) && !path.file_name().is_some_and(|n| n.to_string_lossy().starts_with('_'))
         })
         .collect();
     found.sort();
@@ -161,14 +161,14 @@ fn scripts() -> Result<Vec<PathBuf>, String> {
 /// Returns the Python interpreter for the peers: the one in the environment `target/bench/venv`, which `--peers
 /// install` creates, otherwise `python3`.
 fn interpreter(peers: Peers) -> Result<String, String> {
-    let environment = Path::new(WORK).join("venv");
+    let environment = Path::new(WORK_FOLDER).join("venv");
     let folder = if cfg!(windows) { "Scripts" } else { "bin" };
     let own = environment.join(folder).join("python");
     if peers == Peers::Install {
         if !own.exists() {
             run(Command::new("python3").args(["-m", "venv"]).arg(&environment))?;
         }
-        let requirements = Path::new(PEERS).join("requirements.txt");
+        let requirements = Path::new(PEER_FOLDER).join("requirements.txt");
         run(Command::new(&own)
             .args(["-m", "pip", "install", "--quiet", "-r"])
             .arg(requirements))?;
@@ -178,7 +178,7 @@ fn interpreter(peers: Peers) -> Result<String, String> {
 }
 
 /// Describes the processor, its cores and the operating system.
-fn machine() -> String {
+fn machine_description() -> String {
     let model = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = model
         .lines()

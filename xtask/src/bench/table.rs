@@ -8,7 +8,7 @@ use super::lines::{Line, Outcome, difference};
 const EQUAL_TOLERANCE: f64 = 1e-6;
 
 /// Limits on the speed of hoid: task, words in the name of the peer, and smallest permitted ratio.
-const LIMITS: [(&str, &str, f64); 16] = [
+const RATIO_LIMITS: [(&str, &str, f64); 16] = [
     ("arx", "normal equations", 10.0),
     ("arx", "numba", 2.0),
     ("bj", "own LM", 7.0),
@@ -28,7 +28,7 @@ const LIMITS: [(&str, &str, f64); 16] = [
 ];
 
 /// Returns a table with one row per task and peer, followed by the versions and the machine.
-pub fn ratios(lines: &[Line], machine: &str) -> String {
+pub fn ratio_table(lines: &[Line], machine: &str) -> String {
     let mut text = String::from(
         "| task | hoid | peer | its time | ratio | at least | answers |\n|---|---:|---|---:|---:|---:|---|\n",
     );
@@ -57,26 +57,26 @@ pub fn ratios(lines: &[Line], machine: &str) -> String {
             };
             alone = false;
             let ratio = theirs / seconds;
-            let limit = LIMITS
+            let limit = RATIO_LIMITS
                 .iter()
                 .find(|(task, words, _)| *task == own.task && peer.peer.contains(words));
             let asked = limit.map_or(String::new(), |(_, _, least)| {
                 let missed = if ratio < *least { " (missed)" } else { "" };
-                format!("{}{missed}", plain(*least))
+                format!("{}{missed}", format_number(*least))
             });
-            let answers = answers(answer, other, differs.as_deref());
+            let answers = compare_answers(answer, other, differs.as_deref());
             let _ = writeln!(
                 text,
                 "| {} | {} | {} | {} | {} | {asked} | {answers} |",
                 own.task,
-                time(*seconds),
+                format_time(*seconds),
                 peer.peer,
-                time(*theirs),
-                plain(ratio)
+                format_time(*theirs),
+                format_number(ratio)
             );
         }
         if alone {
-            let _ = writeln!(text, "| {} | {} | | | | | |", own.task, time(*seconds));
+            let _ = writeln!(text, "| {} | {} | | | | | |", own.task, format_time(*seconds));
         }
     }
     let version = lines.iter().find(|l| l.is_ours()).map_or("", |l| l.peer.as_str());
@@ -87,7 +87,7 @@ pub fn ratios(lines: &[Line], machine: &str) -> String {
     text
 }
 
-fn answers(ours: &[f64], theirs: &[f64], differs: Option<&str>) -> String {
+fn compare_answers(ours: &[f64], theirs: &[f64], differs: Option<&str>) -> String {
     match (difference(ours, theirs), differs) {
         (Some(d), None) if d <= EQUAL_TOLERANCE => format!("same to {d:.0e}"),
         (Some(d), None) => format!("**differ by {d:.0e}**"),
@@ -98,17 +98,17 @@ fn answers(ours: &[f64], theirs: &[f64], differs: Option<&str>) -> String {
 }
 
 /// Formats a time with a unit and about three digits.
-pub fn time(seconds: f64) -> String {
+pub fn format_time(seconds: f64) -> String {
     let (value, unit) = match seconds {
         s if s < 1e-3 => (s * 1e6, "us"),
         s if s < 1.0 => (s * 1e3, "ms"),
         s => (s, "s"),
     };
-    format!("{} {unit}", plain(value))
+    format!("{} {unit}", format_number(value))
 }
 
 /// Formats a number with about three digits.
-pub fn plain(value: f64) -> String {
+pub fn format_number(value: f64) -> String {
     match value.abs() {
         v if v >= 100.0 => format!("{value:.0}"),
         v if v >= 10.0 => format!("{value:.1}"),
@@ -147,7 +147,7 @@ mod tests {
             line("arx", "other", 1e-2, &[1.1], Some("zeros before the record")),
             skipped,
         ];
-        let text = ratios(&lines, "a machine");
+        let text = ratio_table(&lines, "a machine");
         for part in [
             "| arx | 10.0 us | numba 1 | 15.0 us | 1.50 | 2.00 (missed) | same to 1e-9 |",
             "| arx | 10.0 us | numpy 2, normal equations | 200 us | 20.0 | 10.0 | **differ by 9e-2** |",

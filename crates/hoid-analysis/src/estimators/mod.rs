@@ -56,7 +56,7 @@ pub trait BatchEstimator: Sized + 'static {
     fn initial_state(&self) -> &'static str;
 
     /// Returns an estimator of the same kind with default options.
-    fn by_default(&self) -> Self;
+    fn with_defaults(&self) -> Self;
 
     /// Returns the name of the estimator as a printed setting.
     fn structure(&self) -> Setting {
@@ -64,7 +64,7 @@ pub trait BatchEstimator: Sized + 'static {
     }
 
     /// Returns a setting that is printed although no option sets it, if there is one.
-    fn beside_options(&self) -> Option<Setting> {
+    fn fixed_setting(&self) -> Option<Setting> {
         None
     }
 
@@ -73,15 +73,15 @@ pub trait BatchEstimator: Sized + 'static {
     ///
     /// # Errors
     /// [`AnalysisError`] if the fit fails.
-    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<Self::Fit>, AnalysisError>;
+    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<FittedModel<Self::Fit>, AnalysisError>;
 
     /// Stores the final verdict in a fit that contains a verdict.
-    fn judged(_fit: &mut Self::Fit, _verdict: &Verdict) {}
+    fn set_verdict(_fit: &mut Self::Fit, _verdict: &Verdict) {}
 }
 
 /// A fit before the findings on the recordings are added to its verdict.
 #[derive(Debug, Clone)]
-pub struct Fitted<F> {
+pub struct FittedModel<F> {
     /// The fit.
     pub fit: F,
     /// Verdict on the fit itself, including the findings of the second fit.
@@ -111,14 +111,16 @@ impl<E: BatchEstimator> Identification<E> {
     /// Returns the printed settings of the estimator at a sample time.
     pub(crate) fn settings(&self, sample_time: SampleTime) -> Vec<Setting> {
         let options = E::options_of_analysis();
-        let own = options.iter().filter_map(|option| option.words(self, sample_time));
+        let own = options
+            .iter()
+            .filter_map(|option| option.formatted_value(self, sample_time));
         let own = own.map(|(name, words)| Setting::new(name, words));
         let structure = [self.estimator.structure()].into_iter();
-        structure.chain(own).chain(self.estimator.beside_options()).collect()
+        structure.chain(own).chain(self.estimator.fixed_setting()).collect()
     }
 }
 
 /// Returns the registry entry of each option.
-fn known<E: 'static>(options: Vec<AnalysisOption<E>>) -> Vec<hoid_ident::settings::Setting> {
+fn registry_settings<E: 'static>(options: Vec<AnalysisOption<E>>) -> Vec<hoid_ident::settings::Setting> {
     options.into_iter().map(|option| option.setting).collect()
 }

@@ -9,12 +9,12 @@ use hoid_ident::{
 };
 use hoid_model::{Detrend, FaultHandling, Structure, Verdict};
 
-use super::{BatchEstimator, Fitted, known};
+use super::{BatchEstimator, FittedModel, registry_settings};
 use crate::{
     AnalysisError,
-    description::of_lines,
+    description::line_describing_function,
     identification::Identification,
-    level::levels_into,
+    level::write_levels,
     names::OPERATOR,
     options::{self, AnalysisOption},
     recordings::Recordings,
@@ -30,14 +30,14 @@ impl BatchEstimator for FamilyEstimator {
             help: "the operator of a person: form, parameters with a prior, standard errors from the scatter between runs, and a verdict",
             source: "McRuer and Jex 1967; the thesis, equation 2.2",
             structures: &[Structure::BoxJenkins],
-            settings: known(Self::options_of_analysis()),
+            settings: registry_settings(Self::options_of_analysis()),
         }]
     }
 
     fn options_of_analysis() -> Vec<AnalysisOption<Self>> {
-        let mut all = options::with_prior_of_fits(options::own(), |how: &mut Self| &mut how.prior);
-        all.extend(options::excitation());
-        all.extend([options::controlled_element(), options::answers()]);
+        let mut all = options::with_prior_of_fits(options::estimator_options(), |how: &mut Self| &mut how.prior);
+        all.extend(options::excitation_options());
+        all.extend([options::controlled_element_option(), options::answers_option()]);
         all
     }
 
@@ -58,25 +58,25 @@ impl BatchEstimator for FamilyEstimator {
         self.initial_state.name()
     }
 
-    fn by_default(&self) -> Self {
+    fn with_defaults(&self) -> Self {
         Self::default()
     }
 
-    fn beside_options(&self) -> Option<Setting> {
+    fn fixed_setting(&self) -> Option<Setting> {
         Some(Setting::new("removed from e and u", self.detrend.to_string()))
     }
 
-    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
+    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<FittedModel<FamilyFit>, AnalysisError> {
         // At a line of the excitation, several inputs contribute to the single ratio of u to e.
         let alone = with.estimator.channels.is_empty();
         let described = match alone {
-            true => data.described(&with.excitation, with.period_s, with.faults),
+            true => data.describe(&with.excitation, with.period_s, with.faults),
             false => Ok(None),
         };
         let channel = match &described {
             // Instruments do not require lines, so a channel named by the user is used even without lines.
             Ok(Some(found)) => found.channel.clone(),
-            _ => with.excitation.named().filter(|_| alone).map(str::to_owned),
+            _ => with.excitation.channel_name().filter(|_| alone).map(str::to_owned),
         };
         let estimator = Self {
             excitation: channel,
@@ -89,21 +89,27 @@ impl BatchEstimator for FamilyEstimator {
             },
             ..with.estimator.clone()
         };
-        let mut fit = estimator.fit_with_response(&data.records, of_lines(&described, &with.excitation))?;
+        let mut fit =
+            estimator.fit_with_response(&data.records, line_describing_function(&described, &with.excitation))?;
         fit.lead_s = data.input_lead_s();
         let element = with.controlled_element.as_ref();
         let mut verdict = fit.verdict.clone();
         if with.faults != FaultHandling::Keep {
-            verdict = verdict.append(second_opinion::of_family(&estimator, &fit, &data.records, element));
-            verdict = verdict.append(other_inputs::of_family(&estimator, &fit, &data.records));
+            verdict = verdict.append(second_opinion::family_findings(
+                &estimator,
+                &fit,
+                &data.records,
+                element,
+            ));
+            verdict = verdict.append(other_inputs::family_findings(&estimator, &fit, &data.records));
         }
         if let Some(element) = element {
             verdict = verdict.append(fit.loop_finding(0, element));
         }
         let described = described.ok().flatten();
         let channel = described.as_ref().and_then(|d| d.channel.clone());
-        let is_named = with.excitation.named().is_some();
-        let found = channel.map(|channel| Setting::new("excitation", channel).given(is_named));
+        let is_named = with.excitation.channel_name().is_some();
+        let found = channel.map(|channel| Setting::new("excitation", channel).with_given(is_named));
         let asked = Identification {
             estimator,
             ..with.clone()
@@ -111,7 +117,7 @@ impl BatchEstimator for FamilyEstimator {
         let used = asked.settings(fit.sample_time);
         let estimator = asked.estimator;
         if estimator.detrend == Detrend::Mean {
-            levels_into(&mut data.accounts, &data.records, |k, record| {
+            write_levels(&mut data.accounts, &data.records, |k, record| {
                 fit.operator(k).polynomial_fit.level(record)
             });
         }
@@ -122,7 +128,7 @@ impl BatchEstimator for FamilyEstimator {
             };
             *record = of_error.detrended(estimator.detrend);
         }
-        Ok(Fitted {
+        Ok(FittedModel {
             fit,
             verdict,
             described,
@@ -132,7 +138,7 @@ impl BatchEstimator for FamilyEstimator {
         })
     }
 
-    fn judged(fit: &mut FamilyFit, verdict: &Verdict) {
+    fn set_verdict(fit: &mut FamilyFit, verdict: &Verdict) {
         fit.verdict = verdict.clone();
     }
 }

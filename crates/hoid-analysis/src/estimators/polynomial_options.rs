@@ -6,14 +6,14 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 use hoid_ident::{
     Estimator, Focus, IdentError, Instruments, IvMethod, Loss, NamedOrders, Prior, SearchOptions,
     order_selection::{Criterion, check_order},
-    settings::{BatchOption, BatchOptions, Bounds, DelayRange, Kind, OneOrSpan, Setting},
+    settings::{BatchOption, BatchOptions, Bounds, DelayRange, Kind, NumberOrSpan, Setting},
     shared_options as shared,
 };
 use hoid_model::{Orders, SampleTime, Structure};
 
 /// Default limit of a robust loss in standard deviations, beyond which the loss is linear; the efficiency for normal
 /// noise is 95 % (Huber 1981).
-const HUBER: f64 = 1.345;
+const DEFAULT_HUBER_LIMIT: f64 = 1.345;
 
 /// A polynomial structure and the options of its estimation.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,7 +50,7 @@ impl Polynomials {
         }
     }
 
-    fn order(&mut self, option: &Setting, name: String, range: RangeInclusive<usize>) -> Result<(), IdentError> {
+    fn set_order(&mut self, option: &Setting, name: String, range: RangeInclusive<usize>) -> Result<(), IdentError> {
         check_order(&name, &range)?;
         if self.orders.contains_key(&name) {
             return Err(option.error(format!("{name} is given twice; drop one of the two")));
@@ -62,34 +62,39 @@ impl Polynomials {
 
 /// Returns the names of the options that only the prediction error method has, and of the options that only
 /// instrumental variables have.
-pub(super) fn names_of_methods() -> [Vec<&'static str>; 2] {
-    [by_prediction(), by_instruments()].map(|options| options.iter().map(|option| option.setting.name).collect())
+pub(super) fn method_option_names() -> [Vec<&'static str>; 2] {
+    [prediction_error_options(), instrument_options()]
+        .map(|options| options.iter().map(|option| option.setting.name).collect())
 }
 
 impl BatchOptions for Polynomials {
     fn options() -> Vec<BatchOption<Self>> {
-        let ends = shared::search_ends(SearchOptions::default(), |how: &mut Self| &mut how.template.search);
-        let mut all = searched();
-        all.extend(by_prediction());
-        all.extend(by_instruments());
+        let ends =
+            shared::search_termination_options(SearchOptions::default(), |how: &mut Self| &mut how.template.search);
+        let mut all = order_options();
+        all.extend(prediction_error_options());
+        all.extend(instrument_options());
         all.extend(ends);
         all
     }
 }
 
 /// Returns the options for orders and delay.
-fn searched() -> Vec<BatchOption<Polynomials>> {
+fn order_options() -> Vec<BatchOption<Polynomials>> {
     let default = "bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
     let nk = "Delay of b0 in samples (29) or dead time in s (0.28s), or a range (20..40, 0.1s..0.4s) to search";
     let criterion = "Criterion that selects among searched candidates";
     vec![
-        BatchOption::new(shared::orders(default), |how: &mut Polynomials, option, text| {
-            for (name, range) in option.read::<NamedOrders>(text)? {
-                how.order(option, name, range)?;
-            }
-            Ok(())
-        })
-        .printed("orders", |how, sample_time: SampleTime| {
+        BatchOption::new(
+            shared::orders_setting(default),
+            |how: &mut Polynomials, option, text| {
+                for (name, range) in option.read::<NamedOrders>(text)? {
+                    how.set_order(option, name, range)?;
+                }
+                Ok(())
+            },
+        )
+        .with_formatter("orders", |how, sample_time: SampleTime| {
             Some(
                 how.ranges(sample_time)
                     .map_or_else(|_| String::new(), |ranges| ranges.to_string()),
@@ -99,7 +104,7 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
             Setting::new("nk", Kind::Delay, nk).default("0.05 to 0.6 s"),
             |how: &mut Polynomials, option, text| {
                 match option.read(text)? {
-                    DelayRange::Samples(range) => how.order(option, "nk".to_owned(), range)?,
+                    DelayRange::Samples(range) => how.set_order(option, "nk".to_owned(), range)?,
                     DelayRange::Seconds(low, high) => how.delay_s = Some((low, high)),
                 }
                 Ok(())
@@ -108,20 +113,20 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
         BatchOption::new(
             Setting::new("criterion", Kind::Choice(&Criterion::NAMES), criterion).default(Criterion::Bic.name()),
             |how: &mut Polynomials, option, text| {
-                how.criterion = option.word(text)?;
+                how.criterion = option.parse_choice(text)?;
                 Ok(())
             },
         )
-        .printed("criterion", |how, _| Some(how.criterion.to_string())),
-        BatchOption::new(shared::delay(""), |how: &mut Polynomials, option, text| {
+        .with_formatter("criterion", |how, _| Some(how.criterion.to_string())),
+        BatchOption::new(shared::delay_setting(""), |how: &mut Polynomials, option, text| {
             if how.delay_s.is_some() || how.orders.contains_key("nk") {
                 return Err(option.error("delay in s and nk in samples are the same quantity; give only one of them"));
             }
-            let OneOrSpan(low, high) = option.read(text)?;
+            let NumberOrSpan(low, high) = option.read(text)?;
             how.delay_s = Some((low, high));
             Ok(())
         })
-        .printed("delay", |how, _| match how.delay_s? {
+        .with_formatter("delay", |how, _| match how.delay_s? {
             (low, high) if low == high => Some(format!("{low} s")),
             (low, high) => Some(format!("{low}..{high} s")),
         }),
@@ -129,7 +134,7 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
 }
 
 /// Returns the options that only the prediction error method has.
-fn by_prediction() -> Vec<BatchOption<Polynomials>> {
+fn prediction_error_options() -> Vec<BatchOption<Polynomials>> {
     let focus = "Purpose of the model: one-step prediction, or simulation from the input alone";
     let start = "Start of the search: all coefficients, such as f1=-1.9,f2=.92,b0=.04,...";
     let guess = "Prior values and weights of coefficients: f1=-1.9:0.5 adds 0.5 (f1 + 1.9)^2 to the loss";
@@ -139,11 +144,11 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
         BatchOption::new(
             Setting::new("focus", Kind::Choice(&Focus::NAMES), focus).default(Focus::default().name()),
             |how: &mut Polynomials, option, text| {
-                how.template.focus = option.word(text)?;
+                how.template.focus = option.parse_choice(text)?;
                 Ok(())
             },
         )
-        .printed("focus", |how, _| Some(how.template.focus.to_string())),
+        .with_formatter("focus", |how, _| Some(how.template.focus.to_string())),
         BatchOption::new(
             Setting::new("start", Kind::Named(&Kind::Number), start)
                 .default("automatic starts")
@@ -153,9 +158,9 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
                 Ok(())
             },
         )
-        .printed("start", |how, _| {
+        .with_formatter("start", |how, _| {
             let given = how.start.as_ref();
-            let given = given.and_then(|start| shared::named_words(start.iter().map(|(name, v)| (name, *v))));
+            let given = given.and_then(|start| shared::named_values_text(start.iter().map(|(name, v)| (name, *v))));
             Some(given.unwrap_or_else(|| "own".to_owned()))
         }),
         BatchOption::new(
@@ -165,7 +170,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
                 Ok(())
             },
         )
-        .printed("prior of coefficients", |how, _| {
+        .with_formatter("prior of coefficients", |how, _| {
             let all = how.template.priors.iter();
             let all: Vec<String> = all
                 .map(|(name, p)| format!("{name}={}:{}", p.value, p.weight))
@@ -176,14 +181,14 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
             Setting::new("robust", Kind::NumberOrDefault("1.345"), robust).bounds(Bounds::Positive),
             |how: &mut Polynomials, option, text| {
                 let threshold = match text {
-                    "true" => HUBER,
+                    "true" => DEFAULT_HUBER_LIMIT,
                     _ => option.read(text)?,
                 };
                 how.template.loss = Loss::Huber { threshold };
                 Ok(())
             },
         )
-        .printed("robust loss", |how, _| match how.template.loss {
+        .with_formatter("robust loss", |how, _| match how.template.loss {
             Loss::Huber { threshold } => Some(format!("Huber, {threshold} standard deviations")),
             Loss::Quadratic => None,
         }),
@@ -194,16 +199,16 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
                 Ok(())
             },
         )
-        .printed("stable models only", |how, _| {
+        .with_formatter("stable models only", |how, _| {
             how.template.stable.then(|| "yes".to_owned())
         }),
-        shared::initial_state(|how: &mut Polynomials, _, rule| {
+        shared::initial_state_option(|how: &mut Polynomials, _, rule| {
             how.template.initial_state = rule;
             Ok(())
         }),
-        shared::search_method(|how: &mut Polynomials| &mut how.template.search),
+        shared::search_method_option(|how: &mut Polynomials| &mut how.template.search),
     ];
-    all.extend(shared::constraints(
+    all.extend(shared::constraint_options(
         |how: &mut Polynomials| &mut how.template.constraints,
         |how| &how.template.constraints,
     ));
@@ -211,12 +216,12 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
 }
 
 /// Returns the options that only instrumental variables have.
-fn by_instruments() -> Vec<BatchOption<Polynomials>> {
+fn instrument_options() -> Vec<BatchOption<Polynomials>> {
     let help = "Instruments: a channel independent of the noise, or `simulated` from the input (for an open loop)";
     let setting =
         Setting::new("instruments", Kind::Channel, help).default("f_t if all records have it, else simulated");
     vec![BatchOption::new(setting, |how: &mut Polynomials, _, text| {
-        how.instruments = Some(Instruments::of_text(text));
+        how.instruments = Some(Instruments::from_text(text));
         Ok(())
     })]
 }

@@ -11,19 +11,20 @@ use hoid_ident::{
 use hoid_model::{ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, Verdict, theta_of};
 
 use super::{
-    BatchEstimator, Fitted, known,
+    BatchEstimator, FittedModel,
     polynomial_options::{self, Polynomials},
+    registry_settings,
 };
 use crate::{
     AnalysisError,
-    answers::{Answered, Answers, of_operator},
+    answers::{AnswerStatus, Answers, operator_answers},
     identification::Identification,
     level::Level,
     names::PEM,
     options::{self, AnalysisOption},
     quality::Of,
     recordings::Recordings,
-    repair::steps_from_level_to_level,
+    repair::is_multilevel_input,
     settings::Setting,
 };
 
@@ -37,8 +38,8 @@ pub struct PolynomialFit {
 }
 
 impl Answers for PolynomialFit {
-    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
-        of_operator(&self.fit)
+    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+        operator_answers(&self.fit)
     }
 }
 
@@ -66,7 +67,7 @@ impl Polynomials {
             reason: error.to_string(),
         };
         let default = default_operator_ranges(self.template.structure, sample_time);
-        let ranges = default.with(&orders).map_err(options)?;
+        let ranges = default.with_named_orders(&orders).map_err(options)?;
         ranges.candidate_count().map_err(options)?;
         Ok(ranges)
     }
@@ -99,8 +100,8 @@ impl BatchEstimator for Polynomials {
     const OF: Of = Of::System;
 
     fn specs() -> Vec<MethodSpec> {
-        let [of_prediction, of_instruments] = polynomial_options::names_of_methods();
-        let all = known(Self::options_of_analysis());
+        let [of_prediction, of_instruments] = polynomial_options::method_option_names();
+        let all = registry_settings(Self::options_of_analysis());
         let without = |others: &[&str]| {
             let own = all.iter().filter(|setting| !others.contains(&setting.name));
             own.cloned().collect()
@@ -123,8 +124,8 @@ impl BatchEstimator for Polynomials {
     }
 
     fn options_of_analysis() -> Vec<AnalysisOption<Self>> {
-        let mut all = options::own();
-        all.extend([options::controlled_element(), options::answers()]);
+        let mut all = options::estimator_options();
+        all.extend([options::controlled_element_option(), options::answers_option()]);
         all
     }
 
@@ -140,16 +141,16 @@ impl BatchEstimator for Polynomials {
         self.template.initial_state.map_or("auto", InitialState::name)
     }
 
-    fn by_default(&self) -> Self {
+    fn with_defaults(&self) -> Self {
         Self::new(self.template.structure)
     }
 
     fn structure(&self) -> Setting {
         // The default estimator is not a polynomial structure, so the user must have requested this structure.
-        Setting::new("structure", self.template.structure.name()).given(true)
+        Setting::new("structure", self.template.structure.name()).with_given(true)
     }
 
-    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<PolynomialFit>, AnalysisError> {
+    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<FittedModel<PolynomialFit>, AnalysisError> {
         let how = &with.estimator;
         let mut level = Level::remove(data, how.template.structure.has_input(), with.faults);
         let records = &data.records;
@@ -179,7 +180,7 @@ impl BatchEstimator for Polynomials {
                 .instruments
                 .clone()
                 .unwrap_or_else(|| Instruments::default_for(records));
-            found.push(Setting::new("method", format!("{method}, {instruments}")).given(true));
+            found.push(Setting::new("method", format!("{method}, {instruments}")).with_given(true));
             if choice.is_some() {
                 found.push(Setting::new("orders chosen by", "the prediction error method"));
             }
@@ -191,11 +192,11 @@ impl BatchEstimator for Polynomials {
             fit = instrumental.fit(records)?;
         }
         if estimator.level {
-            level.remove_remaining_level(data, |record| fit.constant_of(record))?;
+            level.remove_remaining_level(data, |record| fit.constant_part(record))?;
         }
         let records = &data.records;
         let mut verdict = fit.verdict(records, choice.as_ref())?;
-        let steps = records.iter().all(steps_from_level_to_level);
+        let steps = records.iter().all(is_multilevel_input);
         if steps {
             // A step test has information only after its steps, so a finding on the influence of one stretch does not
             // apply.
@@ -205,17 +206,17 @@ impl BatchEstimator for Polynomials {
         // The second fit uses the prediction error method with a squared loss; for other methods and losses it is not
         // made.
         let is_asked_again =
-            how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding().is_none();
+            how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding_error_share().is_none();
         if with.faults != FaultHandling::Keep && is_asked_again {
             let element = with.controlled_element.as_ref();
-            verdict = verdict.append(second_opinion::of_polynomials(&estimator, &fit, records, element));
+            verdict = verdict.append(second_opinion::polynomial_findings(&estimator, &fit, records, element));
             // If no level was estimated, the effect of a level on the result is checked.
             if level.is_kept() && !data.were_detrended() {
-                verdict = verdict.append(second_opinion::of_level(&estimator, &fit, records));
+                verdict = verdict.append(second_opinion::level_finding(&estimator, &fit, records));
             }
         }
         found.extend(level.report(data, |_, record| fit.level(record)));
-        Ok(Fitted {
+        Ok(FittedModel {
             fit: PolynomialFit { fit, choice },
             verdict,
             described: None,

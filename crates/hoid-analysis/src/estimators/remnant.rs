@@ -3,7 +3,7 @@
 use hoid_ident::{GreyBox, GreyBoxFit, SearchOptions, diagnostics::second_opinion, settings::MethodSpec};
 use hoid_model::{FaultHandling, Structure};
 
-use super::{BatchEstimator, Fitted, known};
+use super::{BatchEstimator, FittedModel, registry_settings};
 use crate::{
     AnalysisError,
     identification::Identification,
@@ -22,13 +22,13 @@ impl BatchEstimator for GreyBox {
             help: "operator and remnant in physical parameters, with a real delay",
             source: "Ljung 1999, section 4.3; the thesis, equation 4",
             structures: &[Structure::BoxJenkins],
-            settings: known(Self::options_of_analysis()),
+            settings: registry_settings(Self::options_of_analysis()),
         }]
     }
 
     fn options_of_analysis() -> Vec<AnalysisOption<Self>> {
-        let mut all = options::own();
-        all.extend([options::controlled_element(), options::answers()]);
+        let mut all = options::estimator_options();
+        all.extend([options::controlled_element_option(), options::answers_option()]);
         all
     }
 
@@ -40,21 +40,26 @@ impl BatchEstimator for GreyBox {
         self.initial_state.name()
     }
 
-    fn by_default(&self) -> Self {
+    fn with_defaults(&self) -> Self {
         Self::default()
     }
 
-    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<GreyBoxFit>, AnalysisError> {
+    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<FittedModel<GreyBoxFit>, AnalysisError> {
         let estimator = &with.estimator;
         let level = Level::remove(data, true, with.faults);
         let fit = estimator.fit(&data.records)?;
         let mut verdict = fit.verdict(&data.records)?;
         if with.faults != FaultHandling::Keep {
             let element = with.controlled_element.as_ref();
-            verdict = verdict.append(second_opinion::of_grey_box(estimator, &fit, &data.records, element));
+            verdict = verdict.append(second_opinion::grey_box_findings(
+                estimator,
+                &fit,
+                &data.records,
+                element,
+            ));
         }
         let found = level.report(data, |k, record| fit.polynomial_fit(k).level(record));
-        Ok(Fitted {
+        Ok(FittedModel {
             fit,
             verdict,
             described: None,

@@ -6,11 +6,11 @@ use hoid_ident::{
 };
 use hoid_model::{Detrend, FaultHandling, Structure};
 
-use super::{BatchEstimator, Fitted, known};
+use super::{BatchEstimator, FittedModel, registry_settings};
 use crate::{
     AnalysisError,
     identification::Identification,
-    level::{levels_into, may_have_level},
+    level::{may_have_level, write_levels},
     names::CHANGE,
     options::{self, AnalysisOption},
     recordings::Recordings,
@@ -26,13 +26,13 @@ impl BatchEstimator for SigmoidChange {
             help: "an operator of any form whose gains change once, along a sigmoid",
             source: "Zaal 2016; the thesis, section II",
             structures: &[Structure::BoxJenkins],
-            settings: known(Self::options_of_analysis()),
+            settings: registry_settings(Self::options_of_analysis()),
         }]
     }
 
     fn options_of_analysis() -> Vec<AnalysisOption<Self>> {
-        let mut all = options::with_prior_of_fits(options::own(), |how: &mut Self| &mut how.prior);
-        all.push(options::answers());
+        let mut all = options::with_prior_of_fits(options::estimator_options(), |how: &mut Self| &mut how.prior);
+        all.push(options::answers_option());
         all
     }
 
@@ -44,11 +44,11 @@ impl BatchEstimator for SigmoidChange {
         InitialState::Estimate.name()
     }
 
-    fn by_default(&self) -> Self {
+    fn with_defaults(&self) -> Self {
         Self::default()
     }
 
-    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<SigmoidFit>, AnalysisError> {
+    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<FittedModel<SigmoidFit>, AnalysisError> {
         let estimator = Self {
             level: may_have_level(data, true, with.faults),
             ..with.estimator.clone()
@@ -56,12 +56,12 @@ impl BatchEstimator for SigmoidChange {
         let fit = estimator.fit(&data.records)?;
         let mut verdict = fit.verdict(&data.records)?;
         if with.faults != FaultHandling::Keep {
-            verdict = verdict.append(second_opinion::of_sigmoid(&estimator, &fit, &data.records));
+            verdict = verdict.append(second_opinion::sigmoid_finding(&estimator, &fit, &data.records));
         }
         if estimator.level {
-            levels_into(&mut data.accounts, &data.records, |_, record| fit.level(record));
+            write_levels(&mut data.accounts, &data.records, |_, record| fit.level(record));
         }
-        Ok(Fitted {
+        Ok(FittedModel {
             fit,
             verdict,
             described: None,

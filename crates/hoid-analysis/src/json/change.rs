@@ -5,18 +5,18 @@ use serde_json::{Map, Value, json};
 
 use super::{
     envelope, estimate, ljung_box, number, operator as of_gain_and_lead, optional,
-    result::{BatchAnswer, OPERATOR},
+    result::{JsonFit, OPERATOR_KIND},
     termination,
 };
-use crate::{AnalysisError, identified::Identified, registry};
+use crate::{AnalysisError, identified::IdentifiedModel, registry};
 
-impl BatchAnswer for SigmoidFit {
+impl JsonFit for SigmoidFit {
     const ESTIMATOR: &'static str = registry::CHANGE;
 
-    fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError> {
+    fn object(found: &IdentifiedModel<Self>) -> Result<Map<String, Value>, AnalysisError> {
         let (fit, data) = (&found.fit, &found.data);
         let mut map = envelope(
-            OPERATOR,
+            OPERATOR_KIND,
             &data.names,
             &data.records,
             &data.accounts,
@@ -40,7 +40,7 @@ impl BatchAnswer for SigmoidFit {
         }
         let c = fit.comparison();
         let interval = |interval: Option<(f64, f64)>| interval.map_or(Value::Null, |(low, high)| json!([low, high]));
-        set("structure", json!(OPERATOR));
+        set("structure", json!(OPERATOR_KIND));
         set("form", json!(fit.form().name()));
         set("neuromuscular", json!(fit.has_neuromuscular()));
         set("parameters", parameters.collect());
@@ -53,7 +53,7 @@ impl BatchAnswer for SigmoidFit {
         set(
             "change",
             json!({
-                "found": fit.change_found(),
+                "found": fit.has_change(),
                 "likelihood_ratio": number(c.likelihood_ratio),
                 "extra_parameters": c.extra_parameters,
                 "bic_difference": number(c.bic_difference),
@@ -70,7 +70,7 @@ impl BatchAnswer for SigmoidFit {
 
 /// Returns the operator before or after the change as JSON.
 fn operator(of: &ChangedOperator) -> Value {
-    if let Some(lead) = of.lead() {
+    if let Some(lead) = of.operator_estimate() {
         return of_gain_and_lead(&Ok(lead));
     }
     let mut map = Map::new();

@@ -4,9 +4,9 @@ use hoid_ident::{MarginEstimates, frequency::Realisation};
 use serde_json::{Map, Value, json};
 
 use super::{envelope, estimate, margin_estimates, number, optional};
-use crate::describing::Described;
+use crate::describing::DescribingFunctionResult;
 
-impl Described {
+impl DescribingFunctionResult {
     /// Returns crossover and margins with the controlled element; `None` if the controlled element is unknown.
     pub fn margins(&self) -> Option<MarginEstimates> {
         self.found.margins.as_ref().map(|m| MarginEstimates {

@@ -36,8 +36,8 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 pub(crate) use operator::response;
-pub use polynomials::{PolynomialAnswer, of_family};
-pub use result::{BatchAnswer, BatchResult};
+pub use polynomials::{PolynomialResult, family_json};
+pub use result::{BatchResult, JsonFit};
 pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
 use crate::{found::FoundFault, recordings::Account, settings::Setting};
@@ -91,7 +91,7 @@ pub fn estimate(e: &Estimate) -> Value {
 }
 
 /// Returns an estimate with its standard error and its 95 % interval, which is null if there is none.
-pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
+pub fn estimate_with_interval(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     json!({
         "value": number(e.value),
         "standard_error": optional(e.standard_error),

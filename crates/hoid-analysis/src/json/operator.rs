@@ -11,25 +11,25 @@ use hoid_model::{FamilyOperator, uncertainty::Estimate};
 use serde_json::{Map, Value, json};
 
 use super::{
-    envelope, estimate_within, goodness, loop_shape, named, number, optional, orders,
-    result::{BatchAnswer, OPERATOR},
+    envelope, estimate_with_interval, goodness, loop_shape, named, number, optional, orders,
+    result::{JsonFit, OPERATOR_KIND},
     termination,
 };
-use crate::{AnalysisError, identified::Identified, registry};
+use crate::{AnalysisError, identified::IdentifiedModel, registry};
 
 /// Frequencies in rad/s at which the responses to several inputs are given.
 const CHANNEL_FREQUENCIES: [f64; 16] = [
     0.3, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 16.0,
 ];
 
-impl BatchAnswer for FamilyFit {
+impl JsonFit for FamilyFit {
     const ESTIMATOR: &'static str = registry::OPERATOR;
 
-    fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError> {
+    fn object(found: &IdentifiedModel<Self>) -> Result<Map<String, Value>, AnalysisError> {
         let (fit, data) = (&found.fit, &found.data);
         let of = fit.operator(0);
         let mut map = envelope(
-            OPERATOR,
+            OPERATOR_KIND,
             &data.names,
             &data.records,
             &data.accounts,
@@ -37,7 +37,7 @@ impl BatchAnswer for FamilyFit {
             &found.settings,
         );
         let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
-        set("structure", json!(OPERATOR));
+        set("structure", json!(OPERATOR_KIND));
         set("form", json!(fit.form.name()));
         set("neuromuscular", json!(fit.neuromuscular));
         set("orders", orders(&of.polynomial_fit.orders()));
@@ -111,7 +111,7 @@ impl BatchAnswer for FamilyFit {
 }
 
 /// Returns the responses to all inputs, the response to the error first.
-fn channels(found: &Identified) -> Value {
+fn channels(found: &IdentifiedModel) -> Value {
     let fit = &found.fit;
     let sampling = (fit.sample_time, fit.intersample);
     let error = found.data.records[0]
@@ -158,12 +158,12 @@ pub(crate) fn response(points: &[ResponsePoint]) -> Value {
     points.iter().map(one).collect()
 }
 
-fn lines(found: &Identified) -> Value {
+fn lines(found: &IdentifiedModel) -> Value {
     let Some(lines) = &found.fit.lines else {
         return reason_or_null(found.fit.no_lines.as_ref());
     };
     let mut map = Map::new();
-    map.insert("parameters".to_owned(), all_named(&lines.parameters()));
+    map.insert("parameters".to_owned(), named_estimates(&lines.parameters()));
     map.insert("chi2".to_owned(), number(lines.chi_squared));
     map.insert("degrees_of_freedom".to_owned(), json!(lines.degrees_of_freedom));
     map.insert("held_out".to_owned(), optional(lines.held_out_total()));
@@ -175,12 +175,12 @@ fn lines(found: &Identified) -> Value {
     Value::Object(map)
 }
 
-fn instrumental(found: &Identified) -> Value {
+fn instrumental(found: &IdentifiedModel) -> Value {
     let Some(of) = &found.fit.instrumental else {
         return reason_or_null(found.fit.no_instrumental.as_ref());
     };
     let mut map = Map::new();
-    map.insert("parameters".to_owned(), all_named(&of.parameters()));
+    map.insert("parameters".to_owned(), named_estimates(&of.parameters()));
     map.insert("nd".to_owned(), json!(of.noise_order));
     map.insert("converged".to_owned(), json!(of.termination.converged()));
     map.insert("termination".to_owned(), json!(of.termination.to_string()));
@@ -191,7 +191,7 @@ fn instrumental(found: &Identified) -> Value {
     Value::Object(map)
 }
 
-fn agreement(found: &Identified) -> Value {
+fn agreement(found: &IdentifiedModel) -> Value {
     found.fit.agreement.as_ref().map_or(Value::Null, |agreement| {
         let row = |r: &AgreementRow| {
             let mut map = Map::new();
@@ -232,7 +232,7 @@ fn reason_or_null(reason: Option<&String>) -> Value {
 }
 
 /// Returns named estimates in the order of the parameters of the form.
-fn all_named(parameters: &[(&'static str, Estimate)]) -> Value {
+fn named_estimates(parameters: &[(&'static str, Estimate)]) -> Value {
     parameters.iter().map(|(name, e)| named(name, e)).collect()
 }
 
@@ -267,7 +267,7 @@ fn operator(of: &OperatorOfRecord) -> Value {
 
 fn open_loop(found: Option<&LoopMeasures>) -> Value {
     let of = |estimate: Estimate, interval: Option<(f64, f64)>, of_person: Option<f64>| {
-        let mut value = estimate_within(&estimate, interval);
+        let mut value = estimate_with_interval(&estimate, interval);
         if let Some(fields) = value.as_object_mut() {
             fields.insert("standard_error_person".to_owned(), optional(of_person));
         }

@@ -16,11 +16,12 @@ use serde_json::{Map, Value, json};
 
 use super::{
     envelope, estimate, goodness, ljung_box, margin_estimates, named, number, operator, optional, orders,
-    result::{BatchAnswer, OPERATOR, POLYNOMIAL},
+    result::{JsonFit, OPERATOR_KIND, POLYNOMIAL_KIND},
     termination, validation,
 };
 use crate::{
-    AnalysisError, estimators::PolynomialFit, identified::Identified, recordings::Account, registry, settings::Setting,
+    AnalysisError, estimators::PolynomialFit, identified::IdentifiedModel, recordings::Account, registry,
+    settings::Setting,
 };
 
 fn root(r: &Root, sample_time_s: f64) -> Value {
@@ -62,7 +63,7 @@ fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
 }
 
 /// A fit of polynomials, and the quantities that follow from the fit and its records.
-pub struct PolynomialAnswer<'a> {
+pub struct PolynomialResult<'a> {
     /// Verdict on the fit.
     pub verdict: &'a Verdict,
     /// Names of the fitted records.
@@ -97,12 +98,12 @@ pub struct PolynomialAnswer<'a> {
     pub validation: Option<(&'a str, GoodnessOfFit)>,
 }
 
-impl<'a> PolynomialAnswer<'a> {
+impl<'a> PolynomialResult<'a> {
     /// Collects the quantities that follow from an identified model.
     ///
     /// # Errors
     /// The errors of predicting the records.
-    pub fn of<F>(found: &'a Identified<F>, fit: &'a Fit) -> Result<Self, AnalysisError> {
+    pub fn of<F>(found: &'a IdentifiedModel<F>, fit: &'a Fit) -> Result<Self, AnalysisError> {
         let (data, with_input) = (&found.data, fit.model().structure().has_input());
         let validations = data.records.iter().map(|record| fit.validate(record));
         let validations = validations.collect::<Result<Vec<_>, _>>()?;
@@ -146,7 +147,7 @@ impl<'a> PolynomialAnswer<'a> {
         let fit = self.fit;
         let parameters: Vec<Value> = fit.parameters().iter().map(|(name, e)| named(name, e)).collect();
         let physical = fit.is_grey_box();
-        let kind = if physical { OPERATOR } else { POLYNOMIAL };
+        let kind = if physical { OPERATOR_KIND } else { POLYNOMIAL_KIND };
         let mut map = envelope(
             kind,
             self.files,
@@ -157,7 +158,7 @@ impl<'a> PolynomialAnswer<'a> {
         );
         let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
         let structure = fit.model().structure().name();
-        set("structure", json!(if physical { OPERATOR } else { structure }));
+        set("structure", json!(if physical { OPERATOR_KIND } else { structure }));
         set("orders", orders(&fit.orders()));
         set("parameters", Value::Array(parameters));
         set("loss", number(fit.loss()));
@@ -170,7 +171,9 @@ impl<'a> PolynomialAnswer<'a> {
         set("fit", quality(&self.quality, fit));
         set(
             "operator",
-            self.family.as_ref().map_or_else(|| operator(&self.operator), of_family),
+            self.family
+                .as_ref()
+                .map_or_else(|| operator(&self.operator), family_json),
         );
         set("remnant", self.remnant.as_ref().map_or(Value::Null, remnant));
         if let Some(m) = &self.margins {
@@ -215,23 +218,23 @@ impl<'a> PolynomialAnswer<'a> {
     }
 }
 
-impl BatchAnswer for PolynomialFit {
+impl JsonFit for PolynomialFit {
     const ESTIMATOR: &'static str = registry::PEM;
 
-    fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError> {
-        let answer = PolynomialAnswer::of(found, &found.fit.fit)?;
+    fn object(found: &IdentifiedModel<Self>) -> Result<Map<String, Value>, AnalysisError> {
+        let answer = PolynomialResult::of(found, &found.fit.fit)?;
         let choice = found.fit.choice.as_ref();
-        Ok(PolynomialAnswer { choice, ..answer }.object())
+        Ok(PolynomialResult { choice, ..answer }.object())
     }
 }
 
-impl BatchAnswer for GreyBoxFit {
+impl JsonFit for GreyBoxFit {
     const ESTIMATOR: &'static str = registry::REMNANT;
 
-    fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError> {
-        let answer = PolynomialAnswer::of(found, found.fit.polynomial_fit(0))?;
+    fn object(found: &IdentifiedModel<Self>) -> Result<Map<String, Value>, AnalysisError> {
+        let answer = PolynomialResult::of(found, found.fit.polynomial_fit(0))?;
         let grey_box = Some(&found.fit);
-        Ok(PolynomialAnswer { grey_box, ..answer }.object())
+        Ok(PolynomialResult { grey_box, ..answer }.object())
     }
 }
 
@@ -291,7 +294,7 @@ fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> Value {
 
 /// Returns the operator of the family that the polynomials represent: form, parameters by name, the meaning of the real
 /// poles, and the misfit.
-pub fn of_family(found: &Result<FamilyConversion, NotConvertible>) -> Value {
+pub fn family_json(found: &Result<FamilyConversion, NotConvertible>) -> Value {
     let found = match found {
         Ok(found) => found,
         Err(reason) => return json!({"convertible": false, "reason": reason.to_string()}),

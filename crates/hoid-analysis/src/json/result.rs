@@ -11,19 +11,19 @@ use crate::{
     AnalysisError,
     answers::Answers,
     estimators::PolynomialFit,
-    identified::Identified,
+    identified::IdentifiedModel,
     recordings::{Account, Recordings},
     registry,
     settings::Setting,
 };
 
 /// Value of `kind` for an operator.
-pub(super) const OPERATOR: &str = "operator";
+pub(super) const OPERATOR_KIND: &str = "operator";
 /// Value of `kind` for a polynomial model.
-pub(super) const POLYNOMIAL: &str = "polynomial";
+pub(super) const POLYNOMIAL_KIND: &str = "polynomial";
 
 /// A fit that can be written as JSON.
-pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
+pub trait JsonFit: Answers + Serialize + DeserializeOwned {
     /// Name of the estimator of this fit in the registry.
     const ESTIMATOR: &'static str;
 
@@ -31,7 +31,7 @@ pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
     ///
     /// # Errors
     /// The errors of predicting the records.
-    fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError>;
+    fn object(found: &IdentifiedModel<Self>) -> Result<Map<String, Value>, AnalysisError>;
 }
 
 /// The result of any batch fit.
@@ -40,29 +40,29 @@ pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
 #[allow(clippy::large_enum_variant)]
 pub enum BatchResult {
     /// Operator of a person in the form that the evidence supports.
-    Operator(Identified),
+    Operator(IdentifiedModel),
     /// Operator with a gain and a lead, and a remnant of order m.
-    Remnant(Identified<GreyBoxFit>),
+    Remnant(IdentifiedModel<GreyBoxFit>),
     /// An operator whose gains change once.
-    Change(Identified<SigmoidFit>),
+    Change(IdentifiedModel<SigmoidFit>),
     /// A polynomial model.
-    Polynomials(Identified<PolynomialFit>),
+    Polynomials(IdentifiedModel<PolynomialFit>),
 }
 
 impl BatchResult {
-    /// Reads a result written by [`Identified::to_json`].
+    /// Reads a result written by [`IdentifiedModel::to_json`].
     ///
     /// # Errors
     /// [`AnalysisError::NotAResult`] if the text is invalid, damaged, or from another version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
-        let object = parsed(text)?;
+        let object = parse_object(text)?;
         let estimator = object.get("estimator").and_then(Value::as_str).unwrap_or_default();
         match estimator {
-            registry::OPERATOR => restored(object).map(Self::Operator),
-            registry::REMNANT => restored(object).map(Self::Remnant),
-            registry::CHANGE => restored(object).map(Self::Change),
-            registry::PEM => restored(object).map(Self::Polynomials),
-            other => Err(not_a_result(format!("its estimator is {other:?}"))),
+            registry::OPERATOR => restore_result(object).map(Self::Operator),
+            registry::REMNANT => restore_result(object).map(Self::Remnant),
+            registry::CHANGE => restore_result(object).map(Self::Change),
+            registry::PEM => restore_result(object).map(Self::Polynomials),
+            other => Err(not_a_result_error(format!("its estimator is {other:?}"))),
         }
     }
 }
@@ -143,7 +143,7 @@ impl FoundIn {
     }
 }
 
-impl<F: BatchAnswer> Identified<F> {
+impl<F: JsonFit> IdentifiedModel<F> {
     /// Returns the JSON object of the result, including the state from which the result can be restored.
     ///
     /// # Errors
@@ -175,7 +175,7 @@ impl<F: BatchAnswer> Identified<F> {
             rate: self.rate,
             counts_samples: self.counts_samples,
         };
-        let state = state::written(&state).map_or(Value::Null, Value::String);
+        let state = state::serialise(&state).map_or(Value::Null, Value::String);
         map.insert("state".to_owned(), state);
         map
     }
@@ -194,41 +194,41 @@ impl<F: BatchAnswer> Identified<F> {
     /// # Errors
     /// [`AnalysisError::NotAResult`] if the text is invalid, damaged, or from another version or estimator.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
-        restored(parsed(text)?)
+        restore_result(parse_object(text)?)
     }
 }
 
 /// Two results are equal if their serialised forms are equal.
-impl<F: BatchAnswer> PartialEq for Identified<F> {
+impl<F: JsonFit> PartialEq for IdentifiedModel<F> {
     fn eq(&self, other: &Self) -> bool {
         matches!((self.json(), other.json()), (Ok(one), Ok(two)) if one == two)
     }
 }
 
-fn not_a_result(found: String) -> AnalysisError {
+fn not_a_result_error(found: String) -> AnalysisError {
     AnalysisError::NotAResult { found }
 }
 
-fn parsed(text: &str) -> Result<Map<String, Value>, AnalysisError> {
+fn parse_object(text: &str) -> Result<Map<String, Value>, AnalysisError> {
     match serde_json::from_str(text) {
         Ok(Value::Object(object)) => Ok(object),
-        Ok(_) => Err(not_a_result("it is not an object".to_owned())),
-        Err(error) => Err(not_a_result(format!("it is not JSON: {error}"))),
+        Ok(_) => Err(not_a_result_error("it is not an object".to_owned())),
+        Err(error) => Err(not_a_result_error(format!("it is not JSON: {error}"))),
     }
 }
 
-fn restored<F: BatchAnswer>(object: Map<String, Value>) -> Result<Identified<F>, AnalysisError> {
+fn restore_result<F: JsonFit>(object: Map<String, Value>) -> Result<IdentifiedModel<F>, AnalysisError> {
     let estimator = object.get("estimator").and_then(Value::as_str).unwrap_or_default();
     if estimator != F::ESTIMATOR {
-        return Err(not_a_result(format!(
+        return Err(not_a_result_error(format!(
             "its estimator is {estimator:?}, expected {:?}",
             F::ESTIMATOR
         )));
     }
     let text = object.get("state").and_then(Value::as_str);
-    let text = text.ok_or_else(|| not_a_result("it has no state".to_owned()))?;
-    let read: SavedResult<F> = state::read(text).map_err(not_a_result)?;
-    Ok(Identified {
+    let text = text.ok_or_else(|| not_a_result_error("it has no state".to_owned()))?;
+    let read: SavedResult<F> = state::read(text).map_err(not_a_result_error)?;
+    Ok(IdentifiedModel {
         fit: read.fit,
         verdict: read.verdict,
         data: Recordings {

@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 use crate::AnalysisError;
 
 /// Number of hexadecimal digits of the checksum.
-const DIGITS: usize = 16;
+const CHECKSUM_DIGITS: usize = 16;
 
 /// Wrapper that makes a value of any type a TOML table.
 #[derive(Serialize, Deserialize)]
@@ -23,9 +23,9 @@ struct Table<T> {
 }
 
 /// Serialises a value to text; `None` if this is not possible.
-pub fn written<T: Serialize>(value: &T) -> Option<String> {
+pub fn serialise<T: Serialize>(value: &T) -> Option<String> {
     let text = toml::to_string(&Table { value }).ok()?;
-    Some(format!("{}{text}", sum(&text)))
+    Some(format!("{}{text}", checksum(&text)))
 }
 
 /// Restores the value from a text written by [`written`].
@@ -33,8 +33,8 @@ pub fn written<T: Serialize>(value: &T) -> Option<String> {
 /// # Errors
 /// A message if the text was truncated or changed, or comes from another version.
 pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
-    let (stated, text) = text.split_at_checked(DIGITS).ok_or("its state is truncated")?;
-    if stated != sum(text) {
+    let (stated, text) = text.split_at_checked(CHECKSUM_DIGITS).ok_or("its state is truncated")?;
+    if stated != checksum(text) {
         return Err("its state was truncated or changed after it was written".to_owned());
     }
     let version = env!("CARGO_PKG_VERSION");
@@ -47,7 +47,7 @@ pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
 ///
 /// # Errors
 /// [`AnalysisError::NotAResult`] if the text is invalid or damaged, or belongs to another kind or version.
-pub fn of_kind<T: DeserializeOwned>(text: &str, kind: &str) -> Result<T, AnalysisError> {
+pub fn restore_state<T: DeserializeOwned>(text: &str, kind: &str) -> Result<T, AnalysisError> {
     let none = |found: String| AnalysisError::NotAResult { found };
     let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is not JSON: {error}")))?;
     if object["kind"] != kind {
@@ -57,11 +57,11 @@ pub fn of_kind<T: DeserializeOwned>(text: &str, kind: &str) -> Result<T, Analysi
     read(state.ok_or_else(|| none("it has no state".to_owned()))?).map_err(none)
 }
 
-fn sum(text: &str) -> String {
+fn checksum(text: &str) -> String {
     let bytes = Sha256::digest(text.as_bytes());
     bytes
         .iter()
-        .take(DIGITS / 2)
+        .take(CHECKSUM_DIGITS / 2)
         .map(|byte| format!("{byte:02x}"))
         .collect()
 }
@@ -74,15 +74,15 @@ mod tests {
     #[test]
     fn round_trip_is_bit_identical() {
         let numbers = [0.1, -0.0, 1.0 / 3.0, f64::INFINITY, f64::MIN_POSITIVE / 3.0];
-        let back: Vec<f64> = read(&written(&numbers.to_vec()).unwrap()).unwrap();
+        let back: Vec<f64> = read(&serialise(&numbers.to_vec()).unwrap()).unwrap();
         assert!(numbers.iter().zip(&back).all(|(a, b)| a.to_bits() == b.to_bits()));
-        let nan: f64 = read(&written(&f64::NAN).unwrap()).unwrap();
+        let nan: f64 = read(&serialise(&f64::NAN).unwrap()).unwrap();
         assert!(nan.is_nan());
     }
 
     #[test]
     fn damaged_state_is_refused() {
-        let whole = written(&vec![1.0, 2.0]).unwrap();
+        let whole = serialise(&vec![1.0, 2.0]).unwrap();
         for text in ["", "0123", &whole[..whole.len() - 4], &whole.replacen("2", "3", 1)] {
             assert!(read::<Vec<f64>>(text).is_err(), "{text}");
         }

@@ -6,17 +6,17 @@ use hoid_model::{
     remnant::RemnantDiscretisation,
     uncertainty::{Estimate, OperatorEstimate},
 };
-use hoid_track::{Change, Determined, NoCrossover, OpenLoop, Response, TrackFault};
+use hoid_track::{Change, Determination, NoCrossover, OpenLoop, Response, TrackFault};
 use serde_json::{Map, Value, json};
 
-use super::{PolynomialAnswer, envelope, estimate, loop_shape, number, operator, optional, orders};
-use crate::{AnalysisError, settings::Setting, tracking::Tracked};
+use super::{PolynomialResult, envelope, estimate, loop_shape, number, operator, optional, orders};
+use crate::{AnalysisError, settings::Setting, tracking::TrackingResult};
 
-impl Tracked {
+impl TrackingResult {
     /// Returns the JSON object as text.
     ///
     /// # Errors
-    /// As [`Tracked::json`].
+    /// As [`TrackingResult::json`].
     pub fn to_json(&self) -> Result<String, AnalysisError> {
         Ok(format!("{:#}\n", Value::Object(self.json()?)))
     }
@@ -79,12 +79,12 @@ impl Tracked {
             set("changes", Value::Array(each.collect()));
         }
         set("rows", json!(trace.len()));
-        let none = self.not_converted();
+        let none = self.unconverted_rows();
         set("rows_not_convertible", json!(none.rows));
         set("not_convertible_reason", json!(none.reason));
-        if let Some((rows, reason)) = self.without_crossover() {
+        if let Some((rows, reason)) = self.rows_without_crossover() {
             set("rows_without_crossover", json!(rows));
-            set("no_crossover_reason", json!(reason.map(NoCrossover::words)));
+            set("no_crossover_reason", json!(reason.map(NoCrossover::as_text)));
         }
         let errors: Map<String, Value> = self
             .relative_errors()
@@ -102,7 +102,7 @@ impl Tracked {
         let verdict = fit.verdict(records, self.choice.as_ref())?;
         let remnant = (fit.orders().nd > 0).then(|| fit.remnant(RemnantDiscretisation::ZeroOrderHold));
         let words = format!("{} to {}", span.time_s(0), span.time_s(span.len()));
-        let answer = PolynomialAnswer {
+        let answer = PolynomialResult {
             verdict: &verdict,
             files: &self.data.names,
             records,
@@ -173,7 +173,7 @@ impl Tracked {
         let mut last = json!({
             "t": number(trace.times_s()[row]),
             "parameters": parameters,
-            "operator": tracked_operator(&self.operators[row], |o| trace.determined(o)),
+            "operator": tracked_operator(&self.operators[row], |o| trace.determinations(o)),
             "response": responses(&trace.options().at_rad_s, |place, _| trace.response(row, place)),
             "innovation": number(trace.innovation()[row]),
             "innovation_variance": number(trace.innovation_variance()[row]),
@@ -208,14 +208,14 @@ pub fn open_loop(found: &Result<OpenLoop, NoCrossover>) -> Value {
             "crossover_rad_s": estimate(&found.crossover_rad_s),
             "phase_margin_deg": estimate(&found.phase_margin_deg),
         }),
-        Err(reason) => json!({"crossover_rad_s": null, "phase_margin_deg": null, "reason": reason.words()}),
+        Err(reason) => json!({"crossover_rad_s": null, "phase_margin_deg": null, "reason": reason.as_text()}),
     }
 }
 
 /// Returns the operator of a recursion; for each parameter it includes whether the data determine the parameter.
 pub fn tracked_operator(
     found: &Result<OperatorEstimate, NotConvertible>,
-    determined: impl Fn(&OperatorEstimate) -> Vec<Determined>,
+    determined: impl Fn(&OperatorEstimate) -> Vec<Determination>,
 ) -> Value {
     let mut whole = operator(found);
     for (name, yes) in found.as_ref().map(determined).unwrap_or_default() {
@@ -245,7 +245,7 @@ pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
         "since": optional(declared_at.map(|t| t - c.seconds_ago)),
         "probability": number(c.probability()),
         "log_odds": number(c.odds),
-        "changed": c.changed(),
+        "changed": c.changed_quantities(),
         "K_e": before_and_after(&c.k_e),
         "K_e_dot": before_and_after(&c.k_e_dot),
         "omega_nm": before_and_after(&c.omega_nm_rad_s),

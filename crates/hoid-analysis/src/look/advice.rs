@@ -3,7 +3,7 @@
 use hoid_ident::frequency::COMMON_EXCITATIONS;
 use hoid_io::{TimeChoice, TrialChoice};
 
-use super::{columns::Role, file::Look};
+use super::{columns::Role, file::FileExamination};
 
 /// Advice on how to read a file: the options that differ from the defaults.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,7 +30,7 @@ pub struct Advice {
     pub controlled_element: Option<String>,
 }
 
-impl Look {
+impl FileExamination {
     /// Returns the advice; `None` if it is not certain which columns are error and control. If the columns do not form
     /// a record yet, the advice contains only the columns.
     pub fn advice(&self) -> Option<Advice> {
@@ -98,12 +98,12 @@ impl Advice {
     pub fn command(&self, verb: &str, file: &str) -> String {
         let mut words = vec!["hoid".to_owned(), verb.to_owned(), file.to_owned()];
         words.extend(self.arguments());
-        typed(&words)
+        shell_command(&words)
     }
 }
 
 /// Joins words as typed in a shell.
-pub fn typed(words: &[String]) -> String {
+pub fn shell_command(words: &[String]) -> String {
     let plain = |word: &str| {
         let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+%@".contains(c);
         !word.is_empty() && word.chars().all(is_plain)

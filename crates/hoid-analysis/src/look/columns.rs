@@ -1,6 +1,6 @@
 //! Recognition of error and control by their common column names.
 
-use hoid_io::{control_among, error_among};
+use hoid_io::{find_control_column, find_error_column};
 
 /// Common names of the tracked signals.
 const TARGETS: [&str; 7] = ["r", "ref", "reference", "target", "track", "setpoint", "f_t"];
@@ -53,7 +53,7 @@ impl Roles {
         };
         let (targets, outputs) = (known(&TARGETS), known(&OUTPUTS));
         let asked = |name: &str| Role::new(name, "as requested", true);
-        let input = match (input, error_among(columns), targets.first().zip(outputs.first())) {
+        let input = match (input, find_error_column(columns), targets.first().zip(outputs.first())) {
             (Some(name), ..) => asked(name),
             (_, Some(name), _) => Role::new(name, "the tracking error, by name", true),
             (_, _, Some((r, y))) => Role::new(
@@ -67,7 +67,7 @@ impl Roles {
                 false,
             ),
         };
-        let output = match (output, control_among(columns)) {
+        let output = match (output, find_control_column(columns)) {
             (Some(name), _) => asked(name),
             (_, Some(name)) => Role::new(name, "the control, by name", true),
             _ => Role::new("u", "not found by name: give the column", false),

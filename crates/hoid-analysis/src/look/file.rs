@@ -14,7 +14,7 @@ use super::{
 
 /// Result of the examination of a file.
 #[derive(Debug)]
-pub struct Look {
+pub struct FileExamination {
     /// Columns, sampling and problems of the file.
     pub survey: FileSurvey,
     /// Columns of error and control.
@@ -36,16 +36,16 @@ pub struct RecordSummary {
     pub lag: Option<Result<Lag, String>>,
 }
 
-impl Look {
+impl FileExamination {
     /// Examines a file.
     ///
     /// # Errors
     /// The errors of [`survey`] if the file cannot be read.
     pub fn at(path: &Path, known: &LookOptions) -> Result<Self, IoError> {
         let found = survey(path)?;
-        let roles = Roles::of(&names(&found), known.input.as_deref(), known.output.as_deref());
+        let roles = Roles::of(&column_names(&found), known.input.as_deref(), known.output.as_deref());
         Ok(Self {
-            seen: seen(path, &roles, known),
+            seen: summarise_record(path, &roles, known),
             survey: found,
             roles,
             known: known.clone(),
@@ -61,7 +61,7 @@ impl Look {
 }
 
 /// Returns the names of the columns.
-pub(super) fn names(found: &FileSurvey) -> Vec<&str> {
+pub(super) fn column_names(found: &FileSurvey) -> Vec<&str> {
     found.columns.iter().map(|column| column.path.as_str()).collect()
 }
 
@@ -77,7 +77,7 @@ fn unit_of(column: &ColumnSurvey) -> Option<&str> {
     })
 }
 
-fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary, IoError> {
+fn summarise_record(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary, IoError> {
     let options = ReadOptions {
         input: Some(roles.input.column.parse()?),
         output: roles.output.column.parse()?,
@@ -99,7 +99,7 @@ fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary
     let lag = match (known.offset_samples, &known.controlled_element) {
         (None, Some((_, element))) => {
             let excitation = periods.as_ref().ok().map(|found| found.channel.as_str());
-            Some(lag::of_control(&record, excitation, element))
+            Some(lag::control_lag(&record, excitation, element))
         }
         _ => None,
     };

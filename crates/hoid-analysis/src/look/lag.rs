@@ -2,7 +2,7 @@
 //! from the delay between u and e in the recorded loop ([`recorded_element`]).
 
 use hoid_ident::diagnostics::recorded_element;
-use hoid_model::numbers::counted;
+use hoid_model::numbers::count_with_noun;
 use hoid_model::{ContinuousTransferFunction, Record};
 
 /// Lag of the recorded control.
@@ -18,7 +18,7 @@ pub struct Lag {
 
 /// Returns the lag of the control, or the reason why it is unknown: a signal of the loop was not recorded, or the loop
 /// contains another controlled element.
-pub(super) fn of_control(
+pub(super) fn control_lag(
     record: &Record,
     excitation: Option<&str>,
     element: &ContinuousTransferFunction,
@@ -30,7 +30,7 @@ pub(super) fn of_control(
                 .to_owned(),
         );
     };
-    if !found.is_given() {
+    if !found.matches_given() {
         return Err(found
             .finding(element)
             .map_or_else(String::new, |finding| finding.message));
@@ -44,7 +44,7 @@ pub(super) fn of_control(
         words: format!(
             "e follows from u through the controlled element if the control is {} late; {:.2} % of the power is \
              unexplained",
-            counted(samples, "sample"),
+            count_with_noun(samples, "sample"),
             100.0 * found.unexplained
         ),
     })
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     /// A loop around `y = (u + d) / s` with noise in u, which is recorded a number of samples late.
-    fn integrated(late: usize) -> Record {
+    fn integrator_loop(late: usize) -> Record {
         let (ts, n) = (0.02_f64, 2000_usize);
         let (mut y, mut noise, mut state) = (0.0, 0.0, 7_u64);
         let mut all: [Vec<f64>; 3] = Default::default();
@@ -87,22 +87,22 @@ mod tests {
     fn recording_lag_of_the_control_is_found() {
         let element: ContinuousTransferFunction = "1/s".parse().unwrap();
         for late in [0, 1, 2] {
-            let lag = of_control(&integrated(late), Some("d"), &element).unwrap();
+            let lag = control_lag(&integrator_loop(late), Some("d"), &element).unwrap();
             assert_eq!(lag.samples, late as f64, "{}", lag.words);
         }
     }
 
     #[test]
     fn wrong_element_and_missing_signal_are_reported() {
-        let record = integrated(1);
-        let why = of_control(&record, None, &"1/(s^2+0.01s)".parse().unwrap()).unwrap_err();
+        let record = integrator_loop(1);
+        let why = control_lag(&record, None, &"1/(s^2+0.01s)".parse().unwrap()).unwrap_err();
         assert!(why.contains("the recorded element is 1/s"), "{why}");
         let without = Record::new(
             record.sample_time(),
             record.input_channel().unwrap().clone(),
             record.output_channel().clone(),
         );
-        let why = of_control(&without.unwrap(), None, &"1/s".parse().unwrap()).unwrap_err();
+        let why = control_lag(&without.unwrap(), None, &"1/s".parse().unwrap()).unwrap_err();
         assert!(why.contains("was not recorded"), "{why}");
     }
 }

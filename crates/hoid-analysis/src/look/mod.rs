@@ -10,7 +10,7 @@
 //! | `columns` | error and control, recognised by their common names |
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
 //! | `lag` | number of samples by which the control was recorded later than the error, for a known controlled element |
-//! | `file` | [`Look`]: all these findings for one file |
+//! | `file` | [`FileExamination`]: all these findings for one file |
 //! | `other_columns` | error message for a file without the columns that were requested |
 //! | `advice` | advice on how to read the file, and the command to type |
 
@@ -22,9 +22,9 @@ mod options;
 mod other_columns;
 mod periods;
 
-pub use advice::{Advice, typed};
+pub use advice::{Advice, shell_command};
 pub use columns::{Role, Roles};
-pub use file::{Look, RecordSummary};
+pub use file::{FileExamination, RecordSummary};
 pub use lag::Lag;
 pub use options::LookOptions;
 pub use other_columns::{OtherColumns, other_columns};

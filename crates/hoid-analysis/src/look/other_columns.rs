@@ -6,11 +6,11 @@ use std::path::Path;
 use hoid_io::{ColumnExpression, ColumnOption, IoError, ReadOptions, survey};
 use thiserror::Error;
 
-use super::{advice::typed, columns::Roles, file::names};
+use super::{advice::shell_command, columns::Roles, file::column_names};
 
 /// A file without the requested columns, in which error and control are recognised under other names.
 #[derive(Debug, Clone, PartialEq, Error)]
-#[error("{}: {}", self.found(), self.as_keys())]
+#[error("{}: {}", self.description(), self.as_keys())]
 pub struct OtherColumns {
     /// Name of the file.
     pub file: String,
@@ -26,7 +26,7 @@ pub struct OtherColumns {
 
 impl OtherColumns {
     /// Describes the request, the existing columns, and the recognised columns.
-    pub fn found(&self) -> String {
+    pub fn description(&self) -> String {
         let Self {
             file,
             missing,
@@ -65,7 +65,7 @@ impl OtherColumns {
                     .flat_map(|column| [option.to_owned(), column.clone()]),
             );
         }
-        typed(&words)
+        shell_command(&words)
     }
 }
 
@@ -83,7 +83,7 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
         return None;
     };
     let found = survey(path).ok()?;
-    let names = names(&found);
+    let names = column_names(&found);
     // Only default names are replaced; the user typed any other name deliberately.
     let of = |column: &ColumnExpression, default: &str| {
         let found = column.is_among(&names).then(|| column.to_string());

@@ -3,12 +3,12 @@
 //!
 //! Over a whole number of periods `T` the power of a periodic signal lies in the bins of its discrete Fourier transform
 //! at the frequencies `n / T`, and in no others; over any other span it leaks into all bins. The spans between whole
-//! seconds are tried, the longest first, until nearly all the power lies in single bins ([`Excitation::found_in`]).
+//! seconds are tried, the longest first, until nearly all the power lies in single bins ([`Excitation::detect`]).
 //! A period need not be a number of whole seconds, so the length of this span is then varied by samples until the
 //! leakage is smallest. Without this step, a span of 82.01 s for a period of 81.92 s has two additional lines, at which
 //! the ratio of u to e is not the response of the person.
 
-use hoid_ident::frequency::{COMMON_EXCITATIONS, Excitation, LineSearch};
+use hoid_ident::frequency::{COMMON_EXCITATIONS, Excitation, LineDetectionOptions};
 use hoid_model::{Complex64, Record};
 use hoid_numerics::statistics::variance;
 
@@ -25,7 +25,7 @@ const MAX_LEAK_RATIO: f64 = 3.0;
 /// First step in which the length of a span is varied, s.
 const COARSE_STEP_S: f64 = 0.01;
 /// Fraction of the power outside the lines that may be due to rounding to about five digits.
-const ROUNDING: f64 = 1e-9;
+const ROUNDING_POWER_FRACTION: f64 = 1e-9;
 
 /// The excitation of a run.
 #[derive(Debug, Clone)]
@@ -65,7 +65,9 @@ pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, St
             channels.join(", ")
         ));
     }
-    let found = candidates.iter().find_map(|channel| in_channel(record, channel, known));
+    let found = candidates
+        .iter()
+        .find_map(|channel| search_channel(record, channel, known));
     found.ok_or_else(|| {
         if candidates.is_empty() {
             return "there are no columns other than the error and the control".to_owned();
@@ -80,20 +82,20 @@ pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, St
 /// Finds the longest span of whole periods of a channel. A span that is a few samples too long leaks little and would
 /// be accepted; therefore the spans that are shorter by less than a second are compared, and the one with the least
 /// leakage is chosen.
-fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Periods> {
+fn search_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Periods> {
     let all = spans(record, known);
     let longest = all.iter().position(|span| lines_in(record, channel, *span).is_some())?;
     let least_s = all[longest].1 - all[longest].0 - 1.0;
-    let near: Vec<Found> = all[longest..]
+    let near: Vec<FoundSpan> = all[longest..]
         .iter()
         .take_while(|(from_s, to_s)| to_s - from_s > least_s)
         .filter_map(|span| lines_in(record, channel, *span).map(|(excitation, leak)| (*span, excitation, leak)))
         .collect();
     let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
     // Of spans with equal leakage the first one, which is the longest, is chosen.
-    let limit = MAX_LEAK_RATIO * least.max(ROUNDING);
+    let limit = MAX_LEAK_RATIO * least.max(ROUNDING_POWER_FRACTION);
     let chosen = near.into_iter().find(|(.., leak)| *leak <= limit)?;
-    let ((from_s, to_s), excitation, _) = refined(record, channel, chosen, known);
+    let ((from_s, to_s), excitation, _) = refine_span(record, channel, chosen, known);
     let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
     let words = format!(
         "{channel} has {} lines from {:.3} to {:.3} rad/s, harmonics of {period_s:.4} s, over {from_s:.3} to {to_s:.3} s",
@@ -111,18 +113,18 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
 }
 
 /// A span with its lines and its leakage.
-type Found = ((f64, f64), Excitation, f64);
+type FoundSpan = ((f64, f64), Excitation, f64);
 
 /// Varies the length of a span by up to a second, first in steps of a hundredth of a second and then by samples, and
 /// returns the span with the least leakage. The span keeps its end, or its start if the user gave that one.
-fn refined(record: &Record, channel: &str, found: Found, known: &LookOptions) -> Found {
+fn refine_span(record: &Record, channel: &str, found: FoundSpan, known: &LookOptions) -> FoundSpan {
     let ts = record.sample_time().s();
     let is_given = (known.from_s.is_some(), known.to_s.is_some());
-    if found.2 <= ROUNDING || is_given == (true, true) {
+    if found.2 <= ROUNDING_POWER_FRACTION || is_given == (true, true) {
         return found;
     }
     let (start_s, end_s) = (record.time_s(0), record.time_s(record.len()));
-    let least_of = |best: Found, step: i64, steps: i64| {
+    let least_of = |best: FoundSpan, step: i64, steps: i64| {
         let (from_s, to_s) = best.0;
         let moved = |k: i64| {
             let by_s = (k * step) as f64 * ts;
@@ -143,7 +145,7 @@ fn refined(record: &Record, channel: &str, found: Found, known: &LookOptions) ->
     let best = least_of(found.clone(), coarse, steps);
     let best = if coarse > 1 { least_of(best, 1, coarse) } else { best };
     // A small gain is due to noise in the channel.
-    if MAX_LEAK_RATIO * best.2.max(ROUNDING) < leak {
+    if MAX_LEAK_RATIO * best.2.max(ROUNDING_POWER_FRACTION) < leak {
         best
     } else {
         found
@@ -154,7 +156,7 @@ fn refined(record: &Record, channel: &str, found: Found, known: &LookOptions) ->
 /// outside them.
 fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
     let span = record.span(from_s, to_s).ok()?;
-    let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
+    let excitation = Excitation::detect(&span, channel, &LineDetectionOptions::default()).ok()?;
     if excitation.harmonics().len() < MIN_LINES {
         return None;
     }
@@ -257,7 +259,7 @@ mod tests {
     /// The thesis's period of 8192 samples, in a record that starts and ends elsewhere.
     #[test]
     fn period_of_a_fraction_of_a_second_is_found() {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let target = ForcingFunction::reference().samples(0.0, ts, 9001);
         let noise = |k: usize| ((k * 7919 % 1013) as f64 / 1013.0) - 0.5;
         let channel = |name: &str, f: &dyn Fn(usize) -> f64| Channel::new(name, "", (0..9001).map(f).collect());

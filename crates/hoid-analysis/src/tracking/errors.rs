@@ -2,7 +2,7 @@
 
 use hoid_model::{NotConvertible, Record, uncertainty::OperatorEstimate};
 use hoid_numerics::statistics::mean;
-use hoid_track::{Trace, value_of};
+use hoid_track::{Trace, operator_parameter};
 
 /// Returns, for each parameter whose true value is in the record, the root mean square of the relative error over all
 /// rows from `first` on that have an operator.
@@ -18,7 +18,7 @@ pub fn relative_errors(
         let truth = record.channel(name)?;
         let squares: Vec<f64> = (first..trace.len())
             .filter_map(|row| {
-                let found = value_of(&operators[row], name)?.value;
+                let found = operator_parameter(&operators[row], name)?.value;
                 let k = ((trace.times_s()[row] - start_s) / ts).round() as usize;
                 let truth = truth.get(k).copied().filter(|v| *v != 0.0)?;
                 Some((found / truth - 1.0).powi(2))

@@ -6,7 +6,7 @@ use hoid_track::{Method, TrackedInput};
 
 use crate::{
     AnalysisError,
-    several_inputs::{roles, several_inputs},
+    several_inputs::{parse_roles, several_inputs},
 };
 
 /// Returns the orders of the model of the first input and the further input, from text such as
@@ -30,7 +30,7 @@ pub fn two_inputs(
             inputs.len()
         )));
     };
-    if !method.takes_further_input() {
+    if !method.supports_further_input() {
         return Err(options(format!(
             "the method {method} tracks the response to one input; use rls or rpem for {further}"
         )));
@@ -57,7 +57,7 @@ pub fn two_inputs(
         ("nk", nk),
     ];
     let named = all.into_iter().map(|(name, n)| (name.to_owned(), n..=n)).collect();
-    let role = roles(std::slice::from_ref(further), role)?;
+    let role = parse_roles(std::slice::from_ref(further), role)?;
     let further = TrackedInput {
         channel: further.clone(),
         role: role.first().copied().unwrap_or_default(),

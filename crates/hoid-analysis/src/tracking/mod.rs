@@ -1,7 +1,7 @@
 //! Tracking: the processing steps from a recording to a trace and its verdict.
 //!
 //! ```text
-//! file -- Reading --> Recordings -- Tracking { options }.run --> Tracked { trace, verdict, data, settings }
+//! file -- Reading --> Recordings -- Tracking { options }.run --> TrackingResult { trace, verdict, data, settings }
 //! ```
 //!
 //! A high sampling rate is reduced. Orders that are not given are searched on the span of the start fit. The recursion
@@ -17,6 +17,6 @@ mod tracked;
 
 pub use errors::relative_errors;
 pub use inputs::two_inputs;
-pub use run::{Tracking, options_of_recursion};
+pub use run::{Tracking, recursion_options_error};
 pub use settings::settings_of_recursion;
-pub use tracked::Tracked;
+pub use tracked::TrackingResult;

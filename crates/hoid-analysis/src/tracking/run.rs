@@ -3,13 +3,13 @@
 use hoid_ident::IdentError;
 use hoid_model::{Decimation, Record, SampleTime};
 use hoid_track::{
-    CovarianceUpdates, RequestedStart, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest, choose_covariance,
+    CovarianceUpdates, RequestedStart, StartSource, Trace, TrackOptions, TrackPlan, TrackRequest, choose_covariance,
     default_start_span, track, track_validated,
 };
 
 use super::{
     settings::{OwnSettings, settings_of_recursion},
-    tracked::{Covariance, Tracked},
+    tracked::{CovarianceSource, TrackingResult},
 };
 use crate::{
     AnalysisError,
@@ -68,23 +68,23 @@ impl Tracking {
             .sample_time();
         let rate = match self.recursion.counts_samples() {
             _ if recordings.has_fixed_rate() => Decimation::Off,
-            true => self.rate.when_named(),
+            true => self.rate.explicit_only(),
             false => self.rate,
         };
-        plan_of(&self.recursion, SampleTime::new(rate.factor(read) as f64 * read.s())?)
+        recursion_plan(&self.recursion, SampleTime::new(rate.factor(read) as f64 * read.s())?)
     }
 
     /// Tracks the recording. `validation` is a second run of the same person; `each` is called after every candidate of
     /// a search.
     ///
     /// # Errors
-    /// [`AnalysisError`] if there is no trace. A doubtful trace is not an error: see [`Tracked::verdict`].
+    /// [`AnalysisError`] if there is no trace. A doubtful trace is not an error: see [`TrackingResult::verdict`].
     pub fn run(
         &self,
         recordings: Recordings,
         validation: Option<Recordings>,
         each: &(dyn Fn() + Sync),
-    ) -> Result<Tracked, AnalysisError> {
+    ) -> Result<TrackingResult, AnalysisError> {
         let counts_samples = self.recursion.counts_samples();
         let read_ts = recordings
             .records
@@ -100,18 +100,18 @@ impl Tracking {
             false => (self.every as f64 * read_ts.s() / record.sample_time().s()).round() as usize,
         }
         .max(1);
-        let plan = plan_of(&self.recursion, record.sample_time())?;
+        let plan = recursion_plan(&self.recursion, record.sample_time())?;
         self.check(&plan, record, validation.is_some())?;
         let span_s = self.start_span_s.unwrap_or_else(|| default_start_span(record));
         let span = record.span(span_s.0, span_s.1);
-        let (planned, choice) = if plan.is_settled() {
+        let (planned, choice) = if plan.has_fixed_orders() {
             (plan.options().clone(), None)
         } else {
             plan.choose(span.as_ref().map_err(|error| error.clone())?, each)?
         };
         let mut used = TrackOptions {
             start: match planned.start {
-                StartAt::Span(_) => StartAt::Span(Some(span_s)),
+                StartSource::Span(_) => StartSource::Span(Some(span_s)),
                 other => other,
             },
             update_from_s: self.update_from_s,
@@ -122,11 +122,11 @@ impl Tracking {
             .transpose()?;
         let covariance = match &other {
             None => None,
-            Some(other) if self.update_covariance => Some(Covariance::Updated(other.names[0].clone())),
+            Some(other) if self.update_covariance => Some(CovarianceSource::Updated(other.names[0].clone())),
             Some(other) => {
                 let (options, chosen) = choose_covariance(record, &other.records[0], &used)?;
                 used = options;
-                Some(Covariance::Chosen(other.names[0].clone(), chosen))
+                Some(CovarianceSource::Chosen(other.names[0].clone(), chosen))
             }
         };
         let trace = match (&other, self.update_covariance) {
@@ -154,7 +154,7 @@ impl Tracking {
             rate: self.rate,
         };
         settings.extend(own.list(&data));
-        Ok(Tracked {
+        Ok(TrackingResult {
             verdict,
             span: span.ok().filter(|_| trace.start().is_some()),
             operators: trace.operators(),
@@ -170,26 +170,26 @@ impl Tracking {
     fn check(&self, plan: &TrackPlan, record: &Record, validated: bool) -> Result<(), AnalysisError> {
         let method = &plan.options().method;
         if validated && plan.options().further.is_some() {
-            return Err(options(
+            return Err(options_error(
                 "--validate works with only one input; drop --validate, or track with one input".to_owned(),
             ));
         }
         if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {
-            return Err(options(
+            return Err(options_error(
                 "--start-span sets the span of the start fit, but --start replaces this fit; drop one of these \
                  options"
                     .to_owned(),
             ));
         }
-        if self.start_span_s.is_some() && method.starts_itself() {
-            return Err(options(format!(
+        if self.start_span_s.is_some() && method.is_self_starting() {
+            return Err(options_error(format!(
                 "--start-span sets the span of a start fit, but {method} has no start fit; drop --start-span, or use \
                  --method physical"
             )));
         }
         let end = record.time_s(record.len());
         match self.update_from_s {
-            Some(t) if t.is_nan() || t >= end => Err(options(format!(
+            Some(t) if t.is_nan() || t >= end => Err(options_error(format!(
                 "--update-from {t}: the record ends at {end:.4} s; give an earlier time"
             ))),
             _ => Ok(()),
@@ -203,7 +203,7 @@ impl Tracking {
         };
         let row = every as f64 * record.sample_time().s();
         if !(length >= 0.0 && length <= record.len() as f64 * record.sample_time().s()) {
-            return Err(options(format!(
+            return Err(options_error(format!(
                 "--moving-average {length}: expected 0 s to the length of the record, {:.4} s",
                 record.len() as f64 * record.sample_time().s()
             )));
@@ -213,18 +213,18 @@ impl Tracking {
 }
 
 /// Returns the plan of a recursion; its errors are reported as errors of the options.
-fn plan_of(asked: &TrackRequest, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
-    asked.plan(sample_time).map_err(options_of_recursion)
+fn recursion_plan(asked: &TrackRequest, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
+    asked.plan(sample_time).map_err(recursion_options_error)
 }
 
 /// Converts an error of a requested recursion to an error of its options.
-pub fn options_of_recursion(error: IdentError) -> AnalysisError {
+pub fn recursion_options_error(error: IdentError) -> AnalysisError {
     match error {
-        IdentError::BadStart { reason } => options(format!("--start: {reason}")),
-        other => options(other.to_string()),
+        IdentError::BadStart { reason } => options_error(format!("--start: {reason}")),
+        other => options_error(other.to_string()),
     }
 }
 
-fn options(reason: String) -> AnalysisError {
+fn options_error(reason: String) -> AnalysisError {
     AnalysisError::Options { reason }
 }

@@ -15,7 +15,7 @@ use crate::{
 
 /// Use of a second run for the covariance, with the label of that run.
 #[derive(Debug, Clone)]
-pub enum Covariance {
+pub enum CovarianceSource {
     /// The second run determined the initial covariance.
     Chosen(String, CovarianceChoice),
     /// The second run controlled the covariance during the run.
@@ -24,7 +24,7 @@ pub enum Covariance {
 
 /// Result of a recursion over a record.
 #[derive(Debug, Clone)]
-pub struct Tracked {
+pub struct TrackingResult {
     /// Estimates over the record.
     pub trace: Trace,
     /// Final verdict on the trace.
@@ -38,21 +38,21 @@ pub struct Tracked {
     /// Result of the search for the orders, if there was one.
     pub choice: Option<Choice>,
     /// Covariance obtained from a second run, if there was one.
-    pub covariance: Option<Covariance>,
+    pub covariance: Option<CovarianceSource>,
     /// Settings used in the recursion.
     pub settings: Vec<Setting>,
 }
 
 /// Number of rows without an operator, and the most frequent reason.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct NotConverted {
+pub struct UnconvertedRows {
     /// Number of rows without an operator.
     pub rows: usize,
     /// Most frequent reason; `None` if all rows have an operator.
     pub reason: Option<String>,
 }
 
-impl Tracked {
+impl TrackingResult {
     /// Returns the tracked record.
     pub fn record(&self) -> &Record {
         &self.data.records[0]
@@ -71,7 +71,7 @@ impl Tracked {
     /// Returns the initial covariance determined by a second run, and the label of that run.
     pub fn chosen_covariance(&self) -> Option<(&str, &CovarianceChoice)> {
         match &self.covariance {
-            Some(Covariance::Chosen(file, choice)) => Some((file, choice)),
+            Some(CovarianceSource::Chosen(file, choice)) => Some((file, choice)),
             _ => None,
         }
     }
@@ -97,7 +97,7 @@ impl Tracked {
             );
         }
         if trace.is_guarded() {
-            add("held".to_owned(), ColumnValues::Whole(trace.held().to_vec()));
+            add("held".to_owned(), ColumnValues::Whole(trace.held_counts().to_vec()));
         }
         add(
             "steps_shortened".to_owned(),
@@ -139,24 +139,24 @@ impl Tracked {
     }
 
     /// Returns the first row in which the estimate has been updated.
-    pub fn first_moved_row(&self) -> usize {
+    pub fn first_updated_row(&self) -> usize {
         // Half a sample of tolerance removes the effect of rounding in the times.
         let from = self.trace.updated_from_s() - self.record().sample_time().s() / 2.0;
         let first = self.trace.times_s().partition_point(|t| *t < from);
         let first = first
             + (first..self.trace.len())
-                .take_while(|row| self.trace.is_before_the_first(*row))
+                .take_while(|row| self.trace.is_before_first_estimate(*row))
                 .count();
         first.min(self.trace.len().saturating_sub(1))
     }
 
     /// Returns the number of rows without an operator, and the most frequent reason.
-    pub fn not_converted(&self) -> NotConverted {
+    pub fn unconverted_rows(&self) -> UnconvertedRows {
         let mut kinds: BTreeMap<&'static str, (usize, String)> = BTreeMap::new();
         let rows = self.operators.iter().enumerate();
         for (row, reason) in rows.filter_map(|(row, o)| Some((row, o.as_ref().err()?))) {
             let (kind, example) = match reason {
-                _ if self.trace.is_before_the_first(row) => ("none yet", "there is no estimate yet".to_owned()),
+                _ if self.trace.is_before_first_estimate(row) => ("none yet", "there is no estimate yet".to_owned()),
                 NotConvertible::NegativeRealPole { .. } => (
                     "pole",
                     "a pole lies on the closed negative real axis, so no real continuous-time system corresponds to \
@@ -171,7 +171,7 @@ impl Tracked {
             };
             kinds.entry(kind).or_insert((0, example)).0 += 1;
         }
-        NotConverted {
+        UnconvertedRows {
             rows: kinds.values().map(|(n, _)| n).sum(),
             reason: kinds.into_values().max_by_key(|(n, _)| *n).map(|(_, text)| text),
         }
@@ -179,7 +179,7 @@ impl Tracked {
 
     /// Returns the number of rows without a crossover and the most frequent reason; `None` if the controlled element is
     /// unknown.
-    pub fn without_crossover(&self) -> Option<(usize, Option<NoCrossover>)> {
+    pub fn rows_without_crossover(&self) -> Option<(usize, Option<NoCrossover>)> {
         self.trace.options().controlled_element.as_ref()?;
         let mut kinds: BTreeMap<NoCrossover, usize> = BTreeMap::new();
         for reason in (0..self.trace.len()).filter_map(|row| self.trace.open_loop(row)?.err()) {
@@ -195,7 +195,7 @@ impl Tracked {
             self.record(),
             &self.trace,
             &self.operators,
-            self.first_moved_row(),
+            self.first_updated_row(),
             &self.trace.operator_columns(),
         )
     }

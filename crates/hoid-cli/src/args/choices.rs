@@ -4,12 +4,12 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hoid::model::NamedChoice;
 
 /// One of some choices of the library, by its name.
-pub fn choice_of<T: NamedChoice + Send + Sync>(choices: &'static [T]) -> impl TypedValueParser<Value = T> {
-    by_name(choices.iter().map(|choice| (choice.choice_name(), *choice)))
+pub fn choice_parser<T: NamedChoice + Send + Sync>(choices: &'static [T]) -> impl TypedValueParser<Value = T> {
+    value_parser_by_name(choices.iter().map(|choice| (choice.choice_name(), *choice)))
 }
 
 /// One of some values by its name, in capitals or not where the option takes both.
-pub fn by_name<T: Clone + Send + Sync + 'static>(
+pub fn value_parser_by_name<T: Clone + Send + Sync + 'static>(
     values: impl IntoIterator<Item = (&'static str, T)>,
 ) -> impl TypedValueParser<Value = T> {
     let values: Vec<(&str, T)> = values.into_iter().collect();

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use hoid::design::compare::{Adjustment, Covariate, Factor, Quantity, Weights};
 
-use super::{choices::choice_of, figure::FigureArgs, show::ShowArgs};
+use super::{choices::choice_parser, figure::FigureArgs, show::ShowArgs};
 
 #[derive(Debug, Args)]
 pub struct CompareArgs {
@@ -30,14 +30,14 @@ pub struct CompareArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub of: Vec<Quantity>,
     /// Remove the trend over this covariate from the estimates, and report its slope
-    #[arg(long, value_name = "NAME", value_parser = choice_of(&Covariate::ALL))]
+    #[arg(long, value_name = "NAME", value_parser = choice_parser(&Covariate::ALL))]
     pub covariate: Option<Covariate>,
     /// Adjustment for multiple tests
-    #[arg(long, value_name = "METHOD", default_value = "holm", value_parser = choice_of(&Adjustment::ALL))]
+    #[arg(long, value_name = "METHOD", default_value = "holm", value_parser = choice_parser(&Adjustment::ALL))]
     pub adjust: Adjustment,
     /// Estimator of the variance between people: penalised (kept away from zero) or reml (restricted likelihood;
     /// intervals too short with few people)
-    #[arg(long, value_name = "METHOD", default_value = "penalised", value_parser = choice_of(&Weights::ALL))]
+    #[arg(long, value_name = "METHOD", default_value = "penalised", value_parser = choice_parser(&Weights::ALL))]
     pub weights: Weights,
     /// Directory for all results: comparison.json, differences.csv, .md and .tex, people.svg, sentences.txt, and the
     /// analysis of recordings, which the next run reuses

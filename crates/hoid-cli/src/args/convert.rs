@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use hoid::io::readable_endings;
+use hoid::io::readable_extensions;
 use hoid::model::{ContinuousTransferFunction, discretise};
 
 use super::look::LookArgs;
@@ -11,7 +11,7 @@ use crate::orders::parse_numbers;
 
 #[derive(Debug, Args)]
 pub struct InfoArgs {
-    #[arg(value_name = "FILE", help = format!("File to inspect: {}", readable_endings()))]
+    #[arg(value_name = "FILE", help = format!("File to inspect: {}", readable_extensions()))]
     pub file: PathBuf,
     #[command(flatten)]
     pub look: LookArgs,

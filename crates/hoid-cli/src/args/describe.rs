@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use hoid::ident::frequency::COMMON_EXCITATIONS;
-use hoid::io::readable_endings;
+use hoid::io::readable_extensions;
 use hoid::model::ContinuousTransferFunction;
 
 use super::{
@@ -17,7 +17,7 @@ use super::{
 pub struct DescribeArgs {
     #[arg(required = true, value_name = "RECORD", help = format!(
         "Record files: {}; several files are runs of one person in one task",
-        readable_endings()
+        readable_extensions()
     ))]
     pub records: Vec<PathBuf>,
     #[command(flatten)]

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use hoid::design::experiment::{
-    ALPHA, Against, POWER, People, Remnant, RequestedQuantity, SpreadSource, TargetDifference,
+    DEFAULT_ALPHA, DEFAULT_POWER, OtherForcing, People, Remnant, RequestedQuantity, SpreadSource, TargetDifference,
 };
 use hoid::model::{ContinuousTransferFunction, Form, family_scenario::Display};
 
-use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::ShowArgs};
+use super::{choices::choice_parser, figure::FigureArgs, parse::parse_span, show::ShowArgs};
 
 #[derive(Debug, Args)]
 pub struct DesignArgs {
@@ -21,7 +21,7 @@ pub struct DesignArgs {
     #[arg(long, value_name = "NAME")]
     pub condition: Option<String>,
     /// Form of the population's operator [default: the form that people use with the element]
-    #[arg(long, value_name = "FORM", value_parser = choice_of(&Form::OF_ERROR))]
+    #[arg(long, value_name = "FORM", value_parser = choice_parser(&Form::ERROR_FORMS))]
     pub form: Option<Form>,
     /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 [default: from the scenario or group]
     #[arg(long, value_name = "TF")]
@@ -71,16 +71,16 @@ pub struct DesignArgs {
     /// Forcing function to compare with the design: a scenario with a target or disturbance (or both), a table of lines
     /// (columns omega_rad_s, amplitude, phase_rad), or reference (the ten sines of the thesis)
     #[arg(long, value_name = "FORCING.toml|.csv|reference")]
-    pub against: Option<Against>,
+    pub against: Option<OtherForcing>,
     /// Difference to detect between two conditions, with each person in both: crossover=.5 (rad/s), phase_margin=5
     /// (deg), tau_e=10% (of tau_e). Reports how many people, and runs per condition, are needed
     #[arg(long, value_name = "NAME=SIZE")]
     pub difference: Option<TargetDifference>,
     /// Power: probability of detecting the difference
-    #[arg(long, value_name = "P", default_value_t = POWER, requires = "difference")]
+    #[arg(long, value_name = "P", default_value_t = DEFAULT_POWER, requires = "difference")]
     pub power: f64,
     /// Two-sided significance level of the test
-    #[arg(long, value_name = "P", default_value_t = ALPHA, requires = "difference")]
+    #[arg(long, value_name = "P", default_value_t = DEFAULT_ALPHA, requires = "difference")]
     pub alpha: f64,
     /// Standard deviation of the difference across people, as a fraction like --run-to-run, or a file that contains it:
     /// output of `hoid compare --json`, the result of a group with several conditions, or a population.json [default:
@@ -90,7 +90,7 @@ pub struct DesignArgs {
     /// Display of the task: compensatory (error only), pursuit (target and output), preview (also the future target).
     /// For the last two, a target and a disturbance with different lines are designed, to separate the responses to
     /// error and target
-    #[arg(long, value_name = "NAME", default_value = "compensatory", value_parser = choice_of(&Display::ALL))]
+    #[arg(long, value_name = "NAME", default_value = "compensatory", value_parser = choice_parser(&Display::ALL))]
     pub display: Display,
     /// Seed of the phase search: the same seed repeats the design; another changes only the phases
     #[arg(long, value_name = "N", default_value_t = 0)]

@@ -7,7 +7,7 @@ use hoid::io::fmu::FmiVersion;
 use hoid::model::{ContinuousTransferFunction, scenario::Condition};
 use hoid::track::Method;
 
-use super::{choices::choice_of, recursion::method_names};
+use super::{choices::choice_parser, recursion::method_names};
 
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
@@ -23,7 +23,7 @@ pub struct FmuArgs {
     #[arg(long = "library", value_name = "FILE")]
     pub libraries: Vec<PathBuf>,
     /// FMI version
-    #[arg(long, value_name = "N", default_value = "2", value_parser = choice_of(&FmiVersion::ALL))]
+    #[arg(long, value_name = "N", default_value = "2", value_parser = choice_parser(&FmiVersion::ALL))]
     pub fmi: FmiVersion,
     /// Sample time in s: start value of the parameter sample_time
     #[arg(long, value_name = "S", default_value_t = 0.01, conflicts_with = "operator")]

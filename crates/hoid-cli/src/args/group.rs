@@ -7,7 +7,7 @@ use hoid::model::{Form, scenario::Condition};
 use hoid::sim::people::{Plant, RemnantKind};
 use hoid::study::group::{ConditionElement, SamplingDefect};
 
-use super::{choices::choice_of, figure::FigureArgs, look::LookArgs, parse::parse_span, show::ShowArgs};
+use super::{choices::choice_parser, figure::FigureArgs, look::LookArgs, parse::parse_span, show::ShowArgs};
 
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -139,12 +139,12 @@ pub struct PeopleOptions {
         value_delimiter = ',',
         requires = "people",
         default_value = "integrator,lagged-integrator,double-integrator",
-        value_parser = choice_of(&Plant::ALL)
+        value_parser = choice_parser(&Plant::ALL)
     )]
     pub plants: Vec<Plant>,
     /// With --people: form of all operators [default: lead-lag on 1/s, lead2-lag or lead on the
     /// others]
-    #[arg(long, value_name = "FORM", requires = "people", value_parser = choice_of(&Form::ALL))]
+    #[arg(long, value_name = "FORM", requires = "people", value_parser = choice_parser(&Form::ALL))]
     pub form: Option<Form>,
     /// With --people: kinds of remnant, comma-separated, assigned to subjects in turn
     #[arg(
@@ -153,7 +153,7 @@ pub struct PeopleOptions {
         value_delimiter = ',',
         requires = "people",
         default_value = "lag,broad-band,signal-dependent,pulsed,intermittent",
-        value_parser = choice_of(&RemnantKind::ALL)
+        value_parser = choice_parser(&RemnantKind::ALL)
     )]
     pub remnants: Vec<RemnantKind>,
     /// With --people: range of the remnant's share of the variance of u

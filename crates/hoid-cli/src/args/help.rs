@@ -17,7 +17,7 @@ struct Help {
 }
 
 /// The commands by purpose, in the order of the first page.
-const GROUPS: [(&str, &[&str]); 4] = [
+const COMMAND_GROUPS: [(&str, &[&str]); 4] = [
     (
         "Recordings",
         &[
@@ -32,7 +32,7 @@ const GROUPS: [(&str, &[&str]); 4] = [
     ("This program", &["completions", "man", "help"]),
 ];
 
-const HELP: [Help; 19] = [
+const COMMAND_HELP: [Help; 19] = [
     Help {
         command: "lab",
         examples: &["hoid lab --open", "hoid lab --config lab.toml --out study"],
@@ -281,7 +281,7 @@ const HELP: [Help; 19] = [
 ];
 
 /// The headings of options that several commands share; what is left is under the model.
-const HEADINGS: [(&str, &[&str]); 2] = [
+const OPTION_HEADINGS: [(&str, &[&str]); 2] = [
     (
         "Data",
         &[
@@ -341,37 +341,37 @@ const COMMANDS_WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "str
 
 /// The program as it is parsed and as it explains itself.
 pub fn command() -> Command {
-    let mut program = Cli::command().mut_subcommands(explained);
+    let mut program = Cli::command().mut_subcommands(add_help);
     let page = first_page(&mut program);
     program.help_template(page)
 }
 
-fn explained(command: Command) -> Command {
+fn add_help(command: Command) -> Command {
     let name = command.get_name().to_owned();
-    let Some(help) = HELP.iter().find(|help| help.command == name) else {
+    let Some(help) = COMMAND_HELP.iter().find(|help| help.command == name) else {
         return command;
     };
     let examples: String = help.examples.iter().map(|line| format!("  {line}\n")).collect();
     let command = command.after_help(format!("Examples:\n{examples}"));
-    let command = command.mut_subcommands(|inner| inner.mut_args(ignoring_case));
-    command.mut_args(|arg| argument(arg, help))
+    let command = command.mut_subcommands(|inner| inner.mut_args(ignore_case));
+    command.mut_args(|arg| add_argument_help(arg, help))
 }
 
 /// Choices are taken in capitals too.
-fn ignoring_case(arg: Arg) -> Arg {
+fn ignore_case(arg: Arg) -> Arg {
     let takes_value = arg.get_action().takes_values();
     arg.ignore_case(takes_value)
 }
 
 /// Rarely needed options are shown by `--help` alone.
-fn argument(arg: Arg, help: &Help) -> Arg {
+fn add_argument_help(arg: Arg, help: &Help) -> Arg {
     let id = arg.get_id().as_str().to_owned();
     let hidden = !arg.is_positional() && !help.shown.is_empty() && !help.shown.contains(&id.as_str());
-    let arg = ignoring_case(arg).hide_short_help(hidden);
+    let arg = ignore_case(arg).hide_short_help(hidden);
     if !COMMANDS_WITH_HEADINGS.contains(&help.command) || arg.is_positional() {
         return arg;
     }
-    let heading = HEADINGS.iter().find(|(_, ids)| ids.contains(&id.as_str()));
+    let heading = OPTION_HEADINGS.iter().find(|(_, ids)| ids.contains(&id.as_str()));
     arg.help_heading(heading.map_or("Model", |(heading, _)| heading))
 }
 
@@ -383,7 +383,7 @@ fn first_page(program: &mut Command) -> String {
         text.unwrap_or_else(|| "Show help for a command".to_owned())
     };
     let mut page = "{about-with-newline}\n{usage-heading} {usage}\n".to_owned();
-    for (heading, commands) in GROUPS {
+    for (heading, commands) in COMMAND_GROUPS {
         page.push_str(&format!("\n{heading}:\n"));
         for name in commands {
             page.push_str(&format!("  {name:<15} {}\n", about(name)));
@@ -400,7 +400,7 @@ mod tests {
     use super::*;
 
     /// The words of an example after the program's name, as a shell would hand them over.
-    fn words(example: &str) -> Vec<String> {
+    fn shell_words(example: &str) -> Vec<String> {
         let (_, typed) = example.split_once("hoid ").unwrap();
         let typed = typed.split([' ']).take_while(|word| !["<", ">", "|"].contains(word));
         std::iter::once("hoid".to_owned())
@@ -412,7 +412,10 @@ mod tests {
     fn help_tables_match_the_commands_and_options() {
         let program = Cli::command();
         let known: BTreeSet<&str> = program.get_subcommands().map(Command::get_name).collect();
-        let grouped: BTreeSet<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
+        let grouped: BTreeSet<&str> = COMMAND_GROUPS
+            .iter()
+            .flat_map(|(_, names)| names.iter().copied())
+            .collect();
         assert_eq!(
             grouped
                 .into_iter()
@@ -420,8 +423,11 @@ mod tests {
                 .collect::<BTreeSet<_>>(),
             known
         );
-        assert_eq!(HELP.iter().map(|help| help.command).collect::<BTreeSet<_>>(), known);
-        for help in &HELP {
+        assert_eq!(
+            COMMAND_HELP.iter().map(|help| help.command).collect::<BTreeSet<_>>(),
+            known
+        );
+        for help in &COMMAND_HELP {
             let command = program.find_subcommand(help.command).unwrap();
             let ids: Vec<&str> = command.get_arguments().map(|arg| arg.get_id().as_str()).collect();
             for id in help.shown {
@@ -432,10 +438,10 @@ mod tests {
 
     #[test]
     fn every_example_parses() {
-        for help in &HELP {
+        for help in &COMMAND_HELP {
             assert_eq!(help.examples.len(), 2, "{}", help.command);
             for example in help.examples.iter().filter(|example| !example.starts_with("man ")) {
-                let parsed = command().try_get_matches_from(words(example));
+                let parsed = command().try_get_matches_from(shell_words(example));
                 assert!(parsed.is_ok(), "{example}: {}", parsed.unwrap_err());
             }
         }

@@ -11,15 +11,15 @@ use hoid::analysis::{
     registry::{OPERATOR, PEM},
 };
 use hoid::ident::IvMethod;
-use hoid::io::{readable_endings, writable_endings};
+use hoid::io::{readable_extensions, writable_extensions};
 use hoid::model::{Structure, remnant::RemnantDiscretisation};
 
 use super::{
-    choices::choice_of,
+    choices::choice_parser,
     figure::FigureArgs,
     parse::parse_horizon,
     reading::{FaultArgs, MaskArgs, ReadArgs},
-    settings::{Batch, SettingArgs},
+    settings::{BatchEstimators, SettingArgs},
     show::ShowArgs,
 };
 
@@ -31,7 +31,7 @@ pub struct IdentifyArgs {
         help = "Record files, such as .csv, .parquet or .mat; several files share one model",
         long_help = format!(
             "Record files: {}; several files share one model, each with its own initial states",
-            readable_endings()
+            readable_extensions()
         )
     )]
     pub records: Vec<PathBuf>,
@@ -47,21 +47,21 @@ pub struct IdentifyArgs {
     pub faults: FaultArgs,
     /// Model to fit: operator (human operator) or a polynomial structure [default: operator; with --method, its
     /// structure; with polynomial options such as --nk, bj]
-    #[arg(long, value_name = "NAME", value_parser = structures(), ignore_case = true)]
+    #[arg(long, value_name = "NAME", value_parser = structure_parser(), ignore_case = true)]
     pub structure: Option<String>,
     /// Fitting method for polynomials: pem (prediction error), or instrumental variables (iv4 for arx, sriv for oe,
     /// rivbj for bj)
     #[arg(long, value_name = "NAME", default_value = PEM, value_parser = PossibleValuesParser::new(fit_methods()))]
     pub method: String,
     #[command(flatten)]
-    pub options: SettingArgs<Batch>,
+    pub options: SettingArgs<BatchEstimators>,
     #[arg(long, value_name = "FILE", help = format!(
         "With --change sigmoid: write K_e, T_L, K_e_dot (K, T_L for other forms) over time to this file: {}",
-        writable_endings()
+        writable_extensions()
     ))]
     pub trace: Option<PathBuf>,
     /// Discretisation assumed to get T_n and K_n from the noise model
-    #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_of(&RemnantDiscretisation::ALL))]
+    #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_parser(&RemnantDiscretisation::ALL))]
     pub remnant_discretisation: RemnantDiscretisation,
     #[command(flatten)]
     pub picture: FigureArgs,
@@ -79,7 +79,7 @@ pub struct IdentifyArgs {
 }
 
 /// The structures; earlier names are read, and not shown.
-fn structures() -> PossibleValuesParser {
+fn structure_parser() -> PossibleValuesParser {
     let polynomials = Structure::ALL.map(|structure| PossibleValue::new(structure.name()));
     let before = ["grey-box", "family", "time-varying"].map(|name| PossibleValue::new(name).hide(true));
     let all = [PossibleValue::new(OPERATOR)].into_iter().chain(polynomials);

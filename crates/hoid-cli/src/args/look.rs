@@ -43,7 +43,7 @@ pub struct LookArgs {
 
 impl LookArgs {
     /// The text as typed.
-    pub fn known(&self) -> LookOptions {
+    pub fn to_options(&self) -> LookOptions {
         LookOptions {
             input: self.input.clone(),
             output: self.output.clone(),

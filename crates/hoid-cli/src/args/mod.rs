@@ -62,4 +62,4 @@ pub use shell::{CompletionsArgs, ManArgs};
 pub use show::ShowArgs;
 pub use simulate::{DemoArgs, MarginsArgs, ScenarioChoice, SimulateArgs, StateName};
 pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};
-pub use udp::UdpPlaces;
+pub use udp::UdpAddresses;

@@ -28,13 +28,14 @@ pub fn parse_width(text: &str) -> Result<f64, String> {
 }
 
 /// Most samples ahead of a prediction that is judged.
-const MAX_AHEAD: usize = 1_000_000;
+const MAX_HORIZON: usize = 1_000_000;
 
 /// A number of samples ahead.
 pub fn parse_horizon(text: &str) -> Result<usize, String> {
-    let samples = text.trim().parse().ok().filter(|k| (1..=MAX_AHEAD).contains(k));
-    samples
-        .ok_or_else(|| format!("{text:?} is not a number of samples ahead; write a whole number from 1 to {MAX_AHEAD}"))
+    let samples = text.trim().parse().ok().filter(|k| (1..=MAX_HORIZON).contains(k));
+    samples.ok_or_else(|| {
+        format!("{text:?} is not a number of samples ahead; write a whole number from 1 to {MAX_HORIZON}")
+    })
 }
 
 #[cfg(test)]

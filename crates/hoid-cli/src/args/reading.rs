@@ -1,10 +1,10 @@
 //! The options by which `hoid identify` and `hoid track` read records and prepare them.
 
 use clap::Args;
-use hoid::io::{Offset, QualityIssueKind, Scaling, Sparse, TimeChoice, TrialChoice};
+use hoid::io::{Offset, QualityIssueKind, Scaling, SparseTreatment, TimeChoice, TrialChoice};
 use hoid::model::{Decimation, Detrend, FaultHandling};
 
-use super::choices::choice_of;
+use super::choices::choice_parser;
 
 /// How record files are read.
 #[derive(Debug, Clone, Args)]
@@ -47,14 +47,14 @@ pub struct ReadArgs {
     /// Column logged at its own times and missing in some rows: hold the last value, interpolate (linear), or drop
     /// those rows. May be repeated
     #[arg(long, value_name = "COLUMN=hold|linear|drop", value_parser = parse_sparse, value_delimiter = ',', allow_hyphen_values = true)]
-    pub sparse: Vec<(String, Sparse)>,
+    pub sparse: Vec<(String, SparseTreatment)>,
     /// Other columns to keep, such as f_t,r, or none, to save time and memory on long files [default: all]
     #[arg(long, value_name = "COLUMN,...", value_delimiter = ',')]
     pub columns: Option<Vec<String>>,
     #[command(flatten)]
     pub prepare: PrepareArgs,
     /// Finally, remove the mean or linear trend of input and output
-    #[arg(long, value_name = "HOW", default_value = "none", value_parser = choice_of(&Detrend::ALL))]
+    #[arg(long, value_name = "HOW", default_value = "none", value_parser = choice_parser(&Detrend::ALL))]
     pub detrend: Detrend,
 }
 
@@ -122,7 +122,7 @@ impl DecimateArgs {
     /// Processing for an estimator; what counts samples is not decimated automatically.
     pub fn of(self, counts_samples: bool) -> Decimation {
         if counts_samples {
-            self.decimate.when_named()
+            self.decimate.explicit_only()
         } else {
             self.decimate
         }
@@ -133,7 +133,7 @@ impl DecimateArgs {
 #[derive(Debug, Args)]
 pub struct MaskArgs {
     /// Cut these sampling problems out of the record (see `hoid info`); each segment has its own initial states
-    #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = choice_of(&QualityIssueKind::MASKABLE))]
+    #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = choice_parser(&QualityIssueKind::MASKABLE_KINDS))]
     pub mask: Vec<QualityIssueKind>,
     /// Shortest segment to use between masked samples, s
     #[arg(long, value_name = "S", default_value_t = 2.0)]
@@ -145,12 +145,12 @@ pub struct MaskArgs {
 pub struct FaultArgs {
     /// Treatment of recording faults (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge (faults up to
     /// 0.1 s; cut the record at longer ones), cut (at every fault), report (change nothing), or keep (do not search)
-    #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_of(&FaultHandling::ALL))]
+    #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_parser(&FaultHandling::ALL))]
     pub faults: FaultHandling,
 }
 
 /// `NAME=VALUE`; the name may hold `=` no more than a column may.
-fn pair(text: &str) -> Result<(String, &str), String> {
+fn parse_pair(text: &str) -> Result<(String, &str), String> {
     let (name, value) = text
         .rsplit_once('=')
         .filter(|(name, _)| !name.trim().is_empty())
@@ -168,8 +168,8 @@ pub(super) fn parse_trial(text: &str) -> Result<TrialChoice, String> {
     text.parse::<TrialChoice>().map_err(|error| error.to_string())
 }
 
-fn parse_sparse(text: &str) -> Result<(String, Sparse), String> {
-    let (name, value) = pair(text)?;
+fn parse_sparse(text: &str) -> Result<(String, SparseTreatment), String> {
+    let (name, value) = parse_pair(text)?;
     let how = value
         .trim()
         .parse()
@@ -178,7 +178,7 @@ fn parse_sparse(text: &str) -> Result<(String, Sparse), String> {
 }
 
 fn parse_unit(text: &str) -> Result<(String, String), String> {
-    let (name, unit) = pair(text)?;
+    let (name, unit) = parse_pair(text)?;
     match unit.trim() {
         "" => Err(format!("{text:?} names no unit; write CHANNEL=UNIT, such as e=deg")),
         unit => Ok((name, unit.to_owned())),
@@ -186,12 +186,12 @@ fn parse_unit(text: &str) -> Result<(String, String), String> {
 }
 
 pub fn parse_scale(text: &str) -> Result<(String, Scaling), String> {
-    let (name, value) = pair(text)?;
+    let (name, value) = parse_pair(text)?;
     Ok((name, value.parse().map_err(|e: hoid::io::IoError| e.to_string())?))
 }
 
 fn parse_offset(text: &str) -> Result<(String, Offset), String> {
-    let (name, value) = pair(text)?;
+    let (name, value) = parse_pair(text)?;
     Ok((name, value.parse().map_err(|e: hoid::io::IoError| e.to_string())?))
 }
 
@@ -208,7 +208,10 @@ mod tests {
         }
         assert!(parse_offset("u=1 sample").is_err());
         assert_eq!(parse_unit("e = deg").unwrap(), ("e".to_owned(), "deg".to_owned()));
-        assert_eq!(parse_sparse("r-y=hold").unwrap(), ("r-y".to_owned(), Sparse::Hold));
+        assert_eq!(
+            parse_sparse("r-y=hold").unwrap(),
+            ("r-y".to_owned(), SparseTreatment::Hold)
+        );
         assert!(parse_sparse("e=held").unwrap_err().contains("hold, linear or drop"));
         assert!(parse_sparse("hold").is_err());
         assert!(parse_unit("e=").is_err() && parse_unit("deg").is_err());

@@ -8,17 +8,17 @@ use clap::{
 };
 use hoid::ident::{
     order_selection::Criterion,
-    settings::{DelayRange, MethodSpec, OneOrSpan},
+    settings::{DelayRange, MethodSpec, NumberOrSpan},
 };
-use hoid::io::{Scaling, readable_endings, writable_endings};
+use hoid::io::{Scaling, readable_extensions, writable_extensions};
 use hoid::model::{ContinuousTransferFunction, Structure};
 use hoid::survey::is_for_comparison;
 use hoid::thesis::comparators;
 use hoid::track::Method;
 
 use super::{
-    ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, reading::DecimateArgs, settings::SettingArgs,
-    show::ShowArgs, udp::UdpPlaces,
+    ReadArgs, choices::choice_parser, figure::FigureArgs, parse_span, reading::DecimateArgs, settings::SettingArgs,
+    show::ShowArgs, udp::UdpAddresses,
 };
 
 /// The tracked signal, and how.
@@ -28,7 +28,7 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "NAME", long_help = method_help(), default_value_t = Method::default().name().to_owned(), value_parser = method_names())]
     pub method: String,
     /// Polynomial structure [default: arx for rls, else bj]
-    #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
+    #[arg(long, value_name = "NAME", value_parser = choice_parser(&Structure::ALL))]
     pub structure: Option<Structure>,
     /// Orders, or ranges to search on the start span, such as nb=2,nc=0,nd=1..4,nf=2 [default: bj nb=2,nd=1..4,nf=2
     /// (adaptive: nd=16; multiple-model: nd=6); arx na=2,nb=2]
@@ -41,9 +41,9 @@ pub struct RecursionArgs {
     pub nk: Vec<DelayRange>,
     /// Delay tau_e in s, instead of --nk: .28, or a range (0.1..0.4) to search on the start span
     #[arg(long, value_name = "S|LO..HI", conflicts_with = "nk")]
-    pub delay: Option<OneOrSpan>,
+    pub delay: Option<NumberOrSpan>,
     /// Criterion that selects among searched candidates
-    #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
+    #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_parser(&Criterion::ALL))]
     pub criterion: Criterion,
     /// Initial values of all coefficients, such as f1=-1.9,f2=.92,b0=.04,..., or `nothing` [default: a batch fit of the
     /// start span or warm-up; adaptive starts from --prior]
@@ -66,7 +66,7 @@ pub struct RecursionArgs {
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub struct TrackArgs {
-    #[arg(value_name = "RECORD", required_unless_present = "methods", help = format!("Record file: {}", readable_endings()))]
+    #[arg(value_name = "RECORD", required_unless_present = "methods", help = format!("Record file: {}", readable_extensions()))]
     pub record: Option<PathBuf>,
     #[command(flatten)]
     pub read: ReadArgs,
@@ -102,7 +102,7 @@ pub struct TrackArgs {
     pub every: usize,
     #[arg(long, value_name = "TRACE", help = format!(
         "File for the trace (estimate and standard errors at each sample): {}",
-        writable_endings()
+        writable_extensions()
     ))]
     pub out: Option<PathBuf>,
     /// Write an HTML report to this directory: parameters over time with bands, innovations, standard errors
@@ -144,7 +144,7 @@ pub struct StreamArgs {
     /// 0.5, "u": -1}, or a C struct, answered in the same format (text in JSON). Ports on 127.0.0.1, or addresses and
     /// ports, such as 0.0.0.0:5005:192.168.1.7:5006
     #[arg(long, value_name = "IN:OUT")]
-    pub udp: Option<UdpPlaces>,
+    pub udp: Option<UdpAddresses>,
     /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
     #[arg(long, value_name = "NAME", hide = true)]
     pub lsl_in: Option<String>,
@@ -177,9 +177,9 @@ pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
         let value = PossibleValue::new(name).help(help).aliases(method.earlier_name());
         value.hide(is_for_comparison(&method))
     };
-    let batch = comparators::names().map(|(name, _)| PossibleValue::new(name).hide(true));
+    let batch = comparators::names_and_descriptions().map(|(name, _)| PossibleValue::new(name).hide(true));
     let all = hoid::survey::methods().into_iter().map(value).chain(batch);
-    PossibleValuesParser::new(all).try_map(|name| match comparators::not_tracked(&name) {
+    PossibleValuesParser::new(all).try_map(|name| match comparators::untracked_comparator_message(&name) {
         Some(reason) => Err(reason),
         None => Ok(name.to_lowercase()),
     })

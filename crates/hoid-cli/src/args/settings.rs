@@ -11,15 +11,15 @@ use hoid::ident::{
 };
 use hoid::survey;
 
-use super::choices::by_name;
+use super::choices::value_parser_by_name;
 
 /// The options of the recursive methods.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Recursive;
+pub struct RecursiveMethods;
 
 /// The options of the batch estimators.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Batch;
+pub struct BatchEstimators;
 
 /// Commands and methods that have options.
 pub trait Registry {
@@ -27,13 +27,13 @@ pub trait Registry {
     fn specs() -> Vec<MethodSpec>;
 }
 
-impl Registry for Recursive {
+impl Registry for RecursiveMethods {
     fn specs() -> Vec<MethodSpec> {
         survey::registry()
     }
 }
 
-impl Registry for Batch {
+impl Registry for BatchEstimators {
     fn specs() -> Vec<MethodSpec> {
         estimators()
     }
@@ -41,20 +41,22 @@ impl Registry for Batch {
 
 /// The text as typed: name and text, in the order of the registry.
 #[derive(Debug, Clone, Default)]
-pub struct SettingArgs<R = Recursive> {
+pub struct SettingArgs<R = RecursiveMethods> {
     given: Vec<(&'static str, String)>,
     of: PhantomData<R>,
 }
 
 impl<R> SettingArgs<R> {
     /// Name and text of each.
-    pub fn given(&self) -> impl Iterator<Item = (&'static str, &str)> {
+    pub fn given_settings(&self) -> impl Iterator<Item = (&'static str, &str)> {
         self.given.iter().map(|(name, text)| (*name, text.as_str()))
     }
 
     /// The text of one.
     pub fn text(&self, name: &str) -> Option<&str> {
-        self.given().find(|(given, _)| *given == name).map(|(_, text)| text)
+        self.given_settings()
+            .find(|(given, _)| *given == name)
+            .map(|(_, text)| text)
     }
 }
 
@@ -112,7 +114,7 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
         Kind::Flag => arg.action(ArgAction::SetTrue),
         Kind::Choice(words) => {
             let words = words.iter().map(|word| (*word, (*word).to_owned()));
-            arg.value_name("NAME").value_parser(by_name(words))
+            arg.value_name("NAME").value_parser(value_parser_by_name(words))
         }
         Kind::Count => arg.value_name("N"),
         Kind::Counts => arg.value_name("N|LO..HI"),

@@ -8,7 +8,7 @@ use hoid::model::{
     scenario::{Condition, Realisation},
 };
 
-use super::choices::choice_of;
+use super::choices::choice_parser;
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
@@ -45,7 +45,7 @@ pub struct SimulateArgs {
     pub noise_level: Option<f64>,
     /// Definition of the noise level: var(u_n)/var(u) (response) or var(n)/var(u) (remnant) [default: response, or the
     /// scenario's]
-    #[arg(long, value_name = "WHICH", value_parser = choice_of(&NoiseDefinition::ALL))]
+    #[arg(long, value_name = "WHICH", value_parser = choice_parser(&NoiseDefinition::ALL))]
     pub noise_definition: Option<NoiseDefinition>,
     /// Remnant time constant T_n in s [default: 0.06, or the scenario's]
     #[arg(long, value_name = "S")]
@@ -55,7 +55,7 @@ pub struct SimulateArgs {
     pub sample_time: Option<f64>,
     /// Where a changing K_c acts: input matrix (x stays continuous) or output matrix (as in the thesis) [default:
     /// input, or the scenario's]
-    #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
+    #[arg(long, value_name = "WHERE", value_parser = choice_parser(&Realisation::ALL))]
     pub realisation: Option<Realisation>,
     /// Response to a displayed target: its form and gain, then other parameters by name, such as
     /// derivative:0.15,tau_f=0.1,preview=0.25 [default: none, or the scenario's]
@@ -94,7 +94,7 @@ pub struct MarginsArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.01, 0.1, 0.2, 0.3])]
     pub noise_levels: Vec<f64>,
     /// Definition of the noise level: var(u_n)/var(u) (response) or var(n)/var(u) (remnant)
-    #[arg(long, value_name = "WHICH", default_value = "response", value_parser = choice_of(&NoiseDefinition::ALL))]
+    #[arg(long, value_name = "WHICH", default_value = "response", value_parser = choice_parser(&NoiseDefinition::ALL))]
     pub noise_definition: NoiseDefinition,
     /// Print one JSON object instead of tables
     #[arg(long)]

@@ -7,13 +7,13 @@ use std::{
 
 /// Where samples come in, and where answers go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct UdpPlaces {
+pub struct UdpAddresses {
     pub input: SocketAddr,
     pub output: SocketAddr,
 }
 
 /// `IN:OUT`, each a port, or an address and a port.
-impl FromStr for UdpPlaces {
+impl FromStr for UdpAddresses {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn udp_addresses_are_parsed() {
         let of = |text: &str| {
-            text.parse::<UdpPlaces>()
+            text.parse::<UdpAddresses>()
                 .map(|p| (p.input.to_string(), p.output.to_string()))
         };
         for (text, input, output) in [

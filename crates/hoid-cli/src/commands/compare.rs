@@ -3,19 +3,19 @@
 
 use std::path::Path;
 
-use hoid::design::compare::{Comparing, Comparison, Difference, GroupEstimates, Variation};
+use hoid::design::compare::{Comparison, ComparisonOptions, Difference, GroupEstimates, Variation};
 use hoid::model::numbers::{self, with_uncertainty};
 use hoid::report::{PaperTable, comparison_figure};
 use hoid::study::{RunOptions, group::Manifest};
 
-use super::{figure, group::analysed, output_paths, paper_table};
+use super::{figure, group::analyse_with_progress, output_paths, paper_table};
 use crate::{args::CompareArgs, error::CliError, json, output, table::Rows, text};
 
 /// Tables that `--out` writes, in addition to the figure and the sentences.
-const TABLES: [&str; 3] = ["differences.csv", "differences.md", "differences.tex"];
-const FIGURE: &str = "people.svg";
-const SENTENCES: &str = "sentences.txt";
-const OBJECT: &str = "comparison.json";
+const TABLE_FILES: [&str; 3] = ["differences.csv", "differences.md", "differences.tex"];
+const FIGURE_FILE: &str = "people.svg";
+const SENTENCE_FILE: &str = "sentences.txt";
+const JSON_FILE: &str = "comparison.json";
 
 pub fn run(args: &CompareArgs) -> Result<(), CliError> {
     if let Some(figure) = &args.picture.figure {
@@ -32,7 +32,7 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
         (_, true) => Some(Variation::Between),
         _ => None,
     };
-    let comparing = Comparing {
+    let comparing = ComparisonOptions {
         factors: args.factor.clone(),
         variation,
         quantities: args.of.clone(),
@@ -40,8 +40,8 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
         adjustment: args.adjust,
         weights: args.weights,
     };
-    let estimates = match GroupEstimates::recordings(&args.results) {
-        Some(manifest) => of_recordings(&comparing, &manifest, args)?,
+    let estimates = match GroupEstimates::recordings_path(&args.results) {
+        Some(manifest) => estimates_from_recordings(&comparing, &manifest, args)?,
         None => GroupEstimates::read(&args.results)?,
     };
     let found = comparing.run(&estimates)?;
@@ -57,18 +57,22 @@ pub fn run(args: &CompareArgs) -> Result<(), CliError> {
     } else {
         output::show(&page(&found, args.show.verbose))?;
     }
-    CliError::of_verdict(&found.verdict)
+    CliError::check_verdict(&found.verdict)
 }
 
 /// Analyses recordings and returns the estimates. The results of the runs are written to the directory of `--out`, or
 /// to a temporary directory that is removed afterwards.
-fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Result<GroupEstimates, CliError> {
+fn estimates_from_recordings(
+    comparing: &ComparisonOptions,
+    path: &Path,
+    args: &CompareArgs,
+) -> Result<GroupEstimates, CliError> {
     let manifest = Manifest::read(path)?;
     let removed;
     let directory = match &args.out {
         Some(out) => out.as_path(),
         None => {
-            removed = tempfile::tempdir().map_err(no_temporary_directory)?;
+            removed = tempfile::tempdir().map_err(temporary_directory_error)?;
             removed.path()
         }
     };
@@ -79,7 +83,7 @@ fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Resu
         ..RunOptions::default()
     };
     comparing.estimates_of(&manifest, directory, |manifest, place| {
-        match analysed(manifest, path, place, &options) {
+        match analyse_with_progress(manifest, path, place, &options) {
             // This command has no --resume: with --out, runs already analysed are kept; otherwise they are removed.
             Err(CliError::Stopped(_)) => Err(CliError::Stopped(
                 "the comparison was stopped; if --out was given, run the same command again to resume it".to_owned(),
@@ -89,7 +93,7 @@ fn of_recordings(comparing: &Comparing, path: &Path, args: &CompareArgs) -> Resu
     })
 }
 
-fn no_temporary_directory(error: std::io::Error) -> CliError {
+fn temporary_directory_error(error: std::io::Error) -> CliError {
     CliError::Stream(format!(
         "no temporary directory can be created for the analysis ({error}): name a directory with --out"
     ))
@@ -99,15 +103,15 @@ fn write_all(found: &Comparison, out: &Path) -> Result<(), CliError> {
     hoid::io::make_directory(out)?;
     let write =
         |name: &str, text: &str| hoid::io::write_atomically(&out.join(name), |file| file.write_all(text.as_bytes()));
-    write(OBJECT, &found.to_json())?;
-    write(SENTENCES, &sentences(found))?;
-    write(FIGURE, &comparison_figure(found))?;
+    write(JSON_FILE, &found.to_json())?;
+    write(SENTENCE_FILE, &sentences(found))?;
+    write(FIGURE_FILE, &comparison_figure(found))?;
     if let Some(table) = PaperTable::of(&found.json()) {
-        for name in TABLES {
+        for name in TABLE_FILES {
             table.write(&out.join(name))?;
         }
     }
-    output::notice("", format!("results: {}", out.display()));
+    output::add_notice("", format!("results: {}", out.display()));
     Ok(())
 }
 
@@ -119,20 +123,20 @@ fn page(found: &Comparison, verbose: bool) -> String {
     let mut page = format!(
         "{}\n\n{}\n",
         text::verdict(&found.verdict).trim_end(),
-        differences(found, verbose)
+        difference_table(found, verbose)
     );
     page.push_str(
         "Mean over people ± standard error, weighted by the error of each person and the variance between people; \
          Hartung-Knapp 95 % intervals.\n",
     );
     if !found.learning.is_empty() {
-        page.push_str(&format!("\nChange per run\n{}\n", learning(found)));
+        page.push_str(&format!("\nChange per run\n{}\n", learning_table(found)));
     }
     if verbose {
         page.push_str(&format!(
             "\nMeans over people\n{}\n\nPeople\n{}\n",
-            means(found),
-            people(found)
+            mean_table(found),
+            people_table(found)
         ));
     }
     page.push_str(&format!("\n{}", sentences(found)));
@@ -142,7 +146,7 @@ fn page(found: &Comparison, verbose: bool) -> String {
     page
 }
 
-fn differences(found: &Comparison, verbose: bool) -> Rows {
+fn difference_table(found: &Comparison, verbose: bool) -> Rows {
     let all = &found.differences;
     let several = all.iter().any(|d| d.factor != all[0].factor);
     let adjusted = all.iter().any(|d| d.p_adjusted != d.estimate.p);
@@ -166,26 +170,30 @@ fn differences(found: &Comparison, verbose: bool) -> Rows {
         let of_size = d
             .effect_size
             .as_ref()
-            .map(|s| (s.name.as_str(), numbers::significant(s.value, 2)));
+            .map(|s| (s.name.as_str(), numbers::format_significant(s.value, 2)));
         let of_size = match (of_size, size) {
             (None, _) => String::new(),
             (Some((_, value)), Some(_)) => value,
             (Some((name, value)), None) => format!("{name} = {value}"),
         };
-        let mut cells = vec![with_unit(d)];
+        let mut cells = vec![name_with_unit(d)];
         cells.extend(several.then(|| d.factor.clone()));
         cells.extend([
             format!("{} - {}", d.to, d.from),
             format!("{value} ± {error}"),
             digits(d.estimate.interval.0),
             digits(d.estimate.interval.1),
-            format!("{} ({})", numbers::significant(d.estimate.t, 2), d.degrees_of_freedom),
-            numbers::significant(d.estimate.p, 2),
+            format!(
+                "{} ({})",
+                numbers::format_significant(d.estimate.t, 2),
+                d.degrees_of_freedom
+            ),
+            numbers::format_significant(d.estimate.p, 2),
         ]);
-        cells.extend(adjusted.then(|| numbers::significant(d.p_adjusted, 2)));
+        cells.extend(adjusted.then(|| numbers::format_significant(d.p_adjusted, 2)));
         cells.extend(verbose.then(|| {
             d.bayes_factor
-                .map_or_else(String::new, |factor| numbers::significant(factor, 2))
+                .map_or_else(String::new, |factor| numbers::format_significant(factor, 2))
         }));
         cells.extend([of_size, d.people.len().to_string()]);
         rows.add_row(cells);
@@ -193,14 +201,14 @@ fn differences(found: &Comparison, verbose: bool) -> Rows {
     rows
 }
 
-fn with_unit(d: &Difference) -> String {
+fn name_with_unit(d: &Difference) -> String {
     match d.quantity.unit() {
         "" => d.quantity.to_string(),
         unit => format!("{} ({unit})", d.quantity),
     }
 }
 
-fn learning(found: &Comparison) -> Rows {
+fn learning_table(found: &Comparison) -> Rows {
     let mut rows = text::table(&["quantity", "condition", "per run", "95 % from", "to", "p", "n"]);
     for l in &found.learning {
         let error = Some(l.estimate.standard_error);
@@ -212,14 +220,14 @@ fn learning(found: &Comparison) -> Rows {
             format!("{value} ± {error}"),
             digits(l.estimate.interval.0),
             digits(l.estimate.interval.1),
-            text::significant(l.estimate.p),
+            text::format_significant(l.estimate.p),
             l.people.to_string(),
         ]);
     }
     rows
 }
 
-fn means(found: &Comparison) -> Rows {
+fn mean_table(found: &Comparison) -> Rows {
     let mut rows = text::table(&[
         "quantity",
         "condition",
@@ -241,14 +249,14 @@ fn means(found: &Comparison) -> Rows {
             format!("{value} ± {error}"),
             digits(m.estimate.interval.0),
             digits(m.estimate.interval.1),
-            text::significant(m.tau),
+            text::format_significant(m.tau),
             m.people.to_string(),
         ]);
     }
     rows
 }
 
-fn people(found: &Comparison) -> Rows {
+fn people_table(found: &Comparison) -> Rows {
     let mut rows = text::table(&["quantity", "person", "condition", "value", "runs"]);
     for e in &found.estimates {
         let value = match e.standard_error {
@@ -256,7 +264,7 @@ fn people(found: &Comparison) -> Rows {
                 let (value, error) = with_uncertainty(e.value, Some(error));
                 format!("{value} ± {error}")
             }
-            None => text::significant(e.value),
+            None => text::format_significant(e.value),
         };
         let cells = [
             e.quantity.to_string(),

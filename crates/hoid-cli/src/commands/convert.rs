@@ -1,7 +1,7 @@
 //! `hoid convert`: conversion of discrete coefficients to operator parameters and back, and of any transfer function to
 //! discrete time.
 
-use hoid::ident::family::family_of_polynomials;
+use hoid::ident::family::family_from_polynomials;
 use hoid::model::{
     ContinuousTransferFunction, DiscreteOperator, GainUnit, OperatorParameters, Orders, PolynomialModel, SampleTime,
     Structure, discretise::discretise, second_order::HeldSecondOrder, uncertainty::OperatorEstimate,
@@ -14,12 +14,12 @@ use crate::{args::ConvertArgs, error::CliError, family_operator, json, output, t
 pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     let sample_time = SampleTime::new(args.sample_time)?;
     if let Some(h) = &args.transfer_function {
-        return discretised(args, h, sample_time);
+        return print_discretised(args, h, sample_time);
     }
     if let (Some(f), Some(b)) = (&args.f, &args.b)
         && (f.len(), b.len()) != (2, 2)
     {
-        return to_family(args, f, b, sample_time);
+        return print_family_operator(args, f, b, sample_time);
     }
     let (discrete, operator) = match (&args.f, &args.b, &args.operator) {
         (Some(f), Some(b), _) => {
@@ -37,7 +37,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
         }
         (_, _, Some(pairs)) => {
             let operator =
-                OperatorParameters::of_names(pairs).map_err(|e| CliError::Usage(format!("--operator: {e}")))?;
+                OperatorParameters::from_names(pairs).map_err(|e| CliError::Usage(format!("--operator: {e}")))?;
             (operator.discretise(sample_time)?, Ok(operator))
         }
         _ => {
@@ -80,7 +80,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
         Ok(o) => {
             let mut table = text::table(&["operator", "value", "unit"]);
             for (name, unit, e) in OperatorEstimate::from(o).rows() {
-                table.add_row([name, &numbers::plain(e.value), unit]);
+                table.add_row([name, &numbers::format_plain(e.value), unit]);
             }
             text.push_str(&format!("{table}\n"));
             if !o.is_stable() {
@@ -95,7 +95,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
 
 /// Converts polynomials with orders other than those of a gain with a lead to an operator of the family, and prints
 /// this operator.
-fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) -> Result<(), CliError> {
+fn print_family_operator(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) -> Result<(), CliError> {
     let orders = Orders {
         nb: b.len(),
         nf: f.len(),
@@ -103,12 +103,12 @@ fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) 
         ..Orders::default()
     };
     let model = PolynomialModel::new(Structure::OutputError, orders, sample_time, [b, f].concat())?;
-    let found = family_of_polynomials(&model, None, None);
+    let found = family_from_polynomials(&model, None, None);
     if args.json {
         json::print(&json!({
             "sample_time": json::number(sample_time.s()),
             "discrete": {"f": f, "b": b, "nk": args.nk},
-            "operator": json::of_family(&found),
+            "operator": json::family_json(&found),
         }))?;
     } else {
         output::show(&family_operator::to_text(&found, &GainUnit::default()))?;
@@ -116,7 +116,11 @@ fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) 
     Ok(())
 }
 
-fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: SampleTime) -> Result<(), CliError> {
+fn print_discretised(
+    args: &ConvertArgs,
+    h: &ContinuousTransferFunction,
+    sample_time: SampleTime,
+) -> Result<(), CliError> {
     let discrete = discretise(h, sample_time, args.method.method(args.prewarp))?;
     if args.json {
         json::print(&json!({

@@ -13,12 +13,12 @@ use hoid::model::{
 };
 use hoid::report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, known_operator, numbers, write_report};
 use hoid::sim::{RunSeed, Simulator};
-use hoid::track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
+use hoid::track::{Method, OPERATOR_COLUMNS, StartSource, Trace, TrackOptions, track};
 
 use crate::{args::DemoArgs, commands::output_paths, error::CliError, output, text};
 
 /// Spans of the thesis (V.B) that are entirely before or after the change, s.
-const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
+const STAGE_SPANS_S: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
 
 struct Stage {
     name: &'static str,
@@ -46,15 +46,15 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
         record.sample_time().s(),
         path.display()
     ))?;
-    let stages = SPANS
+    let stages = STAGE_SPANS_S
         .into_iter()
         .map(|(name, from, to)| identify(name, record.span(from, to)?))
         .collect::<Result<Vec<Stage>, CliError>>()?;
-    output::print(&table(&stages))?;
-    let traces = tracked(&record, &stages)?;
-    output::print(&errors_over_time(&record, &traces))?;
-    let page = report(args, &stages)?;
-    let page_of_traces = report_of_traces(args, &record, &stages, &traces)?;
+    output::print(&stage_table(&stages))?;
+    let traces = track_stages(&record, &stages)?;
+    output::print(&trace_error_table(&record, &traces))?;
+    let page = write_stage_report(args, &stages)?;
+    let page_of_traces = write_trace_report(args, &record, &stages, &traces)?;
     output::show(&format!(
         "Report: {}\nTracking: {}\n",
         page.display(),
@@ -65,19 +65,19 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
 
 /// Computes traces of the whole run with the default method, without prior information, and with the two methods of the
 /// thesis, which start from the batch fit before the change.
-fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
-    let (_, from, to) = SPANS[0];
+fn track_stages(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
+    let (_, from, to) = STAGE_SPANS_S[0];
     let nk = stages[0].choice.fit.orders().nk;
     [Method::adaptive(), Method::rls(), Method::rpem()]
         .into_iter()
         .map(|method| {
             let structure = method.default_structure();
-            let (options, note) = if method.starts_itself() {
+            let (options, note) = if method.is_self_starting() {
                 let options = TrackOptions::without_prior(method.clone(), record.sample_time());
                 (options, "no prior information".to_owned())
             } else {
                 let options = TrackOptions {
-                    start: StartAt::Span(Some((from, to))),
+                    start: StartSource::Span(Some((from, to))),
                     ..TrackOptions::new(method.clone(), structure, structure.operator_orders(nk))
                 };
                 (options, structure.label())
@@ -89,7 +89,7 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
 
 /// Returns a table of the RMS relative error of each trace, evaluated from the end of the first span on, or from the
 /// first update of the estimate if that is later.
-fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
+fn trace_error_table(record: &Record, traces: &[(String, Trace)]) -> String {
     let mut rows = text::table(&[
         "tracked by",
         "K_e",
@@ -101,7 +101,7 @@ fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
     ]);
     for (name, trace) in traces {
         let operators: Vec<_> = (0..trace.len()).map(|row| trace.operator(row)).collect();
-        let from_s = trace.updated_from_s().max(SPANS[0].2);
+        let from_s = trace.updated_from_s().max(STAGE_SPANS_S[0].2);
         let first = trace.times_s().partition_point(|t| *t < from_s);
         let errors = relative_errors(record, trace, &operators, first, &OPERATOR_COLUMNS);
         let error = |column: &str| errors.iter().find(|(name, _)| *name == column);
@@ -113,11 +113,11 @@ fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
     }
     format!(
         "The whole run, tracked sample by sample: RMS relative error from {} s on\n{rows}\n\n",
-        SPANS[0].2
+        STAGE_SPANS_S[0].2
     )
 }
 
-fn report_of_traces(
+fn write_trace_report(
     args: &DemoArgs,
     record: &Record,
     stages: &[Stage],
@@ -126,7 +126,7 @@ fn report_of_traces(
     let batch = |name: &str| -> Vec<BatchLine<'_>> {
         stages
             .iter()
-            .zip(SPANS)
+            .zip(STAGE_SPANS_S)
             .map(|(stage, (_, from_s, to_s))| BatchLine {
                 from_s,
                 to_s,
@@ -144,7 +144,7 @@ fn report_of_traces(
             ("seed".to_owned(), args.seed.to_string()),
             (
                 "start".to_owned(),
-                format!("batch fit of {} to {} s", SPANS[0].1, SPANS[0].2),
+                format!("batch fit of {} to {} s", STAGE_SPANS_S[0].1, STAGE_SPANS_S[0].2),
             ),
             ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ],
@@ -182,7 +182,7 @@ fn identify(name: &'static str, record: Record) -> Result<Stage, CliError> {
     })
 }
 
-fn table(stages: &[Stage]) -> String {
+fn stage_table(stages: &[Stage]) -> String {
     let mut text = String::new();
     for stage in stages {
         let bj = &stage.choice.fit;
@@ -204,11 +204,18 @@ fn table(stages: &[Stage]) -> String {
                 for (i, (name, unit, e)) in bj.rows().into_iter().enumerate() {
                     let (value, error) = text::with_uncertainty(&e);
                     let by_arx = match &arx {
-                        Ok(o) => numbers::plain(o.rows()[i].2.value),
+                        Ok(o) => numbers::format_plain(o.rows()[i].2.value),
                         Err(_) => "not convertible".to_owned(),
                     };
                     let unit = gain.unit(name, unit);
-                    rows.add_row([name, &numbers::plain(truth[i].2.value), &by_arx, &value, &error, &unit]);
+                    rows.add_row([
+                        name,
+                        &numbers::format_plain(truth[i].2.value),
+                        &by_arx,
+                        &value,
+                        &error,
+                        &unit,
+                    ]);
                 }
                 text.push_str(&format!("{rows}\n\n"));
             }
@@ -218,7 +225,7 @@ fn table(stages: &[Stage]) -> String {
     text
 }
 
-fn report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliError> {
+fn write_stage_report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliError> {
     let mut models = Vec::new();
     for stage in stages {
         let records = std::slice::from_ref(&stage.record);

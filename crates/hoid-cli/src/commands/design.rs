@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use hoid::design::experiment::{
-    DesignRequest, Designing, DifferencePlan, DifferenceRequest, Enters, Expected, ExpectedQuantity, ExperimentDesign,
-    Remnant, SpreadSource,
+    DesignOptions, DesignRequest, DifferencePlan, DifferenceRequest, Enters, Expected, ExpectedQuantity,
+    ExperimentDesign, Remnant, SpreadSource,
 };
-use hoid::model::numbers::{DASH, counted};
+use hoid::model::numbers::{DASH, count_with_noun};
 use hoid::report::{PaperTable, design_figure, runs_figure};
 use serde_json::Value;
 
@@ -14,8 +14,8 @@ use super::{figure, output_paths, paper_table};
 use crate::{args::DesignArgs, error::CliError, json, output, table::Rows, text};
 
 /// Tables with the estimates that `--out` writes, in addition to the scenario.
-const TABLES: [&str; 2] = ["design.csv", "design.md"];
-const SCENARIO: &str = "scenario.toml";
+const TABLE_FILES: [&str; 2] = ["design.csv", "design.md"];
+const SCENARIO_FILE: &str = "scenario.toml";
 
 pub fn run(args: &DesignArgs) -> Result<(), CliError> {
     if let Some(figure) = &args.picture.figure {
@@ -64,7 +64,7 @@ fn request(args: &DesignArgs) -> DesignRequest {
             time_constant_s: args.remnant_time_constant,
             ..Remnant::default()
         },
-        designing: Designing {
+        designing: DesignOptions {
             wanted: args.wanted.clone(),
             period_s: args.length,
             lines: args.lines,
@@ -73,7 +73,7 @@ fn request(args: &DesignArgs) -> DesignRequest {
             shelf: args.shelf,
             most_rms: [args.max_rms_e, args.max_u],
             seed: args.seed,
-            ..Designing::default()
+            ..DesignOptions::default()
         },
         run_to_run: args.run_to_run.clone(),
         runs: args.runs.map(|runs| runs as usize),
@@ -93,10 +93,10 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
     let write =
         |name: &str, text: &str| hoid::io::write_atomically(&out.join(name), |file| file.write_all(text.as_bytes()));
     write("design.json", &format!("{}\n", found.to_json()))?;
-    write(SCENARIO, &found.scenario())?;
-    match found.lab(SCENARIO) {
+    write(SCENARIO_FILE, &found.scenario())?;
+    match found.lab_config(SCENARIO_FILE) {
         Some(lab) => write("lab.toml", &lab)?,
-        None => output::notice(
+        None => output::add_notice(
             "",
             "lab.toml was not written: a run in the lab must last a multiple of 0.01 s; change --length".to_owned(),
         ),
@@ -108,27 +108,27 @@ fn write_all(found: &ExperimentDesign, out: &Path) -> Result<(), CliError> {
         write("power.csv", &plan.csv())?;
     }
     if let Some(table) = PaperTable::of(&found.json()) {
-        for name in TABLES {
+        for name in TABLE_FILES {
             table.write(&out.join(name))?;
         }
     }
-    output::notice("", format!("design: {}", out.display()));
+    output::add_notice("", format!("design: {}", out.display()));
     Ok(())
 }
 
 fn page(found: &ExperimentDesign, verbose: bool) -> String {
-    let counted = counted(found.runs, "run");
+    let counted = count_with_noun(found.runs, "run");
     let mut page = format!(
         "Expected errors of {counted} of {} s, {} ({})\n{}\n{}",
         found.length_s,
         found.person,
         found.task.state.operator.form(),
-        errors(found),
-        sizes(found)
+        error_table(found),
+        signal_sizes(found)
     );
-    page.push_str(&needed(found));
+    page.push_str(&needed_runs(found));
     if let Some(plan) = &found.difference {
-        page.push_str(&difference(plan));
+        page.push_str(&difference_text(plan));
     }
     if let Some(seen) = &found.task.feedforward {
         page.push_str(&format!(
@@ -143,8 +143,8 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
          The error of the runs follows from the information in these lines. The error for the person also includes a \
          run-to-run variation of {} % ({}).\n",
         found.crest_factor,
-        lines(found),
-        text::significant(100.0 * found.run_to_run),
+        line_table(found),
+        text::format_significant(100.0 * found.run_to_run),
         found.run_to_run_source,
     ));
     for reason in found.verdict.reasons().chain(found.verdict.notes()) {
@@ -156,7 +156,7 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
     page
 }
 
-fn errors(found: &ExperimentDesign) -> Rows {
+fn error_table(found: &ExperimentDesign) -> Rows {
     let others = [
         found.worst.as_ref().map(|w| (format!("of {}", w.name), &w.expected)),
         found
@@ -169,13 +169,13 @@ fn errors(found: &ExperimentDesign) -> Rows {
     header.extend(others.iter().map(|(name, _)| name.as_str()));
     let mut rows = text::table(&header);
     for q in &found.expected.quantities {
-        let error = |error: Option<f64>| error.map_or_else(String::new, text::significant);
+        let error = |error: Option<f64>| error.map_or_else(String::new, text::format_significant);
         let mut cells = vec![
             label(q),
-            text::significant(q.estimate.value),
+            text::format_significant(q.estimate.value),
             error(q.estimate.standard_error),
             error(q.standard_error_person),
-            relative(q.standard_error_person.unwrap_or(f64::NAN) / q.estimate.value.abs()),
+            format_relative_error(q.standard_error_person.unwrap_or(f64::NAN) / q.estimate.value.abs()),
         ];
         cells.extend(others.iter().map(|(_, e)| {
             let other = e.estimate(q.name).and_then(|e| e.standard_error);
@@ -197,7 +197,7 @@ fn label(q: &ExpectedQuantity) -> String {
     }
 }
 
-fn relative(error: f64) -> String {
+fn format_relative_error(error: f64) -> String {
     if error.is_finite() {
         format!("{:.1} %", 100.0 * error)
     } else {
@@ -205,8 +205,8 @@ fn relative(error: f64) -> String {
     }
 }
 
-fn sizes(found: &ExperimentDesign) -> String {
-    let of = |e: &Expected| (text::significant(e.rms_e), text::significant(e.rms_u));
+fn signal_sizes(found: &ExperimentDesign) -> String {
+    let of = |e: &Expected| (text::format_significant(e.rms_e), text::format_significant(e.rms_u));
     let (e, u) = of(&found.expected);
     let other = found.against.as_ref().map_or_else(String::new, |o| {
         let (e, u) = of(&o.expected);
@@ -216,34 +216,37 @@ fn sizes(found: &ExperimentDesign) -> String {
 }
 
 /// Returns a sentence with the number of runs needed to reach the accepted errors of the requested quantities.
-fn needed(found: &ExperimentDesign) -> String {
+fn needed_runs(found: &ExperimentDesign) -> String {
     if found.wanted.is_empty() {
         return String::new();
     }
-    let mut needed = format!("The requested errors require {}.\n", counted(found.runs_needed, "run"));
+    let mut needed = format!(
+        "The requested errors require {}.\n",
+        count_with_noun(found.runs_needed, "run")
+    );
     if let Some(worst) = &found.worst {
-        let runs = counted(worst.runs_needed, "run");
+        let runs = count_with_noun(worst.runs_needed, "run");
         needed.push_str(&format!("For {} they require {runs}.\n", worst.name));
     }
     if let Some(other) = &found.against {
-        let runs = counted(other.runs_needed, "run");
+        let runs = count_with_noun(other.runs_needed, "run");
         needed.push_str(&format!("With {} they require {runs}.\n", other.name));
     }
     needed
 }
 
 /// Formats the number of people and runs needed to detect a difference, and the table of the power of the test.
-fn difference(plan: &DifferencePlan) -> String {
+fn difference_text(plan: &DifferencePlan) -> String {
     let sought = &plan.request.sought.name;
     let unit = match sought.as_str() {
         "crossover" => " rad/s",
         "phase_margin" => " deg",
         _ => "",
     };
-    let size = format!("{sought} of {}{unit}", text::significant(plan.size));
-    let answer = match plan.answer() {
+    let size = format!("{sought} of {}{unit}", text::format_significant(plan.size));
+    let answer = match plan.recommended_row() {
         Some(row) => {
-            let runs = counted(row.runs, "run");
+            let runs = count_with_noun(row.runs, "run");
             match row.people {
                 Some(people) => format!("{people} people, each with {runs} per condition"),
                 None => format!("more than 1000 people, each with {runs} per condition"),
@@ -267,21 +270,21 @@ fn difference(plan: &DifferencePlan) -> String {
          {} from run to run, {} from the expected error of a run.\n",
         plan.request.power,
         plan.request.alpha,
-        text::significant(plan.between_people),
+        text::format_significant(plan.between_people),
         plan.between_source,
-        text::significant(plan.run_to_run),
-        text::significant(plan.error_of_run),
+        text::format_significant(plan.run_to_run),
+        text::format_significant(plan.error_of_run),
     )
 }
 
-fn lines(found: &ExperimentDesign) -> Rows {
+fn line_table(found: &ExperimentDesign) -> Rows {
     let mut lines = text::table(&["line (rad/s)", "periods per run", "amplitude", "phase (rad)", "enters"]);
     for designed in &found.lines {
         let line = designed.line;
         lines.add_row([
             format!("{:.4}", line.omega_rad_s),
             format!("{:.0}", line.omega_rad_s * found.length_s / std::f64::consts::TAU),
-            text::significant(line.amplitude_deg),
+            text::format_significant(line.amplitude_deg),
             format!("{:.3}", line.phase_rad),
             designed.enters.name().to_owned(),
         ]);

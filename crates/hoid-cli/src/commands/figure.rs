@@ -36,6 +36,6 @@ pub fn write(path: &Path, svg: &str, width_mm: Option<f64>) -> Result<(), CliErr
     let sized = width_mm.map(|mm| with_width_mm(svg, mm));
     let bytes = format_of(path)?.bytes(sized.as_deref().unwrap_or(svg))?;
     write_atomically(path, |file| file.write_all(&bytes))?;
-    output::notice("", format!("figure: {}", path.display()));
+    output::add_notice("", format!("figure: {}", path.display()));
     Ok(())
 }

@@ -18,7 +18,7 @@ use crate::{
     args::{FmuArgs, OperatorChoice},
     error::CliError,
     output,
-    recursion::method_of,
+    recursion::parse_method,
 };
 
 pub fn run(args: &FmuArgs) -> Result<(), CliError> {
@@ -27,8 +27,8 @@ pub fn run(args: &FmuArgs) -> Result<(), CliError> {
         named => named.to_vec(),
     };
     let (settings, read, step_s) = match &args.operator {
-        Some(operator) => of_operator(operator, args.seed)?,
-        None => of_tracker(args)?,
+        Some(operator) => operator_unit(operator, args.seed)?,
+        None => tracker_unit(args)?,
     };
     let inputs: Vec<&Path> = libraries.iter().chain(&read).map(PathBuf::as_path).collect();
     output_paths::check(&inputs, &[Some(&args.out)], &[])?;
@@ -52,11 +52,11 @@ pub fn run(args: &FmuArgs) -> Result<(), CliError> {
 }
 
 /// Settings of a unit, the files read for it, and its sample time in s.
-type Unit = (FmuSettings, Vec<PathBuf>, f64);
+type FmuUnit = (FmuSettings, Vec<PathBuf>, f64);
 
-fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
+fn tracker_unit(args: &FmuArgs) -> Result<FmuUnit, CliError> {
     let step = SampleTime::new(args.sample_time)?;
-    let mut method = method_of(&args.method)?;
+    let mut method = parse_method(&args.method)?;
     let mut settings = FmuSettings::new(FmuKind::Tracker)
         .with("sample_time", FmuStart::Real(step.s()))
         .with("method", FmuStart::Text(method.name().to_owned()));
@@ -83,7 +83,7 @@ fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
     Ok((settings, read, step.s()))
 }
 
-fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
+fn operator_unit(operator: &OperatorChoice, seed: i32) -> Result<FmuUnit, CliError> {
     let (text, source, read) = match operator {
         OperatorChoice::Condition(condition) => (
             format!("condition = \"{}\"\n", condition.name()),

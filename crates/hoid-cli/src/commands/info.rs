@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use hoid::analysis::{Look, Role};
+use hoid::analysis::{FileExamination, Role};
 use hoid::ident::faults::repair;
 use hoid::io::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey};
-use hoid::model::numbers::counted;
+use hoid::model::numbers::count_with_noun;
 use hoid::model::{Fault, FaultHandling};
 use hoid::report::numbers;
 use serde_json::{Value, json};
@@ -13,16 +13,16 @@ use serde_json::{Value, json};
 use crate::{args::InfoArgs, error::CliError, json, output, text};
 
 pub fn run(args: &InfoArgs) -> Result<(), CliError> {
-    let look = Look::at(&args.file, &args.look.known())?;
+    let look = FileExamination::at(&args.file, &args.look.to_options())?;
     let file = args.file.display().to_string();
-    let faults = faults_of(&look);
+    let faults = find_faults(&look);
     if args.json {
-        let mut object = object(&look.survey);
+        let mut object = file_survey_json(&look.survey);
         object["faults"] = faults.iter().map(|fault| json::fault(&file, &fault.into())).collect();
         object["look"] = survey_json(&look, &file);
         json::print(&object)?;
     } else {
-        let mut text = words(&file, &look.survey);
+        let mut text = survey_text(&file, &look.survey);
         if !faults.is_empty() {
             text.push_str("\nFaults of e and u:\n");
         }
@@ -36,14 +36,14 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
 }
 
 /// Returns the faults of e and u; empty if the file does not contain a valid record of both.
-fn faults_of(look: &Look) -> Vec<Fault> {
+fn find_faults(look: &FileExamination) -> Vec<Fault> {
     let seen = look.seen.as_ref().ok();
     let repaired = seen.and_then(|seen| repair(&seen.record, FaultHandling::Report).ok());
     repaired.map_or_else(Vec::new, |repaired| repaired.faults)
 }
 
 /// Returns the layout of the file and the next command to use.
-fn layout_and_next_command(look: &Look, file: &str) -> String {
+fn layout_and_next_command(look: &FileExamination, file: &str) -> String {
     let role = |role: &Role| format!("{} ({})", role.column, role.why);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
     // The printed table of columns already gives the units that it found.
@@ -90,7 +90,7 @@ fn layout_and_next_command(look: &Look, file: &str) -> String {
 }
 
 /// Returns the survey as a JSON object.
-fn survey_json(look: &Look, file: &str) -> Value {
+fn survey_json(look: &FileExamination, file: &str) -> Value {
     let role = |role: &Role| json!({"column": role.column, "why": role.why, "certain": role.certain});
     let seen = look.seen.as_ref().ok();
     let excitation = match seen.map(|seen| &seen.periods) {
@@ -121,10 +121,10 @@ fn survey_json(look: &Look, file: &str) -> Value {
     })
 }
 
-fn words(file: &str, found: &FileSurvey) -> String {
+fn survey_text(file: &str, found: &FileSurvey) -> String {
     let mut text = format!("{file}: {}, {} columns\n", found.format, found.columns.len());
     for sampling in &found.samplings {
-        text.push_str(&sampled(sampling));
+        text.push_str(&sampling_line(sampling));
     }
     // Most files give no units, and an empty column would make the table too wide for a screen.
     let has_units = found.columns.iter().any(|column| !column.unit.is_empty());
@@ -144,7 +144,7 @@ fn words(file: &str, found: &FileSurvey) -> String {
         }
         cells.extend([column.kind.clone(), rows]);
         if let Some(v) = &column.values {
-            cells.extend([v.min, v.max, v.mean, v.deviation].map(numbers::plain));
+            cells.extend([v.min, v.max, v.mean, v.deviation].map(numbers::format_plain));
             sketches.push((column, v));
         }
         table.add_row(cells);
@@ -172,13 +172,13 @@ fn words(file: &str, found: &FileSurvey) -> String {
     text
 }
 
-fn sampled(s: &SamplingSurvey) -> String {
+fn sampling_line(s: &SamplingSurvey) -> String {
     let mut line = format!(
         "{}: {} rows from {} to {} s, {:.4} Hz (sample time {:.6} s), jitter {:.2e} s",
         s.path,
         s.rows,
-        numbers::plain(s.span_s.0),
-        numbers::plain(s.span_s.1),
+        numbers::format_plain(s.span_s.0),
+        numbers::format_plain(s.span_s.1),
         1.0 / s.sample_time_s,
         s.sample_time_s,
         s.jitter_s
@@ -186,8 +186,8 @@ fn sampled(s: &SamplingSurvey) -> String {
     if let Some(first) = s.first_gap_s {
         line.push_str(&format!(
             ", {} ({}, the first after {first} s)",
-            counted(s.gaps, "gap"),
-            counted(s.missing, "sample")
+            count_with_noun(s.gaps, "gap"),
+            count_with_noun(s.missing, "sample")
         ));
     } else {
         line.push_str(", no gaps");
@@ -195,13 +195,13 @@ fn sampled(s: &SamplingSurvey) -> String {
     if s.not_increasing > 0 {
         line.push_str(&format!(
             ", t does not increase in {}",
-            counted(s.not_increasing, "row")
+            count_with_noun(s.not_increasing, "row")
         ));
     }
     if s.repeated > 0 {
         line.push_str(&format!(
             ", {} identical to the previous row",
-            counted(s.repeated, "row")
+            count_with_noun(s.repeated, "row")
         ));
     }
     line.push('\n');
@@ -218,18 +218,18 @@ fn remarks(v: &ValueSurvey) -> String {
         remarks.push(String::from("constant"));
     }
     if let Some(quantum) = v.quantum {
-        remarks.push(format!("quantised in steps of {}", numbers::plain(quantum)));
+        remarks.push(format!("quantised in steps of {}", numbers::format_plain(quantum)));
     }
     for (rows, end) in [(v.saturated_low, v.min), (v.saturated_high, v.max)] {
         if rows > 0 {
-            let rows = counted(rows, "row");
-            remarks.push(format!("saturated at {} in {rows}", numbers::plain(end)));
+            let rows = count_with_noun(rows, "row");
+            remarks.push(format!("saturated at {} in {rows}", numbers::format_plain(end)));
         }
     }
     remarks.join(", ")
 }
 
-fn object(found: &FileSurvey) -> Value {
+fn file_survey_json(found: &FileSurvey) -> Value {
     let column = |c: &ColumnSurvey| {
         let values = c.values.as_ref().map_or(Value::Null, |v| {
             json!({

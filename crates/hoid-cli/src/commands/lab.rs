@@ -33,9 +33,9 @@ pub fn run(args: &LabArgs) -> Result<(), CliError> {
     let address = server.address();
     output::print(&format!("{address}\n"))?;
     if args.open
-        && let Err(error) = open(&server.address_once()?)
+        && let Err(error) = open(&server.single_use_address()?)
     {
-        output::notice(
+        output::add_notice(
             "",
             format!("no browser could be opened ({error}): open the address yourself"),
         );

@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// K_n for one order and noise level, or the reason why there is none.
-struct Gain {
+struct RemnantGain {
     order: usize,
     level: f64,
     k_n: Result<f64, ModelError>,
@@ -27,7 +27,7 @@ struct Gain {
 pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
     let scenario = match chosen_scenario(&args.base)? {
         AnyScenario::Reference(scenario) => *scenario,
-        AnyScenario::Family(scenario) => return of_family(&scenario, args),
+        AnyScenario::Family(scenario) => return print_family_margins(&scenario, args),
     };
     let state = match args.state {
         StateName::Initial => scenario.initial,
@@ -39,9 +39,9 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         .series(&state.controlled_element.transfer_function()?);
     let found = crossings(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
     let definition = args.noise_definition;
-    let gains: Vec<Gain> = (1..=HIGHEST_ORDER)
+    let gains: Vec<RemnantGain> = (1..=HIGHEST_ORDER)
         .flat_map(|order| args.noise_levels.iter().map(move |&level| (order, level)))
-        .map(|(order, level)| Gain {
+        .map(|(order, level)| RemnantGain {
             order,
             level,
             k_n: scenario.remnant_gain_for(&state, order, level, definition),
@@ -86,7 +86,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         NoiseDefinition::Response => "var(u_n)/var(u)",
         NoiseDefinition::Remnant => "var(n)/var(u)",
     };
-    let state_name = name_of(args.state);
+    let state_name = state_name(args.state);
     output::show(&format!(
         "{}, {state_name} state.\n{}\nRemnant gain K_n for P_n = {share}, T_n = {} s, Ts = {} s:\n{table}\n",
         scenario.name,
@@ -98,7 +98,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
 }
 
 /// Prints the margins of the loop for an operator of the family, and the gains of the parts of its remnant.
-fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliError> {
+fn print_family_margins(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliError> {
     let (state, which) = match args.state {
         StateName::Initial => (&scenario.initial, 0),
         StateName::Last => (&scenario.last, 1),
@@ -131,13 +131,13 @@ fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliErr
     output::show(&format!(
         "{}, {} state.\n{}\n{parts}",
         scenario.name,
-        name_of(args.state),
+        state_name(args.state),
         text::crossings(&found),
     ))?;
     Ok(())
 }
 
-fn name_of(state: StateName) -> &'static str {
+fn state_name(state: StateName) -> &'static str {
     match state {
         StateName::Initial => "initial",
         StateName::Last => "last",

@@ -8,7 +8,7 @@ use hoid::io::{check_output, check_output_directory};
 use crate::error::CliError;
 
 /// Name of the page in the directory of a report.
-const PAGE: &str = "report.html";
+const PAGE_FILE: &str = "report.html";
 
 /// Checks the files and the report directories that a command with these inputs writes.
 ///
@@ -21,7 +21,7 @@ pub fn check(inputs: &[&Path], files: &[Option<&Path>], reports: &[Option<&Path>
     for directory in reports.iter().flatten() {
         check_output_directory(directory, &[])?;
         if directory.is_dir() {
-            check_output(&directory.join(PAGE), inputs)?;
+            check_output(&directory.join(PAGE_FILE), inputs)?;
         }
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! Writing of a result as a table for a paper.
 
-use hoid::io::writable_endings;
+use hoid::io::writable_extensions;
 use hoid::report::PaperTable;
 use serde_json::{Map, Value};
 
@@ -12,8 +12,8 @@ use crate::{args::ShowArgs, error::CliError, output};
 /// [`CliError::Usage`] if the name of the file does not correspond to any format.
 pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     let Some(path) = &show.table else { return Ok(()) };
-    PaperTable::check(path).map_err(|_| {
-        let endings = writable_endings();
+    PaperTable::check_format(path).map_err(|_| {
+        let endings = writable_extensions();
         CliError::Usage(format!(
             "--table {}: expected a file name that ends in .tex, .md, {endings}",
             path.display()
@@ -30,9 +30,9 @@ pub fn write(show: &ShowArgs, object: impl FnOnce() -> Result<Map<String, Value>
     match PaperTable::of(&object()?) {
         Some(table) => {
             table.write(path)?;
-            output::notice("", format!("table: {}", path.display()));
+            output::add_notice("", format!("table: {}", path.display()));
         }
-        None => output::notice("", "no table is written: the result has no estimate".to_owned()),
+        None => output::add_notice("", "no table is written: the result has no estimate".to_owned()),
     }
     Ok(())
 }

@@ -26,17 +26,17 @@ pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<
 pub fn report_problems(path: &Path, read: &ReadRecord) {
     let file = path.display().to_string();
     for note in &read.notes {
-        output::notice(&file, note.to_string());
+        output::add_notice(&file, note.to_string());
     }
     for issue in &read.quality_issues {
-        output::warning(&file, &issue.to_string());
+        output::add_warning(&file, &issue.to_string());
     }
 }
 
 /// Reports that a high sampling frequency was kept, if it was.
 pub fn report_kept_rate(words: Option<String>) {
     if let Some(words) = words {
-        output::notice("", words);
+        output::add_notice("", words);
     }
 }
 
@@ -58,7 +58,7 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
         trial: args.trial.clone(),
         sampling_hz: args.fs,
         span_s: (args.from, args.to),
-        sparse: by_channel("--sparse", &args.sparse)?,
+        sparse: values_by_channel("--sparse", &args.sparse)?,
         columns: args.kept_columns(),
         repair: Repair {
             resample: args.resample,
@@ -70,9 +70,9 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
 fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
     let prepare = &args.prepare;
     Ok(Preparation {
-        units: by_channel("--unit", &prepare.unit)?,
-        scale: by_channel("--scale", &prepare.scale)?,
-        offset: by_channel("--offset", &prepare.offset)?,
+        units: values_by_channel("--unit", &prepare.unit)?,
+        scale: values_by_channel("--scale", &prepare.scale)?,
+        offset: values_by_channel("--offset", &prepare.offset)?,
         // Decimation is done after the search for faults, since its filter would hide faults.
         rate: prepare.new_fs.map_or(NewRate::Kept, NewRate::Hz),
         run_in_s: prepare.run_in.unwrap_or(0.0),
@@ -82,7 +82,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
 }
 
 /// Returns the values of an option by channel; a channel that is given twice is an error.
-pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTreeMap<String, T>, CliError> {
+pub fn values_by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTreeMap<String, T>, CliError> {
     let mut all = BTreeMap::new();
     for (name, value) in typed {
         if all.insert(name.clone(), value.clone()).is_some() {

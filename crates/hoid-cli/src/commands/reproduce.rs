@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use hoid::thesis::{
     ThesisError,
-    reproduction::{CLAIMS, Reproduction, ReproductionEvent, items, reproduce},
+    reproduction::{CLAIMS_NAME, Reproduction, ReproductionEvent, items, reproduce},
 };
 
 use super::{output_paths, study::stop_at_interrupt};
@@ -14,7 +14,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     if args.list {
         let items = items().into_iter().map(|item| (item.name, item.title));
         let claims = (
-            CLAIMS.to_owned(),
+            CLAIMS_NAME.to_owned(),
             "Statements of the thesis and the evidence from the data".to_owned(),
         );
         let lines = items
@@ -31,7 +31,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         recordings: args.recordings.clone(),
     };
     let stopped = stop_at_interrupt();
-    let bar = output::progress(0, "estimates");
+    let bar = output::progress_bar(0, "estimates");
     let tell = |event: ReproductionEvent<'_>| match event {
         ReproductionEvent::Progress(progress) => {
             bar.set_length(progress.total);
@@ -41,10 +41,10 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
             let took = study
                 .seconds
                 .map_or("already present".to_owned(), |s| format!("{s:.1} s"));
-            bar.suspend(|| output::message(&format!("{:22} {} estimates, {took}", study.name, study.estimates)));
+            bar.suspend(|| output::print_message(&format!("{:22} {} estimates, {took}", study.name, study.estimates)));
             bar.reset();
         }
-        ReproductionEvent::Note(note) => bar.suspend(|| output::message(&format!("warning: {note}"))),
+        ReproductionEvent::Note(note) => bar.suspend(|| output::print_message(&format!("warning: {note}"))),
     };
     let found = reproduce(&wanted, &args.out, &tell, &|| !stopped.load(Ordering::Relaxed));
     bar.finish_and_clear();

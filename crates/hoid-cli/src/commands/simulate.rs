@@ -23,15 +23,15 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     args.sample_time.map(SampleTime::new).transpose()?;
     let scenario = changes(args)
         .apply(chosen_scenario(&args.base)?)
-        .map_err(|error| refused(&error))?;
+        .map_err(|error| change_error(&error))?;
     let record = match scenario {
         AnyScenario::Reference(scenario) => Simulator::new(&scenario)?.run(run_seed, args.keep_run_in)?,
         AnyScenario::Family(scenario) => FamilySimulator::new(&scenario)?.run_with_truth(run_seed, args.keep_run_in)?,
     };
     let piped = args.out.as_os_str() == "-";
     if piped {
-        write_out(&record)?;
-        if output::pipe_closed() {
+        print_record(&record)?;
+        if output::is_pipe_closed() {
             return Ok(());
         }
     } else {
@@ -44,8 +44,8 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         record.sample_time().s(),
         args.seed,
         args.replication,
-        numbers::plain(root_mean_square(record.input())),
-        numbers::plain(root_mean_square(record.output())),
+        numbers::format_plain(root_mean_square(record.input())),
+        numbers::format_plain(root_mean_square(record.output())),
         if piped {
             "standard output".to_owned()
         } else {
@@ -53,7 +53,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         },
     );
     if piped {
-        output::message(summary.trim_end());
+        output::print_message(summary.trim_end());
     } else {
         output::show(&summary)?;
     }
@@ -61,7 +61,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
 }
 
 /// Writes the record to standard output.
-fn write_out(record: &Record) -> Result<(), CliError> {
+fn print_record(record: &Record) -> Result<(), CliError> {
     let mut text = Vec::new();
     write_record_csv(&mut text, "standard output", record)?;
     output::print(&String::from_utf8_lossy(&text))?;
@@ -82,6 +82,6 @@ fn changes(args: &SimulateArgs) -> ScenarioChanges {
 }
 
 /// Converts the error; the message contains the option as typed on the command line.
-fn refused(error: &ScenarioChangeError) -> CliError {
+fn change_error(error: &ScenarioChangeError) -> CliError {
     CliError::Usage(format!("--{} {}", error.option.replace('_', "-"), error.reason))
 }

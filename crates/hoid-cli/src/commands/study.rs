@@ -14,7 +14,7 @@ use serde_json::json;
 
 use crate::{
     args::{StudyCommand, StudyMergeArgs, StudyRunArgs},
-    commands::study_answer::answer,
+    commands::study_answer::summary,
     error::CliError,
     interrupt, output,
 };
@@ -27,7 +27,7 @@ pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
             output::show(&description(&read_plan(&args.plan)?))?;
             Ok(())
         }
-        StudyCommand::Plans(args) => list(args.name.as_deref()),
+        StudyCommand::Plans(args) => print_plans(args.name.as_deref()),
         StudyCommand::Schema => {
             output::print(&plan_schema())?;
             Ok(())
@@ -59,7 +59,7 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         resume: args.resume,
         csv: args.csv,
     };
-    let estimates = usize::try_from(plan.estimates()).unwrap_or(usize::MAX);
+    let estimates = usize::try_from(plan.estimate_count()).unwrap_or(usize::MAX);
     let outcome = with_progress(
         &plan.name,
         &args.out,
@@ -70,7 +70,7 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         output::print(&format!("{:#}\n", outcome_json(&plan, &outcome)))?;
         return Ok(());
     }
-    let mut text = answer(&outcome.tables)?;
+    let mut text = summary(&outcome.tables)?;
     text.push_str(&format!("{}: {} estimates made\n", plan.name, outcome.estimates));
     if let Some(shard) = args.shard {
         text.push_str(&format!(
@@ -93,7 +93,7 @@ pub fn with_progress(
     work: impl FnOnce(&(dyn Fn(Progress) + Sync), &(dyn Fn() -> bool + Sync)) -> Result<Outcome, StudyError>,
 ) -> Result<Outcome, CliError> {
     let stopped = stop_at_interrupt();
-    let bar = output::progress(total, unit);
+    let bar = output::progress_bar(total, unit);
     let outcome = work(
         &|progress: Progress| {
             bar.set_length(progress.total);
@@ -117,7 +117,7 @@ pub fn with_progress(
 /// Prints the notes on a directory as warnings.
 fn print_warnings(directory: &Path, notes: &[String]) {
     for note in notes {
-        output::warning(&directory.display().to_string(), note);
+        output::add_warning(&directory.display().to_string(), note);
     }
 }
 
@@ -128,7 +128,7 @@ pub fn stop_at_interrupt() -> Arc<AtomicBool> {
     let flag = Arc::clone(&stopped);
     interrupt::on_interrupt(move |_| {
         if flag.swap(true, Ordering::Relaxed) {
-            interrupt::end(interrupt::exit_code());
+            interrupt::exit(interrupt::exit_code());
         }
     });
     stopped
@@ -147,7 +147,7 @@ fn merge_shards(args: &StudyMergeArgs) -> Result<(), CliError> {
     }
     output::show(&format!(
         "{}{} estimates\n{}",
-        answer(&outcome.tables)?,
+        summary(&outcome.tables)?,
         outcome.estimates,
         tables_text(&outcome)
     ))?;
@@ -186,7 +186,7 @@ fn description(plan: &Plan) -> String {
         plan.replications,
         plan.cells.len(),
         plan.estimators.len(),
-        plan.estimates()
+        plan.estimate_count()
     ));
     const MAX_ENTRIES: usize = 12;
     let mut list = |title: &str, entries: Vec<String>| {
@@ -212,7 +212,7 @@ fn description(plan: &Plan) -> String {
     text
 }
 
-fn list(name: Option<&str>) -> Result<(), CliError> {
+fn print_plans(name: Option<&str>) -> Result<(), CliError> {
     let Some(name) = name else {
         let mut text = String::new();
         for named in named_plans() {
@@ -221,7 +221,7 @@ fn list(name: Option<&str>) -> Result<(), CliError> {
                 "{:22} {} ({} estimates)\n",
                 plan.name,
                 plan.title,
-                plan.estimates()
+                plan.estimate_count()
             ));
         }
         output::show(&text)?;

@@ -7,13 +7,13 @@
 use std::path::PathBuf;
 
 use hoid::io::{ColumnValues, OutputTable, read_table};
-use hoid::model::numbers::counted;
+use hoid::model::numbers::count_with_noun;
 use hoid::report::numbers;
 
 use crate::{error::CliError, text};
 
 /// Parameters in order of preference; the first of them that the table contains are shown.
-const PARAMETERS: [&str; 10] = [
+const SHOWN_PARAMETERS: [&str; 10] = [
     "K_e",
     "K_over_T_I",
     "K",
@@ -31,12 +31,12 @@ const MAX_PARAMETERS: usize = 3;
 const MAX_ROWS: usize = 24;
 
 /// Returns the summary of the tables of a study; empty if they contain no bias of a parameter.
-pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
+pub fn summary(tables: &[PathBuf]) -> Result<String, CliError> {
     let is_summary = |path: &&PathBuf| path.file_stem().is_some_and(|stem| stem == "summary");
     let Some(summary) = tables.iter().find(is_summary) else {
         return Ok(String::new());
     };
-    Ok(words(&read_table(summary)?))
+    Ok(summary_text(&read_table(summary)?))
 }
 
 /// Results of one estimator in one cell.
@@ -55,16 +55,16 @@ struct Row {
     biases: Vec<String>,
 }
 
-fn words(summary: &OutputTable) -> String {
+fn summary_text(summary: &OutputTable) -> String {
     let (cell, estimator, quantity) = (
-        texts(summary, "cell"),
-        texts(summary, "estimator"),
-        texts(summary, "quantity"),
+        text_column(summary, "cell"),
+        text_column(summary, "estimator"),
+        text_column(summary, "quantity"),
     );
-    let [count, mean, median, error] = ["count", "mean", "median", "median_se"].map(|name| reals(summary, name));
+    let [count, mean, median, error] = ["count", "mean", "median", "median_se"].map(|name| real_column(summary, name));
     let has = |what: &String| quantity.contains(what);
     let bias = |name: &str| format!("bias_{name}");
-    let shown: Vec<&str> = PARAMETERS
+    let shown: Vec<&str> = SHOWN_PARAMETERS
         .into_iter()
         .filter(|name| has(&bias(name)))
         .take(MAX_PARAMETERS)
@@ -117,7 +117,7 @@ fn words(summary: &OutputTable) -> String {
     }
     let more = match rows.len().checked_sub(MAX_ROWS) {
         None | Some(0) => String::new(),
-        Some(more) => format!("and {}\n", counted(more, "more row")),
+        Some(more) => format!("and {}\n", count_with_noun(more, "more row")),
     };
     format!(
         "{table}\n{more}Fits: number that give an operator, of all fits. Relative bias in %: median over these fits \
@@ -126,7 +126,7 @@ fn words(summary: &OutputTable) -> String {
     )
 }
 
-fn texts(table: &OutputTable, name: &str) -> Vec<String> {
+fn text_column(table: &OutputTable, name: &str) -> Vec<String> {
     match table.column(name) {
         Some(ColumnValues::Text(values)) => values.clone(),
         Some(ColumnValues::Whole(values)) => values.iter().map(u64::to_string).collect(),
@@ -135,7 +135,7 @@ fn texts(table: &OutputTable, name: &str) -> Vec<String> {
     }
 }
 
-fn reals(table: &OutputTable, name: &str) -> Vec<f64> {
+fn real_column(table: &OutputTable, name: &str) -> Vec<f64> {
     match table.column(name) {
         Some(ColumnValues::Real(values)) => values.clone(),
         Some(ColumnValues::Whole(values)) => values.iter().map(|value| *value as f64).collect(),
@@ -180,7 +180,7 @@ mod tests {
                 column("median_se", real(2)),
             ],
         };
-        let words = words(&table);
+        let words = summary_text(&table);
         for part in [
             "3/10",
             "1.8 ± 1.4",

@@ -14,12 +14,12 @@ impl Draw {
     }
 
     /// Returns an integer below `n`; 0 if `n` is 0.
-    pub fn below(&mut self, n: usize) -> usize {
+    pub fn integer_below(&mut self, n: usize) -> usize {
         (self.bits() % (n.max(1) as u64)) as usize
     }
 
     /// Returns a number in [0, 1).
-    pub fn share(&mut self) -> f64 {
+    pub fn uniform(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 }

@@ -7,9 +7,9 @@
 use std::fs;
 
 use crate::{
-    disk::{Disk, copied},
+    disk::{Disk, copy_folder},
     draw::Draw,
-    interrupted::{Bench, Work, compare, files},
+    interrupted::{Bench, Work, compare, read_files},
 };
 
 /// Size of a page of a disk, kB.
@@ -26,11 +26,11 @@ pub struct Outcome {
 }
 
 /// Runs a number of rounds of a work; `None` if no separate disk can be mounted.
-pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Option<Outcome> {
-    let whole = bench.place(work, "whole");
+pub fn run_rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Option<Outcome> {
+    let whole = bench.output_path(work, "whole");
     fs::create_dir_all(&whole).unwrap();
-    bench.whole(work, "whole");
-    let expected = files(&whole);
+    bench.run_to_end(work, "whole");
+    let expected = read_files(&whole);
     let bytes = |all: &std::collections::BTreeMap<_, Vec<u8>>| all.values().map(Vec::len).sum::<usize>();
     // The disk contains the blocks in addition to the tables made from them.
     let largest_kb = PAGE_KB * (expected.len() + 2) + (1 + usize::from(work.has_parts)) * bytes(&expected) / 1024;
@@ -38,14 +38,14 @@ pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Opti
     fs::create_dir_all(&at).unwrap();
     let mut outcome = Outcome::default();
     for round in 0..count {
-        let kilobytes = PAGE_KB * (1 + draw.below(largest_kb / PAGE_KB));
+        let kilobytes = PAGE_KB * (1 + draw.integer_below(largest_kb / PAGE_KB));
         let disk = Disk::mount(&at, kilobytes)?;
         let what = format!("{} {round}, {kilobytes} kB", work.name);
         let mut fail = |said: String| outcome.failures.push(format!("{what}: {said}"));
         let run = bench.command(work, &at).output().unwrap();
         let said = String::from_utf8_lossy(&run.stderr).into_owned();
-        let place = bench.place(work, "moved");
-        copied(&at, &place);
+        let place = bench.output_path(work, "moved");
+        copy_folder(&at, &place);
         drop(disk);
         if run.status.success() {
             compare(&expected, &place, &what).into_iter().for_each(&mut fail);
@@ -56,7 +56,7 @@ pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Opti
         if run.status.code() != Some(1) || !said.contains("No space left") || !said.contains("free space") {
             fail(format!("{}: {said}", run.status));
         }
-        let left = files(&place);
+        let left = read_files(&place);
         for (path, bytes) in &left {
             let name = path.file_name().unwrap().to_string_lossy();
             if name.starts_with('.') {

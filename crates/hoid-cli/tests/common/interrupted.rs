@@ -108,7 +108,7 @@ impl Bench {
         bench
     }
 
-    pub fn place(&self, work: &Work, name: &str) -> PathBuf {
+    pub fn output_path(&self, work: &Work, name: &str) -> PathBuf {
         self.at.join(format!("{}-{name}", work.name))
     }
 
@@ -126,12 +126,12 @@ impl Bench {
     }
 
     pub fn start(&self, work: &Work, name: &str) -> Child {
-        let mut command = self.command(work, &self.place(work, name));
+        let mut command = self.command(work, &self.output_path(work, name));
         command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
     }
 
     /// Runs a command to completion.
-    pub fn whole(&self, work: &Work, name: &str) {
+    pub fn run_to_end(&self, work: &Work, name: &str) {
         let status = self.start(work, name).wait().unwrap();
         assert!(status.success(), "{} {name}: {status}", work.name);
     }
@@ -139,7 +139,7 @@ impl Bench {
 
 /// Returns all files below a directory, by their paths. The durations on the page of a reproduction are removed,
 /// because they are the only difference between runs.
-pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+pub fn read_files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![directory.to_owned()];
     while let Some(folder) = open.pop() {
@@ -163,7 +163,7 @@ pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
 
 /// Returns the differences between the files below a directory and the expected files.
 pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &str) -> Vec<String> {
-    let found = files(directory);
+    let found = read_files(directory);
     let differs = |path: &PathBuf| {
         Some(match (expected.get(path), found.get(path)) {
             (Some(a), Some(b)) if a == b => return None,

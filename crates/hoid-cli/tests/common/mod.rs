@@ -20,7 +20,7 @@ pub fn hoid(directory: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-pub fn good(directory: &Path, arguments: &[&str]) -> String {
+pub fn stdout_of(directory: &Path, arguments: &[&str]) -> String {
     let output = hoid(directory, arguments);
     assert!(
         output.status.success(),
@@ -31,7 +31,7 @@ pub fn good(directory: &Path, arguments: &[&str]) -> String {
 }
 
 pub fn json(directory: &Path, arguments: &[&str]) -> Value {
-    serde_json::from_str(&good(directory, arguments)).unwrap()
+    serde_json::from_str(&stdout_of(directory, arguments)).unwrap()
 }
 
 /// Returns the result of a fit with any verdict; a result that is not determined is also printed, with exit code 1.
@@ -45,7 +45,7 @@ pub fn json_with_any_exit_code(directory: &Path, arguments: &[&str]) -> Value {
 }
 
 /// Returns exit code and message of a command that fails; it must print nothing on standard output and leave no file.
-pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
+pub fn failure_of(directory: &Path, arguments: &[&str]) -> (i32, String) {
     let files = |d: &Path| fs::read_dir(d).unwrap().count();
     let before = files(directory);
     let output = hoid(directory, arguments);
@@ -61,9 +61,9 @@ pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
 }
 
 /// Returns a folder with a simulated run of C1.
-pub fn simulated() -> TempDir {
+pub fn simulated_run() -> TempDir {
     let directory = TempDir::new().unwrap();
-    good(
+    stdout_of(
         directory.path(),
         &["simulate", "--condition", "C1", "--seed", "1", "--out", "c1.csv"],
     );
@@ -71,7 +71,7 @@ pub fn simulated() -> TempDir {
 }
 
 /// Writes a file of `rows` samples at 100 Hz; `row` makes each line from its index.
-pub fn write(directory: &Path, name: &str, header: &str, rows: usize, row: impl Fn(usize) -> String) {
+pub fn write_samples(directory: &Path, name: &str, header: &str, rows: usize, row: impl Fn(usize) -> String) {
     let lines: Vec<String> = std::iter::once(header.to_owned()).chain((0..rows).map(row)).collect();
     fs::write(directory.join(name), lines.join("\n") + "\n").unwrap();
 }
@@ -94,7 +94,7 @@ pub fn row(k: usize) -> String {
 
 /// Returns arguments of `track` or `stream`, with the physical method, which starts with a fit, unless a method is
 /// given.
-pub fn physical<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+pub fn with_physical_method<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     let mut all = arguments.to_vec();
     if !all.contains(&"--method") {
         all.extend(["--method", "physical"]);

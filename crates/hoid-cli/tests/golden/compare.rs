@@ -25,13 +25,13 @@ pub fn changes(key: &str, was: &Value, now: &Value, tolerance: f64) -> Vec<Strin
                 .flat_map(|(k, (was, now))| changes(&format!("{key}[{k}]"), was, now, tolerance))
                 .collect()
         }
-        (Value::Number(a), Value::Number(b)) if same(a, b, tolerance) => Vec::new(),
+        (Value::Number(a), Value::Number(b)) if numbers_agree(a, b, tolerance) => Vec::new(),
         _ if was == now => Vec::new(),
         _ => vec![change_message(key, was, now)],
     }
 }
 
-fn same(a: &serde_json::Number, b: &serde_json::Number, tolerance: f64) -> bool {
+fn numbers_agree(a: &serde_json::Number, b: &serde_json::Number, tolerance: f64) -> bool {
     if !a.is_f64() && !b.is_f64() {
         return a == b;
     }

@@ -10,9 +10,9 @@ pub fn write(at: &Path, inputs: &[Input]) {
         let path = at.join(&input.file);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
         if let Some(options) = &input.simulate {
-            good(at, &format!("simulate {options} --out {}", input.file));
+            run_successfully(at, &format!("simulate {options} --out {}", input.file));
         } else if let Some(command) = &input.command {
-            let printed = good(at, command);
+            let printed = run_successfully(at, command);
             if !path.exists() {
                 fs::write(&path, printed).unwrap();
             }
@@ -21,12 +21,12 @@ pub fn write(at: &Path, inputs: &[Input]) {
         } else {
             let of = input.of.as_ref().unwrap_or_else(|| panic!("{}: of what?", input.file));
             let text = fs::read_to_string(at.join(of)).unwrap();
-            fs::write(&path, changed(&text, input)).unwrap();
+            fs::write(&path, modify_table(&text, input)).unwrap();
         }
     }
 }
 
-fn good(at: &Path, command: &str) -> Vec<u8> {
+fn run_successfully(at: &Path, command: &str) -> Vec<u8> {
     let done = run(at, command, None);
     let printed = String::from_utf8_lossy(&done.stderr);
     assert!(matches!(done.status.code(), Some(0 | 1)), "{command}: {printed}");
@@ -34,7 +34,7 @@ fn good(at: &Path, command: &str) -> Vec<u8> {
 }
 
 /// Applies the modifications to the columns and rows of a table, in order.
-fn changed(text: &str, input: &Input) -> String {
+fn modify_table(text: &str, input: &Input) -> String {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let places: Vec<usize> = input

@@ -9,7 +9,7 @@
 //! estimate. The evidence is tempered, since it assumes that the model is right (P. Grunwald and T. van Ommen,
 //! *Bayesian Analysis* 12 (2017) 1069-1103). The factor f^2 removes results that later samples have superseded.
 
-use super::sizes::{PARAMETERS, STARTS};
+use super::sizes::{PARAMETER_COUNT, START_COUNT};
 
 /// Deficit of evidence, in nats, at which the weight of an alternative has fallen to 1/e.
 const TEMPERATURE_NATS: f64 = 3.0;
@@ -17,7 +17,7 @@ const TEMPERATURE_NATS: f64 = 3.0;
 /// Operator rejected in a trial from another starting point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Alternative {
-    operator: [f64; PARAMETERS],
+    operator: [f64; PARAMETER_COUNT],
     deficit: f64,
     samples: u64,
     known: bool,
@@ -28,24 +28,24 @@ crate::state!([] Alternative { operator, deficit, samples, known });
 /// Operators rejected in the last trial from each starting point.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Alternatives {
-    all: [Alternative; STARTS],
+    all: [Alternative; START_COUNT],
 }
 
 crate::state!([] Alternatives { all });
 
 impl Alternatives {
-    pub const NONE: Self = Self {
+    pub const EMPTY: Self = Self {
         all: [Alternative {
-            operator: [0.0; PARAMETERS],
+            operator: [0.0; PARAMETER_COUNT],
             deficit: 0.0,
             samples: 0,
             known: false,
-        }; STARTS],
+        }; START_COUNT],
     };
 
     /// Stores the operator rejected in the trial from a starting point, with its deficit of evidence and the number of
     /// samples read by then.
-    pub fn put(&mut self, start: usize, operator: [f64; PARAMETERS], deficit: f64, samples: u64) {
+    pub fn store(&mut self, start: usize, operator: [f64; PARAMETER_COUNT], deficit: f64, samples: u64) {
         if let Some(place) = self.all.get_mut(start) {
             *place = Alternative {
                 operator,
@@ -58,16 +58,21 @@ impl Alternatives {
 
     /// Returns the weighted scatter of the alternatives about an operator. `samples` is the current number of samples;
     /// the last `window` of them are replayed.
-    pub fn scatter(&self, about: &[f64; PARAMETERS], samples: u64, window: u64) -> [[f64; PARAMETERS]; PARAMETERS] {
-        let mut scatter = [[0.0; PARAMETERS]; PARAMETERS];
+    pub fn scatter(
+        &self,
+        about: &[f64; PARAMETER_COUNT],
+        samples: u64,
+        window: u64,
+    ) -> [[f64; PARAMETER_COUNT]; PARAMETER_COUNT] {
+        let mut scatter = [[0.0; PARAMETER_COUNT]; PARAMETER_COUNT];
         let mut weights = 1.0;
         for other in self.all.iter().filter(|other| other.known) {
             let since = samples.saturating_sub(other.samples) as f64;
             let share = (1.0 - since / samples.min(window).max(1) as f64).max(0.0);
             let weight = libm::exp(-other.deficit / TEMPERATURE_NATS) * share * share;
             weights += weight;
-            for i in 0..PARAMETERS {
-                for j in 0..PARAMETERS {
+            for i in 0..PARAMETER_COUNT {
+                for j in 0..PARAMETER_COUNT {
                     scatter[i][j] += weight * (other.operator[i] - about[i]) * (other.operator[j] - about[j]);
                 }
             }
@@ -83,18 +88,18 @@ mod tests {
     #[test]
     fn alternatives_are_weighted_by_prediction_and_age() {
         let about = [0.1, 0.04, 11.0, 0.3, 0.28];
-        let mut all = Alternatives::NONE;
-        assert_eq!(all.scatter(&about, 100, 150), [[0.0; PARAMETERS]; PARAMETERS]);
+        let mut all = Alternatives::EMPTY;
+        assert_eq!(all.scatter(&about, 100, 150), [[0.0; PARAMETER_COUNT]; PARAMETER_COUNT]);
         let mut other = about;
         other[2] = 13.0;
-        all.put(0, other, 0.0, 100);
+        all.store(0, other, 0.0, 100);
         assert!((all.scatter(&about, 100, 150)[2][2] - 2.0).abs() < 1e-12);
         // If half of the replayed samples are new, its weight is 1/4; if all are, it is zero.
         assert!((all.scatter(&about, 175, 150)[2][2] - 0.8).abs() < 1e-12);
         assert_eq!(all.scatter(&about, 250, 150)[2][2], 0.0);
         // The same operator again, with a much larger deficit.
-        all.put(0, other, 300.0, 200);
+        all.store(0, other, 300.0, 200);
         assert!(all.scatter(&about, 200, 150)[2][2] < 1e-9);
-        all.put(STARTS, other, 0.0, 200);
+        all.store(START_COUNT, other, 0.0, 200);
     }
 }

@@ -24,28 +24,28 @@
 //! exact for a piecewise linear error and any delay. Apart from aliasing, the response to a sampled sine is the
 //! response of the operator multiplied by the response of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`.
 //!
-//! Each r_i is divided by its gain at [`REFERENCE`], so all gains of the numerator are in units of |Y| at that
+//! Each r_i is divided by its gain at [`REFERENCE_RAD_S`], so all gains of the numerator are in units of |Y| at that
 //! frequency.
 
 use super::{
     f64x2::F64x2,
-    signal_history::{Paired, paired},
-    sizes::{DYNAMICS, GAINS, LINEAR, SIGNALS, STATES},
+    signal_history::{SignalPairs, to_pairs},
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, SIGNAL_COUNT, STATE_COUNT},
 };
 
 /// Frequency in rad/s at which each response is scaled to a gain of one.
-pub const REFERENCE: f64 = 2.0;
+pub const REFERENCE_RAD_S: f64 = 2.0;
 
 /// Number of filter states.
-const N: usize = SIGNALS - 1;
+const N: usize = SIGNAL_COUNT - 1;
 /// Size of the matrix exponential: the filter states, plus one state for a step and one for a ramp.
 const M: usize = N + 2;
-type Square = [[f64; M]; M];
+type SquareMatrix = [[f64; M]; M];
 
 /// Complex number as real and imaginary part.
 pub type Complex = [f64; 2];
 /// Signals `z_0 .. z_5` of the basis.
-pub type Signals = [f64; SIGNALS];
+pub type Signals = [f64; SIGNAL_COUNT];
 
 /// Dynamics of a person: delay, natural frequency and damping ratio of the neuromuscular system, and lag.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,7 +64,7 @@ crate::state!([] Point { tau, omega, zeta, lag });
 
 impl Point {
     /// Returns the point with corrections of omega, zeta and tau added.
-    pub fn moved(self, [omega, zeta, tau]: [f64; DYNAMICS]) -> Self {
+    pub fn moved(self, [omega, zeta, tau]: [f64; DYNAMICS_COUNT]) -> Self {
         Self {
             tau: self.tau + tau,
             omega: self.omega + omega,
@@ -78,9 +78,9 @@ impl Point {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Regressors {
     /// Responses r_i.
-    pub x: [f64; GAINS],
+    pub x: [f64; GAIN_COUNT],
     /// Derivatives of the r_i with respect to omega, zeta and tau.
-    pub by: [[f64; GAINS]; DYNAMICS],
+    pub by: [[f64; GAIN_COUNT]; DYNAMICS_COUNT],
 }
 
 /// Filter that generates the responses for one [`Point`].
@@ -89,12 +89,12 @@ pub struct Basis {
     point: Point,
     sample_time: f64,
     /// Columns of Phi, and T_0 to T_2, each padded with a zero to the number of signals.
-    columns: [Paired; N],
-    taps: [Paired; 3],
+    columns: [SignalPairs; N],
+    taps: [SignalPairs; 3],
     monic: [f64; N],
     delay: usize,
     part: f64,
-    scale: [f64; GAINS],
+    scale: [f64; GAIN_COUNT],
     z: [f64; N],
 }
 
@@ -112,16 +112,16 @@ impl Basis {
         let mut basis = Self {
             point,
             sample_time,
-            columns: [[F64x2::ZERO; SIGNALS / 2]; N],
-            taps: [[F64x2::ZERO; SIGNALS / 2]; 3],
+            columns: [[F64x2::ZERO; SIGNAL_COUNT / 2]; N],
+            taps: [[F64x2::ZERO; SIGNAL_COUNT / 2]; 3],
             monic: [0.0; N],
             delay: 0,
             part: 0.0,
-            scale: [1.0; GAINS],
+            scale: [1.0; GAIN_COUNT],
             z: [0.0; N],
         };
         basis.discretise();
-        let at = basis.response(REFERENCE, point);
+        let at = basis.response(REFERENCE_RAD_S, point);
         basis.scale = at.map(|[re, im]| 1.0 / libm::hypot(re, im));
         let sound = basis
             .scale
@@ -156,18 +156,18 @@ impl Basis {
                 *entry = -d * h;
             }
             (m[N - 1][N], m[N][N + 1]) = (h, h);
-            exponential(&m)
+            matrix_exponential(&m)
         };
         let (first, second) = (held(delta), held(ts - delta));
-        let phi = product(&second, &first);
+        let phi = matrix_product(&second, &first);
         let through = |v: [f64; N]| -> [f64; N] { core::array::from_fn(|i| (0..N).map(|j| second[i][j] * v[j]).sum()) };
         let part = delta / ts;
         let early = through(core::array::from_fn(|i| {
             first[i][N] * (1.0 - part) + first[i][N + 1] / ts
         }));
         let late = through(core::array::from_fn(|i| first[i][N] * part - first[i][N + 1] / ts));
-        let column = |of: &dyn Fn(usize) -> f64| -> Paired {
-            paired(&core::array::from_fn(|i| if i < N { of(i) } else { 0.0 }))
+        let column = |of: &dyn Fn(usize) -> f64| -> SignalPairs {
+            to_pairs(&core::array::from_fn(|i| if i < N { of(i) } else { 0.0 }))
         };
         self.columns = core::array::from_fn(|j| column(&|i| phi[i][j]));
         self.taps = [
@@ -223,8 +223,8 @@ impl Basis {
         self.delay
     }
 
-    /// Returns the scale factor of each response: the reciprocal of its unscaled gain at [`REFERENCE`].
-    pub fn scale(&self) -> [f64; GAINS] {
+    /// Returns the scale factor of each response: the reciprocal of its unscaled gain at [`REFERENCE_RAD_S`].
+    pub fn scale_factors(&self) -> [f64; GAIN_COUNT] {
         self.scale
     }
 
@@ -238,13 +238,13 @@ impl Basis {
     /// `delay + 2` samples ago.
     #[inline(always)]
     pub fn step(&mut self, errors: [f64; 3]) -> Signals {
-        let mut sums = [F64x2::ZERO; SIGNALS / 2];
+        let mut sums = [F64x2::ZERO; SIGNAL_COUNT / 2];
         for i in 0..sums.len() {
             for j in 0..N {
-                sums[i] += self.columns[j][i] * F64x2::both(self.z[j]);
+                sums[i] += self.columns[j][i] * F64x2::splat(self.z[j]);
             }
             for j in 0..3 {
-                sums[i] += self.taps[j][i] * F64x2::both(errors[j]);
+                sums[i] += self.taps[j][i] * F64x2::splat(errors[j]);
             }
         }
         let mut signals: Signals = core::array::from_fn(|i| sums[i / 2].0[i % 2]);
@@ -262,12 +262,12 @@ impl Basis {
     pub fn regressors(&self, z: &Signals) -> Regressors {
         let Point { omega, zeta, .. } = self.point;
         let (p, q) = (2.0 * zeta * omega, omega * omega);
-        let through: [f64; LINKS] = core::array::from_fn(|i| z[i + 2] + p * z[i + 1] + q * z[i]);
+        let through: [f64; PRODUCT_COUNT] = core::array::from_fn(|i| z[i + 2] + p * z[i + 1] + q * z[i]);
         let mut r = Regressors {
-            x: [0.0; GAINS],
-            by: [[0.0; GAINS]; DYNAMICS],
+            x: [0.0; GAIN_COUNT],
+            by: [[0.0; GAIN_COUNT]; DYNAMICS_COUNT],
         };
-        for i in 0..GAINS {
+        for i in 0..GAIN_COUNT {
             let s = self.scale[i] * q;
             r.x[i] = s * through[i];
             r.by[0][i] = 2.0 / omega * r.x[i] - 2.0 * s * (zeta * z[i + 1] + omega * z[i]);
@@ -279,12 +279,12 @@ impl Basis {
 
     /// Returns the weights of the signals in the response `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, where `state`
     /// contains the gains theta and the corrections c.
-    pub fn weights(&self, state: &[f64; STATES]) -> Signals {
+    pub fn weights(&self, state: &[f64; STATE_COUNT]) -> Signals {
         let Point { omega, zeta, .. } = self.point;
         let (p, q) = (2.0 * zeta * omega, omega * omega);
         let [_, _, _, _, of_omega, of_zeta, of_tau] = *state;
-        let mut weights = [0.0; SIGNALS];
-        for i in 0..GAINS {
+        let mut weights = [0.0; SIGNAL_COUNT];
+        for i in 0..GAIN_COUNT {
             let a = state[i] * self.scale[i] * q;
             let b = a * (1.0 + 2.0 * of_omega / omega);
             weights[i] += b * q - 2.0 * a * omega * of_omega;
@@ -296,20 +296,20 @@ impl Basis {
     }
 
     /// Returns the factors that convert gains from the units of this basis to the units of the basis `to`.
-    pub(super) fn units_of(&self, to: &Self) -> [f64; GAINS] {
+    pub(super) fn gain_conversion(&self, to: &Self) -> [f64; GAIN_COUNT] {
         core::array::from_fn(|i| self.scale[i] / to.scale[i])
     }
 
     /// Converts a state to the coordinates of the basis `to`: the gains are converted to the units of `to`, and the
     /// corrections are taken relative to the point of `to`.
-    pub(super) fn carried(&self, to: &Self, state: &[f64; STATES]) -> [f64; STATES] {
+    pub(super) fn convert_state(&self, to: &Self, state: &[f64; STATE_COUNT]) -> [f64; STATE_COUNT] {
         let mut carried = *state;
-        for (s, unit) in carried.iter_mut().zip(self.units_of(to)) {
+        for (s, unit) in carried.iter_mut().zip(self.gain_conversion(to)) {
             *s *= unit;
         }
         let (from, there) = (self.point, to.point);
         let moved = [from.omega - there.omega, from.zeta - there.zeta, from.tau - there.tau];
-        for (c, moved) in carried[LINEAR..].iter_mut().zip(moved) {
+        for (c, moved) in carried[LINEAR_COUNT..].iter_mut().zip(moved) {
             *c += moved;
         }
         carried
@@ -322,10 +322,10 @@ impl Basis {
 
     /// Returns the frequency response of each r_i at a frequency in rad/s, with the natural frequency, damping and
     /// delay of the point `at`.
-    pub fn response(&self, omega_rad_s: f64, at: Point) -> [Complex; GAINS] {
+    pub fn response(&self, omega_rad_s: f64, at: Point) -> [Complex; GAIN_COUNT] {
         let w = omega_rad_s;
         let square = at.omega * at.omega;
-        let poles = times(
+        let poles = complex_product(
             [1.0 / self.point.lag, w],
             [square - w * w, 2.0 * at.zeta * at.omega * w],
         );
@@ -333,11 +333,11 @@ impl Basis {
         let hold = if half == 0.0 { 1.0 } else { libm::sin(half) / half };
         let (sin, cos) = libm::sincos(-at.tau * w);
         let size = square * hold * hold;
-        let common = over([size * cos, size * sin], poles);
+        let common = complex_quotient([size * cos, size * sin], poles);
         let mut power = [1.0, 0.0];
         core::array::from_fn(|i| {
-            let h = times(common, power).map(|h| h * self.scale[i]);
-            power = times(power, [0.0, w]);
+            let h = complex_product(common, power).map(|h| h * self.scale[i]);
+            power = complex_product(power, [0.0, w]);
             h
         })
     }
@@ -345,17 +345,17 @@ impl Basis {
     /// Returns the matrix that maps the gains to K_e and K_e_dot of the gain and lead nearest to `N(s)/(s + a)`, where
     /// N is the numerator, at the given frequencies in rad/s. The fit is by least squares in `K_e + K_e_dot j omega`;
     /// it is linear in the gains and independent of poles and delay.
-    pub fn gain_and_lead(&self, at_rad_s: &[f64]) -> [[f64; GAINS]; 2] {
+    pub fn gain_and_lead_matrix(&self, at_rad_s: &[f64]) -> [[f64; GAIN_COUNT]; 2] {
         let (a, count) = (1.0 / self.point.lag, at_rad_s.len() as f64);
         let squares: f64 = at_rad_s.iter().map(|w| w * w).sum();
-        let mut map = [[0.0; GAINS]; 2];
+        let mut map = [[0.0; GAIN_COUNT]; 2];
         for w in at_rad_s {
             let mut power = [1.0, 0.0];
-            for i in 0..GAINS {
-                let [re, im] = over(power, [a, *w]);
+            for i in 0..GAIN_COUNT {
+                let [re, im] = complex_quotient(power, [a, *w]);
                 map[0][i] += self.scale[i] * re / count;
                 map[1][i] += self.scale[i] * w * im / squares;
-                power = times(power, [0.0, *w]);
+                power = complex_product(power, [0.0, *w]);
             }
         }
         map
@@ -363,26 +363,26 @@ impl Basis {
 }
 
 /// Number of products `Q z_i` in the responses and their derivatives with respect to the delay.
-const LINKS: usize = SIGNALS - 2;
+const PRODUCT_COUNT: usize = SIGNAL_COUNT - 2;
 
-pub(super) fn times(a: Complex, b: Complex) -> Complex {
+pub(super) fn complex_product(a: Complex, b: Complex) -> Complex {
     [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]]
 }
 
-pub(super) fn over(a: Complex, b: Complex) -> Complex {
+pub(super) fn complex_quotient(a: Complex, b: Complex) -> Complex {
     let square = b[0] * b[0] + b[1] * b[1];
-    let [re, im] = times(a, [b[0], -b[1]]);
+    let [re, im] = complex_product(a, [b[0], -b[1]]);
     [re / square, im / square]
 }
 
-fn product(a: &Square, b: &Square) -> Square {
+fn matrix_product(a: &SquareMatrix, b: &SquareMatrix) -> SquareMatrix {
     core::array::from_fn(|i| core::array::from_fn(|j| (0..M).map(|k| a[i][k] * b[k][j]).sum()))
 }
 
 /// Returns the matrix exponential. The matrix is scaled to a norm below 1/4, its Taylor series is summed to order 14,
 /// and the result is squared repeatedly. The truncation error is below 1e-20 (C. Moler and C. Van Loan, *SIAM Review*
 /// 45 (2003) 3-49).
-fn exponential(m: &Square) -> Square {
+fn matrix_exponential(m: &SquareMatrix) -> SquareMatrix {
     let norm = m
         .iter()
         .map(|row| row.iter().map(|x| x.abs()).sum::<f64>())
@@ -393,12 +393,12 @@ fn exponential(m: &Square) -> Square {
         scale *= 0.5;
         halvings += 1;
     }
-    let scaled: Square = m.map(|row| row.map(|x| x * scale));
+    let scaled: SquareMatrix = m.map(|row| row.map(|x| x * scale));
     let mut sum = [[0.0; M]; M];
     (0..M).for_each(|i| sum[i][i] = 1.0);
     let mut term = sum;
     for k in 1..=14 {
-        term = product(&term, &scaled).map(|row| row.map(|x| x / f64::from(k)));
+        term = matrix_product(&term, &scaled).map(|row| row.map(|x| x / f64::from(k)));
         for (row, t) in sum.iter_mut().zip(&term) {
             for (s, t) in row.iter_mut().zip(t) {
                 *s += t;
@@ -406,7 +406,7 @@ fn exponential(m: &Square) -> Square {
         }
     }
     for _ in 0..halvings {
-        sum = product(&sum, &sum);
+        sum = matrix_product(&sum, &sum);
     }
     sum
 }

@@ -12,18 +12,18 @@
 
 use hoid_numerics::{cholesky, products::dot};
 
-use super::sizes::{DYNAMICS, LINEAR, STATES};
+use super::sizes::{DYNAMICS_COUNT, LINEAR_COUNT, STATE_COUNT};
 
 /// Number of products in the upper triangle of the normal equations.
-const PRODUCTS: usize = STATES * (STATES + 1) / 2;
+const PRODUCT_COUNT: usize = STATE_COUNT * (STATE_COUNT + 1) / 2;
 /// Ridge that is added to the diagonal, relative to the diagonal and divided by the number of samples.
-const RIDGE: f64 = 1e-3;
+const RELATIVE_RIDGE: f64 = 1e-3;
 
 /// Row of one sample in the normal equations.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     /// Regressors of gains and level, followed by the regressors of the dynamics.
-    pub x: [f64; STATES],
+    pub x: [f64; STATE_COUNT],
     /// Output, with its innovation limited, plus `q' p`.
     pub y: f64,
     /// Innovation before limiting.
@@ -35,8 +35,8 @@ pub(super) struct Row {
 /// Sums over one block from which its normal equations are formed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Block {
-    products: [f64; PRODUCTS],
-    with_output: [f64; STATES],
+    products: [f64; PRODUCT_COUNT],
+    with_output: [f64; STATE_COUNT],
     square: f64,
     pub samples: f64,
     /// Sum of the squares of the innovations before limiting.
@@ -46,8 +46,8 @@ pub(super) struct Block {
 crate::state!([] Block { products, with_output, square, samples, power });
 
 pub(super) const EMPTY: Block = Block {
-    products: [0.0; PRODUCTS],
-    with_output: [0.0; STATES],
+    products: [0.0; PRODUCT_COUNT],
+    with_output: [0.0; STATE_COUNT],
     square: 0.0,
     samples: 0.0,
     power: 0.0,
@@ -56,9 +56,9 @@ pub(super) const EMPTY: Block = Block {
 /// Solution of the normal equations `A x = b`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Solution {
-    pub state: [f64; STATES],
+    pub state: [f64; STATE_COUNT],
     /// `A^-1`.
-    pub inverse: [[f64; STATES]; STATES],
+    pub inverse: [[f64; STATE_COUNT]; STATE_COUNT],
     /// Residual sum of squares, including the contribution of the prior.
     pub residual_squares: f64,
 }
@@ -70,7 +70,7 @@ impl Block {
         let Row { x, y, .. } = row;
         let weight = 1.0 / row.variance;
         let mut k = 0;
-        for i in 0..STATES {
+        for i in 0..STATE_COUNT {
             let a = weight * x[i];
             for x in &x[i..] {
                 self.products[k] += a * x;
@@ -83,7 +83,7 @@ impl Block {
         self.power += row.innovation * row.innovation;
     }
 
-    fn join(&mut self, other: &Self) {
+    fn merge(&mut self, other: &Self) {
         let sums = |to: &mut [f64], from: &[f64]| to.iter_mut().zip(from).for_each(|(t, f)| *t += f);
         sums(&mut self.products, &other.products);
         sums(&mut self.with_output, &other.with_output);
@@ -94,17 +94,17 @@ impl Block {
 
     pub fn of(blocks: &[Self]) -> Self {
         blocks.iter().fold(EMPTY, |mut sum, block| {
-            sum.join(block);
+            sum.merge(block);
             sum
         })
     }
 
     /// Returns the block with a normal prior of the dynamics, of the given mean and standard deviations, added to its
     /// sums.
-    pub fn with_prior(mut self, mean: [f64; DYNAMICS], deviations: [f64; DYNAMICS]) -> Self {
+    pub fn with_prior(mut self, mean: [f64; DYNAMICS_COUNT], deviations: [f64; DYNAMICS_COUNT]) -> Self {
         let mut diagonal = 0;
-        for i in 0..STATES {
-            if let Some(j) = i.checked_sub(LINEAR) {
+        for i in 0..STATE_COUNT {
+            if let Some(j) = i.checked_sub(LINEAR_COUNT) {
                 // The sums are in units of the variance of eps, so the weight of the prior is the reciprocal of its
                 // variance.
                 let weight = 1.0 / (deviations[j] * deviations[j]);
@@ -112,7 +112,7 @@ impl Block {
                 self.with_output[i] += weight * mean[j];
                 self.square += weight * mean[j] * mean[j];
             }
-            diagonal += STATES - i;
+            diagonal += STATE_COUNT - i;
         }
         self
     }
@@ -123,11 +123,11 @@ impl Block {
     }
 
     /// Matrix A of the normal equations.
-    pub fn matrix(&self) -> [[f64; STATES]; STATES] {
-        let mut matrix = [[0.0; STATES]; STATES];
+    pub fn matrix(&self) -> [[f64; STATE_COUNT]; STATE_COUNT] {
+        let mut matrix = [[0.0; STATE_COUNT]; STATE_COUNT];
         let mut k = 0;
-        for i in 0..STATES {
-            for j in i..STATES {
+        for i in 0..STATE_COUNT {
+            for j in i..STATE_COUNT {
                 (matrix[i][j], matrix[j][i]) = (self.products[k], self.products[k]);
                 k += 1;
             }
@@ -136,20 +136,20 @@ impl Block {
     }
 
     /// Least-squares solution; `None` if the equations are singular or there are too few samples.
-    pub fn solved(&self) -> Option<Solution> {
-        if self.samples <= STATES as f64 {
+    pub fn solve(&self) -> Option<Solution> {
+        if self.samples <= STATE_COUNT as f64 {
             return None;
         }
         let mut factor = self.matrix();
         for (i, row) in factor.iter_mut().enumerate() {
-            row[i] *= 1.0 + RIDGE / self.samples;
+            row[i] *= 1.0 + RELATIVE_RIDGE / self.samples;
         }
-        if !cholesky::factor(&mut factor, STATES) {
+        if !cholesky::factor(&mut factor, STATE_COUNT) {
             return None;
         }
         let mut state = self.with_output;
-        cholesky::solve(&factor, STATES, &mut state);
-        let inverse = cholesky::scaled_inverse(&factor, STATES, 1.0);
+        cholesky::solve(&factor, STATE_COUNT, &mut state);
+        let inverse = cholesky::scaled_inverse(&factor, STATE_COUNT, 1.0);
         let residual_squares = (self.square - dot(&state, &self.with_output)).max(self.samples * 1e-12);
         Some(Solution {
             state,
@@ -159,7 +159,7 @@ impl Block {
     }
 
     /// Score `b - A x` of a state x. Its expected value is zero at the true state.
-    pub fn score(&self, state: &[f64; STATES]) -> [f64; STATES] {
+    pub fn score(&self, state: &[f64; STATE_COUNT]) -> [f64; STATE_COUNT] {
         let matrix = self.matrix();
         core::array::from_fn(|i| self.with_output[i] - dot(&matrix[i], state))
     }

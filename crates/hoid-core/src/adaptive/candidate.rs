@@ -21,30 +21,30 @@ use super::{
     mixture::{ChangePrior, Mixture, NoiseScales, Segments},
     moments::Moments,
     noise::NoiseModel,
-    signal_history::{Paired, SignalHistory, paired},
-    sizes::{DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STATES},
+    signal_history::{SignalHistory, SignalPairs, to_pairs},
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT, SIGNAL_COUNT, STATE_COUNT},
     volatility::Volatility,
 };
 use crate::state::{State, visit_all};
 
 /// Magnitude of a signal beyond which the filters are reset.
 pub(super) const MAX_SIGNAL: f64 = 1e100;
-/// `BASIS_POINT_RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `LARGEST_STEP` limits the change of
+/// `BASIS_POINT_RANGE` limits the basis point (omega in rad/s, zeta, tau in s), and `CORRECTION_RANGE` limits the change of
 /// the basis point in one step (relative for omega and zeta, in s for tau).
-const BASIS_POINT_RANGE: [[f64; 2]; DYNAMICS] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
-const LARGEST_STEP: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
+const BASIS_POINT_RANGE: [[f64; 2]; DYNAMICS_COUNT] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
+const CORRECTION_RANGE: [[f64; 2]; DYNAMICS_COUNT] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
 /// Longest delay in s.
 pub(super) const LONGEST_DELAY_S: f64 = 0.9;
 /// Frequencies in rad/s at which K_e and K_e_dot are fitted to the numerator of the operator.
-pub(super) const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+pub(super) const FIT_FREQUENCIES_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Initial time in s during which blocks do not count as evidence.
-const UNSETTLED_S: f64 = 2.0;
+const SETTLING_S: f64 = 2.0;
 /// Time in s over which [`Volatility`] sums each energy.
-const BURST_S: f64 = 1.28;
+const ENERGY_SPAN_S: f64 = 1.28;
 /// Longest memory, in s, of the variance in the predictive density of the evidence.
-const LEVEL_S: f64 = 20.0;
+const VARIANCE_MEMORY_S: f64 = 20.0;
 /// Time constant in s with which evidence is forgotten.
-const EVIDENCE_S: f64 = 20.0;
+const EVIDENCE_MEMORY_S: f64 = 20.0;
 /// Interval in s between updates of the whitening filter if there are no replays.
 const NOISE_UPDATE_S: f64 = 1.28;
 /// Squared innovation, in innovation variances, above which the weight of a sample in the noise model is reduced.
@@ -54,9 +54,9 @@ const MIN_RELATIVE_VARIANCE: f64 = 1e-24;
 
 /// Sample after the whitening filter.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Whitened {
+pub(super) struct WhitenedSample {
     pub y: f64,
-    pub signals: [f64; SIGNALS],
+    pub signals: [f64; SIGNAL_COUNT],
     pub level: f64,
 }
 
@@ -64,10 +64,10 @@ pub(super) struct Whitened {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Candidate {
     basis: Basis,
-    now: [f64; SIGNALS],
+    now: [f64; SIGNAL_COUNT],
     past: SignalHistory,
-    outputs: [f64; LARGEST_ORDER],
-    d: [f64; LARGEST_ORDER],
+    outputs: [f64; MAX_NOISE_ORDER],
+    d: [f64; MAX_NOISE_ORDER],
     pub noise: NoiseModel,
     /// Sums over the first p samples of the current block (p is the order of D), and over its other samples.
     early: Moments,
@@ -129,23 +129,23 @@ impl Candidate {
         start: u64,
     ) -> Self {
         let block = libm::round(prior.block / scales.sample_time).max(1.0);
-        let mut padded = [0.0; LARGEST_ORDER];
+        let mut padded = [0.0; MAX_NOISE_ORDER];
         padded[..d.order()].copy_from_slice(d.d());
         Self {
             basis,
-            now: [0.0; SIGNALS],
+            now: [0.0; SIGNAL_COUNT],
             past: SignalHistory::ZERO,
-            outputs: [0.0; LARGEST_ORDER],
+            outputs: [0.0; MAX_NOISE_ORDER],
             d: padded,
             noise: empty,
-            early: Moments::NONE,
-            late: Moments::NONE,
+            early: Moments::EMPTY,
+            late: Moments::EMPTY,
             block: block as u64,
             mixture,
             scales,
-            guide: Segments::NONE,
+            guide: Segments::EMPTY,
             skipped: 0,
-            volatility: Volatility::new(libm::round(BURST_S / (block * scales.sample_time)).max(1.0) as u64),
+            volatility: Volatility::new(libm::round(ENERGY_SPAN_S / (block * scales.sample_time)).max(1.0) as u64),
             predictive_variance: [scales.innovations, 20.0],
             evidence: 0.0,
             samples: 0,
@@ -171,7 +171,7 @@ impl Candidate {
 
     /// Makes the candidate continue without the guide, so the noise model uses the mean of the mixture.
     pub fn clear_guide(&mut self) {
-        self.guide = Segments::NONE;
+        self.guide = Segments::EMPTY;
     }
 
     pub fn basis(&self) -> &Basis {
@@ -196,18 +196,18 @@ impl Candidate {
 
     /// Step 2: returns `y = D u`, the signals of the basis filtered by D, and `D(1)`, the factor of the level.
     #[inline(always)]
-    pub fn whitened(&self, u: f64) -> Whitened {
-        let (mut y, mut z, mut level) = (u, paired(&self.now), 1.0);
-        let order = self.noise.order().next_multiple_of(4).min(LARGEST_ORDER);
+    pub fn whiten(&self, u: f64) -> WhitenedSample {
+        let (mut y, mut z, mut level) = (u, to_pairs(&self.now), 1.0);
+        let order = self.noise.order().next_multiple_of(4).min(MAX_NOISE_ORDER);
         // All hypotheses are linear in the signals, so filtering the signals once by D serves every hypothesis.
         for ((d, u), before) in self.d[..order].iter().zip(&self.outputs).zip(self.past.newest_first()) {
             y += d * u;
             level += d;
             for (z, before) in z.iter_mut().zip(before) {
-                *z += F64x2::both(*d) * *before;
+                *z += F64x2::splat(*d) * *before;
             }
         }
-        Whitened {
+        WhitenedSample {
             y,
             signals: core::array::from_fn(|i| z[i / 2].0[i % 2]),
             level,
@@ -216,16 +216,16 @@ impl Candidate {
 
     /// Step 3: returns `nu = y - H x^`, the innovation of a whitened sample for the mean of the mixture.
     #[inline(always)]
-    pub fn innovation(&self, white: &Whitened) -> f64 {
+    pub fn innovation(&self, white: &WhitenedSample) -> f64 {
         let state = self.mixture.mean();
         let w = self.basis.weights(state);
-        white.y - state[GAINS] * white.level - (0..SIGNALS).map(|k| w[k] * white.signals[k]).sum::<f64>()
+        white.y - state[GAIN_COUNT] * white.level - (0..SIGNAL_COUNT).map(|k| w[k] * white.signals[k]).sum::<f64>()
     }
 
     /// Adds a sample to the sums of the block, to the noise model and to the detector, and completes the block if it is
     /// full. Returns false if a number has overflowed.
     #[inline(always)]
-    pub fn update(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
+    pub fn update(&mut self, white: &WhitenedSample, u: f64, prior: &ChangePrior) -> bool {
         let sound = |x: &f64| x.abs() < MAX_SIGNAL;
         if !(sound(&white.y) && white.signals.iter().all(sound)) {
             return false;
@@ -234,7 +234,7 @@ impl Candidate {
             // D filters the last p outputs. A predicted output lacks the noise v and increases the innovations while it
             // is in the filter. After n consecutive predictions, n samples are therefore not used, at most p.
             self.predicted -= 1;
-            self.blocks.pass_over();
+            self.blocks.ignore_sample();
             return true;
         }
         self.samples += 1;
@@ -243,18 +243,18 @@ impl Candidate {
         if self.samples <= order.max(self.skipped) {
             return true;
         }
-        self.take_residual(u);
+        self.add_residual(u);
         let innovation = self.innovation(white);
         let row = self.row(white, innovation, prior.detector_limit);
-        self.blocks.take(&row);
-        let y = self.limited(white.y, innovation, prior.limit);
+        self.blocks.add(&row);
+        let y = self.limit_innovation(white.y, innovation, prior.limit);
         let part = match self.early.samples < order as f64 {
             true => &mut self.early,
             false => &mut self.late,
         };
         part.add(&white.signals, white.level, y);
         if (self.early.samples + self.late.samples) as u64 >= self.block {
-            self.end_of_block(prior);
+            self.end_block(prior);
         }
         true
     }
@@ -262,7 +262,7 @@ impl Candidate {
     /// Returns the output with its innovation limited to `limit` standard deviations (P. J. Huber, *Robust Statistics*,
     /// 1981).
     #[inline(always)]
-    fn limited(&self, y: f64, innovation: f64, limit: f64) -> f64 {
+    fn limit_innovation(&self, y: f64, innovation: f64, limit: f64) -> f64 {
         let most = limit * libm::sqrt(self.predictive_variance[0]);
         if most == f64::INFINITY {
             return y;
@@ -272,28 +272,28 @@ impl Candidate {
 
     /// Returns the row of the sample in the normal equations of the detector.
     #[inline(always)]
-    fn row(&self, white: &Whitened, innovation: f64, limit: f64) -> Row {
+    fn row(&self, white: &WhitenedSample, innovation: f64, limit: f64) -> Row {
         let Regressors { x, by } = self.basis.regressors(&white.signals);
         let state = self.mixture.mean();
-        let (mut row, mut shift) = ([0.0; STATES], 0.0);
+        let (mut row, mut shift) = ([0.0; STATE_COUNT], 0.0);
         // The response is linearised about the current state: dy/dtheta_i = r_i + sum_j c_j dr_i/dj, dy/dc_j = sum_i
         // theta_i dr_i/dj.
-        for i in 0..GAINS {
+        for i in 0..GAIN_COUNT {
             row[i] = x[i];
-            for j in 0..DYNAMICS {
-                row[i] += state[LINEAR + j] * by[j][i];
-                row[LINEAR + j] += state[i] * by[j][i];
+            for j in 0..DYNAMICS_COUNT {
+                row[i] += state[LINEAR_COUNT + j] * by[j][i];
+                row[LINEAR_COUNT + j] += state[i] * by[j][i];
             }
         }
-        row[GAINS] = white.level;
+        row[GAIN_COUNT] = white.level;
         // The products theta_i c_j appear in both derivatives; H_c c is added once to y so that y = H x is exact at the
         // state.
-        for j in LINEAR..STATES {
+        for j in LINEAR_COUNT..STATE_COUNT {
             shift += row[j] * state[j];
         }
         Row {
             x: row,
-            y: self.limited(white.y, innovation, limit) + shift,
+            y: self.limit_innovation(white.y, innovation, limit) + shift,
             innovation,
             variance: self.predictive_variance[0],
         }
@@ -302,20 +302,20 @@ impl Candidate {
     /// Step 10: updates the noise model with `v = u - level - w' z` at the current and the preceding samples, computed
     /// with the gains of the guide or, without a guide, with the current gains.
     #[inline(always)]
-    fn take_residual(&mut self, u: f64) {
+    fn add_residual(&mut self, u: f64) {
         let order = self.noise.order();
         if self.samples <= 2 * order as u64 {
             return;
         }
         let state = self.guide.at(self.mixture.blocks).unwrap_or(self.mixture.mean());
-        let level = state[GAINS];
-        let weights = paired(&self.basis.weights(state));
-        let left = |u: f64, z: &Paired| {
+        let level = state[GAIN_COUNT];
+        let weights = to_pairs(&self.basis.weights(state));
+        let left = |u: f64, z: &SignalPairs| {
             let response = weights[0] * z[0] + weights[1] * z[1] + weights[2] * z[2];
             u - level - response.sum()
         };
-        let mut v = [0.0; LARGEST_ORDER + 1];
-        v[0] = left(u, &paired(&self.now));
+        let mut v = [0.0; MAX_NOISE_ORDER + 1];
+        v[0] = left(u, &to_pairs(&self.now));
         for ((v, u), z) in v[1..=order].iter_mut().zip(&self.outputs).zip(self.past.newest_first()) {
             *v = left(*u, z);
         }
@@ -326,28 +326,28 @@ impl Candidate {
         self.noise.update(&v, eps, 1.0 / excess.max(1.0));
     }
 
-    fn end_of_block(&mut self, prior: &ChangePrior) {
-        let [early, late] = [&mut self.early, &mut self.late].map(|part| core::mem::replace(part, Moments::NONE));
-        let moments = early.with(&late);
+    fn end_block(&mut self, prior: &ChangePrior) {
+        let [early, late] = [&mut self.early, &mut self.late].map(|part| core::mem::replace(part, Moments::EMPTY));
+        let moments = early.merged(&late);
         let (n, ts) = (moments.samples, self.scales.sample_time);
         let least = MIN_RELATIVE_VARIANCE * self.scales.size * self.scales.size;
-        let energy = moments.energy(&self.basis, self.mixture.mean()).max(n * least);
-        let settled = self.samples as f64 * ts > UNSETTLED_S;
+        let energy = moments.residual_energy(&self.basis, self.mixture.mean()).max(n * least);
+        let settled = self.samples as f64 * ts > SETTLING_S;
         let [predictive_variance, rests_on] = &mut self.predictive_variance;
         if settled {
             // Student's density with n degrees of freedom, without the constants that cancel in differences between
             // candidates.
             let density =
                 -0.5 * n * (libm::log(*predictive_variance) + 2.0 * libm::log1p(energy / (n * *predictive_variance)));
-            self.evidence = density + libm::exp(-n * ts / EVIDENCE_S) * self.evidence;
+            self.evidence = density + libm::exp(-n * ts / EVIDENCE_MEMORY_S) * self.evidence;
         }
-        *rests_on = (*rests_on + n).min(LEVEL_S / ts).max(n);
+        *rests_on = (*rests_on + n).min(VARIANCE_MEMORY_S / ts).max(n);
         *predictive_variance = (*predictive_variance + n / *rests_on * (energy / n - *predictive_variance)).max(least);
         // The variance in the predictive density follows the mean energy of the blocks with a memory that grows to at
         // most LEVEL_S.
         let left = self.mixture.update([&early, &late], &self.basis, prior, &self.scales);
         if settled {
-            self.volatility.take(left, n);
+            self.volatility.add(left, n);
         }
     }
 
@@ -366,7 +366,7 @@ impl Candidate {
     /// Stores the output and the signals of a sample for the whitening filter.
     #[inline(always)]
     pub fn store(&mut self, u: f64) {
-        self.outputs.copy_within(0..LARGEST_ORDER - 1, 1);
+        self.outputs.copy_within(0..MAX_NOISE_ORDER - 1, 1);
         self.outputs[0] = u;
         self.past.push(&self.now);
     }
@@ -385,64 +385,68 @@ impl Candidate {
 
     /// Returns the basis point plus the corrections of a state; each correction is limited to the largest step, and the
     /// resulting point to the range of the basis.
-    pub fn corrected(&self, state: &[f64; STATES]) -> Point {
+    pub fn corrected_point(&self, state: &[f64; STATE_COUNT]) -> Point {
         let at = self.basis.point();
         let of = [at.omega, at.zeta, 1.0];
         let [omega, zeta, tau] = core::array::from_fn(|j| {
-            let [down, up] = LARGEST_STEP[j].map(|far| far * of[j]);
+            let [down, up] = CORRECTION_RANGE[j].map(|far| far * of[j]);
             let [low, high] = BASIS_POINT_RANGE[j];
             let from = [at.omega, at.zeta, at.tau][j];
-            (from + state[LINEAR + j].max(down).min(up)).max(low).min(high)
+            (from + state[LINEAR_COUNT + j].max(down).min(up)).max(low).min(high)
         });
         Point { omega, zeta, tau, ..at }
     }
 
     /// Returns the basis point plus the current corrections, within the same limits.
     pub fn point(&self) -> Point {
-        self.corrected(self.mixture.mean())
+        self.corrected_point(self.mixture.mean())
     }
 
     /// Estimates of K_e, K_e_dot, omega, zeta and tau.
-    pub fn operator(&self) -> [f64; PARAMETERS] {
-        let (map, state) = (self.basis.gain_and_lead(&NEAR_RAD_S), self.mixture.mean());
+    pub fn operator(&self) -> [f64; PARAMETER_COUNT] {
+        let (map, state) = (
+            self.basis.gain_and_lead_matrix(&FIT_FREQUENCIES_RAD_S),
+            self.mixture.mean(),
+        );
         let Point { omega, zeta, tau, .. } = self.point();
-        let gain = |i: usize| (0..GAINS).map(|k| map[i][k] * state[k]).sum();
+        let gain = |i: usize| (0..GAIN_COUNT).map(|k| map[i][k] * state[k]).sum();
         [gain(0), gain(1), omega, zeta, tau]
     }
 
     /// Frequency responses by which the gains are multiplied, at a frequency in rad/s and at the current point.
-    pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
+    pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAIN_COUNT] {
         self.basis.response(omega_rad_s, self.point())
     }
 
     /// Frequency response Y of the operator at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Complex {
         let (state, h) = (self.mixture.mean(), self.responses(omega_rad_s));
-        [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum())
+        [0, 1].map(|part| (0..GAIN_COUNT).map(|i| state[i] * h[i][part]).sum())
     }
 
     /// As [`Candidate::response`], with the derivatives of the real and imaginary parts with respect to gains, level
     /// and corrections. The derivatives are exact for the gains and finite differences for the corrections.
-    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
+    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATE_COUNT]; 2]) {
         let (state, point) = (self.mixture.mean(), self.point());
         let h = self.basis.response(omega_rad_s, point);
-        let of = |h: &[Complex; GAINS]| [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum::<f64>());
-        let mut by = [[0.0; STATES]; 2];
+        let of =
+            |h: &[Complex; GAIN_COUNT]| [0, 1].map(|part| (0..GAIN_COUNT).map(|i| state[i] * h[i][part]).sum::<f64>());
+        let mut by = [[0.0; STATE_COUNT]; 2];
         for part in 0..2 {
-            for i in 0..GAINS {
+            for i in 0..GAIN_COUNT {
                 by[part][i] = h[i][part];
             }
         }
         for (j, size) in [point.omega, point.zeta, 0.1].into_iter().enumerate() {
             let step = 1e-5 * size;
             let at = |sign: f64| {
-                let mut by = [0.0; DYNAMICS];
+                let mut by = [0.0; DYNAMICS_COUNT];
                 by[j] = sign * step;
                 of(&self.basis.response(omega_rad_s, point.moved(by)))
             };
             let (up, down) = (at(1.0), at(-1.0));
             for part in 0..2 {
-                by[part][LINEAR + j] = (up[part] - down[part]) / (2.0 * step);
+                by[part][LINEAR_COUNT + j] = (up[part] - down[part]) / (2.0 * step);
             }
         }
         (of(&h), by)
@@ -450,11 +454,15 @@ impl Candidate {
 
     /// Returns a state in the coordinates of another basis; if the points of the two bases are far apart, the
     /// corrections are set to zero.
-    pub fn carried(&self, to: &Basis, state: &[f64; STATES]) -> [f64; STATES] {
-        let mut carried = self.basis.carried(to, state);
-        let [omega, _, tau] = [carried[LINEAR], carried[LINEAR + 1], carried[LINEAR + 2]];
+    pub fn convert_state(&self, to: &Basis, state: &[f64; STATE_COUNT]) -> [f64; STATE_COUNT] {
+        let mut carried = self.basis.convert_state(to, state);
+        let [omega, _, tau] = [
+            carried[LINEAR_COUNT],
+            carried[LINEAR_COUNT + 1],
+            carried[LINEAR_COUNT + 2],
+        ];
         if tau.abs() > 0.03 || omega.abs() > 0.3 * to.point().omega {
-            carried[LINEAR..].fill(0.0);
+            carried[LINEAR_COUNT..].fill(0.0);
         }
         carried
     }

@@ -12,7 +12,7 @@
 //! for K stretches in both spans together, N unknowns, and `n_i` of the n samples in span i. The divisor corrects for
 //! two lost degrees of freedom, since the scores of each span sum to zero, and for the mean `K/(K - N - 1)` of an
 //! inverse Wishart matrix. With few stretches S is uncertain; the term with `sigma^2` keeps the covariance positive
-//! definite. The weight w is `EMPIRICAL_SHARE`. Then
+//! definite. The weight w is `EMPIRICAL_WEIGHT`. Then
 //!
 //! `d = x_1 - x_0`, `C = A_0^-1 W_0 A_0^-1 + A_1^-1 W_1 A_1^-1`.
 //!
@@ -21,16 +21,16 @@
 
 use hoid_numerics::{cholesky, products::dot};
 
-use super::{blocks::Block, sizes::STATES};
+use super::{blocks::Block, sizes::STATE_COUNT};
 
-type Matrix = [[f64; STATES]; STATES];
+type Matrix = [[f64; STATE_COUNT]; STATE_COUNT];
 
 /// Number of blocks over which each score is summed.
 const BLOCKS_PER_SCORE: usize = 2;
-/// Weight w of the covariance estimated from the scores. `MODEL_ONLY` is the weight at which only the covariance given
+/// Weight w of the covariance estimated from the scores. `MODEL_ONLY_WEIGHT` is the weight at which only the covariance given
 /// by the noise model is used.
-pub(super) const EMPIRICAL_SHARE: f64 = 2.0 / 3.0;
-pub(super) const MODEL_ONLY: f64 = 0.0;
+pub(super) const EMPIRICAL_WEIGHT: f64 = 2.0 / 3.0;
+pub(super) const MODEL_ONLY_WEIGHT: f64 = 0.0;
 /// Lower limit of the divisor of S.
 const MIN_DIVISOR: f64 = 0.3;
 
@@ -38,11 +38,11 @@ const MIN_DIVISOR: f64 = 0.3;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Contrast {
     /// State of the present minus state of the past.
-    pub difference: [f64; STATES],
+    pub difference: [f64; STATE_COUNT],
     /// Covariance of the difference.
     pub covariance: Matrix,
     /// State of the past, with corrections relative to the point of the basis.
-    pub before: [f64; STATES],
+    pub before: [f64; STATE_COUNT],
     /// Covariance of the state of the past.
     pub covariance_before: Matrix,
     /// Residual sum of squares over both spans.
@@ -56,17 +56,17 @@ crate::state!([] Contrast { difference, covariance, before, covariance_before, r
 impl Contrast {
     /// Computes the difference between two spans of blocks. `with_prior` adds a prior to the sums of each span;
     /// `empirical_share` is w. Returns `None` if the data of a span do not determine a state.
-    pub(super) fn between(
+    pub(super) fn from_spans(
         sides: [&[Block]; 2],
         empirical_share: f64,
         with_prior: impl Fn(Block) -> Block,
     ) -> Option<Self> {
         let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
-        let [Some(before), Some(now)] = sums.each_ref().map(Block::solved) else {
+        let [Some(before), Some(now)] = sums.each_ref().map(Block::solve) else {
             return None;
         };
         let solutions = [before, now];
-        let (mut squares, mut stretches) = ([[0.0; STATES]; STATES], 0.0);
+        let (mut squares, mut stretches) = ([[0.0; STATE_COUNT]; STATE_COUNT], 0.0);
         for (blocks, solution) in sides.iter().zip(&solutions) {
             for stretch in blocks.rchunks_exact(BLOCKS_PER_SCORE) {
                 let score = Block::of(stretch).score(&solution.state);
@@ -76,21 +76,21 @@ impl Contrast {
                 stretches += 1.0;
             }
         }
-        let free = (1.0 - (STATES + 3) as f64 / stretches).max(MIN_DIVISOR);
+        let free = (1.0 - (STATE_COUNT + 3) as f64 / stretches).max(MIN_DIVISOR);
         let samples = sums.map(|s| s.samples);
         let all = samples[0] + samples[1];
         let residual_squares = before.residual_squares + now.residual_squares;
-        let variance = residual_squares / (all - 2.0 * STATES as f64).max(1.0);
+        let variance = residual_squares / (all - 2.0 * STATE_COUNT as f64).max(1.0);
         let [covariance_before, covariance_now] = core::array::from_fn(|side| {
             let (matrix, inverse) = (sums[side].matrix(), &solutions[side].inverse);
             let share = empirical_share * samples[side] / (all * free);
             let model = (1.0 - empirical_share) * variance;
-            let of_score = each(|i, j| share * squares[i][j] + model * matrix[i][j]);
-            product(&product(inverse, &of_score), inverse)
+            let of_score = matrix_from_fn(|i, j| share * squares[i][j] + model * matrix[i][j]);
+            matrix_product(&matrix_product(inverse, &of_score), inverse)
         });
         Some(Self {
             difference: core::array::from_fn(|i| now.state[i] - before.state[i]),
-            covariance: each(|i, j| covariance_before[i][j] + covariance_now[i][j]),
+            covariance: matrix_from_fn(|i, j| covariance_before[i][j] + covariance_now[i][j]),
             before: before.state,
             covariance_before,
             residual_squares,
@@ -102,20 +102,20 @@ impl Contrast {
     /// if the latter is not positive definite.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
-        if !cholesky::factor(&mut factor, STATES) {
+        if !cholesky::factor(&mut factor, STATE_COUNT) {
             return None;
         }
         let mut trace = 0.0;
-        for i in 0..STATES {
+        for i in 0..STATE_COUNT {
             let mut column = core::array::from_fn(|j| self.covariance[j][i]);
-            cholesky::solve(&factor, STATES, &mut column);
+            cholesky::solve(&factor, STATE_COUNT, &mut column);
             trace += column[i];
         }
-        Some(trace / STATES as f64)
+        Some(trace / STATE_COUNT as f64)
     }
 
     /// Returns this contrast with both covariances multiplied by a factor.
-    pub(super) fn times(&self, factor: f64) -> Self {
+    pub(super) fn scaled(&self, factor: f64) -> Self {
         Self {
             covariance: self.covariance.map(|row| row.map(|c| factor * c)),
             covariance_before: self.covariance_before.map(|row| row.map(|c| factor * c)),
@@ -138,12 +138,12 @@ impl Contrast {
     }
 }
 
-fn each(of: impl Fn(usize, usize) -> f64) -> Matrix {
+fn matrix_from_fn(of: impl Fn(usize, usize) -> f64) -> Matrix {
     core::array::from_fn(|i| core::array::from_fn(|j| of(i, j)))
 }
 
-fn product(a: &Matrix, b: &Matrix) -> Matrix {
-    each(|i, j| (0..STATES).map(|k| a[i][k] * b[k][j]).sum())
+fn matrix_product(a: &Matrix, b: &Matrix) -> Matrix {
+    matrix_from_fn(|i, j| (0..STATE_COUNT).map(|k| a[i][k] * b[k][j]).sum())
 }
 
 #[cfg(test)]
@@ -153,7 +153,7 @@ mod tests {
     use crate::adaptive::blocks::{EMPTY, Row};
 
     /// Returns a number of the standard normal distribution, except for its tails.
-    fn normal(state: &mut u64) -> f64 {
+    fn random_normal(state: &mut u64) -> f64 {
         let uniform = |state: &mut u64| {
             *state = state
                 .wrapping_mul(6_364_136_223_846_793_005)
@@ -163,23 +163,23 @@ mod tests {
         (0..12).map(|_| uniform(state)).sum::<f64>() - 6.0
     }
 
-    const STATE: [f64; STATES] = [1.0, -0.5, 0.3, 0.2, 0.1, -0.2, 0.4];
-    const PLACES: [usize; 6] = [0, 1, 2, 4, 5, 6];
+    const STATE: [f64; STATE_COUNT] = [1.0, -0.5, 0.3, 0.2, 0.1, -0.2, 0.4];
+    const TESTED_STATES: [usize; 6] = [0, 1, 2, 4, 5, 6];
     /// Number of samples in a block.
-    const SAMPLES: usize = 25;
+    const SAMPLES_PER_BLOCK: usize = 25;
 
     /// Returns blocks whose regressors and noise are first-order processes, with the pole 0.8 for the regressors and
     /// the given pole for the noise.
-    fn blocks(count: usize, state: &[f64; STATES], noise_pole: f64, random: &mut u64) -> std::vec::Vec<Block> {
-        let (mut x, mut v) = ([0.0; STATES], 0.0);
+    fn blocks(count: usize, state: &[f64; STATE_COUNT], noise_pole: f64, random: &mut u64) -> std::vec::Vec<Block> {
+        let (mut x, mut v) = ([0.0; STATE_COUNT], 0.0);
         let mut all = std::vec::Vec::new();
         for _ in 0..count {
             let mut block = EMPTY;
-            for _ in 0..SAMPLES {
+            for _ in 0..SAMPLES_PER_BLOCK {
                 for x in &mut x {
-                    *x = 0.8 * *x + 0.6 * normal(random);
+                    *x = 0.8 * *x + 0.6 * random_normal(random);
                 }
-                v = noise_pole * v + libm::sqrt(1.0 - noise_pole * noise_pole) * normal(random);
+                v = noise_pole * v + libm::sqrt(1.0 - noise_pole * noise_pole) * random_normal(random);
                 let y: f64 = x.iter().zip(state).map(|(x, s)| x * s).sum();
                 block.add(&Row {
                     x,
@@ -201,12 +201,12 @@ mod tests {
         for _ in 0..runs {
             let all = blocks(70, &STATE, noise_pole, &mut random);
             let sides = [&all[..60], &all[60..]];
-            let contrast = Contrast::between(sides, EMPIRICAL_SHARE, |sum| sum).unwrap();
-            let t = contrast.wald_statistic(PLACES).unwrap();
+            let contrast = Contrast::from_spans(sides, EMPIRICAL_WEIGHT, |sum| sum).unwrap();
+            let t = contrast.wald_statistic(TESTED_STATES).unwrap();
             sum += t;
             square += t * t;
-            let model = Contrast::between(sides, MODEL_ONLY, |sum| sum).unwrap();
-            by_model += model.wald_statistic(PLACES).unwrap();
+            let model = Contrast::from_spans(sides, MODEL_ONLY_WEIGHT, |sum| sum).unwrap();
+            by_model += model.wald_statistic(TESTED_STATES).unwrap();
         }
         let n = runs as f64;
         let mean = sum / n;
@@ -235,13 +235,13 @@ mod tests {
         for (pole, [low, high]) in [(0.0, [0.9, 1.6]), (0.9, [3.0, 12.0])] {
             let mut random = 5;
             let all = blocks(70, &STATE, pole, &mut random);
-            let [shown, model] = [1.0, MODEL_ONLY].map(|w| {
+            let [shown, model] = [1.0, MODEL_ONLY_WEIGHT].map(|w| {
                 let sides = [&all[..60], &all[60..]];
-                Contrast::between(sides, w, |sum| sum).unwrap()
+                Contrast::from_spans(sides, w, |sum| sum).unwrap()
             });
             let times = shown.dispersion(&model).unwrap();
             assert!((low..high).contains(&times), "{pole}: {times}");
-            assert!((model.times(times).dispersion(&model).unwrap() - times).abs() < 1e-9);
+            assert!((model.scaled(times).dispersion(&model).unwrap() - times).abs() < 1e-9);
         }
     }
 
@@ -251,9 +251,9 @@ mod tests {
         let mut all = blocks(60, &STATE, 0.0, &mut random);
         let changed = core::array::from_fn(|i| STATE[i] + if i == 1 { 1.0 } else { 0.0 });
         all.extend(blocks(10, &changed, 0.0, &mut random));
-        let contrast = Contrast::between([&all[..60], &all[60..]], EMPIRICAL_SHARE, |sum| sum).unwrap();
-        assert!(contrast.wald_statistic(PLACES).unwrap() > 100.0);
-        for i in 0..STATES {
+        let contrast = Contrast::from_spans([&all[..60], &all[60..]], EMPIRICAL_WEIGHT, |sum| sum).unwrap();
+        assert!(contrast.wald_statistic(TESTED_STATES).unwrap() > 100.0);
+        for i in 0..STATE_COUNT {
             let expected = if i == 1 { 1.0 } else { 0.0 };
             let error = libm::sqrt(contrast.covariance[i][i]);
             assert!((contrast.difference[i] - expected).abs() < 4.0 * error);
@@ -266,10 +266,10 @@ mod tests {
     fn empty_blocks_give_no_contrast() {
         let mut random = 4;
         let all = blocks(20, &STATE, 0.0, &mut random);
-        assert!(Contrast::between([&[], &all], EMPIRICAL_SHARE, |sum| sum).is_none());
-        assert!(Contrast::between([&all, &[EMPTY; 4]], EMPIRICAL_SHARE, |sum| sum).is_none());
+        assert!(Contrast::from_spans([&[], &all], EMPIRICAL_WEIGHT, |sum| sum).is_none());
+        assert!(Contrast::from_spans([&all, &[EMPTY; 4]], EMPIRICAL_WEIGHT, |sum| sum).is_none());
         let nothing = |sum: Block| sum;
-        assert!(Contrast::between([&[EMPTY; 10], &[EMPTY; 4]], EMPIRICAL_SHARE, nothing).is_none());
-        assert!(Contrast::default().wald_statistic(PLACES).is_none());
+        assert!(Contrast::from_spans([&[EMPTY; 10], &[EMPTY; 4]], EMPIRICAL_WEIGHT, nothing).is_none());
+        assert!(Contrast::default().wald_statistic(TESTED_STATES).is_none());
     }
 }

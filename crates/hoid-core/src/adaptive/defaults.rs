@@ -7,11 +7,11 @@
 
 use super::{
     basis::Point,
-    detector::Detection,
+    detector::DetectorSettings,
     last_blocks::BLOCK_S,
     mixture::ChangePrior,
     prior::AdaptivePrior,
-    sizes::{DYNAMICS, STARTS},
+    sizes::{DYNAMICS_COUNT, START_COUNT},
 };
 
 /// Lag T_I of the default person in s.
@@ -21,21 +21,21 @@ pub const OMEGA_RAD_S: f64 = 11.0;
 /// Damping ratio of the neuromuscular system.
 pub const ZETA: f64 = 0.25;
 /// Prior standard deviations of omega and zeta (relative) and of the delay (in s) if no delay is given.
-pub const SPREAD: [f64; DYNAMICS] = [0.3, 0.5, 0.1];
+pub const PRIOR_DEVIATIONS: [f64; DYNAMICS_COUNT] = [0.3, 0.5, 0.1];
 /// Prior standard deviation of a given delay in s.
-pub const GIVEN_DELAY_S: f64 = 0.02;
+pub const GIVEN_DELAY_DEVIATION_S: f64 = 0.02;
 /// Order of the noise model.
-pub const ORDER: usize = 16;
+pub const NOISE_ORDER: usize = 16;
 /// Limit of an innovation, in standard deviations. It is large because people with a dead zone act in pulses, which are
 /// part of their response and not outliers.
-pub const LIMIT: f64 = 8.0;
+pub const INNOVATION_LIMIT: f64 = 8.0;
 /// Time in s after which the estimate starts.
-pub const HOLD_S: f64 = 1.0;
+pub const START_TIME_S: f64 = 1.0;
 /// Span in s of the data that are replayed.
-pub const REPLAYED_S: f64 = 100.0;
+pub const REPLAY_SPAN_S: f64 = 100.0;
 
 /// Default prior of the changes of the operator.
-const CHANGES: ChangePrior = ChangePrior {
+const CHANGE_PRIOR: ChangePrior = ChangePrior {
     block: 0.32,
     mean_interval_s: 180.0,
     change_deviation: [0.3, 0.4],
@@ -46,7 +46,7 @@ const CHANGES: ChangePrior = ChangePrior {
     steady: 0.6,
     free_numerator: 0.4,
     protected_blocks: 4,
-    limit: LIMIT,
+    limit: INNOVATION_LIMIT,
     detector_limit: DETECTOR_LIMIT,
 };
 /// Memory of the noise model in s.
@@ -55,7 +55,7 @@ const NOISE_MEMORY_S: f64 = 100.0;
 const DETECTOR_LIMIT: f64 = 3.5;
 /// Starting points of the first estimate: delay in s relative to the delay of the person, natural frequency in rad/s,
 /// and damping ratio. If the delay is given, all starting points have this delay.
-const STARTING_POINTS: [[f64; 3]; STARTS] = [
+const STARTING_POINTS: [[f64; 3]; START_COUNT] = [
     [0.0, OMEGA_RAD_S, ZETA],
     [0.1, 11.0, 0.3],
     [0.2, 9.0, 0.4],
@@ -67,20 +67,20 @@ const STARTING_POINTS: [[f64; 3]; STARTS] = [
 ];
 /// Shortest delay of a starting point in s.
 const SHORTEST_DELAY_S: f64 = 0.03;
-/// Spans of the detector in s: `PRESENT_S` contains the lengths of the short and the long present, `PAST_S` the
-/// smallest and the largest length of the past, and `REFRACTORY_S` is the time after a change in which no other change
+/// Spans of the detector in s: `PRESENT_LENGTHS_S` contains the lengths of the short and the long present, `PAST_LENGTHS_S` the
+/// smallest and the largest length of the past, and `REFRACTORY_PERIOD_S` is the time after a change in which no other change
 /// is declared.
-const PRESENT_S: [f64; 2] = [4.0, 8.0];
-const PAST_S: [f64; 2] = [15.0, 40.0];
-const REFRACTORY_S: f64 = 8.0;
-/// Threshold in nats for an accepted rate of one false alarm per hour; `SLOPE` is its decrease per unit of the
+const PRESENT_LENGTHS_S: [f64; 2] = [4.0, 8.0];
+const PAST_LENGTHS_S: [f64; 2] = [15.0, 40.0];
+const REFRACTORY_PERIOD_S: f64 = 8.0;
+/// Threshold in nats for an accepted rate of one false alarm per hour; `THRESHOLD_SLOPE` is its decrease per unit of the
 /// logarithm of the rate. By chance alone, one of the 7200 blocks in an hour exceeds 8.9 nats, but people vary more
 /// than the model. In 3.8 hours of recordings of three pilots without a change, the statistic exceeded 12.5 nats 2.6
 /// times per hour and 11.0 nats 3.9 times per hour.
-const THRESHOLD: f64 = 12.5;
-const SLOPE: f64 = 2.2;
+const THRESHOLD_NATS: f64 = 12.5;
+const THRESHOLD_SLOPE: f64 = 2.2;
 /// Prior standard deviation of a change of the delay in s.
-const DELAY_CHANGE_S: f64 = 0.05;
+const DELAY_CHANGE_DEVIATION_S: f64 = 0.05;
 
 /// Operator and settings assumed before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,7 +88,7 @@ pub struct DefaultOperator {
     /// Delay, natural frequency, damping and lag of the operator.
     pub point: Point,
     /// Prior standard deviations of omega and zeta (relative) and of the delay (in s).
-    pub spread: [f64; DYNAMICS],
+    pub spread: [f64; DYNAMICS_COUNT],
     /// Order of the noise model.
     pub order: usize,
     /// Limit of an innovation, in standard deviations.
@@ -108,32 +108,32 @@ impl DefaultOperator {
                 zeta: ZETA,
                 lag: LAG_S,
             },
-            spread: SPREAD,
-            order: ORDER,
-            limit: LIMIT,
+            spread: PRIOR_DEVIATIONS,
+            order: NOISE_ORDER,
+            limit: INNOVATION_LIMIT,
             false_alarms: 1.0,
         }
     }
 
     /// Returns the threshold of the detector in nats for the accepted number of false alarms.
     fn threshold(&self) -> f64 {
-        (THRESHOLD - SLOPE * libm::log(self.false_alarms)).max(1.0)
+        (THRESHOLD_NATS - THRESHOLD_SLOPE * libm::log(self.false_alarms)).max(1.0)
     }
 
     /// Returns the prior for a sample time in s.
     pub fn prior(&self, sample_time: f64) -> AdaptivePrior {
         let blocks = |seconds: f64| libm::round(seconds / BLOCK_S) as usize;
-        let given = self.spread[2] < SPREAD[2];
+        let given = self.spread[2] < PRIOR_DEVIATIONS[2];
         AdaptivePrior {
             person: self.point,
             spread: self.spread,
             sample_time,
             order: self.order,
             noise_memory: NOISE_MEMORY_S,
-            hold: HOLD_S,
+            hold: START_TIME_S,
             changes: ChangePrior {
                 limit: self.limit,
-                ..CHANGES
+                ..CHANGE_PRIOR
             },
             starts: STARTING_POINTS.map(|[later, omega, zeta]| Point {
                 tau: (self.point.tau + if given { 0.0 } else { later }).max(SHORTEST_DELAY_S),
@@ -141,13 +141,17 @@ impl DefaultOperator {
                 zeta,
                 ..self.point
             }),
-            detection: Detection {
-                recent: PRESENT_S.map(blocks),
-                least: blocks(PAST_S[0]),
-                most: blocks(PAST_S[1]),
+            detection: DetectorSettings {
+                recent: PRESENT_LENGTHS_S.map(blocks),
+                least: blocks(PAST_LENGTHS_S[0]),
+                most: blocks(PAST_LENGTHS_S[1]),
                 threshold: self.threshold(),
-                dynamics: [OMEGA_RAD_S * SPREAD[0], ZETA * SPREAD[1], DELAY_CHANGE_S],
-                refractory: blocks(REFRACTORY_S) as u64,
+                dynamics: [
+                    OMEGA_RAD_S * PRIOR_DEVIATIONS[0],
+                    ZETA * PRIOR_DEVIATIONS[1],
+                    DELAY_CHANGE_DEVIATION_S,
+                ],
+                refractory: blocks(REFRACTORY_PERIOD_S) as u64,
             },
         }
     }

@@ -30,20 +30,20 @@
 
 use super::{
     blocks::Block,
-    contrast::{Contrast, EMPIRICAL_SHARE, MODEL_ONLY},
+    contrast::{Contrast, EMPIRICAL_WEIGHT, MODEL_ONLY_WEIGHT},
     difference::Difference,
-    last_blocks::{BLOCK_S, BLOCKS, LastBlocks},
-    sizes::{DYNAMICS, GAINS, LINEAR},
+    last_blocks::{BLOCK_S, LastBlocks, MAX_BLOCKS},
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT},
 };
 
 /// Expected value of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
-const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
+const MEAN_LOG_CHI_SQUARE: f64 = 0.115_931_515_658_412_45;
 /// Number of tested parameters: gains and dynamics.
-const OPERATOR: usize = GAINS + DYNAMICS;
+const TESTED_COUNT: usize = GAIN_COUNT + DYNAMICS_COUNT;
 /// Indices of the tested parameters in the state: all states except the level.
-const OPERATOR_STATES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR + 2];
+const TESTED_STATES: [usize; TESTED_COUNT] = [0, 1, 2, LINEAR_COUNT, LINEAR_COUNT + 1, LINEAR_COUNT + 2];
 /// Number of pairs of degrees of freedom of the statistic.
-const PAIRS: u32 = OPERATOR as u32 / 2;
+const PAIR_COUNT: u32 = TESTED_COUNT as u32 / 2;
 /// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
 /// Minimum number of blocks in a present that starts after a gap.
@@ -51,14 +51,14 @@ const MIN_BLOCKS_AFTER_GAP: usize = 4;
 /// Weight, in blocks, of the prior for the level of a statistic; the prior is the level of a chi-square.
 const PRIOR_BLOCKS: f64 = 60.0;
 /// Maximum number of blocks, in addition to the prior, in the mean that estimates the level of a statistic.
-const LEVEL_MEMORY: f64 = 240.0;
+const LEVEL_MEMORY_BLOCKS: f64 = 240.0;
 /// Largest amount by which the logarithm of a statistic may exceed its mean level in the update of that level, so a
 /// change does not count as normal variation.
 const LARGEST_LOG_STEP: f64 = 3.0;
 
 /// Settings of the change detector.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Detection {
+pub struct DetectorSettings {
     /// Numbers of blocks in the short and in the long present.
     pub recent: [usize; 2],
     /// Minimum number of blocks in the past.
@@ -68,7 +68,7 @@ pub struct Detection {
     /// Log significance in nats above which a change is declared.
     pub threshold: f64,
     /// Prior standard deviations of natural frequency (rad/s), damping ratio and delay (s).
-    pub dynamics: [f64; DYNAMICS],
+    pub dynamics: [f64; DYNAMICS_COUNT],
     /// Number of blocks after a declared change in which no other change is declared.
     pub refractory: u64,
 }
@@ -86,7 +86,7 @@ crate::state!([] Statistic { level, levels, log_significance });
 impl Statistic {
     fn new() -> Self {
         Self {
-            level: mean_log(PAIRS),
+            level: mean_log_chi_square(PAIR_COUNT),
             levels: PRIOR_BLOCKS,
             log_significance: 0.0,
         }
@@ -94,21 +94,21 @@ impl Statistic {
 
     /// Mean ratio of the statistic so far to a chi-square, at least one.
     fn scale(&self) -> f64 {
-        libm::exp(self.level - mean_log(PAIRS)).max(1.0)
+        libm::exp(self.level - mean_log_chi_square(PAIR_COUNT)).max(1.0)
     }
 
-    fn take(&mut self, t: f64) {
+    fn update(&mut self, t: f64) {
         // The test uses the level estimated before this block, so a change does not reduce its own significance.
-        self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIRS);
-        self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY);
+        self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIR_COUNT);
+        self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY_BLOCKS);
         let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);
         self.level += (log - self.level) / self.levels;
     }
 }
 
 /// Returns the expected value of the logarithm of a chi-square with the given number of pairs of degrees of freedom.
-fn mean_log(pairs: u32) -> f64 {
-    MEAN_LOG + (1..pairs).map(|k| 1.0 / f64::from(k)).sum::<f64>()
+fn mean_log_chi_square(pairs: u32) -> f64 {
+    MEAN_LOG_CHI_SQUARE + (1..pairs).map(|k| 1.0 / f64::from(k)).sum::<f64>()
 }
 
 /// Returns `-ln P(chi^2 > x)` for a chi-square with the given number of pairs of degrees of freedom.
@@ -125,7 +125,7 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
 /// Detector of changes of the operator.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
-    settings: Detection,
+    settings: DetectorSettings,
     /// Statistics for the short and for the long present.
     statistics: [Statistic; 2],
     /// Number of blocks since the last change was declared.
@@ -141,10 +141,11 @@ crate::state!([] Detector { statistics, since, declared, declared_contrast, inno
 
 impl Detector {
     /// Builds the detector. Returns `None` if the settings are not valid or need more blocks than can be stored.
-    pub fn new(settings: Detection) -> Option<Self> {
+    pub fn new(settings: DetectorSettings) -> Option<Self> {
         let [short, long] = settings.recent;
         let present = short > 0 && short <= long;
-        let room = present && settings.least > 0 && settings.least <= settings.most && long + settings.most <= BLOCKS;
+        let room =
+            present && settings.least > 0 && settings.least <= settings.most && long + settings.most <= MAX_BLOCKS;
         let sound = settings.dynamics.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
             settings,
@@ -160,18 +161,18 @@ impl Detector {
 
     /// Tests the stored blocks; the last one is new. `dynamics` are the current corrections of natural frequency,
     /// damping and delay, relative to the basis of the blocks.
-    pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS]) {
+    pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS_COUNT]) {
         self.declared = false;
         self.since += 1;
         // Blocks recorded before the last declared change belong to another operator and are not used.
         let known = last
-            .all()
+            .blocks()
             .len()
-            .min(usize::try_from(self.since).unwrap_or(BLOCKS) + self.ago);
-        let blocks = &last.all()[last.all().len() - known..];
+            .min(usize::try_from(self.since).unwrap_or(MAX_BLOCKS) + self.ago);
+        let blocks = &last.blocks()[last.blocks().len() - known..];
         for present in 0..self.statistics.len() {
-            match self.wald_statistic(blocks, last.fresh(), dynamics, present) {
-                Some(t) => self.statistics[present].take(t),
+            match self.wald_statistic(blocks, last.fresh_block_count(), dynamics, present) {
+                Some(t) => self.statistics[present].update(t),
                 None => self.statistics[present].log_significance = 0.0,
             }
         }
@@ -179,13 +180,19 @@ impl Detector {
             self.declared = true;
             self.since = 0;
             let [_, long] = self.settings.recent;
-            self.locate_change(blocks, dynamics, long.min(last.fresh()));
+            self.locate_change(blocks, dynamics, long.min(last.fresh_block_count()));
         }
     }
 
     /// Statistic T for a given length of the present; `None` if there are too few blocks.
-    fn wald_statistic(&self, blocks: &[Block], fresh: usize, dynamics: [f64; DYNAMICS], present: usize) -> Option<f64> {
-        let Detection {
+    fn wald_statistic(
+        &self,
+        blocks: &[Block],
+        fresh: usize,
+        dynamics: [f64; DYNAMICS_COUNT],
+        present: usize,
+    ) -> Option<f64> {
+        let DetectorSettings {
             recent, least, most, ..
         } = self.settings;
         let recent_blocks = recent[present].min(fresh);
@@ -195,8 +202,8 @@ impl Detector {
             return None;
         }
         let sides = [&blocks[before.saturating_sub(most)..before], &blocks[now..]];
-        self.compare(sides, EMPIRICAL_SHARE, dynamics)?
-            .wald_statistic(OPERATOR_STATES)
+        self.compare(sides, EMPIRICAL_WEIGHT, dynamics)?
+            .wald_statistic(TESTED_STATES)
     }
 
     /// Locates the change at the block border with the smallest residual sum of squares. The difference is reported
@@ -204,12 +211,12 @@ impl Detector {
     /// the covariance estimated from the scores to that given by the noise model, for the difference between the two
     /// halves of the past. The covariance from the scores alone is too uncertain to distinguish gains from a delay, and
     /// the scores of the present contain the change.
-    fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS], recent: usize) {
+    fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS_COUNT], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
         for after in 1..=self.ago {
             let (past, present) = blocks.split_at(blocks.len() - after);
-            let Some(contrast) = self.compare([past, present], MODEL_ONLY, dynamics) else {
+            let Some(contrast) = self.compare([past, present], MODEL_ONLY_WEIGHT, dynamics) else {
                 continue;
             };
             if best.is_none_or(|best| contrast.residual_squares < best.residual_squares) {
@@ -218,21 +225,22 @@ impl Detector {
         }
         let (past, present) = blocks.split_at(blocks.len() - self.ago);
         let halves = past.split_at(past.len() / 2);
-        let [by_model, shown] = [MODEL_ONLY, EMPIRICAL_SHARE].map(|w| self.compare([halves.0, halves.1], w, dynamics));
+        let [by_model, shown] =
+            [MODEL_ONLY_WEIGHT, EMPIRICAL_WEIGHT].map(|w| self.compare([halves.0, halves.1], w, dynamics));
         let dispersion = shown.zip(by_model).and_then(|(shown, model)| shown.dispersion(&model));
-        self.declared_contrast = best.unwrap_or_default().times(dispersion.unwrap_or(1.0).max(1.0));
+        self.declared_contrast = best.unwrap_or_default().scaled(dispersion.unwrap_or(1.0).max(1.0));
         self.innovation_variances = [past, present].map(|side| Block::of(side).innovation_variance());
         self.difference = Difference::of(&self.declared_contrast).unwrap_or_default();
     }
 
     /// Computes the difference of all states between two spans.
-    fn compare(&self, sides: [&[Block]; 2], empirical_share: f64, dynamics: [f64; DYNAMICS]) -> Option<Contrast> {
+    fn compare(&self, sides: [&[Block]; 2], empirical_share: f64, dynamics: [f64; DYNAMICS_COUNT]) -> Option<Contrast> {
         let deviations = self.settings.dynamics;
-        Contrast::between(sides, empirical_share, |sum| sum.with_prior(dynamics, deviations))
+        Contrast::from_spans(sides, empirical_share, |sum| sum.with_prior(dynamics, deviations))
     }
 
     /// Returns the time in s between the last declared change and its declaration.
-    pub fn ago_s(&self) -> f64 {
+    pub fn detection_delay_s(&self) -> f64 {
         self.ago as f64 * BLOCK_S
     }
 
@@ -259,7 +267,7 @@ impl Detector {
     }
 
     /// True if a change was declared at the newest sample.
-    pub fn declared(&self) -> bool {
+    pub fn is_change_declared(&self) -> bool {
         self.declared
     }
 
@@ -269,7 +277,7 @@ impl Detector {
     }
 
     /// Records that no block was completed at this sample, so no change is declared at it.
-    pub(super) fn pass_over(&mut self) {
+    pub(super) fn ignore_sample(&mut self) {
         self.declared = false;
     }
 }

@@ -16,14 +16,14 @@ use hoid_numerics::{cholesky, products::dot};
 
 use super::{
     contrast::Contrast,
-    sizes::{GAINS, LINEAR, STATES},
+    sizes::{GAIN_COUNT, LINEAR_COUNT, STATE_COUNT},
 };
 
 /// Penalty per changed parameter.
-const PENALTY: f64 = 4.0;
+const PARAMETER_PENALTY: f64 = 4.0;
 /// Number of possible sets of changed groups (gains, neuromuscular system, delay); each group is one bit of the index
 /// of the set.
-const SETS: usize = 8;
+const SET_COUNT: usize = 8;
 const GAINS_BIT: usize = 1;
 const SYSTEM_BIT: usize = 2;
 const DELAY_BIT: usize = 4;
@@ -32,9 +32,9 @@ const DELAY_BIT: usize = 4;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Difference {
     /// Changes of gains, level, natural frequency, damping and delay; zero for parameters that did not change.
-    pub value: [f64; STATES],
+    pub value: [f64; STATE_COUNT],
     /// Covariance of `value`.
-    pub covariance: [[f64; STATES]; STATES],
+    pub covariance: [[f64; STATE_COUNT]; STATE_COUNT],
     /// Whether the gains, the neuromuscular system (natural frequency and damping) and the delay changed.
     pub changed: [bool; 3],
 }
@@ -45,39 +45,39 @@ impl Difference {
     /// Selects the parameters that changed. Returns `None` if the covariance of the contrast is not positive definite.
     pub(super) fn of(contrast: &Contrast) -> Option<Self> {
         let (d, mut factor) = (contrast.difference, contrast.covariance);
-        if !cholesky::factor(&mut factor, STATES) {
+        if !cholesky::factor(&mut factor, STATE_COUNT) {
             return None;
         }
-        let w = cholesky::scaled_inverse(&factor, STATES, 1.0);
+        let w = cholesky::scaled_inverse(&factor, STATE_COUNT, 1.0);
         let mut best = None;
         let mut least = f64::MAX;
         // The loop covers all sets of groups except the empty set.
-        for set in 1..SETS {
+        for set in 1..SET_COUNT {
             let is_in = |i: usize| match i {
-                0..GAINS => set & GAINS_BIT > 0,
-                GAINS => true,
-                LINEAR | 5 => set & SYSTEM_BIT > 0,
+                0..GAIN_COUNT => set & GAINS_BIT > 0,
+                GAIN_COUNT => true,
+                LINEAR_COUNT | 5 => set & SYSTEM_BIT > 0,
                 _ => set & DELAY_BIT > 0,
             };
-            let (mut places, mut n) = ([0; STATES], 0);
-            for i in (0..STATES).filter(|i| is_in(*i)) {
+            let (mut places, mut n) = ([0; STATE_COUNT], 0);
+            for i in (0..STATE_COUNT).filter(|i| is_in(*i)) {
                 places[n] = i;
                 n += 1;
             }
-            let mut own = [[0.0; STATES]; STATES];
-            let mut of_d = [0.0; STATES];
+            let mut own = [[0.0; STATE_COUNT]; STATE_COUNT];
+            let mut of_d = [0.0; STATE_COUNT];
             for (a, i) in places[..n].iter().enumerate() {
                 for (b, j) in places[..n].iter().enumerate() {
                     own[a][b] = w[*i][*j];
                 }
-                of_d[a] = (0..STATES).map(|j| w[*i][j] * d[j]).sum();
+                of_d[a] = (0..STATE_COUNT).map(|j| w[*i][j] * d[j]).sum();
             }
             if !cholesky::factor(&mut own, n) {
                 continue;
             }
             let mut of_set = of_d;
             cholesky::solve(&own, n, &mut of_set);
-            let cost = PENALTY * n as f64 - dot(&of_set[..n], &of_d);
+            let cost = PARAMETER_PENALTY * n as f64 - dot(&of_set[..n], &of_d);
             if cost < least {
                 least = cost;
                 let mut difference = Self {
@@ -104,8 +104,8 @@ mod tests {
     use super::*;
 
     /// Returns a contrast in which the delay is poorly distinguished from the gains.
-    fn contrast(difference: [f64; STATES]) -> Contrast {
-        let mut covariance = [[0.0; STATES]; STATES];
+    fn contrast(difference: [f64; STATE_COUNT]) -> Contrast {
+        let mut covariance = [[0.0; STATE_COUNT]; STATE_COUNT];
         for (i, row) in covariance.iter_mut().enumerate() {
             row[i] = 0.02;
         }

@@ -17,16 +17,16 @@ impl crate::state::State for F64x2 {
 }
 
 impl F64x2 {
-    pub const ZERO: Self = Self::both(0.0);
+    pub const ZERO: Self = Self::splat(0.0);
 
     /// Returns a pair that contains the same number twice.
     #[inline(always)]
-    pub const fn both(x: f64) -> Self {
+    pub const fn splat(x: f64) -> Self {
         Self([x; 2])
     }
 
     #[inline(always)]
-    fn with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+    fn zip_with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
         Self(core::array::from_fn(|i| of(self.0[i], other.0[i])))
     }
 
@@ -41,7 +41,7 @@ impl Add for F64x2 {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
-        self.with(other, |a, b| a + b)
+        self.zip_with(other, |a, b| a + b)
     }
 }
 
@@ -49,7 +49,7 @@ impl Sub for F64x2 {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        self.with(other, |a, b| a - b)
+        self.zip_with(other, |a, b| a - b)
     }
 }
 
@@ -57,7 +57,7 @@ impl Mul for F64x2 {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
-        self.with(other, |a, b| a * b)
+        self.zip_with(other, |a, b| a * b)
     }
 }
 
@@ -65,7 +65,7 @@ impl Div for F64x2 {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
-        self.with(other, |a, b| a / b)
+        self.zip_with(other, |a, b| a / b)
     }
 }
 

@@ -6,20 +6,20 @@
 
 mod replay;
 
-pub use replay::REPLAYED;
+pub use replay::REPLAY_SAMPLES_PER_STEP;
 
 use super::{
     alternatives::Alternatives,
     basis::{Basis, Complex, Point},
     candidate::{Candidate, LONGEST_DELAY_S, MAX_SIGNAL},
     detector::Detector,
-    history::{History, Use},
+    history::{History, SampleUse},
     initial_estimate::InitialEstimate,
     mixture::{Mixture, NoiseScales},
     noise::NoiseModel,
     prior::AdaptivePrior,
     saturation::Saturation,
-    sizes::{DYNAMICS, GAINS, LINEAR, STATES},
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, STATE_COUNT},
 };
 use crate::{
     recursion::Step,
@@ -27,12 +27,12 @@ use crate::{
 };
 
 /// Trust region of the corrections in a replay, as standard deviations: relative for omega and zeta, in s for tau.
-const TRUST_DEVIATIONS: [f64; DYNAMICS] = [0.15, 0.3, 0.03];
+const TRUST_DEVIATIONS: [f64; DYNAMICS_COUNT] = [0.15, 0.3, 0.03];
 /// Initial part of a replay, in s, that does not update the estimate: the filters start at rest, but the recorded
 /// signals do not.
-const AT_REST_S: f64 = 2.0;
+const REPLAY_RUN_IN_S: f64 = 2.0;
 /// Time in s for which the signals must be constant before their samples no longer update the estimate.
-const STILL_S: f64 = 0.1;
+const STATIONARY_AFTER_S: f64 = 0.1;
 /// Time in s in which the filters settle after a span of constant signals.
 const SETTLING_S: f64 = 2.0;
 
@@ -114,7 +114,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             sample_time: ts,
             dispersion: 1.0,
         };
-        let mixture = Mixture::new(&prior.changes, &basis, &scales, variances(&prior));
+        let mixture = Mixture::new(&prior.changes, &basis, &scales, correction_variances(&prior));
         let live = Candidate::new(
             basis.clone(),
             &prior_noise,
@@ -135,7 +135,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             replay_stage: 0,
             next_sample: 0,
             replays: 0,
-            alternatives: Alternatives::NONE,
+            alternatives: Alternatives::EMPTY,
             detector,
             history: History::new(memory),
             saturation: Saturation::new(),
@@ -155,15 +155,15 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             return None;
         }
         self.initial = Some(*known);
-        self.live = self.candidate(self.origin.point(), &self.prior_noise, 1.0)?;
+        self.live = self.build_candidate(self.origin.point(), &self.prior_noise, 1.0)?;
         self.started = true;
         Some(self)
     }
 
     /// Scales of the signals, from the data so far.
-    fn scales(&self, dispersion: f64) -> NoiseScales {
+    fn noise_scales(&self, dispersion: f64) -> NoiseScales {
         let [e, u, y] = self.powers;
-        let samples = self.history.samples().max(1) as f64;
+        let samples = self.history.sample_count().max(1) as f64;
         let measured = NoiseScales {
             // |Y| is about sqrt(power of u/power of e), the scale of the prior of the gains.
             unit: libm::sqrt(u / e),
@@ -179,7 +179,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         match &self.initial {
             Some(known) => NoiseScales {
                 unit: known.unit,
-                size: measured.size.max(libm::sqrt(known.covariance[GAINS][GAINS])),
+                size: measured.size.max(libm::sqrt(known.covariance[GAIN_COUNT][GAIN_COUNT])),
                 ..measured
             },
             None => measured,
@@ -187,13 +187,13 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Builds a candidate that starts at the oldest sample of a replay.
-    fn candidate(&self, point: Point, d: &NoiseModel, dispersion: f64) -> Option<Candidate> {
+    fn build_candidate(&self, point: Point, d: &NoiseModel, dispersion: f64) -> Option<Candidate> {
         let (ts, changes) = (self.prior.sample_time, &self.prior.changes);
         let basis = Basis::new(point, ts)?;
-        let scales = self.scales(dispersion);
+        let scales = self.noise_scales(dispersion);
         let mixture = match &self.initial {
             Some(known) => {
-                let units = self.origin.units_of(&basis);
+                let units = self.origin.gain_conversion(&basis);
                 let of = |i: usize| units.get(i).copied().unwrap_or(1.0);
                 let mut covariance = known.covariance;
                 for (i, row) in covariance.iter_mut().enumerate() {
@@ -201,67 +201,67 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                         *c *= of(i) * of(j);
                     }
                 }
-                let state = self.origin.carried(&basis, &known.state);
+                let state = self.origin.convert_state(&basis, &known.state);
                 Mixture::at(changes, state, covariance, known.variance)
             }
             None => {
                 // With replays, the basis changes from one replay to the next, and each replay has a trust region about
                 // its point. Without replays, the corrections have the full prior for a person.
-                let dynamics = match self.replays_anything() {
+                let dynamics = match self.has_replays() {
                     true => trust_region(point),
-                    false => variances(&self.prior),
+                    false => correction_variances(&self.prior),
                 };
                 Mixture::new(changes, &basis, &scales, dynamics)
             }
         };
-        let start = self.history.samples().saturating_sub(self.window());
+        let start = self.history.sample_count().saturating_sub(self.max_replay_samples());
         let empty = NoiseModel::new(self.prior.order, self.prior.noise_memory, ts)?;
-        let there = self.history.samples().saturating_sub(start);
-        let skipped = (libm::round(AT_REST_S / ts) as u64).min(there / 2);
+        let there = self.history.sample_count().saturating_sub(start);
+        let skipped = (libm::round(REPLAY_RUN_IN_S / ts) as u64).min(there / 2);
         Some(Candidate::new(basis, d, empty, mixture, scales, changes, start).with_skipped(skipped))
     }
 
     /// Maximum number of samples that a replay reads.
-    pub(super) fn window(&self) -> u64 {
+    pub(super) fn max_replay_samples(&self) -> u64 {
         let delay = errors_needed(self.prior.sample_time);
         self.history.capacity().saturating_sub(2 * delay) as u64
     }
 
-    fn replays_anything(&self) -> bool {
-        self.window() > 0
+    fn has_replays(&self) -> bool {
+        self.max_replay_samples() > 0
     }
 
     /// Takes a sample. e and u must be finite.
     pub fn step(&mut self, e: f64, u: f64) -> Step {
         self.advance_basis(e);
-        let end = self.saturation.end(u).filter(|_| self.started);
+        let end = self.saturation.limit_reached(u).filter(|_| self.started);
         self.saturation.update(u);
-        self.detector.pass_over();
+        self.detector.ignore_sample();
         if let Some(end) = end {
             // When a limit is first recognised, the previous sample, which had the same output, was already at this
             // limit. Its correction takes effect in the next replay.
             self.history.revise_previous(u, end);
-            return self.pass(u, end);
+            return self.process_without_update(u, end);
         }
         if self.is_stationary(u) {
-            return self.pass(u, Use::FilterOnly);
+            return self.process_without_update(u, SampleUse::FilterOnly);
         }
         self.powers[0] += e * e;
         self.powers[1] += u * u;
         if !self.started {
             // At the first samples the whitening filter does not yet contain enough outputs.
-            if self.history.samples() > self.prior.order as u64 {
-                let y = self.live.whitened(u).y;
+            if self.history.sample_count() > self.prior.order as u64 {
+                let y = self.live.whiten(u).y;
                 self.powers[2] += y * y;
             }
-            self.keep(u);
+            self.store_sample(u);
             self.try_to_start();
             return Step {
                 innovation: 0.0,
                 shortened: false,
             };
         }
-        let white = self.live.whitened(u);
+        let white = self.live.whiten(u);
         let innovation = self.live.innovation(&white);
         if !self.live.update(&white, u, &self.prior.changes) {
             self.restart();
@@ -271,12 +271,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             };
         }
         self.age += 1;
-        self.keep(u);
-        match self.replays_anything() {
+        self.store_sample(u);
+        match self.has_replays() {
             true => self.replay(),
             false => self.live.update_whitening(),
         }
-        if self.live.blocks.closed() {
+        if self.live.blocks.is_block_complete() {
             self.test_for_change();
         }
         Step {
@@ -285,12 +285,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// True once neither signal has changed for longer than `STILL_S`, and afterwards until the filters have settled.
+    /// True once neither signal has changed for longer than `STATIONARY_AFTER_S`, and afterwards until the filters have settled.
     /// The estimate is then not updated: the recorder has stopped or the person is resting, and the innovation variance
     /// would tend to zero.
     #[inline(always)]
     fn is_stationary(&mut self, u: f64) -> bool {
-        let samples = self.history.samples();
+        let samples = self.history.sample_count();
         let moved = samples < 2 || {
             let (newest, before) = (samples - 1, samples - 2);
             self.history.error(newest, 0) != self.history.error(before, 0) || u != self.history.output(before).0
@@ -298,19 +298,19 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let seconds = |samples: u64| samples as f64 * self.prior.sample_time;
         if !moved {
             self.constant_samples += 1;
-        } else if seconds(self.constant_samples) > STILL_S && seconds(self.settling) < SETTLING_S {
+        } else if seconds(self.constant_samples) > STATIONARY_AFTER_S && seconds(self.settling) < SETTLING_S {
             // The filters contain constant signals and need time to settle.
             self.settling += 1;
         } else {
             (self.constant_samples, self.settling) = (0, 0);
         }
-        seconds(self.constant_samples) > STILL_S
+        seconds(self.constant_samples) > STATIONARY_AFTER_S
     }
 
     /// Processes a sample without an update of the estimate.
-    fn pass(&mut self, u: f64, sample_use: Use) -> Step {
-        let innovation = self.live.innovation(&self.live.whitened(u));
-        let through = through_filters(&self.saturation, sample_use, u, u - innovation);
+    fn process_without_update(&mut self, u: f64, sample_use: SampleUse) -> Step {
+        let innovation = self.live.innovation(&self.live.whiten(u));
+        let through = filter_output(&self.saturation, sample_use, u, u - innovation);
         if innovation.abs() < MAX_SIGNAL && through.abs() < MAX_SIGNAL {
             self.history.complete(u, sample_use);
             self.passed += 1;
@@ -330,48 +330,48 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Like [`AdaptiveFilter::step`], but the estimate stays constant and only the filters are advanced.
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
         self.advance_basis(e);
-        self.detector.pass_over();
-        self.pass(u, Use::FilterOnly)
+        self.detector.ignore_sample();
+        self.process_without_update(u, SampleUse::FilterOnly)
     }
 
     /// Like [`AdaptiveFilter::step_without_update`], for a sample without u; the one-step prediction replaces the
     /// missing output.
     pub fn bridge(&mut self, e: f64) {
         self.advance_basis(e);
-        self.detector.pass_over();
-        self.pass(0.0, Use::Missing);
+        self.detector.ignore_sample();
+        self.process_without_update(0.0, SampleUse::Missing);
     }
 
     /// Advances the basis by one sample.
     #[inline(always)]
     fn advance_basis(&mut self, e: f64) {
         self.history.push(e);
-        let newest = self.history.samples() - 1;
+        let newest = self.history.sample_count() - 1;
         let history = &self.history;
         self.live.advance_basis(|age| history.error(newest, age));
     }
 
-    fn keep(&mut self, u: f64) {
-        self.history.complete(u, Use::Update);
+    fn store_sample(&mut self, u: f64) {
+        self.history.complete(u, SampleUse::Update);
         self.live.store(u);
     }
 
     /// Step 12: tests the last blocks of the live candidate for a change.
     fn test_for_change(&mut self) {
-        let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
+        let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR_COUNT + j]);
         self.detector.test(&self.live.blocks, dynamics);
     }
 
     /// Restarts the recursion after an overflow of a signal.
     fn restart(&mut self) {
         self.history.clear();
-        self.detector.pass_over();
+        self.detector.ignore_sample();
         self.saturation = Saturation::new();
         (self.powers, self.replay_stage, self.age, self.replays, self.passed) = ([0.0; 3], 0, 0, 0, 0);
-        self.alternatives = Alternatives::NONE;
+        self.alternatives = Alternatives::EMPTY;
         self.restarts += 1;
         self.started = false;
-        if let Some(live) = self.candidate(self.origin.point(), &self.prior_noise, 1.0) {
+        if let Some(live) = self.build_candidate(self.origin.point(), &self.prior_noise, 1.0) {
             self.live = live;
             self.started = self.initial.is_some();
         }
@@ -383,7 +383,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Returns the number of samples that have updated the estimate.
-    pub fn samples(&self) -> u64 {
+    pub fn update_count(&self) -> u64 {
         self.age
     }
 
@@ -409,10 +409,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Number of samples of the record, excluding those that did not update the estimate, since samples without
     /// information do not make old results obsolete.
     pub(super) fn informative_samples(&self) -> u64 {
-        self.history.samples().saturating_sub(self.passed)
+        self.history.sample_count().saturating_sub(self.passed)
     }
 
-    pub(super) fn live(&self) -> &Candidate {
+    pub(super) fn live_candidate(&self) -> &Candidate {
         &self.live
     }
 
@@ -423,7 +423,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// Returns the frequency responses by which the gains are multiplied, at a frequency in rad/s and at the current
     /// point.
-    pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
+    pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAIN_COUNT] {
         self.live.responses(omega_rad_s)
     }
 
@@ -434,7 +434,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// Returns Y at a frequency in rad/s, with the derivatives of its real and imaginary parts with respect to gains,
     /// level and corrections. The derivatives are exact for the gains and finite differences for the corrections.
-    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
+    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATE_COUNT]; 2]) {
         self.live.response_with_derivatives(omega_rad_s)
     }
 
@@ -449,7 +449,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Returns the noise model.
-    pub fn noise(&self) -> &NoiseModel {
+    pub fn noise_model(&self) -> &NoiseModel {
         &self.live.noise
     }
 
@@ -459,39 +459,39 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Returns the number of overflows after which the filters were reset.
-    pub fn restarts(&self) -> u64 {
+    pub fn restart_count(&self) -> u64 {
         self.restarts
     }
 }
 
-fn store(candidate: &mut Candidate, sample_use: Use, u: f64) {
+fn store(candidate: &mut Candidate, sample_use: SampleUse, u: f64) {
     match sample_use {
-        Use::Update => {}
-        Use::FilterOnly | Use::Missing => candidate.blocks.skip(),
-        Use::AtUpperLimit | Use::AtLowerLimit => candidate.blocks.pass_over(),
+        SampleUse::Update => {}
+        SampleUse::FilterOnly | SampleUse::Missing => candidate.blocks.count_unused_sample(),
+        SampleUse::AtUpperLimit | SampleUse::AtLowerLimit => candidate.blocks.ignore_sample(),
     }
     match sample_use {
-        Use::Update | Use::FilterOnly => candidate.store(u),
+        SampleUse::Update | SampleUse::FilterOnly => candidate.store(u),
         _ => candidate.store_prediction(u),
     }
 }
 
 /// Output that the filters receive for a sample: measured, predicted, or beyond a limit of the stick.
-fn through_filters(saturation: &Saturation, sample_use: Use, u: f64, predicted: f64) -> f64 {
+fn filter_output(saturation: &Saturation, sample_use: SampleUse, u: f64, predicted: f64) -> f64 {
     match sample_use {
-        Use::Missing => predicted,
-        _ => saturation.beyond(sample_use, u, predicted),
+        SampleUse::Missing => predicted,
+        _ => saturation.replacement(sample_use, u, predicted),
     }
 }
 
 /// Prior variances of the corrections of omega, zeta and tau.
-fn variances(prior: &AdaptivePrior) -> [f64; DYNAMICS] {
+fn correction_variances(prior: &AdaptivePrior) -> [f64; DYNAMICS_COUNT] {
     let [omega, zeta, tau] = prior.spread;
     [omega * prior.person.omega, zeta * prior.person.zeta, tau].map(|s| s * s)
 }
 
 /// Variances of the corrections in the trust region of a replay.
-fn trust_region(point: Point) -> [f64; DYNAMICS] {
+fn trust_region(point: Point) -> [f64; DYNAMICS_COUNT] {
     let [omega, zeta, tau] = TRUST_DEVIATIONS;
     [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
 }
@@ -507,10 +507,10 @@ pub fn min_memory(sample_time: f64) -> usize {
 }
 
 /// Maximum number of samples in a replay.
-const MAX_REPLAYED: f64 = 12_000.0;
+const MAX_REPLAY_SAMPLES: f64 = 12_000.0;
 
 /// Returns the length of the memory, in numbers, for replays over `seconds`. The sample time is in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
-    let samples = (seconds / sample_time).clamp(0.0, MAX_REPLAYED);
+    let samples = (seconds / sample_time).clamp(0.0, MAX_REPLAY_SAMPLES);
     3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)
 }

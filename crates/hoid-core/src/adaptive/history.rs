@@ -5,13 +5,13 @@
 use crate::state::State;
 
 /// Index of the ring of errors; the constants below are the indices of the other rings.
-const ERRORS: usize = 0;
-const OUTPUTS: usize = 1;
-const USES: usize = 2;
+const ERROR_RING: usize = 0;
+const OUTPUT_RING: usize = 1;
+const USE_RING: usize = 2;
 
 /// Use of a sample by the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Use {
+pub(super) enum SampleUse {
     /// The sample updates the estimate.
     Update,
     /// The sample only advances the filters.
@@ -24,7 +24,7 @@ pub(super) enum Use {
     AtLowerLimit,
 }
 
-impl Use {
+impl SampleUse {
     const ALL: [Self; 5] = [
         Self::FilterOnly,
         Self::Update,
@@ -37,7 +37,7 @@ impl Use {
         Self::ALL.get(number as usize).copied().unwrap_or(Self::FilterOnly)
     }
 
-    fn number(self) -> f64 {
+    fn to_number(self) -> f64 {
         Self::ALL.iter().position(|of| *of == self).unwrap_or(0) as f64
     }
 }
@@ -68,64 +68,66 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
     }
 
     /// Number of samples stored so far, including those already overwritten.
-    pub fn samples(&self) -> u64 {
+    pub fn sample_count(&self) -> u64 {
         self.samples
     }
 
     /// Index, in the memory, of a sample in a ring; `None` if there is no memory.
     #[inline(always)]
-    fn place(&self, ring: usize, sample: u64) -> Option<usize> {
+    fn index(&self, ring: usize, sample: u64) -> Option<usize> {
         let capacity = self.capacity();
         (capacity > 0).then(|| ring * capacity + (sample % capacity as u64) as usize)
     }
 
     #[inline(always)]
-    fn put(&mut self, ring: usize, sample: u64, value: f64) {
-        if let Some(place) = self.place(ring, sample) {
+    fn set(&mut self, ring: usize, sample: u64, value: f64) {
+        if let Some(place) = self.index(ring, sample) {
             self.memory.as_mut()[place] = value;
         }
     }
 
     #[inline(always)]
     fn get(&self, ring: usize, sample: u64) -> f64 {
-        self.place(ring, sample)
+        self.index(ring, sample)
             .map_or(0.0, |place| self.memory.as_ref()[place])
     }
 
     /// Stores the error of a new sample; [`History::complete`] adds the output and the use of the sample.
     #[inline(always)]
     pub fn push(&mut self, error: f64) {
-        self.put(ERRORS, self.samples, error);
+        self.set(ERROR_RING, self.samples, error);
         self.samples += 1;
     }
 
     /// Stores the output and the use of the newest sample.
     #[inline(always)]
-    pub fn complete(&mut self, output: f64, sample_use: Use) {
+    pub fn complete(&mut self, output: f64, sample_use: SampleUse) {
         let newest = self.samples.saturating_sub(1);
-        self.put(OUTPUTS, newest, output);
-        self.put(USES, newest, sample_use.number());
+        self.set(OUTPUT_RING, newest, output);
+        self.set(USE_RING, newest, sample_use.to_number());
     }
 
     /// Changes the use of the sample before the newest one if its output was `u` and it updated the estimate.
-    pub fn revise_previous(&mut self, u: f64, sample_use: Use) {
+    pub fn revise_previous(&mut self, u: f64, sample_use: SampleUse) {
         if let Some(previous) = self.samples.checked_sub(2)
-            && self.output(previous) == (u, Use::Update)
+            && self.output(previous) == (u, SampleUse::Update)
         {
-            self.put(USES, previous, sample_use.number());
+            self.set(USE_RING, previous, sample_use.to_number());
         }
     }
 
     /// Error `age` samples before the given sample; zero before the start of the record.
     #[inline(always)]
     pub fn error(&self, sample: u64, age: usize) -> f64 {
-        sample.checked_sub(age as u64).map_or(0.0, |at| self.get(ERRORS, at))
+        sample
+            .checked_sub(age as u64)
+            .map_or(0.0, |at| self.get(ERROR_RING, at))
     }
 
     /// Output and use of a sample.
     #[inline(always)]
-    pub fn output(&self, sample: u64) -> (f64, Use) {
-        (self.get(OUTPUTS, sample), Use::of(self.get(USES, sample)))
+    pub fn output(&self, sample: u64) -> (f64, SampleUse) {
+        (self.get(OUTPUT_RING, sample), SampleUse::of(self.get(USE_RING, sample)))
     }
 
     /// Removes all samples.
@@ -144,11 +146,19 @@ mod tests {
         let mut history = History::new([0.0; 30]);
         for u in [1.0, 2.0, 2.0, 1.0] {
             history.push(0.5);
-            history.complete(u, Use::Update);
-            history.revise_previous(u, Use::AtUpperLimit);
+            history.complete(u, SampleUse::Update);
+            history.revise_previous(u, SampleUse::AtUpperLimit);
         }
-        let uses: [Use; 4] = core::array::from_fn(|k| history.output(k as u64).1);
-        assert_eq!(uses, [Use::Update, Use::AtUpperLimit, Use::Update, Use::Update]);
+        let uses: [SampleUse; 4] = core::array::from_fn(|k| history.output(k as u64).1);
+        assert_eq!(
+            uses,
+            [
+                SampleUse::Update,
+                SampleUse::AtUpperLimit,
+                SampleUse::Update,
+                SampleUse::Update
+            ]
+        );
     }
 
     #[test]
@@ -156,20 +166,20 @@ mod tests {
         let mut history = History::new([9.0; 30]);
         for k in 0..25_u32 {
             history.push(f64::from(k));
-            history.complete(-f64::from(k), Use::ALL[k as usize % 5]);
+            history.complete(-f64::from(k), SampleUse::ALL[k as usize % 5]);
         }
-        assert_eq!((history.capacity(), history.samples()), (10, 25));
+        assert_eq!((history.capacity(), history.sample_count()), (10, 25));
         for k in 15..25_u64 {
             assert_eq!(history.error(24, (24 - k) as usize), k as f64);
-            assert_eq!(history.output(k), (-(k as f64), Use::ALL[k as usize % 5]));
+            assert_eq!(history.output(k), (-(k as f64), SampleUse::ALL[k as usize % 5]));
         }
         assert_eq!(history.error(3, 4), 0.0);
         history.clear();
-        assert_eq!((history.samples(), history.error(0, 0)), (0, 0.0));
+        assert_eq!((history.sample_count(), history.error(0, 0)), (0, 0.0));
         // A memory without room for a sample causes no panic.
         let mut none = History::new([0.0; 2]);
         none.push(1.0);
-        none.complete(1.0, Use::Update);
-        assert_eq!(none.output(0), (0.0, Use::FilterOnly));
+        none.complete(1.0, SampleUse::Update);
+        assert_eq!(none.output(0), (0.0, SampleUse::FilterOnly));
     }
 }

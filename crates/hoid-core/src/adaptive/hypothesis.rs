@@ -21,16 +21,16 @@ use hoid_numerics::elimination;
 use super::{
     basis::Basis,
     moments::Moments,
-    sizes::{SEGMENTS, STATES},
+    sizes::{MAX_SEGMENTS, STATE_COUNT},
 };
 
-pub(super) type Covariance = [[f64; STATES]; STATES];
+pub(super) type Covariance = [[f64; STATE_COUNT]; STATE_COUNT];
 
 /// Segment that ended with a change: its last block, and the state at its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segment {
     pub until: u64,
-    pub state: [f64; STATES],
+    pub state: [f64; STATE_COUNT],
 }
 
 crate::state!([] Segment { until, state });
@@ -38,7 +38,7 @@ crate::state!([] Segment { until, state });
 /// Hypothesis about the last change of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Hypothesis {
-    pub state: [f64; STATES],
+    pub state: [f64; STATE_COUNT],
     pub covariance: Covariance,
     /// Innovation variance, followed by its degrees of freedom.
     pub variance: f64,
@@ -47,7 +47,7 @@ pub(super) struct Hypothesis {
     /// Block at which the hypothesis was born; zero for the initial hypotheses.
     pub born: u64,
     pub class: usize,
-    segments: [Segment; SEGMENTS],
+    segments: [Segment; MAX_SEGMENTS],
     changes: usize,
 }
 
@@ -74,7 +74,13 @@ impl BlockResidual {
 }
 
 impl Hypothesis {
-    pub fn new(state: [f64; STATES], covariance: Covariance, variance: f64, class: usize, log_weight: f64) -> Self {
+    pub fn new(
+        state: [f64; STATE_COUNT],
+        covariance: Covariance,
+        variance: f64,
+        class: usize,
+        log_weight: f64,
+    ) -> Self {
         Self {
             state,
             covariance,
@@ -85,8 +91,8 @@ impl Hypothesis {
             class,
             segments: [Segment {
                 until: 0,
-                state: [0.0; STATES],
-            }; SEGMENTS],
+                state: [0.0; STATE_COUNT],
+            }; MAX_SEGMENTS],
             changes: 0,
         }
     }
@@ -97,17 +103,17 @@ impl Hypothesis {
 
     /// Segments between earlier changes, the oldest first.
     pub fn segments(&self) -> &[Segment] {
-        &self.segments[..self.changes.min(SEGMENTS)]
+        &self.segments[..self.changes.min(MAX_SEGMENTS)]
     }
 
     /// Returns the child hypothesis, which assumes that the operator changed in the given block.
     pub fn child(&self, block: u64) -> Self {
         let mut child = *self;
-        let changes = self.changes.min(SEGMENTS);
-        if changes == SEGMENTS {
+        let changes = self.changes.min(MAX_SEGMENTS);
+        if changes == MAX_SEGMENTS {
             child.segments.copy_within(1.., 0);
         }
-        let last = changes.min(SEGMENTS - 1);
+        let last = changes.min(MAX_SEGMENTS - 1);
         child.segments[last] = Segment {
             until: block,
             state: self.state,
@@ -120,30 +126,30 @@ impl Hypothesis {
     /// `1/dispersion` of an independent sample.
     pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> BlockResidual {
         // The block is linearised about the predicted state, since the response is bilinear in gains and corrections.
-        let about = moments.about(basis, &self.state);
+        let about = moments.local_model(basis, &self.state);
         let per = 1.0 / (self.variance * dispersion);
         let mut matrix: Covariance = core::array::from_fn(|i| {
             core::array::from_fn(|j| {
-                let product: f64 = (0..STATES)
+                let product: f64 = (0..STATE_COUNT)
                     .map(|k| self.covariance[i][k] * about.information[k][j])
                     .sum();
                 product * per
             })
         });
-        (0..STATES).for_each(|i| matrix[i][i] += 1.0);
+        (0..STATE_COUNT).for_each(|i| matrix[i][i] += 1.0);
         // Solving (I + P A/sigma^2) P+ = P also gives the determinant of I + P A/sigma^2, which equals the determinant
         // of S/sigma^2.
         let mut after = self.covariance;
-        let log_determinant = elimination::solve_any(&mut matrix, &mut after);
+        let log_determinant = elimination::solve_general(&mut matrix, &mut after);
         // Rounding makes P+ slightly asymmetric, and without this correction the asymmetry would grow from block to
         // block.
-        for i in 0..STATES {
+        for i in 0..STATE_COUNT {
             for j in 0..i {
                 let mean = 0.5 * (after[i][j] + after[j][i]);
                 (after[i][j], after[j][i]) = (mean, mean);
             }
         }
-        let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATES).all(|i| after[i][i] >= 0.0);
+        let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATE_COUNT).all(|i| after[i][i] >= 0.0);
         if !sound {
             return BlockResidual {
                 energy: about.energy,
@@ -152,8 +158,8 @@ impl Hypothesis {
         }
         // The step x+ - x^ = P+ b/sigma^2 is the sum of W_k nu_k over the samples of the block.
         let mut explained = 0.0;
-        for i in 0..STATES {
-            let step: f64 = (0..STATES).map(|k| after[i][k] * about.score[k]).sum();
+        for i in 0..STATE_COUNT {
+            let step: f64 = (0..STATE_COUNT).map(|k| after[i][k] * about.score[k]).sum();
             self.state[i] += per * step;
             explained += per * about.score[i] * step;
         }
@@ -195,7 +201,7 @@ mod tests {
     use super::*;
     use crate::adaptive::{
         basis::Point,
-        sizes::{GAINS, LINEAR, SIGNALS},
+        sizes::{GAIN_COUNT, LINEAR_COUNT, SIGNAL_COUNT},
     };
 
     fn basis() -> Basis {
@@ -209,15 +215,15 @@ mod tests {
     }
 
     fn covariance(gains: f64) -> Covariance {
-        let mut p = [[0.0; STATES]; STATES];
+        let mut p = [[0.0; STATE_COUNT]; STATE_COUNT];
         for (i, row) in p.iter_mut().enumerate() {
-            row[i] = if i < LINEAR { gains } else { 1e-4 };
+            row[i] = if i < LINEAR_COUNT { gains } else { 1e-4 };
         }
         p
     }
 
     fn blocks(count: usize) -> Moments {
-        let (mut basis, mut moments) = (basis(), Moments::NONE);
+        let (mut basis, mut moments) = (basis(), Moments::EMPTY);
         for k in 0..32 * count {
             let e = |k: usize| libm::sin(0.05 * k as f64) + libm::cos(0.02 * k as f64);
             let z = basis.step([e(k + 2), e(k + 1), e(k)]);
@@ -230,29 +236,32 @@ mod tests {
     fn update_satisfies_the_kalman_equations() {
         // A singular covariance: the gains are on a line.
         let mut p = covariance(0.0);
-        for i in 0..GAINS {
-            for j in 0..GAINS {
+        for i in 0..GAIN_COUNT {
+            for j in 0..GAIN_COUNT {
                 p[i][j] = 0.3 * (1.0 + i as f64) * (1.0 + j as f64);
             }
         }
-        p[GAINS][GAINS] = 0.2;
-        let mut h = Hypothesis::new([0.0; STATES], p, 0.01, 0, 0.0);
+        p[GAIN_COUNT][GAIN_COUNT] = 0.2;
+        let mut h = Hypothesis::new([0.0; STATE_COUNT], p, 0.01, 0, 0.0);
         let moments = blocks(2);
-        let about = moments.about(&basis(), &h.state);
+        let about = moments.local_model(&basis(), &h.state);
         h.update(&moments, &basis(), 1.0);
         // A is singular here, so P+ = P - P (A^-1 sigma^2 + P)^-1 P cannot be used; P+ (I + A P/sigma^2) = P is
         // equivalent.
-        for i in 0..STATES {
-            for j in 0..STATES {
-                let back: f64 = (0..STATES)
+        for i in 0..STATE_COUNT {
+            for j in 0..STATE_COUNT {
+                let back: f64 = (0..STATE_COUNT)
                     .map(|k| {
-                        let of_k: f64 = (0..STATES).map(|l| about.information[k][l] * p[l][j]).sum();
+                        let of_k: f64 = (0..STATE_COUNT).map(|l| about.information[k][l] * p[l][j]).sum();
                         h.covariance[i][k] * (of_k / 0.01 + if k == j { 1.0 } else { 0.0 })
                     })
                     .sum();
                 assert!((back - p[i][j]).abs() < 1e-9, "{i} {j}: {back} {}", p[i][j]);
             }
-            let step: f64 = (0..STATES).map(|k| h.covariance[i][k] * about.score[k]).sum::<f64>() / 0.01;
+            let step: f64 = (0..STATE_COUNT)
+                .map(|k| h.covariance[i][k] * about.score[k])
+                .sum::<f64>()
+                / 0.01;
             assert!((h.state[i] - step).abs() < 1e-12);
         }
         // The gains remain on this line.
@@ -261,30 +270,30 @@ mod tests {
 
     #[test]
     fn empty_and_overflowing_blocks_change_nothing() {
-        let mut h = Hypothesis::new([0.1; STATES], covariance(1.0), 0.01, 0, 0.0);
+        let mut h = Hypothesis::new([0.1; STATE_COUNT], covariance(1.0), 0.01, 0, 0.0);
         let before = h;
-        let left = h.update(&Moments::NONE, &basis(), 1.0);
+        let left = h.update(&Moments::EMPTY, &basis(), 1.0);
         assert_eq!(
             (h.state, h.covariance, left.energy),
             (before.state, before.covariance, 0.0)
         );
         // A block that overflows does not change the estimate either.
-        let mut huge = Moments::NONE;
-        huge.add(&[1e200; SIGNALS], 1.0, 1.0);
+        let mut huge = Moments::EMPTY;
+        huge.add(&[1e200; SIGNAL_COUNT], 1.0, 1.0);
         h.update(&huge, &basis(), 1.0);
         assert!(h.state.iter().all(|s| s.is_finite()));
     }
 
     #[test]
     fn child_keeps_earlier_segments() {
-        let mut h = Hypothesis::new([0.1; STATES], covariance(1.0), 0.01, 0, 0.0);
-        for block in 1..=SEGMENTS as u64 + 2 {
+        let mut h = Hypothesis::new([0.1; STATE_COUNT], covariance(1.0), 0.01, 0, 0.0);
+        for block in 1..=MAX_SEGMENTS as u64 + 2 {
             h.state[0] = block as f64;
             h = h.child(block);
         }
         let segments = h.segments();
-        assert_eq!(segments.len(), SEGMENTS);
+        assert_eq!(segments.len(), MAX_SEGMENTS);
         assert_eq!((segments[0].until, segments[0].state[0]), (3, 3.0));
-        assert_eq!(h.born, SEGMENTS as u64 + 2);
+        assert_eq!(h.born, MAX_SEGMENTS as u64 + 2);
     }
 }

@@ -6,16 +6,16 @@
 
 use super::{
     noise::{Lags, NoiseModel},
-    sizes::{GAINS, STATES},
+    sizes::{GAIN_COUNT, STATE_COUNT},
 };
 
 /// Estimate before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InitialEstimate {
     /// Gains, level, and corrections of the basis point.
-    pub state: [f64; STATES],
+    pub state: [f64; STATE_COUNT],
     /// Covariance of the state.
-    pub covariance: [[f64; STATES]; STATES],
+    pub covariance: [[f64; STATE_COUNT]; STATE_COUNT],
     /// Innovation variance.
     pub variance: f64,
     /// |Y| at the reference frequency.
@@ -31,8 +31,8 @@ impl InitialEstimate {
         let finite = |x: &f64| x.is_finite();
         self.state.iter().all(finite)
             && self.covariance.iter().flatten().all(finite)
-            && (0..STATES).all(|i| self.covariance[i][i] >= 0.0)
-            && self.covariance[GAINS][GAINS] > 0.0
+            && (0..STATE_COUNT).all(|i| self.covariance[i][i] >= 0.0)
+            && self.covariance[GAIN_COUNT][GAIN_COUNT] > 0.0
             && self.variance > 0.0
             && self.unit > 0.0
             && self.variance.is_finite()

@@ -8,19 +8,19 @@
 use super::blocks::{Block, EMPTY, Row};
 
 /// Maximum number of blocks.
-pub const BLOCKS: usize = 96;
+pub const MAX_BLOCKS: usize = 96;
 /// Length of a block in s.
 pub const BLOCK_S: f64 = 0.5;
-/// Time in s from which unused samples count as a gap; `SKIPPED_S` is the time that is skipped after a gap.
-const GAP_S: f64 = 0.25;
-const SKIPPED_S: f64 = 2.0;
+/// Time in s from which unused samples count as a gap; `SKIPPED_AFTER_GAP_S` is the time that is skipped after a gap.
+const MIN_GAP_S: f64 = 0.25;
+const SKIPPED_AFTER_GAP_S: f64 = 2.0;
 
 /// Last blocks, the oldest first.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LastBlocks {
     samples_of_block: u64,
     open: Block,
-    blocks: [Block; BLOCKS],
+    blocks: [Block; MAX_BLOCKS],
     count: usize,
     /// Number of consecutive unused samples, and number of samples that still have to be skipped.
     gap: u64,
@@ -29,12 +29,12 @@ pub(super) struct LastBlocks {
     closed: bool,
 }
 
-crate::state!([] LastBlocks { open, blocks, count, gap, to_skip, fresh, closed }, bounded);
+crate::state!([] LastBlocks { open, blocks, count, gap, to_skip, fresh, closed }, limit_restored);
 
 impl LastBlocks {
     /// Limits the restored number of blocks.
-    fn bounded(&mut self) {
-        self.count = self.count.min(BLOCKS);
+    fn limit_restored(&mut self) {
+        self.count = self.count.min(MAX_BLOCKS);
     }
 
     /// Returns an empty list of blocks, with the sample time in s.
@@ -42,18 +42,18 @@ impl LastBlocks {
         Self {
             samples_of_block: libm::round(BLOCK_S / ts).max(1.0) as u64,
             open: EMPTY,
-            blocks: [EMPTY; BLOCKS],
+            blocks: [EMPTY; MAX_BLOCKS],
             count: 0,
             gap: 0,
             to_skip: 0,
-            fresh: BLOCKS,
+            fresh: MAX_BLOCKS,
             closed: false,
         }
     }
 
     /// Adds a sample to the current block, unless it follows a gap and has to be skipped.
     #[inline(always)]
-    pub fn take(&mut self, row: &Row) {
+    pub fn add(&mut self, row: &Row) {
         (self.gap, self.closed) = (0, false);
         if self.to_skip > 0 {
             self.to_skip -= 1;
@@ -61,32 +61,32 @@ impl LastBlocks {
         }
         self.open.add(row);
         if self.open.samples >= self.samples_of_block as f64 {
-            self.close();
+            self.close_block();
         }
     }
 
-    fn close(&mut self) {
-        if self.count == BLOCKS {
+    fn close_block(&mut self) {
+        if self.count == MAX_BLOCKS {
             self.blocks.copy_within(1.., 0);
             self.count -= 1;
         }
         self.blocks[self.count] = core::mem::replace(&mut self.open, EMPTY);
         self.count += 1;
-        self.fresh = (self.fresh + 1).min(BLOCKS);
+        self.fresh = (self.fresh + 1).min(MAX_BLOCKS);
         self.closed = true;
     }
 
     /// Passes over a sample that carries no information but is not faulty, such as an output at a limit of the stick.
-    pub fn pass_over(&mut self) {
+    pub fn ignore_sample(&mut self) {
         self.closed = false;
     }
 
     /// Counts an unused sample.
-    pub fn skip(&mut self) {
-        self.pass_over();
+    pub fn count_unused_sample(&mut self) {
+        self.ignore_sample();
         self.gap += 1;
         let samples = |seconds: f64| (seconds / BLOCK_S * self.samples_of_block as f64) as u64;
-        let (long, to_skip) = (samples(GAP_S).max(1), samples(SKIPPED_S));
+        let (long, to_skip) = (samples(MIN_GAP_S).max(1), samples(SKIPPED_AFTER_GAP_S));
         if self.gap == long {
             // Drops the incomplete block and the block before it.
             self.open = EMPTY;
@@ -99,17 +99,17 @@ impl LastBlocks {
     }
 
     /// All stored blocks, the oldest first.
-    pub fn all(&self) -> &[Block] {
-        &self.blocks[..self.count.min(BLOCKS)]
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks[..self.count.min(MAX_BLOCKS)]
     }
 
     /// Number of blocks completed since the last gap.
-    pub fn fresh(&self) -> usize {
+    pub fn fresh_block_count(&self) -> usize {
         self.fresh
     }
 
     /// True if the last sample completed a block.
-    pub fn closed(&self) -> bool {
+    pub fn is_block_complete(&self) -> bool {
         self.closed
     }
 }
@@ -117,10 +117,10 @@ impl LastBlocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{adaptive::sizes::STATES, state::State};
+    use crate::{adaptive::sizes::STATE_COUNT, state::State};
 
     const ROW: Row = Row {
-        x: [1.0; STATES],
+        x: [1.0; STATE_COUNT],
         y: 1.0,
         innovation: 0.0,
         variance: 1.0,
@@ -130,11 +130,11 @@ mod tests {
     fn blocks_last_half_a_second_and_the_oldest_is_dropped() {
         let mut last = LastBlocks::new(0.1);
         let mut closed = 0;
-        for _ in 0..5 * (BLOCKS + 3) {
-            last.take(&ROW);
-            closed += usize::from(last.closed());
+        for _ in 0..5 * (MAX_BLOCKS + 3) {
+            last.add(&ROW);
+            closed += usize::from(last.is_block_complete());
         }
-        assert_eq!((closed, last.all().len()), (BLOCKS + 3, BLOCKS));
+        assert_eq!((closed, last.blocks().len()), (MAX_BLOCKS + 3, MAX_BLOCKS));
     }
 
     /// The number of blocks remains within the list after invalid numbers were restored.
@@ -142,27 +142,27 @@ mod tests {
     fn restored_block_count_is_limited() {
         let mut last = LastBlocks::new(0.1);
         last.visit(&mut |number| *number = 1e18);
-        (0..20).for_each(|_| last.take(&ROW));
+        (0..20).for_each(|_| last.add(&ROW));
         (last.to_skip, last.open) = (0, EMPTY);
-        (0..20).for_each(|_| last.take(&ROW));
-        assert_eq!(last.all().len(), BLOCKS);
+        (0..20).for_each(|_| last.add(&ROW));
+        assert_eq!(last.blocks().len(), MAX_BLOCKS);
     }
 
     #[test]
     fn blocks_next_to_a_gap_are_dropped() {
         let mut last = LastBlocks::new(0.05);
-        (0..25).for_each(|_| last.take(&ROW));
-        assert_eq!(last.all().len(), 2);
+        (0..25).for_each(|_| last.add(&ROW));
+        assert_eq!(last.blocks().len(), 2);
         // First fewer unused samples than in a gap, then a gap.
-        (0..4).for_each(|_| last.skip());
-        last.take(&ROW);
-        assert_eq!(last.all().len(), 2);
-        (0..5).for_each(|_| last.skip());
-        assert_eq!((last.all().len(), last.fresh()), (1, 0));
+        (0..4).for_each(|_| last.count_unused_sample());
+        last.add(&ROW);
+        assert_eq!(last.blocks().len(), 2);
+        (0..5).for_each(|_| last.count_unused_sample());
+        assert_eq!((last.blocks().len(), last.fresh_block_count()), (1, 0));
         // The two seconds after the gap are skipped.
-        (0..49).for_each(|_| last.take(&ROW));
-        assert_eq!(last.all().len(), 1);
-        last.take(&ROW);
-        assert_eq!((last.all().len(), last.fresh()), (2, 1));
+        (0..49).for_each(|_| last.add(&ROW));
+        assert_eq!(last.blocks().len(), 1);
+        last.add(&ROW);
+        assert_eq!((last.blocks().len(), last.fresh_block_count()), (2, 1));
     }
 }

@@ -30,7 +30,7 @@ use super::{
     basis::Basis,
     hypothesis::{BlockResidual, Covariance, Hypothesis, Segment},
     moments::Moments,
-    sizes::{CLASSES, DYNAMICS, GAINS, HYPOTHESES, LINEAR, SEGMENTS, STATES},
+    sizes::{CLASS_COUNT, DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_HYPOTHESES, MAX_SEGMENTS, STATE_COUNT},
 };
 
 /// Prior of the changes of the operator. Gains are in units of |Y| at the reference frequency.
@@ -85,7 +85,7 @@ impl ChangePrior {
 const FIRST_BIRTH_S: f64 = 3.0;
 /// Factor that multiplies the probability of a class with gain and lead when its best hypothesis has a child with a
 /// free numerator.
-const FORM_SWITCH: f64 = 0.3;
+const FORM_SWITCH_FACTOR: f64 = 0.3;
 /// Lower limit of a log probability.
 const MIN_LOG_WEIGHT: f64 = -60.0;
 /// Prior standard deviation of the gains relative to the ratio of the magnitudes of u and e.
@@ -109,10 +109,10 @@ crate::state!([] NoiseScales { unit, size, innovations, sample_time, dispersion 
 /// Mixture of hypotheses.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Mixture {
-    hypotheses: [Hypothesis; HYPOTHESES],
+    hypotheses: [Hypothesis; MAX_HYPOTHESES],
     count: usize,
     pub blocks: u64,
-    mean: [f64; STATES],
+    mean: [f64; STATE_COUNT],
 }
 
 crate::state!([] Mixture { hypotheses, count, blocks, mean });
@@ -120,36 +120,42 @@ crate::state!([] Mixture { hypotheses, count, blocks, mean });
 impl Mixture {
     /// Returns a mixture with one hypothesis of each class, all at the prior. `dynamics` are the prior variances of the
     /// corrections.
-    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, dynamics: [f64; DYNAMICS]) -> Self {
-        let mut p = [[0.0; STATES]; STATES];
-        p[GAINS][GAINS] = scales.size * scales.size;
+    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, dynamics: [f64; DYNAMICS_COUNT]) -> Self {
+        let mut p = [[0.0; STATE_COUNT]; STATE_COUNT];
+        p[GAIN_COUNT][GAIN_COUNT] = scales.size * scales.size;
         for (j, variance) in dynamics.into_iter().enumerate() {
-            p[LINEAR + j][LINEAR + j] = variance;
+            p[LINEAR_COUNT + j][LINEAR_COUNT + j] = variance;
         }
         Self::of(prior, |class| {
             let mut p = p;
             inflate_gains(&mut p, basis, class, [INITIAL_GAIN_DEVIATION * scales.unit; 2]);
-            ([0.0; STATES], p, scales.innovations)
+            ([0.0; STATE_COUNT], p, scales.innovations)
         })
     }
 
     /// Returns a mixture with one hypothesis of each class, all at a known estimate.
-    pub fn at(prior: &ChangePrior, state: [f64; STATES], covariance: Covariance, variance: f64) -> Self {
+    pub fn at(prior: &ChangePrior, state: [f64; STATE_COUNT], covariance: Covariance, variance: f64) -> Self {
         Self::of(prior, |_| (state, covariance, variance))
     }
 
-    fn of(prior: &ChangePrior, start: impl Fn(usize) -> ([f64; STATES], Covariance, f64)) -> Self {
+    fn of(prior: &ChangePrior, start: impl Fn(usize) -> ([f64; STATE_COUNT], Covariance, f64)) -> Self {
         let share = |class: usize| {
             [prior.steady, 1.0 - prior.steady][class % 2]
                 * [1.0 - prior.free_numerator, prior.free_numerator][class / 2]
         };
         let mut mixture = Self {
-            hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, MIN_LOG_WEIGHT); HYPOTHESES],
+            hypotheses: [Hypothesis::new(
+                [0.0; STATE_COUNT],
+                [[0.0; STATE_COUNT]; STATE_COUNT],
+                0.0,
+                0,
+                MIN_LOG_WEIGHT,
+            ); MAX_HYPOTHESES],
             count: 0,
             blocks: 0,
-            mean: [0.0; STATES],
+            mean: [0.0; STATE_COUNT],
         };
-        for class in (0..CLASSES).filter(|class| share(*class) > 0.0) {
+        for class in (0..CLASS_COUNT).filter(|class| share(*class) > 0.0) {
             let (state, covariance, variance) = start(class);
             let weight = libm::log(share(class));
             mixture.hypotheses[mixture.count] = Hypothesis::new(state, covariance, variance, class, weight);
@@ -159,12 +165,12 @@ impl Mixture {
         mixture
     }
 
-    fn all(&self) -> &[Hypothesis] {
-        &self.hypotheses[..self.count.min(HYPOTHESES)]
+    fn hypotheses(&self) -> &[Hypothesis] {
+        &self.hypotheses[..self.count.min(MAX_HYPOTHESES)]
     }
 
-    fn all_mut(&mut self) -> &mut [Hypothesis] {
-        &mut self.hypotheses[..self.count.min(HYPOTHESES)]
+    fn hypotheses_mut(&mut self) -> &mut [Hypothesis] {
+        &mut self.hypotheses[..self.count.min(MAX_HYPOTHESES)]
     }
 
     /// Performs steps 5 to 9 for a block, given the sums over its first p samples and over its other samples. Returns
@@ -177,13 +183,13 @@ impl Mixture {
         scales: &NoiseScales,
     ) -> f64 {
         self.blocks += 1;
-        let moments = &early.with(late);
+        let moments = &early.merged(late);
         let (blocks, seconds) = (self.blocks, moments.samples * scales.sample_time);
         let newborn = |h: &Hypothesis| h.born > 0 && h.born + 1 == blocks;
         let parents = self.likeliest_per_class().map(|best| best.map(|i| self.hypotheses[i]));
-        let mut left = [BlockResidual::ZERO; HYPOTHESES];
+        let mut left = [BlockResidual::ZERO; MAX_HYPOTHESES];
         let (mut common, mut best) = (f64::INFINITY, self.mean);
-        for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
+        for (h, left) in self.hypotheses_mut().iter_mut().zip(&mut left) {
             // Step 5, P_j + Q_j: a random walk of the gains, which is faster just after a change, while the gains are
             // still settling.
             let age = (blocks - h.born.min(blocks)) as f64 * seconds;
@@ -195,7 +201,7 @@ impl Mixture {
             let step = libm::sqrt(drift * seconds) * scales.unit;
             inflate_gains(&mut h.covariance, basis, h.class, [step; 2]);
             let level = prior.level * scales.size;
-            h.covariance[GAINS][GAINS] += level * level * seconds;
+            h.covariance[GAIN_COUNT][GAIN_COUNT] += level * level * seconds;
             if newborn(h) {
                 *left = h.update(late, basis, scales.dispersion);
                 continue;
@@ -207,8 +213,8 @@ impl Mixture {
         }
         // A newborn hypothesis skips its early samples. It is charged the residual energy that the best hypothesis has
         // at these samples, so skipping gives it neither an advantage nor a disadvantage.
-        let of_early = early.energy(basis, &best);
-        for (_, left) in self.all().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
+        let of_early = early.residual_energy(basis, &best);
+        for (_, left) in self.hypotheses().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
             left.passed = [early.samples, of_early];
             left.energy += of_early;
             common = common.min(left.energy);
@@ -220,14 +226,14 @@ impl Mixture {
         // The variance must stay positive even if the prediction is perfect.
         let least = 1e-24 * scales.size * scales.size;
         // Step 7: weights of the hypotheses.
-        for (h, left) in self.all_mut().iter_mut().zip(&left) {
+        for (h, left) in self.hypotheses_mut().iter_mut().zip(&left) {
             h.weigh(left, moments.samples, common, scales.dispersion, memory);
             h.variance = h.variance.max(least);
         }
         self.normalise();
         self.average();
         if blocks as f64 * seconds >= FIRST_BIRTH_S {
-            self.births(&parents, basis, prior, scales, seconds);
+            self.add_children(&parents, basis, prior, scales, seconds);
         }
         common
     }
@@ -235,28 +241,28 @@ impl Mixture {
     fn normalise(&mut self) {
         let finite = |x: f64| if x.is_finite() { x } else { f64::NEG_INFINITY };
         let best = self
-            .all()
+            .hypotheses()
             .iter()
             .map(|h| finite(h.log_weight))
             .fold(f64::NEG_INFINITY, f64::max);
         if !best.is_finite() {
             let even = -libm::log(self.count.max(1) as f64);
-            self.all_mut().iter_mut().for_each(|h| h.log_weight = even);
+            self.hypotheses_mut().iter_mut().for_each(|h| h.log_weight = even);
             return;
         }
         // mu_j = exp(l_j - max)/sum, where the maximum is subtracted to avoid underflow.
-        let sum: f64 = (self.all().iter())
+        let sum: f64 = (self.hypotheses().iter())
             .map(|h| libm::exp(finite(h.log_weight) - best))
             .sum();
         let all = best + libm::log(sum);
-        for h in self.all_mut() {
+        for h in self.hypotheses_mut() {
             h.log_weight = (finite(h.log_weight) - all).max(MIN_LOG_WEIGHT);
         }
     }
 
     fn average(&mut self) {
-        let mut mean = [0.0; STATES];
-        for h in self.all() {
+        let mut mean = [0.0; STATE_COUNT];
+        for h in self.hypotheses() {
             let weight = h.weight();
             for (m, s) in mean.iter_mut().zip(h.state) {
                 *m += weight * s;
@@ -265,8 +271,8 @@ impl Mixture {
         self.mean = mean;
     }
 
-    fn likeliest(&self, of: impl Fn(&Hypothesis) -> bool) -> Option<usize> {
-        (0..self.all().len())
+    fn likeliest_index(&self, of: impl Fn(&Hypothesis) -> bool) -> Option<usize> {
+        (0..self.hypotheses().len())
             .filter(|i| of(&self.hypotheses[*i]))
             .max_by(|a, b| {
                 self.hypotheses[*a]
@@ -275,8 +281,8 @@ impl Mixture {
             })
     }
 
-    fn probability(&self, class: usize) -> f64 {
-        self.all()
+    fn class_probability(&self, class: usize) -> f64 {
+        self.hypotheses()
             .iter()
             .filter(|h| h.class == class)
             .map(Hypothesis::weight)
@@ -284,29 +290,29 @@ impl Mixture {
     }
 
     /// Index of the likeliest hypothesis of each class.
-    fn likeliest_per_class(&self) -> [Option<usize>; CLASSES] {
-        core::array::from_fn(|class| self.likeliest(|h| h.class == class))
+    fn likeliest_per_class(&self) -> [Option<usize>; CLASS_COUNT] {
+        core::array::from_fn(|class| self.likeliest_index(|h| h.class == class))
     }
 
     /// Step 9: adds the children of a block, with the hypotheses before the block as parents. Wandering classes have
     /// children in every second block only.
-    fn births(
+    fn add_children(
         &mut self,
-        parents: &[Option<Hypothesis>; CLASSES],
+        parents: &[Option<Hypothesis>; CLASS_COUNT],
         basis: &Basis,
         prior: &ChangePrior,
         scales: &NoiseScales,
         seconds: f64,
     ) {
-        for class in 0..CLASSES {
+        for class in 0..CLASS_COUNT {
             let (wanders, any) = (class % 2 == 1, class >= 2);
             let turn = self.blocks + u64::from(any);
             if wanders && !turn.is_multiple_of(2) {
                 continue;
             }
-            let own = self.probability(class);
+            let own = self.class_probability(class);
             let other = if any {
-                FORM_SWITCH * self.probability(class - 2)
+                FORM_SWITCH_FACTOR * self.class_probability(class - 2)
             } else {
                 0.0
             };
@@ -344,13 +350,13 @@ impl Mixture {
     /// Index of a free slot or, if there is none, of the least likely hypothesis that is old enough and not the best of
     /// its class.
     fn free_slot(&mut self, prior: &ChangePrior) -> Option<usize> {
-        if self.count < HYPOTHESES {
+        if self.count < MAX_HYPOTHESES {
             self.count += 1;
             return Some(self.count - 1);
         }
         let best = self.likeliest_per_class();
         let old = |i: &usize| self.blocks >= self.hypotheses[*i].born + prior.protected_blocks;
-        (0..HYPOTHESES)
+        (0..MAX_HYPOTHESES)
             .filter(|i| old(i) && !best.contains(&Some(*i)))
             .min_by(|a, b| {
                 self.hypotheses[*a]
@@ -360,17 +366,17 @@ impl Mixture {
     }
 
     /// Returns `x^ = sum_j mu_j x^_j`.
-    pub fn mean(&self) -> &[f64; STATES] {
+    pub fn mean(&self) -> &[f64; STATE_COUNT] {
         &self.mean
     }
 
     /// Returns `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`. The second term is the spread of the means.
     pub fn covariance(&self) -> Covariance {
-        let mut c = [[0.0; STATES]; STATES];
-        for h in self.all() {
+        let mut c = [[0.0; STATE_COUNT]; STATE_COUNT];
+        for h in self.hypotheses() {
             let weight = h.weight();
-            for i in 0..STATES {
-                for j in 0..STATES {
+            for i in 0..STATE_COUNT {
+                for j in 0..STATE_COUNT {
                     let apart = (h.state[i] - self.mean[i]) * (h.state[j] - self.mean[j]);
                     c[i][j] += weight * (h.covariance[i][j] + apart);
                 }
@@ -380,8 +386,8 @@ impl Mixture {
     }
 
     /// Returns the weighted mean, over the hypotheses, of a function of state and covariance.
-    pub fn mean_of(&self, what: impl Fn(&[f64; STATES], &Covariance) -> f64) -> f64 {
-        self.all()
+    pub fn weighted_mean(&self, what: impl Fn(&[f64; STATE_COUNT], &Covariance) -> f64) -> f64 {
+        self.hypotheses()
             .iter()
             .map(|h| h.weight() * what(&h.state, &h.covariance))
             .sum()
@@ -389,14 +395,14 @@ impl Mixture {
 
     /// Returns the innovation variance, averaged over the hypotheses.
     pub fn variance(&self) -> f64 {
-        self.all().iter().map(|h| h.weight() * h.variance).sum()
+        self.hypotheses().iter().map(|h| h.weight() * h.variance).sum()
     }
 
     /// Returns the segments of the likeliest hypothesis: the states before each of the changes that it assumes, the
     /// oldest first, followed by the current state.
     pub fn segments(&self) -> Segments {
-        let mut segments = Segments::NONE;
-        if let Some(best) = self.likeliest(|_| true) {
+        let mut segments = Segments::EMPTY;
+        if let Some(best) = self.likeliest_index(|_| true) {
             for segment in self.hypotheses[best].segments() {
                 segments.push(*segment);
             }
@@ -411,27 +417,34 @@ impl Mixture {
     /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new
     /// prior, for people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`,
     /// `x' = x + P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one.
-    pub fn replace_prior(&mut self, was: [f64; DYNAMICS], is: [f64; DYNAMICS], mean: [f64; DYNAMICS]) {
-        for h in self.all_mut() {
-            let mut matrix: Covariance = [[0.0; STATES]; STATES];
+    pub fn replace_prior(
+        &mut self,
+        was: [f64; DYNAMICS_COUNT],
+        is: [f64; DYNAMICS_COUNT],
+        mean: [f64; DYNAMICS_COUNT],
+    ) {
+        for h in self.hypotheses_mut() {
+            let mut matrix: Covariance = [[0.0; STATE_COUNT]; STATE_COUNT];
             for (i, row) in matrix.iter_mut().enumerate() {
                 row[i] = 1.0;
-                for j in 0..DYNAMICS {
-                    row[LINEAR + j] += h.covariance[i][LINEAR + j] * (1.0 / is[j] - 1.0 / was[j]);
+                for j in 0..DYNAMICS_COUNT {
+                    row[LINEAR_COUNT + j] += h.covariance[i][LINEAR_COUNT + j] * (1.0 / is[j] - 1.0 / was[j]);
                 }
             }
             let mut after = h.covariance;
-            elimination::solve_any(&mut matrix, &mut after);
-            let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATES).all(|i| after[i][i] >= 0.0);
+            elimination::solve_general(&mut matrix, &mut after);
+            let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATE_COUNT).all(|i| after[i][i] >= 0.0);
             if !sound {
                 continue;
             }
-            let pull: [f64; DYNAMICS] = core::array::from_fn(|j| {
-                let s = h.state[LINEAR + j];
+            let pull: [f64; DYNAMICS_COUNT] = core::array::from_fn(|j| {
+                let s = h.state[LINEAR_COUNT + j];
                 (mean[j] - s) / is[j] + s / was[j]
             });
-            for i in 0..STATES {
-                h.state[i] += (0..DYNAMICS).map(|j| after[i][LINEAR + j] * pull[j]).sum::<f64>();
+            for i in 0..STATE_COUNT {
+                h.state[i] += (0..DYNAMICS_COUNT)
+                    .map(|j| after[i][LINEAR_COUNT + j] * pull[j])
+                    .sum::<f64>();
                 for j in 0..i {
                     let half = 0.5 * (after[i][j] + after[j][i]);
                     (after[i][j], after[j][i]) = (half, half);
@@ -446,18 +459,18 @@ impl Mixture {
 /// States of successive segments, each with the last block of its segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segments {
-    all: [Segment; SEGMENTS + 1],
+    all: [Segment; MAX_SEGMENTS + 1],
     count: usize,
 }
 
 crate::state!([] Segments { all, count });
 
 impl Segments {
-    pub const NONE: Self = Self {
+    pub const EMPTY: Self = Self {
         all: [Segment {
             until: 0,
-            state: [0.0; STATES],
-        }; SEGMENTS + 1],
+            state: [0.0; STATE_COUNT],
+        }; MAX_SEGMENTS + 1],
         count: 0,
     };
 
@@ -469,7 +482,7 @@ impl Segments {
     }
 
     /// Returns the segments for a candidate that starts `later` blocks later, with the states converted by `to`.
-    pub fn carried(mut self, later: u64, to: impl Fn(&[f64; STATES]) -> [f64; STATES]) -> Self {
+    pub fn converted(mut self, later: u64, to: impl Fn(&[f64; STATE_COUNT]) -> [f64; STATE_COUNT]) -> Self {
         for segment in &mut self.all {
             *segment = Segment {
                 until: segment.until.saturating_sub(later),
@@ -480,8 +493,8 @@ impl Segments {
     }
 
     /// Returns the state of the segment that contains a block, or `None` if no segment contains it.
-    pub fn at(&self, block: u64) -> Option<&[f64; STATES]> {
-        let all = &self.all[..self.count.min(SEGMENTS + 1)];
+    pub fn at(&self, block: u64) -> Option<&[f64; STATE_COUNT]> {
+        let all = &self.all[..self.count.min(MAX_SEGMENTS + 1)];
         all.iter()
             .find(|segment| block < segment.until)
             .map(|segment| &segment.state)
@@ -490,11 +503,11 @@ impl Segments {
 
 /// Directions of a gain K and of a lead K_dot in the space of the gains: `n_0 = K a`, `n_1 = K + K_dot a`,
 /// `n_2 = K_dot`, each divided by the scale of its response. K_dot is in units of K at 2 rad/s.
-fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
-    let (a, [s0, s1, s2]) = (1.0 / basis.point().lag, basis.scale());
+fn gain_and_lead_directions(basis: &Basis) -> [[f64; GAIN_COUNT]; 2] {
+    let (a, [s0, s1, s2]) = (1.0 / basis.point().lag, basis.scale_factors());
     [
         [a / s0, 1.0 / s1, 0.0],
-        [0.0, a / s1, 1.0 / s2].map(|x| x / super::basis::REFERENCE),
+        [0.0, a / s1, 1.0 / s2].map(|x| x / super::basis::REFERENCE_RAD_S),
     ]
 }
 
@@ -507,9 +520,9 @@ fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: 
         }
         return;
     }
-    for (direction, size) in gain_and_lead(basis).into_iter().zip([gain, lead]) {
-        for i in 0..GAINS {
-            for j in 0..GAINS {
+    for (direction, size) in gain_and_lead_directions(basis).into_iter().zip([gain, lead]) {
+        for i in 0..GAIN_COUNT {
+            for j in 0..GAIN_COUNT {
                 p[i][j] += size * size * direction[i] * direction[j];
             }
         }
@@ -520,10 +533,10 @@ fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: 
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::{basis::Point, defaults::DefaultOperator, sizes::SIGNALS};
+    use crate::adaptive::{basis::Point, defaults::DefaultOperator, sizes::SIGNAL_COUNT};
 
     /// Sample of the change: two samples before the end of block 56.
-    const CHANGE: usize = 32 * 56 - 2;
+    const CHANGE_SAMPLE: usize = 32 * 56 - 2;
 
     /// Returns the distance of the gains from those of the changed operator after a given number of blocks, relative to
     /// the change. The remnant has four poles; `first` is the number of early samples of each block.
@@ -549,9 +562,9 @@ mod tests {
         let gains = [[0.2, 0.6, 0.3], [0.2, 1.0, 0.5]];
         let a: f64 = 0.85;
         let d = [-4.0 * a, 6.0 * a * a, -4.0 * a.powi(3), a.powi(4)];
-        let (mut past, mut v, mut seed) = ([([0.0; SIGNALS], 0.0); 4], [0.0; 4], 5_u64);
+        let (mut past, mut v, mut seed) = ([([0.0; SIGNAL_COUNT], 0.0); 4], [0.0; 4], 5_u64);
         for block in 0..blocks {
-            let mut parts = [Moments::NONE; 2];
+            let mut parts = [Moments::EMPTY; 2];
             for k in 0..32 {
                 seed = seed
                     .wrapping_mul(6_364_136_223_846_793_005)
@@ -562,8 +575,8 @@ mod tests {
                     libm::sin(0.031 * (t - age)) + libm::cos(0.012 * (t - age)) + libm::sin(0.07 * (t - age))
                 };
                 let z = basis.step([e(0.0), e(1.0), e(2.0)]);
-                let mut state = [0.0; STATES];
-                state[..GAINS].copy_from_slice(&gains[usize::from(32 * block + k >= CHANGE)]);
+                let mut state = [0.0; STATE_COUNT];
+                state[..GAIN_COUNT].copy_from_slice(&gains[usize::from(32 * block + k >= CHANGE_SAMPLE)]);
                 let noise = eps - d.iter().zip(v).map(|(d, v)| d * v).sum::<f64>();
                 let u = noise + basis.weights(&state).iter().zip(z).map(|(w, z)| w * z).sum::<f64>();
                 let (mut white, mut y) = (z, u);
@@ -580,7 +593,7 @@ mod tests {
             mixture.update([early, late], &basis, &prior, &scales);
         }
         let [before, after] = gains.map(|g| response(&basis, &g));
-        let now = response(&basis, &mixture.mean()[..GAINS]);
+        let now = response(&basis, &mixture.mean()[..GAIN_COUNT]);
         libm::hypot(now[0] - after[0], now[1] - after[1]) / libm::hypot(after[0] - before[0], after[1] - before[1])
     }
 

@@ -46,7 +46,7 @@
 //! | `child`, `births` | transition p_ij | `M` | births by run length (AM), with P of the parent plus a jump (WJ) |
 //! | `free_slot` | merging | mixing | the least likely hypothesis is pruned; no hypotheses are merged |
 //!
-//! **Time per step.** No step reads more than [`REPLAYED`] stored samples, so the number of operations is bounded. For
+//! **Time per step.** No step reads more than [`REPLAY_SAMPLES_PER_STEP`] stored samples, so the number of operations is bounded. For
 //! two minutes of data at 50 to 200 Hz, the longest step takes 77 us without replays, at the end of a block. With
 //! replays over 100 s the longest step takes 193 to 339 us. The mean is 1 to 2 us without and 28 to 80 us with replays
 //! (one core of a shared server: `cargo xtask slow step-time`).
@@ -110,7 +110,10 @@ mod signal_history;
 mod sizes;
 mod volatility;
 
-pub use filter::{AdaptiveFilter, REPLAYED, errors_needed, memory_needed, min_memory};
-pub use operator::through;
+pub use filter::{AdaptiveFilter, REPLAY_SAMPLES_PER_STEP, errors_needed, memory_needed, min_memory};
+pub use operator::congruence;
 pub use prior::AdaptivePrior;
-pub use sizes::{DYNAMICS, GAINS, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};
+pub use sizes::{
+    DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_HYPOTHESES, MAX_NOISE_ORDER, PARAMETER_COUNT, SIGNAL_COUNT,
+    START_COUNT, STATE_COUNT,
+};

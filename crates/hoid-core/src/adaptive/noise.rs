@@ -15,13 +15,13 @@
 
 use hoid_numerics::{cholesky, elimination};
 
-use super::{defaults::ORDER, f64x2::F64x2, sizes::LARGEST_ORDER};
+use super::{defaults::NOISE_ORDER, f64x2::F64x2, sizes::MAX_NOISE_ORDER};
 
-const WIDTH: usize = LARGEST_ORDER + 1;
+const LAG_COUNT: usize = MAX_NOISE_ORDER + 1;
 /// Number of pairs of adjacent lags, rounded up.
-const PAIRS: usize = WIDTH.div_ceil(2);
+const PAIR_COUNT: usize = LAG_COUNT.div_ceil(2);
 /// Array with one number for each lag, from lag zero.
-pub type Lags = [f64; WIDTH];
+pub type Lags = [f64; LAG_COUNT];
 /// Time constants, in s, of the remnant assumed as the prior.
 const DEFAULT_TIME_CONSTANTS_S: [f64; 2] = [0.3, 0.06];
 /// Prior standard deviation of the coefficients.
@@ -31,7 +31,7 @@ const PRIOR_DEVIATION: f64 = 10.0;
 const MIN_RIDGE: f64 = 1e-300;
 
 /// Fading factor below which the sums are rescaled.
-const RESCALE_BELOW: f64 = 0.5;
+const RESCALE_THRESHOLD: f64 = 0.5;
 
 /// Noise model: the sums and the coefficients of D.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,34 +43,34 @@ pub struct NoiseModel {
     shortest: f64,
     /// Upper triangle of the sums divided by `fade`, in pairs of rows and columns. A new sample gets the weight 1/fade,
     /// so the old sums need not be reduced at each sample.
-    products: [[[F64x2; PAIRS]; 2]; PAIRS],
+    products: [[[F64x2; PAIR_COUNT]; 2]; PAIR_COUNT],
     fade: f64,
     /// Sum of the weights, followed by the weighted sum of eps^2.
     weight: f64,
     squares: f64,
     samples: f64,
-    d: [f64; LARGEST_ORDER],
+    d: [f64; MAX_NOISE_ORDER],
 }
 
 crate::state!([] NoiseModel { products, fade, weight, squares, samples, d });
 
 impl NoiseModel {
     /// Builds the prior noise model, with `memory` and `ts` in s. Returns `None` for an order below 2 or above
-    /// [`LARGEST_ORDER`], or a memory that is not positive.
+    /// [`MAX_NOISE_ORDER`], or a memory that is not positive.
     pub fn new(order: usize, memory: f64, ts: f64) -> Option<Self> {
-        if !(2..=LARGEST_ORDER).contains(&order) || memory.is_nan() || memory <= 0.0 {
+        if !(2..=MAX_NOISE_ORDER).contains(&order) || memory.is_nan() || memory <= 0.0 {
             return None;
         }
         let [a, b] = DEFAULT_TIME_CONSTANTS_S.map(|t| libm::exp(-ts / t));
         let prior_d = [-(a + b), a * b];
-        let mut d = [0.0; LARGEST_ORDER];
+        let mut d = [0.0; MAX_NOISE_ORDER];
         d[..2].copy_from_slice(&prior_d);
         Some(Self {
             order,
             prior_d,
             longest: memory / ts,
             shortest: (3.0 / ts).min(memory / ts).max(2.0 * order as f64),
-            products: [[[F64x2::ZERO; PAIRS]; 2]; PAIRS],
+            products: [[[F64x2::ZERO; PAIR_COUNT]; 2]; PAIR_COUNT],
             fade: 1.0,
             weight: 0.0,
             squares: 0.0,
@@ -110,14 +110,14 @@ impl NoiseModel {
     }
 
     /// Returns the gain of D at zero frequency.
-    pub fn sum(&self) -> f64 {
+    pub fn dc_gain(&self) -> f64 {
         1.0 + self.d().iter().sum::<f64>()
     }
 
     /// Adds the last residuals v, the newest first, with a weight; eps is the innovation that the current D computes
     /// from them.
     #[inline(always)]
-    pub fn update(&mut self, v: &[f64; WIDTH], eps: f64, weight: f64) {
+    pub fn update(&mut self, v: &[f64; LAG_COUNT], eps: f64, weight: f64) {
         self.samples += 1.0;
         let memory = (0.5 * self.samples).clamp(self.shortest, self.longest.max(self.shortest));
         // With lambda = 1 - 1/memory, the exponential window has the length `memory`.
@@ -125,8 +125,8 @@ impl NoiseModel {
         self.weight = lambda * self.weight + weight;
         self.squares = lambda * self.squares + weight * eps * eps;
         self.fade *= lambda;
-        if self.fade < RESCALE_BELOW {
-            let fade = F64x2::both(self.fade);
+        if self.fade < RESCALE_THRESHOLD {
+            let fade = F64x2::splat(self.fade);
             self.products
                 .as_flattened_mut()
                 .as_flattened_mut()
@@ -137,18 +137,19 @@ impl NoiseModel {
         let weight = weight / self.fade;
         // The default order is passed as a constant, so the loops over the lags have a constant length.
         match self.order {
-            ORDER => self.add(v, weight, ORDER),
+            NOISE_ORDER => self.add(v, weight, NOISE_ORDER),
             order => self.add(v, weight, order),
         }
     }
 
     #[inline(always)]
     fn add(&mut self, v: &Lags, weight: f64, order: usize) {
-        let pairs = (order / 2 + 1).min(PAIRS);
-        let v: [F64x2; PAIRS] = core::array::from_fn(|i| F64x2([v[2 * i], v.get(2 * i + 1).copied().unwrap_or(0.0)]));
+        let pairs = (order / 2 + 1).min(PAIR_COUNT);
+        let v: [F64x2; PAIR_COUNT] =
+            core::array::from_fn(|i| F64x2([v[2 * i], v.get(2 * i + 1).copied().unwrap_or(0.0)]));
         for first in 0..pairs {
             let [above, below] = &mut self.products[first];
-            let [a, b] = v[first].0.map(|v| F64x2::both(weight * v));
+            let [a, b] = v[first].0.map(|v| F64x2::splat(weight * v));
             for k in first..pairs {
                 above[k] += a * v[k];
                 below[k] += b * v[k];
@@ -177,7 +178,7 @@ impl NoiseModel {
 
     /// Upper triangle of the sums over the lags 1 to p, plus the ridge.
     #[inline(always)]
-    fn sums<const N: usize>(&self, p: usize) -> [[f64; N]; N] {
+    fn lag_sums<const N: usize>(&self, p: usize) -> [[f64; N]; N] {
         let (mut matrix, ridge) = ([[0.0; N]; N], self.ridge());
         for i in 0..p {
             let lag = i + 1;
@@ -196,8 +197,8 @@ impl NoiseModel {
     /// covariance equals `sigma^2 S^-1` times the mean of mu, which is 0.5 for an exponential memory of constant length
     /// and 0.6 while the memory grows as half the time since the start; 0.6 is used. Returns `None` until the sums
     /// determine d.
-    pub fn covariance(&self) -> Option<[[f64; LARGEST_ORDER]; LARGEST_ORDER]> {
-        let upper = self.sums::<LARGEST_ORDER>(self.order);
+    pub fn covariance(&self) -> Option<[[f64; MAX_NOISE_ORDER]; MAX_NOISE_ORDER]> {
+        let upper = self.lag_sums::<MAX_NOISE_ORDER>(self.order);
         let mut matrix = core::array::from_fn(|i| core::array::from_fn(|j| upper[i.min(j)][i.max(j)]));
         if self.samples <= self.order as f64 || !cholesky::factor(&mut matrix, self.order) {
             return None;
@@ -208,20 +209,20 @@ impl NoiseModel {
     /// Solves the normal equations for D. D stays unchanged if the sums do not determine it.
     pub fn solve(&mut self) {
         match self.order {
-            ORDER => self.solve_of::<ORDER>(ORDER),
-            order => self.solve_of::<LARGEST_ORDER>(order),
+            NOISE_ORDER => self.solve_order::<NOISE_ORDER>(NOISE_ORDER),
+            order => self.solve_order::<MAX_NOISE_ORDER>(order),
         }
     }
 
     #[inline(always)]
-    fn solve_of<const N: usize>(&mut self, p: usize) {
+    fn solve_order<const N: usize>(&mut self, p: usize) {
         let ridge = self.ridge();
         // The ridge is on both sides of the normal equations S d = -s_0: (S + r I) d = r d_prior - s_0.
         let mut d = [0.0; N];
         for (i, d) in d.iter_mut().enumerate().take(p) {
             *d = ridge * self.prior_d.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
         }
-        let solved = elimination::solve(&mut self.sums(p), p, &mut d);
+        let solved = elimination::solve(&mut self.lag_sums(p), p, &mut d);
         if solved && d.iter().all(|d| d.is_finite()) {
             self.d[..N].copy_from_slice(&d);
         }
@@ -234,7 +235,7 @@ mod tests {
     use super::*;
 
     /// Returns uniform noise with variance 1/12 from a fixed stream.
-    fn stream(seed: &mut u64) -> f64 {
+    fn uniform_noise(seed: &mut u64) -> f64 {
         *seed = seed
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
@@ -245,10 +246,10 @@ mod tests {
     fn autoregression_is_found() {
         // The poles .95 and .6 give D = 1 - 1.55 q^-1 + .57 q^-2.
         let (mut model, mut seed) = (NoiseModel::new(6, 100.0, 0.01).unwrap(), 7);
-        let mut v = [0.0; WIDTH];
+        let mut v = [0.0; LAG_COUNT];
         for t in 0..10_000 {
-            v.copy_within(0..WIDTH - 1, 1);
-            let eps = stream(&mut seed);
+            v.copy_within(0..LAG_COUNT - 1, 1);
+            let eps = uniform_noise(&mut seed);
             v[0] = 1.55 * v[1] - 0.57 * v[2] + eps;
             model.update(&v, eps, 1.0);
             if t % 25 == 0 {
@@ -261,7 +262,7 @@ mod tests {
         for (d, expected) in model.d().iter().zip([-1.55, 0.57, 0.0, 0.0, 0.0, 0.0]) {
             assert!((d - expected).abs() < 0.104, "{:?}", model.d());
         }
-        assert!((model.sum() - 1.0 - model.d().iter().sum::<f64>()).abs() < 1e-15);
+        assert!((model.dc_gain() - 1.0 - model.d().iter().sum::<f64>()).abs() < 1e-15);
     }
 
     #[test]
@@ -269,14 +270,14 @@ mod tests {
         // Four poles at .85: v has 1.6e4 times the power of eps, and its spectrum falls by 5e8 up to half the sampling
         // frequency. With a prior that scales with the power of v, D would not follow the remnant there.
         let (mut model, mut seed) = (NoiseModel::new(8, 100.0, 0.01).unwrap(), 3);
-        let (mut v, mut poles, mut power) = ([0.0; WIDTH], [0.0; 4], 0.0);
+        let (mut v, mut poles, mut power) = ([0.0; LAG_COUNT], [0.0; 4], 0.0);
         for t in 0..20_000 {
-            let mut z = stream(&mut seed);
+            let mut z = uniform_noise(&mut seed);
             for pole in &mut poles {
                 z += 0.85 * *pole;
                 *pole = z;
             }
-            v.copy_within(0..WIDTH - 1, 1);
+            v.copy_within(0..LAG_COUNT - 1, 1);
             v[0] = z;
             let eps = v[0] + model.d().iter().zip(&v[1..]).map(|(d, v)| d * v).sum::<f64>();
             if t >= 10_000 {
@@ -299,10 +300,10 @@ mod tests {
         for memory in [1000.0, 10.0] {
             let (mut squares, mut seed) = (0.0, 11);
             for _ in 0..100 {
-                let (mut model, mut v) = (NoiseModel::new(4, memory, 0.01).unwrap(), [0.0; WIDTH]);
+                let (mut model, mut v) = (NoiseModel::new(4, memory, 0.01).unwrap(), [0.0; LAG_COUNT]);
                 for _ in 0..5000 {
-                    v.copy_within(0..WIDTH - 1, 1);
-                    let eps = stream(&mut seed);
+                    v.copy_within(0..LAG_COUNT - 1, 1);
+                    let eps = uniform_noise(&mut seed);
                     v[0] = 1.55 * v[1] - 0.57 * v[2] + eps;
                     model.update(&v, eps, 1.0);
                 }
@@ -328,10 +329,10 @@ mod tests {
             "{:?}",
             model.d()
         );
-        let mut v = [0.0; WIDTH];
+        let mut v = [0.0; LAG_COUNT];
         for _ in 0..40_000 {
-            v.copy_within(0..WIDTH - 1, 1);
-            let eps = stream(&mut seed);
+            v.copy_within(0..LAG_COUNT - 1, 1);
+            let eps = uniform_noise(&mut seed);
             v[0] = 0.5 * v[1] + eps;
             model.update(&v, eps, 1.0);
         }
@@ -339,7 +340,7 @@ mod tests {
         // 4000 samples are ten memories: the prior is forgotten, and d1 has a standard error of .01.
         assert!((model.d()[0] + 0.5).abs() < 0.05, "{:?}", model.d());
         let mut other = NoiseModel::new(6, 40.0, 0.01).unwrap();
-        assert!(!other.set_prior(&[0.0; WIDTH], 1.0, 2000.0) && !other.set_prior(&lags, 1.0, f64::NAN));
+        assert!(!other.set_prior(&[0.0; LAG_COUNT], 1.0, 2000.0) && !other.set_prior(&lags, 1.0, f64::NAN));
     }
 
     #[test]
@@ -347,7 +348,7 @@ mod tests {
         let mut model = NoiseModel::new(4, 40.0, 0.01).unwrap();
         let before = model.d().to_vec();
         for _ in 0..1000 {
-            model.update(&[0.0; WIDTH], 0.0, 1.0);
+            model.update(&[0.0; LAG_COUNT], 0.0, 1.0);
             model.solve();
         }
         for (d, b) in model.d().iter().zip(&before) {

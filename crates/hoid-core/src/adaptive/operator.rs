@@ -1,6 +1,6 @@
 //! Reported operator: its parameters and their covariance, computed from gains and corrections.
 //!
-//! K_e and K_e_dot describe the gain and lead nearest to the numerator at [`NEAR_RAD_S`], by least squares in `K_e +
+//! K_e and K_e_dot describe the gain and lead nearest to the numerator at [`FIT_FREQUENCIES_RAD_S`], by least squares in `K_e +
 //! K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; this is exact for an
 //! operator with a gain and a lead. K_e and K_e_dot are linear in the state, so their covariance is `M P M'`, where M
 //! maps the state to them and P is the covariance of the mixture ([`super::mixture`]). The scatter of other operators
@@ -8,9 +8,9 @@
 
 use super::{
     AdaptiveFilter,
-    candidate::NEAR_RAD_S,
-    defaults::HOLD_S,
-    sizes::{DYNAMICS, GAINS, LINEAR, PARAMETERS, STATES},
+    candidate::FIT_FREQUENCIES_RAD_S,
+    defaults::START_TIME_S,
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, PARAMETER_COUNT, STATE_COUNT},
 };
 
 /// Time constant in s of a correction of the standard errors, which are too small in the first seconds because the
@@ -20,8 +20,8 @@ const SETTLING_S: f64 = 4.0;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Returns K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
-    pub fn operator(&self) -> [f64; PARAMETERS] {
-        let [k_e, k_e_dot, omega, zeta, tau] = self.live().operator();
+    pub fn operator(&self) -> [f64; PARAMETER_COUNT] {
+        let [k_e, k_e_dot, omega, zeta, tau] = self.live_candidate().operator();
         // The error is held over each sample; half a sample of the delay is due to this zero-order hold and is
         // subtracted.
         let hold = 0.5 * self.sample_time();
@@ -30,18 +30,20 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// Returns the covariance of [`AdaptiveFilter::operator`], including the scatter of other operators that predict u
     /// about as well as the estimate.
-    pub fn operator_covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
-        let mut rows = [[0.0; STATES]; PARAMETERS];
-        for (row, gains) in rows.iter_mut().zip(self.gain_and_lead()) {
-            row[..GAINS].copy_from_slice(&gains);
+    pub fn operator_covariance(&self) -> [[f64; PARAMETER_COUNT]; PARAMETER_COUNT] {
+        let mut rows = [[0.0; STATE_COUNT]; PARAMETER_COUNT];
+        for (row, gains) in rows.iter_mut().zip(self.gain_and_lead_matrix()) {
+            row[..GAIN_COUNT].copy_from_slice(&gains);
         }
-        for j in 0..DYNAMICS {
-            rows[2 + j][LINEAR + j] = 1.0;
+        for j in 0..DYNAMICS_COUNT {
+            rows[2 + j][LINEAR_COUNT + j] = 1.0;
         }
-        let own = through(&rows, &self.state_covariance());
-        let scatter = self
-            .alternatives()
-            .scatter(&self.live().operator(), self.informative_samples(), self.window());
+        let own = congruence(&rows, &self.state_covariance());
+        let scatter = self.alternatives().scatter(
+            &self.live_candidate().operator(),
+            self.informative_samples(),
+            self.max_replay_samples(),
+        );
         core::array::from_fn(|i| core::array::from_fn(|j| own[i][j] + scatter[i][j]))
     }
 
@@ -50,13 +52,13 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// `K_e_dot - T_L K_e` with the covariance of the mixture. A single T for the mixture would be far too short if
     /// unlikely hypotheses, such as those born in the last second, leave K_e undetermined.
     pub fn lead_time(&self) -> [f64; 2] {
-        let map = self.gain_and_lead();
-        let pair = |state: &[f64; STATES]| map.map(|row| (0..GAINS).map(|k| row[k] * state[k]).sum::<f64>());
-        let product = |c: &[[f64; STATES]; STATES], i: usize, j: usize| -> f64 {
-            let each = (0..GAINS).map(|a| map[i][a] * (0..GAINS).map(|b| c[a][b] * map[j][b]).sum::<f64>());
+        let map = self.gain_and_lead_matrix();
+        let pair = |state: &[f64; STATE_COUNT]| map.map(|row| (0..GAIN_COUNT).map(|k| row[k] * state[k]).sum::<f64>());
+        let product = |c: &[[f64; STATE_COUNT]; STATE_COUNT], i: usize, j: usize| -> f64 {
+            let each = (0..GAIN_COUNT).map(|a| map[i][a] * (0..GAIN_COUNT).map(|b| c[a][b] * map[j][b]).sum::<f64>());
             each.sum()
         };
-        let lead = self.live().mixture.mean_of(|state, c| {
+        let lead = self.live_candidate().mixture.weighted_mean(|state, c| {
             let [k, k_dot] = pair(state);
             let square = k * k + product(c, 0, 0);
             match square > 0.0 {
@@ -71,16 +73,16 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Returns the matrix that maps the gains of the basis to K_e and K_e_dot.
-    pub fn gain_and_lead(&self) -> [[f64; GAINS]; 2] {
-        self.basis().gain_and_lead(&NEAR_RAD_S)
+    pub fn gain_and_lead_matrix(&self) -> [[f64; GAIN_COUNT]; 2] {
+        self.basis().gain_and_lead_matrix(&FIT_FREQUENCIES_RAD_S)
     }
 
     /// Returns the reported covariance of gains, level and corrections.
-    pub fn state_covariance(&self) -> [[f64; STATES]; STATES] {
-        let mut c = self.live().mixture.covariance();
+    pub fn state_covariance(&self) -> [[f64; STATE_COUNT]; STATE_COUNT] {
+        let mut c = self.live_candidate().mixture.covariance();
         if !self.has_initial_estimate() {
-            let seconds = self.samples() as f64 * self.sample_time();
-            let wider = 1.0 + SETTLING_S / seconds.max(HOLD_S);
+            let seconds = self.update_count() as f64 * self.sample_time();
+            let wider = 1.0 + SETTLING_S / seconds.max(START_TIME_S);
             c.iter_mut().flatten().for_each(|c| *c *= wider * wider);
         }
         c
@@ -88,9 +90,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 }
 
 /// Returns `M C M'`, where M has the given rows.
-pub fn through<const K: usize>(rows: &[[f64; STATES]; K], c: &[[f64; STATES]; STATES]) -> [[f64; K]; K] {
-    let of = |a: &[f64; STATES], b: &[f64; STATES]| -> f64 {
-        let each = (0..STATES).map(|i| a[i] * (0..STATES).map(|j| c[i][j] * b[j]).sum::<f64>());
+pub fn congruence<const K: usize>(
+    rows: &[[f64; STATE_COUNT]; K],
+    c: &[[f64; STATE_COUNT]; STATE_COUNT],
+) -> [[f64; K]; K] {
+    let of = |a: &[f64; STATE_COUNT], b: &[f64; STATE_COUNT]| -> f64 {
+        let each = (0..STATE_COUNT).map(|i| a[i] * (0..STATE_COUNT).map(|j| c[i][j] * b[j]).sum::<f64>());
         each.sum()
     };
     core::array::from_fn(|i| core::array::from_fn(|j| of(&rows[i], &rows[j])))

@@ -2,9 +2,9 @@
 
 use super::{
     basis::Point,
-    detector::Detection,
+    detector::DetectorSettings,
     mixture::ChangePrior,
-    sizes::{DYNAMICS, STARTS},
+    sizes::{DYNAMICS_COUNT, START_COUNT},
 };
 
 /// Prior for a person and for the changes of the operator.
@@ -13,7 +13,7 @@ pub struct AdaptivePrior {
     /// Delay, natural frequency, damping and lag of the person, the point at which the basis starts.
     pub person: Point,
     /// Prior standard deviations of omega and zeta (relative) and of the delay (in s).
-    pub spread: [f64; DYNAMICS],
+    pub spread: [f64; DYNAMICS_COUNT],
     /// Sample time Ts in s.
     pub sample_time: f64,
     /// Order of the noise model.
@@ -26,9 +26,9 @@ pub struct AdaptivePrior {
     /// Prior of the changes of the operator.
     pub changes: ChangePrior,
     /// Starting points of the first estimate; each has the lag of the person.
-    pub starts: [Point; STARTS],
+    pub starts: [Point; START_COUNT],
     /// Settings of the change detector.
-    pub detection: Detection,
+    pub detection: DetectorSettings,
 }
 
 impl AdaptivePrior {

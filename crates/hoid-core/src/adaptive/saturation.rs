@@ -10,7 +10,7 @@
 //! then on, a single sample at the limit is enough. When a limit is first reached, the first of the two samples is
 //! recognised as a limit only in a replay.
 
-use super::history::Use;
+use super::history::SampleUse;
 
 /// Limits of the stick, as far as u has reached them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,12 +37,12 @@ impl Saturation {
 
     /// Returns the limit that an output has reached, or `None` if it is not at a limit.
     #[inline(always)]
-    pub fn end(&self, u: f64) -> Option<Use> {
+    pub fn limit_reached(&self, u: f64) -> Option<SampleUse> {
         let [low, high] = self.known;
         let again = u == self.last;
         match self.highest > self.lowest {
-            true if u == self.highest && (again || high) => Some(Use::AtUpperLimit),
-            true if u == self.lowest && (again || low) => Some(Use::AtLowerLimit),
+            true if u == self.highest && (again || high) => Some(SampleUse::AtUpperLimit),
+            true if u == self.lowest && (again || low) => Some(SampleUse::AtLowerLimit),
             _ => None,
         }
     }
@@ -50,11 +50,11 @@ impl Saturation {
     /// Returns the output that replaces an output at a limit in the filters: the prediction, limited to the interval
     /// from the limit to one range of the stick beyond it.
     #[inline(always)]
-    pub fn beyond(&self, end: Use, u: f64, predicted: f64) -> f64 {
+    pub fn replacement(&self, end: SampleUse, u: f64, predicted: f64) -> f64 {
         let range = self.highest - self.lowest;
         match end {
-            Use::AtUpperLimit => predicted.max(u).min(u + range),
-            Use::AtLowerLimit => predicted.min(u).max(u - range),
+            SampleUse::AtUpperLimit => predicted.max(u).min(u + range),
+            SampleUse::AtLowerLimit => predicted.min(u).max(u - range),
             _ => u,
         }
     }
@@ -76,7 +76,7 @@ impl Saturation {
 mod tests {
     use super::*;
 
-    fn after(outputs: &[f64]) -> Saturation {
+    fn saturation_after(outputs: &[f64]) -> Saturation {
         let mut ends = Saturation::new();
         outputs.iter().for_each(|u| ends.update(*u));
         ends
@@ -84,44 +84,44 @@ mod tests {
 
     #[test]
     fn held_extreme_value_is_a_limit() {
-        let ends = after(&[0.1, -0.4, 1.0]);
+        let ends = saturation_after(&[0.1, -0.4, 1.0]);
         // Predictions beyond the limit, inside the limit, and more than one range beyond it.
-        let beyond = |u: f64, predicted: f64| ends.end(u).map(|end| ends.beyond(end, u, predicted));
+        let beyond = |u: f64, predicted: f64| ends.limit_reached(u).map(|end| ends.replacement(end, u, predicted));
         assert_eq!(beyond(1.0, 1.3), Some(1.3));
         assert_eq!(beyond(1.0, 0.2), Some(1.0));
         assert_eq!(beyond(1.0, 1e9), Some(1.0 + 1.4));
-        let lower = after(&[0.1, -0.4]);
-        assert_eq!(lower.end(-0.4), Some(Use::AtLowerLimit));
-        assert_eq!(lower.beyond(Use::AtLowerLimit, -0.4, -0.5), -0.5);
-        assert_eq!(lower.beyond(Use::AtLowerLimit, -0.4, 3.0), -0.4);
+        let lower = saturation_after(&[0.1, -0.4]);
+        assert_eq!(lower.limit_reached(-0.4), Some(SampleUse::AtLowerLimit));
+        assert_eq!(lower.replacement(SampleUse::AtLowerLimit, -0.4, -0.5), -0.5);
+        assert_eq!(lower.replacement(SampleUse::AtLowerLimit, -0.4, 3.0), -0.4);
     }
 
     #[test]
     fn moving_or_inner_value_is_not_a_limit() {
-        let ends = after(&[0.1, 1.0, 0.5]);
-        assert_eq!(ends.end(0.5), None);
-        assert_eq!(ends.end(1.0), None);
-        assert_eq!(after(&[1.0]).end(1.1), None);
+        let ends = saturation_after(&[0.1, 1.0, 0.5]);
+        assert_eq!(ends.limit_reached(0.5), None);
+        assert_eq!(ends.limit_reached(1.0), None);
+        assert_eq!(saturation_after(&[1.0]).limit_reached(1.1), None);
     }
 
     #[test]
     fn known_limit_is_recognised_at_once() {
-        let ends = after(&[0.1, 1.0, 1.0, -0.3]);
-        assert_eq!(ends.end(1.0), Some(Use::AtUpperLimit));
-        assert_eq!(ends.end(-0.3), Some(Use::AtLowerLimit));
+        let ends = saturation_after(&[0.1, 1.0, 1.0, -0.3]);
+        assert_eq!(ends.limit_reached(1.0), Some(SampleUse::AtUpperLimit));
+        assert_eq!(ends.limit_reached(-0.3), Some(SampleUse::AtLowerLimit));
         // An output beyond the limit is not at a limit.
-        assert_eq!(after(&[0.1, 1.0, 1.0, 1.2, 0.0]).end(1.2), None);
+        assert_eq!(saturation_after(&[0.1, 1.0, 1.0, 1.2, 0.0]).limit_reached(1.2), None);
     }
 
     #[test]
     fn constant_output_has_no_limit() {
-        assert_eq!(after(&[]).end(0.0), None);
-        assert_eq!(after(&[0.0; 4]).end(0.0), None);
+        assert_eq!(saturation_after(&[]).limit_reached(0.0), None);
+        assert_eq!(saturation_after(&[0.0; 4]).limit_reached(0.0), None);
     }
 
     #[test]
     fn released_pedal_is_at_its_lower_limit() {
-        let ends = after(&[0.0, 0.3, 0.0]);
-        assert_eq!(ends.end(0.0), Some(Use::AtLowerLimit));
+        let ends = saturation_after(&[0.0, 0.3, 0.0]);
+        assert_eq!(ends.limit_reached(0.0), Some(SampleUse::AtLowerLimit));
     }
 }

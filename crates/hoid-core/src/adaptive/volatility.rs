@@ -54,7 +54,7 @@ impl Volatility {
     }
 
     /// Adds the energy of a block and the number of its samples.
-    pub fn take(&mut self, energy: f64, samples: f64) {
+    pub fn add(&mut self, energy: f64, samples: f64) {
         self.energy += energy;
         self.samples += samples;
         self.taken += 1;
@@ -103,8 +103,8 @@ mod tests {
                     x * x
                 })
                 .sum();
-            even.take(energy, 32.0);
-            bursts.take(if block / 4 % 2 == 0 { energy } else { 10.0 * energy }, 32.0);
+            even.add(energy, 32.0);
+            bursts.add(if block / 4 % 2 == 0 { energy } else { 10.0 * energy }, 32.0);
         }
         // 1000 differences: v = 1 with a standard error of .05.
         assert!((even.dispersion() - 1.0).abs() < 0.06, "{}", even.dispersion());
@@ -117,7 +117,7 @@ mod tests {
     fn zero_power_is_not_a_burst() {
         let mut v = Volatility::new(1);
         for energy in [0.0, 1.0, 0.0, 0.0, 1.0] {
-            v.take(energy, 32.0);
+            v.add(energy, 32.0);
         }
         assert!((v.dispersion() - 1.0).abs() < 1e-12);
     }

@@ -29,19 +29,19 @@
 //! floor is a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
 //!
 //! **Held-back samples.** While samples are held back, the signal is continued with its last slope, damped with the
-//! time constant [`SLOPE_S`], if the order is 2 or more, and otherwise with its last value. After h samples, the signal
+//! time constant [`SLOPE_TIME_CONSTANT_S`], if the order is 2 or more, and otherwise with its last value. After h samples, the signal
 //! has returned if its distance from the continued value is at most `max(m q_j, floor) + h q_1` with a slope, and
 //! `max(m q_1, floor) sqrt(h + 1)` without a slope.
 
 /// Number of orders of the backward differences.
-pub const ORDERS: usize = 4;
-/// Probability that an error exceeds the quantile; `GAIN` is the gain of the approximation of the quantile.
+pub const ORDER_COUNT: usize = 4;
+/// Probability that an error exceeds the quantile; `QUANTILE_GAIN` is the gain of the approximation of the quantile.
 const TAIL_PROBABILITY: f64 = 0.01;
-const GAIN: f64 = 0.05;
-/// Probability that an error exceeds the inner quantile; `INNER_GAIN` is the gain of the approximation of the inner
+const QUANTILE_GAIN: f64 = 0.05;
+/// Probability that an error exceeds the inner quantile; `INNER_QUANTILE_GAIN` is the gain of the approximation of the inner
 /// quantile.
 const INNER_TAIL_PROBABILITY: f64 = 0.1;
-const INNER_GAIN: f64 = 0.02;
+const INNER_QUANTILE_GAIN: f64 = 0.02;
 /// Smallest limit of an error, relative to the quantile; `LARGEST_TAIL_RATIO` is the largest.
 const MIN_TAIL_RATIO: f64 = 2.5;
 const LARGEST_TAIL_RATIO: f64 = 12.0;
@@ -51,27 +51,27 @@ const MAX_TYPICAL_RATIO: f64 = 1.3;
 /// Number of blocks over which the tails are averaged.
 const AVERAGED_BLOCKS: u32 = 20;
 /// Ratio of the inner (90 %) quantile to the 99 % quantile for Gaussian errors.
-const GAUSSIAN_INNER: f64 = 1.6449 / 2.5758;
+const GAUSSIAN_INNER_RATIO: f64 = 1.6449 / 2.5758;
 /// Time constant in s with which the slope of a held-back signal is damped.
-pub const SLOPE_S: f64 = 0.1;
+pub const SLOPE_TIME_CONSTANT_S: f64 = 0.1;
 /// Ratio of the 99 % quantile to the mean magnitude for Gaussian errors, used for the initial quantiles.
-const QUANTILE_OVER_MEAN: f64 = 3.228;
+const QUANTILE_TO_MEAN_RATIO: f64 = 3.228;
 
 /// Guard of one signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChannelGuard {
     /// Last accepted sample, and its backward differences of order 1 to 3.
     last: f64,
-    differences: [f64; ORDERS - 1],
-    /// Number of consecutive samples that were not replaced, up to [`ORDERS`].
+    differences: [f64; ORDER_COUNT - 1],
+    /// Number of consecutive samples that were not replaced, up to [`ORDER_COUNT`].
     known: usize,
     /// 99 % quantiles of the magnitudes of the differences; zero if unknown.
-    quantiles: [f64; ORDERS],
+    quantiles: [f64; ORDER_COUNT],
     /// Inner (90 %) quantiles, from which the tail is extrapolated.
-    inner: [f64; ORDERS],
+    inner: [f64; ORDER_COUNT],
     /// Mean of the squared ratio of the 99 % quantile to the inner quantile, and number of blocks over which it was
     /// averaged.
-    tail_ratio: [f64; ORDERS],
+    tail_ratio: [f64; ORDER_COUNT],
     averaged: u32,
     /// True once outliers are being detected.
     detects_outliers: bool,
@@ -93,12 +93,12 @@ pub struct ChannelGuard {
 crate::state!([] ChannelGuard {
     last, differences, known, quantiles, inner, tail_ratio, averaged, detects_outliers, resting, order, floor, held,
     largest_error, base, slope, damping,
-}, bounded);
+}, limit_restored);
 
 impl ChannelGuard {
-    fn bounded(&mut self) {
-        self.known = self.known.min(ORDERS);
-        self.order = self.order.min(ORDERS - 1);
+    fn limit_restored(&mut self) {
+        self.known = self.known.min(ORDER_COUNT);
+        self.order = self.order.min(ORDER_COUNT - 1);
     }
 
     /// Builds the guard of a signal without prior knowledge. Until [`ChannelGuard::set_quantiles`] or
@@ -106,11 +106,11 @@ impl ChannelGuard {
     pub fn new(sample_time: f64) -> Self {
         Self {
             last: 0.0,
-            differences: [0.0; ORDERS - 1],
+            differences: [0.0; ORDER_COUNT - 1],
             known: 0,
-            quantiles: [0.0; ORDERS],
-            inner: [0.0; ORDERS],
-            tail_ratio: [0.0; ORDERS],
+            quantiles: [0.0; ORDER_COUNT],
+            inner: [0.0; ORDER_COUNT],
+            tail_ratio: [0.0; ORDER_COUNT],
             averaged: 0,
             detects_outliers: false,
             resting: 0.0,
@@ -120,19 +120,19 @@ impl ChannelGuard {
             largest_error: 0.0,
             base: 0.0,
             slope: 0.0,
-            damping: libm::exp(-sample_time / SLOPE_S),
+            damping: libm::exp(-sample_time / SLOPE_TIME_CONSTANT_S),
         }
     }
 
     /// Sets the 99 % quantiles of the magnitudes of the differences of order 1 to 4, known from the past of the signal,
     /// and starts the detection of outliers. A quantile of zero or less counts as unknown. The tails are assumed to be
     /// Gaussian until they are learnt.
-    pub fn set_quantiles(&mut self, quantiles: [f64; ORDERS]) {
-        self.set_tails(quantiles, quantiles.map(|q| GAUSSIAN_INNER * q));
+    pub fn set_quantiles(&mut self, quantiles: [f64; ORDER_COUNT]) {
+        self.set_tails(quantiles, quantiles.map(|q| GAUSSIAN_INNER_RATIO * q));
     }
 
     /// As [`ChannelGuard::set_quantiles`], with `inner` as the 90 % quantiles.
-    pub fn set_tails(&mut self, quantiles: [f64; ORDERS], inner: [f64; ORDERS]) {
+    pub fn set_tails(&mut self, quantiles: [f64; ORDER_COUNT], inner: [f64; ORDER_COUNT]) {
         (self.quantiles, self.inner) = (quantiles, inner);
         self.averaged = 0;
         self.average_tails();
@@ -142,11 +142,11 @@ impl ChannelGuard {
 
     /// Sets the initial values of unknown quantiles from the mean magnitudes of the differences. The quantiles are then
     /// learnt; until [`ChannelGuard::start_detection`], no sample counts as an outlier.
-    pub fn start_estimation(&mut self, means: [f64; ORDERS]) {
+    pub fn start_estimation(&mut self, means: [f64; ORDER_COUNT]) {
         for (j, mean) in means.into_iter().enumerate() {
             if self.quantiles[j] <= 0.0 {
-                self.quantiles[j] = QUANTILE_OVER_MEAN * mean;
-                self.inner[j] = GAUSSIAN_INNER * self.quantiles[j];
+                self.quantiles[j] = QUANTILE_TO_MEAN_RATIO * mean;
+                self.inner[j] = GAUSSIAN_INNER_RATIO * self.quantiles[j];
             }
         }
     }
@@ -154,7 +154,7 @@ impl ChannelGuard {
     /// Starts the detection of outliers if the quantiles are known.
     pub fn start_detection(&mut self) {
         self.detects_outliers = self.quantiles[0] > 0.0;
-        self.choose();
+        self.select_order();
     }
 
     /// True if the quantiles are known and outliers are detected.
@@ -165,7 +165,7 @@ impl ChannelGuard {
     /// True if consecutive samples, the first of them after a jump, move like the signal: the mean magnitude of the
     /// prediction errors, of the order in use, is below the value for a signal about three times as large.
     pub fn moves_typically(&self, samples: impl Iterator<Item = f64>) -> bool {
-        let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
+        let (mut past, mut count, mut sum) = ([0.0; ORDER_COUNT], 0, 0.0);
         for x in samples {
             let mut difference = x;
             for (j, kept) in past.iter_mut().enumerate() {
@@ -186,12 +186,12 @@ impl ChannelGuard {
     }
 
     /// Returns the first difference above which a sample counts as a jump.
-    pub fn largest_move(&self) -> f64 {
+    pub fn jump_threshold(&self) -> f64 {
         self.limit(0)
     }
 
     /// Sets the largest first difference with which the signal counts as constant.
-    pub fn set_resting(&mut self, difference: f64) {
+    pub fn set_constant_tolerance(&mut self, difference: f64) {
         self.resting = difference;
     }
 
@@ -202,7 +202,7 @@ impl ChannelGuard {
 
     /// Returns the difference between the last two samples if the order of the prediction is 2 or more, otherwise zero.
     pub fn slope(&self) -> f64 {
-        if self.order_in_use() > 0 {
+        if self.order_index() > 0 {
             self.differences[0]
         } else {
             0.0
@@ -215,13 +215,13 @@ impl ChannelGuard {
     }
 
     /// Sets the lower bound of the limit of the prediction error.
-    pub fn set_floor(&mut self, floor: f64) {
+    pub fn set_limit_floor(&mut self, floor: f64) {
         self.floor = floor;
     }
 
     /// Returns the prediction errors of x as the next sample: its backward differences of order 1 to 4.
     #[inline(always)]
-    pub fn errors(&self, x: f64) -> [f64; ORDERS] {
+    pub fn errors(&self, x: f64) -> [f64; ORDER_COUNT] {
         let first = x - self.last;
         let second = first - self.differences[0];
         let third = second - self.differences[1];
@@ -230,7 +230,7 @@ impl ChannelGuard {
 
     /// Order of the prediction in use minus one, limited so that the differences contain no replaced samples.
     #[inline(always)]
-    fn order_in_use(&self) -> usize {
+    fn order_index(&self) -> usize {
         let most = self.known.saturating_sub(1);
         if self.order < most { self.order } else { most }
     }
@@ -244,8 +244,8 @@ impl ChannelGuard {
     /// True if the error exceeds the limit, provided that outliers are detected and a preceding sample is known; always
     /// true for a sample that is not finite.
     #[inline(always)]
-    pub fn is_outlier(&self, errors: &[f64; ORDERS]) -> bool {
-        let order = self.order_in_use();
+    pub fn is_outlier(&self, errors: &[f64; ORDER_COUNT]) -> bool {
+        let order = self.order_index();
         // The comparison is false if the error is NaN.
         let within = errors[order].abs() <= self.limit(order);
         !within && (self.detects_outliers && self.known > 0 || !errors[0].is_finite())
@@ -253,32 +253,36 @@ impl ChannelGuard {
 
     /// Accepts a sample: updates the prediction with the sample and the quantiles with its errors.
     #[inline(always)]
-    pub fn accept(&mut self, x: f64, errors: &[f64; ORDERS]) {
+    pub fn accept(&mut self, x: f64, errors: &[f64; ORDER_COUNT]) {
         if errors[0].abs() > self.resting {
             for (q, r) in self.quantiles.iter_mut().zip(errors) {
                 *q *= if r.abs() > *q {
-                    1.0 + GAIN * (1.0 - TAIL_PROBABILITY)
+                    1.0 + QUANTILE_GAIN * (1.0 - TAIL_PROBABILITY)
                 } else {
-                    1.0 - GAIN * TAIL_PROBABILITY
+                    1.0 - QUANTILE_GAIN * TAIL_PROBABILITY
                 };
             }
             for (p, r) in self.inner.iter_mut().zip(errors) {
                 *p *= if r.abs() > *p {
-                    1.0 + INNER_GAIN * (1.0 - INNER_TAIL_PROBABILITY)
+                    1.0 + INNER_QUANTILE_GAIN * (1.0 - INNER_TAIL_PROBABILITY)
                 } else {
-                    1.0 - INNER_GAIN * INNER_TAIL_PROBABILITY
+                    1.0 - INNER_QUANTILE_GAIN * INNER_TAIL_PROBABILITY
                 };
             }
         }
-        self.follow(x, errors);
+        self.update_prediction(x, errors);
     }
 
     /// Updates the prediction with a sample, but not the quantiles.
     #[inline(always)]
-    pub fn follow(&mut self, x: f64, errors: &[f64; ORDERS]) {
+    pub fn update_prediction(&mut self, x: f64, errors: &[f64; ORDER_COUNT]) {
         self.last = x;
         self.differences = [errors[0], errors[1], errors[2]];
-        self.known = if self.known < ORDERS { self.known + 1 } else { ORDERS };
+        self.known = if self.known < ORDER_COUNT {
+            self.known + 1
+        } else {
+            ORDER_COUNT
+        };
     }
 
     fn average_tails(&mut self) {
@@ -300,10 +304,10 @@ impl ChannelGuard {
     /// Ends a block: updates the averages of the tails and selects the order of the prediction.
     pub fn end_block(&mut self) {
         self.average_tails();
-        self.choose();
+        self.select_order();
     }
 
-    fn choose(&mut self) {
+    fn select_order(&mut self) {
         for (order, q) in self.quantiles.iter().enumerate() {
             if *q < self.quantiles[self.order] {
                 self.order = order;
@@ -312,17 +316,17 @@ impl ChannelGuard {
     }
 
     /// Returns the number of consecutive held-back samples.
-    pub fn held(&self) -> u32 {
+    pub fn held_count(&self) -> u32 {
         self.held
     }
 
     /// Returns the largest deviation of a held-back sample from the last value of the continued signal.
-    pub fn largest_error(&self) -> f64 {
+    pub fn largest_held_error(&self) -> f64 {
         self.largest_error
     }
 
     /// Holds back a sample, which may be missing (NaN), and returns its replacement.
-    pub fn hold(&mut self, x: f64) -> f64 {
+    pub fn hold_back(&mut self, x: f64) -> f64 {
         if self.held == 0 {
             (self.largest_error, self.base) = (0.0, self.last);
             self.slope = self.slope();
@@ -338,9 +342,9 @@ impl ChannelGuard {
     }
 
     /// True if a held-back signal has returned to a plausible value with this sample.
-    pub fn is_back(&self, x: f64) -> bool {
+    pub fn has_returned(&self, x: f64) -> bool {
         let expected = self.last + self.damping * self.slope;
-        let (limit, held) = (self.limit(self.order_in_use()), f64::from(self.held));
+        let (limit, held) = (self.limit(self.order_index()), f64::from(self.held));
         let room = if self.order > 0 {
             limit + held * self.quantiles[0]
         } else {
@@ -366,12 +370,12 @@ impl ChannelGuard {
         for x in samples {
             if first {
                 self.last = x;
-                self.differences = [0.0; ORDERS - 1];
+                self.differences = [0.0; ORDER_COUNT - 1];
                 self.known = 1;
                 first = false;
             } else {
                 let errors = self.errors(x);
-                self.follow(x, &errors);
+                self.update_prediction(x, &errors);
             }
         }
     }
@@ -401,7 +405,7 @@ mod tests {
                     assert!((x - predicted - error).abs() < 1e-12, "{t} {order}: {error}");
                 }
             }
-            channel.follow(x, &errors);
+            channel.update_prediction(x, &errors);
         }
     }
 
@@ -450,16 +454,16 @@ mod tests {
         for t in 0..300 {
             let x = signal(t);
             let errors = channel.errors(x);
-            channel.follow(x, &errors);
+            channel.update_prediction(x, &errors);
         }
         for t in 300..308 {
             let x = signal(t) + 5.0;
-            assert!(channel.is_outlier(&channel.errors(x)) || channel.held() > 0);
-            assert!(channel.held() == 0 || !channel.is_back(x), "{t}");
-            let replacement = channel.hold(x);
+            assert!(channel.is_outlier(&channel.errors(x)) || channel.held_count() > 0);
+            assert!(channel.held_count() == 0 || !channel.has_returned(x), "{t}");
+            let replacement = channel.hold_back(x);
             assert!((replacement - signal(t)).abs() < 0.1, "{t}: {replacement}");
         }
-        assert!(channel.is_back(signal(308)) && (channel.largest_error() - 5.0).abs() < 0.1);
+        assert!(channel.has_returned(signal(308)) && (channel.largest_held_error() - 5.0).abs() < 0.1);
         channel.resume(signal(308));
         for t in 309..400 {
             let errors = channel.errors(signal(t));
@@ -481,7 +485,7 @@ mod tests {
                 ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
             };
             let mut channel = ChannelGuard::new(0.01);
-            channel.set_quantiles([1.0; ORDERS]);
+            channel.set_quantiles([1.0; ORDER_COUNT]);
             let (mut beyond, mut factor, mut x) = (0, 0.0, 0.0);
             for t in 0..100_000 {
                 // Moves for half a second and rests for half a second.
@@ -507,15 +511,15 @@ mod tests {
 
     #[test]
     fn offset_after_a_step_is_accepted_and_rescaling_is_not() {
-        for order in 0..ORDERS {
+        for order in 0..ORDER_COUNT {
             let mut channel = ChannelGuard::new(0.01);
             let mut state = 3;
-            let mut quantiles = [9.0; ORDERS];
+            let mut quantiles = [9.0; ORDER_COUNT];
             quantiles[order] = 2.576;
             channel.set_quantiles(quantiles);
             assert_eq!(channel.order, order);
             // White noise, summed once for each order.
-            let mut sums = [0.0; ORDERS];
+            let mut sums = [0.0; ORDER_COUNT];
             let signal: [f64; 11] = core::array::from_fn(|_| {
                 let mut x = noise(&mut state);
                 for sum in &mut sums[..=order] {
@@ -533,11 +537,11 @@ mod tests {
     #[test]
     fn no_outliers_are_detected_while_quantiles_are_estimated() {
         let mut channel = ChannelGuard::new(0.01);
-        channel.follow(0.0, &[0.0; ORDERS]);
-        channel.start_estimation([0.0; ORDERS]);
+        channel.update_prediction(0.0, &[0.0; ORDER_COUNT]);
+        channel.start_estimation([0.0; ORDER_COUNT]);
         channel.start_detection();
         assert!(!channel.is_known());
-        channel.start_estimation([0.1; ORDERS]);
+        channel.start_estimation([0.1; ORDER_COUNT]);
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         channel.start_detection();
         assert!(channel.is_known() && channel.is_outlier(&channel.errors(1e9)));
@@ -547,8 +551,8 @@ mod tests {
     fn tail_ratio_is_set_after_empty_blocks() {
         let mut channel = ChannelGuard::new(0.01);
         channel.end_block();
-        assert_eq!(channel.tail_ratio, [MIN_TAIL_RATIO; ORDERS]);
-        channel.set_tails([3.0; ORDERS], [1.0; ORDERS]);
+        assert_eq!(channel.tail_ratio, [MIN_TAIL_RATIO; ORDER_COUNT]);
+        channel.set_tails([3.0; ORDER_COUNT], [1.0; ORDER_COUNT]);
         let expected = 9.0_f64.clamp(MIN_TAIL_RATIO, LARGEST_TAIL_RATIO);
         assert!(channel.tail_ratio.iter().all(|heavy| (heavy - expected).abs() < 1e-12));
     }
@@ -558,11 +562,11 @@ mod tests {
         let mut channel = ChannelGuard::new(0.01);
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         assert!(channel.is_outlier(&channel.errors(f64::NAN)));
-        assert!(channel.hold(f64::NAN).is_finite() && channel.held() == 1);
+        assert!(channel.hold_back(f64::NAN).is_finite() && channel.held_count() == 1);
         // A signal that never moves has no scale, and only its floor detects outliers.
         channel.restart([3.0; 9].into_iter());
-        channel.set_quantiles([1e-300; ORDERS]);
-        channel.set_floor(0.1);
+        channel.set_quantiles([1e-300; ORDER_COUNT]);
+        channel.set_limit_floor(0.1);
         assert!(!channel.is_outlier(&channel.errors(3.05)));
         assert!(channel.is_outlier(&channel.errors(3.2)));
     }

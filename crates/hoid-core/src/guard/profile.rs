@@ -20,11 +20,11 @@
 //! negative for channels that are not swapped, and at most the distance between the two profiles for swapped channels.
 //! Channels with similar profiles are therefore never reported as swapped.
 
-use super::channel::ORDERS;
-use crate::bounds::within;
+use super::channel::ORDER_COUNT;
+use crate::bounds::clamp;
 
 /// Number of channels: e and u.
-pub const CHANNELS: usize = 2;
+pub const CHANNEL_COUNT: usize = 2;
 /// Number of blocks from which the long-run values are learnt.
 const ESTIMATION_BLOCKS: u32 = 10;
 /// Weight of a block once the long-run values are known.
@@ -55,19 +55,19 @@ const SIMILAR_DISTANCE: f64 = 4.0 * 1.386;
 /// Distance from the long-run values above which a block is unusual.
 const UNUSUAL_DISTANCE: f64 = 4.0;
 /// Largest contribution of the logarithm of one ratio to a distance.
-const LARGEST_LOG: f64 = 10.0;
+const MAX_LOG_RATIO: f64 = 10.0;
 
 /// Sums over the samples of a block, or the means computed from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Block {
     /// Magnitudes of the backward differences of order 1 to 4 of e and u.
-    pub differences: [[f64; ORDERS]; CHANNELS],
+    pub differences: [[f64; ORDER_COUNT]; CHANNEL_COUNT],
     /// Magnitudes of e and u about their long-run means.
-    pub magnitude: [f64; CHANNELS],
+    pub magnitude: [f64; CHANNEL_COUNT],
     /// Smallest and largest values of e and u.
-    pub range: [[f64; 2]; CHANNELS],
+    pub range: [[f64; 2]; CHANNEL_COUNT],
     /// Sums or means of the values of e and u.
-    pub mean: [f64; CHANNELS],
+    pub mean: [f64; CHANNEL_COUNT],
     /// Magnitudes of the innovations.
     pub innovation: f64,
     /// Number of samples.
@@ -81,10 +81,10 @@ crate::state!([] Block { differences, magnitude, range, mean, innovation, sample
 impl Default for Block {
     fn default() -> Self {
         Self {
-            differences: [[0.0; ORDERS]; CHANNELS],
-            magnitude: [0.0; CHANNELS],
-            range: [[f64::INFINITY, f64::NEG_INFINITY]; CHANNELS],
-            mean: [0.0; CHANNELS],
+            differences: [[0.0; ORDER_COUNT]; CHANNEL_COUNT],
+            magnitude: [0.0; CHANNEL_COUNT],
+            range: [[f64::INFINITY, f64::NEG_INFINITY]; CHANNEL_COUNT],
+            mean: [0.0; CHANNEL_COUNT],
             innovation: 0.0,
             samples: 0,
             innovations: 0,
@@ -95,9 +95,14 @@ impl Default for Block {
 impl Block {
     /// Adds a sample of both channels: its backward differences and values; `centre` are the long-run means.
     #[inline(always)]
-    pub fn add(&mut self, differences: &[[f64; ORDERS]; CHANNELS], values: [f64; CHANNELS], centre: [f64; CHANNELS]) {
-        for c in 0..CHANNELS {
-            for j in 0..ORDERS {
+    pub fn add(
+        &mut self,
+        differences: &[[f64; ORDER_COUNT]; CHANNEL_COUNT],
+        values: [f64; CHANNEL_COUNT],
+        centre: [f64; CHANNEL_COUNT],
+    ) {
+        for c in 0..CHANNEL_COUNT {
+            for j in 0..ORDER_COUNT {
                 self.differences[c][j] += differences[c][j].abs();
             }
             self.magnitude[c] += (values[c] - centre[c]).abs();
@@ -171,12 +176,12 @@ pub enum Fault {
 
 impl Fault {
     /// True for faults that can turn out to be a new normal state of the signals; frozen and idle channels cannot.
-    pub fn may_be_the_new_level(self) -> bool {
+    pub fn may_be_new_level(self) -> bool {
         !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
     }
 
     /// Minimum duration of the fault in blocks when it is first reported.
-    pub fn blocks(self) -> u32 {
+    pub fn min_duration_blocks(self) -> u32 {
         match self {
             Self::FrozenInput => 1,
             Self::FrozenOutput => FROZEN_U_BLOCKS,
@@ -197,7 +202,7 @@ pub struct Profile {
     frozen_u: u32,
     idle: u32,
     larger: u32,
-    rescaled: [u32; CHANNELS],
+    rescaled: [u32; CHANNEL_COUNT],
     swapped: f64,
     misfits: u32,
     /// Long-run value of R, and number of blocks from which it was learnt.
@@ -224,7 +229,7 @@ impl Profile {
             frozen_u: 0,
             idle: 0,
             larger: 0,
-            rescaled: [0; CHANNELS],
+            rescaled: [0; CHANNEL_COUNT],
             swapped: 0.0,
             misfits: 0,
             ratio: 0.0,
@@ -248,7 +253,7 @@ impl Profile {
             && self.frozen_u == 0
             && self.idle == 0
             && self.larger == 0
-            && self.rescaled == [0; CHANNELS]
+            && self.rescaled == [0; CHANNEL_COUNT]
             && self.swapped == 0.0
             && self.misfits == 0
     }
@@ -271,7 +276,7 @@ impl Profile {
     }
 
     /// Returns the long-run values.
-    pub fn typical(&self) -> &Block {
+    pub fn typical_values(&self) -> &Block {
         &self.typical
     }
 
@@ -285,7 +290,7 @@ impl Profile {
             1.0 / f64::from(self.blocks)
         };
         let toward = |typical: &mut f64, found: f64, least: f64, most: f64| {
-            let bounded = if known { within(found, [least, most]) } else { found };
+            let bounded = if known { clamp(found, [least, most]) } else { found };
             *typical += weight * (bounded - *typical);
         };
         // If the squares of a signal underflow, the ratio R is not defined.
@@ -299,20 +304,20 @@ impl Profile {
                 1.0 / f64::from(self.ratios)
             };
             let bounded = if known {
-                within(ratio, [0.5 * self.ratio, 2.0 * self.ratio])
+                clamp(ratio, [0.5 * self.ratio, 2.0 * self.ratio])
             } else {
                 ratio
             };
             self.ratio += weight * (bounded - self.ratio);
             let size = block.innovation;
             let bounded = if known {
-                within(size, [0.5 * self.innovation, 2.0 * self.innovation])
+                clamp(size, [0.5 * self.innovation, 2.0 * self.innovation])
             } else {
                 size
             };
             self.innovation += weight * (bounded - self.innovation);
         }
-        for c in 0..CHANNELS {
+        for c in 0..CHANNEL_COUNT {
             for (typical, found) in self.typical.differences[c].iter_mut().zip(block.differences[c]) {
                 let now = *typical;
                 toward(typical, found, 0.5 * now, 2.0 * now);
@@ -332,8 +337,8 @@ impl Profile {
     /// Returns the minimum time, in blocks, for which a fault that was just reported has lasted.
     pub fn duration_blocks(&self, fault: Fault) -> u32 {
         match fault {
-            Fault::FrozenOutput => self.frozen_u.max(fault.blocks()),
-            _ => fault.blocks(),
+            Fault::FrozenOutput => self.frozen_u.max(fault.min_duration_blocks()),
+            _ => fault.min_duration_blocks(),
         }
     }
 
@@ -368,7 +373,7 @@ impl Profile {
             typical > 0.0 && block.differences[c][j] > LARGER_RATIO * typical
         };
         self.larger = count(self.larger, [0, 2].iter().all(|j| grown(0, *j) && grown(1, *j)));
-        let ratios = [0, 1].map(|c| self.ratios_of(block, c));
+        let ratios = [0, 1].map(|c| self.ratio_range(block, c));
         for (c, run) in self.rescaled.iter_mut().enumerate() {
             let [least, most] = ratios[c];
             let other = ratios[1 - c][1];
@@ -409,7 +414,7 @@ impl Profile {
     }
 
     /// Smallest and largest ratio of the differences of a channel to their long-run values.
-    fn ratios_of(&self, block: &Block, c: usize) -> [f64; 2] {
+    fn ratio_range(&self, block: &Block, c: usize) -> [f64; 2] {
         let mut ends = [f64::INFINITY, 0.0];
         for (found, typical) in block.differences[c].iter().zip(&self.typical.differences[c]) {
             let ratio = if found == typical { 1.0 } else { found / typical };
@@ -420,7 +425,7 @@ impl Profile {
 
     /// Distance of a block from the long-run values, where channel c of the block is compared with the long-run values
     /// of channel `of[c]`.
-    fn distance(&self, block: &Block, of: [usize; CHANNELS]) -> f64 {
+    fn distance(&self, block: &Block, of: [usize; CHANNEL_COUNT]) -> f64 {
         let mut sum = 0.0;
         for (c, typical) in of.into_iter().enumerate() {
             for j in [0, 2] {
@@ -431,7 +436,7 @@ impl Profile {
                 } else {
                     libm::log(found / typical).abs()
                 };
-                sum += if log < LARGEST_LOG { log } else { LARGEST_LOG };
+                sum += if log < MAX_LOG_RATIO { log } else { MAX_LOG_RATIO };
             }
         }
         sum
@@ -455,7 +460,7 @@ mod tests {
         }
     }
 
-    fn known() -> Profile {
+    fn known_profile() -> Profile {
         let mut profile = Profile::new();
         for _ in 0..20 {
             let typical = block([0.02, 0.1], [0.1, 1.1]);
@@ -468,7 +473,7 @@ mod tests {
     /// Squares that underflow: infinite innovations do not become a long-run value, and nothing panics afterwards.
     #[test]
     fn non_finite_innovations_do_not_enter_the_profile() {
-        let mut profile = known();
+        let mut profile = known_profile();
         for innovation in [f64::INFINITY, f64::NAN, 0.1] {
             let found = Block {
                 innovation,
@@ -500,7 +505,7 @@ mod tests {
             ),
         ];
         for (bad, fault, after) in cases {
-            let mut profile = known();
+            let mut profile = known_profile();
             for n in 1..=5 {
                 let found = profile.find_fault(&bad, false);
                 assert_eq!(found, (n >= after).then_some(fault), "{n} {fault:?}");
@@ -520,7 +525,7 @@ mod tests {
             ..block([e, 0.0], [0.1, 1.1])
         };
         let after = |rests: bool, found: &Block| {
-            let mut profile = known();
+            let mut profile = known_profile();
             (1..=20).find_map(|n| profile.find_fault(found, rests).map(|fault| (n, fault)))
         };
         assert_eq!(after(false, &still), Some((3, Fault::FrozenOutput)));
@@ -529,7 +534,7 @@ mod tests {
         assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Fault::FrozenOutput)));
         assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Fault::FrozenInput)));
         // The duration of a fault includes the blocks in which it was accepted as a rest.
-        let mut profile = known();
+        let mut profile = known_profile();
         (0..9).for_each(|_| assert_eq!(profile.find_fault(&quiet(0.0, 0.02), true), None));
         let reported = profile.find_fault(&quiet(0.0, 0.02), false);
         assert_eq!(reported.map(|fault| profile.duration_blocks(fault)), Some(10));
@@ -537,11 +542,11 @@ mod tests {
 
     #[test]
     fn one_block_changes_long_run_values_by_at_most_two_percent() {
-        let mut profile = known();
-        let before = *profile.typical();
+        let mut profile = known_profile();
+        let before = *profile.typical_values();
         profile.update(&block([20.0, 100.0], [0.1, 1.1]));
-        for c in 0..CHANNELS {
-            let ratio = profile.typical().differences[c][0] / before.differences[c][0];
+        for c in 0..CHANNEL_COUNT {
+            let ratio = profile.typical_values().differences[c][0] / before.differences[c][0];
             assert!((1.0..1.02).contains(&ratio), "{ratio}");
         }
     }

@@ -10,9 +10,9 @@
 //! distribution, and gives little weight to a few outliers. The innovations of a sound recursion exceed those of a
 //! fixed model by half the effective number of parameters divided by the memory: .2 % for memories of 2 to 5 s and
 //! white innovations. They are larger by several per cent for a few seconds at a time if the order of the noise model
-//! is too low for the remnant, and by more for an unsteady person. Only the part of the logarithm beyond [`DRIFT`]
+//! is too low for the remnant, and by more for an unsteady person. Only the part of the logarithm beyond [`TOLERATED_DRIFT`]
 //! counts. The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a diverged estimate when
-//! it reaches [`DIVERGED`].
+//! it reaches [`DIVERGENCE_LIMIT`].
 //!
 //! After a change of the person, an estimate that has followed the change predicts u better than the initial model, and
 //! the sum stays at zero.
@@ -20,9 +20,9 @@
 /// Highest order of a polynomial of the model.
 pub const MAX_ORDER: usize = 16;
 /// Tolerated increase of the logarithm of the mean magnitude of the innovations, compared with the fixed model.
-pub const DRIFT: f64 = 0.2;
+pub const TOLERATED_DRIFT: f64 = 0.2;
 /// Cumulative sum above which the estimate is reported as diverged.
-pub const DIVERGED: f64 = 40.0;
+pub const DIVERGENCE_LIMIT: f64 = 40.0;
 /// Largest contribution of one block to the cumulative sum.
 const LARGEST_CONTRIBUTION: f64 = 15.0;
 
@@ -107,13 +107,13 @@ impl ReferenceModel {
     /// recursion has diverged.
     pub fn end_block(&mut self, innovation: f64) -> bool {
         let own = self.sum / f64::from(self.samples.max(1));
-        let score = f64::from(self.samples) * (libm::log(innovation / own) - DRIFT);
+        let score = f64::from(self.samples) * (libm::log(innovation / own) - TOLERATED_DRIFT);
         self.skip_block();
         // A comparison with NaN is false; zero divided by zero carries no information.
         if score.abs() <= f64::INFINITY {
             self.score = (self.score + score.clamp(-LARGEST_CONTRIBUTION, LARGEST_CONTRIBUTION)).max(0.0);
         }
-        self.score >= DIVERGED
+        self.score >= DIVERGENCE_LIMIT
     }
 }
 

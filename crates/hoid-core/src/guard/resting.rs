@@ -2,7 +2,7 @@
 //! channel is a fault.
 //!
 //! A stick with a dead zone rests at its centre, and a stick that is pushed to its end rests there. Such values are
-//! atoms of the distribution of u: u often returns to them and stays there. The last [`ATOMS`] values at which u stayed
+//! atoms of the distribution of u: u often returns to them and stays there. The last [`MAX_ATOMS`] values at which u stayed
 //! for `MIN_REST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration
 //! l of the longest rest. A constant span of length T is a **rest**, and no fault, if
 //!
@@ -20,7 +20,7 @@
 //! larger than is typical.
 
 /// Number of stored values.
-pub const ATOMS: usize = 4;
+pub const MAX_ATOMS: usize = 4;
 /// Minimum duration of a rest in s.
 const MIN_REST_S: f64 = 0.1;
 /// Minimum number of rests at a value for it to count as an atom; `MIN_TIME_SHARE` is the minimum fraction of the time
@@ -46,11 +46,11 @@ crate::state!([] Atom { value, rests, samples, longest });
 
 /// Values at which u has rested, and the current constant span.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Resting {
+pub struct RestDetector {
     sample_time: f64,
     /// Largest difference between two values that count as equal.
     tolerance: f64,
-    atoms: [Atom; ATOMS],
+    atoms: [Atom; MAX_ATOMS],
     samples: u64,
     /// Current value of u, and number of samples for which it has been constant.
     value: f64,
@@ -59,15 +59,15 @@ pub struct Resting {
     rejected: bool,
 }
 
-crate::state!([] Resting { tolerance, atoms, samples, value, constant_samples, rejected });
+crate::state!([] RestDetector { tolerance, atoms, samples, value, constant_samples, rejected });
 
-impl Resting {
+impl RestDetector {
     /// Returns an empty list of rests, with the sample time in s.
     pub fn new(sample_time: f64) -> Self {
         Self {
             sample_time,
             tolerance: 0.0,
-            atoms: [Atom::default(); ATOMS],
+            atoms: [Atom::default(); MAX_ATOMS],
             samples: 0,
             value: 0.0,
             constant_samples: 0,
@@ -82,7 +82,7 @@ impl Resting {
 
     /// Takes a sample of u. A NaN ends a constant span.
     #[inline]
-    pub fn take(&mut self, u: f64) {
+    pub fn update(&mut self, u: f64) {
         self.samples += 1;
         if self.constant_samples > 0 && (u - self.value).abs() <= self.tolerance {
             self.constant_samples += 1;
@@ -103,8 +103,8 @@ impl Resting {
     /// Learns the constant span that has just ended. If the list of atoms is full and does not contain the value of the
     /// span, this value replaces the atom with the shortest total duration.
     fn record_rest(&mut self) {
-        let place = self.place().unwrap_or_else(|| {
-            let least = (0..ATOMS).min_by_key(|i| self.atoms[*i].samples).unwrap_or(0);
+        let place = self.atom_index().unwrap_or_else(|| {
+            let least = (0..MAX_ATOMS).min_by_key(|i| self.atoms[*i].samples).unwrap_or(0);
             self.atoms[least] = Atom {
                 value: self.value,
                 ..Atom::default()
@@ -118,14 +118,14 @@ impl Resting {
     }
 
     /// Index of the current value in the list of atoms; `None` if the list does not contain it.
-    fn place(&self) -> Option<usize> {
+    fn atom_index(&self) -> Option<usize> {
         let known = |atom: &Atom| atom.rests > 0 && (atom.value - self.value).abs() <= self.tolerance;
         self.atoms.iter().position(known)
     }
 
     /// True while u is constant because the person is resting at an atom.
     pub fn is_rest(&self) -> bool {
-        let Some(place) = self.place() else {
+        let Some(place) = self.atom_index() else {
             return false;
         };
         let Atom {
@@ -152,20 +152,20 @@ mod tests {
 
     /// Returns the rests of a person who moves for 2 s before each rest at zero; the lengths of the rests are in
     /// samples of 10 ms.
-    fn person(rests: &[u64]) -> Resting {
-        let mut resting = Resting::new(0.01);
+    fn person(rests: &[u64]) -> RestDetector {
+        let mut resting = RestDetector::new(0.01);
         for rest in rests {
-            (0..200).for_each(|k| resting.take(libm::sin(f64::from(k) * 0.1 + 0.05)));
-            (0..*rest).for_each(|_| resting.take(0.0));
+            (0..200).for_each(|k| resting.update(libm::sin(f64::from(k) * 0.1 + 0.05)));
+            (0..*rest).for_each(|_| resting.update(0.0));
         }
-        (0..200).for_each(|k| resting.take(libm::sin(f64::from(k) * 0.1 + 0.05)));
+        (0..200).for_each(|k| resting.update(libm::sin(f64::from(k) * 0.1 + 0.05)));
         resting
     }
 
     /// Returns the time in s after which a constant span at a value is no longer a rest.
-    fn rest_ends_after(mut resting: Resting, value: f64) -> f64 {
+    fn rest_duration_s(mut resting: RestDetector, value: f64) -> f64 {
         let last = (1..10_000).take_while(|_| {
-            resting.take(value);
+            resting.update(value);
             resting.is_rest()
         });
         last.count() as f64 * 0.01
@@ -174,35 +174,35 @@ mod tests {
     #[test]
     fn rest_is_accepted_at_known_values_for_a_limited_time() {
         let resting = person(&[60, 150, 80, 120]);
-        assert!((rest_ends_after(resting, 0.0) - 8.0).abs() < 0.02);
-        assert!((rest_ends_after(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
+        assert!((rest_duration_s(resting, 0.0) - 8.0).abs() < 0.02);
+        assert!((rest_duration_s(person(&[60, 600, 80, 120]), 0.0) - 12.0).abs() < 0.02);
         // A new value, and a value with a single rest.
-        assert!(rest_ends_after(resting, 0.37) == 0.0);
-        assert!(rest_ends_after(person(&[150]), 0.0) == 0.0);
+        assert!(rest_duration_s(resting, 0.37) == 0.0);
+        assert!(rest_duration_s(person(&[150]), 0.0) == 0.0);
     }
 
     /// A signal that takes each of many values for a moment, as from a coarse converter.
     #[test]
     fn quantised_values_are_not_rest_values() {
-        let mut resting = Resting::new(0.01);
+        let mut resting = RestDetector::new(0.01);
         for k in 0_u32..400 {
             let value = f64::from(k.wrapping_mul(2_654_435_761) >> 26);
-            (0..12).for_each(|_| resting.take(value));
+            (0..12).for_each(|_| resting.update(value));
         }
         for value in [0.0, 7.0, 33.0, 63.0] {
-            assert!(rest_ends_after(resting, value) == 0.0, "{value}");
+            assert!(rest_duration_s(resting, value) == 0.0, "{value}");
         }
     }
 
     #[test]
     fn rejected_rests_and_nan_are_ignored() {
         let mut resting = person(&[60, 150, 80]);
-        (0..3000).for_each(|_| resting.take(0.0));
+        (0..3000).for_each(|_| resting.update(0.0));
         resting.reject();
-        resting.take(1.0);
-        assert!((rest_ends_after(resting, 0.0) - 8.0).abs() < 0.02);
-        resting.take(f64::NAN);
+        resting.update(1.0);
+        assert!((rest_duration_s(resting, 0.0) - 8.0).abs() < 0.02);
+        resting.update(f64::NAN);
         assert!(!resting.is_rest());
-        assert!(!Resting::new(0.01).is_rest());
+        assert!(!RestDetector::new(0.01).is_rest());
     }
 }

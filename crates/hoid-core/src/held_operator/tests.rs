@@ -5,8 +5,8 @@ use super::*;
 use std::vec::Vec;
 
 const TS: f64 = 0.01;
-const ROWS: [&str; 5] = ["b0", "b1", "b2", "f1", "f2"];
-const COLUMNS: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau"];
+const ROW_NAMES: [&str; 5] = ["b0", "b1", "b2", "f1", "f2"];
+const COLUMN_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau"];
 
 struct Case {
     parameters: [f64; 4],
@@ -39,7 +39,7 @@ fn cases() -> Vec<Case> {
         .collect()
 }
 
-fn largest(values: &[f64]) -> f64 {
+fn largest_magnitude(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |m, v| m.max(v.abs()))
 }
 
@@ -49,12 +49,15 @@ fn column(jacobian: &[[f64; 5]; 5], j: usize) -> [f64; 5] {
 
 /// Returns the scales of a numerator, and of a denominator with its leading one.
 fn scales(coefficients: &[f64; 5]) -> [f64; 5] {
-    let (b, f) = (largest(&coefficients[..3]), largest(&coefficients[3..]).max(1.0));
+    let (b, f) = (
+        largest_magnitude(&coefficients[..3]),
+        largest_magnitude(&coefficients[3..]).max(1.0),
+    );
     [b, b, b, f, f]
 }
 
 /// Returns the largest pole times the sample time.
-fn size_of_poles(omega: f64, zeta: f64, ts: f64) -> f64 {
+fn pole_size(omega: f64, zeta: f64, ts: f64) -> f64 {
     let zeta = zeta.abs().max(1.0);
     omega * ts * (zeta + (zeta * zeta - 1.0).sqrt())
 }
@@ -78,7 +81,7 @@ fn coefficients_agree_with_60_digit_reference() {
         for i in 0..5 {
             // One ulp each from the divided differences, the products of gain and time, and the two sums in b1. The
             // largest errors are 3.92 for b and 0.64 for f.
-            let what = format_args!("{p:?} {} {}: {}", case.delta, case.ts, ROWS[i]);
+            let what = format_args!("{p:?} {} {}: {}", case.delta, case.ts, ROW_NAMES[i]);
             assert_within(found[i], case.coefficients[i], 4.0 * scales[i], what);
         }
     }
@@ -110,11 +113,14 @@ fn jacobian_agrees_with_60_digit_reference() {
         // A pole times Ts is rounded, and its exponential has |z| times that error. The bound is constant for |z| <= 2
         // (the largest error is 2.7) and proportional to |z| beyond, where a column also becomes small as the sine
         // passes zero (14.2 at |z| = 4).
-        let tolerance = 8.0 * (size_of_poles(p[2], p[3], case.ts) / 2.0).max(1.0);
+        let tolerance = 8.0 * (pole_size(p[2], p[3], case.ts) / 2.0).max(1.0);
         for j in 0..5 {
-            let scale = largest(&column(&case.jacobian, j));
+            let scale = largest_magnitude(&column(&case.jacobian, j));
             for i in 0..5 {
-                let what = format_args!("{p:?} {} {}: {} by {}", case.delta, case.ts, ROWS[i], COLUMNS[j]);
+                let what = format_args!(
+                    "{p:?} {} {}: {} by {}",
+                    case.delta, case.ts, ROW_NAMES[i], COLUMN_NAMES[j]
+                );
                 assert_within(found[i][j], case.jacobian[i][j], tolerance * scale, what);
             }
         }
@@ -128,7 +134,7 @@ fn zero_fraction_equals_the_whole_sample_hold() {
         let (whole, by_whole) = held_operator(case.parameters, case.ts);
         let (any, by_any) = held_operator_delayed(case.parameters, 0.0, case.ts);
         assert_eq!(any[2], 0.0);
-        assert_eq!(largest(&by_any[2][..4]), 0.0);
+        assert_eq!(largest_magnitude(&by_any[2][..4]), 0.0);
         for (row, i) in [0, 1, 3, 4].into_iter().enumerate() {
             assert_eq!(whole[row], any[i]);
             assert_eq!(by_whole[row], by_any[i][..4]);
@@ -145,14 +151,19 @@ fn fraction_of_one_sample_equals_a_whole_sample() {
         let (whole, by_whole) = held_operator(p, case.ts);
         let (any, by_any) = held_operator_delayed(p, case.ts, case.ts);
         assert_eq!(any[0], 0.0);
-        let scale = largest(&whole[..2]);
+        let scale = largest_magnitude(&whole[..2]);
         for i in 0..2 {
             // Both are within 4 eps of the exact value.
-            assert_within(any[i + 1], whole[i], 8.0 * scale, format_args!("{p:?} {}", ROWS[i + 1]));
-            let tolerance = 16.0 * (size_of_poles(p[2], p[3], case.ts) / 2.0).max(1.0);
+            assert_within(
+                any[i + 1],
+                whole[i],
+                8.0 * scale,
+                format_args!("{p:?} {}", ROW_NAMES[i + 1]),
+            );
+            let tolerance = 16.0 * (pole_size(p[2], p[3], case.ts) / 2.0).max(1.0);
             for j in 0..4 {
-                let scale = largest(&by_whole.map(|row| row[j]));
-                let what = format_args!("{p:?} {} by {}", ROWS[i + 1], COLUMNS[j]);
+                let scale = largest_magnitude(&by_whole.map(|row| row[j]));
+                let what = format_args!("{p:?} {} by {}", ROW_NAMES[i + 1], COLUMN_NAMES[j]);
                 assert_within(by_any[i + 1][j], by_whole[i][j], tolerance * scale, what);
             }
         }
@@ -182,7 +193,7 @@ fn jacobian_agrees_with_finite_differences() {
             up[j] += h;
             down[j] -= h;
             let ((up, _), (down, _)) = (at(up), at(down));
-            let scale = largest(&column(&exact, j));
+            let scale = largest_magnitude(&column(&exact, j));
             for i in 0..5 {
                 let difference = (up[i] - down[i]) / (2.0 * h);
                 // Truncation error: h^2/6 of a third derivative, 1e-8 times the cubed size of the poles. Rounding
@@ -191,8 +202,8 @@ fn jacobian_agrees_with_finite_differences() {
                     (exact[i][j] - difference).abs() < 1e-7 * scale,
                     "{p:?} Ts {}: {} by {}: {} and {difference}",
                     case.ts,
-                    ROWS[i],
-                    COLUMNS[j],
+                    ROW_NAMES[i],
+                    COLUMN_NAMES[j],
                     exact[i][j]
                 );
             }
@@ -217,7 +228,7 @@ fn coefficients_are_continuous_in_the_fraction() {
         let step = TS / STEPS as f64;
         // The third derivative of R is omega^2 times the divided difference of z^3 e^{zt}, at most (3 + |z|
         // t) |z|^2 |e^{zt}|; for A it is smaller by |z|.
-        let fastest = size_of_poles(omega, zeta, TS) / TS;
+        let fastest = pole_size(omega, zeta, TS) / TS;
         let growth = (-2.0 * zeta * omega * TS).exp().max(1.0);
         let third = omega * omega * (3.0 + fastest * TS) * fastest * (p[0] + p[1] * fastest) * growth;
         let (mut before, mut slopes_before) = at(0);
@@ -227,11 +238,11 @@ fn coefficients_are_continuous_in_the_fraction() {
                 // Trapezoidal rule: step^3/12 of the third derivative, of two responses in b1, and 4 eps for each
                 // coefficient.
                 let change = step * (slopes[i][4] + slopes_before[i][4]) / 2.0;
-                let bound = step.powi(3) / 12.0 * 2.0 * third + 8.0 * f64::EPSILON * largest(&now[..3]);
+                let bound = step.powi(3) / 12.0 * 2.0 * third + 8.0 * f64::EPSILON * largest_magnitude(&now[..3]);
                 assert!(
                     (now[i] - before[i] - change).abs() < bound,
                     "{p:?} step {k}: {} moves by {:e}, not {change:e}, bound {bound:e}",
-                    ROWS[i],
+                    ROW_NAMES[i],
                     now[i] - before[i]
                 );
             }

@@ -40,13 +40,13 @@ pub fn box_jenkins(samples: usize, seed: u64, level: f64) -> Vec<(f64, f64)> {
 }
 
 /// P by rows, updated as printed in the thesis and made symmetric at each sample: the reference for the factored form.
-pub struct Plain<const N: usize> {
+pub struct PlainCovariance<const N: usize> {
     pub p: [[f64; N]; N],
     pub power: f64,
     pub largest: f64,
 }
 
-impl<const N: usize> Plain<N> {
+impl<const N: usize> PlainCovariance<N> {
     pub fn times(&self, psi: &[f64; N]) -> [f64; N] {
         std::array::from_fn(|i| (0..N).map(|j| self.p[i][j] * psi[j]).sum())
     }
@@ -144,12 +144,12 @@ pub fn covariance<const N: usize>(p0: f64, forgetting: Forgetting<N>) -> Covaria
 }
 
 /// Returns error bars that start from p0 I, with the innovation limited to five standard deviations.
-pub fn bars<const N: usize, const K: usize>(p0: f64) -> ErrorBars<N, K> {
+pub fn error_bars<const N: usize, const K: usize>(p0: f64) -> ErrorBars<N, K> {
     ErrorBars::new(&diagonal::<N>(p0), InnovationVariance::new(0.0, 0.0, 1.0), 5.0)
 }
 
 /// Returns stable coefficients for these orders.
-pub fn start<const N: usize>(shape: &AnyShape) -> [f64; N] {
+pub fn start_coefficients<const N: usize>(shape: &AnyShape) -> [f64; N] {
     let mut theta = [0.0; N];
     let mut at = 0;
     for (n, values) in [

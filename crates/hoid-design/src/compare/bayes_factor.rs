@@ -20,7 +20,7 @@ use std::f64::consts::PI;
 /// Scale of the prior distribution of effect sizes.
 const R: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// Number of steps of the trapezoidal rule per unit of log g.
-const STEPS: usize = 64;
+const STEPS_PER_UNIT: usize = 64;
 
 /// Returns BF_10 of a t test of one group of people (`second` is 0) or of two groups; `None` if there are too few
 /// people or t is not finite.
@@ -42,11 +42,11 @@ pub fn bayes_factor(t: f64, first: usize, second: usize) -> Option<f64> {
     // Below log g = -8, e^(-1/(2 g)) is negligible; at the upper end the integrand falls as e^(-x), once N g r^2
     // exceeds t^2.
     let (from, to) = (-8.0, 45.0 + (t * t).ln_1p());
-    let count = ((to - from) * STEPS as f64).ceil() as usize;
+    let count = ((to - from) * STEPS_PER_UNIT as f64).ceil() as usize;
     let sum: f64 = (0..=count)
-        .map(|k| (with(from + k as f64 / STEPS as f64) - without).exp())
+        .map(|k| (with(from + k as f64 / STEPS_PER_UNIT as f64) - without).exp())
         .sum();
-    let found = sum / STEPS as f64;
+    let found = sum / STEPS_PER_UNIT as f64;
     found.is_finite().then_some(found)
 }
 

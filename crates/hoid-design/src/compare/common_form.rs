@@ -6,7 +6,7 @@
 //! Multimodel Inference*, 2002, section 2.6). The common form is the simplest form within 2 of the smallest sum. A form
 //! that the data of most people leave open is not considered, because its parameters would not be determined.
 
-use hoid_ident::family::{MIN_WEIGHT, NO_EVIDENCE};
+use hoid_ident::family::{MIN_WEIGHT, NEGLIGIBLE_AIC_DIFFERENCE};
 use hoid_model::{Finding, Form};
 use hoid_study::group::FormEvidence;
 
@@ -44,8 +44,10 @@ pub(super) fn common_form(people: &[&[FormEvidence]]) -> Option<CommonForm> {
     }
     let sums: Vec<CommonForm> = Form::ALL.iter().filter_map(|form| sum(*form)).collect();
     let least = sums.iter().map(|of| of.criterion).fold(f64::INFINITY, f64::min);
-    let near = sums.into_iter().filter(|of| of.criterion - least <= NO_EVIDENCE);
-    near.min_by_key(|of| (of.form.simplicity(), of.form))
+    let near = sums
+        .into_iter()
+        .filter(|of| of.criterion - least <= NEGLIGIBLE_AIC_DIFFERENCE);
+    near.min_by_key(|of| (of.form.coordinate_count(), of.form))
 }
 
 impl CommonForm {

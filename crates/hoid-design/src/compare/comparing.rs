@@ -8,10 +8,10 @@ use super::{
     Observation, PersonEstimate, Quantity, Variation, Weights,
     adjust::holm,
     bayes_factor,
-    contrast::{Contrast, Resolved, conditions_of, contrasts},
+    contrast::{Contrast, ResolvedFactor, conditions_of, contrasts},
     d_z,
     factor::Factor,
-    group_estimates::{EstimatedValue, forms, in_words},
+    group_estimates::{EstimatedValue, forms, forms_text},
     hedges_g,
     learning::Practice,
     meta_mean, meta_regression,
@@ -46,7 +46,7 @@ named_choice!(Covariate, "covariate", 1, {
 
 /// Options of a comparison of people and conditions.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Comparing {
+pub struct ComparisonOptions {
     /// Factors to compare; if empty, the conditions are the levels of one factor.
     pub factors: Vec<Factor>,
     /// Whether the factor varies within or between people; determined from the group if `None`.
@@ -64,7 +64,7 @@ pub struct Comparing {
 /// Share of the prior in an estimate above which a finding is reported.
 const MAX_PRIOR_SHARE: f64 = 0.5;
 
-impl Comparing {
+impl ComparisonOptions {
     /// Computes the comparison.
     ///
     /// # Errors
@@ -75,8 +75,8 @@ impl Comparing {
             true => vec![Factor::conditions()],
             false => self.factors.clone(),
         };
-        let resolve = |factor: &Factor| Resolved::of(factor, self.variation.filter(|_| asked.len() == 1), group);
-        let factors: Vec<Resolved> = asked.iter().map(resolve).collect::<Result<_, _>>()?;
+        let resolve = |factor: &Factor| ResolvedFactor::of(factor, self.variation.filter(|_| asked.len() == 1), group);
+        let factors: Vec<ResolvedFactor> = asked.iter().map(resolve).collect::<Result<_, _>>()?;
         let contrasts = contrasts(&factors, group)?;
         let quantities = match self.quantities.is_empty() {
             true => Quantity::defaults(),
@@ -90,11 +90,11 @@ impl Comparing {
                 )
             };
             let what = self.covariate.map(|_| "the value of each run".to_owned());
-            if let Some(what) = what.or(quantities.iter().find(from_runs).map(Quantity::words)) {
+            if let Some(what) = what.or(quantities.iter().find(from_runs).map(Quantity::sentence_name)) {
                 return Err(CompareError::NotInJson { what });
             }
         }
-        let mut at_work = Work {
+        let mut at_work = ComparisonWork {
             group,
             factors: &factors,
             covariate: self.covariate,
@@ -115,7 +115,7 @@ impl Comparing {
         for quantity in &quantities {
             at_work.compare(quantity, &contrasts);
         }
-        let Work {
+        let ComparisonWork {
             mut result,
             mut findings,
             apart,
@@ -123,7 +123,7 @@ impl Comparing {
         } = at_work;
         let not_compared = |(why, names): (String, Vec<String>)| {
             let are = if names.len() == 1 { "is" } else { "are" };
-            Finding::doubt(
+            Finding::warning(
                 "forms-differ",
                 format!("{} {are} not compared: {why}", names.join(", ")),
             )
@@ -144,39 +144,40 @@ impl Comparing {
                 "no difference can be estimated: too few people have an estimate at every level of the factor",
             ));
         }
-        let parameters = quantities.iter().any(|quantity| !quantity.is_of_any_form());
+        let parameters = quantities.iter().any(|quantity| !quantity.is_form_independent());
         findings.extend(group.common.clone().filter(|_| parameters));
-        findings.extend(missing(&result));
-        findings.extend(doubtful(group, &result));
+        findings.extend(missing_estimate_findings(&result));
+        findings.extend(doubtful_people_finding(group, &result));
         result.verdict = Verdict::of(findings);
         Ok(result)
     }
 
-    fn settings(&self, factors: &[Resolved], quantities: &[Quantity]) -> Vec<Setting> {
+    fn settings(&self, factors: &[ResolvedFactor], quantities: &[Quantity]) -> Vec<Setting> {
         let joined = |all: Vec<String>| all.join("; ");
         let level = |l: &super::contrast::Members| match l.members.as_slice() {
             [one] if *one == l.name => l.name.clone(),
             all => format!("{} ({})", l.name, all.join(", ")),
         };
-        let factor = |f: &Resolved| {
+        let factor = |f: &ResolvedFactor| {
             let levels: Vec<String> = f.levels.iter().map(level).collect();
             format!("{}, {} people: {}", f.name, f.variation.name(), levels.join(", "))
         };
         let names: Vec<String> = quantities.iter().map(Quantity::to_string).collect();
         vec![
-            Setting::new("factor", joined(factors.iter().map(factor).collect())).given(!self.factors.is_empty()),
-            Setting::new("of", names.join(", ")).given(!self.quantities.is_empty()),
-            Setting::new("covariate", self.covariate.map_or("none", Covariate::name)).given(self.covariate.is_some()),
-            Setting::new("adjust", self.adjustment.name()).given(self.adjustment != Adjustment::default()),
-            Setting::new("weights", self.weights.name()).given(self.weights != Weights::default()),
+            Setting::new("factor", joined(factors.iter().map(factor).collect())).with_given(!self.factors.is_empty()),
+            Setting::new("of", names.join(", ")).with_given(!self.quantities.is_empty()),
+            Setting::new("covariate", self.covariate.map_or("none", Covariate::name))
+                .with_given(self.covariate.is_some()),
+            Setting::new("adjust", self.adjustment.name()).with_given(self.adjustment != Adjustment::default()),
+            Setting::new("weights", self.weights.name()).with_given(self.weights != Weights::default()),
         ]
     }
 }
 
 /// Intermediate results of a comparison.
-struct Work<'a> {
+struct ComparisonWork<'a> {
     group: &'a GroupEstimates,
-    factors: &'a [Resolved],
+    factors: &'a [ResolvedFactor],
     covariate: Option<Covariate>,
     weights: Weights,
     findings: Vec<Finding>,
@@ -186,22 +187,22 @@ struct Work<'a> {
 }
 
 /// Subject and condition, with the estimate and its change per run, or the reason why there is no estimate.
-type OfCell = (String, String, Result<(EstimatedValue, Option<Coefficient>), String>);
+type CellEstimate = (String, String, Result<(EstimatedValue, Option<Coefficient>), String>);
 
-impl Work<'_> {
+impl ComparisonWork<'_> {
     fn compare(&mut self, quantity: &Quantity, contrasts: &[Contrast]) {
         let cells = self.cells(quantity);
         if !self.is_comparable(quantity, &cells) {
             return;
         }
-        self.keep(quantity, &cells);
+        self.store_estimates(quantity, &cells);
         for contrast in contrasts {
-            self.difference(quantity, contrast, &cells);
+            self.add_difference(quantity, contrast, &cells);
         }
     }
 
     /// Returns the estimates of all people and conditions that are compared.
-    fn cells(&self, quantity: &Quantity) -> Vec<OfCell> {
+    fn cells(&self, quantity: &Quantity) -> Vec<CellEstimate> {
         let conditions = conditions_of(self.factors, self.group);
         let practice = self.covariate.map(|Covariate::Run| Practice::of(self.group, quantity));
         let is_in = |subject: &str| {
@@ -215,7 +216,7 @@ impl Work<'_> {
                 let found = self.group.estimate(cell, quantity).and_then(|known| match &practice {
                     None => Ok((known, None)),
                     Some(practice) => {
-                        let [at_middle, slope] = practice.of_cell(self.group, cell, quantity)?;
+                        let [at_middle, slope] = practice.quantity_of_cell(self.group, cell, quantity)?;
                         let known = EstimatedValue {
                             value: at_middle.value,
                             standard_error: Some(at_middle.standard_error),
@@ -230,7 +231,7 @@ impl Work<'_> {
     }
 
     /// Returns true if the quantity can be compared; a parameter can be compared only within one form.
-    fn is_comparable(&mut self, quantity: &Quantity, cells: &[OfCell]) -> bool {
+    fn is_comparable(&mut self, quantity: &Quantity, cells: &[CellEstimate]) -> bool {
         let input = match quantity {
             Quantity::Parameter(_) => None,
             Quantity::OfInput { input, .. } => Some(input.as_str()),
@@ -242,11 +243,14 @@ impl Work<'_> {
         if forms.len() < 2 {
             return true;
         }
-        let all = in_words(&forms);
-        if input.is_none() && quantity.is_of_any_form() {
+        let all = forms_text(&forms);
+        if input.is_none() && quantity.is_form_independent() {
             self.findings.push(Finding::note(
                 "forms-differ",
-                format!("{} comes from fits of different forms ({all})", quantity.words()),
+                format!(
+                    "{} comes from fits of different forms ({all})",
+                    quantity.sentence_name()
+                ),
             ));
             return true;
         }
@@ -273,7 +277,7 @@ impl Work<'_> {
     }
 
     /// Stores the estimates, their means by condition, and the changes from run to run.
-    fn keep(&mut self, quantity: &Quantity, cells: &[OfCell]) {
+    fn store_estimates(&mut self, quantity: &Quantity, cells: &[CellEstimate]) {
         let group_of = |subject: &str| {
             let between = self.factors.iter().find(|f| f.of_people);
             let level =
@@ -306,7 +310,7 @@ impl Work<'_> {
             }
         }
         if !prior.is_empty() {
-            self.findings.push(Finding::doubt(
+            self.findings.push(Finding::warning(
                 "prior-weighs",
                 format!(
                     "{quantity} is determined mostly by the prior ({}), which is the same for all people and shrinks the differences between them towards zero; to omit the prior, write prior = \"none\" under [analysis] in group.toml",
@@ -317,7 +321,7 @@ impl Work<'_> {
         let own = self.result.estimates.iter().filter(|e| e.quantity == *quantity);
         let mut places: Vec<(String, String, Vec<EstimatedValue>)> = Vec::new();
         for e in own {
-            let known = known_of(e);
+            let known = estimated_value_of(e);
             match places.iter_mut().find(|(c, g, _)| (c, g) == (&e.condition, &e.group)) {
                 Some((_, _, of)) => of.push(known),
                 None => places.push((e.condition.clone(), e.group.clone(), vec![known])),
@@ -335,10 +339,10 @@ impl Work<'_> {
                 });
             }
         }
-        self.learning(quantity, cells);
+        self.add_learning(quantity, cells);
     }
 
-    fn learning(&mut self, quantity: &Quantity, cells: &[OfCell]) {
+    fn add_learning(&mut self, quantity: &Quantity, cells: &[CellEstimate]) {
         let slopes = |condition: Option<&String>| -> Vec<EstimatedValue> {
             let of = cells
                 .iter()
@@ -367,11 +371,11 @@ impl Work<'_> {
     }
 
     /// Computes one difference, from the people who have estimates in all of its conditions.
-    fn difference(&mut self, quantity: &Quantity, contrast: &Contrast, cells: &[OfCell]) {
+    fn add_difference(&mut self, quantity: &Quantity, contrast: &Contrast, cells: &[CellEstimate]) {
         let mut people: Vec<(String, usize)> = Vec::new();
         let mut of: Vec<EstimatedValue> = Vec::new();
         for (subject, weights, group) in &contrast.people {
-            let mut sum = known(0.0, Some(0.0));
+            let mut sum = estimated_value(0.0, Some(0.0));
             let mut whole = true;
             for (condition, weight) in weights {
                 let cell = cells.iter().find(|(s, c, _)| s == subject && c == condition);
@@ -403,20 +407,20 @@ impl Work<'_> {
         }
         let name = format!(
             "{} of {}, {} - {}",
-            quantity.words(),
+            quantity.sentence_name(),
             contrast.factor,
             contrast.to,
             contrast.from
         );
         let weighted = observations(&of);
         let flat: Vec<Observation> = weighted.iter().map(|o| Observation { variance: 0.0, ..*o }).collect();
-        let fitted = |all: &[Observation]| fitted(contrast, &people, all, self.weights);
-        let found = fitted(&weighted).and_then(|found| Ok((found, fitted(&flat)?)));
+        let fit = |all: &[Observation]| fit_contrast(contrast, &people, all, self.weights);
+        let found = fit(&weighted).and_then(|found| Ok((found, fit(&flat)?)));
         let (found, unweighted) = match found {
             Ok(both) => both,
             Err(error) => {
                 self.findings
-                    .push(Finding::doubt("no-difference", format!("{name}: {error}")));
+                    .push(Finding::warning("no-difference", format!("{name}: {error}")));
                 return;
             }
         };
@@ -427,7 +431,7 @@ impl Work<'_> {
             ));
         }
         if found.degrees_of_freedom < 2 {
-            self.findings.push(Finding::doubt(
+            self.findings.push(Finding::warning(
                 "few-people",
                 format!(
                     "{name}: {} people leave only one degree of freedom, so the interval carries little information; record more people",
@@ -473,7 +477,7 @@ impl Work<'_> {
 }
 
 /// Computes the mean over people, or the difference between two groups of people.
-fn fitted(
+fn fit_contrast(
     contrast: &Contrast,
     people: &[(String, usize)],
     all: &[Observation],
@@ -501,7 +505,7 @@ fn observations(all: &[EstimatedValue]) -> Vec<Observation> {
     all.iter().map(one).collect()
 }
 
-fn known(value: f64, standard_error: Option<f64>) -> EstimatedValue {
+fn estimated_value(value: f64, standard_error: Option<f64>) -> EstimatedValue {
     EstimatedValue {
         value,
         standard_error,
@@ -511,13 +515,13 @@ fn known(value: f64, standard_error: Option<f64>) -> EstimatedValue {
     }
 }
 
-fn known_of(e: &PersonEstimate) -> EstimatedValue {
-    known(e.value, e.standard_error)
+fn estimated_value_of(e: &PersonEstimate) -> EstimatedValue {
+    estimated_value(e.value, e.standard_error)
 }
 
 /// Returns one finding for each person, condition and reason for which estimates are missing, with the quantities
 /// concerned.
-fn missing(result: &Comparison) -> Vec<Finding> {
+fn missing_estimate_findings(result: &Comparison) -> Vec<Finding> {
     let mut all: Vec<(String, Vec<String>)> = Vec::new();
     for out in &result.left_out {
         let name = format!("{} in {} is left out: {}", out.subject, out.condition, out.reason);
@@ -526,12 +530,12 @@ fn missing(result: &Comparison) -> Vec<Finding> {
             None => all.push((name, vec![out.quantity.to_string()])),
         }
     }
-    let one = |(name, of): (String, Vec<String>)| Finding::doubt("left-out", format!("{name} ({})", of.join(", ")));
+    let one = |(name, of): (String, Vec<String>)| Finding::warning("left-out", format!("{name} ({})", of.join(", ")));
     all.into_iter().map(one).collect()
 }
 
 /// Returns a finding about people who are included although the verdict on their own fit is doubtful.
-fn doubtful(group: &GroupEstimates, result: &Comparison) -> Option<Finding> {
+fn doubtful_people_finding(group: &GroupEstimates, result: &Comparison) -> Option<Finding> {
     let counts = |subject: &str, condition: &str| {
         let mut all = result.estimates.iter();
         all.any(|e| e.subject == subject && e.condition == condition)

@@ -172,7 +172,7 @@ impl Comparison {
             self.learning.iter().map(|l| with_unit(&l.quantity, json!(l))).collect(),
         );
         set("left_out", json!(self.left_out));
-        let state = json::state::written(self).map_or(Value::Null, Value::String);
+        let state = json::state::serialise(self).map_or(Value::Null, Value::String);
         set("state", state);
         map
     }
@@ -187,6 +187,6 @@ impl Comparison {
     /// # Errors
     /// [`AnalysisError::NotAResult`] if the text is invalid or damaged, or has another version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
-        json::state::of_kind(text, KIND)
+        json::state::restore_state(text, KIND)
     }
 }

@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 
 use super::{
     CompareError, GroupEstimates,
-    factor::{CONDITION, Factor, Variation},
+    factor::{CONDITION_FACTOR, Factor, Variation},
 };
 
 /// A level and its members.
@@ -26,7 +26,7 @@ pub(super) struct Members {
 
 /// A factor with known levels, and whether it varies within or between people.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Resolved {
+pub(super) struct ResolvedFactor {
     pub name: String,
     pub variation: Variation,
     pub levels: Vec<Members>,
@@ -47,7 +47,7 @@ pub(super) struct Contrast {
     pub people: Vec<(String, BTreeMap<String, f64>, usize)>,
 }
 
-impl Resolved {
+impl ResolvedFactor {
     pub fn of(factor: &Factor, wanted: Option<Variation>, group: &GroupEstimates) -> Result<Self, CompareError> {
         let bad = |reason: String| CompareError::Factor {
             name: factor.name.clone(),
@@ -60,7 +60,7 @@ impl Resolved {
                 members: level.members.clone(),
             });
             of.collect()
-        } else if factor.name == CONDITION {
+        } else if factor.name == CONDITION_FACTOR {
             let own = |name: &String| Members {
                 name: name.clone(),
                 members: vec![name.clone()],
@@ -145,7 +145,7 @@ impl Resolved {
 }
 
 /// Returns the conditions that are compared: those that are members of a level of every factor over conditions.
-pub(super) fn conditions_of(factors: &[Resolved], group: &GroupEstimates) -> Vec<String> {
+pub(super) fn conditions_of(factors: &[ResolvedFactor], group: &GroupEstimates) -> Vec<String> {
     let counts = |condition: &String| {
         let mut over = factors.iter().filter(|factor| !factor.of_people);
         over.all(|factor| factor.levels.iter().any(|level| level.members.contains(condition)))
@@ -154,16 +154,16 @@ pub(super) fn conditions_of(factors: &[Resolved], group: &GroupEstimates) -> Vec
 }
 
 /// Returns all contrasts of these factors.
-pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<Vec<Contrast>, CompareError> {
+pub(super) fn contrasts(factors: &[ResolvedFactor], group: &GroupEstimates) -> Result<Vec<Contrast>, CompareError> {
     let conditions = conditions_of(factors, group);
-    let between: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Between).collect();
+    let between: Vec<&ResolvedFactor> = factors.iter().filter(|f| f.variation == Variation::Between).collect();
     if let [_, second, ..] = between[..] {
         return Err(CompareError::Factor {
             name: second.name.clone(),
             reason: "it is a second factor between people: compare one factor at a time".to_owned(),
         });
     }
-    let within: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Within).collect();
+    let within: Vec<&ResolvedFactor> = factors.iter().filter(|f| f.variation == Variation::Within).collect();
     let mut all = Vec::new();
     let people_with = |weights: &BTreeMap<String, f64>| -> Vec<_> {
         let of = |subject: &String| weights.keys().any(|c| group.cell(subject, c).is_some());
@@ -172,7 +172,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
     };
     for factor in &within {
         for (a, b) in factor.pairs() {
-            let weights = difference(&conditions, a, b);
+            let weights = difference_weights(&conditions, a, b);
             all.push(Contrast {
                 factor: factor.name.clone(),
                 variation: Variation::Within,
@@ -194,8 +194,8 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
                             .cloned()
                             .collect()
                     };
-                    let mut weights = difference(&inside(d), a, b);
-                    for (condition, weight) in difference(&inside(c), a, b) {
+                    let mut weights = difference_weights(&inside(d), a, b);
+                    for (condition, weight) in difference_weights(&inside(c), a, b) {
                         *weights.entry(condition).or_insert(0.0) -= weight;
                     }
                     all.push(Contrast {
@@ -250,7 +250,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
             }
             for other in &within {
                 for (c, d) in other.pairs() {
-                    let weights = difference(&conditions, c, d);
+                    let weights = difference_weights(&conditions, c, d);
                     let of = |_: &str| weights.clone();
                     let people = [side(a, 0, &of), side(b, 1, &of)].concat();
                     let name = format!("{} × {}", other.name, factor.name);
@@ -265,7 +265,7 @@ pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<
 
 /// Returns the weight of each condition in the difference: the mean over the conditions of b minus the mean over the
 /// conditions of a.
-fn difference(conditions: &[String], a: &Members, b: &Members) -> BTreeMap<String, f64> {
+fn difference_weights(conditions: &[String], a: &Members, b: &Members) -> BTreeMap<String, f64> {
     let mut weights = BTreeMap::new();
     for (level, sign) in [(a, -1.0), (b, 1.0)] {
         let of: Vec<&String> = conditions.iter().filter(|c| level.members.contains(c)).collect();
@@ -284,7 +284,7 @@ mod tests {
     fn of(people: &[(&str, &str)], factors: &[&str]) -> Result<Vec<Contrast>, CompareError> {
         let people: Vec<_> = people.iter().map(|(s, c)| (*s, *c, 1.0, 0.1)).collect();
         let group = group(&people);
-        let resolved = factors.iter().map(|f| Resolved::of(&f.parse()?, None, &group));
+        let resolved = factors.iter().map(|f| ResolvedFactor::of(&f.parse()?, None, &group));
         contrasts(&resolved.collect::<Result<Vec<_>, _>>()?, &group)
     }
 
@@ -358,7 +358,7 @@ mod tests {
         );
         let group = group(&[("P", "a", 1.0, 0.1), ("P", "b", 1.0, 0.1)]);
         let factor = Factor::conditions();
-        let error = Resolved::of(&factor, Some(Variation::Between), &group).unwrap_err();
+        let error = ResolvedFactor::of(&factor, Some(Variation::Between), &group).unwrap_err();
         assert!(error.to_string().contains("P appears at the levels a and b"), "{error}");
     }
 }

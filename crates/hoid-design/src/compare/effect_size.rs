@@ -15,7 +15,7 @@
 //! With the density `f(s)` of `s = sqrt(chi^2_nu/nu)`, the distribution is `P(T <= t) = int Phi(t s - delta) f(s) ds`,
 //! computed by Simpson's rule over the range in which f is not negligible.
 
-use hoid_numerics::statistics::{mean, sample_variance, squared_deviations};
+use hoid_numerics::statistics::{mean, sample_variance, sum_of_squared_deviations};
 use serde::{Deserialize, Serialize};
 use statrs::{
     distribution::{ContinuousCDF, Normal},
@@ -49,7 +49,7 @@ pub fn hedges_g(first: &[f64], second: &[f64]) -> Option<EffectSize> {
         return None;
     }
     let dof = n1 + n2 - 2.0;
-    let pooled = ((squared_deviations(first) + squared_deviations(second)) / dof).sqrt();
+    let pooled = ((sum_of_squared_deviations(first) + sum_of_squared_deviations(second)) / dof).sqrt();
     let root = (n1 * n2 / (n1 + n2)).sqrt();
     of("g", (mean(second) - mean(first)) / pooled, root, dof, correction(dof))
 }
@@ -92,7 +92,7 @@ fn noncentrality(t: f64, dof: f64, share: f64) -> f64 {
 }
 
 /// Number of intervals of Simpson's rule.
-const INTERVALS: usize = 600;
+const INTERVAL_COUNT: usize = 600;
 
 /// Returns `P(T <= t)` of the noncentral t distribution.
 pub(super) fn noncentral_t(t: f64, dof: f64, delta: f64) -> f64 {
@@ -106,16 +106,16 @@ pub(super) fn noncentral_t(t: f64, dof: f64, delta: f64) -> f64 {
     // s has a standard deviation of about 1/sqrt(2 nu).
     let width = 9.0 / (2.0 * dof).sqrt();
     let (from, to) = ((1.0 - width).max(0.0), 1.0 + width);
-    let step = (to - from) / INTERVALS as f64;
+    let step = (to - from) / INTERVAL_COUNT as f64;
     let at = |k: usize| {
         let s = from + step * k as f64;
         let f = density(s);
         if f == 0.0 { 0.0 } else { f * normal.cdf(t * s - delta) }
     };
-    let inner: f64 = (1..INTERVALS)
+    let inner: f64 = (1..INTERVAL_COUNT)
         .map(|k| if k % 2 == 1 { 4.0 * at(k) } else { 2.0 * at(k) })
         .sum();
-    (step / 3.0 * (at(0) + inner + at(INTERVALS))).clamp(0.0, 1.0)
+    (step / 3.0 * (at(0) + inner + at(INTERVAL_COUNT))).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]
@@ -123,7 +123,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn of_case(case: &str) -> [Vec<f64>; 3] {
+    fn read_case(case: &str) -> [Vec<f64>; 3] {
         let mut all = [Vec::new(), Vec::new(), Vec::new()];
         for line in include_str!("../../../../fixtures/compare/cases.csv").lines().skip(1) {
             let cells: Vec<&str> = line.split(',').collect();
@@ -145,7 +145,7 @@ mod tests {
             let close = |found: f64, k: usize, tolerance: f64| {
                 assert!((found - number(k)).abs() < tolerance, "{line}: {found}");
             };
-            let [all, first, second] = of_case(cells[1]);
+            let [all, first, second] = read_case(cells[1]);
             let found = match cells[0] {
                 // R's own algorithm is no more accurate in the tails.
                 "pt" => {

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::CompareError;
 
 /// The factor whose levels are the conditions.
-pub const CONDITION: &str = "condition";
+pub const CONDITION_FACTOR: &str = "condition";
 
 /// Variation of a factor: within or between people.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,7 +52,7 @@ impl Factor {
     /// Returns the factor whose levels are the conditions.
     pub fn conditions() -> Self {
         Self {
-            name: CONDITION.to_owned(),
+            name: CONDITION_FACTOR.to_owned(),
             levels: Vec::new(),
         }
     }

@@ -16,7 +16,7 @@ use hoid_model::{Finding, VerdictLevel, operator_family::PARAMETERS, uncertainty
 use hoid_numerics::statistics::{mean, sample_variance};
 use hoid_study::{
     StudyError,
-    group::{FormEvidence, GroupSummary, MANIFEST, Manifest, Person, PersonStatus, RunEstimates, has_results},
+    group::{FormEvidence, GroupSummary, MANIFEST_FILE, Manifest, Person, PersonStatus, RunEstimates, has_results},
 };
 use serde_json::Value;
 
@@ -64,14 +64,14 @@ pub struct GroupEstimates {
 impl GroupEstimates {
     /// Returns the path of a manifest whose recordings have not been analysed yet: `place` itself, or the manifest in a
     /// directory without results.
-    pub fn recordings(place: &Path) -> Option<PathBuf> {
+    pub fn recordings_path(place: &Path) -> Option<PathBuf> {
         if place.is_file() {
             return place
                 .extension()
                 .is_some_and(|ending| ending == "toml")
                 .then(|| place.to_owned());
         }
-        let manifest = place.join(MANIFEST);
+        let manifest = place.join(MANIFEST_FILE);
         (manifest.is_file() && !has_results(place)).then_some(manifest)
     }
 
@@ -87,12 +87,12 @@ impl GroupEstimates {
         if !place.is_dir() {
             let bytes = hoid_io::read_bytes(place).map_err(StudyError::Io)?;
             let object = serde_json::from_slice(&bytes).map_err(|error| none(format!("it is not JSON: {error}")))?;
-            return Self::of_json(&object).map_err(none);
+            return Self::from_json(&object).map_err(none);
         }
-        let path = place.join(MANIFEST);
+        let path = place.join(MANIFEST_FILE);
         if !path.exists() {
             return Err(none(format!(
-                "there is no {MANIFEST} in it; for recordings, write one with `hoid group init {}`",
+                "there is no {MANIFEST_FILE} in it; for recordings, write one with `hoid group init {}`",
                 place.display()
             )));
         }
@@ -105,7 +105,7 @@ impl GroupEstimates {
         let summary = GroupSummary::read(&manifest, place)?;
         Ok(Self {
             name: manifest.name.clone(),
-            cells: merged(summary.people.iter().map(Cell::of_person).collect()),
+            cells: merge_runs(summary.people.iter().map(Cell::from_person).collect()),
             runs: Some(RunEstimates::read(place)?),
             runs_in_form: None,
             common: None,
@@ -113,15 +113,15 @@ impl GroupEstimates {
     }
 
     /// Reads the JSON object that `hoid group --json` writes.
-    fn of_json(object: &Value) -> Result<Self, String> {
+    fn from_json(object: &Value) -> Result<Self, String> {
         let people = object["people"].as_array().ok_or("it has no people")?;
-        let cells: Vec<Cell> = people.iter().map(Cell::of_json).collect();
+        let cells: Vec<Cell> = people.iter().map(Cell::from_json).collect();
         if cells.iter().any(|cell| cell.subject.is_empty()) {
             return Err("an entry of people has no subject".to_owned());
         }
         Ok(Self {
             name: object["group"].as_str().unwrap_or("group").to_owned(),
-            cells: merged(cells),
+            cells: merge_runs(cells),
             runs: None,
             runs_in_form: None,
             common: None,
@@ -148,10 +148,10 @@ impl GroupEstimates {
 
     /// Replaces the parameters that belong to one form by those of the fits in the common form.
     pub(super) fn with_parameters_of(mut self, other: Self, common: CommonForm) -> Self {
-        let best = in_words(&forms(self.cells.iter(), None));
+        let best = forms_text(&forms(self.cells.iter(), None));
         for cell in &mut self.cells {
             let of = other.cell(&cell.subject, &cell.condition);
-            let of_form = |name: &String| !Quantity::Parameter(name.clone()).is_of_any_form();
+            let of_form = |name: &String| !Quantity::Parameter(name.clone()).is_form_independent();
             let is_parameter = |name: &String| of_form(name) && PARAMETERS.iter().any(|(known, _)| known == name);
             cell.known.retain(|name, _| !is_parameter(name));
             let Some(of) = of else { continue };
@@ -173,11 +173,15 @@ impl GroupEstimates {
     /// Returns a quantity of a cell, or the reason why the cell does not have it.
     pub(super) fn estimate(&self, cell: &Cell, quantity: &Quantity) -> Result<EstimatedValue, String> {
         let of_runs = || {
-            let all: Vec<f64> = self.of_runs(cell, quantity).into_iter().map(|(_, o)| o.value).collect();
+            let all: Vec<f64> = self
+                .run_estimates(cell, quantity)
+                .into_iter()
+                .map(|(_, o)| o.value)
+                .collect();
             if all.is_empty() {
-                return Err(format!("no run has the {}", quantity.words()));
+                return Err(format!("no run has the {}", quantity.sentence_name()));
             }
-            Ok(over_runs(&all))
+            Ok(mean_over_runs(&all))
         };
         if matches!(quantity, Quantity::RmsE | Quantity::RmsU) {
             return of_runs();
@@ -187,12 +191,12 @@ impl GroupEstimates {
         }
         let Some(name) = quantity.key() else {
             let response = self.response(cell, None, quantity);
-            let value = response.ok_or_else(|| format!("its operator has no {}", quantity.words()))?;
+            let value = response.ok_or_else(|| format!("its operator has no {}", quantity.sentence_name()))?;
             let scatter = of_runs().ok().filter(|runs| runs.runs > 1);
             return Ok(EstimatedValue {
                 value,
                 standard_error: scatter.and_then(|runs| runs.standard_error),
-                ..over_runs(&vec![value; cell.runs.max(1)])
+                ..mean_over_runs(&vec![value; cell.runs.max(1)])
             });
         };
         let known = cell.known.get(&name).copied();
@@ -201,7 +205,7 @@ impl GroupEstimates {
             .ok_or_else(|| match quantity {
                 Quantity::Crossover | Quantity::PhaseMargin => format!(
                     "it has no {}: the condition has no controlled element, or the loop gain does not cross 1",
-                    quantity.words()
+                    quantity.sentence_name()
                 ),
                 Quantity::OfInput { parameter, input } => match cell.inputs.get(input) {
                     None => format!("{input} is not an input of its model"),
@@ -218,8 +222,8 @@ impl GroupEstimates {
     }
 
     /// Returns a quantity in each run of a cell, with the names of the runs; empty if the runs are not known.
-    pub(super) fn of_runs(&self, cell: &Cell, quantity: &Quantity) -> Vec<(&str, Observation)> {
-        let in_form = self.runs_in_form.as_ref().filter(|_| !quantity.is_of_any_form());
+    pub(super) fn run_estimates(&self, cell: &Cell, quantity: &Quantity) -> Vec<(&str, Observation)> {
+        let in_form = self.runs_in_form.as_ref().filter(|_| !quantity.is_form_independent());
         let Some(runs) = in_form.or(self.runs.as_ref()) else {
             return Vec::new();
         };
@@ -258,7 +262,7 @@ impl GroupEstimates {
 }
 
 impl Cell {
-    fn without(subject: &str, condition: &str, runs: usize) -> Self {
+    fn without_estimates(subject: &str, condition: &str, runs: usize) -> Self {
         Self {
             subject: subject.to_owned(),
             condition: condition.to_owned(),
@@ -272,7 +276,7 @@ impl Cell {
         }
     }
 
-    fn judged(&mut self, level: Option<VerdictLevel>, reason: &str) {
+    fn set_verdict(&mut self, level: Option<VerdictLevel>, reason: &str) {
         self.doubtful = level == Some(VerdictLevel::Doubtful);
         self.missing = match level {
             Some(VerdictLevel::NotDetermined) => Some(format!("the data do not determine its operator: {reason}")),
@@ -281,17 +285,17 @@ impl Cell {
         };
     }
 
-    fn of_person(person: &Person) -> Self {
-        let mut cell = Self::without(&person.subject, &person.condition, person.runs);
+    fn from_person(person: &Person) -> Self {
+        let mut cell = Self::without_estimates(&person.subject, &person.condition, person.runs);
         let fitted = person.status == PersonStatus::Fitted;
         let reasons = person.reasons.join("; ");
-        cell.judged(
+        cell.set_verdict(
             person.verdict.filter(|_| fitted),
             if fitted { &reasons } else { &person.reason },
         );
         cell.form.clone_from(&person.form);
         cell.forms.clone_from(&person.forms);
-        let runs = if person.is_of_all_runs() { person.runs } else { 1 };
+        let runs = if person.covers_all_runs() { person.runs } else { 1 };
         let of_parameter = |p: &Parameter| EstimatedValue {
             value: p.value,
             standard_error: p.standard_error_person.or(p.standard_error),
@@ -315,16 +319,17 @@ impl Cell {
             (Quantity::PhaseMargin, person.phase_margin_deg),
         ] {
             if let (Some(e), Some(name)) = (estimate, quantity.key()) {
-                cell.known.insert(name, known(e.value, e.standard_error, runs));
+                cell.known
+                    .insert(name, estimated_value(e.value, e.standard_error, runs));
             }
         }
         cell
     }
 
-    fn of_json(person: &Value) -> Self {
+    fn from_json(person: &Value) -> Self {
         let text = |key: &str| person[key].as_str().unwrap_or_default();
         let runs = person["runs"].as_u64().unwrap_or(1) as usize;
-        let mut cell = Self::without(text("subject"), text("condition"), runs);
+        let mut cell = Self::without_estimates(text("subject"), text("condition"), runs);
         let verdict = &person["verdict"];
         let reasons: Vec<&str> = verdict["reasons"]
             .as_array()
@@ -337,13 +342,13 @@ impl Cell {
             Some(_) => reasons.join("; "),
             None => text("reason").to_owned(),
         };
-        cell.judged(level, &reason);
+        cell.set_verdict(level, &reason);
         cell.form = text("form").to_owned();
         let runs = if text("run") == "all" { runs } else { 1 };
         let estimated = |found: &Value| EstimatedValue {
             determined: found["determined"] != false,
             prior_share: found["prior_share"].as_f64().unwrap_or(0.0),
-            ..known(
+            ..estimated_value(
                 found["value"].as_f64().unwrap_or(f64::NAN),
                 found["standard_error"].as_f64(),
                 runs,
@@ -385,14 +390,14 @@ pub(super) fn forms<'a>(cells: impl Iterator<Item = &'a Cell>, input: Option<&st
 }
 
 /// Formats forms and their cells, such as `lead: P03 in fo, P05 in fo; lead-lag: P09 in fo`.
-pub(super) fn in_words(forms: &[(&str, Vec<String>)]) -> String {
+pub(super) fn forms_text(forms: &[(&str, Vec<String>)]) -> String {
     let all = forms
         .iter()
         .map(|(form, names)| format!("{form}: {}", names.join(", ")));
     all.collect::<Vec<_>>().join("; ")
 }
 
-fn known(value: f64, standard_error: Option<f64>, runs: usize) -> EstimatedValue {
+fn estimated_value(value: f64, standard_error: Option<f64>, runs: usize) -> EstimatedValue {
     EstimatedValue {
         value,
         standard_error,
@@ -403,13 +408,13 @@ fn known(value: f64, standard_error: Option<f64>, runs: usize) -> EstimatedValue
 }
 
 /// Returns the mean over runs, with the standard error from the scatter of the runs.
-fn over_runs(values: &[f64]) -> EstimatedValue {
+fn mean_over_runs(values: &[f64]) -> EstimatedValue {
     let error = (sample_variance(values) / values.len() as f64).sqrt();
-    known(mean(values), Some(error).filter(|e| e.is_finite()), values.len())
+    estimated_value(mean(values), Some(error).filter(|e| e.is_finite()), values.len())
 }
 
 /// Merges the cells of the individual runs of a person in one condition into a single cell.
-fn merged(cells: Vec<Cell>) -> Vec<Cell> {
+fn merge_runs(cells: Vec<Cell>) -> Vec<Cell> {
     let mut all: Vec<Vec<Cell>> = Vec::new();
     for cell in cells {
         let same = |of: &&mut Vec<Cell>| of[0].subject == cell.subject && of[0].condition == cell.condition;
@@ -427,7 +432,7 @@ fn merged(cells: Vec<Cell>) -> Vec<Cell> {
                 let merged = EstimatedValue {
                     determined: each.iter().all(|k| k.determined),
                     prior_share: each.iter().map(|k| k.prior_share).fold(0.0, f64::max),
-                    ..over_runs(&values)
+                    ..mean_over_runs(&values)
                 };
                 (name, merged)
             });
@@ -467,7 +472,7 @@ pub(super) mod tests {
             })
         };
         let people: Vec<Value> = people.iter().map(person).collect();
-        GroupEstimates::of_json(&json!({"group": "test", "people": people})).unwrap()
+        GroupEstimates::from_json(&json!({"group": "test", "people": people})).unwrap()
     }
 
     #[test]
@@ -479,7 +484,7 @@ pub(super) mod tests {
              "verdict": {"level": "doubtful", "reasons": ["it drifts"]}},
             {"subject": "R", "condition": "c", "run": "all", "verdict": {"level": "not determined", "reasons": ["too short"]}},
         ]});
-        let group = GroupEstimates::of_json(&object).unwrap();
+        let group = GroupEstimates::from_json(&object).unwrap();
         let of = |subject: &str, name: &str| {
             let cell = group.cell(subject, "c").unwrap();
             group.estimate(cell, &name.parse().unwrap())
@@ -491,7 +496,7 @@ pub(super) mod tests {
         assert_eq!((of("Q", "K_e").unwrap().value, of("Q", "K_e").unwrap().runs), (2.0, 2));
         assert!(of("R", "K_e").unwrap_err().ends_with("too short"));
         assert!(of("Q", "rms_e").is_err() && of("Q", "gain_db@1").is_err() && !group.has_runs());
-        assert!(GroupEstimates::of_json(&json!({"kind": "operator"})).is_err());
+        assert!(GroupEstimates::from_json(&json!({"kind": "operator"})).is_err());
     }
 
     #[test]
@@ -512,10 +517,10 @@ pub(super) mod tests {
                     ]
                 })
                 .collect();
-            let group = GroupEstimates::of_json(&json!({"people": people})).unwrap();
-            let comparing = crate::compare::Comparing {
+            let group = GroupEstimates::from_json(&json!({"people": people})).unwrap();
+            let comparing = crate::compare::ComparisonOptions {
                 quantities: vec!["tau_f[r]".parse().unwrap()],
-                ..crate::compare::Comparing::default()
+                ..crate::compare::ComparisonOptions::default()
             };
             (comparing.run(&group).unwrap(), group)
         };
@@ -549,7 +554,7 @@ pub(super) mod tests {
                    "parameters": {"K": {"value": k, "standard_error": 0.01}},
                    "verdict": {"level": "trustworthy", "reasons": []}})
         };
-        let group = GroupEstimates::of_json(&json!({"people": [row("1", 1.0), row("2", 3.0)]})).unwrap();
+        let group = GroupEstimates::from_json(&json!({"people": [row("1", 1.0), row("2", 3.0)]})).unwrap();
         let found = group.estimate(&group.cells[0], &"K".parse().unwrap()).unwrap();
         assert_eq!((group.cells.len(), found.value, found.runs), (1, 2.0, 2));
         assert!((found.standard_error.unwrap() - 1.0).abs() < 1e-15);

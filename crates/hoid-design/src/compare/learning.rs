@@ -24,9 +24,15 @@ impl Practice {
         let runs: Vec<Vec<&str>> = group
             .cells
             .iter()
-            .map(|cell| group.of_runs(cell, quantity).into_iter().map(|(run, _)| run).collect())
+            .map(|cell| {
+                group
+                    .run_estimates(cell, quantity)
+                    .into_iter()
+                    .map(|(run, _)| run)
+                    .collect()
+            })
             .collect();
-        let by_name = runs.iter().flatten().all(|run| number(run).is_some());
+        let by_name = runs.iter().flatten().all(|run| run_number(run).is_some());
         let mut practice = Self { by_name, middle: 0.0 };
         let numbers: Vec<f64> = runs
             .iter()
@@ -42,7 +48,7 @@ impl Practice {
     }
 
     fn number(&self, run: &str, place: usize) -> f64 {
-        match number(run) {
+        match run_number(run) {
             Some(number) if self.by_name => number,
             _ => place as f64 + 1.0,
         }
@@ -50,13 +56,13 @@ impl Practice {
 
     /// Returns the quantity of a cell at the mean run number and its change per run, both with errors, or the reason
     /// why they cannot be computed.
-    pub fn of_cell(
+    pub fn quantity_of_cell(
         &self,
         group: &GroupEstimates,
         cell: &Cell,
         quantity: &Quantity,
     ) -> Result<[Coefficient; 2], String> {
-        let runs = group.of_runs(cell, quantity);
+        let runs = group.run_estimates(cell, quantity);
         let x: Vec<Vec<f64>> = runs
             .iter()
             .enumerate()
@@ -81,6 +87,6 @@ impl Practice {
     }
 }
 
-fn number(run: &str) -> Option<f64> {
+fn run_number(run: &str) -> Option<f64> {
     run.trim().parse().ok().filter(|n: &f64| n.is_finite())
 }

@@ -109,7 +109,7 @@ pub fn meta_regression(
     x: &[Vec<f64>],
     weights: Weights,
 ) -> Result<MetaRegression, CompareError> {
-    let (model, scatter, known) = checked(observations, x)?;
+    let (model, scatter, known) = checked_model(observations, x)?;
     let (n, p) = model.x.shape();
     let search = |penalty: f64| match known {
         true => model.tau_squared(scatter, penalty).ok_or(CompareError::Collinear),
@@ -136,7 +136,7 @@ pub fn meta_regression(
             let typical = dof as f64 / at.trace;
             tau_squared / (tau_squared + typical)
         }),
-        heterogeneity: fixed.map(|at| (at.q, chi_squared_beyond(at.q, dof))),
+        heterogeneity: fixed.map(|at| (at.q, chi_squared_upper_tail(at.q, dof))),
         covariance,
     })
 }
@@ -147,7 +147,7 @@ pub fn meta_regression(
 /// # Errors
 /// As [`meta_regression`].
 pub fn variance_between_people(observations: &[Observation]) -> Result<f64, CompareError> {
-    let (model, scatter, known) = checked(observations, &vec![vec![1.0]; observations.len()])?;
+    let (model, scatter, known) = checked_model(observations, &vec![vec![1.0]; observations.len()])?;
     match known {
         true => model.tau_squared(scatter, 0.5).ok_or(CompareError::Collinear),
         false => Ok(scatter),
@@ -155,7 +155,7 @@ pub fn variance_between_people(observations: &[Observation]) -> Result<f64, Comp
 }
 
 /// Returns the model, the residual variance of y with equal weights, and whether the standard errors are known.
-fn checked(observations: &[Observation], x: &[Vec<f64>]) -> Result<(Model, f64, bool), CompareError> {
+fn checked_model(observations: &[Observation], x: &[Vec<f64>]) -> Result<(Model, f64, bool), CompareError> {
     let (n, p) = (observations.len(), x.first().map_or(0, Vec::len));
     if n <= p {
         return Err(CompareError::TooFew {
@@ -190,7 +190,7 @@ impl Coefficient {
             value,
             standard_error,
             t,
-            p: student_two_sided(t, dof as f64),
+            p: student_two_sided_p(t, dof as f64),
             interval: (value - reach, value + reach),
         }
     }
@@ -201,11 +201,11 @@ pub(super) fn student_quantile(share: f64, dof: f64) -> f64 {
     StudentsT::new(0.0, 1.0, dof).map_or(f64::INFINITY, |d| d.inverse_cdf(share))
 }
 
-fn student_two_sided(t: f64, dof: f64) -> f64 {
+fn student_two_sided_p(t: f64, dof: f64) -> f64 {
     StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |d| 2.0 * d.cdf(-t.abs()))
 }
 
-fn chi_squared_beyond(q: f64, dof: usize) -> f64 {
+fn chi_squared_upper_tail(q: f64, dof: usize) -> f64 {
     ChiSquared::new(dof as f64).map_or(f64::NAN, |d| d.sf(q))
 }
 
@@ -231,8 +231,8 @@ struct At {
 }
 
 /// Range of the grid of tau^2, in decades relative to the scatter, and number of steps per decade.
-const DECADES: (i32, i32) = (-8, 6);
-const STEPS: i32 = 3;
+const DECADE_RANGE: (i32, i32) = (-8, 6);
+const STEPS_PER_DECADE: i32 = 3;
 
 impl Model {
     fn at(&self, tau_squared: f64) -> Option<At> {
@@ -284,7 +284,8 @@ impl Model {
     /// Returns the tau^2 that maximises `l + penalty log tau^2`, if the standard errors are known.
     fn tau_squared(&self, scatter: f64, penalty: f64) -> Option<f64> {
         let unit = scatter.max(self.v.iter().sum::<f64>() / self.v.len() as f64);
-        let steps = (DECADES.0 * STEPS..=DECADES.1 * STEPS).map(|k| unit * 10f64.powf(f64::from(k) / f64::from(STEPS)));
+        let steps = (DECADE_RANGE.0 * STEPS_PER_DECADE..=DECADE_RANGE.1 * STEPS_PER_DECADE)
+            .map(|k| unit * 10f64.powf(f64::from(k) / f64::from(STEPS_PER_DECADE)));
         let zero = (penalty == 0.0).then_some(0.0);
         let grid: Vec<f64> = zero.into_iter().chain(steps).collect();
         let height = |tau: f64| Some(self.at(tau)?.likelihood + if penalty > 0.0 { penalty * tau.ln() } else { 0.0 });

@@ -14,7 +14,7 @@
 //! | [`Quantity`] | quantities to compare |
 //! | [`Factor`] | variables in which conditions or people differ; `contrast`: weights of the conditions |
 //! | [`CommonForm`] | form in which the parameters of all people are compared; `recordings`: analysis of recordings in this form |
-//! | [`Comparing`] | comparison of a group; `learning`: runs as a covariate |
+//! | [`ComparisonOptions`] | comparison of a group; `learning`: runs as a covariate |
 //! | [`Comparison`] | result of a comparison, written to and read from JSON; `sentence`: description of each difference for a paper |
 
 mod adjust;
@@ -37,7 +37,7 @@ mod sentence;
 pub use adjust::holm;
 pub use bayes_factor::bayes_factor;
 pub use common_form::CommonForm;
-pub use comparing::{Adjustment, Comparing, Covariate};
+pub use comparing::{Adjustment, ComparisonOptions, Covariate};
 pub use comparison::{Comparison, Difference, Learning, LeftOut, Mean, PersonEstimate};
 pub use effect_size::{EffectSize, d_z, hedges_g};
 pub use error::CompareError;

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 use super::CompareError;
 
 /// The delay, a parameter of every form.
-const DELAY: &str = "tau_e";
+const DELAY_NAME: &str = "tau_e";
 /// The delay of the response to a further input.
-const DELAY_TO_INPUT: (&str, &str) = ("tau_f", "s");
+const INPUT_DELAY: (&str, &str) = ("tau_f", "s");
 
 /// A quantity to compare.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -42,7 +42,11 @@ pub enum Quantity {
 impl Quantity {
     /// Returns the default quantities of a comparison.
     pub fn defaults() -> Vec<Self> {
-        vec![Self::Crossover, Self::PhaseMargin, Self::Parameter(DELAY.to_owned())]
+        vec![
+            Self::Crossover,
+            Self::PhaseMargin,
+            Self::Parameter(DELAY_NAME.to_owned()),
+        ]
     }
 
     /// Returns the unit of the quantity; empty if it has none or has the unit of the recording.
@@ -53,14 +57,14 @@ impl Quantity {
             Self::Gain(_) => "dB",
             Self::RmsE | Self::RmsU => "",
             Self::Parameter(name) | Self::OfInput { parameter: name, .. } => {
-                let mut known = PARAMETERS.iter().chain([&DELAY_TO_INPUT]);
+                let mut known = PARAMETERS.iter().chain([&INPUT_DELAY]);
                 known.find(|(n, _)| n == name).map_or("", |(_, unit)| unit)
             }
         }
     }
 
     /// Returns the name of the quantity for use in a sentence.
-    pub fn words(&self) -> String {
+    pub fn sentence_name(&self) -> String {
         match self {
             Self::Crossover => "crossover".to_owned(),
             Self::PhaseMargin => "phase margin".to_owned(),
@@ -68,7 +72,7 @@ impl Quantity {
             Self::Phase(omega) => format!("phase at {omega} rad/s"),
             Self::RmsE => "RMS of e".to_owned(),
             Self::RmsU => "RMS of u".to_owned(),
-            Self::Parameter(name) if name == DELAY => "delay tau_e".to_owned(),
+            Self::Parameter(name) if name == DELAY_NAME => "delay tau_e".to_owned(),
             Self::Parameter(name) => name.clone(),
             Self::OfInput { parameter, input } => format!("{parameter} of the response to {input}"),
         }
@@ -76,8 +80,8 @@ impl Quantity {
 
     /// True if the meaning of the quantity does not depend on the form of the operator; false for all of its parameters
     /// except the delay.
-    pub fn is_of_any_form(&self) -> bool {
-        !matches!(self, Self::Parameter(name) if name != DELAY)
+    pub fn is_form_independent(&self) -> bool {
+        !matches!(self, Self::Parameter(name) if name != DELAY_NAME)
     }
 
     /// Returns the name of the quantity among the estimates of a person; `None` for a gain or phase at a frequency.
@@ -113,7 +117,7 @@ impl FromStr for Quantity {
         let text = text.trim();
         let unknown = || CompareError::Quantity { found: text.to_owned() };
         if let Some((parameter, input)) = text.strip_suffix(']').and_then(|text| text.split_once('[')) {
-            let mut known = PARAMETERS.iter().chain([&DELAY_TO_INPUT]);
+            let mut known = PARAMETERS.iter().chain([&INPUT_DELAY]);
             return match known.any(|(name, _)| *name == parameter) && !input.is_empty() {
                 true => Ok(Self::OfInput {
                     parameter: parameter.to_owned(),
@@ -136,7 +140,7 @@ impl FromStr for Quantity {
             "phase_margin" | "margin" | "phase_margin_deg" => Ok(Self::PhaseMargin),
             "rms_e" => Ok(Self::RmsE),
             "rms_u" => Ok(Self::RmsU),
-            "delay" => Ok(Self::Parameter(DELAY.to_owned())),
+            "delay" => Ok(Self::Parameter(DELAY_NAME.to_owned())),
             name if PARAMETERS.iter().any(|(n, _)| *n == name) => Ok(Self::Parameter(name.to_owned())),
             _ => Err(unknown()),
         }
@@ -179,7 +183,7 @@ mod tests {
         }
         assert_eq!(
             "delay".parse::<Quantity>().unwrap(),
-            Quantity::Parameter(DELAY.to_owned())
+            Quantity::Parameter(DELAY_NAME.to_owned())
         );
         assert_eq!("margin".parse::<Quantity>().unwrap().unit(), "deg");
         for bad in [
@@ -197,7 +201,9 @@ mod tests {
             assert!(error.contains("crossover") && error.contains("gain_db@W"), "{error}");
         }
         let of_input: Quantity = "tau_f[f_t]".parse().unwrap();
-        assert_eq!((of_input.unit(), of_input.is_of_any_form()), ("s", true));
-        assert!(Quantity::Crossover.is_of_any_form() && !Quantity::Parameter("K".to_owned()).is_of_any_form());
+        assert_eq!((of_input.unit(), of_input.is_form_independent()), ("s", true));
+        assert!(
+            Quantity::Crossover.is_form_independent() && !Quantity::Parameter("K".to_owned()).is_form_independent()
+        );
     }
 }

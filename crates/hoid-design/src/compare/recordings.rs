@@ -4,9 +4,9 @@ use std::path::Path;
 
 use hoid_study::group::Manifest;
 
-use super::{CompareError, Comparing, GroupEstimates, Quantity, group_estimates::forms};
+use super::{CompareError, ComparisonOptions, GroupEstimates, Quantity, group_estimates::forms};
 
-impl Comparing {
+impl ComparisonOptions {
     /// Returns the estimates of recordings. The runs are analysed by `analyse` in a directory below `directory`. If
     /// parameters are compared and people differ in their form, the runs are analysed once more in the common form.
     ///
@@ -27,7 +27,7 @@ impl Comparing {
             Ok(GroupEstimates::read(&place)?)
         };
         let estimates = estimates_in(manifest, "group")?;
-        let of_one_form = |quantity: &Quantity| !quantity.is_of_any_form();
+        let of_one_form = |quantity: &Quantity| !quantity.is_form_independent();
         if !self.quantities.iter().any(of_one_form) || forms(estimates.cells.iter(), None).len() < 2 {
             return Ok(estimates);
         }

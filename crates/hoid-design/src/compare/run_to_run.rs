@@ -22,9 +22,9 @@ const MIN_RUNS: usize = 3;
 impl GroupEstimates {
     /// Returns the standard deviation of the crossover frequency of one person from run to run, relative to its mean,
     /// and the number of people; `None` if no person has the crossover of three runs in one condition.
-    pub(crate) fn run_to_run(&self) -> Option<(f64, usize)> {
+    pub(crate) fn run_to_run_variation(&self) -> Option<(f64, usize)> {
         let of_cell = |cell: &Cell| {
-            let runs = self.of_runs(cell, &Quantity::Crossover);
+            let runs = self.run_estimates(cell, &Quantity::Crossover);
             runs.into_iter().map(|(_, o)| o.value).collect::<Vec<f64>>()
         };
         let enough = |cell: &&Cell| of_cell(cell).len() >= MIN_RUNS;
@@ -56,7 +56,7 @@ mod tests {
     /// 40 cells of five runs with a variation of 15 %. The standard error of the standard deviation is `1/sqrt(2 160)`,
     /// 5.6 %.
     #[test]
-    fn variation_from_run_to_run_is_found() {
+    fn run_to_run_variation_is_found() {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
         let mut cell = |k: usize| -> Vec<f64> {
             let crossover = 2.0 + 0.1 * k as f64;
@@ -68,6 +68,9 @@ mod tests {
         assert!((found / 0.15 - 1.0).abs() < 0.15, "{found}");
         assert_eq!(variation(&[vec![2.0; 3]]), Some(0.0));
         assert_eq!(variation(&[]), None);
-        assert_eq!(group(&[("A", "x", 2.0, 0.1), ("B", "x", 2.2, 0.1)]).run_to_run(), None);
+        assert_eq!(
+            group(&[("A", "x", 2.0, 0.1), ("B", "x", 2.2, 0.1)]).run_to_run_variation(),
+            None
+        );
     }
 }

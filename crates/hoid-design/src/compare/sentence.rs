@@ -1,11 +1,11 @@
 //! Differences as sentences for a paper.
 
-use hoid_model::numbers::{significant, with_uncertainty};
+use hoid_model::numbers::{format_significant, with_uncertainty};
 
 use super::{Difference, Variation};
 
 /// Significance level.
-pub(super) const LEVEL: f64 = 0.05;
+pub(super) const SIGNIFICANCE_LEVEL: f64 = 0.05;
 
 /// Returns a sentence such as `crossover fell by 0.63 rad/s from fo to so (95 % 0.14 to 1.12, t(2) = -5.5, p = 0.032,
 /// d_z = -3.2, n = 3)`. If the adjusted p-value is not below .05, the sentence reports that no difference was found.
@@ -18,7 +18,7 @@ pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
         to,
         ..
     } = difference;
-    let what = quantity.words();
+    let what = quantity.sentence_name();
     let unit = match quantity.unit() {
         "" => String::new(),
         unit => format!(" {unit}"),
@@ -26,9 +26,9 @@ pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
     let error = Some(estimate.standard_error);
     // The ends of the interval are rounded to the digits of the value.
     let digits = |v: f64| with_uncertainty(v, error).0;
-    let test = test(difference, adjusted);
+    let test = test_text(difference, adjusted);
     let (low, high) = estimate.interval;
-    let is_found = difference.p_adjusted < LEVEL;
+    let is_found = difference.p_adjusted < SIGNIFICANCE_LEVEL;
     let falls = estimate.value < 0.0;
     let (size, ends) = match falls {
         true => (
@@ -60,19 +60,19 @@ pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
     }
 }
 
-fn test(difference: &Difference, adjusted: bool) -> String {
+fn test_text(difference: &Difference, adjusted: bool) -> String {
     let Difference { estimate, people, .. } = difference;
     let mut parts = vec![format!(
         "t({}) = {}",
         difference.degrees_of_freedom,
-        significant(estimate.t, 2)
+        format_significant(estimate.t, 2)
     )];
-    parts.push(format!("p {}", probability(estimate.p)));
+    parts.push(format!("p {}", p_value_text(estimate.p)));
     if adjusted && difference.p_adjusted != estimate.p {
-        parts.push(format!("Holm p {}", probability(difference.p_adjusted)));
+        parts.push(format!("Holm p {}", p_value_text(difference.p_adjusted)));
     }
     if let Some(effect) = &difference.effect_size {
-        parts.push(format!("{} = {}", effect.name, significant(effect.value, 2)));
+        parts.push(format!("{} = {}", effect.name, format_significant(effect.value, 2)));
     }
     let of = |group: usize| people.iter().filter(|(_, g)| *g == group).count();
     parts.push(match difference.variation {
@@ -83,10 +83,10 @@ fn test(difference: &Difference, adjusted: bool) -> String {
 }
 
 /// Formats a p-value, such as `= 0.032` or `< 0.0001`.
-pub(super) fn probability(p: f64) -> String {
+pub(super) fn p_value_text(p: f64) -> String {
     if p < 1e-4 {
         "< 0.0001".to_owned()
     } else {
-        format!("= {}", significant(p, 2))
+        format!("= {}", format_significant(p, 2))
     }
 }

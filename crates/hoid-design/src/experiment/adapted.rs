@@ -17,22 +17,22 @@
 use hoid_ident::family::OperatorPrior;
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyState, Form, ModelError,
-    family_scenario::{LONGEST_LEAD_S, NEAR_CROSSOVER_RAD_S, slope, time_constant},
+    family_scenario::{LONGEST_LEAD_S, SLOPE_FREQUENCY_RAD_S, slope, time_constant},
     operator_family::Coordinate,
 };
 
 use super::{DesignError, chosen::NamedState};
 
 /// Largest slope to be added for which the form has neither lead nor lag.
-const SMALL_SLOPE: f64 = 0.3;
+const MAX_GAIN_FORM_SLOPE: f64 = 0.3;
 /// Longest lag, in s.
-const LONGEST_LAG_S: f64 = 3.0;
+const MAX_LAG_S: f64 = 3.0;
 /// Desired and smallest phase margin, in deg.
-const MARGIN_DEG: f64 = 40.0;
+const TARGET_MARGIN_DEG: f64 = 40.0;
 const MIN_MARGIN_DEG: f64 = 15.0;
 /// Range of the crossover frequencies to try, in rad/s, and their number.
-const CROSSOVERS_RAD_S: (f64, f64) = (0.3, 5.0);
-const TRIALS: usize = 300;
+const CROSSOVER_RANGE_RAD_S: (f64, f64) = (0.3, 5.0);
+const TRIAL_COUNT: usize = 300;
 
 /// Neuromuscular system and delay of a person.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,7 +44,7 @@ struct NeuromuscularValues {
 
 impl NeuromuscularValues {
     /// Returns the medians of the population, except for one parameter with a given value.
-    fn with(other: Option<(&str, f64)>) -> Self {
+    fn with_replacement(other: Option<(&str, f64)>) -> Self {
         let prior = OperatorPrior::population();
         let of = |name: &str| match other {
             Some((changed, value)) if changed == name => value,
@@ -68,16 +68,25 @@ pub(super) fn population(
 ) -> Result<(NamedState, Vec<NamedState>), DesignError> {
     let form = form.unwrap_or_else(|| form_of(element));
     let named = |name: String, muscles: NeuromuscularValues| {
-        adapted(element, form, muscles).map(|state| NamedState { name, state })
+        adapted_state(element, form, muscles).map(|state| NamedState { name, state })
     };
-    let typical = named("typical of the population".to_owned(), NeuromuscularValues::with(None))?;
+    let typical = named(
+        "typical of the population".to_owned(),
+        NeuromuscularValues::with_replacement(None),
+    )?;
     let mut others = Vec::new();
     for entry in OperatorPrior::population().entries() {
         for sign in [-1.0, 1.0] {
             let value = entry.centre * (sign * entry.spread).exp();
             let name = format!("{} = {value:.2}", entry.parameter);
             // A person who cannot control this element, for example because of a long delay, is left out.
-            others.extend(named(name, NeuromuscularValues::with(Some((&entry.parameter, value)))).ok());
+            others.extend(
+                named(
+                    name,
+                    NeuromuscularValues::with_replacement(Some((&entry.parameter, value))),
+                )
+                .ok(),
+            );
         }
     }
     Ok((typical, others))
@@ -86,33 +95,33 @@ pub(super) fn population(
 /// Returns the form that people typically adopt with an element.
 fn form_of(element: &ContinuousTransferFunction) -> Form {
     match -1.0 - slope(element) {
-        added if added > SMALL_SLOPE => Form::Lead,
-        added if added < -SMALL_SLOPE => Form::Lag,
+        added if added > MAX_GAIN_FORM_SLOPE => Form::Lead,
+        added if added < -MAX_GAIN_FORM_SLOPE => Form::Lag,
         _ => Form::Gain,
     }
 }
 
-fn adapted(
+fn adapted_state(
     element: &ContinuousTransferFunction,
     form: Form,
     muscles: NeuromuscularValues,
 ) -> Result<FamilyState, DesignError> {
     let operator = unit_operator(element, form, muscles)?;
-    let (low, high) = CROSSOVERS_RAD_S;
-    let crossover = |k: usize| high * (low / high).powf(k as f64 / (TRIALS - 1) as f64);
+    let (low, high) = CROSSOVER_RANGE_RAD_S;
+    let crossover = |k: usize| high * (low / high).powf(k as f64 / (TRIAL_COUNT - 1) as f64);
     let margin = |omega: f64| {
         (-(operator.response(omega) * element.response(omega)))
             .arg()
             .to_degrees()
     };
-    let all: Vec<(f64, f64)> = (0..TRIALS).map(|k| (crossover(k), margin(crossover(k)))).collect();
+    let all: Vec<(f64, f64)> = (0..TRIAL_COUNT).map(|k| (crossover(k), margin(crossover(k)))).collect();
     let mut falling: Vec<(f64, f64)> = all
         .iter()
         .copied()
-        .filter(|(_, m)| *m < MARGIN_DEG && *m >= MIN_MARGIN_DEG)
+        .filter(|(_, m)| *m < TARGET_MARGIN_DEG && *m >= MIN_MARGIN_DEG)
         .collect();
     falling.sort_by(|a, b| b.1.total_cmp(&a.1));
-    let wide = all.into_iter().filter(|(_, m)| *m >= MARGIN_DEG);
+    let wide = all.into_iter().filter(|(_, m)| *m >= TARGET_MARGIN_DEG);
     for (omega, _) in wide.chain(falling) {
         let state = with_crossover(&operator, element, omega)?;
         let found = state.margins().ok().and_then(|m| m.crossover_rad_s);
@@ -134,11 +143,11 @@ fn unit_operator(
 ) -> Result<FamilyOperator, DesignError> {
     let with_both = form.degree() > 0 && form.has_lag();
     let lag_s = match with_both {
-        true => LONGEST_LAG_S,
-        false => time_constant(slope(element) + 1.0, LONGEST_LAG_S),
+        true => MAX_LAG_S,
+        false => time_constant(slope(element) + 1.0, MAX_LAG_S),
     };
     let of_lag = if with_both {
-        let x = lag_s * NEAR_CROSSOVER_RAD_S;
+        let x = lag_s * SLOPE_FREQUENCY_RAD_S;
         x * x / (1.0 + x * x)
     } else {
         0.0

@@ -17,38 +17,38 @@ use super::{DesignError, Enters, Forcing};
 /// Another forcing function: the ten sines of the thesis (`reference`), the forcing functions of a scenario, or the
 /// lines in a table with the columns omega_rad_s, amplitude and, optionally, phase_rad.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Against {
+pub enum OtherForcing {
     /// The ten sines of the thesis.
     Reference,
     /// A scenario (`.toml`) or a table of lines.
     File(PathBuf),
 }
 
-/// Name of [`Against::Reference`].
-const REFERENCE: &str = "reference";
+/// Name of [`OtherForcing::Reference`].
+const REFERENCE_NAME: &str = "reference";
 
-impl Against {
+impl OtherForcing {
     /// Parses the name `reference` or the path of a file.
-    pub fn of_text(text: &str) -> Self {
+    pub fn from_text(text: &str) -> Self {
         match text {
-            REFERENCE => Self::Reference,
+            REFERENCE_NAME => Self::Reference,
             file => Self::File(file.into()),
         }
     }
 }
 
-impl FromStr for Against {
+impl FromStr for OtherForcing {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(Self::of_text(text))
+        Ok(Self::from_text(text))
     }
 }
 
-impl Against {
+impl OtherForcing {
     pub(super) fn name(&self) -> String {
         match self {
-            Self::Reference => REFERENCE.to_owned(),
+            Self::Reference => REFERENCE_NAME.to_owned(),
             Self::File(path) => path.display().to_string(),
         }
     }

@@ -97,23 +97,26 @@ impl ExperimentDesign {
         set("run_to_run", json::number(self.run_to_run));
         set("run_to_run_source", json!(self.run_to_run_source));
         set("crest_factor", json::number(self.crest_factor));
-        for (key, value) in of_expected(&self.expected) {
+        for (key, value) in expected_json(&self.expected) {
             set(&key, value);
         }
-        set("lines", self.lines.iter().map(of_line).collect());
-        set("response", self.response.iter().map(of_response).collect());
+        set("lines", self.lines.iter().map(line_json).collect());
+        set("response", self.response.iter().map(response_json).collect());
         set(
             "response_to_target",
-            self.response_to_target.iter().map(of_response).collect(),
+            self.response_to_target.iter().map(response_json).collect(),
         );
-        set("people", self.people.iter().map(of_named).collect());
-        set("worst", self.worst.as_ref().map_or(Value::Null, of_named));
-        set("against", self.against.as_ref().map_or(Value::Null, of_named));
+        set("people", self.people.iter().map(named_expected_json).collect());
+        set("worst", self.worst.as_ref().map_or(Value::Null, named_expected_json));
+        set(
+            "against",
+            self.against.as_ref().map_or(Value::Null, named_expected_json),
+        );
         set(
             "difference",
             self.difference.as_ref().map_or(Value::Null, DifferencePlan::json),
         );
-        let state = json::state::written(self).map_or(Value::Null, Value::String);
+        let state = json::state::serialise(self).map_or(Value::Null, Value::String);
         set("state", state);
         map
     }
@@ -128,12 +131,12 @@ impl ExperimentDesign {
     /// # Errors
     /// [`AnalysisError::NotAResult`] if the text is invalid or damaged, or has another version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
-        json::state::of_kind(text, KIND)
+        json::state::restore_state(text, KIND)
     }
 }
 
-fn of_line(designed: &DesignedLine) -> Value {
-    let mut one = of_response(&designed.response);
+fn line_json(designed: &DesignedLine) -> Value {
+    let mut one = response_json(&designed.response);
     one["enters"] = json!(designed.enters.name());
     one["amplitude"] = json::number(designed.line.amplitude_deg);
     one["phase_rad"] = json::number(designed.line.phase_rad);
@@ -148,7 +151,7 @@ fn feedforward_json(seen: &Feedforward) -> Value {
     })
 }
 
-fn of_response(r: &ExpectedResponse) -> Value {
+fn response_json(r: &ExpectedResponse) -> Value {
     json!({
         "omega_rad_s": json::number(r.omega_rad_s),
         "gain_db": json::number(r.gain_db.value),
@@ -158,15 +161,15 @@ fn of_response(r: &ExpectedResponse) -> Value {
     })
 }
 
-fn of_named(one: &NamedExpected) -> Value {
+fn named_expected_json(one: &NamedExpected) -> Value {
     let mut map = Map::new();
     map.insert("name".to_owned(), json!(one.name));
     map.insert("runs_needed".to_owned(), json!(one.runs_needed));
-    map.extend(of_expected(&one.expected));
+    map.extend(expected_json(&one.expected));
     Value::Object(map)
 }
 
-fn of_expected(e: &Expected) -> Map<String, Value> {
+fn expected_json(e: &Expected) -> Map<String, Value> {
     let with_person = |mut one: Value, q: &ExpectedQuantity| {
         one["standard_error_person"] = json::optional(q.standard_error_person);
         one

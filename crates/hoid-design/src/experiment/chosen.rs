@@ -13,7 +13,7 @@ pub(super) struct NamedState {
 
 /// The people of a design.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Chosen {
+pub(super) struct ChosenPeople {
     pub typical: NamedState,
     pub others: Vec<NamedState>,
     /// Response to a displayed target, if the source of the people specifies it.
@@ -23,13 +23,13 @@ pub(super) struct Chosen {
 
 /// Options given in addition to the people.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Given<'a> {
+pub(super) struct GivenOptions<'a> {
     pub controlled_element: Option<&'a ContinuousTransferFunction>,
     pub form: Option<Form>,
     pub condition: Option<&'a str>,
 }
 
-impl Given<'_> {
+impl GivenOptions<'_> {
     /// Returns the given controlled element, for people whose source does not specify one.
     pub fn element(&self, people: &str) -> Result<ContinuousTransferFunction, DesignError> {
         let missing = || DesignError::NoElement {
@@ -40,6 +40,6 @@ impl Given<'_> {
 }
 
 /// Returns the finding that a person is left out.
-pub(super) fn left_out(name: &str, reason: &str) -> Finding {
-    Finding::doubt("person-left-out", format!("{name} is left out: {reason}"))
+pub(super) fn exclusion_finding(name: &str, reason: &str) -> Finding {
+    Finding::warning("person-left-out", format!("{name} is left out: {reason}"))
 }

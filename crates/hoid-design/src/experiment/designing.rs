@@ -13,18 +13,18 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 
 use super::{
-    DesignError, Enters, Expected, Forcing, RUN_TO_RUN, RequestedQuantity, Task,
+    DesignError, Enters, Expected, Forcing, RUN_TO_RUN_DEVIATION, RequestedQuantity, Task,
     difference::check_spread,
     information::Loop,
     joint::Quantity,
     lines::{are_separate_lines, crest_factor, multiples, set_phases},
-    periods,
+    period_count,
     search::Search,
 };
 
 /// Options of the design of a forcing function.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Designing {
+pub struct DesignOptions {
     /// The requested quantities; if empty, all parameters, with errors relative to their values.
     pub wanted: Vec<RequestedQuantity>,
     /// Period in s: the duration of a run divided by an integer.
@@ -47,7 +47,7 @@ pub struct Designing {
     pub seed: u64,
 }
 
-impl Default for Designing {
+impl Default for DesignOptions {
     fn default() -> Self {
         Self {
             wanted: Vec::new(),
@@ -57,7 +57,7 @@ impl Default for Designing {
             band_rad_s: (0.2, 18.0),
             shelf: 0.2,
             most_rms: [None; 2],
-            run_to_run: RUN_TO_RUN,
+            run_to_run: RUN_TO_RUN_DEVIATION,
             seed: 0,
         }
     }
@@ -65,7 +65,7 @@ impl Default for Designing {
 
 /// Designed forcing functions with their expected errors.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Designed {
+pub struct DesignedForcing {
     /// Forcing function for each point of entry.
     pub forcing: Forcing,
     /// Ratio of peak to rms; of two forcing functions, the larger ratio.
@@ -76,13 +76,13 @@ pub struct Designed {
     pub periods: usize,
 }
 
-impl Designing {
+impl DesignOptions {
     /// Designs a forcing function for each point of entry.
     ///
     /// # Errors
     /// [`DesignError`] as for [`super::expected`], if a requested quantity does not exist, or if the band has no room
     /// for the lines.
-    pub fn run(&self, task: &Task, points: &[Enters]) -> Result<Designed, DesignError> {
+    pub fn run(&self, task: &Task, points: &[Enters]) -> Result<DesignedForcing, DesignError> {
         check_spread("spread from run to run", self.run_to_run)?;
         let least = (self.band_rad_s.0 * self.period_s / TAU).ceil();
         let largest = (self.band_rad_s.1 * self.period_s / TAU).floor();
@@ -111,7 +111,7 @@ impl Designing {
             });
         }
         let places = found.into_iter().zip(points.iter().cycle().copied()).collect();
-        let (places, shares) = search.places(places, |all, k, moved| {
+        let (places, shares) = search.optimise_places(places, |all, k, moved| {
             let others = all.iter().enumerate().filter(|(j, _)| *j != k);
             let mut others = others.map(|(_, (m, _))| *m);
             (least..=largest).contains(&moved) && others.all(|m| are_separate_lines(m, moved, self.spacing))
@@ -139,9 +139,9 @@ impl Designing {
         let expected = all
             .expected(&forcing, self.period_s)?
             .with_run_to_run(self.run_to_run, 1);
-        Ok(Designed {
+        Ok(DesignedForcing {
             crest_factor: crest,
-            periods: periods(&expected, &self.wanted),
+            periods: period_count(&expected, &self.wanted),
             expected,
             forcing,
         })
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn design_is_more_informative_than_the_thesis_lines() {
         let task = task(0.2);
-        let designed = Designing::default().run(&task, &[Enters::Target]).unwrap();
+        let designed = DesignOptions::default().run(&task, &[Enters::Target]).unwrap();
         let text = super::super::expected(&task, &reference(), 81.92).unwrap();
         let sum = |of: &Expected| -> f64 {
             of.parameters()
@@ -205,7 +205,10 @@ mod tests {
         assert!(sum(&designed.expected) < 0.7 * sum(&text));
         assert!(designed.crest_factor < 2.5 && designed.periods == 1);
         assert!((designed.forcing.function(Enters::Target).unwrap().rms_deg() - 1.0).abs() < 1e-9);
-        assert_eq!(designed, Designing::default().run(&task, &[Enters::Target]).unwrap());
+        assert_eq!(
+            designed,
+            DesignOptions::default().run(&task, &[Enters::Target]).unwrap()
+        );
         // The shelf above the crossover, and no dominant line.
         let crossover = designed.expected.estimate("crossover").unwrap().value;
         let amplitudes = |beyond: bool| -> Vec<f64> {
@@ -235,9 +238,9 @@ mod tests {
                 name: name.to_owned(),
                 error: 0.02,
             }];
-            let designed = Designing {
+            let designed = DesignOptions {
                 wanted,
-                ..Designing::default()
+                ..DesignOptions::default()
             }
             .run(&task, &[Enters::Target])
             .unwrap();
@@ -254,9 +257,9 @@ mod tests {
             name: "T_I".to_owned(),
             error: 0.1,
         }];
-        let error = Designing {
+        let error = DesignOptions {
             wanted,
-            ..Designing::default()
+            ..DesignOptions::default()
         }
         .run(&task, &[Enters::Target])
         .unwrap_err();
@@ -267,9 +270,9 @@ mod tests {
     fn rms_limits_are_respected() {
         let task = task(0.2);
         let of = |most_rms| {
-            Designing {
+            DesignOptions {
                 most_rms,
-                ..Designing::default()
+                ..DesignOptions::default()
             }
             .run(&task, &[Enters::Target])
             .unwrap()
@@ -279,17 +282,17 @@ mod tests {
         assert!((small.rms_e - 0.5).abs() < 1e-9 && small.rms_u < 100.0);
         let weak = of([None, Some(0.1)]);
         assert!((weak.rms_u - 0.1).abs() < 1e-9);
-        let error = Designing {
+        let error = DesignOptions {
             band_rad_s: (3.0, 2.0),
-            ..Designing::default()
+            ..DesignOptions::default()
         }
         .run(&task, &[Enters::Target])
         .unwrap_err();
         assert!(matches!(error, DesignError::OutOfRange { .. }));
         assert!(matches!(
-            Designing {
+            DesignOptions {
                 lines: 1,
-                ..Designing::default()
+                ..DesignOptions::default()
             }
             .run(&task, &[Enters::Target]),
             Err(DesignError::NotIdentifiable { .. })

@@ -8,7 +8,7 @@
 //! run to run, and s the expected error of one run (`information`). The power of the paired t test is computed in
 //! `power`. More runs reduce the effect of w and s; only more people reduce the effect of b.
 //!
-//! **Defaults.** The spread from run to run is [`RUN_TO_RUN`](super::RUN_TO_RUN). The spread
+//! **Defaults.** The spread from run to run is [`RUN_TO_RUN_DEVIATION`](super::RUN_TO_RUN_DEVIATION). The spread
 //! of the difference over people is 10 % (the crossover of three recorded people fell by .31 to .78 rad/s from one
 //! element to another, a standard deviation of 10 % of its mean). A spread is relative to the quantity; for the phase
 //! margin it is the spread that results from this spread of the gain.
@@ -25,8 +25,8 @@ use serde_json::{Map, Value, json};
 use super::{
     DesignError, Expected, People, SpreadSource,
     power::{MAX_PEOPLE, people_needed, power},
-    spread::between_people,
-    wanted::named_number,
+    spread::between_people_spread,
+    wanted::parse_named_number,
 };
 
 /// The difference to be found.
@@ -45,7 +45,7 @@ impl FromStr for TargetDifference {
 
     /// Parses a text such as `crossover=.5` (in rad/s) or `tau_e=10%` (of its value).
     fn from_str(text: &str) -> Result<Self, DesignError> {
-        let (name, number, relative) = named_number(text, "quantity with the size of its difference")?;
+        let (name, number, relative) = parse_named_number(text, "quantity with the size of its difference")?;
         Ok(Self {
             name,
             size: if relative { number / 100.0 } else { number },
@@ -64,24 +64,24 @@ pub struct DifferenceRequest {
     /// Significance level of the test.
     pub alpha: f64,
     /// Standard deviation, over people, of the difference. If `None`, it comes from the people of the design if they
-    /// provide it; otherwise it is [`BETWEEN_PEOPLE`].
+    /// provide it; otherwise it is [`DEFAULT_BETWEEN_PEOPLE`].
     pub between_people: Option<SpreadSource>,
 }
 
 /// Default required probability of finding a difference.
-pub const POWER: f64 = 0.8;
+pub const DEFAULT_POWER: f64 = 0.8;
 /// Default significance level of the test.
-pub const ALPHA: f64 = 0.05;
+pub const DEFAULT_ALPHA: f64 = 0.05;
 /// Default standard deviation, over people, of the difference, relative to the quantity.
-pub const BETWEEN_PEOPLE: f64 = 0.1;
+pub const DEFAULT_BETWEEN_PEOPLE: f64 = 0.1;
 
 impl DifferenceRequest {
     /// Creates a request for a difference with the default assumptions.
     pub fn new(sought: TargetDifference) -> Self {
         Self {
             sought,
-            power: POWER,
-            alpha: ALPHA,
+            power: DEFAULT_POWER,
+            alpha: DEFAULT_ALPHA,
             between_people: None,
         }
     }
@@ -124,11 +124,11 @@ pub struct DifferencePlan {
 }
 
 /// Numbers of runs in the table.
-const RUNS: [usize; 6] = [1, 2, 3, 4, 6, 8];
+const RUN_COUNTS: [usize; 6] = [1, 2, 3, 4, 6, 8];
 /// Numbers of people in the table.
-const PEOPLE: [usize; 8] = [4, 6, 8, 10, 12, 16, 20, 30];
+const PEOPLE_COUNTS: [usize; 8] = [4, 6, 8, 10, 12, 16, 20, 30];
 /// Cost of a person in addition to their runs, expressed as a number of runs.
-const COST_OF_PERSON: usize = 4;
+const PERSON_COST_RUNS: usize = 4;
 
 impl DifferenceRequest {
     /// Plans the numbers of people and runs; `of_run` contains the expected errors of one run, to which the relative
@@ -156,7 +156,12 @@ impl DifferenceRequest {
             self.sought.size
         };
         let name = self.sought.name.as_str();
-        let between = between_people(self.between_people.as_ref(), people, (name, found.size), BETWEEN_PEOPLE)?;
+        let between = between_people_spread(
+            self.between_people.as_ref(),
+            people,
+            (name, found.size),
+            DEFAULT_BETWEEN_PEOPLE,
+        )?;
         let mut plan = DifferencePlan {
             request: self.clone(),
             size,
@@ -164,12 +169,12 @@ impl DifferenceRequest {
             run_to_run: run_to_run * found.size,
             between_people: between.value,
             between_source: between.source,
-            people: PEOPLE.to_vec(),
+            people: PEOPLE_COUNTS.to_vec(),
             rows: Vec::new(),
             answer: 0,
         };
-        let mut all = RUNS.to_vec();
-        all.extend(runs.filter(|runs| !RUNS.contains(runs)));
+        let mut all = RUN_COUNTS.to_vec();
+        all.extend(runs.filter(|runs| !RUN_COUNTS.contains(runs)));
         all.sort_unstable();
         plan.rows = all.into_iter().map(|runs| self.row(&plan, runs)).collect();
         plan.answer = chosen_row(&plan.rows, runs);
@@ -235,14 +240,14 @@ fn chosen_row(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
     if let Some(place) = rows.iter().position(|row| Some(row.runs) == runs) {
         return place;
     }
-    let cost = |row: &RunsAndPeople| row.people.unwrap_or(MAX_PEOPLE) * (2 * row.runs + COST_OF_PERSON);
+    let cost = |row: &RunsAndPeople| row.people.unwrap_or(MAX_PEOPLE) * (2 * row.runs + PERSON_COST_RUNS);
     let least = rows.iter().enumerate().min_by_key(|(_, row)| cost(row));
     least.map_or(0, |(place, _)| place)
 }
 
 impl DifferencePlan {
     /// Returns the recommended row: the number of runs and of people.
-    pub fn answer(&self) -> Option<&RunsAndPeople> {
+    pub fn recommended_row(&self) -> Option<&RunsAndPeople> {
         self.rows.get(self.answer)
     }
 
@@ -261,8 +266,8 @@ impl DifferencePlan {
             "size": json::number(self.size),
             "power": self.request.power,
             "alpha": self.request.alpha,
-            "people": self.answer().and_then(|row| row.people),
-            "runs": self.answer().map(|row| row.runs),
+            "people": self.recommended_row().and_then(|row| row.people),
+            "runs": self.recommended_row().map(|row| row.runs),
             "error_of_run": json::number(self.error_of_run),
             "run_to_run": json::number(self.run_to_run),
             "between_people": json::number(self.between_people),
@@ -291,14 +296,18 @@ mod tests {
     use statrs::distribution::{ContinuousCDF, StudentsT};
 
     use super::*;
-    use crate::experiment::{Designing, RUN_TO_RUN, information::tests::task};
+    use crate::experiment::{DesignOptions, RUN_TO_RUN_DEVIATION, information::tests::task};
 
     fn plan(text: &str, runs: Option<usize>) -> Result<DifferencePlan, DesignError> {
         let task = task(0.2);
-        let designed = Designing::default()
+        let designed = DesignOptions::default()
             .run(&task, &[crate::experiment::Enters::Target])
             .unwrap();
-        DifferenceRequest::new(text.parse()?).plan(&People::Population, (&designed.expected, RUN_TO_RUN), runs)
+        DifferenceRequest::new(text.parse()?).plan(
+            &People::Population,
+            (&designed.expected, RUN_TO_RUN_DEVIATION),
+            runs,
+        )
     }
 
     #[test]
@@ -311,16 +320,19 @@ mod tests {
         assert!((of_one.of_person.powi(2) - plan.between_people.powi(2) - 2.0 * within).abs() < 1e-12);
         assert!(plan.rows.iter().all(|row| row.of_person > plan.between_people));
         assert_eq!(plan.csv().lines().count(), 1 + 48);
-        assert_eq!(plan.json()["people"], plan.answer().unwrap().people.unwrap());
+        assert_eq!(plan.json()["people"], plan.recommended_row().unwrap().people.unwrap());
     }
 
     #[test]
     fn sizes_are_absolute_or_relative() {
         let relative = plan("crossover=10%", Some(5)).unwrap();
         let value = relative.size / 0.1;
-        assert_eq!(relative.answer().unwrap().runs, 5);
+        assert_eq!(relative.recommended_row().unwrap().runs, 5);
         let absolute = plan(&format!("crossover={}", relative.size), Some(5)).unwrap();
-        assert_eq!(absolute.answer().unwrap().people, relative.answer().unwrap().people);
+        assert_eq!(
+            absolute.recommended_row().unwrap().people,
+            relative.recommended_row().unwrap().people
+        );
         assert!((relative.between_people - 0.1 * value).abs() < 1e-12);
         // Of the margin, the variation of the gain: some degrees.
         let margin = plan("margin=5", None).unwrap();
@@ -334,7 +346,7 @@ mod tests {
     #[test]
     fn simulated_experiments_confirm_the_power() {
         let plan = plan("crossover=8%", Some(2)).unwrap();
-        let row = plan.answer().unwrap();
+        let row = plan.recommended_row().unwrap();
         let people = row.people.unwrap();
         let mut rng = ChaCha8Rng::seed_from_u64(11);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };

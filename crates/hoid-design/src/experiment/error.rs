@@ -194,7 +194,7 @@ pub enum DesignError {
 
 impl DesignError {
     /// True if the error is in the request, not in the data.
-    pub fn is_of_request(&self) -> bool {
+    pub fn is_request_error(&self) -> bool {
         !matches!(
             self,
             Self::NoCrossover

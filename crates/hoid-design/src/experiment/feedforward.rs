@@ -9,7 +9,7 @@ use super::DesignError;
 
 /// Returns the typical response to the target for a person with this response to the error; with a preview, 1 s of the
 /// future target is displayed, the default of a condition of `hoid lab`.
-pub(super) fn typical(state: &FamilyState, display: Display) -> Result<Feedforward, DesignError> {
+pub(super) fn typical_target_response(state: &FamilyState, display: Display) -> Result<Feedforward, DesignError> {
     let found = typical_feedforward(state, display, FOLLOWED_FRACTION, PREVIEW_S)?;
     found.ok_or_else(|| DesignError::NoFeedforward {
         element: state.controlled_element.to_string(),

@@ -8,7 +8,7 @@ use hoid_model::{
     operator_family::{Coordinate, NamedParameter},
 };
 
-use super::{DesignedLine, Enters, ExperimentDesign, task::SAMPLE_S};
+use super::{DesignedLine, Enters, ExperimentDesign, task::SAMPLE_TIME_S};
 
 /// Time before the measurement, s.
 const RUN_IN_S: f64 = 10.0;
@@ -19,7 +19,7 @@ impl ExperimentDesign {
         let operator = &self.task.state.operator;
         let forcing = |enters: Enters| {
             let own = self.lines.iter().filter(|l| l.enters == enters);
-            let lines: Vec<String> = own.map(|l| of_line(&l.line)).collect();
+            let lines: Vec<String> = own.map(|l| line_toml(&l.line)).collect();
             match lines.as_slice() {
                 [] => String::new(),
                 lines => format!("[{}]\nlines = [\n{},\n]\n\n", enters.name(), lines.join(",\n")),
@@ -29,7 +29,7 @@ impl ExperimentDesign {
             0.0 => "shape = \"white\"\n".to_owned(),
             t => format!("shape = \"lag\"\nT_n_s = {t}\n"),
         };
-        let sample_s = self.sample_s();
+        let sample_s = self.sample_time_s();
         format!(
             "# Made by `hoid design`.\nname = \"design\"\nform = \"{}\"\nneuromuscular = {}\nsample_time_s = {}\nmeasurement_s = {}\nrun_in_s = {}\n\n\
              [initial]\n{}controlled_element = \"{}\"\n\n{}{}{}[[remnant]]\n{shape}share = {}\n",
@@ -51,15 +51,15 @@ impl ExperimentDesign {
     }
 
     /// Returns a sample time in s such that a run is a whole number of samples.
-    fn sample_s(&self) -> f64 {
-        let whole = self.length_s / SAMPLE_S;
+    fn sample_time_s(&self) -> f64 {
+        let whole = self.length_s / SAMPLE_TIME_S;
         match (whole - whole.round()).abs() < 1e-6 {
-            true => SAMPLE_S,
+            true => SAMPLE_TIME_S,
             false => self.length_s / whole.ceil(),
         }
     }
 
-    /// Returns the table of the lines as CSV, which [`super::Against`] reads.
+    /// Returns the table of the lines as CSV, which [`super::OtherForcing`] reads.
     pub fn forcing_csv(&self) -> String {
         let line = |DesignedLine { enters, line: l, .. }: &DesignedLine| {
             let enters = enters.name();
@@ -79,8 +79,8 @@ const MAX_RUNS: usize = 100;
 impl ExperimentDesign {
     /// Returns an experiment for `hoid lab --config`. Its condition is the scenario file named by `scenario`, in the
     /// same directory. `None` if a run is not a whole number of hundredths of a second, as the lab requires.
-    pub fn lab(&self, scenario: &str) -> Option<String> {
-        if self.sample_s().to_bits() != SAMPLE_S.to_bits() {
+    pub fn lab_config(&self, scenario: &str) -> Option<String> {
+        if self.sample_time_s().to_bits() != SAMPLE_TIME_S.to_bits() {
             return None;
         }
         let room = |rms: f64| RMS_MULTIPLE * if rms > 0.0 { rms } else { 1.0 };
@@ -90,7 +90,7 @@ impl ExperimentDesign {
              # {RMS_MULTIPLE} times the expected rms of the error and of the control.\nhalf_width = {:.4}\nfull_deflection = {:.4}\n\
              training = 1\nruns = {}\n",
             self.display.name(),
-            self.preview(),
+            self.preview_key(),
             room(self.expected.rms_e),
             room(self.expected.rms_u),
             self.runs.clamp(1, MAX_RUNS),
@@ -98,7 +98,7 @@ impl ExperimentDesign {
     }
 }
 
-fn of_line(line: &Sinusoid) -> String {
+fn line_toml(line: &Sinusoid) -> String {
     format!(
         "  {{ amplitude = {}, omega_rad_s = {}, phase_rad = {} }}",
         line.amplitude_deg, line.omega_rad_s, line.phase_rad
@@ -108,14 +108,14 @@ fn of_line(line: &Sinusoid) -> String {
 /// Returns the keys of the response to a displayed target. Its neuromuscular system is the same as in the response to
 /// the error.
 fn feedforward_keys(seen: &Feedforward, sample_s: f64) -> String {
-    let named = seen.operator.named();
+    let named = seen.operator.named_parameters();
     let own = |p: &&NamedParameter| {
         let common = matches!(p.coordinate, Some(Coordinate::LogOmega | Coordinate::LogZeta));
         p.coordinate.is_some() && !common
     };
     let key = |p: &NamedParameter| match p.coordinate {
         Some(Coordinate::Delay) => format!("tau_f_s = {}\n", p.value - seen.preview_s),
-        _ => key_of(p),
+        _ => scenario_key(p),
     };
     let keys: String = named.iter().filter(own).map(key).collect();
     let form = seen.operator.form().name();
@@ -125,13 +125,17 @@ fn feedforward_keys(seen: &Feedforward, sample_s: f64) -> String {
 }
 
 fn operator_keys(operator: &FamilyOperator) -> String {
-    let named = operator.named();
-    named.iter().filter(|p| p.coordinate.is_some()).map(key_of).collect()
+    let named = operator.named_parameters();
+    named
+        .iter()
+        .filter(|p| p.coordinate.is_some())
+        .map(scenario_key)
+        .collect()
 }
 
 impl ExperimentDesign {
     /// Returns the preview as a key of a lab experiment.
-    fn preview(&self) -> String {
+    fn preview_key(&self) -> String {
         let seen = self
             .task
             .feedforward
@@ -142,7 +146,7 @@ impl ExperimentDesign {
 }
 
 /// Returns the name of a parameter as a key of a scenario.
-fn key_of(p: &NamedParameter) -> String {
+fn scenario_key(p: &NamedParameter) -> String {
     let name = match p.name {
         "K_e" => "K",
         "K_d" => "K_d_s",

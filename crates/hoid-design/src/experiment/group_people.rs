@@ -9,12 +9,12 @@ use std::path::Path;
 
 use hoid_model::{ContinuousTransferFunction, FamilyOperator, FamilyState, Form, VerdictLevel};
 use hoid_numerics::statistics::upper_median;
-use hoid_study::group::{GroupSummary, MANIFEST, Manifest};
+use hoid_study::group::{GroupSummary, MANIFEST_FILE, Manifest};
 use serde_json::Value;
 
 use super::{
     DesignError,
-    chosen::{Chosen, Given, NamedState, left_out},
+    chosen::{ChosenPeople, GivenOptions, NamedState, exclusion_finding},
 };
 
 /// A person in a condition, with parameters by name.
@@ -27,20 +27,20 @@ struct Row {
 }
 
 /// The pooled population of a condition.
-struct Pooled {
+struct PooledPopulation {
     centre: Row,
     people: Vec<Row>,
 }
 
-pub(super) fn of_directory(directory: &Path, given: &Given<'_>) -> Result<Chosen, DesignError> {
-    let manifest = directory.join(MANIFEST);
+pub(super) fn from_directory(directory: &Path, given: &GivenOptions<'_>) -> Result<ChosenPeople, DesignError> {
+    let manifest = directory.join(MANIFEST_FILE);
     if !manifest.exists() {
-        return Err(none(directory, format!("there is no {MANIFEST} in it")));
+        return Err(no_people_error(directory, format!("there is no {MANIFEST_FILE} in it")));
     }
     let manifest = Manifest::read(&manifest)?;
     let summary = GroupSummary::read(&manifest, directory)?;
     let determined = |p: &&hoid_study::group::Person| {
-        p.is_of_all_runs() && p.verdict.is_some_and(|level| level != VerdictLevel::NotDetermined)
+        p.covers_all_runs() && p.verdict.is_some_and(|level| level != VerdictLevel::NotDetermined)
     };
     let row = |p: &hoid_study::group::Person| Row {
         subject: p.subject.clone(),
@@ -56,10 +56,10 @@ pub(super) fn of_directory(directory: &Path, given: &Given<'_>) -> Result<Chosen
     };
     let pooled = read_pooled(directory, &condition)?;
     let rows = rows.into_iter().filter(|row| row.condition == condition).collect();
-    of_rows(rows, pooled.as_ref(), directory, &element)
+    from_rows(rows, pooled.as_ref(), directory, &element)
 }
 
-pub(super) fn of_json(object: &Value, path: &Path, given: &Given<'_>) -> Result<Chosen, DesignError> {
+pub(super) fn from_json(object: &Value, path: &Path, given: &GivenOptions<'_>) -> Result<ChosenPeople, DesignError> {
     let people = object["people"].as_array().map(Vec::as_slice).unwrap_or_default();
     let of_all = |p: &&Value| p["run"] == "all" && p["verdict"]["level"] != VerdictLevel::NotDetermined.name();
     let text = |p: &Value, key: &str| p[key].as_str().unwrap_or_default().to_owned();
@@ -80,10 +80,14 @@ pub(super) fn of_json(object: &Value, path: &Path, given: &Given<'_>) -> Result<
     let condition = condition_of(&rows, path, given)?;
     let element = given.element(&path.display().to_string())?;
     let rows = rows.into_iter().filter(|row| row.condition == condition).collect();
-    of_rows(rows, None, path, &element)
+    from_rows(rows, None, path, &element)
 }
 
-pub(super) fn of_population(object: &Value, path: &Path, given: &Given<'_>) -> Result<Chosen, DesignError> {
+pub(super) fn from_population(
+    object: &Value,
+    path: &Path,
+    given: &GivenOptions<'_>,
+) -> Result<ChosenPeople, DesignError> {
     let element = given.element(&path.display().to_string())?;
     let missing: Vec<&str> = object["left_out"]
         .as_array()
@@ -96,12 +100,12 @@ pub(super) fn of_population(object: &Value, path: &Path, given: &Given<'_>) -> R
         let reason = format!(
             "{names} could not be pooled; give the directory of the group, which contains the operator of each person"
         );
-        return Err(none(path, reason));
+        return Err(no_people_error(path, reason));
     }
-    of_pooled(&pooled(object), path, &element)
+    from_pooled(&read_pooled_population(object), path, &element)
 }
 
-fn none(place: &Path, reason: impl Into<String>) -> DesignError {
+fn no_people_error(place: &Path, reason: impl Into<String>) -> DesignError {
     DesignError::NoPeople {
         place: place.display().to_string(),
         reason: reason.into(),
@@ -109,7 +113,7 @@ fn none(place: &Path, reason: impl Into<String>) -> DesignError {
 }
 
 /// Returns the condition: the given one, or the only one of the group.
-fn condition_of(rows: &[Row], place: &Path, given: &Given<'_>) -> Result<String, DesignError> {
+fn condition_of(rows: &[Row], place: &Path, given: &GivenOptions<'_>) -> Result<String, DesignError> {
     let mut all: Vec<&str> = Vec::new();
     for row in rows {
         if !all.contains(&row.condition.as_str()) {
@@ -117,7 +121,10 @@ fn condition_of(rows: &[Row], place: &Path, given: &Given<'_>) -> Result<String,
         }
     }
     match (given.condition, all.as_slice()) {
-        (_, []) => Err(none(place, "the data do not determine the operator of any person")),
+        (_, []) => Err(no_people_error(
+            place,
+            "the data do not determine the operator of any person",
+        )),
         (Some(wanted), _) if all.contains(&wanted) => Ok(wanted.to_owned()),
         (None, [one]) => Ok((*one).to_owned()),
         (wanted, _) => Err(DesignError::Condition {
@@ -141,8 +148,8 @@ fn element_of(
 }
 
 /// Reads the pooled population of a condition from the files of a directory; `None` if there is none.
-fn read_pooled(directory: &Path, condition: &str) -> Result<Option<Pooled>, DesignError> {
-    let unreadable = |error: std::io::Error| none(directory, error.to_string());
+fn read_pooled(directory: &Path, condition: &str) -> Result<Option<PooledPopulation>, DesignError> {
+    let unreadable = |error: std::io::Error| no_people_error(directory, error.to_string());
     let mut names: Vec<_> = std::fs::read_dir(directory)
         .map_err(unreadable)?
         .filter_map(|entry| Some(entry.ok()?.path()))
@@ -155,13 +162,13 @@ fn read_pooled(directory: &Path, condition: &str) -> Result<Option<Pooled>, Desi
     for path in names {
         let object: Value = serde_json::from_str(&hoid_io::read_settings(&path)?).unwrap_or_default();
         if object["kind"] == "population" && object["condition"] == condition {
-            return Ok(Some(pooled(&object)));
+            return Ok(Some(read_pooled_population(&object)));
         }
     }
     Ok(None)
 }
 
-fn pooled(object: &Value) -> Pooled {
+fn read_pooled_population(object: &Value) -> PooledPopulation {
     let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
     let row = |subject: String| Row {
         subject,
@@ -169,7 +176,7 @@ fn pooled(object: &Value) -> Pooled {
         form: text(&object["form"]),
         parameters: Vec::new(),
     };
-    let mut all = Pooled {
+    let mut all = PooledPopulation {
         centre: row("typical".to_owned()),
         people: Vec::new(),
     };
@@ -192,15 +199,19 @@ fn pooled(object: &Value) -> Pooled {
     all
 }
 
-fn of_pooled(pooled: &Pooled, place: &Path, element: &ContinuousTransferFunction) -> Result<Chosen, DesignError> {
-    let state = state_of(&pooled.centre, element).map_err(|reason| none(place, reason))?;
+fn from_pooled(
+    pooled: &PooledPopulation,
+    place: &Path,
+    element: &ContinuousTransferFunction,
+) -> Result<ChosenPeople, DesignError> {
+    let state = state_of(&pooled.centre, element).map_err(|reason| no_people_error(place, reason))?;
     let name = format!("typical of {} people", pooled.people.len());
     Ok(with_others(NamedState { name, state }, &pooled.people, element))
 }
 
 impl Row {
     /// Replaces each parameter that the row `pooled` contains by its pooled value.
-    fn with(mut self, pooled: &Self) -> Self {
+    fn with_pooled_values(mut self, pooled: &Self) -> Self {
         for (name, value) in &mut self.parameters {
             if let Some((_, better)) = pooled.parameters.iter().find(|(n, _)| n == name) {
                 *value = *better;
@@ -210,14 +221,14 @@ impl Row {
     }
 }
 
-fn of_rows(
+fn from_rows(
     rows: Vec<Row>,
-    pooled: Option<&Pooled>,
+    pooled: Option<&PooledPopulation>,
     place: &Path,
     element: &ContinuousTransferFunction,
-) -> Result<Chosen, DesignError> {
+) -> Result<ChosenPeople, DesignError> {
     let with_pooled = |row: Row| match pooled.and_then(|p| p.people.iter().find(|q| q.subject == row.subject)) {
-        Some(own) => row.with(own),
+        Some(own) => row.with_pooled_values(own),
         None => row,
     };
     let rows: Vec<Row> = rows.into_iter().map(with_pooled).collect();
@@ -244,10 +255,10 @@ fn of_rows(
         form,
     };
     let typical = match pooled {
-        Some(pooled) => typical.with(&pooled.centre),
+        Some(pooled) => typical.with_pooled_values(&pooled.centre),
         None => typical,
     };
-    let state = state_of(&typical, element).map_err(|reason| none(place, reason))?;
+    let state = state_of(&typical, element).map_err(|reason| no_people_error(place, reason))?;
     let name = match alike.len() == rows.len() {
         true => format!("typical of {} people", rows.len()),
         false => format!("typical of {} of {} people", alike.len(), rows.len()),
@@ -255,7 +266,7 @@ fn of_rows(
     Ok(with_others(NamedState { name, state }, &rows, element))
 }
 
-fn with_others(typical: NamedState, rows: &[Row], element: &ContinuousTransferFunction) -> Chosen {
+fn with_others(typical: NamedState, rows: &[Row], element: &ContinuousTransferFunction) -> ChosenPeople {
     let (mut others, mut findings) = (Vec::new(), Vec::new());
     for row in rows {
         match state_of(row, element) {
@@ -263,10 +274,10 @@ fn with_others(typical: NamedState, rows: &[Row], element: &ContinuousTransferFu
                 name: row.subject.clone(),
                 state,
             }),
-            Err(reason) => findings.push(left_out(&row.subject, &reason)),
+            Err(reason) => findings.push(exclusion_finding(&row.subject, &reason)),
         }
     }
-    Chosen {
+    ChosenPeople {
         typical,
         others,
         feedforward: None,
@@ -293,7 +304,7 @@ fn state_of(row: &Row, element: &ContinuousTransferFunction) -> Result<FamilySta
     };
     let names = form.parameters(neuromuscular);
     let pairs: Result<Vec<(String, f64)>, String> = names.iter().filter(|n| !dependent(n)).map(|n| pair(n)).collect();
-    let operator = FamilyOperator::of_names(form, &pairs?).map_err(|error| error.to_string())?;
+    let operator = FamilyOperator::from_names(form, &pairs?).map_err(|error| error.to_string())?;
     Ok(FamilyState {
         operator,
         controlled_element: element.clone(),

@@ -32,7 +32,7 @@ use nalgebra::{DMatrix, DVector};
 use super::{
     DesignError, Enters, Expected, ExpectedQuantity, Forcing, Remnant, Task,
     joint::{Joint, Quantity},
-    task::SAMPLE_S,
+    task::SAMPLE_TIME_S,
 };
 
 /// Power and information of a line of unit amplitude.
@@ -55,8 +55,8 @@ pub(super) struct Loop<'a> {
 }
 
 /// Range of the integrals over frequency in rad/s, up to half the sampling rate, and the number of points.
-const RANGE: (f64, f64) = (1e-3, std::f64::consts::PI / SAMPLE_S);
-const POINTS: usize = 6000;
+const FREQUENCY_RANGE_RAD_S: (f64, f64) = (1e-3, std::f64::consts::PI / SAMPLE_TIME_S);
+const POINT_COUNT: usize = 6000;
 
 impl<'a> Loop<'a> {
     pub fn of(task: &'a Task) -> Result<Self, DesignError> {
@@ -77,13 +77,13 @@ impl<'a> Loop<'a> {
             crossover_rad_s,
         };
         // Trapezoidal rule over log omega; the factor 2 accounts for negative frequencies.
-        let ratio = (RANGE.1 / RANGE.0).ln() / (POINTS - 1) as f64;
-        for k in 0..POINTS {
-            let omega = RANGE.0 * (ratio * k as f64).exp();
-            let weight = if k == 0 || k == POINTS - 1 { 0.5 } else { 1.0 };
+        let ratio = (FREQUENCY_RANGE_RAD_S.1 / FREQUENCY_RANGE_RAD_S.0).ln() / (POINT_COUNT - 1) as f64;
+        for k in 0..POINT_COUNT {
+            let omega = FREQUENCY_RANGE_RAD_S.0 * (ratio * k as f64).exp();
+            let weight = if k == 0 || k == POINT_COUNT - 1 { 0.5 } else { 1.0 };
             let width = 2.0 * omega * ratio * weight / TAU;
             let (s, p) = all.sensitivity(omega);
-            let density = all.density(omega);
+            let density = all.remnant_density(omega);
             all.noise[0] += width * density * s.norm_sqr();
             all.noise[1] += width * density * (s * p).norm_sqr();
         }
@@ -98,7 +98,7 @@ impl<'a> Loop<'a> {
     }
 
     /// Returns the power density of a remnant of unit gain.
-    pub fn density(&self, omega: f64) -> f64 {
+    pub fn remnant_density(&self, omega: f64) -> f64 {
         let Remnant {
             time_constant_s, order, ..
         } = self.task.remnant;
@@ -110,12 +110,12 @@ impl<'a> Loop<'a> {
         let seen = self.task.feedforward.as_ref();
         seen.map_or_else(Complex64::default, |seen| {
             // The operator's delay is counted from the end of the preview.
-            seen.operator.response(omega) * ahead(seen.preview_s, omega)
+            seen.operator.response(omega) * preview_response(seen.preview_s, omega)
         })
     }
 
     /// Returns the Fourier coefficients of e and of the target for a line of unit amplitude.
-    pub fn excited(&self, (enters, omega): (Enters, f64)) -> [Complex64; 2] {
+    pub fn line_coefficients(&self, (enters, omega): (Enters, f64)) -> [Complex64; 2] {
         let (s, p) = self.sensitivity(omega);
         match enters {
             Enters::Target => [s * (1.0 - p * self.feedforward(omega)), Complex64::new(1.0, 0.0)],
@@ -124,12 +124,12 @@ impl<'a> Loop<'a> {
     }
 
     fn line_information(&self, (enters, omega): (Enters, f64)) -> LineInformation {
-        let [error, target] = self.excited((enters, omega));
+        let [error, target] = self.line_coefficients((enters, omega));
         let feedback = self.task.state.operator.response_and_gradient(omega);
         let seen = self.task.feedforward.as_ref();
         let feedforward = seen.map(|seen| {
             let found = seen.operator.response_and_gradient(omega);
-            (found, target * ahead(seen.preview_s, omega))
+            (found, target * preview_response(seen.preview_s, omega))
         });
         let (gradient, answer) = match &feedforward {
             Some((found, shown)) => (
@@ -143,7 +143,7 @@ impl<'a> Loop<'a> {
                 Complex64::default(),
             ),
         };
-        let density = self.density(omega);
+        let density = self.remnant_density(omega);
         let n = self.joint.count;
         LineInformation {
             error: error.norm_sqr(),
@@ -310,7 +310,7 @@ pub fn expected(task: &Task, forcing: &Forcing, length_s: f64) -> Result<Expecte
 }
 
 /// Returns the phase advance of a preview.
-pub(super) fn ahead(preview_s: f64, omega: f64) -> Complex64 {
+pub(super) fn preview_response(preview_s: f64, omega: f64) -> Complex64 {
     Complex64::from_polar(1.0, omega * preview_s)
 }
 
@@ -351,7 +351,7 @@ pub(super) mod tests {
         let pairs = pairs.map(|(name, value)| (name.to_owned(), value));
         Task {
             state: FamilyState {
-                operator: FamilyOperator::of_names(Form::Lead, &pairs).unwrap(),
+                operator: FamilyOperator::from_names(Form::Lead, &pairs).unwrap(),
                 controlled_element: "4/(s(s+1))".parse().unwrap(),
             },
             feedforward: None,

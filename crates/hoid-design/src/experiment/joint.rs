@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use super::Task;
 
 /// Returns the name of a parameter of F: its name in the operator with the suffix `_f`.
-fn name_of_target(parameter: &NamedParameter) -> &'static str {
+fn target_parameter_name(parameter: &NamedParameter) -> &'static str {
     let name = match parameter.name {
         "K_d" | "K_e" => "K".to_owned(),
         "tau_e" => "tau".to_owned(),
@@ -119,7 +119,7 @@ impl Joint {
             if common(p) && feedback.has_neuromuscular() {
                 continue;
             }
-            let mut one = Quantity::relative(p, name_of_target(p), self.target(gradient));
+            let mut one = Quantity::relative(p, target_parameter_name(p), self.target(gradient));
             if p.coordinate == Some(Coordinate::Delay) {
                 // Relative to the present target the delay may be zero, so its error is absolute, in s.
                 one.value -= seen.preview_s;
@@ -132,17 +132,17 @@ impl Joint {
     }
 
     /// Returns the covariance of the coordinates of B, row by row.
-    pub fn of_feedback(&self, covariance: &DMatrix<f64>, operator: &FamilyOperator) -> Vec<f64> {
-        block(covariance, &(0..operator.coordinates().len()).collect::<Vec<_>>())
+    pub fn feedback_covariance(&self, covariance: &DMatrix<f64>, operator: &FamilyOperator) -> Vec<f64> {
+        covariance_block(covariance, &(0..operator.coordinates().len()).collect::<Vec<_>>())
     }
 
     /// Returns the covariance of the coordinates of F, row by row.
-    pub fn of_feedforward(&self, covariance: &DMatrix<f64>) -> Vec<f64> {
-        block(covariance, &self.of_target)
+    pub fn feedforward_covariance(&self, covariance: &DMatrix<f64>) -> Vec<f64> {
+        covariance_block(covariance, &self.of_target)
     }
 }
 
-fn block(covariance: &DMatrix<f64>, places: &[usize]) -> Vec<f64> {
+fn covariance_block(covariance: &DMatrix<f64>, places: &[usize]) -> Vec<f64> {
     let pairs = places.iter().flat_map(|&a| places.iter().map(move |&b| (a, b)));
     pairs.map(|pair| covariance[pair]).collect()
 }
@@ -158,14 +158,14 @@ mod tests {
     fn task() -> Task {
         let state = population(&"90/(s(s+6))".parse().unwrap(), None).unwrap().0.state;
         Task {
-            feedforward: Some(feedforward::typical(&state, Display::Preview).unwrap()),
+            feedforward: Some(feedforward::typical_target_response(&state, Display::Preview).unwrap()),
             state,
             remnant: Remnant::default(),
         }
     }
 
     /// The same task with one joint coordinate at another value.
-    fn moved(task: &Task, joint: &Joint, place: usize, by: f64) -> Task {
+    fn with_moved_coordinate(task: &Task, joint: &Joint, place: usize, by: f64) -> Task {
         let change = |operator: &FamilyOperator, places: &[usize]| {
             let x = operator.coordinates().iter().zip(places);
             let x: Vec<f64> = x.map(|(x, k)| if *k == place { x + by } else { *x }).collect();
@@ -196,7 +196,7 @@ mod tests {
             let found = joint.derivatives((&b.gradient, error), (&f.gradient, target));
             for k in 0..joint.count {
                 let step = 1e-6;
-                let [up, down] = [step, -step].map(|by| answer(&moved(&task, &joint, k, by)));
+                let [up, down] = [step, -step].map(|by| answer(&with_moved_coordinate(&task, &joint, k, by)));
                 let slope = (up - down) / (2.0 * step);
                 assert!(
                     (found[k] - slope).norm() < 1e-6 * (1.0 + slope.norm()),
@@ -217,7 +217,7 @@ mod tests {
         for (i, quantity) in all.iter().enumerate() {
             for k in 0..joint.count {
                 let step = 1e-6;
-                let of = |by: f64| joint.parameters(&moved(&task, &joint, k, by))[i].value;
+                let of = |by: f64| joint.parameters(&with_moved_coordinate(&task, &joint, k, by))[i].value;
                 let slope = (of(step) - of(-step)) / (2.0 * step);
                 assert!(
                     (quantity.gradient[k] - slope).abs() < 1e-6 * (1.0 + slope.abs()),

@@ -42,7 +42,7 @@ pub(super) fn multiples((least, largest): (u32, u32), count: usize, spacing: u32
 
 /// Returns `A cos(omega t)` and `A sin(omega t)` of each line over one period T, with 16 samples per period of the
 /// fastest line, but 64 to 8192 in total.
-fn samples(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
+fn sampled_lines(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
     let fastest = lines.iter().map(|l| l.omega_rad_s).fold(0.0, f64::max);
     let n = ((16.0 * fastest * period_s / TAU).ceil() as usize).clamp(64, 8192);
     let of = |line: &Sinusoid| -> Vec<(f64, f64)> {
@@ -56,7 +56,7 @@ fn samples(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
 
 /// Returns the ratio of peak to rms of a sum of sines over its period.
 pub fn crest_factor(lines: &[Sinusoid], period_s: f64) -> f64 {
-    let table = samples(lines, period_s);
+    let table = sampled_lines(lines, period_s);
     peak(&sum(&table, lines)) / rms(lines)
 }
 
@@ -81,22 +81,22 @@ fn sum(table: &[Vec<(f64, f64)>], lines: &[Sinusoid]) -> Vec<f64> {
 }
 
 /// Steps by which phases are changed, in turns.
-const STEPS: [f64; 6] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
+const PHASE_STEPS: [f64; 6] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
 /// Largest number of rounds per step.
-const ROUNDS: usize = 12;
+const MAX_ROUNDS: usize = 12;
 /// Number of starts of the search for phases.
-const STARTS: usize = 24;
+const START_COUNT: usize = 24;
 
 /// Sets the phases of the lines for a low crest factor. Different seeds use different starts.
 pub(super) fn set_phases(lines: &mut [Sinusoid], period_s: f64, seed: u64) {
     let power: f64 = lines.iter().map(|l| l.amplitude_deg.powi(2)).sum();
     let relative: Vec<f64> = lines.iter().map(|l| l.amplitude_deg.powi(2) / power).collect();
-    let table = samples(lines, period_s);
+    let table = sampled_lines(lines, period_s);
     let mut best = f64::INFINITY;
     let mut trial = lines.to_vec();
     // The seed is limited to a million, because larger products would lose their fractional part.
-    let first = (seed % 1_000_000) as usize * STARTS;
-    for start in first..first + STARTS {
+    let first = (seed % 1_000_000) as usize * START_COUNT;
+    for start in first..first + START_COUNT {
         for k in 0..trial.len() {
             let turns = match start {
                 0 => -(0..k).map(|j| (k - j) as f64 * relative[j]).sum::<f64>(),
@@ -105,7 +105,7 @@ pub(super) fn set_phases(lines: &mut [Sinusoid], period_s: f64, seed: u64) {
             };
             trial[k].phase_rad = (TAU * turns).rem_euclid(TAU);
         }
-        let found = flattened(&mut trial, &table);
+        let found = minimise_peak(&mut trial, &table);
         if found < best {
             best = found;
             lines.copy_from_slice(&trial);
@@ -114,11 +114,11 @@ pub(super) fn set_phases(lines: &mut [Sinusoid], period_s: f64, seed: u64) {
 }
 
 /// Changes the phases until the peak no longer decreases, and returns the peak.
-fn flattened(lines: &mut [Sinusoid], table: &[Vec<(f64, f64)>]) -> f64 {
+fn minimise_peak(lines: &mut [Sinusoid], table: &[Vec<(f64, f64)>]) -> f64 {
     let mut values = sum(table, lines);
     let mut least = peak(&values);
-    for step in STEPS {
-        for _ in 0..ROUNDS {
+    for step in PHASE_STEPS {
+        for _ in 0..MAX_ROUNDS {
             let before = least;
             for k in 0..lines.len() {
                 for sign in [1.0, -1.0] {
@@ -145,7 +145,7 @@ fn flattened(lines: &mut [Sinusoid], table: &[Vec<(f64, f64)>]) -> f64 {
 mod tests {
     use super::*;
 
-    fn equal(multiples: &[u32], period_s: f64) -> Vec<Sinusoid> {
+    fn equal_lines(multiples: &[u32], period_s: f64) -> Vec<Sinusoid> {
         let line = |m: &u32| Sinusoid {
             amplitude_deg: 1.0,
             omega_rad_s: f64::from(*m) * TAU / period_s,
@@ -174,20 +174,20 @@ mod tests {
     #[test]
     fn optimised_phases_reduce_the_crest_factor() {
         let all = multiples((2, 200), 10, 1);
-        let mut lines = equal(&all, 80.0);
+        let mut lines = equal_lines(&all, 80.0);
         let before = crest_factor(&lines, 80.0);
         set_phases(&mut lines, 80.0, 0);
         let crest = crest_factor(&lines, 80.0);
         println!("crest factor {crest:.3}, of sines with equal phases {before:.3}");
         assert!(crest < 2.3 && crest < 0.9 * before, "{crest} {before}");
-        let mut again = equal(&all, 80.0);
+        let mut again = equal_lines(&all, 80.0);
         set_phases(&mut again, 80.0, 0);
         assert_eq!(lines, again);
-        let mut other = equal(&all, 80.0);
+        let mut other = equal_lines(&all, 80.0);
         set_phases(&mut other, 80.0, 7);
         assert!(lines != other && crest_factor(&other, 80.0) < 2.3);
         // The table of one line has its amplitude.
-        let one = equal(&[3], 10.0);
+        let one = equal_lines(&[3], 10.0);
         assert!((crest_factor(&one, 10.0) - 2f64.sqrt()).abs() < 1e-2);
     }
 }

@@ -6,9 +6,9 @@
 //! | [`People`] | people for whom the experiment is designed: the population (`adapted`), one person, or a group (`group_people`) |
 //! | [`Task`], [`Forcing`] | person, controlled element and remnant; lines with their points of entry |
 //! | [`expected`](fn@expected) | standard errors from the information of the lines (`information`) and the variation from run to run, for the responses to error and target (`joint`, `feedforward`) |
-//! | [`Designing`] | most informative amplitudes and frequencies of the lines within limits (`search`) |
+//! | [`DesignOptions`] | most informative amplitudes and frequencies of the lines within limits (`search`) |
 //! | [`crest_factor`] | lines without common harmonics, and their phases (`lines`) |
-//! | [`Against`] | another forcing function for comparison |
+//! | [`OtherForcing`] | another forcing function for comparison |
 //! | [`DifferenceRequest`] | number of people and runs needed to find a difference between conditions, from the [`power`](fn@power) of the test and the spread between people |
 //! | [`SpreadSource`] | source of the spread between people and of the variation from run to run |
 //! | [`RequestedQuantity`] | requested quantities, and the number of runs needed for their accepted errors |
@@ -36,15 +36,16 @@ mod spread;
 mod task;
 mod wanted;
 
-pub use against::Against;
+pub use against::OtherForcing;
 pub use answer::{ExperimentDesign, NamedExpected};
-pub use designing::{Designed, Designing};
+pub use designing::{DesignOptions, DesignedForcing};
 pub use difference::{
-    ALPHA, BETWEEN_PEOPLE, DifferencePlan, DifferenceRequest, POWER, RunsAndPeople, TargetDifference,
+    DEFAULT_ALPHA, DEFAULT_BETWEEN_PEOPLE, DEFAULT_POWER, DifferencePlan, DifferenceRequest, RunsAndPeople,
+    TargetDifference,
 };
 pub use error::DesignError;
 pub use expected::{Expected, ExpectedQuantity, has_absolute_error};
-pub use hoid_ident::diagnostics::RUN_TO_RUN;
+pub use hoid_ident::diagnostics::RUN_TO_RUN_DEVIATION;
 pub use information::expected;
 pub use lines::crest_factor;
 pub use people::People;
@@ -53,4 +54,4 @@ pub use request::DesignRequest;
 pub use response::{DesignedLine, ExpectedResponse};
 pub use spread::SpreadSource;
 pub use task::{Enters, Forcing, Remnant, Task};
-pub use wanted::{RequestedQuantity, periods};
+pub use wanted::{RequestedQuantity, period_count};

@@ -18,7 +18,7 @@ use serde_json::Value;
 use super::{
     DesignError, adapted,
     against::family,
-    chosen::{Chosen, Given, NamedState},
+    chosen::{ChosenPeople, GivenOptions, NamedState},
     group_people,
 };
 
@@ -34,13 +34,13 @@ pub enum People {
 }
 
 /// Name of [`People::Population`].
-const POPULATION: &str = "population";
+const POPULATION_NAME: &str = "population";
 
 impl People {
     /// Parses the name `population` or a path.
-    pub fn of_text(text: &str) -> Self {
+    pub fn from_text(text: &str) -> Self {
         match text {
-            POPULATION => Self::Population,
+            POPULATION_NAME => Self::Population,
             file => Self::File(file.into()),
         }
     }
@@ -50,14 +50,14 @@ impl FromStr for People {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(Self::of_text(text))
+        Ok(Self::from_text(text))
     }
 }
 
 impl std::fmt::Display for People {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Population => f.write_str(POPULATION),
+            Self::Population => f.write_str(POPULATION_NAME),
             Self::File(path) => write!(f, "{}", path.display()),
         }
     }
@@ -72,10 +72,10 @@ impl People {
         }
     }
 
-    pub(super) fn chosen(&self, given: &Given<'_>) -> Result<Chosen, DesignError> {
+    pub(super) fn choose(&self, given: &GivenOptions<'_>) -> Result<ChosenPeople, DesignError> {
         let Self::File(path) = self else {
-            let (typical, others) = adapted::population(&given.element(POPULATION)?, given.form)?;
-            return Ok(Chosen {
+            let (typical, others) = adapted::population(&given.element(POPULATION_NAME)?, given.form)?;
+            return Ok(ChosenPeople {
                 typical,
                 others,
                 feedforward: None,
@@ -89,22 +89,22 @@ impl People {
             });
         }
         if path.is_dir() {
-            return group_people::of_directory(path, given);
+            return group_people::from_directory(path, given);
         }
         if !hoid_io::is_fit_file(&path.to_string_lossy()) {
-            let (state, feedforward) = of_scenario(path, given)?;
-            return Ok(Chosen {
+            let (state, feedforward) = read_scenario(path, given)?;
+            return Ok(ChosenPeople {
                 feedforward,
-                ..one(path, state)
+                ..single_person(path, state)
             });
         }
         let text = hoid_io::read_settings(path)?;
         let object: Value = serde_json::from_str(&text).unwrap_or_default();
         if object["kind"] == "population" {
-            return group_people::of_population(&object, path, given);
+            return group_people::from_population(&object, path, given);
         }
         if object["people"].is_array() && object["kind"] != "design" {
-            return group_people::of_json(&object, path, given);
+            return group_people::from_json(&object, path, given);
         }
         let name = path.display().to_string();
         let file = hoid_io::parse_fit(&text, &name)?;
@@ -114,14 +114,14 @@ impl People {
             operator: fit.operator,
             controlled_element: given.element(&name)?,
         };
-        Ok(Chosen {
+        Ok(ChosenPeople {
             feedforward,
-            ..one(path, state)
+            ..single_person(path, state)
         })
     }
 }
 
-fn of_scenario(path: &Path, given: &Given<'_>) -> Result<(FamilyState, Option<Feedforward>), DesignError> {
+fn read_scenario(path: &Path, given: &GivenOptions<'_>) -> Result<(FamilyState, Option<Feedforward>), DesignError> {
     let scenario = family(path)?;
     let mut state = scenario.initial;
     if let Some(element) = given.controlled_element {
@@ -130,9 +130,9 @@ fn of_scenario(path: &Path, given: &Given<'_>) -> Result<(FamilyState, Option<Fe
     Ok((state, scenario.feedforward))
 }
 
-fn one(path: &Path, state: FamilyState) -> Chosen {
+fn single_person(path: &Path, state: FamilyState) -> ChosenPeople {
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    Chosen {
+    ChosenPeople {
         typical: NamedState { name, state },
         others: Vec::new(),
         feedforward: None,

@@ -7,13 +7,13 @@ use hoid_model::{
 };
 
 use super::{
-    Against, BETWEEN_PEOPLE, DesignError, DesignedLine, Designing, DifferenceRequest, Enters, Expected,
-    ExperimentDesign, Forcing, NamedExpected, People, Remnant, RequestedQuantity, SpreadSource, Task,
-    chosen::{Chosen, Given, NamedState, left_out},
+    DEFAULT_BETWEEN_PEOPLE, DesignError, DesignOptions, DesignedLine, DifferenceRequest, Enters, Expected,
+    ExperimentDesign, Forcing, NamedExpected, OtherForcing, People, Remnant, RequestedQuantity, SpreadSource, Task,
+    chosen::{ChosenPeople, GivenOptions, NamedState, exclusion_finding},
     expected, feedforward, has_absolute_error,
     information::Loop,
-    periods,
-    spread::run_to_run,
+    period_count,
+    spread::run_to_run_spread,
 };
 
 /// Request for the design of an experiment.
@@ -34,14 +34,14 @@ pub struct DesignRequest {
     /// Remnant of the people.
     pub remnant: Remnant,
     /// Options of the forcing function.
-    pub designing: Designing,
+    pub designing: DesignOptions,
     /// Standard deviation of one person from run to run, relative to the quantity. If `None`, it comes from the people of
     /// the design if they provide it; otherwise it is that of `designing`.
     pub run_to_run: Option<SpreadSource>,
     /// Number of runs; if `None`, the number needed for the accepted errors of the requested quantities.
     pub runs: Option<usize>,
     /// Forcing function with which the designed one is compared.
-    pub against: Option<Against>,
+    pub against: Option<OtherForcing>,
     /// Difference between two conditions that the experiment should find.
     pub difference: Option<DifferenceRequest>,
 }
@@ -51,9 +51,9 @@ impl DesignRequest {
     ///
     /// # Errors
     /// [`DesignError`] if the people cannot be read or the controlled element is not known, and as for
-    /// [`Designing::run`].
+    /// [`DesignOptions::run`].
     pub fn run(&self) -> Result<ExperimentDesign, DesignError> {
-        let spread = run_to_run(self.run_to_run.as_ref(), &self.people, self.designing.run_to_run)?;
+        let spread = run_to_run_spread(self.run_to_run.as_ref(), &self.people, self.designing.run_to_run)?;
         let mut of_people = self.clone();
         of_people.designing.run_to_run = spread.value;
         of_people.with_run_to_run_from(spread.source)
@@ -61,17 +61,17 @@ impl DesignRequest {
 
     /// Designs the experiment with the variation from run to run of `designing`, which comes from `source`.
     fn with_run_to_run_from(&self, source: String) -> Result<ExperimentDesign, DesignError> {
-        let given = Given {
+        let given = GivenOptions {
             controlled_element: self.controlled_element.as_ref(),
             form: self.form,
             condition: self.condition.as_deref(),
         };
-        let Chosen {
+        let ChosenPeople {
             typical,
             others,
             feedforward,
             mut findings,
-        } = self.people.chosen(&given)?;
+        } = self.people.choose(&given)?;
         let feedforward = feedforward.as_ref();
         let task = self.task(&typical, feedforward)?;
         let designed = self.designing.run(&task, self.points())?;
@@ -88,16 +88,18 @@ impl DesignRequest {
         let all = Loop::of(&task)?;
         let lines = all.designed_lines(&designed.forcing, self.designing.period_s, runs)?;
         let [response, response_to_target] = all.responses(&designed.forcing, length_s)?;
-        findings.extend(lines_below_remnant(&lines, task.feedforward.is_some()));
-        let people = self.people((&others, feedforward), &designed.forcing, runs, &mut findings);
+        findings.extend(low_line_finding(&lines, task.feedforward.is_some()));
+        let people = self.expected_for_people((&others, feedforward), &designed.forcing, runs, &mut findings);
         let against = self.against.as_ref();
-        let against = against.map(|other| self.compared(other, &task, runs)).transpose()?;
+        let against = against
+            .map(|other| self.compare_forcing(other, &task, runs))
+            .transpose()?;
         let difference = self.difference.as_ref();
         let difference = difference
             .map(|sought| sought.plan(&self.people, (&designed.expected, self.designing.run_to_run), self.runs))
             .transpose()?;
         Ok(ExperimentDesign {
-            worst: worst(&people, &self.designing.wanted).cloned(),
+            worst: worst_person(&people, &self.designing.wanted).cloned(),
             settings: self.settings(&task),
             person: typical.name,
             enters: self.enters,
@@ -135,7 +137,7 @@ impl DesignRequest {
         let feedforward = match (self.points().len(), given) {
             (1, _) => None,
             (_, Some(given)) => Some(given.clone()),
-            (_, None) => Some(feedforward::typical(&person.state, self.display)?),
+            (_, None) => Some(feedforward::typical_target_response(&person.state, self.display)?),
         };
         Ok(Task {
             state: person.state.clone(),
@@ -146,7 +148,7 @@ impl DesignRequest {
 
     /// Returns the expected errors for the other people. A person whose errors cannot be computed is reported in
     /// `findings`.
-    fn people(
+    fn expected_for_people(
         &self,
         (others, feedforward): (&[NamedState], Option<&Feedforward>),
         forcing: &Forcing,
@@ -162,7 +164,7 @@ impl DesignRequest {
                     runs_needed: self.runs_needed(&found, runs),
                     expected: found,
                 }),
-                Err(error) => findings.push(left_out(&person.name, &error.to_string())),
+                Err(error) => findings.push(exclusion_finding(&person.name, &error.to_string())),
             }
         }
         all
@@ -174,7 +176,7 @@ impl DesignRequest {
         Ok(found.with_run_to_run(self.designing.run_to_run, runs))
     }
 
-    fn compared(&self, other: &Against, task: &Task, runs: usize) -> Result<NamedExpected, DesignError> {
+    fn compare_forcing(&self, other: &OtherForcing, task: &Task, runs: usize) -> Result<NamedExpected, DesignError> {
         let forcing = other.forcing(self.points())?;
         let found = self.expected(task, &forcing, runs)?;
         Ok(NamedExpected {
@@ -185,16 +187,16 @@ impl DesignRequest {
     }
 
     fn runs_needed(&self, all_runs: &Expected, runs: usize) -> usize {
-        periods(&all_runs.clone().scaled((runs as f64).sqrt()), &self.designing.wanted)
+        period_count(&all_runs.clone().scaled((runs as f64).sqrt()), &self.designing.wanted)
     }
 
     fn settings(&self, task: &Task) -> Vec<Setting> {
         let by_default = Self::default();
         let number = |name: &str, value: f64, default: f64| {
-            Setting::new(name, value.to_string()).given(value.to_bits() != default.to_bits())
+            Setting::new(name, value.to_string()).with_given(value.to_bits() != default.to_bits())
         };
         let limit = |name: &str, value: Option<f64>| {
-            Setting::new(name, value.map_or("none".to_owned(), |v| v.to_string())).given(value.is_some())
+            Setting::new(name, value.map_or("none".to_owned(), |v| v.to_string())).with_given(value.is_some())
         };
         let wanted: Vec<String> = self
             .designing
@@ -209,13 +211,13 @@ impl DesignRequest {
         };
         let (d, of) = (&self.designing, &by_default.designing);
         let mut all = vec![
-            Setting::new("people", self.people.to_string()).given(self.people != by_default.people),
+            Setting::new("people", self.people.to_string()).with_given(self.people != by_default.people),
             Setting::new("controlled_element", task.state.controlled_element.to_string())
-                .given(self.controlled_element.is_some()),
-            Setting::new("form", task.state.operator.form().name()).given(self.form.is_some()),
-            Setting::new("for", wanted).given(!d.wanted.is_empty()),
-            Setting::new("display", self.display.name()).given(self.display != by_default.display),
-            Setting::new("enters", self.enters.name()).given(self.enters != by_default.enters),
+                .with_given(self.controlled_element.is_some()),
+            Setting::new("form", task.state.operator.form().name()).with_given(self.form.is_some()),
+            Setting::new("for", wanted).with_given(!d.wanted.is_empty()),
+            Setting::new("display", self.display.name()).with_given(self.display != by_default.display),
+            Setting::new("enters", self.enters.name()).with_given(self.enters != by_default.enters),
             number("remnant_share", self.remnant.share, by_default.remnant.share),
             number(
                 "remnant_time_constant",
@@ -223,19 +225,22 @@ impl DesignRequest {
                 by_default.remnant.time_constant_s,
             ),
             number("length", d.period_s, of.period_s),
-            Setting::new("lines", d.lines.to_string()).given(d.lines != of.lines),
-            Setting::new("spacing", d.spacing.to_string()).given(d.spacing != of.spacing),
+            Setting::new("lines", d.lines.to_string()).with_given(d.lines != of.lines),
+            Setting::new("spacing", d.spacing.to_string()).with_given(d.spacing != of.spacing),
             Setting::new("band", format!("{}..{}", d.band_rad_s.0, d.band_rad_s.1))
-                .given(d.band_rad_s != of.band_rad_s),
+                .with_given(d.band_rad_s != of.band_rad_s),
             number("shelf", d.shelf, of.shelf),
-            Setting::new("run_to_run", d.run_to_run.to_string()).given(self.run_to_run.is_some()),
-            Setting::new("seed", d.seed.to_string()).given(d.seed != of.seed),
+            Setting::new("run_to_run", d.run_to_run.to_string()).with_given(self.run_to_run.is_some()),
+            Setting::new("seed", d.seed.to_string()).with_given(d.seed != of.seed),
             limit("max_rms_e", d.most_rms[0]),
             limit("max_u", d.most_rms[1]),
         ];
         if let Some(of) = &self.difference {
             let default = DifferenceRequest::new(of.sought.clone());
-            let between = of.between_people.clone().unwrap_or(SpreadSource::Part(BETWEEN_PEOPLE));
+            let between = of
+                .between_people
+                .clone()
+                .unwrap_or(SpreadSource::Part(DEFAULT_BETWEEN_PEOPLE));
             let size = format!(
                 "{}={}{}",
                 of.sought.name,
@@ -243,10 +248,10 @@ impl DesignRequest {
                 if of.sought.relative { " (relative)" } else { "" }
             );
             all.extend([
-                Setting::new("difference", size).given(true),
+                Setting::new("difference", size).with_given(true),
                 number("power", of.power, default.power),
                 number("alpha", of.alpha, default.alpha),
-                Setting::new("between_people", between.to_string()).given(of.between_people.is_some()),
+                Setting::new("between_people", between.to_string()).with_given(of.between_people.is_some()),
             ]);
         }
         all
@@ -255,12 +260,12 @@ impl DesignRequest {
 
 /// Returns a finding about lines at which the remnant in e is not small. A displayed target contains no remnant, so its
 /// lines are not checked.
-fn lines_below_remnant(lines: &[DesignedLine], is_seen: bool) -> Option<Finding> {
+fn low_line_finding(lines: &[DesignedLine], is_seen: bool) -> Option<Finding> {
     let of_error = lines.iter().filter(|l| !(is_seen && l.enters == Enters::Target));
-    let weak = of_error.filter(|l| l.to_remnant < MIN_LINE_TO_REMNANT);
+    let weak = of_error.filter(|l| l.to_remnant < MIN_LINE_TO_REMNANT_RATIO);
     let weak: Vec<String> = weak.map(|l| format!("{:.2}", l.line.omega_rad_s)).collect();
     let message = format!(
-        "in one run the power of the lines at {} rad/s is less than {MIN_LINE_TO_REMNANT} times that of the remnant in e, \
+        "in one run the power of the lines at {} rad/s is less than {MIN_LINE_TO_REMNANT_RATIO} times that of the remnant in e, \
          so the predicted errors there are too small: use fewer lines or longer runs",
         weak.join(", ")
     );
@@ -269,11 +274,11 @@ fn lines_below_remnant(lines: &[DesignedLine], is_seen: bool) -> Option<Finding>
 
 /// Ratio of the power of a line to that of the remnant below which the estimate is biased towards `-1/P` by more than a
 /// tenth.
-const MIN_LINE_TO_REMNANT: f64 = 10.0;
+const MIN_LINE_TO_REMNANT_RATIO: f64 = 10.0;
 
 /// Returns the person with the largest errors relative to the accepted errors or, if no errors are given, relative to
 /// the values of the parameters.
-fn worst<'a>(people: &'a [NamedExpected], wanted: &[RequestedQuantity]) -> Option<&'a NamedExpected> {
+fn worst_person<'a>(people: &'a [NamedExpected], wanted: &[RequestedQuantity]) -> Option<&'a NamedExpected> {
     let of = |person: &NamedExpected| -> f64 {
         let e = &person.expected;
         if wanted.is_empty() {
@@ -297,9 +302,9 @@ mod tests {
     fn request() -> DesignRequest {
         DesignRequest {
             controlled_element: Some("4/s".parse().unwrap()),
-            designing: Designing {
+            designing: DesignOptions {
                 wanted: vec!["tau_e=3%".parse().unwrap(), "crossover=1%".parse().unwrap()],
-                ..Designing::default()
+                ..DesignOptions::default()
             },
             ..DesignRequest::default()
         }
@@ -308,7 +313,7 @@ mod tests {
     #[test]
     fn design_round_trips_through_json() {
         let design = DesignRequest {
-            against: Some(Against::Reference),
+            against: Some(OtherForcing::Reference),
             difference: Some(DifferenceRequest::new("crossover=0.4".parse().unwrap())),
             ..request()
         }
@@ -336,9 +341,9 @@ mod tests {
     fn accepted_error_of_the_target_delay_is_absolute() {
         let design = DesignRequest {
             display: Display::Pursuit,
-            designing: Designing {
+            designing: DesignOptions {
                 wanted: vec!["tau_f=0.02".parse().unwrap()],
-                ..Designing::default()
+                ..DesignOptions::default()
             },
             ..request()
         }
@@ -392,15 +397,20 @@ mod tests {
         };
         let alone = design.run().unwrap();
         assert!(alone.lines.iter().all(|l| l.enters == Enters::Disturbance) && alone.response_to_target.is_empty());
-        assert!(alone.lab("scenario.toml").unwrap().contains("display = \"pursuit\""));
-        let odd = Designing {
+        assert!(
+            alone
+                .lab_config("scenario.toml")
+                .unwrap()
+                .contains("display = \"pursuit\"")
+        );
+        let odd = DesignOptions {
             period_s: 80.123,
-            ..Designing::default()
+            ..DesignOptions::default()
         };
         let odd = DesignRequest {
             designing: odd,
             ..request()
         };
-        assert_eq!(odd.run().unwrap().lab("scenario.toml"), None);
+        assert_eq!(odd.run().unwrap().lab_config("scenario.toml"), None);
     }
 }

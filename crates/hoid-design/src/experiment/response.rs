@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     DesignError, Enters, Forcing,
-    information::{Loop, ahead},
+    information::{Loop, preview_response},
 };
 
 /// Response of a person at one frequency, with its expected errors.
@@ -47,7 +47,7 @@ pub struct DesignedLine {
 }
 
 /// Number of frequencies at which the response of the operator is evaluated.
-const POINTS: usize = 120;
+const POINT_COUNT: usize = 120;
 /// Factor from the natural logarithm of a gain to dB.
 const DB: f64 = 20.0 / std::f64::consts::LN_10;
 
@@ -66,11 +66,11 @@ impl Loop<'_> {
         let length_s = period_s * runs as f64;
         let feedback = &self.task.state.operator;
         let covariance = self.covariance(forcing, length_s)?;
-        let of_feedback = self.joint.of_feedback(&covariance, feedback);
+        let of_feedback = self.joint.feedback_covariance(&covariance, feedback);
         let line = |(enters, line): &(Enters, Sinusoid)| {
             let omega = line.omega_rad_s;
-            let noise = gain * self.density(omega);
-            let [error, target] = self.excited((*enters, omega)).map(|x| x * line.amplitude_deg);
+            let noise = gain * self.remnant_density(omega);
+            let [error, target] = self.line_coefficients((*enters, omega)).map(|x| x * line.amplitude_deg);
             let (response, [gain, phase], to_remnant) =
                 match self.task.feedforward.is_some() && *enters == Enters::Target {
                     false => {
@@ -85,14 +85,14 @@ impl Loop<'_> {
                         let own = 2.0 * noise / (length_s * target.norm_sqr() * response.norm_sqr());
                         let known = feedback.response_and_gradient(omega);
                         let by_feedback = error * known.value / (target * response);
-                        let of_known = turned(known.relative_covariance(&of_feedback), by_feedback);
+                        let of_known = rotated_variances(known.relative_covariance(&of_feedback), by_feedback);
                         (response, of_known.map(|v| v + own), (target * response).norm_sqr())
                     }
                 };
             DesignedLine {
                 enters: *enters,
                 line: *line,
-                response: expected(omega, response, [gain.sqrt(), phase.sqrt()]),
+                response: expected_response(omega, response, [gain.sqrt(), phase.sqrt()]),
                 to_remnant: period_s * to_remnant / (4.0 * noise),
             }
         };
@@ -121,32 +121,32 @@ impl Loop<'_> {
         let (low, high) = all.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
         let curve = |operator: &FamilyOperator, preview_s: f64, covariance: &[f64]| {
             let at = |k: usize| {
-                let omega = 0.9 * low * (1.1 / 0.9 * high / low).powf(k as f64 / (POINTS - 1) as f64);
+                let omega = 0.9 * low * (1.1 / 0.9 * high / low).powf(k as f64 / (POINT_COUNT - 1) as f64);
                 let response = operator.response_and_gradient(omega);
                 let [[gain, _], [_, phase]] = response.relative_covariance(covariance);
-                let value = response.value * ahead(preview_s, omega);
-                expected(omega, value, [gain.sqrt(), phase.sqrt()])
+                let value = response.value * preview_response(preview_s, omega);
+                expected_response(omega, value, [gain.sqrt(), phase.sqrt()])
             };
-            unwrapped((0..POINTS).map(at).collect(), operator.tau_e_s() - preview_s)
+            unwrapped((0..POINT_COUNT).map(at).collect(), operator.tau_e_s() - preview_s)
         };
         let feedback = &self.task.state.operator;
         let of_target = self.task.feedforward.as_ref().map(|seen| {
-            let covariance = self.joint.of_feedforward(&covariance);
+            let covariance = self.joint.feedforward_covariance(&covariance);
             curve(&seen.operator, seen.preview_s, &covariance)
         });
-        let of_error = curve(feedback, 0.0, &self.joint.of_feedback(&covariance, feedback));
+        let of_error = curve(feedback, 0.0, &self.joint.feedback_covariance(&covariance, feedback));
         Ok([of_error, of_target.unwrap_or_default()])
     }
 }
 
 /// Returns the variances of the real and imaginary parts of `c z`, from the covariance of the parts of z.
-fn turned(covariance: [[f64; 2]; 2], c: Complex64) -> [f64; 2] {
+fn rotated_variances(covariance: [[f64; 2]; 2], c: Complex64) -> [f64; 2] {
     let [[aa, ab], [_, bb]] = covariance;
     let along = |x: f64, y: f64| x * x * aa + 2.0 * x * y * ab + y * y * bb;
     [along(c.re, -c.im), along(c.im, c.re)]
 }
 
-fn expected(omega_rad_s: f64, value: Complex64, [gain, phase]: [f64; 2]) -> ExpectedResponse {
+fn expected_response(omega_rad_s: f64, value: Complex64, [gain, phase]: [f64; 2]) -> ExpectedResponse {
     let estimate = |value: f64, error: f64| Estimate {
         value,
         standard_error: Some(error),
@@ -192,13 +192,13 @@ fn unwrapped<T: HasResponse>(mut all: Vec<T>, delay_s: f64) -> Vec<T> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::experiment::{Designing, information::tests::task};
+    use crate::experiment::{DesignOptions, information::tests::task};
 
     #[test]
     fn all_lines_together_reduce_the_error_of_one_line() {
         let task = task(0.2);
         let all = Loop::of(&task).unwrap();
-        let designing = Designing::default();
+        let designing = DesignOptions::default();
         let lines = designing.run(&task, &[Enters::Target]).unwrap().forcing;
         let of = |runs| all.designed_lines(&lines, designing.period_s, runs).unwrap();
         let (one, four) = (of(1), of(4));

@@ -33,13 +33,13 @@ use super::{
 /// is the smallest ratio.
 const MAX_AMPLITUDE_RATIO: f64 = 2.0;
 /// Smallest fraction of an equal share that each line keeps.
-const MIN_SHARE: f64 = 0.1;
+const MIN_LINE_SHARE: f64 = 0.1;
 /// Number of iterations for the shares: in general, and when a line is moved on trial.
-const STEPS: usize = 400;
-const STEPS_OF_TRIAL: usize = 60;
+const ITERATIONS: usize = 400;
+const TRIAL_ITERATIONS: usize = 60;
 /// Numbers of multiples by which a line is moved on trial, and the number of rounds.
-const MOVES: [i32; 10] = [-16, -8, -4, -2, -1, 1, 2, 4, 8, 16];
-const ROUNDS: usize = 3;
+const MOVE_MULTIPLES: [i32; 10] = [-16, -8, -4, -2, -1, 1, 2, 4, 8, 16];
+const ROUND_COUNT: usize = 3;
 /// Smallest relative improvement of J for which a line is moved.
 const MIN_IMPROVEMENT: f64 = 1e-3;
 
@@ -64,16 +64,16 @@ impl Search<'_> {
 
     /// Moves one line at a time to an admissible multiple, as long as J decreases, and returns the lines with their
     /// shares.
-    pub fn places(
+    pub fn optimise_places(
         &self,
         mut places: Vec<Place>,
         admissible: impl Fn(&[Place], usize, u32) -> bool,
     ) -> Result<(Vec<Place>, Vec<f64>), DesignError> {
-        let (mut shares, mut best) = self.shares(&places, STEPS)?;
-        for _ in 0..ROUNDS {
+        let (mut shares, mut best) = self.shares(&places, ITERATIONS)?;
+        for _ in 0..ROUND_COUNT {
             let before = best;
             for k in 0..places.len() {
-                for by in MOVES {
+                for by in MOVE_MULTIPLES {
                     let Some(moved) = places[k].0.checked_add_signed(by) else {
                         continue;
                     };
@@ -82,7 +82,7 @@ impl Search<'_> {
                     }
                     let mut trial = places.clone();
                     trial[k].0 = moved;
-                    if let Ok((found, criterion)) = self.shares(&trial, STEPS_OF_TRIAL)
+                    if let Ok((found, criterion)) = self.shares(&trial, TRIAL_ITERATIONS)
                         && criterion < best * (1.0 - MIN_IMPROVEMENT)
                     {
                         (places, shares, best) = (trial, found, criterion);
@@ -93,7 +93,7 @@ impl Search<'_> {
                 break;
             }
         }
-        let (found, _) = self.shares(&places, STEPS).unwrap_or((shares, best));
+        let (found, _) = self.shares(&places, ITERATIONS).unwrap_or((shares, best));
         Ok((places, found))
     }
 
@@ -128,15 +128,15 @@ impl Search<'_> {
                 .map(|(m, q)| q * (slope(m) / criterion).sqrt())
                 .collect();
             let whole: f64 = moved.iter().sum();
-            let least = MIN_SHARE / n as f64;
+            let least = MIN_LINE_SHARE / n as f64;
             shares = moved.iter().map(|q| (q / whole).max(least)).collect();
-            self.limit(places, &mut shares);
+            self.limit_amplitudes(places, &mut shares);
         }
         Ok((shares, last))
     }
 
     /// Limits the amplitudes of the lines of each forcing function and normalises the sum of the shares to one.
-    fn limit(&self, places: &[Place], shares: &mut [f64]) {
+    fn limit_amplitudes(&self, places: &[Place], shares: &mut [f64]) {
         for enters in [Enters::Target, Enters::Disturbance] {
             let mut lines: Vec<(f64, bool, &mut f64)> = (places.iter().zip(shares.iter_mut()))
                 .filter(|((_, at), _)| *at == enters)

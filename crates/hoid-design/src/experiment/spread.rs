@@ -12,7 +12,7 @@
 //! rho is one half or more. A population of one condition does not determine rho.
 //!
 //! The variation from run to run comes from a number, or from the crossover frequencies of the runs in the result of a
-//! group ([`GroupEstimates::run_to_run`]), as an upper bound. It applies to all quantities: the prior of a fit reduces the scatter of other
+//! group ([`GroupEstimates::run_to_run_variation`]), as an upper bound. It applies to all quantities: the prior of a fit reduces the scatter of other
 //! parameters.
 
 use std::{
@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::{DesignError, People};
-use crate::compare::{Comparing, Comparison, GroupEstimates, Quantity, Variation};
+use crate::compare::{Comparison, ComparisonOptions, GroupEstimates, Quantity, Variation};
 
 /// Source of a standard deviation over people or over the runs of a person.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -39,7 +39,7 @@ pub enum SpreadSource {
 
 impl SpreadSource {
     /// Parses a number or the path of a file.
-    pub fn of_text(text: &str) -> Self {
+    pub fn from_text(text: &str) -> Self {
         match text.parse() {
             Ok(part) => Self::Part(part),
             Err(_) => Self::File(text.into()),
@@ -51,7 +51,7 @@ impl FromStr for SpreadSource {
     type Err = Infallible;
 
     fn from_str(text: &str) -> Result<Self, Infallible> {
-        Ok(Self::of_text(text))
+        Ok(Self::from_text(text))
     }
 }
 
@@ -73,7 +73,7 @@ pub(super) struct Spread {
 
 /// Returns a given fraction of `unit`, or what `read` finds in the given file. If nothing is given, `read` is tried on the
 /// people of the design, and otherwise the result is the default fraction.
-fn resolved(
+fn resolve_spread(
     given: Option<&SpreadSource>,
     people: &People,
     (default, unit): (f64, f64),
@@ -97,28 +97,32 @@ fn resolved(
 ///
 /// # Errors
 /// [`DesignError::NoSpread`] if a given file does not provide it.
-pub(super) fn between_people(
+pub(super) fn between_people_spread(
     given: Option<&SpreadSource>,
     people: &People,
     (name, value): (&str, f64),
     default: f64,
 ) -> Result<Spread, DesignError> {
-    resolved(given, people, (default, value), |path| of_file(path, (name, value)))
+    resolve_spread(given, people, (default, value), |path| read_spread(path, (name, value)))
 }
 
 /// Returns the relative standard deviation of one person from run to run.
 ///
 /// # Errors
 /// [`DesignError::NoRunToRun`] if a given directory does not provide it.
-pub(super) fn run_to_run(given: Option<&SpreadSource>, people: &People, default: f64) -> Result<Spread, DesignError> {
-    resolved(given, people, (default, 1.0), |path| {
+pub(super) fn run_to_run_spread(
+    given: Option<&SpreadSource>,
+    people: &People,
+    default: f64,
+) -> Result<Spread, DesignError> {
+    resolve_spread(given, people, (default, 1.0), |path| {
         let none = |reason: String| DesignError::NoRunToRun {
             path: path.display().to_string(),
             reason,
         };
         let group = GroupEstimates::read(path).map_err(|error| none(error.to_string()))?;
         let (value, people) = group
-            .run_to_run()
+            .run_to_run_variation()
             .ok_or_else(|| none("no person has a crossover from three runs in one condition".to_owned()))?;
         Ok(Spread {
             value,
@@ -127,7 +131,7 @@ pub(super) fn run_to_run(given: Option<&SpreadSource>, people: &People, default:
     })
 }
 
-fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignError> {
+fn read_spread(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignError> {
     let none = |reason: String| DesignError::NoSpread {
         path: path.display().to_string(),
         name: name.to_owned(),
@@ -141,7 +145,7 @@ fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignErro
         let text = hoid_io::read_settings(path)?;
         let object: Value = serde_json::from_str(&text).map_err(|error| none(format!("it is not JSON: {error}")))?;
         if object["kind"] == "population" {
-            let spread = in_population(&object, name).ok_or_else(|| none("it lacks this parameter".to_owned()))?;
+            let spread = population_spread(&object, name).ok_or_else(|| none("it lacks this parameter".to_owned()))?;
             return Ok(Spread {
                 value: spread * value,
                 source: format!("at most the spread between people within one condition, from {shown}"),
@@ -149,25 +153,25 @@ fn of_file(path: &Path, (name, value): (&str, f64)) -> Result<Spread, DesignErro
         }
         if object["kind"] == "comparison" {
             let found = Comparison::from_json(&text).map_err(|error| none(error.to_string()))?;
-            return of_comparison(&found, &quantity, &shown.to_string()).map_err(none);
+            return comparison_spread(&found, &quantity, &shown.to_string()).map_err(none);
         }
     }
     let group = GroupEstimates::read(path).map_err(|error| none(error.to_string()))?;
-    let comparing = Comparing {
+    let comparing = ComparisonOptions {
         quantities: vec![quantity.clone()],
-        ..Comparing::default()
+        ..ComparisonOptions::default()
     };
     let found = comparing.run(&group).map_err(|error| none(error.to_string()))?;
-    of_comparison(&found, &quantity, &shown.to_string()).map_err(none)
+    comparison_spread(&found, &quantity, &shown.to_string()).map_err(none)
 }
 
 /// Returns the standard deviation between people of the logarithm of a parameter.
-fn in_population(object: &Value, name: &str) -> Option<f64> {
+fn population_spread(object: &Value, name: &str) -> Option<f64> {
     let parameters = object["parameters"].as_array()?;
     parameters.iter().find(|p| p["name"] == name)?["spread"].as_f64()
 }
 
-fn of_comparison(found: &Comparison, quantity: &Quantity, shown: &str) -> Result<Spread, String> {
+fn comparison_spread(found: &Comparison, quantity: &Quantity, shown: &str) -> Result<Spread, String> {
     let within = (found.differences.iter())
         .filter(|d| d.quantity == *quantity && d.variation == Variation::Within && d.effect.is_none());
     let all: Vec<(f64, usize)> = within.map(|d| (d.tau, d.people.len())).collect();

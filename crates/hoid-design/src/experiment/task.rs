@@ -12,7 +12,7 @@ use hoid_model::{
 use serde::{Deserialize, Serialize};
 
 /// Sample time of an experiment in s, if the length of a run is a multiple of it.
-pub(super) const SAMPLE_S: f64 = 0.01;
+pub(super) const SAMPLE_TIME_S: f64 = 0.01;
 
 /// Point at which a forcing function enters the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -93,7 +93,7 @@ impl Forcing {
     }
 
     /// Creates a target and a disturbance.
-    pub fn both(target: &ForcingFunction, disturbance: &ForcingFunction) -> Self {
+    pub fn with_target_and_disturbance(target: &ForcingFunction, disturbance: &ForcingFunction) -> Self {
         let mut all = Self::of(Enters::Target, target);
         all.lines.extend(Self::of(Enters::Disturbance, disturbance).lines);
         all

@@ -28,7 +28,7 @@ pub(super) fn known_name(name: &str) -> String {
 }
 
 /// Parses `NAME=5%` or `NAME=0.05`; returns the name, the number, and whether it has a percent sign.
-pub(super) fn named_number(text: &str, what: &'static str) -> Result<(String, f64, bool), DesignError> {
+pub(super) fn parse_named_number(text: &str, what: &'static str) -> Result<(String, f64, bool), DesignError> {
     let unreadable = || DesignError::Unreadable {
         what,
         found: text.to_owned(),
@@ -47,7 +47,7 @@ impl FromStr for RequestedQuantity {
     type Err = DesignError;
 
     fn from_str(text: &str) -> Result<Self, DesignError> {
-        let (name, number, percent) = named_number(text, "quantity with its error")?;
+        let (name, number, percent) = parse_named_number(text, "quantity with its error")?;
         Ok(Self {
             name,
             error: if percent { number / 100.0 } else { number },
@@ -56,7 +56,7 @@ impl FromStr for RequestedQuantity {
 }
 
 /// Returns the number of periods needed for the accepted errors of all quantities.
-pub fn periods(of_one: &Expected, wanted: &[RequestedQuantity]) -> usize {
+pub fn period_count(of_one: &Expected, wanted: &[RequestedQuantity]) -> usize {
     let needed = wanted
         .iter()
         .filter_map(|w| Some((of_one.error(&w.name)? / w.error).powi(2)));

@@ -5,7 +5,7 @@
 //! information of the lines is that of the least covariance. Of n experiments the standard deviation has an error of
 //! `1/sqrt(2 n)`.
 
-use hoid_design::experiment::{DesignRequest, Designing, Enters, ExperimentDesign, Remnant};
+use hoid_design::experiment::{DesignOptions, DesignRequest, Enters, ExperimentDesign, Remnant};
 use hoid_io::{AnyScenario, parse_any_scenario};
 use hoid_model::{
     Complex64, FamilyOperator, FamilyScenario, FamilyState, Form, Record,
@@ -31,7 +31,7 @@ pub struct Case {
 }
 
 /// A target on a display of the error, one run of 81.92 s.
-const TARGET: Case = Case {
+const TARGET_CASE: Case = Case {
     name: "",
     element: "4/s",
     form: None,
@@ -47,26 +47,26 @@ const TARGET: Case = Case {
 pub const CASES: [Case; 12] = [
     Case {
         name: "integrator, target",
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "lag and integrator, target, four runs",
         element: "4/(s(s+1))",
         runs: 4,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "two integrators, target, four runs",
         element: "1/s^2",
         remnant: (0.1, 0.06),
         runs: 4,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "gain with a lag, target, two runs",
         element: "3/(2s+1)",
         runs: 2,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "integrator, disturbance, four runs",
@@ -74,14 +74,14 @@ pub const CASES: [Case; 12] = [
         enters: Enters::Disturbance,
         remnant: (0.1, 0.06),
         runs: 4,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "lag and integrator, disturbance, eight runs",
         element: "1/(s(s+1))",
         enters: Enters::Disturbance,
         runs: 8,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "elements of the text, lead-lag, eight runs",
@@ -89,7 +89,7 @@ pub const CASES: [Case; 12] = [
         form: Some(Form::LeadLag),
         remnant: (0.1, 0.06),
         runs: 8,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "gain, lag, disturbance, four runs",
@@ -97,7 +97,7 @@ pub const CASES: [Case; 12] = [
         enters: Enters::Disturbance,
         remnant: (0.1, 0.06),
         runs: 4,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "integrator, half remnant of low frequency, eight short runs",
@@ -106,7 +106,7 @@ pub const CASES: [Case; 12] = [
         length_s: 40.96,
         lines: 8,
         runs: 8,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "lag and integrator, white remnant, long run",
@@ -114,14 +114,14 @@ pub const CASES: [Case; 12] = [
         remnant: (0.3, 0.0),
         length_s: 163.84,
         lines: 14,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "pursuit, integrator, two runs",
         display: Display::Pursuit,
         remnant: (0.1, 0.06),
         runs: 2,
-        ..TARGET
+        ..TARGET_CASE
     },
     Case {
         name: "preview, lag and integrator, four runs",
@@ -129,12 +129,12 @@ pub const CASES: [Case; 12] = [
         display: Display::Preview,
         remnant: (0.1, 0.06),
         runs: 4,
-        ..TARGET
+        ..TARGET_CASE
     },
 ];
 
 /// A quantity with its predicted error, and the standard deviation over the experiments divided by that.
-pub struct Checked {
+pub struct CheckedQuantity {
     pub name: &'static str,
     pub value: f64,
     pub predicted: f64,
@@ -172,10 +172,10 @@ impl Case {
                 time_constant_s: self.remnant.1,
                 order: 1,
             },
-            designing: Designing {
+            designing: DesignOptions {
                 period_s: self.length_s,
                 lines: self.lines,
-                ..Designing::default()
+                ..DesignOptions::default()
             },
             runs: Some(self.runs),
             ..DesignRequest::default()
@@ -184,24 +184,24 @@ impl Case {
     }
 
     /// Scatter of the estimates at the lines of so many experiments.
-    pub fn checked(&self, experiments: u64, seed: u64) -> Vec<Checked> {
-        self.checked_by(experiments, seed, |truth, records, design, scenario| {
+    pub fn check_errors(&self, experiments: u64, seed: u64) -> Vec<CheckedQuantity> {
+        self.check_errors_with(experiments, seed, |truth, records, design, scenario| {
             let preview_s = scenario.feedforward.as_ref().map_or(0.0, |seen| seen.preview_s);
             let lines = records
                 .iter()
                 .flat_map(|record| coefficients(record, design, preview_s));
-            Some(fitted(truth, &lines.collect::<Vec<_>>(), self.remnant.1))
+            Some(fit_lines(truth, &lines.collect::<Vec<_>>(), self.remnant.1))
         })
     }
 
     /// Scatter of the estimates that a method has of the runs of an experiment; those without a result or a
     /// crossover are left out.
-    pub fn checked_by(
+    pub fn check_errors_with(
         &self,
         experiments: u64,
         seed: u64,
         estimate: impl Fn(&Responses, &[Record], &ExperimentDesign, &FamilyScenario) -> Option<Responses>,
-    ) -> Vec<Checked> {
+    ) -> Vec<CheckedQuantity> {
         let design = self.design();
         let scenario = scenario(&design);
         let simulator = FamilySimulator::new(&scenario).unwrap();
@@ -226,7 +226,7 @@ impl Case {
             };
             let Some(found) = names
                 .iter()
-                .map(|name| value(&found, &scenario, name))
+                .map(|name| quantity_value(&found, &scenario, name))
                 .collect::<Option<Vec<_>>>()
             else {
                 continue;
@@ -238,7 +238,7 @@ impl Case {
         let of = |(name, values): (&&'static str, &Vec<f64>)| {
             let expected = design.expected.estimate(name).unwrap();
             let predicted = expected.standard_error.unwrap();
-            Checked {
+            CheckedQuantity {
                 name,
                 value: expected.value,
                 predicted,
@@ -306,7 +306,7 @@ fn places(truth: &Responses) -> (Vec<usize>, usize) {
     (own, count)
 }
 
-fn fitted(truth: &Responses, lines: &[Coefficients], time_constant_s: f64) -> Responses {
+fn fit_lines(truth: &Responses, lines: &[Coefficients], time_constant_s: f64) -> Responses {
     let (own, n) = places(truth);
     let mut found = truth.clone();
     for _ in 0..8 {
@@ -354,13 +354,13 @@ fn fitted(truth: &Responses, lines: &[Coefficients], time_constant_s: f64) -> Re
 }
 
 /// A quantity by the name that it has in a design; `None` if the loop has no crossover.
-fn value(found: &Responses, scenario: &FamilyScenario, name: &str) -> Option<f64> {
+fn quantity_value(found: &Responses, scenario: &FamilyScenario, name: &str) -> Option<f64> {
     let state = || FamilyState {
         operator: found.feedback.clone(),
         ..scenario.initial.clone()
     };
     let of = |operator: &FamilyOperator, name: &str| {
-        let named = operator.named();
+        let named = operator.named_parameters();
         named.iter().find(|p| p.name == name).map(|p| p.value)
     };
     match name {
@@ -368,13 +368,13 @@ fn value(found: &Responses, scenario: &FamilyScenario, name: &str) -> Option<f64
         "phase_margin" => state().margins().ok()?.phase_margin_deg,
         name => of(&found.feedback, name).or_else(|| {
             let (target, seen) = (found.target.as_ref()?, scenario.feedforward.as_ref()?);
-            Some(of_target(target, seen, name.strip_suffix("_f")?))
+            Some(target_quantity_value(target, seen, name.strip_suffix("_f")?))
         }),
     }
 }
 
-fn of_target(target: &FamilyOperator, seen: &Feedforward, name: &str) -> f64 {
-    let named = target.named();
+fn target_quantity_value(target: &FamilyOperator, seen: &Feedforward, name: &str) -> f64 {
+    let named = target.named_parameters();
     let find = |wanted: &str| named.iter().find(|p| p.name == wanted).map(|p| p.value);
     match name {
         "tau" => target.tau_e_s() - seen.preview_s,

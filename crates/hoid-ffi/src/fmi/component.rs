@@ -7,7 +7,7 @@ use std::{
     slice,
 };
 
-use super::{instance::Instance, values::Done};
+use super::{instance::Instance, values::FmiResult};
 use crate::status::panic_message;
 
 /// Status codes that FMI 2.0 and FMI 3.0 have in common.
@@ -79,7 +79,11 @@ pub struct Component {
 ///
 /// # Safety
 /// `logger` was supplied by the importer.
-pub(super) unsafe fn create(name: &str, logger: Logger, instance: impl FnOnce() -> Done<Instance>) -> *mut Component {
+pub(super) unsafe fn create(
+    name: &str,
+    logger: Logger,
+    instance: impl FnOnce() -> FmiResult<Instance>,
+) -> *mut Component {
     let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
     let made = catch_unwind(AssertUnwindSafe(instance)).unwrap_or_else(|panic| Err(panic_message(&*panic)));
     match made {
@@ -113,7 +117,7 @@ pub(super) unsafe fn free(component: *mut Component) {
 ///
 /// # Safety
 /// `component` is null or came from [`create`], and no other thread uses it.
-pub(super) unsafe fn with_instance(component: *mut Component, call: impl FnOnce(&mut Instance) -> Done) -> i32 {
+pub(super) unsafe fn with_instance(component: *mut Component, call: impl FnOnce(&mut Instance) -> FmiResult) -> i32 {
     if component.is_null() || !component.is_aligned() {
         return ERROR;
     }
@@ -140,7 +144,7 @@ pub(super) unsafe fn with_instance(component: *mut Component, call: impl FnOnce(
 ///
 /// # Safety
 /// `pointer` points to `count` elements that do not change during the call.
-pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T]> {
+pub(super) unsafe fn slice_from_raw<'a, T>(pointer: *const T, count: usize) -> FmiResult<&'a [T]> {
     if count == 0 {
         return Ok(&[]);
     }
@@ -155,7 +159,7 @@ pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T
 ///
 /// # Safety
 /// `pointer` points to `count` initialised elements that no other code uses during the call.
-pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a mut [T]> {
+pub(super) unsafe fn slice_from_raw_mut<'a, T>(pointer: *mut T, count: usize) -> FmiResult<&'a mut [T]> {
     if count == 0 {
         return Ok(&mut []);
     }
@@ -170,14 +174,14 @@ pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a 
 ///
 /// # Safety
 /// `pointer` is null or a null-terminated string that does not change during the call.
-pub(super) unsafe fn string<'a>(pointer: *const c_char) -> &'a str {
+pub(super) unsafe fn str_from_raw<'a>(pointer: *const c_char) -> &'a str {
     // SAFETY: guaranteed by the caller of this function.
     let text = unsafe { crate::boundary::text(pointer, "the text") };
     text.ok().flatten().unwrap_or_default()
 }
 
 /// Returns the folder given by a URI, such as `file:///tmp/a%20b/resources`, or by a path; `None` for an empty string.
-pub(super) fn folder(uri: &str) -> Option<PathBuf> {
+pub(super) fn folder_from_uri(uri: &str) -> Option<PathBuf> {
     if uri.is_empty() {
         return None;
     }
@@ -222,8 +226,8 @@ mod tests {
             ("file:///tmp/%c3%a4", "/tmp/\u{e4}"),
             ("/tmp/a%20b", "/tmp/a%20b"),
         ] {
-            assert_eq!(folder(uri), Some(PathBuf::from(expected)), "{uri}");
+            assert_eq!(folder_from_uri(uri), Some(PathBuf::from(expected)), "{uri}");
         }
-        assert_eq!(folder(""), None);
+        assert_eq!(folder_from_uri(""), None);
     }
 }

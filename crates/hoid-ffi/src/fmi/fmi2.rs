@@ -11,9 +11,12 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 use hoid_io::fmu::FmuStart;
 
 use super::{
-    component::{Component, ERROR, Fmi2Logger, Logger, create, folder, free, list, list_mut, string, with_instance},
+    component::{
+        Component, ERROR, Fmi2Logger, Logger, create, folder_from_uri, free, slice_from_raw, slice_from_raw_mut,
+        str_from_raw, with_instance,
+    },
     instance::Instance,
-    values::Done,
+    values::FmiResult,
 };
 
 /// Struct `fmi2CallbackFunctions`; its memory callbacks are not used, since Rust allocates the memory.
@@ -61,7 +64,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
         if kind != CO_SIMULATION {
             return Err("the unit supports only co-simulation, not model exchange".to_owned());
         }
-        Instance::new(guid, folder(resources).as_deref())
+        Instance::new(guid, folder_from_uri(resources).as_deref())
     };
     // SAFETY: the logger is supplied by the importer.
     unsafe { create(name, logger, instance) }
@@ -70,18 +73,18 @@ pub unsafe extern "C" fn fmi2Instantiate(
 /// Returns three strings passed by the importer.
 ///
 /// # Safety
-/// As for [`string`].
+/// As for [`str_from_raw`].
 pub(super) unsafe fn three_strings<'a>(
     a: *const c_char,
     b: *const c_char,
     c: *const c_char,
 ) -> (&'a str, &'a str, &'a str) {
     // SAFETY: guaranteed by the caller of this function.
-    let a = unsafe { string(a) };
+    let a = unsafe { str_from_raw(a) };
     // SAFETY: guaranteed by the caller of this function.
-    let b = unsafe { string(b) };
+    let b = unsafe { str_from_raw(b) };
     // SAFETY: guaranteed by the caller of this function.
-    (a, b, unsafe { string(c) })
+    (a, b, unsafe { str_from_raw(c) })
 }
 
 #[unsafe(no_mangle)]
@@ -161,13 +164,13 @@ pub(super) unsafe fn get<T>(
     references: *const c_uint,
     count: usize,
     values: *mut T,
-    of: impl Fn(&Instance, u32) -> Done<T>,
+    of: impl Fn(&Instance, u32) -> FmiResult<T>,
 ) -> c_int {
     let read = |instance: &mut Instance| {
         // SAFETY: guaranteed by the caller of this function.
-        let references = unsafe { list(references, count) }?;
+        let references = unsafe { slice_from_raw(references, count) }?;
         // SAFETY: guaranteed by the caller of this function.
-        let values = unsafe { list_mut(values, count) }?;
+        let values = unsafe { slice_from_raw_mut(values, count) }?;
         for (value, reference) in values.iter_mut().zip(references) {
             *value = of(instance, *reference)?;
         }
@@ -190,9 +193,9 @@ pub(super) unsafe fn set<T: Copy>(
 ) -> c_int {
     let write = |instance: &mut Instance| {
         // SAFETY: guaranteed by the caller of this function.
-        let references = unsafe { list(references, count) }?;
+        let references = unsafe { slice_from_raw(references, count) }?;
         // SAFETY: guaranteed by the caller of this function.
-        let values = unsafe { list(values, count) }?;
+        let values = unsafe { slice_from_raw(values, count) }?;
         let mut each = references.iter().zip(values);
         each.try_for_each(|(reference, value)| instance.set(*reference, of(*value)))
     };
@@ -200,35 +203,35 @@ pub(super) unsafe fn set<T: Copy>(
     unsafe { with_instance(component, write) }
 }
 
-pub(super) fn real(instance: &Instance, reference: u32) -> Done<f64> {
+pub(super) fn real(instance: &Instance, reference: u32) -> FmiResult<f64> {
     match instance.value(reference)? {
         FmuStart::Real(value) => Ok(*value),
-        _ => Err(instance.other_type(reference)),
+        _ => Err(instance.wrong_type_message(reference)),
     }
 }
 
-pub(super) fn integer(instance: &Instance, reference: u32) -> Done<i32> {
+pub(super) fn integer(instance: &Instance, reference: u32) -> FmiResult<i32> {
     match instance.value(reference)? {
         FmuStart::Integer(value) => Ok(*value),
-        _ => Err(instance.other_type(reference)),
+        _ => Err(instance.wrong_type_message(reference)),
     }
 }
 
-pub(super) fn boolean(instance: &Instance, reference: u32) -> Done<bool> {
+pub(super) fn boolean(instance: &Instance, reference: u32) -> FmiResult<bool> {
     match instance.value(reference)? {
         FmuStart::Boolean(value) => Ok(*value),
-        _ => Err(instance.other_type(reference)),
+        _ => Err(instance.wrong_type_message(reference)),
     }
 }
 
-pub(super) fn text(instance: &Instance, reference: u32) -> Done<*const c_char> {
+pub(super) fn text(instance: &Instance, reference: u32) -> FmiResult<*const c_char> {
     Ok(instance.text(reference)?.as_ptr())
 }
 
 /// Converts a string passed by the importer to a value.
 pub(super) fn as_text(pointer: *const c_char) -> FmuStart {
     // SAFETY: the FMI standard guarantees that the pointer is an element of an array of strings.
-    FmuStart::Text(unsafe { string(pointer) }.to_owned())
+    FmuStart::Text(unsafe { str_from_raw(pointer) }.to_owned())
 }
 
 macro_rules! getters_and_setters {

@@ -6,11 +6,11 @@
 
 use std::{ffi::CString, fs, path::Path};
 
-use hoid_io::fmu::{FMU_SETTINGS, FmuKind, FmuSettings, FmuStart, FmuVariable, Role};
+use hoid_io::fmu::{FMU_SETTINGS_FILE, FmuKind, FmuSettings, FmuStart, FmuVariable, Role};
 
 use super::{
     model::Model,
-    values::{Done, VariableValues},
+    values::{FmiResult, VariableValues},
 };
 
 /// Tolerance in the comparison of times, as a fraction of the sample time.
@@ -45,7 +45,7 @@ pub(super) struct Instance {
 
 impl Instance {
     /// Builds the instance of the unit with the given token; `resources` is the folder that contains its settings.
-    pub fn new(token: &str, resources: Option<&Path>) -> Done<Self> {
+    pub fn new(token: &str, resources: Option<&Path>) -> FmiResult<Self> {
         let kind = (FmuKind::ALL.into_iter().find(|kind| kind.token() == token)).ok_or_else(|| {
             format!(
                 "the model description is for {token:?}, but the library is for {}; build the unit again with hoid fmu",
@@ -55,14 +55,14 @@ impl Instance {
         let settings = match resources {
             None => FmuSettings::new(kind),
             Some(folder) => {
-                let path = folder.join(FMU_SETTINGS);
+                let path = folder.join(FMU_SETTINGS_FILE);
                 let text = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
                 FmuSettings::parse(&text)?
             }
         };
         if settings.kind()? != kind {
             return Err(format!(
-                "{FMU_SETTINGS} is for a unit other than {token}; build it again with hoid fmu"
+                "{FMU_SETTINGS_FILE} is for a unit other than {token}; build it again with hoid fmu"
             ));
         }
         let variables = settings.variables()?;
@@ -88,51 +88,51 @@ impl Instance {
     pub fn reset(&mut self) {
         self.values = self.variables.iter().map(|variable| variable.start.clone()).collect();
         for reference in 0..self.values.len() {
-            self.keep_text(reference);
+            self.update_text(reference);
         }
         self.phase = Phase::Setup;
         (self.start_s, self.k, self.end_s) = (0.0, 0, 0.0);
         self.model = None;
     }
 
-    pub(super) fn keep_text(&mut self, reference: usize) {
+    pub(super) fn update_text(&mut self, reference: usize) {
         if let FmuStart::Text(text) = &self.values[reference] {
             self.texts[reference] = CString::new(text.replace('\0', " ")).unwrap_or_default();
         }
     }
 
-    fn variable(&self, reference: u32) -> Done<&FmuVariable> {
+    fn variable(&self, reference: u32) -> FmiResult<&FmuVariable> {
         let variable = self.variables.get(reference as usize);
         variable.ok_or_else(|| format!("there is no variable with the value reference {reference}"))
     }
 
     /// Returns the value of a variable.
-    pub fn value(&self, reference: u32) -> Done<&FmuStart> {
+    pub fn value(&self, reference: u32) -> FmiResult<&FmuStart> {
         self.variable(reference)?;
         Ok(&self.values[reference as usize])
     }
 
     /// Returns the value of a string variable; it is valid until the variable is set again.
-    pub fn text(&self, reference: u32) -> Done<&CString> {
+    pub fn text(&self, reference: u32) -> FmiResult<&CString> {
         match self.value(reference)? {
             FmuStart::Text(_) => Ok(&self.texts[reference as usize]),
-            _ => Err(self.other_type(reference)),
+            _ => Err(self.wrong_type_message(reference)),
         }
     }
 
     /// Returns the error message for a variable whose type differs from that of the called function.
-    pub fn other_type(&self, reference: u32) -> String {
+    pub fn wrong_type_message(&self, reference: u32) -> String {
         let name = self.variable(reference).map_or("?", |variable| variable.name);
         format!("{name} does not have the type of the called function")
     }
 
     /// Sets a parameter (only before the start) or an input.
-    pub fn set(&mut self, reference: u32, value: FmuStart) -> Done {
+    pub fn set(&mut self, reference: u32, value: FmuStart) -> FmiResult {
         let phase = self.phase;
         let variable = self.variable(reference)?;
         let (name, role) = (variable.name, variable.role);
         if std::mem::discriminant(&variable.start) != std::mem::discriminant(&value) {
-            return Err(self.other_type(reference));
+            return Err(self.wrong_type_message(reference));
         }
         match role {
             Role::Output => return Err(format!("{name} is an output; it cannot be set")),
@@ -144,12 +144,12 @@ impl Instance {
             Role::Parameter | Role::Input => {}
         }
         self.values[reference as usize] = value;
-        self.keep_text(reference as usize);
+        self.update_text(reference as usize);
         Ok(())
     }
 
     /// Sets the start time of the experiment in s.
-    pub fn set_start_time(&mut self, start_s: f64) -> Done {
+    pub fn set_start_time(&mut self, start_s: f64) -> FmiResult {
         if !start_s.is_finite() {
             return Err(format!("the experiment starts at {start_s} s, expected a finite time"));
         }
@@ -161,7 +161,7 @@ impl Instance {
     }
 
     /// Returns the values of the parameters and inputs, by name.
-    fn given(&self) -> VariableValues<'_> {
+    fn variable_values(&self) -> VariableValues<'_> {
         VariableValues {
             variables: &self.variables,
             values: &self.values,
@@ -169,8 +169,8 @@ impl Instance {
     }
 
     /// Builds the model from the parameters and starts the experiment.
-    pub fn start(&mut self) -> Done {
-        let model = Model::new(&self.settings, &self.given(), self.start_s)?;
+    pub fn start(&mut self) -> FmiResult {
+        let model = Model::new(&self.settings, &self.variable_values(), self.start_s)?;
         self.values.splice(self.first_output.., model.outputs());
         self.model = Some(model);
         self.phase = Phase::Running;
@@ -178,7 +178,7 @@ impl Instance {
     }
 
     /// Performs a communication step of length `step_s` from the time `t_s`, both in s.
-    pub fn step(&mut self, t_s: f64, step_s: f64) -> Done {
+    pub fn step(&mut self, t_s: f64, step_s: f64) -> FmiResult {
         let given = VariableValues {
             variables: &self.variables,
             values: &self.values,
@@ -252,7 +252,7 @@ mod tests {
         for kind in FmuKind::ALL {
             let folder = tempfile::tempdir().unwrap();
             let settings = FmuSettings::new(kind).with_scenario("condition = \"C4\"".to_owned());
-            fs::write(folder.path().join(FMU_SETTINGS), settings.text()).unwrap();
+            fs::write(folder.path().join(FMU_SETTINGS_FILE), settings.text()).unwrap();
             let mut instance = Instance::new(&kind.token(), Some(folder.path())).unwrap();
             instance.start().unwrap();
             let outputs: Vec<&FmuVariable> = instance.variables.iter().filter(|v| v.role == Role::Output).collect();
@@ -315,7 +315,7 @@ mod tests {
             .with("prior", FmuStart::Text("fit".to_owned()))
             .with("controlled_element", FmuStart::Text("1/s".to_owned()));
         let started = |settings: &FmuSettings| {
-            fs::write(folder.path().join(FMU_SETTINGS), settings.text()).unwrap();
+            fs::write(folder.path().join(FMU_SETTINGS_FILE), settings.text()).unwrap();
             let mut instance = Instance::new(&FmuKind::Tracker.token(), Some(folder.path())).unwrap();
             instance.start().map(|()| instance)
         };
@@ -339,7 +339,7 @@ mod tests {
 
     #[test]
     fn invalid_calls_give_the_reason() {
-        let why = |done: Done| done.unwrap_err();
+        let why = |done: FmiResult| done.unwrap_err();
         assert!(
             Instance::new("hoid-0.0.0-tracker", None)
                 .err()

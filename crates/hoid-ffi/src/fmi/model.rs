@@ -1,16 +1,16 @@
 //! Model in a unit: a tracker or an operator.
 
-use hoid_io::fmu::{DETERMINED, FmuKind, FmuSettings, FmuStart};
+use hoid_io::fmu::{DETERMINED_VARIABLES, FmuKind, FmuSettings, FmuStart};
 use hoid_track::Sample;
 use serde_json::{Map, Value};
 
 use super::{
     operator::OperatorModel,
-    values::{Done, VariableValues},
+    values::{FmiResult, VariableValues},
 };
 use crate::{
     packed::{as_bytes, as_numbers},
-    results::number_of,
+    results::level_number,
     session::Session,
 };
 
@@ -31,7 +31,7 @@ pub(super) struct TrackerModel {
 
 impl Model {
     /// Builds the model from the parameters, for an experiment that starts at a time in s.
-    pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
+    pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> FmiResult<Self> {
         Ok(match settings.kind()? {
             FmuKind::Tracker => Self::Tracker(Box::new(TrackerModel::new(settings, given)?)),
             FmuKind::Operator => Self::Operator(Box::new(OperatorModel::new(settings, given, start_s)?)),
@@ -40,24 +40,24 @@ impl Model {
 
     /// Returns the saved state, without changing the model: the numbers that are not part of the recursion, and the
     /// recursion as bytes.
-    pub fn saved(&mut self) -> (Vec<f64>, Vec<u8>) {
+    pub fn save_state(&mut self) -> (Vec<f64>, Vec<u8>) {
         match self {
             Self::Tracker(tracker) => {
                 let outputs = vec![tracker.innovation, f64::from(tracker.changes), tracker.change_t_s];
-                (outputs, tracker.session.saved())
+                (outputs, tracker.session.to_bytes())
             }
-            Self::Operator(operator) => (Vec::new(), as_bytes(&operator.saved())),
+            Self::Operator(operator) => (Vec::new(), as_bytes(&operator.save_state())),
         }
     }
 
-    /// Restores a model with the same parameters from the result of [`Model::saved`].
-    pub fn restored(
+    /// Restores a model with the same parameters from the result of [`Model::save_state`].
+    pub fn from_saved_state(
         settings: &FmuSettings,
         given: &VariableValues<'_>,
         start_s: f64,
         extra_numbers: &[f64],
         bytes: &[u8],
-    ) -> Done<Self> {
+    ) -> FmiResult<Self> {
         let wrong = || "the state is from another model".to_owned();
         Ok(match settings.kind()? {
             FmuKind::Tracker => {
@@ -65,7 +65,7 @@ impl Model {
                     return Err(wrong());
                 };
                 Self::Tracker(Box::new(TrackerModel {
-                    session: Session::restored(bytes).map_err(|failure| failure.text)?,
+                    session: Session::from_bytes(bytes).map_err(|failure| failure.text)?,
                     with_excitation: given.is("with_excitation"),
                     innovation,
                     changes: changes as i32,
@@ -104,9 +104,9 @@ impl Model {
     }
 
     /// Returns the outputs with their names, in the order of the model description.
-    fn named(&self) -> Vec<(&'static str, FmuStart)> {
+    fn named_outputs(&self) -> Vec<(&'static str, FmuStart)> {
         match self {
-            Self::Tracker(tracker) => tracker.named(),
+            Self::Tracker(tracker) => tracker.named_outputs(),
             Self::Operator(operator) => vec![
                 ("u", FmuStart::Real(operator.control())),
                 ("n", FmuStart::Real(operator.remnant())),
@@ -116,17 +116,17 @@ impl Model {
 
     /// Returns the outputs in the order of the model description.
     pub fn outputs(&self) -> Vec<FmuStart> {
-        self.named().into_iter().map(|(_, value)| value).collect()
+        self.named_outputs().into_iter().map(|(_, value)| value).collect()
     }
 
     #[cfg(test)]
     pub fn output_names(&self) -> Vec<&'static str> {
-        self.named().into_iter().map(|(name, _)| name).collect()
+        self.named_outputs().into_iter().map(|(name, _)| name).collect()
     }
 }
 
 impl TrackerModel {
-    fn new(settings: &FmuSettings, given: &VariableValues<'_>) -> Done<Self> {
+    fn new(settings: &FmuSettings, given: &VariableValues<'_>) -> FmiResult<Self> {
         let text = given.text("options");
         let mut options: Map<String, Value> = serde_json::from_str(if text.is_empty() { "{}" } else { text })
             .map_err(|error| format!("options: not a JSON object ({error})"))?;
@@ -172,7 +172,7 @@ impl TrackerModel {
         }
     }
 
-    fn named(&self) -> Vec<(&'static str, FmuStart)> {
+    fn named_outputs(&self) -> Vec<(&'static str, FmuStart)> {
         let session = &self.session;
         let operator = session.operator().unwrap_or_default();
         let open_loop = session.open_loop().unwrap_or_default();
@@ -192,7 +192,7 @@ impl TrackerModel {
             let error = estimate.map_or(f64::NAN, |e| e.standard_error);
             all.extend([(name, FmuStart::Real(value)), (error_name, FmuStart::Real(error))]);
         }
-        for (i, name) in DETERMINED.into_iter().enumerate() {
+        for (i, name) in DETERMINED_VARIABLES.into_iter().enumerate() {
             let is = operator.get(i).is_some_and(|e| e.determined == 1);
             all.push((name, FmuStart::Boolean(is)));
         }
@@ -206,7 +206,7 @@ impl TrackerModel {
             ),
             ("change_t", FmuStart::Real(self.change_t_s)),
             ("changes", FmuStart::Integer(self.changes)),
-            ("level", FmuStart::Integer(number_of(session.level()))),
+            ("level", FmuStart::Integer(level_number(session.level()))),
             ("ready", FmuStart::Boolean(session.tracker().is_ok())),
             ("samples", count(counts.samples)),
             ("skipped", count(counts.skipped)),

@@ -3,21 +3,21 @@
 use hoid_io::{AnyScenario, fmu::FmuSettings, parse_any_scenario};
 use hoid_sim::{FamilyOperatorRun, FamilySimulator, OperatorRun, RunSeed, Simulator};
 
-use super::values::{Done, VariableValues};
+use super::values::{FmiResult, VariableValues};
 
 /// Running operator of a scenario.
 pub(super) struct OperatorModel {
-    run: Run,
+    run: OperatorSimulation,
     sample_time_s: f64,
 }
 
-enum Run {
+enum OperatorSimulation {
     Reference(Box<OperatorRun>),
     Family(Box<FamilyOperatorRun>),
 }
 
 impl OperatorModel {
-    pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
+    pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> FmiResult<Self> {
         let text = settings.scenario.as_deref();
         let text = text.ok_or("the unit has no scenario; build it with hoid fmu --operator SCENARIO")?;
         let seed = RunSeed {
@@ -31,7 +31,7 @@ impl OperatorModel {
             AnyScenario::Reference(scenario) => {
                 let simulator = Simulator::new(&scenario).map_err(to_text)?;
                 Self {
-                    run: Run::Reference(Box::new(OperatorRun::new(simulator, seed, start_s))),
+                    run: OperatorSimulation::Reference(Box::new(OperatorRun::new(simulator, seed, start_s))),
                     sample_time_s: scenario.sample_time.s(),
                 }
             }
@@ -39,7 +39,7 @@ impl OperatorModel {
                 let simulator = FamilySimulator::new(&scenario).map_err(to_text)?;
                 let run = FamilyOperatorRun::new(simulator, seed, start_s).map_err(to_text)?;
                 Self {
-                    run: Run::Family(Box::new(run)),
+                    run: OperatorSimulation::Family(Box::new(run)),
                     sample_time_s: scenario.sample_time.s(),
                 }
             }
@@ -52,37 +52,37 @@ impl OperatorModel {
 
     pub fn control(&self) -> f64 {
         match &self.run {
-            Run::Reference(run) => run.control(),
-            Run::Family(run) => run.control(),
+            OperatorSimulation::Reference(run) => run.control(),
+            OperatorSimulation::Family(run) => run.control(),
         }
     }
 
     pub fn remnant(&self) -> f64 {
         match &self.run {
-            Run::Reference(run) => run.remnant(),
-            Run::Family(run) => run.remnant(),
+            OperatorSimulation::Reference(run) => run.remnant(),
+            OperatorSimulation::Family(run) => run.remnant(),
         }
     }
 
     pub fn take(&mut self, e: f64) {
         match &mut self.run {
-            Run::Reference(run) => run.take(e),
-            Run::Family(run) => run.take(e),
+            OperatorSimulation::Reference(run) => run.push(e),
+            OperatorSimulation::Family(run) => run.push(e),
         }
     }
 
-    pub fn saved(&mut self) -> Vec<f64> {
+    pub fn save_state(&mut self) -> Vec<f64> {
         match &mut self.run {
-            Run::Reference(run) => run.saved(),
-            Run::Family(run) => run.saved(),
+            OperatorSimulation::Reference(run) => run.saved_state(),
+            OperatorSimulation::Family(run) => run.saved_state(),
         }
     }
 
     /// Restores a saved state. Returns false if the state belongs to another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         match &mut self.run {
-            Run::Reference(run) => run.restore(saved),
-            Run::Family(run) => run.restore(saved),
+            OperatorSimulation::Reference(run) => run.restore(saved),
+            OperatorSimulation::Family(run) => run.restore(saved),
         }
     }
 }

@@ -14,10 +14,10 @@ use hoid_io::fmu::FmuStart;
 use serde_json::{Value, json};
 
 use super::{
-    component::{Component, list, list_mut, with_instance},
+    component::{Component, slice_from_raw, slice_from_raw_mut, with_instance},
     instance::{Instance, Phase},
     model::Model,
-    values::{Done, VariableValues},
+    values::{FmiResult, VariableValues},
 };
 use crate::packed::{pack, unpack};
 
@@ -28,14 +28,14 @@ pub struct State(Vec<u8>);
 
 impl Instance {
     /// Returns the state as bytes, without changing the instance.
-    fn saved(&mut self) -> Vec<u8> {
+    fn save_state(&mut self) -> Vec<u8> {
         let phase = match self.phase {
             Phase::Setup => "setup",
             Phase::Running => "running",
             Phase::Ended => "ended",
         };
-        let values: Vec<Value> = self.values.iter().map(of_value).collect();
-        let (extra_numbers, bytes) = self.model.as_mut().map(Model::saved).unwrap_or_default();
+        let values: Vec<Value> = self.values.iter().map(value_to_json).collect();
+        let (extra_numbers, bytes) = self.model.as_mut().map(Model::save_state).unwrap_or_default();
         let extra_numbers: Vec<u64> = extra_numbers.into_iter().map(f64::to_bits).collect();
         let description = json!({
             "unit": self.token,
@@ -50,7 +50,7 @@ impl Instance {
     }
 
     /// Restores a state of this unit. If this fails, the instance does not change.
-    fn restore(&mut self, bytes: &[u8]) -> Done {
+    fn restore(&mut self, bytes: &[u8]) -> FmiResult {
         let wrong = || "the state is not from this unit, or was changed or truncated since it was saved".to_owned();
         let (description, bytes) = unpack(MAGIC, bytes).map_err(|_| wrong())?;
         if description["unit"] != json!(self.token) {
@@ -79,22 +79,28 @@ impl Instance {
             Value::Null if phase != Phase::Running => None,
             extra_numbers => {
                 let extra_numbers = extra_numbers.as_array().ok_or_else(wrong)?;
-                let extra_numbers: Vec<f64> = extra_numbers.iter().map(number).collect::<Done<_>>()?;
+                let extra_numbers: Vec<f64> = extra_numbers.iter().map(number).collect::<FmiResult<_>>()?;
                 let given = VariableValues {
                     variables: &self.variables,
                     values: &values,
                 };
-                Some(Model::restored(&self.settings, &given, start_s, &extra_numbers, bytes)?)
+                Some(Model::from_saved_state(
+                    &self.settings,
+                    &given,
+                    start_s,
+                    &extra_numbers,
+                    bytes,
+                )?)
             }
         };
         self.values = values;
-        (0..self.values.len()).for_each(|reference| self.keep_text(reference));
+        (0..self.values.len()).for_each(|reference| self.update_text(reference));
         (self.phase, self.start_s, self.k, self.end_s, self.model) = (phase, start_s, k, end_s, model);
         Ok(())
     }
 }
 
-fn of_value(value: &FmuStart) -> Value {
+fn value_to_json(value: &FmuStart) -> Value {
     match value {
         FmuStart::Real(value) => json!(value.to_bits()),
         FmuStart::Integer(value) => json!(value),
@@ -117,9 +123,9 @@ fn to_value(of: &FmuStart, value: &Value) -> Option<FmuStart> {
 ///
 /// # Safety
 /// `place` is null, or points to null or to a state that came from [`into_handle`] and has not been freed.
-unsafe fn held<'a>(place: *mut *mut State) -> Done<&'a mut *mut State> {
+unsafe fn handle_place<'a>(place: *mut *mut State) -> FmiResult<&'a mut *mut State> {
     // SAFETY: guaranteed by the caller of this function.
-    let place = unsafe { list_mut(place, 1) }?;
+    let place = unsafe { slice_from_raw_mut(place, 1) }?;
     place
         .first_mut()
         .ok_or_else(|| "there is no pointer for the state".to_owned())
@@ -129,15 +135,15 @@ unsafe fn held<'a>(place: *mut *mut State) -> Done<&'a mut *mut State> {
 ///
 /// # Safety
 /// As for [`held`].
-unsafe fn into_handle(bytes: Vec<u8>, place: *mut *mut State) -> Done {
+unsafe fn into_handle(bytes: Vec<u8>, place: *mut *mut State) -> FmiResult {
     // SAFETY: guaranteed by the caller of this function.
-    let place = unsafe { held(place) }?;
+    let place = unsafe { handle_place(place) }?;
     if place.is_null() {
         *place = Box::into_raw(Box::new(State(bytes)));
         return Ok(());
     }
     // SAFETY: the pointer is not null; the caller guarantees that it is a state of this library.
-    let there = unsafe { list_mut(*place, 1) }?;
+    let there = unsafe { slice_from_raw_mut(*place, 1) }?;
     there.iter_mut().for_each(|state| state.0.clone_from(&bytes));
     Ok(())
 }
@@ -146,9 +152,9 @@ unsafe fn into_handle(bytes: Vec<u8>, place: *mut *mut State) -> Done {
 ///
 /// # Safety
 /// `state` is null, or came from [`into_handle`] and has not been freed.
-unsafe fn bytes_of<'a>(state: *const State) -> Done<&'a [u8]> {
+unsafe fn state_bytes<'a>(state: *const State) -> FmiResult<&'a [u8]> {
     // SAFETY: guaranteed by the caller of this function.
-    let states = unsafe { list(state, 1) }?;
+    let states = unsafe { slice_from_raw(state, 1) }?;
     states
         .first()
         .map(|state| state.0.as_slice())
@@ -160,7 +166,7 @@ macro_rules! states {
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $get(component: *mut Component, state: *mut *mut State) -> c_int {
             let take = |instance: &mut Instance| {
-                let bytes = instance.saved();
+                let bytes = instance.save_state();
                 // SAFETY: guaranteed by the FMI standard.
                 unsafe { into_handle(bytes, state) }
             };
@@ -172,7 +178,7 @@ macro_rules! states {
         pub unsafe extern "C" fn $set(component: *mut Component, state: *mut State) -> c_int {
             let go = |instance: &mut Instance| {
                 // SAFETY: guaranteed by the FMI standard.
-                let bytes = unsafe { bytes_of(state) }?;
+                let bytes = unsafe { state_bytes(state) }?;
                 instance.restore(bytes)
             };
             // SAFETY: guaranteed by the FMI standard.
@@ -183,7 +189,7 @@ macro_rules! states {
         pub unsafe extern "C" fn $free(component: *mut Component, state: *mut *mut State) -> c_int {
             let free = |_: &mut Instance| {
                 // SAFETY: guaranteed by the FMI standard.
-                let place = unsafe { held(state) }?;
+                let place = unsafe { handle_place(state) }?;
                 if !place.is_null() {
                     // SAFETY: the pointer came from `into_handle`, and is replaced by null.
                     drop(unsafe { Box::from_raw(std::mem::replace(place, std::ptr::null_mut())) });
@@ -198,9 +204,9 @@ macro_rules! states {
         pub unsafe extern "C" fn $size(component: *mut Component, state: *mut State, size: *mut usize) -> c_int {
             let read = |_: &mut Instance| {
                 // SAFETY: guaranteed by the FMI standard.
-                let bytes = unsafe { bytes_of(state) }?;
+                let bytes = unsafe { state_bytes(state) }?;
                 // SAFETY: guaranteed by the FMI standard.
-                let size = unsafe { list_mut(size, 1) }?;
+                let size = unsafe { slice_from_raw_mut(size, 1) }?;
                 size.fill(bytes.len());
                 Ok(())
             };
@@ -217,7 +223,7 @@ macro_rules! states {
         ) -> c_int {
             let write = |_: &mut Instance| {
                 // SAFETY: guaranteed by the FMI standard.
-                let bytes = unsafe { bytes_of(state) }?;
+                let bytes = unsafe { state_bytes(state) }?;
                 if size < bytes.len() {
                     return Err(format!(
                         "there is room for {size} bytes, but the state has {}",
@@ -225,7 +231,7 @@ macro_rules! states {
                     ));
                 }
                 // SAFETY: the FMI standard guarantees memory of this size, and no more is used.
-                let room = unsafe { list_mut(room, bytes.len()) }?;
+                let room = unsafe { slice_from_raw_mut(room, bytes.len()) }?;
                 room.copy_from_slice(bytes);
                 Ok(())
             };
@@ -242,7 +248,7 @@ macro_rules! states {
         ) -> c_int {
             let read = |_: &mut Instance| {
                 // SAFETY: guaranteed by the FMI standard.
-                let bytes = unsafe { list(bytes, size) }?;
+                let bytes = unsafe { slice_from_raw(bytes, size) }?;
                 unpack(MAGIC, bytes)
                     .map_err(|_| "the bytes are not a state, or were changed or truncated".to_owned())?;
                 // SAFETY: guaranteed by the FMI standard.

@@ -3,7 +3,7 @@
 use hoid_io::fmu::{FmuStart, FmuVariable};
 
 /// Result of an action, or the reason why it failed.
-pub(super) type Done<T = ()> = Result<T, String>;
+pub(super) type FmiResult<T = ()> = Result<T, String>;
 
 /// Values of variables, by name.
 pub(super) struct VariableValues<'a> {

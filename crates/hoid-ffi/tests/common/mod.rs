@@ -58,7 +58,7 @@ pub fn compiler(name: &str) -> Option<String> {
     None
 }
 
-pub fn example(name: &str) -> PathBuf {
+pub fn example_path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("examples").join(name)
 }
 
@@ -98,7 +98,7 @@ pub fn run(program: &Path, arguments: &[&str], input: &str) -> Output {
     output
 }
 
-pub fn good(output: &Output) -> String {
+pub fn successful_output(output: &Output) -> String {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     String::from_utf8(output.stdout.clone()).unwrap()
 }

@@ -20,7 +20,7 @@ impl Criterion<'_> {
         &self,
         theta: &'t [f64],
     ) -> impl Iterator<Item = (&'t [f64], &'t [f64])> + use<'t, '_> {
-        let mut at = self.orders.parameters();
+        let mut at = self.orders.parameter_count();
         self.further.iter().map(move |input| {
             let b = &theta[at..at + input.orders.nb];
             at += input.orders.nb;
@@ -32,7 +32,7 @@ impl Criterion<'_> {
 
     /// Returns, for each further input, the indices in theta of its F coefficients.
     pub(super) fn further_poles(&self) -> impl Iterator<Item = Range<usize>> {
-        let mut at = self.orders.parameters();
+        let mut at = self.orders.parameter_count();
         self.further.iter().map(move |input| {
             let from = at + input.orders.nb;
             at = from + input.orders.nf;
@@ -41,7 +41,13 @@ impl Criterion<'_> {
     }
 
     /// Computes the signals s and w of the further inputs over these samples, and subtracts w from v.
-    pub(super) fn further_responses(&self, theta: &[f64], record: usize, samples: Range<usize>, ws: &mut Workspace) {
+    pub(super) fn compute_further_responses(
+        &self,
+        theta: &[f64],
+        record: usize,
+        samples: Range<usize>,
+        ws: &mut Workspace,
+    ) {
         let (pad, n) = (ws.pad, samples.end);
         ws.further.resize_with(self.further.len(), FurtherSignals::default);
         let from = pad + samples.start;
@@ -68,7 +74,7 @@ impl Criterion<'_> {
     /// Computes the filtered signals of the further inputs, whose shifts are columns of psi.
     pub(super) fn whiten_further(&self, theta: &[f64], ws: &mut Workspace) {
         let parts = Polynomials::split(&self.orders, theta);
-        let from = ws.pad + self.first_regressed();
+        let from = ws.pad + self.first_regressed_sample();
         for ((input, (_, f)), signals) in self
             .further
             .iter()

@@ -90,16 +90,16 @@ impl InitialStateResponses {
             s.iter_mut().for_each(|v| *v = -*v);
             for i in 0..f.len() {
                 // The response to state i starts i samples after w.
-                columns.push(shifted(&s, i, lead, rows));
+                columns.push(shifted_response(&s, i, lead, rows));
                 of_inputs.push((input, i));
             }
             responses_of_inputs.push(h);
         }
-        let prior_rows = past.noise.map_or(0, StationaryNoise::states);
+        let prior_rows = past.noise.map_or(0, StationaryNoise::state_count);
         let unknown = if past.noise.is_some() { prior_rows } else { c.len() };
         if unknown > 0 {
             let k = impulse_response(c, rows);
-            let responses: Vec<Vec<f64>> = (0..unknown).map(|j| shifted(&k, j, 0, rows)).collect();
+            let responses: Vec<Vec<f64>> = (0..unknown).map(|j| shifted_response(&k, j, 0, rows)).collect();
             match past.noise {
                 None => columns.extend(responses),
                 Some(noise) => columns.extend((0..unknown).map(|j| noise.response(&responses, j))),
@@ -212,14 +212,14 @@ impl InitialStateResponses {
     /// True if all responses have decayed after the given number of rows.
     pub fn have_decayed(&self, rows: usize) -> bool {
         /// Relative magnitude below which a response counts as decayed.
-        const DECAYED: f64 = 1e-15;
+        const DECAY_THRESHOLD: f64 = 1e-15;
         /// Number of samples over which the amplitude of an oscillating response is judged.
-        const OSCILLATION_WINDOW: usize = 128;
+        const OSCILLATION_WINDOW_SAMPLES: usize = 128;
         let dead = |response: &[f64]| {
             response.len() < rows
-                || response[response.len().saturating_sub(OSCILLATION_WINDOW)..]
+                || response[response.len().saturating_sub(OSCILLATION_WINDOW_SAMPLES)..]
                     .iter()
-                    .all(|x| x.abs() < DECAYED)
+                    .all(|x| x.abs() < DECAY_THRESHOLD)
         };
         // No scaling is needed: a basis vector has unit length, and an impulse response starts at one.
         self.h.iter().all(|h| h.len() < rows) && self.basis().all(dead)
@@ -233,7 +233,7 @@ impl InitialStateResponses {
 }
 
 /// Returns `response(t + lead - delay)` for t = 0 .. rows, truncated at the end of the response.
-fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64> {
+fn shifted_response(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64> {
     let mut column = vec![0.0; delay.saturating_sub(lead).min(rows)];
     let from = lead.saturating_sub(delay).min(response.len());
     column.extend_from_slice(&response[from..]);
@@ -244,14 +244,14 @@ fn shifted(response: &[f64], delay: usize, lead: usize, rows: usize) -> Vec<f64>
 /// Returns the impulse response of `1/D`, truncated when it has decayed to 1e-16 of its largest value or has `longest`
 /// samples.
 fn impulse_response(d: &[f64], longest: usize) -> Vec<f64> {
-    const BLOCK: usize = 128;
+    const BLOCK_LENGTH: usize = 128;
     let order = d.len();
     let mut h = vec![0.0; order];
     h.reserve(longest.min(4096));
     let mut largest = 1.0_f64;
     while h.len() < order + longest {
         let from = h.len();
-        let to = (from + BLOCK).min(order + longest);
+        let to = (from + BLOCK_LENGTH).min(order + longest);
         h.resize(to, 0.0);
         if from == order {
             h[from] = 1.0;

@@ -48,7 +48,7 @@ impl Criterion<'_> {
     /// Like [`Objective::linearise`], but computes only the derivatives with respect to the coefficients of one
     /// polynomial and sets the other elements to zero.
     pub fn linearise_block(&self, theta: &[f64], block: Block, workspace: &mut Workspace) -> Linearisation {
-        let (p, place) = (theta.len(), block.place(&self.orders));
+        let (p, place) = (theta.len(), block.range(&self.orders));
         let count = place.len();
         let mut part = Linearisation {
             sum_of_squares: 0.0,
@@ -73,7 +73,7 @@ impl Criterion<'_> {
     /// Returns the residuals of one record, starting at [`Criterion::first`].
     pub fn residuals_of(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<f64> {
         let mut residuals = Vec::new();
-        self.pass(theta, &[], record, workspace, |_, counted, ws| {
+        self.process_record(theta, &[], record, workspace, |_, counted, ws| {
             // A short record is copied in one call, a long record span by span; the first call reserves memory for all
             // residuals.
             residuals.reserve_exact(self.data[record].u.len() - self.first - residuals.len());
@@ -85,8 +85,8 @@ impl Criterion<'_> {
     /// Returns the columns of psi in one record, from the first residual on, with the initial states projected out.
     pub fn jacobian(&self, theta: &[f64], record: usize, workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let data = self.data[record];
-        let states = self.residual_pass(theta, record, data, workspace);
-        self.gradient_pass(theta, &Block::ALL, data, workspace);
+        let states = self.compute_residuals(theta, record, data, workspace);
+        self.compute_filtered_signals(theta, &Block::ALL, data, workspace);
         let parts = Polynomials::split(&self.orders, theta);
         let project = |column: Column<'_>| {
             let mut column: Vec<f64> = column.values.iter().map(|x| column.sign * x).collect();
@@ -138,7 +138,7 @@ impl Objective for Criterion<'_> {
             InitialState::Backcast => d..d + o.nd,
             _ => 0..0,
         };
-        let blocks = [c..d, d + o.nd..o.parameters(), noise_poles];
+        let blocks = [c..d, d + o.nd..o.parameter_count(), noise_poles];
         let all = blocks.into_iter().chain(self.further_poles());
         all.filter(|block| !block.is_empty()).collect()
     }

@@ -14,7 +14,7 @@ use super::{
 use crate::{
     linalg::{
         least_squares::{add_scaled, dot},
-        products::{Lagged, gram},
+        products::{LaggedColumn, gram},
     },
     optimize::Linearisation,
 };
@@ -38,7 +38,7 @@ impl Criterion<'_> {
         total: &mut Linearisation,
     ) -> EliminatedStates {
         let parts = Polynomials::split(&self.orders, theta);
-        self.pass(theta, blocks, record, ws, |states, counted, ws| {
+        self.process_record(theta, blocks, record, ws, |states, counted, ws| {
             let columns = self.columns(&parts, counted.clone(), ws, blocks);
             self.accumulate(states, &columns, record, &ws.eps[counted], total);
         })
@@ -53,7 +53,7 @@ impl Criterion<'_> {
         blocks: &[Block],
     ) -> Vec<Column<'w>> {
         let (first, end) = (counted.start, counted.end);
-        let mut columns = Vec::with_capacity(self.orders.parameters());
+        let mut columns = Vec::with_capacity(self.orders.parameter_count());
         for &block in blocks {
             if block == Block::Further {
                 columns.extend(self.further_columns(&counted, ws));
@@ -134,15 +134,15 @@ fn add_products(states: &EliminatedStates, columns: &[Column<'_>], eps: &[f64], 
     for column in columns {
         inside.extend(states.responses.basis().map(|q| dot(q, &column.values[..q.len()])));
     }
-    let residuals = Lagged {
+    let residuals = LaggedColumn {
         values: eps,
         is_shift_of_previous: false,
     };
-    let lagged = columns.iter().map(|column| Lagged {
+    let lagged = columns.iter().map(|column| LaggedColumn {
         values: &column.values,
         is_shift_of_previous: column.is_shift_of_previous,
     });
-    let all: Vec<Lagged<'_>> = std::iter::once(residuals).chain(lagged).collect();
+    let all: Vec<LaggedColumn<'_>> = std::iter::once(residuals).chain(lagged).collect();
     let (raw, q) = (gram(&all), p + 1);
     total.sum_of_squares += raw[0];
     for (i, column) in columns.iter().enumerate() {

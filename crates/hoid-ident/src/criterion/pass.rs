@@ -21,22 +21,22 @@ use super::{
     polynomials::{Block, Polynomials},
     prediction_error::{Criterion, Data},
     signals::EliminatedStates,
-    whitening::whiten_on,
+    whitening::continue_whitening,
     workspace::Workspace,
 };
 
 /// Number of samples in a span: the signals of a span fill a quarter of the second-level cache.
-const SPAN: usize = 1 << 11;
+const SPAN_SAMPLES: usize = 1 << 11;
 
 /// Number of samples in the head. Only a record of at least twice this length is processed in spans; shorter records,
 /// up to several minutes, are processed as a whole.
-const HEAD: usize = 1 << 15;
+const HEAD_SAMPLES: usize = 1 << 15;
 
 impl Criterion<'_> {
     /// Processes a record and calls `visit` with the eliminated initial states, the rows of the workspace that contain
     /// the counted residuals, and the workspace. For a long record `visit` is called once per span. Returns the
     /// eliminated initial states.
-    pub(super) fn pass(
+    pub(super) fn process_record(
         &self,
         theta: &[f64],
         blocks: &[Block],
@@ -44,19 +44,19 @@ impl Criterion<'_> {
         ws: &mut Workspace,
         mut visit: impl FnMut(&EliminatedStates, Range<usize>, &Workspace),
     ) -> EliminatedStates {
-        if let Some(states) = self.pass_in_spans(theta, blocks, record, HEAD, ws, &mut visit) {
+        if let Some(states) = self.process_in_spans(theta, blocks, record, HEAD_SAMPLES, ws, &mut visit) {
             return states;
         }
         let data = self.data[record];
-        let states = self.residual_pass(theta, record, data, ws);
-        self.gradient_pass(theta, blocks, data, ws);
+        let states = self.compute_residuals(theta, record, data, ws);
+        self.compute_filtered_signals(theta, blocks, data, ws);
         visit(&states, ws.pad + self.first..ws.pad + data.u.len(), ws);
         states
     }
 
     /// Processes a record in spans. `visit` receives the eliminated initial states with the head, and empty states with
     /// the other spans. Returns `None`, without calling `visit`, if the record must be processed as a whole.
-    pub(super) fn pass_in_spans(
+    pub(super) fn process_in_spans(
         &self,
         theta: &[f64],
         blocks: &[Block],
@@ -68,7 +68,7 @@ impl Criterion<'_> {
         let Data { e, u, .. } = self.data[record];
         let plain = self.weights.is_none() && self.initial != InitialState::Backcast && self.further.is_empty();
         // A head that is not longer than the lags would contain no residuals.
-        let least = 2 * (self.first + self.orders.nk) + SPAN;
+        let least = 2 * (self.first + self.orders.nk) + SPAN_SAMPLES;
         if !plain || u.len() < 2 * head || head < least {
             return None;
         }
@@ -77,27 +77,27 @@ impl Criterion<'_> {
             u: &u[..head],
             ..self.data[record]
         };
-        let states = self.residual_pass(theta, record, head_data, ws);
+        let states = self.compute_residuals(theta, record, head_data, ws);
         if !states.responses.have_decayed(head - self.first) {
             return None;
         }
-        self.gradient_pass(theta, blocks, head_data, ws);
+        self.compute_filtered_signals(theta, blocks, head_data, ws);
         visit(&states, ws.pad + self.first..ws.pad + head, ws);
         let parts = Polynomials::split(&self.orders, theta);
         let nothing = EliminatedStates::default();
         let mut carried = head;
-        for from in (head..u.len()).step_by(SPAN) {
-            let to = (from + SPAN).min(u.len());
+        for from in (head..u.len()).step_by(SPAN_SAMPLES) {
+            let to = (from + SPAN_SAMPLES).min(u.len());
             ws.carry_over_tail(carried);
             carried = to - from;
-            self.next_span(&parts, blocks, self.data[record], from..to, ws);
+            self.compute_next_span(&parts, blocks, self.data[record], from..to, ws);
             visit(&nothing, ws.pad..ws.pad + carried, ws);
         }
         Some(states)
     }
 
     /// Computes the signals of the next span; the workspace starts with the last samples of the previous span.
-    fn next_span(
+    fn compute_next_span(
         &self,
         parts: &Polynomials<'_>,
         blocks: &[Block],
@@ -112,7 +112,7 @@ impl Criterion<'_> {
             s[pad..].copy_from_slice(&data.e[span.start - o.nk..span.end - o.nk]);
             divide_from(parts.f, s, pad);
         }
-        self.response(parts, data, span.clone(), pad, ws);
+        self.compute_response(parts, data, span.clone(), pad, ws);
         let Workspace {
             s,
             w,
@@ -123,21 +123,21 @@ impl Criterion<'_> {
             ..
         } = ws;
         let (v, w) = (&v[..end], &w[..end]);
-        whiten_on(parts.c, parts.d, v, &mut eps[..end], pad);
+        continue_whitening(parts.c, parts.d, v, &mut eps[..end], pad);
         for block in blocks {
             match block {
                 Block::A if o.na > 0 => {
                     let u = &mut scratch[..end];
                     u.copy_from_slice(&data.u[span.start - pad..span.end]);
-                    whiten_on(parts.c, parts.d, u, &mut xa[..end], pad);
+                    continue_whitening(parts.c, parts.d, u, &mut xa[..end], pad);
                 }
-                Block::B if o.nb > 0 => whiten_on(parts.c, parts.d, &s[..end], &mut xb[..end], pad),
-                Block::C if o.nc > 0 => whiten_on(parts.c, &[], &eps[..end], &mut xc[..end], pad),
+                Block::B if o.nb > 0 => continue_whitening(parts.c, parts.d, &s[..end], &mut xb[..end], pad),
+                Block::C if o.nc > 0 => continue_whitening(parts.c, &[], &eps[..end], &mut xc[..end], pad),
                 // With nc = 0 the signal for D is v itself.
-                Block::D if o.nd > 0 && o.nc > 0 => whiten_on(parts.c, &[], v, &mut xd[..end], pad),
+                Block::D if o.nd > 0 && o.nc > 0 => continue_whitening(parts.c, &[], v, &mut xd[..end], pad),
                 Block::F if o.nf > 0 => {
                     let poles = product(&monic(parts.c), &monic(parts.f));
-                    whiten_on(&poles[1..], parts.d, w, &mut xf[..end], pad);
+                    continue_whitening(&poles[1..], parts.d, w, &mut xf[..end], pad);
                 }
                 _ => {}
             }

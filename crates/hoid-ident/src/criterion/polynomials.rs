@@ -44,7 +44,7 @@ impl Block {
     pub(super) const ALL: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::F, Self::Further];
 
     /// Returns the indices of the coefficients of this block in theta.
-    pub fn place(self, o: &Orders) -> Range<usize> {
+    pub fn range(self, o: &Orders) -> Range<usize> {
         let counts = [o.na, o.nb, o.nc, o.nd, o.nf, 0];
         let from = counts[..self as usize].iter().sum();
         from..from + counts[self as usize]

@@ -50,7 +50,7 @@ pub(crate) fn output_variance(data: &[Data<'_>], first: usize) -> f64 {
 
 impl<'a> Criterion<'a> {
     /// Returns the criterion for one record, with equal weights of all residuals.
-    pub fn of_record(orders: Orders, data: Data<'a>, initial: InitialState, first: usize) -> Self {
+    pub fn for_record(orders: Orders, data: Data<'a>, initial: InitialState, first: usize) -> Self {
         Self {
             orders,
             data: vec![data],
@@ -62,18 +62,18 @@ impl<'a> Criterion<'a> {
     }
 
     /// Returns the number of residuals that count, over all records.
-    pub fn residuals(&self) -> usize {
+    pub fn residual_count(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
     /// Returns the number of coefficients, including the coefficients of the further inputs.
-    pub fn parameters(&self) -> usize {
+    pub fn parameter_count(&self) -> usize {
         let of_further: usize = self.further.iter().map(|f| f.orders.nb + f.orders.nf).sum();
-        self.orders.parameters() + of_further
+        self.orders.parameter_count() + of_further
     }
 
     /// Returns the number of initial states and levels of all records.
-    pub fn states(&self) -> usize {
+    pub fn state_count(&self) -> usize {
         let of_inputs = self.orders.nf + self.further.iter().map(|input| input.orders.nf).sum::<usize>();
         let of_record = match self.initial {
             InitialState::Zero => return 0,
@@ -85,7 +85,7 @@ impl<'a> Criterion<'a> {
     }
 
     /// Returns the first sample at which w and v are computed.
-    pub(super) fn first_regressed(&self) -> usize {
+    pub(super) fn first_regressed_sample(&self) -> usize {
         match self.initial {
             InitialState::Zero => 0,
             InitialState::Estimate => self.first - self.orders.nd,

@@ -12,7 +12,7 @@ use super::{
     prediction_error::{Criterion, Data},
     stationary_noise::StationaryNoise,
     whitening::{divide_and_whiten, whiten},
-    workspace::{Workspace, passes_once},
+    workspace::{Workspace, uses_single_pass},
 };
 use crate::linalg::least_squares::add_scaled;
 
@@ -26,7 +26,7 @@ pub(super) struct EliminatedStates {
 
 impl Criterion<'_> {
     /// Computes w, v and eps of a record, or of its head, with the least squares initial states.
-    pub(super) fn residual_pass(
+    pub(super) fn compute_residuals(
         &self,
         theta: &[f64],
         record: usize,
@@ -38,7 +38,7 @@ impl Criterion<'_> {
         let o = &self.orders;
         ws.allocate(o, &self.further, n);
         let pad = ws.pad;
-        let regressed = self.first_regressed();
+        let regressed = self.first_regressed_sample();
         let start = match self.initial {
             InitialState::Zero => 0,
             InitialState::Estimate | InitialState::Backcast => self.first,
@@ -48,8 +48,8 @@ impl Criterion<'_> {
         let from = pad + regressed;
         ws.w[..from].fill(0.0);
         ws.v[..from].fill(0.0);
-        self.response(&parts, data, regressed..n, from, ws);
-        self.further_responses(theta, record, regressed..n, ws);
+        self.compute_response(&parts, data, regressed..n, from, ws);
+        self.compute_further_responses(theta, record, regressed..n, ws);
         whiten(parts.c, parts.d, &ws.v, &mut ws.eps, pad + start);
 
         let weights = self.weights.map(|all| all[record].as_slice());
@@ -87,7 +87,7 @@ impl Criterion<'_> {
     }
 
     /// Computes `w = B s` and `v = A u - w` over these samples; the first sample has the index `from` in the workspace.
-    pub(super) fn response(
+    pub(super) fn compute_response(
         &self,
         parts: &Polynomials<'_>,
         data: Data<'_>,
@@ -130,10 +130,10 @@ impl Criterion<'_> {
     }
 
     /// Computes the filtered signals whose shifts are the columns of psi.
-    pub(super) fn gradient_pass(&self, theta: &[f64], blocks: &[Block], data: Data<'_>, ws: &mut Workspace) {
+    pub(super) fn compute_filtered_signals(&self, theta: &[f64], blocks: &[Block], data: Data<'_>, ws: &mut Workspace) {
         let parts = Polynomials::split(&self.orders, theta);
         let (o, pad) = (&self.orders, ws.pad);
-        let regressed = self.first_regressed();
+        let regressed = self.first_regressed_sample();
         if blocks.contains(&Block::A) {
             self.filter_output(&parts, data, ws);
         }
@@ -155,7 +155,7 @@ impl Criterion<'_> {
         }
         if o.nf > 0 && blocks.contains(&Block::F) {
             let from = pad + regressed;
-            if passes_once(o) {
+            if uses_single_pass(o) {
                 // w is zero before `from`.
                 let d1 = parts.d.first().copied().unwrap_or(0.0);
                 xf[..from].fill(0.0);

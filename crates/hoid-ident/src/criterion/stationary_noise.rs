@@ -24,7 +24,7 @@ use crate::linalg::least_squares::add_scaled;
 
 /// Number of doublings of the Lyapunov sum: 2^60 terms suffice for any stable pole whose modulus differs from one in
 /// double precision.
-const DOUBLINGS: usize = 60;
+const MAX_DOUBLINGS: usize = 60;
 
 /// Covariance of the initial state of a noise model.
 #[derive(Debug)]
@@ -56,7 +56,7 @@ impl StationaryNoise {
     }
 
     /// Returns the number of states.
-    pub fn states(&self) -> usize {
+    pub fn state_count(&self) -> usize {
         self.gain.len()
     }
 
@@ -74,7 +74,7 @@ impl StationaryNoise {
     /// contribution of the penalty to the descent `psi' eps`.
     pub fn descent(&self, z: &[f64], nc: usize, nd: usize) -> (Vec<f64>, Vec<f64>) {
         // The noise model has no states.
-        if self.states() == 0 {
+        if self.state_count() == 0 {
             return (Vec::new(), Vec::new());
         }
         let y = self.solve_transposed(z);
@@ -108,7 +108,7 @@ impl StationaryNoise {
 fn lyapunov(transition: &DMatrix<f64>, gain: &DVector<f64>) -> Option<DMatrix<f64>> {
     let mut sum = gain * gain.transpose();
     let mut power = transition.clone();
-    for _ in 0..DOUBLINGS {
+    for _ in 0..MAX_DOUBLINGS {
         let more = &power * &sum * power.transpose();
         sum += &more;
         let (size, change) = (sum.amax(), more.amax());

@@ -197,8 +197,8 @@ fn residuals_are_orthogonal_to_the_free_responses() {
         };
         let free = InitialStateResponses::of(&past, eps.len());
         assert_eq!(
-            (free.basis().count(), c.states()),
-            (c.states(), orders.nf + orders.nc + usize::from(level))
+            (free.basis().count(), c.state_count()),
+            (c.state_count(), orders.nf + orders.nc + usize::from(level))
         );
         for q in free.basis() {
             assert!(dot(q, &eps[..q.len()]).abs() < 1e-12);
@@ -326,7 +326,7 @@ fn gradient_is_exact_with_a_later_first_residual() {
         first: 40,
         ..criterion(orders, data, InitialState::Estimate)
     };
-    assert_eq!(late.residuals(), 260);
+    assert_eq!(late.residual_count(), 260);
     let mut ws = Workspace::default();
     let exact = late.linearise(&theta, &mut ws);
     let h = 1e-5;
@@ -349,7 +349,7 @@ fn add_in_spans(
     total: &mut Linearisation,
 ) -> Option<EliminatedStates> {
     let parts = Polynomials::split(&c.orders, theta);
-    c.pass_in_spans(theta, blocks, 0, head, ws, &mut |states, counted, ws| {
+    c.process_in_spans(theta, blocks, 0, head, ws, &mut |states, counted, ws| {
         let columns = c.columns(&parts, counted.clone(), ws, blocks);
         c.accumulate(states, &columns, 0, &ws.eps[counted], total);
     })
@@ -369,7 +369,7 @@ fn sums_over_spans_equal_sums_over_the_record() {
                 .into_iter()
                 .chain([Block::ALL.to_vec(), vec![Block::A, Block::B]]);
             for blocks in sets {
-                let p: usize = blocks.iter().map(|block| block.place(&orders).len()).sum();
+                let p: usize = blocks.iter().map(|block| block.range(&orders).len()).sum();
                 let nothing = Linearisation {
                     sum_of_squares: 0.0,
                     descent: vec![0.0; p],
@@ -382,11 +382,11 @@ fn sums_over_spans_equal_sums_over_the_record() {
                 assert!(states.is_some(), "{initial:?} {orders}");
                 assert!((whole.sum_of_squares - spans.sum_of_squares).abs() < 1e-12 * whole.sum_of_squares);
                 let mut residuals = Vec::new();
-                c.pass_in_spans(&theta, &[], 0, head, &mut ws, &mut |_, counted, ws| {
+                c.process_in_spans(&theta, &[], 0, head, &mut ws, &mut |_, counted, ws| {
                     residuals.extend_from_slice(&ws.eps[counted]);
                 })
                 .unwrap();
-                assert_eq!(residuals.len(), c.residuals());
+                assert_eq!(residuals.len(), c.residual_count());
                 for (a, b) in residuals.iter().zip(c.residuals_of(&theta, 0, &mut ws)) {
                     assert!((a - b).abs() < 1e-12, "{initial:?} {orders}: {a} and {b}");
                 }
@@ -607,5 +607,5 @@ fn residuals_of_noise_free_two_input_data_are_zero() {
     let theta = [0.2, -0.12, -0.4, -1.6, 0.7, 0.3, -0.9];
     let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
     assert!(eps.iter().all(|v| v.abs() < 1e-12));
-    assert_eq!(c.states(), 4);
+    assert_eq!(c.state_count(), 4);
 }

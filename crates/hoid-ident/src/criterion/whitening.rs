@@ -17,7 +17,7 @@ pub(super) fn divide_and_whiten([f1, f2]: [f64; 2], d1: f64, x: &[f64], y: &mut 
         before = s[3];
     }
     for (y, x) in y_rest.iter_mut().zip(x_rest) {
-        let s = filter.one(*x);
+        let s = filter.filter_one(*x);
         *y = s + d1 * before;
         before = s;
     }
@@ -31,12 +31,12 @@ pub(super) fn whiten(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize
         return;
     }
     y[..from].fill(0.0);
-    whiten_on(c, d, x, y, from);
+    continue_whitening(c, d, x, y, from);
 }
 
 /// Computes `y = (D/C) x` from index `from` on. The values of x and y before `from` must be the previous inputs and
 /// outputs of the filter.
-pub(super) fn whiten_on(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
+pub(super) fn continue_whitening(c: &[f64], d: &[f64], x: &[f64], y: &mut [f64], from: usize) {
     match *d {
         // The first lag is added while x is copied.
         [d1, ref rest @ ..] if from > 0 => {
@@ -60,11 +60,11 @@ fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) 
     let (fours, rest) = rest.as_chunks::<4>();
     let mut lag = first_lag;
     for d in eights {
-        add_several(d, lag, x, y, from);
+        add_lag_group(d, lag, x, y, from);
         lag += d.len();
     }
     for d in fours {
-        add_several(d, lag, x, y, from);
+        add_lag_group(d, lag, x, y, from);
         lag += d.len();
     }
     for (i, &di) in rest.iter().enumerate() {
@@ -73,7 +73,7 @@ fn add_lags(d: &[f64], first_lag: usize, x: &[f64], y: &mut [f64], from: usize) 
 }
 
 /// Computes `y(t) += sum_i d_i x(t - lag - i)` from index `from` on, in one pass.
-fn add_several<const N: usize>(d: &[f64; N], lag: usize, x: &[f64], y: &mut [f64], from: usize) {
+fn add_lag_group<const N: usize>(d: &[f64; N], lag: usize, x: &[f64], y: &mut [f64], from: usize) {
     // The lags are added one by one up to the sample at which all of them are inside x.
     let whole = from.max(lag + N - 1).min(y.len());
     for (i, &di) in d.iter().enumerate() {

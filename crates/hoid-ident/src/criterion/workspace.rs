@@ -32,16 +32,16 @@ thread_local! {
 /// Workspace for one fit, reused by the next fit on the same thread: allocating new memory pages for each fit would
 /// take a quarter of the time of a study. The contents are overwritten before they are read.
 #[derive(Debug, Default)]
-pub(crate) struct Borrowed(Workspace);
+pub(crate) struct BorrowedWorkspace(Workspace);
 
 impl Workspace {
     /// Returns the workspace of this thread, or a new one if it is in use.
-    pub fn of_thread() -> Borrowed {
-        Borrowed(LAST_WORKSPACE.take().unwrap_or_default())
+    pub fn borrow_from_thread() -> BorrowedWorkspace {
+        BorrowedWorkspace(LAST_WORKSPACE.take().unwrap_or_default())
     }
 }
 
-impl Deref for Borrowed {
+impl Deref for BorrowedWorkspace {
     type Target = Workspace;
 
     fn deref(&self) -> &Workspace {
@@ -49,13 +49,13 @@ impl Deref for Borrowed {
     }
 }
 
-impl DerefMut for Borrowed {
+impl DerefMut for BorrowedWorkspace {
     fn deref_mut(&mut self) -> &mut Workspace {
         &mut self.0
     }
 }
 
-impl Drop for Borrowed {
+impl Drop for BorrowedWorkspace {
     fn drop(&mut self) {
         if self.0.eps.capacity() <= MAX_KEPT_SAMPLES {
             LAST_WORKSPACE.set(Some(std::mem::take(&mut self.0)));
@@ -81,7 +81,7 @@ impl Workspace {
             (&mut self.w, true),
             (&mut self.v, true),
             (&mut self.eps, true),
-            (&mut self.scratch, o.na > 0 || (o.nf > 0 && !passes_once(o))),
+            (&mut self.scratch, o.na > 0 || (o.nf > 0 && !uses_single_pass(o))),
             (a, o.na > 0),
             (b, o.nb > 0),
             (c, o.nc > 0),
@@ -95,6 +95,6 @@ impl Workspace {
 
 /// True if nf = 2, nc = 0 and nd <= 1, as for an operator with first-order noise: the signal for F is then computed in
 /// one pass.
-pub(super) fn passes_once(o: &Orders) -> bool {
+pub(super) fn uses_single_pass(o: &Orders) -> bool {
     (o.nc, o.nf) == (0, 2) && o.nd <= 1
 }

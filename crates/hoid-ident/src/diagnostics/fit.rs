@@ -15,11 +15,11 @@ use super::{
 use crate::{Choice, Fit, IdentError};
 
 /// Residuals are only rounding errors of the data if their power is below this share of the power of u.
-const ROUNDING: f64 = 1e-22;
+const ROUNDING_POWER_SHARE: f64 = 1e-22;
 /// Minimum number of residuals per unknown; with fewer residuals a fit carries no information.
 const MIN_RESIDUALS: usize = 5;
 /// Significance level of the test of b against zero.
-const LEVEL: f64 = 0.05;
+const SIGNIFICANCE_LEVEL: f64 = 0.05;
 
 impl Fit {
     /// Returns the verdict on the fit. `records` are the records of the fit; `choice` is the search that chose its
@@ -29,11 +29,11 @@ impl Fit {
     /// The errors of [`Fit::residuals`].
     pub fn verdict(&self, records: &[Record], choice: Option<&Choice>) -> Result<Verdict, IdentError> {
         let mut all: Vec<Finding> = search_finding(self.termination).into_iter().collect();
-        all.extend(choice.and_then(delay_at_end));
-        all.extend(self.too_few());
+        all.extend(choice.and_then(delay_limit_finding));
+        all.extend(self.residual_count_finding());
         all.extend(self.system_findings());
         // Residuals that are only rounding errors carry no information.
-        if let Some(share) = self.rounding() {
+        if let Some(share) = self.rounding_error_share() {
             all.push(Finding::note(
                 "no-noise",
                 format!(
@@ -51,13 +51,13 @@ impl Fit {
 
     /// Returns the power of the residuals as a share of the power of u if the residuals are only rounding errors of the
     /// data, otherwise `None`.
-    pub fn rounding(&self) -> Option<f64> {
+    pub fn rounding_error_share(&self) -> Option<f64> {
         let share = self.loss / self.output_variance;
-        (share < ROUNDING).then_some(share)
+        (share < ROUNDING_POWER_SHARE).then_some(share)
     }
 
     /// Returns a finding if there are too few residuals for the number of unknowns.
-    fn too_few(&self) -> Option<Finding> {
+    fn residual_count_finding(&self) -> Option<Finding> {
         let unknowns = self.model.theta().len() + self.states;
         (self.covariance.is_some() && self.residuals < MIN_RESIDUALS * unknowns).then(|| {
             Finding::undetermined(
@@ -76,7 +76,7 @@ impl Fit {
     fn system_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         if !self.model.is_stable() {
-            all.push(Finding::doubt(
+            all.push(Finding::warning(
                 "unstable",
                 "the model is unstable, but a person's response to a brief error dies out; lower the orders, or \
                  require a stable model",
@@ -97,12 +97,12 @@ impl Fit {
                 | NotConvertible::PolesInBoth { .. }
                 | NotConvertible::OtherForm { .. },
             ) => {}
-            Err(reason) => all.push(Finding::doubt(
+            Err(reason) => all.push(Finding::warning(
                 "not-convertible",
                 format!("the coefficients do not correspond to any operator: {reason}"),
             )),
         }
-        if self.responds() == Some(false) {
+        if self.responds_to_input() == Some(false) {
             all.push(Finding::undetermined(
                 "gain",
                 "B does not differ significantly from zero (5 % level): u responds too little to e",
@@ -112,7 +112,7 @@ impl Fit {
     }
 
     /// True if b differs significantly from zero; `None` if the covariance of b is unknown or singular.
-    fn responds(&self) -> Option<bool> {
+    fn responds_to_input(&self) -> Option<bool> {
         let covariance = self.covariance.as_ref()?;
         let names = self.orders().parameter_names();
         let p = names.len();
@@ -126,7 +126,9 @@ impl Fit {
         let b = DVector::from_fn(of_b.len(), |i, _| self.model.theta()[of_b[i]]);
         let statistic = b.dot(&block.cholesky()?.solve(&b));
         let distribution = ChiSquared::new(of_b.len() as f64).ok()?;
-        statistic.is_finite().then(|| distribution.sf(statistic) < LEVEL)
+        statistic
+            .is_finite()
+            .then(|| distribution.sf(statistic) < SIGNIFICANCE_LEVEL)
     }
 
     fn residual_measures(&self, records: &[Record]) -> Result<ResidualMeasures, IdentError> {
@@ -158,22 +160,22 @@ impl Fit {
                 Finding::note(finding.kind, words)
             };
             return measures
-                .coloured()
+                .noise_model_finding()
                 .map(note)
                 .into_iter()
-                .chain(measures.leverage())
+                .chain(measures.leverage_finding())
                 .collect();
         }
         // A robust loss has already reduced the weight of single samples.
-        let leverage = measures.leverage().filter(|_| !self.robust);
-        let others = [measures.coloured(), measures.structure()];
+        let leverage = measures.leverage_finding().filter(|_| !self.robust);
+        let others = [measures.noise_model_finding(), measures.structure_finding()];
         others.into_iter().flatten().chain(leverage).collect()
     }
 }
 
 /// Returns a finding if the delay is at an end of the range of delays that was searched with the other orders of the
 /// chosen model.
-fn delay_at_end(choice: &Choice) -> Option<Finding> {
+fn delay_limit_finding(choice: &Choice) -> Option<Finding> {
     let chosen = choice.fit.orders();
     let same = |o: &Orders| Orders { nk: chosen.nk, ..*o } == chosen;
     let searched = || choice.candidates.iter().map(|c| c.orders).filter(same).map(|o| o.nk);
@@ -195,12 +197,12 @@ mod tests {
     use super::*;
     use crate::{Estimator, InstrumentalVariable, IvMethod, order_selection, order_selection::OrderRanges};
 
-    fn simulated(condition: Condition) -> Record {
+    fn simulated_record(condition: Condition) -> Record {
         let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
         simulator.run(RunSeed::default(), false).unwrap()
     }
 
-    fn kinds(verdict: &Verdict) -> Vec<&'static str> {
+    fn finding_kinds(verdict: &Verdict) -> Vec<&'static str> {
         verdict.findings().iter().map(|f| f.kind).collect()
     }
 
@@ -208,7 +210,7 @@ mod tests {
         Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk))
     }
 
-    fn fitted(estimator: &Estimator, record: &Record) -> Verdict {
+    fn fit_verdict(estimator: &Estimator, record: &Record) -> Verdict {
         let records = std::slice::from_ref(record);
         estimator.fit(records).unwrap().verdict(records, None).unwrap()
     }
@@ -234,16 +236,16 @@ mod tests {
     #[test]
     fn clean_runs_of_the_thesis_are_trustworthy() {
         for condition in [Condition::C1, Condition::C2] {
-            let record = simulated(condition);
-            let verdict = fitted(&box_jenkins(29), &record);
+            let record = simulated_record(condition);
+            let verdict = fit_verdict(&box_jenkins(29), &record);
             assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{condition:?}: {verdict}");
-            assert!(kinds(&verdict).is_empty(), "{verdict}");
+            assert!(finding_kinds(&verdict).is_empty(), "{verdict}");
         }
     }
 
     #[test]
     fn delay_at_the_end_of_its_range_is_reported() {
-        let record = simulated(Condition::C1);
+        let record = simulated_record(Condition::C1);
         let records = std::slice::from_ref(&record);
         let mut ranges = OrderRanges::from(Structure::BoxJenkins.operator_orders(29));
         ranges.nk = 20..=24;
@@ -251,15 +253,15 @@ mod tests {
         let choice = order_selection::choose_orders(&box_jenkins(20), &ranges, criterion, records).unwrap();
         let verdict = choice.fit.verdict(records, Some(&choice)).unwrap();
         assert_eq!(verdict.level, VerdictLevel::Doubtful);
-        assert!(kinds(&verdict).contains(&"delay-at-bound"), "{verdict}");
+        assert!(finding_kinds(&verdict).contains(&"delay-at-bound"), "{verdict}");
         ranges.nk = 27..=31;
         let choice = order_selection::choose_orders(&box_jenkins(29), &ranges, criterion, records).unwrap();
-        assert!(kinds(&choice.fit.verdict(records, Some(&choice)).unwrap()).is_empty());
+        assert!(finding_kinds(&choice.fit.verdict(records, Some(&choice)).unwrap()).is_empty());
     }
 
     #[test]
     fn unrelated_output_is_not_determined() {
-        let record = simulated(Condition::C1);
+        let record = simulated_record(Condition::C1);
         let other = with_output(&record, noise(record.len()));
         let records = std::slice::from_ref(&other);
         let of = |structure: Structure, orders: Orders| {
@@ -278,29 +280,29 @@ mod tests {
             },
         );
         assert_eq!(fir.level, VerdictLevel::NotDetermined, "{fir}");
-        assert_eq!(kinds(&fir), ["gain"], "{fir}");
+        assert_eq!(finding_kinds(&fir), ["gain"], "{fir}");
     }
 
     #[test]
     fn poor_noise_model_and_outlier_are_reported() {
-        let record = simulated(Condition::C1);
+        let record = simulated_record(Condition::C1);
         let oe = Estimator::new(Structure::OutputError, Structure::OutputError.operator_orders(29));
-        assert!(kinds(&fitted(&oe, &record)).contains(&"residuals-not-white"));
+        assert!(finding_kinds(&fit_verdict(&oe, &record)).contains(&"residuals-not-white"));
         let mut output = record.output().to_vec();
         output[4000] += 50.0 * output.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-        let verdict = fitted(&box_jenkins(29), &with_output(&record, output.clone()));
-        assert!(kinds(&verdict).contains(&"leverage"), "{verdict}");
+        let verdict = fit_verdict(&box_jenkins(29), &with_output(&record, output.clone()));
+        assert!(finding_kinds(&verdict).contains(&"leverage"), "{verdict}");
         let robust = Estimator {
             loss: crate::Loss::Huber { threshold: 1.345 },
             ..box_jenkins(29)
         };
-        let verdict = fitted(&robust, &with_output(&record, output));
-        assert!(!kinds(&verdict).contains(&"leverage"), "{verdict}");
+        let verdict = fit_verdict(&robust, &with_output(&record, output));
+        assert!(!finding_kinds(&verdict).contains(&"leverage"), "{verdict}");
     }
 
     #[test]
     fn coloured_residuals_of_instruments_are_only_a_note() {
-        let record = simulated(Condition::C1);
+        let record = simulated_record(Condition::C1);
         let records = std::slice::from_ref(&record);
         let orders = Structure::OutputError.operator_orders(29);
         let estimator = InstrumentalVariable {
@@ -308,19 +310,19 @@ mod tests {
             ..InstrumentalVariable::new(IvMethod::Sriv, orders)
         };
         let verdict = estimator.fit(records).unwrap().verdict(records, None).unwrap();
-        assert_eq!(kinds(&verdict), ["residuals-not-white"], "{verdict}");
+        assert_eq!(finding_kinds(&verdict), ["residuals-not-white"], "{verdict}");
         assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{verdict}");
     }
 
     #[test]
     fn unconvertible_and_unstable_coefficients_are_reported() {
         let of = |f1: f64, f2: f64| {
-            let mut fit = box_jenkins(29).fit(&[simulated(Condition::C1)]).unwrap();
+            let mut fit = box_jenkins(29).fit(&[simulated_record(Condition::C1)]).unwrap();
             let mut theta = fit.model.theta().to_vec();
             let places = fit.model.operator_positions();
             (theta[places[2]], theta[places[3]]) = (f1, f2);
             fit.model =
-                hoid_model::PolynomialModel::new(Structure::BoxJenkins, fit.orders(), SampleTime::HUNDREDTH, theta)
+                hoid_model::PolynomialModel::new(Structure::BoxJenkins, fit.orders(), SampleTime::AT_100_HZ, theta)
                     .unwrap();
             fit.system_findings()
         };
@@ -340,20 +342,20 @@ mod tests {
 
     #[test]
     fn model_without_input_is_judged_by_its_residuals() {
-        let record = simulated(Condition::C1);
+        let record = simulated_record(Condition::C1);
         let output = Channel::new("u", "", noise(3000));
-        let white = Record::of_output(record.sample_time(), output).unwrap();
+        let white = Record::from_output(record.sample_time(), output).unwrap();
         let orders = Orders {
             na: 1,
             ..Orders::default()
         };
-        let verdict = fitted(&Estimator::new(Structure::Ar, orders), &white);
-        assert!(kinds(&verdict).is_empty(), "{verdict}");
+        let verdict = fit_verdict(&Estimator::new(Structure::Ar, orders), &white);
+        assert!(finding_kinds(&verdict).is_empty(), "{verdict}");
         let shocks = noise(3001);
         let moving_average = shocks.windows(2).map(|w| w[1] + 0.9 * w[0]).collect();
         let output = Channel::new("u", "", moving_average);
-        let coloured = Record::of_output(record.sample_time(), output).unwrap();
-        let verdict = fitted(&Estimator::new(Structure::Ar, orders), &coloured);
-        assert_eq!(kinds(&verdict), ["residuals-not-white"], "{verdict}");
+        let coloured = Record::from_output(record.sample_time(), output).unwrap();
+        let verdict = fit_verdict(&Estimator::new(Structure::Ar, orders), &coloured);
+        assert_eq!(finding_kinds(&verdict), ["residuals-not-white"], "{verdict}");
     }
 }

@@ -3,7 +3,7 @@
 use hoid_model::{Finding, Record, Verdict, uncertainty::OperatorEstimate};
 
 use super::{
-    constancy::{Constancy, Direction, RUN_TO_RUN, physical_blocks},
+    constancy::{Constancy, Direction, RUN_TO_RUN_DEVIATION, physical_score_blocks},
     operator::{delay_finding, gain_findings, pole_findings, search_finding},
     residuals::ResidualMeasures,
 };
@@ -11,7 +11,7 @@ use crate::{
     GreyBoxFit, IdentError,
     criterion::{Data, Workspace, first_residual},
     grey_box::{
-        layout::{self, DELAY, LEAD, TIME_CONSTANT},
+        layout::{self, DELAY_SLOT, LEAD_SLOT, TIME_CONSTANT_SLOT},
         objective::PhysicalCriterion,
     },
 };
@@ -29,7 +29,7 @@ impl GreyBoxFit {
             .names
             .iter()
             .enumerate()
-            .filter(|(i, _)| layout.slots[*i] == DELAY)
+            .filter(|(i, _)| layout.slots[*i] == DELAY_SLOT)
         {
             let of = match name.strip_prefix("tau_e") {
                 Some("") | None => String::new(),
@@ -60,7 +60,7 @@ impl GreyBoxFit {
             };
             match self.operator(record) {
                 Ok(operator) => operators.push((label, operator)),
-                Err(reason) => all.push(Finding::doubt(
+                Err(reason) => all.push(Finding::warning(
                     "not-convertible",
                     format!("the coefficients{label} do not correspond to any operator: {reason}"),
                 )),
@@ -93,7 +93,7 @@ impl GreyBoxFit {
         let initial = self.polynomial_fit(0).initial_state();
         let first = first_residual(&layout::orders(layout.order, layout.longest_nk().ok()?), initial);
         let criterion = PhysicalCriterion::new(layout.clone(), Data::of(records), initial, first);
-        let blocks = physical_blocks(&criterion, &self.eta, &self.free, &mut Workspace::of_thread())?;
+        let blocks = physical_score_blocks(&criterion, &self.eta, &self.free, &mut Workspace::borrow_from_thread())?;
         let direction = |place: &usize| {
             let (slot, p) = (layout.slots[*place], self.eta.len());
             let individual = layout.names[*place].contains('[');
@@ -102,21 +102,24 @@ impl GreyBoxFit {
             Direction {
                 name: layout.names[*place].clone(),
                 unit: match slot {
-                    LEAD | DELAY => " s",
+                    LEAD_SLOT | DELAY_SLOT => " s",
                     2 => " rad/s",
                     _ => "",
                 },
                 vector,
-                delay: slot == DELAY,
+                delay: slot == DELAY_SLOT,
                 size: if individual { 0.0 } else { self.eta[*place].abs() },
             }
         };
-        let of_operator = self.free.iter().filter(|place| layout.slots[**place] != TIME_CONSTANT);
+        let of_operator = self
+            .free
+            .iter()
+            .filter(|place| layout.slots[**place] != TIME_CONSTANT_SLOT);
         let constancy = Constancy {
             blocks: &blocks,
             directions: &of_operator.map(direction).collect::<Vec<_>>(),
             variance: self.innovation_variance(),
-            run_to_run: RUN_TO_RUN,
+            run_to_run: RUN_TO_RUN_DEVIATION,
             sample_time_s: layout.sample_time.s(),
         };
         Some(constancy.findings())
@@ -128,7 +131,7 @@ impl GreyBoxFit {
             .enumerate()
             .map(|(k, record)| self.polynomial_fit(k).residuals(record))
             .collect::<Result<Vec<_>, _>>()?;
-        Ok(ResidualMeasures::of_series(
+        Ok(ResidualMeasures::from_series(
             &found,
             records,
             self.layout.sample_time.s(),

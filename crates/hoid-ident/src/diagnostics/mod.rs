@@ -48,9 +48,9 @@ pub mod second_opinion;
 mod sigmoid;
 mod whitened;
 
-pub use constancy::{Course, RUN_TO_RUN, ResponseBasis, ResponseChange, response_changes};
+pub use constancy::{RUN_TO_RUN_DEVIATION, ResponseBasis, ResponseChange, TimeCourse, response_changes};
 pub use loop_response::{LoopResponse, loop_response};
-pub use no_response::{Response, response};
+pub use no_response::{Response, response_to_error};
 pub use operator::{gain_findings, has_negative_lead, is_undetermined, neuromuscular_finding, pole_findings};
 pub use operator_step::{OperatorStep, operator_step};
 pub use recorded_element::{RecordedElement, recorded_element};

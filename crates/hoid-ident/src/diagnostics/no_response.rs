@@ -3,16 +3,16 @@
 //! A search over forms, delays and orders finds a response in any pair of signals, so its result is only weak evidence
 //! of a response. This test is therefore done before the search, for all forms at once. Each channel is whitened by an
 //! autoregression, so a slow component does not count as many independent samples. At the frequencies `omega_k` of the
-//! record up to [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e, followed by a
+//! record up to [`MAX_FREQUENCY_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e, followed by a
 //! typical neuromuscular system and a delay,
 //!
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
 //!
 //! where b is real. T is the share of the power of U that this regression explains, maximised over the delays
 //! [`DELAYS_S`]. Surrogate records have the same spectra, but random phases of E and therefore no relation between e
-//! and u (J. Theiler et al., *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATES`] such records give the
+//! and u (J. Theiler et al., *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATE_COUNT`] such records give the
 //! distribution of T if there is no response. If u does not depend on e, T is one more draw from this distribution: the
-//! probability that it exceeds all others is 1/([`SURROGATES`] + 1), regardless of the spectra. Only the past of e is
+//! probability that it exceeds all others is 1/([`SURROGATE_COUNT`] + 1), regardless of the spectra. Only the past of e is
 //! used, so a response of e to u does not count as a response of u. Several records have the same b.
 
 use std::f64::consts::{PI, TAU};
@@ -24,23 +24,23 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
-use super::whitened::{NOISE, thinning};
+use super::whitened::{NOISE_ORDER, decimation_factor};
 use crate::{family::noise::NoiseProducts, frequency::spectrum, linalg::least_squares::solve_symmetric};
 
 /// Highest frequency that is tested, rad/s.
-const HIGHEST_RAD_S: f64 = 25.0;
+const MAX_FREQUENCY_RAD_S: f64 = 25.0;
 /// Tested delays, s.
 const DELAYS_S: [f64; 8] = [0.05, 0.1, 0.16, 0.23, 0.31, 0.4, 0.52, 0.7];
 /// Pole of the lag, 1/s.
 const LAG_RATE: f64 = 0.3;
 /// Typical neuromuscular system: natural frequency in rad/s, and damping ratio.
-const NEUROMUSCULAR: (f64, f64) = (11.0, 0.4);
+const NEUROMUSCULAR_PARAMETERS: (f64, f64) = (11.0, 0.4);
 /// Number of surrogate records without a relation between e and u.
-const SURROGATES: usize = 1999;
+const SURROGATE_COUNT: usize = 1999;
 /// Minimum number of frequencies for the test.
 const MIN_FREQUENCIES: usize = 12;
 const SEED: u64 = 0x686f_6964;
-const COLUMNS: usize = 3;
+const COLUMN_COUNT: usize = 3;
 
 /// Result of the test of whether u responds to e.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,14 +84,14 @@ struct Spectra {
     e: Vec<Complex64>,
     u: Vec<Complex64>,
     /// Columns of the regression without the delay and without E: `(A_u/A_e) N G_j`.
-    columns: Vec<[Complex64; COLUMNS]>,
+    columns: Vec<[Complex64; COLUMN_COUNT]>,
     /// `e^{-j omega tau}` for each tested delay.
     delays: Vec<Vec<Complex64>>,
 }
 
 /// Tests whether u responds to e in the records of a person. `None` if there are too few data, a value is not a number
 /// or a signal is constant.
-pub fn response(records: &[Record]) -> Option<Response> {
+pub fn response_to_error(records: &[Record]) -> Option<Response> {
     let all: Option<Vec<Spectra>> = records.iter().map(Spectra::of).collect();
     let all = all?;
     if all.iter().map(|s| s.u.len()).sum::<usize>() < MIN_FREQUENCIES {
@@ -101,10 +101,10 @@ pub fn response(records: &[Record]) -> Option<Response> {
     let inverse = inverse_gram(&all)?;
     // Products of columns and output for each frequency and delay; a surrogate changes only the phases of these
     // products.
-    let products: Vec<[[Complex64; COLUMNS]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
+    let products: Vec<[[Complex64; COLUMN_COUNT]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
     let mut turns = vec![Complex64::ONE; products.len()];
     let share = |turns: &[Complex64]| -> f64 {
-        let mut sums = [[0.0; COLUMNS]; DELAYS_S.len()];
+        let mut sums = [[0.0; COLUMN_COUNT]; DELAYS_S.len()];
         for (product, turn) in products.iter().zip(turns) {
             for (sum, column) in sums.iter_mut().zip(product) {
                 for (s, c) in sum.iter_mut().zip(column) {
@@ -121,7 +121,7 @@ pub fn response(records: &[Record]) -> Option<Response> {
     }
     let mut generator = ChaCha8Rng::seed_from_u64(SEED);
     let mut surrogates_above = 0;
-    for _ in 0..SURROGATES {
+    for _ in 0..SURROGATE_COUNT {
         for turn in &mut turns {
             // A resolution of 32 bits is more than sufficient for a phase.
             *turn = Complex64::from_polar(1.0, TAU * f64::from(generator.next_u32()) / 4_294_967_296.0);
@@ -131,47 +131,47 @@ pub fn response(records: &[Record]) -> Option<Response> {
     Some(Response {
         share: own,
         surrogates_above,
-        surrogates: SURROGATES,
+        surrogates: SURROGATE_COUNT,
     })
 }
 
 /// Returns the inverse of `sum Re(x_i* x_j)` by rows. This matrix depends neither on the delay nor on the phases of E.
 /// `None` if the columns are linearly dependent.
 fn inverse_gram(all: &[Spectra]) -> Option<Vec<f64>> {
-    let mut gram = [0.0; COLUMNS * COLUMNS];
+    let mut gram = [0.0; COLUMN_COUNT * COLUMN_COUNT];
     for spectra in all {
         for (columns, e) in spectra.columns.iter().zip(&spectra.e) {
-            for i in 0..COLUMNS {
-                for j in 0..COLUMNS {
-                    gram[i * COLUMNS + j] += (columns[i].conj() * columns[j]).re * e.norm_sqr();
+            for i in 0..COLUMN_COUNT {
+                for j in 0..COLUMN_COUNT {
+                    gram[i * COLUMN_COUNT + j] += (columns[i].conj() * columns[j]).re * e.norm_sqr();
                 }
             }
         }
     }
     let column = |i: usize| {
-        let unit: [f64; COLUMNS] = std::array::from_fn(|j| f64::from(i == j));
+        let unit: [f64; COLUMN_COUNT] = std::array::from_fn(|j| f64::from(i == j));
         solve_symmetric(&gram, &unit)
     };
-    let columns: Option<Vec<Vec<f64>>> = (0..COLUMNS).map(column).collect();
+    let columns: Option<Vec<Vec<f64>>> = (0..COLUMN_COUNT).map(column).collect();
     Some(columns?.concat())
 }
 
 impl Spectra {
     fn of(record: &Record) -> Option<Self> {
-        let thin = thinning(record.sample_time().s());
+        let thin = decimation_factor(record.sample_time().s());
         let sample_time_s = thin as f64 * record.sample_time().s();
-        let (e, d_e) = whitened(record.input(), thin)?;
-        let (u, d_u) = whitened(record.output(), thin)?;
+        let (e, d_e) = whiten(record.input(), thin)?;
+        let (u, d_u) = whiten(record.output(), thin)?;
         let n = e.len();
-        let highest = HIGHEST_RAD_S.min(0.8 * PI / sample_time_s);
+        let highest = MAX_FREQUENCY_RAD_S.min(0.8 * PI / sample_time_s);
         let of_bin = TAU / (n as f64 * sample_time_s);
         let bins = 1..=((highest / of_bin) as usize).min((n - 1) / 2);
         let omegas: Vec<f64> = bins.clone().map(|k| k as f64 * of_bin).collect();
-        let (own, damping) = NEUROMUSCULAR;
+        let (own, damping) = NEUROMUSCULAR_PARAMETERS;
         let columns = |&omega: &f64| {
             let s = Complex64::new(0.0, omega);
             let muscles = own * own / (s * s + 2.0 * damping * own * s + own * own);
-            let whitening = filter(&d_u, omega * sample_time_s) / filter(&d_e, omega * sample_time_s);
+            let whitening = filter_response(&d_u, omega * sample_time_s) / filter_response(&d_e, omega * sample_time_s);
             [Complex64::ONE, s, 1.0 / (s + LAG_RATE)].map(|g| whitening * muscles * g)
         };
         let delays = |tau: f64| {
@@ -179,14 +179,14 @@ impl Spectra {
             omegas.iter().map(turn).collect()
         };
         Some(Self {
-            e: coefficients(&e, bins.clone()),
-            u: coefficients(&u, bins),
+            e: fourier_coefficients(&e, bins.clone()),
+            u: fourier_coefficients(&u, bins),
             columns: omegas.iter().map(columns).collect(),
             delays: DELAYS_S.map(delays).into(),
         })
     }
 
-    fn products(&self) -> impl Iterator<Item = [[Complex64; COLUMNS]; DELAYS_S.len()]> {
+    fn products(&self) -> impl Iterator<Item = [[Complex64; COLUMN_COUNT]; DELAYS_S.len()]> {
         (0..self.u.len()).map(|k| {
             std::array::from_fn(|delay| {
                 self.columns[k].map(|column| (self.delays[delay][k] * column * self.e[k]).conj() * self.u[k])
@@ -196,25 +196,25 @@ impl Spectra {
 }
 
 /// Returns the decimated channel, whitened by its own autoregression, and the coefficients of this autoregression.
-fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
+fn whiten(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
     // Averaging attenuates the components above the new Nyquist frequency before decimation.
     let mut thinned: Vec<f64> = (channel.chunks_exact(thin)).map(mean).collect();
     let mean = mean(&thinned);
     thinned.iter_mut().for_each(|v| *v -= mean);
-    if thinned.len() < 8 * NOISE || !thinned.iter().all(|v| v.is_finite()) {
+    if thinned.len() < 8 * NOISE_ORDER || !thinned.iter().all(|v| v.is_finite()) {
         return None;
     }
     let series = [thinned];
-    let d = NoiseProducts::new(&series, NOISE).fit(NOISE)?.d;
+    let d = NoiseProducts::new(&series, NOISE_ORDER).fit(NOISE_ORDER)?.d;
     let [thinned] = series;
-    let white = (NOISE..thinned.len())
+    let white = (NOISE_ORDER..thinned.len())
         .map(|t| thinned[t] + (d.iter().enumerate()).map(|(k, d)| d * thinned[t - k - 1]).sum::<f64>())
         .collect();
     Some((white, d))
 }
 
 /// Returns the frequency response `1 + d_1 e^{-j w} + ..` at `w = omega_ts`.
-fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
+fn filter_response(d: &[f64], omega_ts: f64) -> Complex64 {
     let terms = d.iter().enumerate();
     terms.fold(Complex64::ONE, |sum, (k, d)| {
         sum + d * Complex64::from_polar(1.0, -omega_ts * (k + 1) as f64)
@@ -222,7 +222,7 @@ fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
 }
 
 /// Returns the Fourier coefficients `sum x_t e^{-j omega t}` in these bins.
-fn coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
+fn fourier_coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
     // Converts amplitudes of sinusoids to sums, so the weight of a record is proportional to its length.
     let scale = 0.5 * values.len() as f64;
     spectrum::coefficients(values)[bins].iter().map(|x| x * scale).collect()
@@ -240,7 +240,7 @@ mod tests {
 
     fn record(e: Vec<f64>, u: Vec<f64>) -> Record {
         Record::new(
-            SampleTime::HUNDREDTH,
+            SampleTime::AT_100_HZ,
             Channel::new("e", "", e),
             Channel::new("u", "", u),
         )
@@ -270,7 +270,7 @@ mod tests {
         for seed in 0..400 {
             let slow = [0.99, [0.999, 0.9, 0.5, 0.98][seed as usize % 4]];
             let (e, u) = (noise(2 * seed, slow, 4000), noise(2 * seed + 1, [0.95, slow[1]], 4000));
-            let found = response(&[record(e, u)]).unwrap();
+            let found = response_to_error(&[record(e, u)]).unwrap();
             small += usize::from(found.p_value() < 0.05);
         }
         assert!((4..40).contains(&small), "{small} of 400");
@@ -283,7 +283,7 @@ mod tests {
                 Some(-*y)
             })
             .collect();
-        assert!(response(&[record(e, u)]).unwrap().finding().is_some());
+        assert!(response_to_error(&[record(e, u)]).unwrap().finding().is_some());
     }
 
     #[test]
@@ -291,7 +291,7 @@ mod tests {
         for condition in [Condition::C1, Condition::C2, Condition::C3] {
             let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
             let run = simulator.run(RunSeed::default(), false).unwrap();
-            let found = response(&[run]).unwrap();
+            let found = response_to_error(&[run]).unwrap();
             assert_eq!(found.surrogates_above, 0, "{found:?}");
             assert!(found.p_value() < 1e-3 && found.finding().is_none());
         }
@@ -299,11 +299,14 @@ mod tests {
 
     #[test]
     fn too_little_data_gives_no_result() {
-        assert_eq!(response(&[record(vec![0.0; 4000], noise(1, [0.9, 0.9], 4000))]), None);
         assert_eq!(
-            response(&[record(noise(1, [0.9, 0.9], 60), noise(2, [0.9, 0.9], 60))]),
+            response_to_error(&[record(vec![0.0; 4000], noise(1, [0.9, 0.9], 4000))]),
             None
         );
-        assert_eq!(response(&[]), None);
+        assert_eq!(
+            response_to_error(&[record(noise(1, [0.9, 0.9], 60), noise(2, [0.9, 0.9], 60))]),
+            None
+        );
+        assert_eq!(response_to_error(&[]), None);
     }
 }

@@ -13,7 +13,7 @@ use crate::{Reason, Termination};
 /// A value within this number of its standard errors of zero counts as undetermined.
 const MIN_STANDARD_ERRORS: f64 = 2.0;
 /// Damping ratio above which the poles count as a lag: the faster of the two real poles is then 34 times the slower.
-const LARGEST_DAMPING: f64 = 3.0;
+const MAX_DAMPING_RATIO: f64 = 3.0;
 
 /// True if a value is less than two standard errors from zero; false for a value without a standard error, which was
 /// given and not estimated.
@@ -50,18 +50,18 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let negative: Vec<String> = backwards
         .map(|(label, o)| format!("T_L{label} ({})", o.t_l_s))
         .collect();
-    not_determined(&open)
+    undetermined_finding(&open)
         .into_iter()
-        .chain(negative_lead(&negative))
+        .chain(negative_lead_finding(&negative))
         .collect()
 }
 
 /// Returns a finding about a negative lead. People have no negative lead; a negative lead arises if a gain and a lead
 /// are fitted to a lag.
-fn negative_lead(negative: &[String]) -> Option<Finding> {
+fn negative_lead_finding(negative: &[String]) -> Option<Finding> {
     let verb = if negative.len() == 1 { "is" } else { "are" };
     (!negative.is_empty()).then(|| {
-        Finding::doubt(
+        Finding::warning(
             "negative-lead",
             format!(
                 "{} {verb} below zero by two standard errors of K_e and of K_e_dot: a gain and a lead do not describe \
@@ -82,7 +82,7 @@ pub fn pole_findings(operator: &OperatorEstimate, sample_time: SampleTime) -> Ve
         .map(|(name, e)| format!("{name} ({e})"))
         .collect();
     let lag = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
-    not_determined(&open).into_iter().chain(lag).collect()
+    undetermined_finding(&open).into_iter().chain(lag).collect()
 }
 
 /// Returns a finding about poles that describe a lag: omega_nm is above the Nyquist frequency, or the damping ratio is
@@ -91,12 +91,12 @@ pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: Sam
     let nyquist = PI / sample_time.s();
     let what = if omega_nm_rad_s > nyquist {
         format!("omega_nm = {omega_nm_rad_s:.0} rad/s lies above the Nyquist frequency, {nyquist:.0} rad/s")
-    } else if zeta_nm > LARGEST_DAMPING {
-        format!("zeta_nm = {zeta_nm:.1} is above {LARGEST_DAMPING}")
+    } else if zeta_nm > MAX_DAMPING_RATIO {
+        format!("zeta_nm = {zeta_nm:.1} is above {MAX_DAMPING_RATIO}")
     } else {
         return None;
     };
-    Some(Finding::doubt(
+    Some(Finding::warning(
         "neuromuscular-lag",
         format!(
             "{what}: the two poles describe a lag and carry no information about the neuromuscular system; use the \
@@ -105,10 +105,10 @@ pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: Sam
     ))
 }
 
-fn not_determined(open: &[String]) -> Option<Finding> {
+fn undetermined_finding(open: &[String]) -> Option<Finding> {
     let verb = if open.len() == 1 { "is" } else { "are" };
     (!open.is_empty()).then(|| {
-        Finding::doubt(
+        Finding::warning(
             "undetermined-parameter",
             format!(
                 "{} {verb} not determined: less than two standard errors from zero",
@@ -121,7 +121,7 @@ fn not_determined(open: &[String]) -> Option<Finding> {
 /// Returns a finding if the delay `tau_s` is at an end of its search range.
 pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Option<Finding> {
     (high > low && (tau_s <= low || tau_s >= high)).then(|| {
-        Finding::doubt(
+        Finding::warning(
             "delay-at-bound",
             format!(
                 "the delay{of}, {tau_s:.3} s, is at an end of its search range, {low:.3} to {high:.3} s; widen this \
@@ -134,7 +134,7 @@ pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Op
 /// Returns a finding if the search did not converge, ended at a border or found an exact fit.
 pub(super) fn search_finding(termination: Termination) -> Option<Finding> {
     match termination.reason {
-        Reason::Border => Some(Finding::doubt(
+        Reason::Border => Some(Finding::warning(
             "border",
             "a root of C or F lies on the unit circle, so standard errors are unreliable; lower the orders",
         )),
@@ -142,9 +142,8 @@ pub(super) fn search_finding(termination: Termination) -> Option<Finding> {
             "exact-fit",
             "the residuals are zero up to rounding: the data contain no noise, and there are no error bars",
         )),
-        _ => {
-            (!termination.converged()).then(|| Finding::doubt("not-converged", format!("the search has {termination}")))
-        }
+        _ => (!termination.converged())
+            .then(|| Finding::warning("not-converged", format!("the search has {termination}"))),
     }
 }
 
@@ -155,7 +154,7 @@ mod tests {
     use super::*;
 
     fn ts() -> SampleTime {
-        SampleTime::HUNDREDTH
+        SampleTime::AT_100_HZ
     }
 
     fn operator() -> OperatorEstimate {
@@ -178,7 +177,7 @@ mod tests {
         }
     }
 
-    fn wide(value: f64) -> Estimate {
+    fn imprecise_estimate(value: f64) -> Estimate {
         Estimate::with_variance(value, value * value)
     }
 
@@ -222,8 +221,8 @@ mod tests {
     #[test]
     fn undetermined_parameters_are_reported() {
         let lead = OperatorEstimate {
-            k_e: wide(0.09),
-            t_l_s: wide(0.4),
+            k_e: imprecise_estimate(0.09),
+            t_l_s: imprecise_estimate(0.4),
             ..operator()
         };
         let found = gain_findings(&[("", lead)]);
@@ -236,7 +235,7 @@ mod tests {
             found[0].message
         );
         let nothing = OperatorEstimate {
-            k_e_dot: wide(0.036),
+            k_e_dot: imprecise_estimate(0.036),
             ..lead
         };
         assert_eq!(gain_findings(&[("", nothing)])[0].kind, "gain");
@@ -245,7 +244,7 @@ mod tests {
         assert_eq!(found[0].kind, "undetermined-parameter");
         assert!(found[0].message.contains("K_e_dot of record 1"), "{}", found[0].message);
         let poles = OperatorEstimate {
-            zeta_nm: wide(0.35),
+            zeta_nm: imprecise_estimate(0.35),
             ..operator()
         };
         assert!(pole_findings(&poles, ts())[0].message.starts_with("zeta_nm (0.35"));

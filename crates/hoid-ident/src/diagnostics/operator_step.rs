@@ -1,7 +1,7 @@
 //! Evidence in a stretch of data against an operator that was estimated from other data: one step towards a fit to this
 //! stretch.
 //!
-//! The operator is held constant, and a noise model `D v = eps` of order [`NOISE`] is fitted to the part of u that the
+//! The operator is held constant, and a noise model `D v = eps` of order [`NOISE_ORDER`] is fitted to the part of u that the
 //! operator does not explain. With `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`,
 //!
 //! `delta = (psi' psi)^-1 psi' eps`
@@ -15,7 +15,10 @@ use std::collections::BTreeMap;
 
 use hoid_model::{
     OperatorParameters, Orders, Record, Structure,
-    delayed_operator::{DELAYED_NAMES, delayed_operator_and_jacobian_within, delayed_parameters, whole_samples},
+    delayed_operator::{
+        DELAYED_PARAMETER_NAMES, delayed_operator_and_jacobian_with_delay_samples, delayed_operator_parameters,
+        whole_samples,
+    },
     uncertainty::Estimate,
 };
 use nalgebra::{DMatrix, DVector};
@@ -29,9 +32,9 @@ use crate::{
 };
 
 /// Order of the noise model.
-const NOISE: usize = 4;
+const NOISE_ORDER: usize = 4;
 /// Number of parameters of the operator.
-const OPERATOR: usize = 5;
+const PARAMETER_COUNT: usize = 5;
 
 /// Change of one parameter of an operator that improves its fit to a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,14 +61,14 @@ impl OperatorStep {
 
 /// Computes the steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s) from an operator towards the fit to
 /// a record. `None` if the record is too short or carries no information.
-pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[OperatorStep; OPERATOR]> {
+pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[OperatorStep; PARAMETER_COUNT]> {
     let ts = record.sample_time();
-    let eta = delayed_parameters(operator);
+    let eta = delayed_operator_parameters(operator);
     let whole = whole_samples(eta[4], ts).ok()?;
-    let (held, slopes) = delayed_operator_and_jacobian_within(whole, eta, ts).ok()?;
+    let (held, slopes) = delayed_operator_and_jacobian_with_delay_samples(whole, eta, ts).ok()?;
     let orders = Orders {
         nb: 3,
-        nd: NOISE,
+        nd: NOISE_ORDER,
         nf: 2,
         nk: held.nk,
         ..Orders::default()
@@ -80,9 +83,9 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
     let (theta, first) = (fit.model().theta(), first_residual(&orders, fit.initial_state()));
     // The coefficients of B are at the start of theta, those of F at the end.
     let places = [0, 1, 2, theta.len() - 2, theta.len() - 1];
-    let mut workspace = Workspace::of_thread();
+    let mut workspace = Workspace::borrow_from_thread();
     let mut scores = |_: usize, data: Data<'_>| {
-        let criterion = Criterion::of_record(orders, data, fit.initial_state(), first);
+        let criterion = Criterion::for_record(orders, data, fit.initial_state(), first);
         let eps = criterion.residuals_of(theta, 0, &mut workspace);
         let psi = criterion.jacobian(theta, 0, &mut workspace);
         let column = |k: usize| {
@@ -92,18 +95,18 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
             }
             (k, column)
         };
-        let columns = (0..OPERATOR).map(column).collect();
+        let columns = (0..PARAMETER_COUNT).map(column).collect();
         Some((eps, columns))
     };
     let blocks = score_blocks(
         &Data::of(std::slice::from_ref(record)),
         first,
-        OPERATOR,
+        PARAMETER_COUNT,
         ts.s(),
         &mut scores,
     )?;
     let n = blocks.len();
-    if n <= OPERATOR {
+    if n <= PARAMETER_COUNT {
         return None;
     }
     let each: Vec<(DVector<f64>, DMatrix<f64>)> = blocks
@@ -111,34 +114,40 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
         .map(|b| {
             (
                 DVector::from_column_slice(&b.score),
-                DMatrix::from_row_slice(OPERATOR, OPERATOR, &b.information),
+                DMatrix::from_row_slice(PARAMETER_COUNT, PARAMETER_COUNT, &b.information),
             )
         })
         .collect();
     let whole = each
         .iter()
-        .fold(DMatrix::zeros(OPERATOR, OPERATOR), |sum, (_, big)| sum + big);
+        .fold(DMatrix::zeros(PARAMETER_COUNT, PARAMETER_COUNT), |sum, (_, big)| {
+            sum + big
+        });
     // Scaling is needed because the units differ by orders of magnitude.
-    let scale = DVector::from_fn(OPERATOR, |i, _| whole[(i, i)].sqrt().recip());
-    let scaled = DMatrix::from_fn(OPERATOR, OPERATOR, |i, j| whole[(i, j)] * scale[i] * scale[j]);
+    let scale = DVector::from_fn(PARAMETER_COUNT, |i, _| whole[(i, i)].sqrt().recip());
+    let scaled = DMatrix::from_fn(PARAMETER_COUNT, PARAMETER_COUNT, |i, j| {
+        whole[(i, j)] * scale[i] * scale[j]
+    });
     let inverse = scaled.cholesky()?.inverse();
-    let inverse = DMatrix::from_fn(OPERATOR, OPERATOR, |i, j| inverse[(i, j)] * scale[i] * scale[j]);
-    let delta = &inverse * each.iter().fold(DVector::zeros(OPERATOR), |sum, (g, _)| sum + g);
-    let mut scatter = DMatrix::zeros(OPERATOR, OPERATOR);
+    let inverse = DMatrix::from_fn(PARAMETER_COUNT, PARAMETER_COUNT, |i, j| {
+        inverse[(i, j)] * scale[i] * scale[j]
+    });
+    let delta = &inverse * each.iter().fold(DVector::zeros(PARAMETER_COUNT), |sum, (g, _)| sum + g);
+    let mut scatter = DMatrix::zeros(PARAMETER_COUNT, PARAMETER_COUNT);
     for (g, big) in &each {
         let score = g - big * &delta;
         scatter += &score * score.transpose();
     }
-    let clustered = &inverse * scatter * &inverse * (n as f64 / (n - OPERATOR) as f64);
+    let clustered = &inverse * scatter * &inverse * (n as f64 / (n - PARAMETER_COUNT) as f64);
     let step = |k: usize| {
         let variance = clustered[(k, k)].max(fit.innovation_variance() * inverse[(k, k)]);
         OperatorStep {
-            name: DELAYED_NAMES[k],
+            name: DELAYED_PARAMETER_NAMES[k],
             by: Estimate::with_variance(delta[k], variance),
             blocks: n,
         }
     };
-    let steps: [OperatorStep; OPERATOR] = std::array::from_fn(step);
+    let steps: [OperatorStep; PARAMETER_COUNT] = std::array::from_fn(step);
     steps.iter().all(|step| step.by.value.is_finite()).then_some(steps)
 }
 

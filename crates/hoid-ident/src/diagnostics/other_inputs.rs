@@ -19,14 +19,14 @@ use crate::{
 };
 
 /// Names of channels that may hold a displayed target.
-pub(super) const TARGETS: [&str; 4] = ["r", "f_t", "target", "reference"];
+pub(super) const TARGET_CHANNELS: [&str; 4] = ["r", "f_t", "target", "reference"];
 /// p-value below which a response to the target is reported. The first value applies if target and disturbance have
 /// separate lines, the second if only the target excites the loop: in that case an error in the form of the fit looks
 /// like a response to the target.
 const P_VALUE_LIMITS: [f64; 2] = [1e-2, 1e-7];
 
 /// Returns a finding for each recorded target to which u responds.
-pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
+pub fn family_findings(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
     let is_recorded = |name: &&str| {
         records.iter().all(|record| {
             let is_signal = record.channels().take(2).any(|signal| signal.name == *name);
@@ -41,9 +41,14 @@ pub fn of_family(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record
             SeenChannel::new(name, ChannelRole::Feedforward),
         )?;
         let chance = found.p_value;
-        (chance < P_VALUE_LIMITS[usize::from(!apart)]).then(|| finding(name, chance, !apart && rests(records)))
+        (chance < P_VALUE_LIMITS[usize::from(!apart)])
+            .then(|| response_finding(name, chance, !apart && has_rest(records)))
     };
-    TARGETS.into_iter().filter(is_recorded).filter_map(found).collect()
+    TARGET_CHANNELS
+        .into_iter()
+        .filter(is_recorded)
+        .filter_map(found)
+        .collect()
 }
 
 /// Returns the response to a channel in addition to the inputs of a fit, with the form and the noise orders of the fit,
@@ -71,15 +76,15 @@ pub fn response_to(
         forms: vec![Form::Gain, Form::Derivative, Form::DerivativeLead],
         ..channel
     };
-    again.responds_to(records, channel).ok()
+    again.test_response(records, channel).ok()
 }
 
 /// True if u of one of the records rests like the signal of a stick with a dead zone.
-fn rests(records: &[Record]) -> bool {
+fn has_rest(records: &[Record]) -> bool {
     records.iter().any(|record| Rest::of(record.output()).is_some())
 }
 
-fn finding(name: &str, chance: f64, nonlinear: bool) -> Finding {
+fn response_finding(name: &str, chance: f64, nonlinear: bool) -> Finding {
     if nonlinear {
         return Finding::note(
             "other-input",
@@ -89,7 +94,7 @@ fn finding(name: &str, chance: f64, nonlinear: bool) -> Finding {
             ),
         );
     }
-    Finding::doubt(
+    Finding::warning(
         "other-input",
         format!(
             "u responds to {name} as well as to the error (p = {chance:.0e}): with one input, the response to the \

@@ -27,8 +27,8 @@ mod spectra;
 
 use hoid_model::{Complex64, ContinuousTransferFunction, Finding, Record};
 
-use equations::Fitted;
-use spectra::{Exogenous, MAX_FREQUENCIES, Spectra};
+use equations::ElementFit;
+use spectra::{ExogenousChannels, MAX_FREQUENCIES, Spectra};
 
 /// Largest unexplained share of the power, expressed as a disturbance at u, for which the element is judged.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.02;
@@ -36,12 +36,12 @@ const MAX_UNEXPLAINED_SHARE: f64 = 0.02;
 /// differences between elements do not count.
 const EXACT_DATA_SHARE: f64 = 1e-4;
 /// Frequencies at which two elements are compared, rad/s: the range in which people close their loops.
-const COMPARED_RAD_S: [f64; 7] = [0.5, 0.75, 1.1, 1.6, 2.4, 3.6, 5.4];
+const COMPARED_FREQUENCIES_RAD_S: [f64; 7] = [0.5, 0.75, 1.1, 1.6, 2.4, 3.6, 5.4];
 /// Largest difference between the logarithms of two responses that count as equal: 10 % of the gain or 6 deg.
-const EQUAL_RESPONSES: f64 = 0.1;
+const MAX_RESPONSE_DIFFERENCE: f64 = 0.1;
 /// Largest delay in samples for which e and u count as aligned: a recorder may store one of them a sample before or
 /// after the other.
-const ALIGNED_SAMPLES: f64 = 1.5;
+const MAX_ALIGNED_DELAY_SAMPLES: f64 = 1.5;
 /// Largest number of poles of a given element that can be tested.
 const MAX_POLES: usize = 4;
 
@@ -63,8 +63,8 @@ pub struct RecordedElement {
 
 impl RecordedElement {
     /// True if the identified element has the same response as the given element, apart from a delay.
-    pub fn is_given(&self) -> bool {
-        self.difference.1.ln().norm() <= EQUAL_RESPONSES
+    pub fn matches_given(&self) -> bool {
+        self.difference.1.ln().norm() <= MAX_RESPONSE_DIFFERENCE
     }
 
     /// Returns a warning if the element is not the given element, or if e and u are not aligned.
@@ -77,18 +77,18 @@ impl RecordedElement {
             false => String::new(),
         };
         let loop_lost = "the crossover and the phase margin do not apply to the recorded loop";
-        let message = match (self.is_given(), beyond.is_empty()) {
+        let message = match (self.matches_given(), beyond.is_empty()) {
             (true, true) => return None,
             (true, false) => format!("the recorded element is {given}{beyond}: {loop_lost}"),
             (false, _) => format!(
                 "the recorded element is {}{beyond}, not {given}: at {omega} rad/s the recorded gain is {} \
                  times the given gain and the phase differs by {:+.0} deg; {loop_lost}",
                 self.element,
-                three_digits(ratio.norm()),
+                round_to_three_digits(ratio.norm()),
                 ratio.arg().to_degrees()
             ),
         };
-        Some(Finding::doubt("controlled-element", message))
+        Some(Finding::warning("controlled-element", message))
     }
 }
 
@@ -105,7 +105,7 @@ pub fn recorded_element(
     if n > MAX_POLES || records.iter().any(|record| record.input_channel().is_none()) {
         return None;
     }
-    let exogenous = Exogenous::of(records, excitation);
+    let exogenous = ExogenousChannels::of(records, excitation);
     let mut spectra = Vec::new();
     let mut frequencies = 0;
     for record in records {
@@ -120,9 +120,9 @@ pub fn recorded_element(
     let mut orders = vec![(0, 1), (0, 2), (1, 2), (m, n.max(1)), (m, n + 1)];
     orders.sort_by_key(|&(m, n)| (m + n, n));
     orders.dedup();
-    let fits: Vec<Fitted> = orders
+    let fits: Vec<ElementFit> = orders
         .iter()
-        .filter_map(|&(m, n)| Fitted::of(&spectra, m, n, sample_time_s))
+        .filter_map(|&(m, n)| ElementFit::of(&spectra, m, n, sample_time_s))
         .collect();
     let least = fits.iter().map(|fit| fit.unexplained).fold(f64::INFINITY, f64::min);
     let chosen = fits
@@ -131,7 +131,7 @@ pub fn recorded_element(
         .filter(|fit| fit.unexplained <= MAX_UNEXPLAINED_SHARE)?;
     let element = transfer_function(&chosen, given.delay_s())?;
     let ratio = |omega: f64| (omega, element.response(omega) / given.response(omega));
-    let difference = COMPARED_RAD_S
+    let difference = COMPARED_FREQUENCIES_RAD_S
         .map(ratio)
         .into_iter()
         .filter(|(_, ratio)| ratio.ln().norm().is_finite())
@@ -141,12 +141,12 @@ pub fn recorded_element(
         unexplained: chosen.unexplained,
         element,
         difference,
-        aligned_s: ALIGNED_SAMPLES * sample_time_s,
+        aligned_s: MAX_ALIGNED_DELAY_SAMPLES * sample_time_s,
     })
 }
 
 /// Returns the fitted element with this delay, without terms that are negligible at the frequencies compared.
-fn transfer_function(fit: &Fitted, delay_s: f64) -> Option<ContinuousTransferFunction> {
+fn transfer_function(fit: &ElementFit, delay_s: f64) -> Option<ContinuousTransferFunction> {
     let without_small = |p: &[f64]| -> Vec<f64> {
         let sizes = |omega: f64| {
             p.iter()
@@ -155,24 +155,26 @@ fn transfer_function(fit: &Fitted, delay_s: f64) -> Option<ContinuousTransferFun
                 .map(move |(i, c)| c.abs() * omega.powi(i as i32))
         };
         let matters = |i: usize| {
-            [COMPARED_RAD_S[0], COMPARED_RAD_S[6]].into_iter().any(|omega| {
-                let largest = sizes(omega).fold(0.0, f64::max);
-                sizes(omega).nth(i).is_some_and(|size| size > 0.02 * largest)
-            })
+            [COMPARED_FREQUENCIES_RAD_S[0], COMPARED_FREQUENCIES_RAD_S[6]]
+                .into_iter()
+                .any(|omega| {
+                    let largest = sizes(omega).fold(0.0, f64::max);
+                    sizes(omega).nth(i).is_some_and(|size| size > 0.02 * largest)
+                })
         };
         let last = p.len() - 1;
         let kept = p
             .iter()
             .enumerate()
             .map(|(i, c)| if matters(last - i) { *c } else { 0.0 });
-        kept.map(three_digits).collect()
+        kept.map(round_to_three_digits).collect()
     };
     let found = ContinuousTransferFunction::new(&without_small(&fit.num), &without_small(&fit.den));
     found.and_then(|found| found.with_delay(delay_s)).ok()
 }
 
 /// Rounds to three significant digits, which are sufficient for a test.
-fn three_digits(value: f64) -> f64 {
+fn round_to_three_digits(value: f64) -> f64 {
     if value == 0.0 {
         return value;
     }

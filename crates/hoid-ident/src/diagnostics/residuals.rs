@@ -17,20 +17,20 @@ use hoid_model::{Finding, Record};
 use crate::fit::Series;
 
 /// Autocorrelation of the residuals above which the noise model is inadequate.
-const LARGEST_AUTOCORRELATION: f64 = 0.1;
+const MAX_AUTOCORRELATION: f64 = 0.1;
 /// Correlation of the residuals with earlier errors above which the operator is inadequate.
-const LARGEST_CROSS_CORRELATION: f64 = 0.1;
+const MAX_CROSS_CORRELATION: f64 = 0.1;
 /// Limit of a correlation in short records, in standard errors of a correlation of white noise.
 const CHANCE_CORRELATION: f64 = 4.0;
 /// Share of the sum of squares above which one sample dominates the fit.
-const LARGEST_LEVERAGE: f64 = 0.05;
+const MAX_LEVERAGE: f64 = 0.05;
 /// Limit of a squared residual in short records, as a multiple of the mean square.
 const CHANCE_LEVERAGE: f64 = 20.0;
 /// Number of lags of the autocorrelation.
-const LAGS: usize = 25;
+const LAG_COUNT: usize = 25;
 /// Longest lag of the correlation with the error, in s and in samples.
-const LONGEST_LAG_S: f64 = 0.6;
-const LONGEST_LAG: f64 = 600.0;
+const MAX_LAG_S: f64 = 0.6;
+const MAX_LAG_SAMPLES: f64 = 600.0;
 
 /// Measures of the deviation of residuals from white noise.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -49,7 +49,7 @@ pub(crate) struct ResidualMeasures {
 
 impl ResidualMeasures {
     /// Computes the measures from the residual series of all records.
-    pub fn of_series(found: &[Series], records: &[Record], sample_time_s: f64) -> Self {
+    pub fn from_series(found: &[Series], records: &[Record], sample_time_s: f64) -> Self {
         let pairs: Vec<(&[f64], &[f64])> = found
             .iter()
             .zip(records)
@@ -78,11 +78,11 @@ impl ResidualMeasures {
             };
             records.iter().map(one).sum()
         };
-        for lag in 1..=LAGS {
+        for lag in 1..=LAG_COUNT {
             measures.autocorrelation = measures.autocorrelation.max((product(lag, false) / total).abs());
         }
         if error_power > 0.0 {
-            let longest = (LONGEST_LAG_S / sample_time_s).round().min(LONGEST_LAG) as usize;
+            let longest = (MAX_LAG_S / sample_time_s).round().min(MAX_LAG_SAMPLES) as usize;
             for lag in 0..=longest {
                 let correlation = product(lag, true) / (total * error_power).sqrt();
                 measures.cross_correlation = measures.cross_correlation.max(correlation.abs());
@@ -100,9 +100,9 @@ impl ResidualMeasures {
     }
 
     /// Returns a finding if the noise model is inadequate.
-    pub fn coloured(&self) -> Option<Finding> {
-        (self.autocorrelation > LARGEST_AUTOCORRELATION.max(self.chance())).then(|| {
-            Finding::doubt(
+    pub fn noise_model_finding(&self) -> Option<Finding> {
+        (self.autocorrelation > MAX_AUTOCORRELATION.max(self.chance_correlation())).then(|| {
+            Finding::warning(
                 "residuals-not-white",
                 format!(
                     "the residuals have a correlation of {:.2} with their own past: the noise model is too simple",
@@ -113,9 +113,9 @@ impl ResidualMeasures {
     }
 
     /// Returns a finding if the operator is inadequate.
-    pub fn structure(&self) -> Option<Finding> {
-        (self.cross_correlation > LARGEST_CROSS_CORRELATION.max(self.chance())).then(|| {
-            Finding::doubt(
+    pub fn structure_finding(&self) -> Option<Finding> {
+        (self.cross_correlation > MAX_CROSS_CORRELATION.max(self.chance_correlation())).then(|| {
+            Finding::warning(
                 "structure",
                 format!(
                     "the residuals have a correlation of {:.2} with past values of e: the operator misses part of the \
@@ -127,9 +127,9 @@ impl ResidualMeasures {
     }
 
     /// Returns a finding if one sample dominates the fit.
-    pub fn leverage(&self) -> Option<Finding> {
-        (self.leverage > LARGEST_LEVERAGE.max(CHANCE_LEVERAGE / self.count as f64)).then(|| {
-            Finding::doubt(
+    pub fn leverage_finding(&self) -> Option<Finding> {
+        (self.leverage > MAX_LEVERAGE.max(CHANCE_LEVERAGE / self.count as f64)).then(|| {
+            Finding::warning(
                 "leverage",
                 format!(
                     "one sample (record {}, residual {}) contributes {:.0} % of the sum of squares: inspect this \
@@ -144,12 +144,16 @@ impl ResidualMeasures {
 
     /// Returns all findings about the residuals.
     pub fn findings(&self) -> impl Iterator<Item = Finding> {
-        [self.coloured(), self.structure(), self.leverage()]
-            .into_iter()
-            .flatten()
+        [
+            self.noise_model_finding(),
+            self.structure_finding(),
+            self.leverage_finding(),
+        ]
+        .into_iter()
+        .flatten()
     }
 
-    fn chance(&self) -> f64 {
+    fn chance_correlation(&self) -> f64 {
         CHANCE_CORRELATION / (self.count as f64).sqrt()
     }
 }
@@ -159,7 +163,7 @@ mod tests {
     use super::*;
 
     /// White noise, uniform in -0.5 to 0.5.
-    fn white(n: usize, seed: u64) -> Vec<f64> {
+    fn white_noise(n: usize, seed: u64) -> Vec<f64> {
         let mut state = seed;
         let draw = |_| {
             state = state
@@ -170,48 +174,48 @@ mod tests {
         (0..n).map(draw).collect()
     }
 
-    fn kinds(measures: &ResidualMeasures) -> Vec<&'static str> {
+    fn finding_kinds(measures: &ResidualMeasures) -> Vec<&'static str> {
         measures.findings().map(|f| f.kind).collect()
     }
 
     #[test]
     fn white_residuals_of_any_length_give_no_finding() {
         for n in [50, 300, 3000] {
-            let (eps, e) = (white(n, 1), white(n, 2));
+            let (eps, e) = (white_noise(n, 1), white_noise(n, 2));
             let measures = ResidualMeasures::of(&[(&eps, &e)], 0.01);
-            assert!(kinds(&measures).is_empty(), "{n}: {measures:?}");
+            assert!(finding_kinds(&measures).is_empty(), "{n}: {measures:?}");
             assert_eq!(measures.count, n);
         }
     }
 
     #[test]
     fn each_residual_measure_has_its_finding() {
-        let (eps, e) = (white(3000, 1), white(3000, 2));
+        let (eps, e) = (white_noise(3000, 1), white_noise(3000, 2));
         let coloured: Vec<f64> = (1..3000).map(|t| eps[t] + 0.3 * eps[t - 1]).collect();
         let measures = ResidualMeasures::of(&[(&coloured, &e[1..])], 0.01);
-        assert_eq!(kinds(&measures), ["residuals-not-white"]);
+        assert_eq!(finding_kinds(&measures), ["residuals-not-white"]);
         // eps(t) + 0.3 eps(t-1): 0.3/1.09.
         assert!((measures.autocorrelation - 0.3 / 1.09).abs() < 0.05, "{measures:?}");
         let missed: Vec<f64> = (20..3000).map(|t| eps[t] + 0.3 * e[t - 20]).collect();
         let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.01);
-        assert_eq!(kinds(&measures), ["structure"]);
+        assert_eq!(finding_kinds(&measures), ["structure"]);
         // A lag of more than 0.6 s does not count.
         let measures = ResidualMeasures::of(&[(&missed, &e[20..])], 0.1);
-        assert!(kinds(&measures).is_empty(), "{measures:?}");
+        assert!(finding_kinds(&measures).is_empty(), "{measures:?}");
         let mut blow = eps.clone();
         blow[1234] = 10.0;
         let records = [(eps.as_slice(), e.as_slice()), (blow.as_slice(), e.as_slice())];
         let measures = ResidualMeasures::of(&records, 0.01);
-        assert_eq!((kinds(&measures), measures.at), (vec!["leverage"], (1, 1234)));
+        assert_eq!((finding_kinds(&measures), measures.at), (vec!["leverage"], (1, 1234)));
     }
 
     #[test]
     fn zero_residuals_and_missing_inputs_are_handled() {
         let measures = ResidualMeasures::of(&[(&[0.0; 9], &[1.0; 9])], 0.01);
-        assert!(kinds(&measures).is_empty());
-        assert!(kinds(&ResidualMeasures::of(&[], 0.01)).is_empty());
+        assert!(finding_kinds(&measures).is_empty());
+        assert!(finding_kinds(&ResidualMeasures::of(&[], 0.01)).is_empty());
         let eps: Vec<f64> = (0..2000).map(|t| (0.1 * f64::from(t)).sin()).collect();
         let measures = ResidualMeasures::of(&[(&eps, &[])], 0.01);
-        assert_eq!(kinds(&measures), ["residuals-not-white"]);
+        assert_eq!(finding_kinds(&measures), ["residuals-not-white"]);
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! | removed | cause of a difference | finding |
 //! |---|---|---|
-//! | deviations of a sample of e or u from its neighbours beyond a limit ([`crate::faults::held`]), so no sample has a large effect on the filters of the fit | a few samples | `leverage` |
-//! | components slower than 20 s or, for a slow system, than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
+//! | deviations of a sample of e or u from its neighbours beyond a limit ([`crate::faults::limited_records`]), so no sample has a large effect on the filters of the fit | a few samples | `leverage` |
+//! | components slower than 20 s or, for a slow system, than ten periods of its slowest pole ([`crate::faults::without_slow_components`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
 //!
 //! Two fits differ if a parameter, the crossover or the phase margin differs by more than three standard errors. The
 //! standard error is the one from the first fit or, if larger, the one from the information lost in the second fit,
@@ -20,35 +20,35 @@ use hoid_model::{
 use crate::{
     Estimator, Fit, GreyBox, GreyBoxFit, SigmoidChange, SigmoidFit,
     family::{FamilyEstimator, FamilyFit},
-    faults::{PERIOD_S, held, without_slow},
+    faults::{SLOW_PERIOD_S, limited_records, without_slow_components},
 };
 
 /// Components are slow if their period is longer than this number of periods of the slowest pole of a system.
-const SLOW_PERIODS: f64 = 10.0;
+const SLOW_PERIOD_FACTOR: f64 = 10.0;
 /// Two fits differ if an estimate differs by more than this number of standard errors.
 const SIGNIFICANT_DIFFERENCE: f64 = 3.0;
 /// Largest acceptable change of a parameter due to a level, in standard errors.
-const LEVEL: f64 = 2.0;
+const MAX_LEVEL_EFFECT: f64 = 2.0;
 
 /// Name of a quantity, and its estimates from the first and the second fit.
 type ComparedEstimate = (String, Estimate, Estimate);
 
 /// Component that is removed from the records before the second fit.
 #[derive(Debug, Clone, Copy)]
-enum Without {
+enum RemovedComponent {
     Outliers,
     /// Components slower than this period, s.
     SlowComponents(f64),
 }
 
-impl Without {
-    const ALL: [Self; 2] = [Self::Outliers, Self::SlowComponents(PERIOD_S)];
+impl RemovedComponent {
+    const ALL: [Self; 2] = [Self::Outliers, Self::SlowComponents(SLOW_PERIOD_S)];
 
     /// Returns the records without the component; `None` if there is nothing to remove.
     fn records(self, records: &[Record]) -> Option<Vec<Record>> {
         match self {
-            Self::Outliers => held(records),
-            Self::SlowComponents(period_s) => without_slow(records, period_s),
+            Self::Outliers => limited_records(records),
+            Self::SlowComponents(period_s) => without_slow_components(records, period_s),
         }
     }
 
@@ -67,14 +67,14 @@ impl Without {
             .collect();
         let differ = (!differ.is_empty()).then(|| differ.join(", "))?;
         Some(match self {
-            Self::Outliers => Finding::doubt(
+            Self::Outliers => Finding::warning(
                 "leverage",
                 format!(
                     "the fit depends on a few samples: limiting each sample by its neighbours changes {differ} \
                      standard errors; look at the recording"
                 ),
             ),
-            Self::SlowComponents(period_s) => Finding::doubt(
+            Self::SlowComponents(period_s) => Finding::warning(
                 "slow",
                 format!(
                     "the fit depends on a drift or a step that the person does not follow: removing components slower \
@@ -86,47 +86,50 @@ impl Without {
     }
 }
 
-/// Removes each component in `all`, one at a time, and returns the findings. `again` fits the changed records and
+/// Removes each component in `all`, one at a time, and returns the findings. `refit` fits the changed records and
 /// returns the quantities of both fits.
-fn opinions(
-    all: &[Without],
+fn component_findings(
+    all: &[RemovedComponent],
     records: &[Record],
-    again: impl Fn(&[Record]) -> Option<Vec<ComparedEstimate>>,
+    refit: impl Fn(&[Record]) -> Option<Vec<ComparedEstimate>>,
 ) -> Vec<Finding> {
-    let asked = |without: &Without| without.finding(again(&without.records(records)?)?);
+    let asked = |without: &RemovedComponent| without.finding(refit(&without.records(records)?)?);
     all.iter().filter_map(asked).collect()
 }
 
 /// Returns the findings of second fits of polynomials, made with the same estimator; crossover and phase margin are
 /// also compared if the controlled element is known.
-pub fn of_polynomials(
+pub fn polynomial_findings(
     estimator: &Estimator,
     fit: &Fit,
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Finding> {
-    let all = [Without::Outliers, Without::SlowComponents(slow_period_s(fit))];
-    opinions(&all, records, |others| {
-        let other = again(estimator, fit, others)?;
+    let all = [
+        RemovedComponent::Outliers,
+        RemovedComponent::SlowComponents(slow_period_s(fit)),
+    ];
+    component_findings(&all, records, |others| {
+        let other = refit(estimator, fit, others)?;
         let mut pairs = compared_parameters(fit, &other);
         pairs.extend(compared_loops(fit, &other, element));
         Some(pairs)
     })
 }
 
-/// Returns the period above which a component is slow: [`PERIOD_S`], or ten periods of the slowest pole of the system
+/// Returns the period above which a component is slow: [`SLOW_PERIOD_S`], or ten periods of the slowest pole of the system
 /// if that is longer.
 fn slow_period_s(fit: &Fit) -> f64 {
     let poles = fit.roots();
     let poles = poles.iter().filter(|root| matches!(root.polynomial, 'a' | 'f'));
     // s Ts = ln z.
     let slowest = poles.map(|root| root.value.ln().norm()).filter(|rate| *rate > 0.0);
-    let periods = slowest.map(|rate| SLOW_PERIODS * TAU * fit.model().sample_time().s() / rate);
-    periods.fold(PERIOD_S, f64::max)
+    let periods = slowest.map(|rate| SLOW_PERIOD_FACTOR * TAU * fit.model().sample_time().s() / rate);
+    periods.fold(SLOW_PERIOD_S, f64::max)
 }
 
 /// Returns the findings of second fits of a grey box; the order of its remnant model stays the same.
-pub fn of_grey_box(
+pub fn grey_box_findings(
     estimator: &GreyBox,
     fit: &GreyBoxFit,
     records: &[Record],
@@ -136,9 +139,9 @@ pub fn of_grey_box(
         order: fit.order()..=fit.order(),
         ..estimator.clone()
     };
-    opinions(&Without::ALL, records, |others| {
+    component_findings(&RemovedComponent::ALL, records, |others| {
         let other = estimator.fit(others).ok()?;
-        let mut pairs = compared(fit.parameters(), other.parameters());
+        let mut pairs = pair_estimates(fit.parameters(), other.parameters());
         pairs.extend(compared_loops(fit.polynomial_fit(0), other.polynomial_fit(0), element));
         Some(pairs)
     })
@@ -147,7 +150,7 @@ pub fn of_grey_box(
 /// Returns the findings of second fits of an operator of the family; its form and the orders of its noise model stay
 /// the same. Only single samples are examined for a fit at the lines of a recorded excitation, which carries no
 /// information about slow components, and for a fit with several inputs.
-pub fn of_family(
+pub fn family_findings(
     estimator: &FamilyEstimator,
     fit: &FamilyFit,
     records: &[Record],
@@ -169,11 +172,11 @@ pub fn of_family(
     };
     // Slow components would be removed only from e and u, not from the other inputs.
     let asked = match &fit.lines {
-        None if again.channels.is_empty() => &Without::ALL[..],
-        _ => &Without::ALL[..1],
+        None if again.channels.is_empty() => &RemovedComponent::ALL[..],
+        _ => &RemovedComponent::ALL[..1],
     };
     let measures = |of: &FamilyFit| of.loop_measures_of_best_form(0, element?);
-    opinions(asked, records, |others| {
+    component_findings(asked, records, |others| {
         let other = again.fit_with_response(others, None).ok()?;
         // Only the best form is compared, because the second fit has no other forms.
         let (one, two) = (fit.weighed.first()?, other.weighed.first()?);
@@ -193,8 +196,8 @@ pub fn of_family(
 
 /// Returns the finding of a second fit without outlying samples, for an operator whose gains change once. If only one
 /// of the two fits finds a change, this counts as a difference regardless of the size of the change.
-pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
-    let without = Without::Outliers;
+pub fn sigmoid_finding(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
+    let without = RemovedComponent::Outliers;
     let other = SigmoidChange {
         likelihood_intervals: false,
         nd: Some(fit.d().len()),
@@ -202,43 +205,43 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
         ..estimator.clone()
     };
     let other = other.fit(&without.records(records)?).ok()?;
-    if fit.change_found() != other.change_found() {
-        return Some(Finding::doubt(
+    if fit.has_change() != other.has_change() {
+        return Some(Finding::warning(
             "leverage",
             "the fit depends on a few samples: limiting each sample by its neighbours determines whether a change is \
              found; look at the recording",
         ));
     }
-    if fit.change_found() {
+    if fit.has_change() {
         // The noise model is not compared, because it also describes the pulses of a stick.
         let named = |of: &SigmoidFit| {
             let operator = of.parameters().len() - of.d().len();
             let parameters = of.parameters().into_iter().take(operator);
             parameters.map(|p| (p.name, p.estimate)).collect()
         };
-        return without.finding(compared(named(fit), named(&other)));
+        return without.finding(pair_estimates(named(fit), named(&other)));
     }
     let constant = |of: &SigmoidFit| {
         let found = &of.constant_operator().parameters;
         found.iter().map(|p| (p.name.to_owned(), p.estimate)).collect()
     };
-    without.finding(compared(constant(fit), constant(&other)))
+    without.finding(pair_estimates(constant(fit), constant(&other)))
 }
 
-/// Returns a warning if a level of e and u affects a polynomial fit: a parameter differs by more than `LEVEL` standard
+/// Returns a warning if a level of e and u affects a polynomial fit: a parameter differs by more than `MAX_LEVEL_EFFECT` standard
 /// errors if the means are removed.
-pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
+pub fn level_finding(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
     let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
-    let other = again(estimator, fit, &without)?;
+    let other = refit(estimator, fit, &without)?;
     let moved: Vec<String> = compared_parameters(fit, &other)
         .into_iter()
         .filter_map(|(name, first, other)| {
             let off = (first.value - other.value).abs() / first.standard_error.filter(|e| *e > 0.0)?;
-            (off > LEVEL).then(|| format!("{name} by {off:.1}"))
+            (off > MAX_LEVEL_EFFECT).then(|| format!("{name} by {off:.1}"))
         })
         .collect();
     (!moved.is_empty()).then(|| {
-        Finding::doubt(
+        Finding::warning(
             "level",
             format!(
                 "an offset of e or u changes {} standard errors: remove the means with --detrend mean",
@@ -249,7 +252,7 @@ pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<
 }
 
 /// Fits the same model to other records, starting from the parameters of the fit.
-fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
+fn refit(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
     let other = Estimator {
         start: Some(fit.model().theta().to_vec()),
         ..estimator.with_orders(fit.orders())
@@ -263,13 +266,13 @@ fn compared_parameters(fit: &Fit, other: &Fit) -> Vec<ComparedEstimate> {
     match (fit.operator(), other.operator()) {
         (Ok(one), Ok(two)) => {
             let named = |of: OperatorEstimate| of.rows().map(|(name, _, estimate)| (name.to_owned(), estimate)).into();
-            compared(named(one), named(two))
+            pair_estimates(named(one), named(two))
         }
-        _ => compared(fit.parameters(), other.parameters()),
+        _ => pair_estimates(fit.parameters(), other.parameters()),
     }
 }
 
-fn compared(one: Vec<(String, Estimate)>, two: Vec<(String, Estimate)>) -> Vec<ComparedEstimate> {
+fn pair_estimates(one: Vec<(String, Estimate)>, two: Vec<(String, Estimate)>) -> Vec<ComparedEstimate> {
     let pairs = one.into_iter().zip(two);
     pairs.map(|((name, first), (_, other))| (name, first, other)).collect()
 }
@@ -302,7 +305,7 @@ mod tests {
 
     use super::*;
 
-    fn simulated(condition: Condition) -> Record {
+    fn simulated_record(condition: Condition) -> Record {
         let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
         simulator.run(RunSeed::default(), false).unwrap()
     }
@@ -317,29 +320,29 @@ mod tests {
 
     #[test]
     fn influential_sample_is_reported_for_all_kinds_of_fits() {
-        let record = simulated(Condition::C1);
+        let record = simulated_record(Condition::C1);
         let (clean, bad) = ([record.clone()], with_outlier(&record));
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
         let element = Some(&element);
         let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
-        let of_bj = |records: &[Record]| of_polynomials(&bj, &bj.fit(records).unwrap(), records, element);
+        let of_bj = |records: &[Record]| polynomial_findings(&bj, &bj.fit(records).unwrap(), records, element);
         assert_eq!(of_bj(&clean), []);
         let words = &of_bj(&bad)[0].message;
         assert!(words.contains("T_L by"), "{words}");
         let grey = GreyBox::new(1..=1);
-        let of_grey = |records: &[Record]| of_grey_box(&grey, &grey.fit(records).unwrap(), records, element);
+        let of_grey = |records: &[Record]| grey_box_findings(&grey, &grey.fit(records).unwrap(), records, element);
         assert_eq!(of_grey(&clean), []);
         assert_eq!(of_grey(&bad)[0].kind, "leverage");
     }
 
     #[test]
     fn change_caused_by_one_sample_is_reported() {
-        let record = simulated(Condition::C4);
+        let record = simulated_record(Condition::C4);
         let estimator = SigmoidChange {
             likelihood_intervals: false,
             ..SigmoidChange::default()
         };
-        let of = |records: &[Record]| of_sigmoid(&estimator, &estimator.fit(records).unwrap(), records);
+        let of = |records: &[Record]| sigmoid_finding(&estimator, &estimator.fit(records).unwrap(), records);
         assert_eq!(of(std::slice::from_ref(&record)), None);
         assert!(of(&with_outlier(&record)).is_some());
     }

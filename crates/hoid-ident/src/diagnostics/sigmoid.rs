@@ -20,7 +20,7 @@ impl SigmoidFit {
     pub fn verdict(&self, records: &[Record]) -> Result<Verdict, IdentError> {
         let mut all: Vec<Finding> = search_finding(self.termination()).into_iter().collect();
         all.extend(self.parameter_findings());
-        let operators: Vec<(&str, &ChangedOperator)> = if self.change_found() {
+        let operators: Vec<(&str, &ChangedOperator)> = if self.has_change() {
             vec![
                 (" before the change", self.initial_operator()),
                 (" after the change", self.last_operator()),
@@ -28,7 +28,10 @@ impl SigmoidFit {
         } else {
             vec![("", self.constant_operator())]
         };
-        let leads: Option<Vec<_>> = operators.iter().map(|(label, o)| Some((*label, o.lead()?))).collect();
+        let leads: Option<Vec<_>> = operators
+            .iter()
+            .map(|(label, o)| Some((*label, o.operator_estimate()?)))
+            .collect();
         // The poles are the same before and after the change.
         match (leads, records.first()) {
             (Some(leads), Some(record)) => {
@@ -51,7 +54,7 @@ impl SigmoidFit {
 
     fn parameter_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
-        if !self.change_found() {
+        if !self.has_change() {
             all.push(Finding::note(
                 "no-change",
                 "the records show no change (BIC): use the operator without a change",
@@ -66,7 +69,7 @@ impl SigmoidFit {
         for parameter in self.parameters() {
             let (name, value) = (parameter.name.as_str(), parameter.estimate.value);
             match parameter.remark {
-                Some(Remark::AtBound) if name == "tau_e" => all.push(Finding::doubt(
+                Some(Remark::AtBound) if name == "tau_e" => all.push(Finding::warning(
                     "delay-at-bound",
                     format!("the delay, {value:.3} s, is at an end of its search range; widen this range"),
                 )),
@@ -79,14 +82,14 @@ impl SigmoidFit {
                     "prior",
                     format!("{name} is determined by the prior alone"),
                 )),
-                Some(Remark::AtBound) => all.push(Finding::doubt(
+                Some(Remark::AtBound) => all.push(Finding::warning(
                     "parameter-at-bound",
                     format!(
                         "{name} = {} is at a bound; widen this bound",
-                        hoid_model::numbers::plain(value)
+                        hoid_model::numbers::format_plain(value)
                     ),
                 )),
-                Some(Remark::Undetermined) => all.push(Finding::doubt(
+                Some(Remark::Undetermined) => all.push(Finding::warning(
                     "undetermined-parameter",
                     format!("{name} is not determined by the data"),
                 )),
@@ -102,7 +105,7 @@ impl SigmoidFit {
             .map(|record| self.residuals(record))
             .collect::<Result<Vec<_>, _>>()?;
         let ts = records.first().map_or(1.0, |record| record.sample_time().s());
-        Ok(ResidualMeasures::of_series(&found, records, ts))
+        Ok(ResidualMeasures::from_series(&found, records, ts))
     }
 }
 
@@ -171,14 +174,14 @@ mod tests {
 
     use crate::SigmoidChange;
 
-    fn simulated(condition: Condition) -> Record {
+    fn simulated_record(condition: Condition) -> Record {
         let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
         simulator.run(RunSeed::default(), false).unwrap()
     }
 
     #[test]
     fn changing_run_is_trustworthy_and_delay_at_bound_is_doubtful() {
-        let record = simulated(Condition::C4);
+        let record = simulated_record(Condition::C4);
         let records = std::slice::from_ref(&record);
         let estimator = SigmoidChange {
             likelihood_intervals: false,
@@ -200,7 +203,7 @@ mod tests {
 
     #[test]
     fn missing_change_is_reported() {
-        let record = simulated(Condition::C1);
+        let record = simulated_record(Condition::C1);
         let records = std::slice::from_ref(&record);
         let estimator = SigmoidChange {
             likelihood_intervals: false,

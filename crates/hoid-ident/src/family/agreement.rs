@@ -47,7 +47,7 @@ pub enum AgreementMethod {
 
 impl AgreementMethod {
     /// Returns the name of the method for use in a sentence.
-    pub fn words(self) -> &'static str {
+    pub fn phrase(self) -> &'static str {
         match self {
             Self::PredictionError => "the prediction error fit",
             Self::Lines => "the fit at the lines",
@@ -112,14 +112,14 @@ pub struct AgreementPair {
 
 impl Agreement {
     /// Returns the pair with the least agreement.
-    pub fn worst(&self) -> Option<&AgreementPair> {
+    pub fn worst_pair(&self) -> Option<&AgreementPair> {
         self.pairs.iter().min_by(|a, b| a.p_value.total_cmp(&b.p_value))
     }
 }
 
 /// Estimate by one method.
 #[derive(Debug, Clone)]
-pub(super) struct Side {
+pub(super) struct MethodEstimate {
     pub method: AgreementMethod,
     /// Estimated coordinates; the first one is the level `ln |Y|` in place of the gain.
     pub coordinates: Vec<f64>,
@@ -129,11 +129,11 @@ pub(super) struct Side {
     pub reported: Vec<(f64, f64)>,
 }
 
-impl Side {
+impl MethodEstimate {
     /// Creates the estimate from an operator, the covariance for the test, and the reported covariance.
     pub fn of(method: AgreementMethod, operator: &FamilyOperator, covariance: &[f64], reported: &[f64]) -> Self {
         let p = operator.coordinates().len();
-        let gradient = level(operator).1;
+        let gradient = log_gain(operator).1;
         // The covariance is transformed by a matrix whose first row is the gradient of the level; the other rows are
         // rows of the identity matrix.
         let times = |c: &[f64], i: usize, j: usize| -> f64 {
@@ -146,7 +146,7 @@ impl Side {
         let turned: Vec<f64> = (0..p * p).map(|at| once[(at % p) * p + at / p]).collect();
         Self {
             method,
-            coordinates: with_level(operator),
+            coordinates: coordinates_with_log_gain(operator),
             covariance: (0..p * p).map(|at| times(&turned, at / p, at % p)).collect(),
             reported: (operator.coordinates().iter().enumerate())
                 .map(|(i, x)| (*x, reported[i * p + i].max(0.0).sqrt()))
@@ -156,19 +156,19 @@ impl Side {
 }
 
 /// Frequency at which the gain is compared, rad/s: the middle of the band of manual control.
-const MIDDLE_RAD_S: f64 = 2.4;
+const COMPARISON_FREQUENCY_RAD_S: f64 = 2.4;
 
-/// Returns `ln |Y|` at [`MIDDLE_RAD_S`] and its gradient with respect to the coordinates.
-fn level(operator: &FamilyOperator) -> (f64, Vec<f64>) {
-    let response = operator.response_and_gradient(MIDDLE_RAD_S);
+/// Returns `ln |Y|` at [`COMPARISON_FREQUENCY_RAD_S`] and its gradient with respect to the coordinates.
+fn log_gain(operator: &FamilyOperator) -> (f64, Vec<f64>) {
+    let response = operator.response_and_gradient(COMPARISON_FREQUENCY_RAD_S);
     let gradient = response.gradient.iter().map(|g| (g / response.value).re);
     (response.value.norm().ln(), gradient.collect())
 }
 
 /// Returns the coordinates with the level `ln |Y|` in place of the gain, which is the first coordinate of every form.
-pub(super) fn with_level(operator: &FamilyOperator) -> Vec<f64> {
+pub(super) fn coordinates_with_log_gain(operator: &FamilyOperator) -> Vec<f64> {
     let mut x = operator.coordinates().to_vec();
-    x[0] = level(operator).0;
+    x[0] = log_gain(operator).0;
     x
 }
 
@@ -177,7 +177,7 @@ pub(super) fn with_level(operator: &FamilyOperator) -> Vec<f64> {
 /// two methods.
 pub(super) fn agreement(
     all: &[Coordinate],
-    sides: &[Side],
+    sides: &[MethodEstimate],
     bias: &[f64],
     counts: impl Fn(usize) -> bool,
 ) -> Option<Agreement> {
@@ -187,7 +187,7 @@ pub(super) fn agreement(
         .collect();
     let pairs: Vec<(AgreementPair, Vec<f64>)> = (0..sides.len())
         .flat_map(|i| (i + 1..sides.len()).map(move |j| (i, j)))
-        .filter_map(|(i, j)| pair(all, &used, (&sides[i], &sides[j]), bias))
+        .filter_map(|(i, j)| compare_pair(all, &used, (&sides[i], &sides[j]), bias))
         .collect();
     let (first, in_errors) = pairs.first()?;
     let least = (pairs.iter()).fold(
@@ -209,10 +209,10 @@ pub(super) fn agreement(
 
 /// Tests the agreement of two methods in the coordinates with the indices `used`. Also returns the difference of each
 /// of these coordinates, in standard errors of the difference.
-fn pair(
+fn compare_pair(
     all: &[Coordinate],
     used: &[usize],
-    (one, other): (&Side, &Side),
+    (one, other): (&MethodEstimate, &MethodEstimate),
     bias: &[f64],
 ) -> Option<(AgreementPair, Vec<f64>)> {
     let (p, q) = (all.len(), used.len());
@@ -249,11 +249,11 @@ mod tests {
     use super::*;
     use hoid_model::Form;
 
-    fn side(method: AgreementMethod, x: &[f64], variance: f64) -> Side {
+    fn estimate(method: AgreementMethod, x: &[f64], variance: f64) -> MethodEstimate {
         let p = x.len();
         let mut covariance = vec![0.0; p * p];
         (0..p).for_each(|i| covariance[i * (p + 1)] = variance);
-        Side {
+        MethodEstimate {
             method,
             coordinates: x.to_vec(),
             reported: x.iter().map(|x| (*x, variance.sqrt())).collect(),
@@ -261,16 +261,16 @@ mod tests {
         }
     }
 
-    const HERE: [f64; 6] = [5.0, 0.6, 0.1, 2.4, -1.2, 0.15];
+    const OPERATOR: [f64; 6] = [5.0, 0.6, 0.1, 2.4, -1.2, 0.15];
 
     #[test]
     fn equal_estimates_agree_and_distant_ones_do_not() {
         let all = Form::LeadLag.coordinates(true);
-        let mut there = HERE;
+        let mut there = OPERATOR;
         let test = |there: &[f64]| {
             let sides = [
-                side(AgreementMethod::PredictionError, &HERE, 0.01),
-                side(AgreementMethod::Lines, there, 0.01),
+                estimate(AgreementMethod::PredictionError, &OPERATOR, 0.01),
+                estimate(AgreementMethod::Lines, there, 0.01),
             ];
             agreement(&all, &sides, &[0.0; 36], |i| i < 3).unwrap()
         };
@@ -280,20 +280,20 @@ mod tests {
         let apart = test(&there);
         assert!((apart.statistic - 16.0).abs() < 1e-9 && apart.p_value < 0.002 && apart.rows.len() == 3);
         assert!((apart.rows[1].difference_in_errors + 4.0).abs() < 1e-9);
-        assert_eq!(apart.worst().unwrap().most.0, Coordinate::Lead);
+        assert_eq!(apart.worst_pair().unwrap().most.0, Coordinate::Lead);
         assert_eq!(apart.rows[1].of(AgreementMethod::Lines).unwrap().0, there[1]);
         assert_eq!(apart.rows[1].of(AgreementMethod::Instrumental), None);
-        let one = [side(AgreementMethod::Lines, &HERE, 0.01)];
+        let one = [estimate(AgreementMethod::Lines, &OPERATOR, 0.01)];
         assert!(agreement(&all, &one, &[0.0; 36], |_| true).is_none());
-        let two = [one[0].clone(), side(AgreementMethod::Instrumental, &there, 0.01)];
+        let two = [one[0].clone(), estimate(AgreementMethod::Instrumental, &there, 0.01)];
         assert!(agreement(&all, &two, &[0.0; 36], |_| false).is_none());
         // A zero variance means that the coordinate is at a bound.
-        let held = [one[0].clone(), side(AgreementMethod::Instrumental, &there, 0.0)];
+        let held = [one[0].clone(), estimate(AgreementMethod::Instrumental, &there, 0.0)];
         assert!(agreement(&all, &held, &[0.0; 36], |_| true).is_none());
     }
 
     #[test]
-    fn covariance_of_a_side_matches_finite_differences() {
+    fn estimate_covariance_matches_finite_differences() {
         let operator = |x: &[f64]| FamilyOperator::new(Form::LeadLag, true, x).unwrap();
         // Three directions, including the gain.
         let directions = [
@@ -308,11 +308,11 @@ mod tests {
         };
         let covariance = outer(&directions.map(|d| d.to_vec()));
         let method = AgreementMethod::Lines;
-        let side = Side::of(method, &operator(&HERE), &covariance, &covariance);
+        let side = MethodEstimate::of(method, &operator(&OPERATOR), &covariance, &covariance);
         let moved = directions.map(|d| {
             let at = |by: f64| {
-                let x: Vec<f64> = HERE.iter().zip(d).map(|(x, d)| x + by * d).collect();
-                with_level(&operator(&x))
+                let x: Vec<f64> = OPERATOR.iter().zip(d).map(|(x, d)| x + by * d).collect();
+                coordinates_with_log_gain(&operator(&x))
             };
             let (up, down) = (at(1e-4), at(-1e-4));
             up.iter().zip(down).map(|(a, b)| (a - b) / 2e-4).collect()
@@ -320,19 +320,19 @@ mod tests {
         for (a, b) in side.covariance.iter().zip(outer(&moved)) {
             assert!((a - b).abs() < 1e-6, "{a} {b}");
         }
-        assert_eq!(side.reported[0].0, HERE[0]);
+        assert_eq!(side.reported[0].0, OPERATOR[0]);
         assert!((side.reported[0].1 - 0.13_f64.sqrt()).abs() < 1e-12);
     }
 
     #[test]
     fn bias_applies_only_to_the_prediction_error_fit() {
         let all = Form::LeadLag.coordinates(true);
-        let mut there = HERE;
+        let mut there = OPERATOR;
         there[0] += 1.0;
         let sides = [
-            side(AgreementMethod::PredictionError, &HERE, 0.01),
-            side(AgreementMethod::Lines, &there, 0.01),
-            side(AgreementMethod::Instrumental, &there, 0.02),
+            estimate(AgreementMethod::PredictionError, &OPERATOR, 0.01),
+            estimate(AgreementMethod::Lines, &there, 0.01),
+            estimate(AgreementMethod::Instrumental, &there, 0.02),
         ];
         let mut bias = [0.0; 36];
         bias[0] = 1.0;
@@ -342,14 +342,14 @@ mod tests {
             assert!((statistic - expected).abs() < 1e-12, "{statistics:?}");
         }
         // Three pairs.
-        let least = found.worst().unwrap();
+        let least = found.worst_pair().unwrap();
         assert!((found.p_value - (3.0 * least.p_value).min(1.0)).abs() < 1e-15);
         let without = agreement(&all, &sides, &[0.0; 36], |i| i == 0).unwrap();
-        assert!(without.p_value < 1e-6 && without.worst().unwrap().methods.1 == AgreementMethod::Lines);
+        assert!(without.p_value < 1e-6 && without.worst_pair().unwrap().methods.1 == AgreementMethod::Lines);
     }
 
     #[test]
-    fn one_percent_test_rejects_one_percent() {
+    fn agreement_test_has_nominal_size() {
         // Independent normal differences of three coordinates: a linear congruential generator (D. E. Knuth, MMIX) and
         // sums of twelve deviates (central limit theorem).
         let mut state = 11_u64;
@@ -367,8 +367,8 @@ mod tests {
         let mut doubted = 0;
         for _ in 0..4000 {
             let mut sides = [
-                side(AgreementMethod::PredictionError, &HERE, 0.01),
-                side(AgreementMethod::Lines, &HERE, 0.04),
+                estimate(AgreementMethod::PredictionError, &OPERATOR, 0.01),
+                estimate(AgreementMethod::Lines, &OPERATOR, 0.04),
             ];
             for (side, s) in sides.iter_mut().zip([0.1, 0.2]) {
                 side.coordinates.iter_mut().for_each(|x| *x += s * normal());

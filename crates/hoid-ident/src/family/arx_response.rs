@@ -10,32 +10,32 @@
 //! is then lowered ([`Record::decimated`]), so fewer coefficients span the same time. The rate is lowered no further
 //! than necessary: in a closed loop the decimation filter, which needs later samples, makes e depend on later noise.
 
-use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, Structure, resampling::PASS};
+use hoid_model::{Channel, Complex64, Orders, Record, SampleTime, Structure, resampling::PASS_BAND_EDGE};
 
 use super::{prediction::ROUNDING_POWER, response_fit::MeasuredResponse};
 use crate::{Estimator, Fit, IdentError, ResponsePoint};
 
 /// Highest order of A.
-const POLES: usize = 16;
+const MAX_NA: usize = 16;
 /// The orders are not reduced further if neither A nor B has more coefficients than this.
 const MIN_COEFFICIENTS: usize = 4;
 /// Maximum number of coefficients of B.
-pub(super) const MAX_GAINS: usize = 60;
+pub(super) const MAX_NB: usize = 60;
 /// Innovation variance relative to the power of u below which the record may be free of noise.
-const NEARLY_NOISE_FREE: f64 = 1e-3;
+const LOW_NOISE_RATIO: f64 = 1e-3;
 /// Smallest ratio of the innovation variance to the power of rounding errors at which the residuals are noise. The margin
 /// allows for different degrees of freedom and first samples.
-const MIN_NOISE_TO_ROUNDING: f64 = 4.0;
+const MIN_NOISE_TO_ROUNDING_RATIO: f64 = 4.0;
 /// Lowest and highest order of A in the exact ARX model of an operator: the neuromuscular system and up to two lags.
-const OWN_ORDERS: (usize, usize) = (2, 4);
+const EXACT_NA_RANGE: (usize, usize) = (2, 4);
 /// Number of B coefficients minus the order of A in the exact ARX model of an operator: one for the fractional part of
 /// the delay and one for linear interpolation.
-const FURTHER_GAINS: usize = 2;
+const EXTRA_NB: usize = 2;
 /// Frequency range of the response, rad/s; its points are evenly spaced on a logarithmic scale.
 const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
-const POINTS: usize = 24;
+const POINT_COUNT: usize = 24;
 /// Duration of the impulse response that B can describe, s.
-const RESPONSE_S: f64 = 0.7;
+const IMPULSE_RESPONSE_S: f64 = 0.7;
 /// Shortest duration of B, s: the duration of a typical delay.
 const SHORTEST_RESPONSE_S: f64 = 0.2;
 
@@ -51,7 +51,7 @@ pub(super) struct ArxResponse {
 impl ArxResponse {
     /// Estimates the response from all records together. The orders are halved until the records determine the
     /// coefficients; a smooth record determines fewer of them. The sampling frequency is halved while B would still
-    /// have [`MAX_GAINS`] coefficients, and if B became shorter than [`SHORTEST_RESPONSE_S`], down to the lowest
+    /// have [`MAX_NB`] coefficients, and if B became shorter than [`SHORTEST_RESPONSE_S`], down to the lowest
     /// frequency that leaves the band of the response.
     ///
     /// # Errors
@@ -61,12 +61,12 @@ impl ArxResponse {
         let mut lead_s = 0.0;
         loop {
             let records = slower.as_deref().unwrap_or(records);
-            let is_too_fast = gains(records) >= 2 * MAX_GAINS;
-            let found = regressed(records, false, MAX_GAINS);
+            let is_too_fast = nb_for_response(records) >= 2 * MAX_NB;
+            let found = regress(records, false, MAX_NB);
             let covers = |orders: &Orders| orders.nb as f64 * records[0].sample_time().s() >= SHORTEST_RESPONSE_S;
             let is_short = found.as_ref().is_ok_and(|(_, orders)| !covers(orders));
             if (is_too_fast || is_short)
-                && let Some((next, lead)) = at_half_rate(records)
+                && let Some((next, lead)) = halve_sampling_rate(records)
             {
                 lead_s += lead;
                 slower = Some(next);
@@ -90,29 +90,29 @@ impl ArxResponse {
     /// takes many samples at high sampling frequencies. However, an operator without noise is exactly an ARX model of
     /// the order of the operator, with its delay in whole samples. The high-order model and all models of this kind are
     /// fitted, and the one with the smallest innovation variance is used.
-    pub fn without_noise(records: &[Record], longest_delay_s: f64) -> Option<Self> {
-        let (high, of_high) = regressed(records, true, MAX_GAINS).ok()?;
-        if high.innovations > NEARLY_NOISE_FREE {
+    pub fn from_noise_free(records: &[Record], longest_delay_s: f64) -> Option<Self> {
+        let (high, of_high) = regress(records, true, MAX_NB).ok()?;
+        if high.innovations > LOW_NOISE_RATIO {
             return None;
         }
         // If there is noise, models that use only a subset of the regressors of the high-order model are skipped, since
         // their innovation variance cannot be smaller.
-        let is_noise = high.innovations > MIN_NOISE_TO_ROUNDING * ROUNDING_POWER;
+        let is_noise = high.innovations > MIN_NOISE_TO_ROUNDING_RATIO * ROUNDING_POWER;
         let contained = |orders: &Orders| {
             let last = |orders: &Orders| orders.nk + orders.nb;
             orders.na <= of_high.na && orders.nk >= of_high.nk && last(orders) <= last(&of_high)
         };
         let longest = (longest_delay_s / records[0].sample_time().s()).ceil() as usize;
-        let own = (OWN_ORDERS.0..=OWN_ORDERS.1)
+        let own = (EXACT_NA_RANGE.0..=EXACT_NA_RANGE.1)
             .flat_map(|na| (0..=longest).map(move |nk| (na, nk)))
             .map(|(na, nk)| {
                 let mut orders = Structure::Arx.operator_orders(nk);
-                (orders.na, orders.nb) = (na, na + FURTHER_GAINS);
+                (orders.na, orders.nb) = (na, na + EXTRA_NB);
                 orders
             })
             .filter(|orders| !(is_noise && contained(orders)))
-            .filter_map(|orders| with_level(orders).fit(records).ok())
-            .map(|fit| Self::of_fit(records, &fit));
+            .filter_map(|orders| estimator_with_level(orders).fit(records).ok())
+            .map(|fit| Self::from_fit(records, &fit));
         let least = own.fold(high, |least, own| {
             if own.innovations < least.innovations {
                 own
@@ -123,12 +123,16 @@ impl ArxResponse {
         (least.innovations < ROUNDING_POWER).then_some(least)
     }
 
-    fn of_fit(records: &[Record], fit: &Fit) -> Self {
+    fn from_fit(records: &[Record], fit: &Fit) -> Self {
         let ts = records[0].sample_time();
         let squares: f64 = records.iter().flat_map(Record::output).map(|u| u * u).sum();
         let samples: usize = records.iter().map(Record::len).sum();
         Self {
-            points: fit.frequency_response(&frequencies(ts)).iter().map(measured).collect(),
+            points: fit
+                .frequency_response(&frequencies(ts))
+                .iter()
+                .map(measured_response)
+                .collect(),
             innovations: fit.innovation_variance() * samples as f64 / squares,
         }
     }
@@ -137,27 +141,27 @@ impl ArxResponse {
 /// Returns the frequencies in rad/s at which the response of an ARX model is computed.
 pub(super) fn frequencies(ts: SampleTime) -> Vec<f64> {
     let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
-    (0..POINTS)
-        .map(|i| BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0)))
+    (0..POINT_COUNT)
+        .map(|i| BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINT_COUNT as f64 - 1.0)))
         .collect()
 }
 
 /// Returns (na, nb) of the first regression; nb applies to each of the inputs.
-pub(super) fn first_orders(records: &[Record], inputs: usize, max_gains: usize) -> (usize, usize) {
+pub(super) fn initial_orders(records: &[Record], inputs: usize, max_gains: usize) -> (usize, usize) {
     let shortest = records.iter().map(Record::len).min().unwrap_or(0);
-    let nb = gains(records)
+    let nb = nb_for_response(records)
         .clamp(MIN_COEFFICIENTS, max_gains)
         .min(shortest / (8 * inputs));
-    (POLES.min(shortest / 12).max(2), nb.max(2))
+    (MAX_NA.min(shortest / 12).max(2), nb.max(2))
 }
 
 /// Returns both orders halved; `None` if neither order exceeds [`MIN_COEFFICIENTS`].
-pub(super) fn halved((na, nb): (usize, usize)) -> Option<(usize, usize)> {
+pub(super) fn halve_orders((na, nb): (usize, usize)) -> Option<(usize, usize)> {
     (na.max(nb) > MIN_COEFFICIENTS).then(|| (na.div_ceil(2).max(2), nb.div_ceil(2).max(2)))
 }
 
 /// Returns an ARX estimator that also estimates a level: without noise, an error of the removed means would be visible.
-fn with_level(orders: Orders) -> Estimator {
+fn estimator_with_level(orders: Orders) -> Estimator {
     Estimator {
         level: true,
         ..Estimator::new(Structure::Arx, orders)
@@ -166,8 +170,8 @@ fn with_level(orders: Orders) -> Estimator {
 
 /// Returns the records at half the sampling frequency, and the time in s by which e is then ahead. `None` if the pass
 /// band would not contain the band of the response, or if a record is too short.
-fn at_half_rate(records: &[Record]) -> Option<(Vec<Record>, f64)> {
-    if 0.5 * PASS * records[0].sample_time().nyquist_rad_s() < BAND_RAD_S.1 {
+fn halve_sampling_rate(records: &[Record]) -> Option<(Vec<Record>, f64)> {
+    if 0.5 * PASS_BAND_EDGE * records[0].sample_time().nyquist_rad_s() < BAND_RAD_S.1 {
         return None;
     }
     let mut lead_s = 0.0;
@@ -186,19 +190,19 @@ fn at_half_rate(records: &[Record]) -> Option<(Vec<Record>, f64)> {
     Some((halved?, lead_s))
 }
 
-/// Returns the number of B coefficients that cover a response with the duration [`RESPONSE_S`].
-fn gains(records: &[Record]) -> usize {
-    (RESPONSE_S / records[0].sample_time().s()).ceil() as usize
+/// Returns the number of B coefficients that cover a response with the duration [`IMPULSE_RESPONSE_S`].
+fn nb_for_response(records: &[Record]) -> usize {
+    (IMPULSE_RESPONSE_S / records[0].sample_time().s()).ceil() as usize
 }
 
 /// Repeats the regression until the records determine the coefficients, each time with half the order of A or with half
 /// of both orders. Returns the response and the orders.
-fn regressed(records: &[Record], of_a_alone: bool, max_gains: usize) -> Result<(ArxResponse, Orders), IdentError> {
+fn regress(records: &[Record], of_a_alone: bool, max_gains: usize) -> Result<(ArxResponse, Orders), IdentError> {
     let mut orders = Structure::Arx.operator_orders(1);
-    (orders.na, orders.nb) = first_orders(records, 1, max_gains);
+    (orders.na, orders.nb) = initial_orders(records, 1, max_gains);
     loop {
         let estimator = if of_a_alone {
-            with_level(orders)
+            estimator_with_level(orders)
         } else {
             Estimator::new(Structure::Arx, orders)
         };
@@ -206,17 +210,17 @@ fn regressed(records: &[Record], of_a_alone: bool, max_gains: usize) -> Result<(
         let fewer = if of_a_alone {
             (orders.na > 2).then(|| (orders.na.div_ceil(2).max(2), orders.nb))
         } else {
-            halved((orders.na, orders.nb))
+            halve_orders((orders.na, orders.nb))
         };
         match fewer {
             Some(fewer) if found.is_err() => (orders.na, orders.nb) = fewer,
-            _ => return found.map(|fit| (ArxResponse::of_fit(records, &fit), orders)),
+            _ => return found.map(|fit| (ArxResponse::from_fit(records, &fit), orders)),
         }
     }
 }
 
 /// Converts a point of the frequency response of a fit.
-pub(super) fn measured(point: &ResponsePoint) -> MeasuredResponse {
+pub(super) fn measured_response(point: &ResponsePoint) -> MeasuredResponse {
     let gain = 10f64.powf(point.magnitude_db.value / 20.0);
     let error = |e: Option<f64>| e.unwrap_or(0.0);
     let relative = error(point.magnitude_db.standard_error) * std::f64::consts::LN_10 / 20.0;

@@ -9,28 +9,30 @@ use hoid_numerics::statistics::mean;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
-    agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
+    agreement::{Agreement, AgreementMethod, MethodEstimate, agreement, coordinates_with_log_gain},
     channel::{ChannelFit, SeenChannel},
-    channel_lines::{AtChannelLines, InForm, have_separate_lines},
-    channels::with_responses,
+    channel_lines::{ChannelInForm, ChannelLineFitter, have_separate_lines},
+    channels::add_responses,
     choice::{FormFigures, evidence_for},
     covariances::response_errors,
     diagnostics::{DiagnosticInputs, LARGEST_RESPONSE_ERROR, findings},
-    estimated::{Errors, Estimated, in_form, operator_of},
-    instrumental::{Instrumental, InstrumentalFit},
-    joint::{Lines, with_lines},
+    estimated::{EstimateErrors, EstimatedOperator, record_operator, weighed_form},
+    instrumental::{InstrumentalFit, InstrumentalSearch},
+    joint::{LineMeasurements, fit_with_lines},
     line_fit::LineFit,
     lines::LineData,
-    prediction::Prediction,
+    prediction::PredictionProblem,
     prediction_fit::PredictionFit,
     result::{FamilyFit, FreeModel, OperatorInForm, WeighedForm},
-    sensitivity::{EXTRA_DEVIATIONS_WITHOUT_LINES, EXTRA_WEIGHT_WITHOUT_LINES, LARGEST_SHARE_AT_LINES, rivals},
+    sensitivity::{
+        EXTRA_DEVIATIONS_WITHOUT_LINES, EXTRA_WEIGHT_WITHOUT_LINES, LARGEST_PRIOR_SHARE_AT_LINES, alternative_fits,
+    },
 };
 use crate::{
     IdentError, SearchOptions,
     criterion::{Criterion, Workspace},
     diagnostics::{
-        constancy::{Constancy, Direction, physical_blocks},
+        constancy::{Constancy, Direction, physical_score_blocks},
         residuals::ResidualMeasures,
     },
     frequency::DescribingFunction,
@@ -39,12 +41,12 @@ use crate::{
 };
 
 /// The excitation data, and the fit of the best form at the lines.
-pub(super) struct AtLines<'d> {
+pub(super) struct LineResults<'d> {
     pub describing: Option<&'d DescribingFunction>,
     /// Data for fits of several inputs at their lines; `None` if there is one input or if there are no lines.
-    pub channels: Option<AtChannelLines<'d>>,
+    pub channels: Option<ChannelLineFitter<'d>>,
     /// Further inputs with a response, in the selected forms.
-    pub in_form: Vec<InForm>,
+    pub in_form: Vec<ChannelInForm>,
     pub fit: Option<LineFit>,
     /// Reason why there is no fit, if one was requested.
     pub missing_reason: Option<String>,
@@ -58,15 +60,15 @@ pub(super) struct OtherForm<'a> {
 }
 
 /// The search of the best form, and everything else that the result requires.
-pub(super) struct Chosen<'p, 'a> {
+pub(super) struct ChosenForm<'p, 'a> {
     pub fit: PredictionFit<'a>,
     pub weight: f64,
-    pub lines: AtLines<'p>,
+    pub lines: LineResults<'p>,
     /// The other forms that have a weight.
     pub others: Vec<OtherForm<'a>>,
     /// Criteria of all compared forms.
     pub forms: Vec<FormFigures>,
-    pub prediction: &'p Prediction<'a>,
+    pub prediction: &'p PredictionProblem<'a>,
     /// Comparison of the forms of each further input.
     pub channels: Vec<ChannelFit>,
     /// The records, detrended.
@@ -80,7 +82,7 @@ pub(super) struct Chosen<'p, 'a> {
     pub highest_order: usize,
 }
 
-impl<'a> Chosen<'_, 'a> {
+impl<'a> ChosenForm<'_, 'a> {
     /// Assembles the result.
     ///
     /// # Errors
@@ -92,56 +94,56 @@ impl<'a> Chosen<'_, 'a> {
         } else {
             self.prediction.data.len()
         };
-        let noise_free = self.prediction.noise_free();
+        let noise_free = self.prediction.noise_free_share();
         let unseen = self.prediction.little_noise.is_none();
-        let mut errors = Errors::of(fit, self.run_to_run, workspace);
-        let error_ratio = errors.largest_ratio(fit);
+        let mut errors = EstimateErrors::of(fit, self.run_to_run, workspace);
+        let error_ratio = errors.largest_error_ratio(fit);
         // Estimates with other noise models: their differences enter the errors and the tolerated difference between
         // methods.
-        let others = rivals(self.prediction, fit, self.highest_order, workspace);
-        let (instrumental, no_instrumental) = match self.instrumental(separate, workspace) {
+        let others = alternative_fits(self.prediction, fit, self.highest_order, workspace);
+        let (instrumental, no_instrumental) = match self.fit_instrumental(separate, workspace) {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
             Some(Err(error)) => (None, Some(error.to_string())),
         };
         let mut agreement = None;
         if noise_free.is_none() {
-            agreement = agreement_of(
+            agreement = compare_methods(
                 fit,
-                &Estimated::of(fit, &errors, 0)?,
+                &EstimatedOperator::of(fit, &errors, 0)?,
                 self.lines.fit.as_ref(),
                 instrumental.as_ref().filter(|found| found.termination.converged()),
                 &others,
             );
         }
-        let joint = self.joint(fit, self.lines.fit.as_ref(), separate, workspace);
+        let joint = self.fit_jointly(fit, self.lines.fit.as_ref(), separate, workspace);
         if let Some(joint) = &joint {
-            errors = Errors::of(joint, self.run_to_run, workspace);
+            errors = EstimateErrors::of(joint, self.run_to_run, workspace);
         }
         let found = joint.as_ref().unwrap_or(fit);
         if noise_free.is_none() {
             add_bias(&mut errors, found, self.lines.fit.as_ref(), separate, (&others, unseen));
         }
-        let mut weighed = vec![in_form(found, &errors, self.weight, separate)?];
+        let mut weighed = vec![weighed_form(found, &errors, self.weight, separate)?];
         for other in &self.others {
-            let form = self.weighed(other, separate, workspace)?;
+            let form = self.weigh_form(other, separate, workspace)?;
             if form.operators.first().is_some_and(response_is_determined) {
                 weighed.push(form);
             }
         }
-        let forms = self.with_weights_of(&mut weighed);
+        let forms = self.normalise_weights(&mut weighed);
         let dc_gain_share = evidence_for(&forms, |form| form.has_lag() == layout.form.has_lag());
         let mut operators = Vec::with_capacity(separate);
         for record in 0..separate {
-            operators.push(operator_of(found, &errors, (&weighed, dc_gain_share), record)?);
+            operators.push(record_operator(found, &errors, (&weighed, dc_gain_share), record)?);
         }
         let free_model = match noise_free {
-            None => free_model(fit, workspace),
+            None => fit_free_model(fit, workspace),
             Some(_) => None,
         };
-        let channels = with_responses(self.channels.clone(), self.prediction, found, &errors)?;
-        let residuals = residuals(fit, workspace);
-        let of_delay = layout.delays().first().copied().unwrap_or(0);
+        let channels = add_responses(self.channels.clone(), self.prediction, found, &errors)?;
+        let residuals = residual_measures(fit, workspace);
+        let of_delay = layout.delay_indices().first().copied().unwrap_or(0);
         let all_parameters: Vec<_> = operators.iter().flat_map(|o| o.parameters.clone()).collect();
         let verdict = Verdict::of(findings(&DiagnosticInputs {
             termination: fit.minimum.termination,
@@ -150,7 +152,7 @@ impl<'a> Chosen<'_, 'a> {
             prior: &self.prediction.prior,
             residuals,
             noise_free,
-            not_constant: constancy(fit, self.run_to_run, workspace),
+            not_constant: constancy_finding(fit, self.run_to_run, workspace),
             lines: self.lines.fit.as_ref(),
             no_lines: self.lines.missing_reason.as_deref(),
             agreement: agreement.as_ref(),
@@ -206,23 +208,23 @@ impl<'a> Chosen<'_, 'a> {
     }
 
     /// Returns the prediction error fit that includes the lines; `None` without lines, without noise, if the records
-    /// have separate operators, or if [`with_lines`] returns none.
-    fn joint(
+    /// have separate operators, or if [`fit_with_lines`] returns none.
+    fn fit_jointly(
         &self,
         fit: &PredictionFit<'a>,
         lines: Option<&LineFit>,
         separate: usize,
         workspace: &mut Workspace,
     ) -> Option<PredictionFit<'a>> {
-        if separate > 1 || self.prediction.noise_free().is_some() {
+        if separate > 1 || self.prediction.noise_free_share().is_some() {
             return None;
         }
         let data = match (&self.lines.channels, self.lines.describing) {
-            (Some(at), _) => Lines::Channels(Box::new(at.criterion(fit.layout().form, &self.lines.in_form))),
-            (None, Some(describing)) => Lines::Response(LineData::new(describing)),
+            (Some(at), _) => LineMeasurements::Channels(Box::new(at.criterion(fit.layout().form, &self.lines.in_form))),
+            (None, Some(describing)) => LineMeasurements::Response(LineData::new(describing)),
             (None, None) => return None,
         };
-        with_lines(self.prediction, fit, (lines?, &data), workspace)
+        fit_with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
     /// Same as [`have_separate_lines`].
@@ -237,10 +239,14 @@ impl<'a> Chosen<'_, 'a> {
 
     /// Estimates one operator for all records by refined instrumental variables with the recorded excitation; `None`
     /// without an excitation, without noise, with separate operators, or with further inputs.
-    fn instrumental(&self, separate: usize, workspace: &mut Workspace) -> Option<Result<InstrumentalFit, IdentError>> {
+    fn fit_instrumental(
+        &self,
+        separate: usize,
+        workspace: &mut Workspace,
+    ) -> Option<Result<InstrumentalFit, IdentError>> {
         let channel = self
             .excitation
-            .filter(|_| separate == 1 && self.prediction.noise_free().is_none() && self.channels.is_empty())?;
+            .filter(|_| separate == 1 && self.prediction.noise_free_share().is_none() && self.channels.is_empty())?;
         let own = self.fit.layout().coordinates_of(self.fit.eta(), 0);
         let auxiliary = match &self.lines.fit {
             Some(lines) => {
@@ -250,13 +256,13 @@ impl<'a> Chosen<'_, 'a> {
             }
             None => vec![own],
         };
-        let found = Instrumental::new(self.prediction, &self.fit, self.records, channel);
+        let found = InstrumentalSearch::new(self.prediction, &self.fit, self.records, channel);
         Some(found.and_then(|method| method.fit(&auxiliary, workspace)))
     }
 
     /// Normalises the weights of the remaining forms to a sum of one, and returns the criteria of all forms with these
     /// weights.
-    fn with_weights_of(&self, weighed: &mut [WeighedForm]) -> Vec<FormFigures> {
+    fn normalise_weights(&self, weighed: &mut [WeighedForm]) -> Vec<FormFigures> {
         let total: f64 = weighed.iter().map(|form| form.weight).sum();
         weighed.iter_mut().for_each(|form| form.weight /= total);
         let weight = |of: Form| {
@@ -274,21 +280,21 @@ impl<'a> Chosen<'_, 'a> {
 
     /// Returns the operators of a form other than the best one, with errors computed in the same way as for the best
     /// form.
-    fn weighed(
+    fn weigh_form(
         &self,
         of: &OtherForm<'a>,
         separate: usize,
         workspace: &mut Workspace,
     ) -> Result<WeighedForm, IdentError> {
-        let joint = self.joint(&of.fit, of.lines.as_ref(), separate, workspace);
+        let joint = self.fit_jointly(&of.fit, of.lines.as_ref(), separate, workspace);
         let found = joint.as_ref().unwrap_or(&of.fit);
-        let mut errors = Errors::of(found, self.run_to_run, workspace);
-        let others = rivals(self.prediction, &of.fit, self.highest_order, workspace);
-        if self.prediction.noise_free().is_none() {
+        let mut errors = EstimateErrors::of(found, self.run_to_run, workspace);
+        let others = alternative_fits(self.prediction, &of.fit, self.highest_order, workspace);
+        if self.prediction.noise_free_share().is_none() {
             let unseen = self.prediction.little_noise.is_none();
             add_bias(&mut errors, found, of.lines.as_ref(), separate, (&others, unseen));
         }
-        in_form(found, &errors, of.weight, separate)
+        weighed_form(found, &errors, of.weight, separate)
     }
 }
 
@@ -297,7 +303,7 @@ impl<'a> Chosen<'_, 'a> {
 /// other noise models ([`super::sensitivity`]). `unseen` is false with little noise; the additional variances without
 /// lines then do not apply.
 fn add_bias(
-    errors: &mut Errors,
+    errors: &mut EstimateErrors,
     fit: &PredictionFit<'_>,
     lines: Option<&LineFit>,
     separate: usize,
@@ -309,7 +315,7 @@ fn add_bias(
     match lines {
         Some(lines) if separate == 1 => {
             let is_from_prior: Vec<bool> = (lines.prior_shares.iter())
-                .map(|share| *share > LARGEST_SHARE_AT_LINES)
+                .map(|share| *share > LARGEST_PRIOR_SHARE_AT_LINES)
                 .collect();
             covariances.add_bias(fit, &lines.elements());
             if is_from_prior.contains(&true) {
@@ -335,9 +341,9 @@ fn add_bias(
 
 /// Compares all methods over the gain and the determined coordinates, as far as their prior shares at the lines and
 /// with instrumental variables are small; `None` if fewer than two methods have errors.
-fn agreement_of(
+fn compare_methods(
     fit: &PredictionFit<'_>,
-    operator: &Estimated,
+    operator: &EstimatedOperator,
     lines: Option<&LineFit>,
     instrumental: Option<&InstrumentalFit>,
     others: &[Vec<f64>],
@@ -347,7 +353,7 @@ fn agreement_of(
     let model_based = operator.model_based.as_ref()?;
     let inflated: Vec<f64> = model_based.iter().map(|c| c * fit.inflation).collect();
     let reported = operator.covariance.as_deref()?;
-    let mut sides = vec![Side::of(
+    let mut sides = vec![MethodEstimate::of(
         AgreementMethod::PredictionError,
         &operator.operator,
         &inflated,
@@ -359,13 +365,18 @@ fn agreement_of(
         && let (Some(by_lines), Some(reported)) = (&lines.by_lines, &lines.covariance)
     {
         owe(&lines.prior_shares);
-        sides.push(Side::of(AgreementMethod::Lines, &lines.operator, by_lines, reported));
+        sides.push(MethodEstimate::of(
+            AgreementMethod::Lines,
+            &lines.operator,
+            by_lines,
+            reported,
+        ));
     }
     if let Some(instrumental) = instrumental
         && let Some(covariance) = &instrumental.covariance
     {
         owe(&instrumental.prior_shares);
-        sides.push(Side::of(
+        sides.push(MethodEstimate::of(
             AgreementMethod::Instrumental,
             &instrumental.operator,
             covariance,
@@ -379,7 +390,7 @@ fn agreement_of(
         let Ok(rival) = FamilyOperator::new(layout.form, layout.neuromuscular, &x) else {
             continue;
         };
-        let d: Vec<f64> = (with_level(&rival).iter().zip(&sides[0].coordinates))
+        let d: Vec<f64> = (coordinates_with_log_gain(&rival).iter().zip(&sides[0].coordinates))
             .map(|(there, here)| there - here)
             .collect();
         for i in 0..p {
@@ -391,13 +402,13 @@ fn agreement_of(
         all.any(|p| p.name == wanted.parameter() && p.determined)
     };
     agreement(&all, &sides, &bias, |i| {
-        shares[i] <= LARGEST_SHARE_AT_LINES && (all[i] == Coordinate::Gain || determined(all[i]))
+        shares[i] <= LARGEST_PRIOR_SHARE_AT_LINES && (all[i] == Coordinate::Gain || determined(all[i]))
     })
 }
 
 /// Fits a Box-Jenkins model with the orders and the delay of the fit, starting from the polynomials of the fit. `None`
 /// with several operators or several inputs, if the search fails, or if the model has no additional parameters.
-fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
+fn fit_free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
     let layout = fit.layout();
     if layout.elements.iter().any(|(_, record)| record.is_some()) || !layout.channels.is_empty() {
         return None;
@@ -418,7 +429,11 @@ fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<Free
     let found = minimise(&criterion, mapped.theta.clone(), &search, None, workspace)?;
     let n = fit.residuals as f64;
     let loss = found.at.sum_of_squares / n;
-    let freedom = mapped.theta.len().checked_sub(fit.parameters()).filter(|f| *f > 0)?;
+    let freedom = mapped
+        .theta
+        .len()
+        .checked_sub(fit.parameter_count())
+        .filter(|f| *f > 0)?;
     let ratio = (n * (fit.loss / loss).ln() / fit.inflation).max(0.0);
     let distribution = ChiSquared::new(freedom as f64).ok()?;
     loss.is_finite().then(|| FreeModel {
@@ -429,7 +444,7 @@ fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<Free
     })
 }
 
-fn residuals(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeasures {
+fn residual_measures(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeasures {
     let data = &fit.criterion.data;
     let first = fit.criterion.first;
     let all: Vec<Vec<f64>> = (0..data.len())
@@ -444,9 +459,9 @@ fn residuals(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> ResidualMeas
 }
 
 /// Returns a warning if the person changes over the records.
-fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Option<Finding> {
-    let (layout, eta, free) = (fit.layout(), fit.eta(), fit.free());
-    let blocks = physical_blocks(&fit.criterion, eta, &free, workspace)?;
+fn constancy_finding(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Option<Finding> {
+    let (layout, eta, free) = (fit.layout(), fit.eta(), fit.free_elements());
+    let blocks = physical_score_blocks(&fit.criterion, eta, &free, workspace)?;
     let direction = |(place, (coordinate, record)): (usize, &(Coordinate, Option<usize>))| {
         let logarithm = matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta);
         let mut vector = vec![0.0; eta.len()];
@@ -475,7 +490,7 @@ fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace
         run_to_run,
         sample_time_s: layout.sample_time.s(),
     }
-    .change()
+    .change_finding()
 }
 
 /// Returns the mean of the squared coherence over the lines; `None` if the coherence is unknown.

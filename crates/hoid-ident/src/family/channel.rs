@@ -36,8 +36,8 @@ impl ChannelRole {
     /// Forms that are compared for a channel with this role.
     pub fn forms(self) -> &'static [Form] {
         match self {
-            Self::Feedforward | Self::Output => &Form::OF_TARGET,
-            Self::Motion => &Form::OF_MOTION,
+            Self::Feedforward | Self::Output => &Form::TARGET_FORMS,
+            Self::Motion => &Form::MOTION_FORMS,
         }
     }
 }
@@ -170,7 +170,7 @@ impl ChannelFit {
             let found = of.operator.response_and_gradient(omega);
             let held = found.value
                 * intersample.response(omega, sample_time)
-                * Complex64::from_polar(1.0, omega * self.lead_s(sample_time));
+                * Complex64::from_polar(1.0, omega * self.preview_time_s(sample_time));
             let relative = of.covariance.as_deref().map(|c| found.relative_covariance(c));
             let error = |part: usize| relative.map(|c| c[part][part].max(0.0).sqrt());
             ResponsePoint {
@@ -189,14 +189,14 @@ impl ChannelFit {
     }
 
     /// Returns the preview time in s, rounded to whole samples.
-    pub(super) fn lead_s(&self, sample_time: SampleTime) -> f64 {
-        lead(self.preview_s, sample_time) as f64 * sample_time.s()
+    pub(super) fn preview_time_s(&self, sample_time: SampleTime) -> f64 {
+        preview_samples(self.preview_s, sample_time) as f64 * sample_time.s()
     }
 }
 
 impl ChannelFit {
     /// Creates the result of a further input from the comparison of its forms; the response is added later.
-    pub(super) fn compared(asked: &SeenChannel, forms: Vec<ChannelForm>, p_value: f64) -> Self {
+    pub(super) fn from_comparison(asked: &SeenChannel, forms: Vec<ChannelForm>, p_value: f64) -> Self {
         Self {
             name: asked.name.clone(),
             role: asked.role,
@@ -209,7 +209,7 @@ impl ChannelFit {
 }
 
 /// Returns the preview in samples.
-pub(super) fn lead(preview_s: f64, sample_time: SampleTime) -> usize {
+pub(super) fn preview_samples(preview_s: f64, sample_time: SampleTime) -> usize {
     (preview_s / sample_time.s()).round() as usize
 }
 
@@ -227,7 +227,7 @@ pub(super) struct Channel<'a> {
 }
 
 impl Channel<'_> {
-    pub fn in_layout(&self) -> ChannelInLayout {
+    pub fn layout_entry(&self) -> ChannelInLayout {
         ChannelInLayout {
             form: self.form,
             limits: self.limits.clone(),

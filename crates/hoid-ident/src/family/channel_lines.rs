@@ -25,27 +25,27 @@ use hoid_numerics::statistics::upper_median;
 
 use super::{
     channel::SeenChannel,
-    coordinates::{self, Grid},
+    coordinates::{self, GridDensity},
     intersample::Intersample,
     layout::{ChannelInLayout, FamilyLayout},
-    lines::{MIN_RUNS, moderated},
+    lines::{MIN_RUNS, shrunk_variance},
     prior::OperatorPrior,
 };
 use crate::{
     SearchOptions,
     criterion::Workspace,
-    frequency::{COMMON_EXCITATIONS, Excitation, LineSearch, Window, greatest_common_divisor},
+    frequency::{COMMON_EXCITATIONS, Excitation, LineDetectionOptions, Window, greatest_common_divisor},
     grey_box::{objective::Penalty, parametrisation::Parametrisation},
     linalg::least_squares::solve_symmetric,
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
 /// Number of starts from which the search runs to completion.
-const SEARCHES: usize = 4;
+const SEARCH_COUNT: usize = 4;
 /// Number of neighbouring bins from which the remnant at a line is estimated.
-const NEIGHBOURS: usize = 8;
+const NEIGHBOUR_COUNT: usize = 8;
 /// Number of rounds in which the variances are updated.
-const ROUNDS: usize = 2;
+const ROUND_COUNT: usize = 2;
 
 /// Fourier coefficients of u and of all inputs, with the error as the first input.
 #[derive(Debug, Clone)]
@@ -105,13 +105,13 @@ impl ChannelLines {
                 exciters.push(name.to_owned());
             }
         }
-        let search = LineSearch {
+        let search = LineDetectionOptions {
             period_s,
-            ..LineSearch::default()
+            ..LineDetectionOptions::default()
         };
         let found: Vec<Vec<Option<Excitation>>> = (records.iter())
             .map(|record| {
-                let of = |name: &String| Excitation::found_in(record, name, &search).ok();
+                let of = |name: &String| Excitation::detect(record, name, &search).ok();
                 exciters.iter().map(of).collect()
             })
             .collect();
@@ -192,17 +192,17 @@ impl ChannelLines {
                     };
                     let mut neighbours: Vec<usize> = (1..u.len()).filter(|bin| !is_line(*bin)).collect();
                     neighbours.sort_by_key(|bin| bin.abs_diff(at));
-                    neighbours.truncate(NEIGHBOURS);
+                    neighbours.truncate(NEIGHBOUR_COUNT);
                     let neighbours = neighbours.into_iter().map(over).collect();
                     let omega = std::f64::consts::TAU * line as f64 / span_s;
-                    self.put(exciter, omega, over(at), neighbours);
+                    self.insert_run(exciter, omega, over(at), neighbours);
                 }
             }
         }
         Some(())
     }
 
-    fn put(&mut self, exciter: usize, omega_rad_s: f64, run: Coefficients, neighbours: Vec<Coefficients>) {
+    fn insert_run(&mut self, exciter: usize, omega_rad_s: f64, run: Coefficients, neighbours: Vec<Coefficients>) {
         let known = |line: &&mut Line| line.exciter == exciter && (line.omega_rad_s / omega_rad_s - 1.0).abs() < 1e-4;
         match self.lines.iter_mut().find(known) {
             Some(line) => {
@@ -245,7 +245,7 @@ impl ChannelLines {
             _ => 1.0,
         };
         for (line, (of_runs, neighbours)) in self.lines.iter_mut().zip(all) {
-            line.variance = moderated(line.runs.len(), of_runs, neighbours, excess);
+            line.variance = shrunk_variance(line.runs.len(), of_runs, neighbours, excess);
         }
     }
 }
@@ -300,7 +300,7 @@ impl ChannelMinimum {
 
 /// A further input in one form, as part of a fit at the lines.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct InForm {
+pub(super) struct ChannelInForm {
     /// Index of the input among the requested channels.
     pub index: usize,
     pub form: Form,
@@ -310,7 +310,7 @@ pub(super) struct InForm {
 
 /// Data and settings common to all fits at the lines.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct AtChannelLines<'l> {
+pub(super) struct ChannelLineFitter<'l> {
     pub lines: &'l Arc<ChannelLines>,
     pub neuromuscular: bool,
     pub delay_range_s: (f64, f64),
@@ -319,14 +319,14 @@ pub(super) struct AtChannelLines<'l> {
     pub search: &'l SearchOptions,
 }
 
-impl AtChannelLines<'_> {
+impl ChannelLineFitter<'_> {
     /// Returns the criterion for these forms, including the prior.
-    pub fn criterion(&self, form: Form, channels: &[InForm]) -> ChannelCriterion {
+    pub fn criterion(&self, form: Form, channels: &[ChannelInForm]) -> ChannelCriterion {
         let (sample_time, _) = self.sampling;
         let limits = coordinates::limits(form, self.neuromuscular, self.delay_range_s, sample_time);
-        let of = |channel: &InForm| {
+        let of = |channel: &ChannelInForm| {
             let all = coordinates::limits(channel.form, self.neuromuscular, channel.delay_range_s, sample_time);
-            let own = own_places(channel.form, self.neuromuscular);
+            let own = own_coordinates(channel.form, self.neuromuscular);
             ChannelInLayout {
                 form: channel.form,
                 limits: own.iter().map(|&i| all[i]).collect(),
@@ -349,17 +349,17 @@ impl AtChannelLines<'_> {
 
     /// Returns the lines with their variances. The part of u that is not explained is computed first with the responses
     /// `begun`, then with the best fit of these forms.
-    pub fn weighed(
+    pub fn weighted_lines(
         &self,
-        (form, channels): (Form, &[InForm]),
+        (form, channels): (Form, &[ChannelInForm]),
         begun: impl Fn(f64) -> Vec<Complex64>,
     ) -> Arc<ChannelLines> {
         let mut lines = self.lines.as_ref().clone();
         lines.weigh(begun);
         let inputs = channels.iter().map(|c| c.index + 1).max().unwrap_or(0);
-        for _ in 0..ROUNDS {
+        for _ in 0..ROUND_COUNT {
             let shared = Arc::new(lines.clone());
-            let at = AtChannelLines {
+            let at = ChannelLineFitter {
                 lines: &shared,
                 ..*self
             };
@@ -373,7 +373,7 @@ impl AtChannelLines<'_> {
     /// Returns the responses of a fit to the error and to `inputs` further inputs at the frequency `omega`.
     fn responses(
         &self,
-        (form, channels): (Form, &[InForm]),
+        (form, channels): (Form, &[ChannelInForm]),
         found: &ChannelMinimum,
         inputs: usize,
         omega: f64,
@@ -393,14 +393,14 @@ impl AtChannelLines<'_> {
     }
 
     /// Searches from the best points of a grid and returns the best result; `None` if every search fails.
-    pub fn fit(&self, form: Form, channels: &[InForm]) -> Option<ChannelMinimum> {
+    pub fn fit(&self, form: Form, channels: &[ChannelInForm]) -> Option<ChannelMinimum> {
         let criterion = self.criterion(form, channels);
         let mut starts: Vec<(f64, Vec<f64>)> = (criterion.grid().into_iter())
-            .filter_map(|mut start| Some((criterion.best_gains(&mut start)?, start)))
+            .filter_map(|mut start| Some((criterion.optimise_gains(&mut start)?, start)))
             .collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<Minimum> = None;
-        for (_, start) in starts.into_iter().take(SEARCHES) {
+        for (_, start) in starts.into_iter().take(SEARCH_COUNT) {
             let known = best.as_ref().map(|b| b.at.sum_of_squares);
             if let Some(found) = minimise(&criterion, start, self.search, None, &mut Workspace::default())
                 && known.is_none_or(|known| found.at.sum_of_squares < known)
@@ -414,7 +414,7 @@ impl AtChannelLines<'_> {
 
 /// Returns the indices of the coordinates that a channel does not share with other channels: all except those of the
 /// neuromuscular system.
-pub(super) fn own_places(form: Form, neuromuscular: bool) -> Vec<usize> {
+pub(super) fn own_coordinates(form: Form, neuromuscular: bool) -> Vec<usize> {
     let all = form.coordinates(neuromuscular);
     let own = |i: &usize| !matches!(all[*i], Coordinate::LogOmega | Coordinate::LogZeta);
     (0..all.len()).filter(own).collect()
@@ -422,7 +422,7 @@ pub(super) fn own_places(form: Form, neuromuscular: bool) -> Vec<usize> {
 
 impl ChannelCriterion {
     /// Returns the largest number of runs that contain the same line.
-    pub fn runs(&self) -> usize {
+    pub fn run_count(&self) -> usize {
         self.lines.runs
     }
 
@@ -449,16 +449,16 @@ impl ChannelCriterion {
     /// Returns the starting points of the searches.
     fn grid(&self) -> Vec<Vec<f64>> {
         let (form, muscles) = (self.layout.form, self.layout.neuromuscular);
-        let of_operator = &self.limits[..self.layout.operator_elements()];
-        let mut grid = coordinates::start_grid(form, muscles, of_operator, Grid::Default);
+        let of_operator = &self.limits[..self.layout.operator_element_count()];
+        let mut grid = coordinates::start_grid(form, muscles, of_operator, GridDensity::Default);
         for channel in &self.layout.channels {
             let coordinates = channel.form.coordinates(muscles);
             let mut whole = vec![(0.0, 0.0); coordinates.len()];
-            let own = own_places(channel.form, muscles);
+            let own = own_coordinates(channel.form, muscles);
             own.iter()
                 .zip(&channel.limits)
                 .for_each(|(&i, limit)| whole[i] = *limit);
-            let all = coordinates::start_grid(channel.form, muscles, &whole, Grid::Default);
+            let all = coordinates::start_grid(channel.form, muscles, &whole, GridDensity::Default);
             let mut points: Vec<Vec<f64>> = (all.iter()).map(|x| own.iter().map(|&i| x[i]).collect()).collect();
             points.dedup();
             grid = grid
@@ -493,7 +493,7 @@ impl ChannelCriterion {
 
     /// Sets the gains to their best values for the other coordinates, which is a linear problem, and returns the value
     /// of the criterion.
-    fn best_gains(&self, x: &mut [f64]) -> Option<f64> {
+    fn optimise_gains(&self, x: &mut [f64]) -> Option<f64> {
         let places: Vec<usize> = std::iter::once(0)
             .chain(self.layout.channels.iter().map(|c| c.place))
             .collect();
@@ -565,8 +565,8 @@ impl Objective for ChannelCriterion {
             .layout
             .channels
             .iter()
-            .map(|channel| self.layout.places_of(channel, 0));
-        let places: Vec<Vec<usize>> = std::iter::once((0..self.layout.coordinates()).collect())
+            .map(|channel| self.layout.channel_indices(channel, 0));
+        let places: Vec<Vec<usize>> = std::iter::once((0..self.layout.coordinate_count()).collect())
             .chain(channels)
             .collect();
         for line in &self.lines.lines {

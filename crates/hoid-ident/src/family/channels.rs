@@ -24,15 +24,15 @@ use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{Complex64, Detrend, Form, Record, SampleTime, Structure, operator_family::Coordinate};
 
 use super::{
-    arx_response::{MAX_GAINS, first_orders, frequencies, halved, measured},
-    channel::{Channel, ChannelFit, ChannelResponse, SeenChannel, lead},
-    channel_lines::{AtChannelLines, ChannelLines, InForm, own_places},
+    arx_response::{MAX_NB, frequencies, halve_orders, initial_orders, measured_response},
+    channel::{Channel, ChannelFit, ChannelResponse, SeenChannel, preview_samples},
+    channel_lines::{ChannelInForm, ChannelLineFitter, ChannelLines, own_coordinates},
     coordinates,
     covariances::Covariances,
-    estimated::Errors,
+    estimated::EstimateErrors,
     intersample::Intersample,
     parameter::{CoordinateEstimate, Parameter},
-    prediction::Prediction,
+    prediction::PredictionProblem,
     prediction_fit::PredictionFit,
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
@@ -50,9 +50,9 @@ use crate::{
 };
 
 /// Fraction of the power of an input that the previous inputs must leave unexplained.
-const MIN_OWN_PART: f64 = 1e-9;
+const MIN_UNEXPLAINED_SHARE: f64 = 1e-9;
 /// Relative increase of the diagonal of the normal matrix in the regression for the ARX model.
-const RIDGE: f64 = 1e-7;
+const RELATIVE_RIDGE: f64 = 1e-7;
 /// Longest delay of a channel relative to the end of the preview, s.
 const LONGEST_DELAY_S: f64 = 0.8;
 
@@ -104,7 +104,7 @@ impl<'s> FurtherInputs<'s> {
                 );
             }
         }
-        let leads: Vec<usize> = all.iter().map(|c| lead(c.preview_s, sample_time)).collect();
+        let leads: Vec<usize> = all.iter().map(|c| preview_samples(c.preview_s, sample_time)).collect();
         let longest = leads.iter().copied().max().unwrap_or(0);
         let mut values = vec![Vec::with_capacity(records.len()); all.len()];
         let mut cut = Vec::with_capacity(records.len());
@@ -125,7 +125,7 @@ impl<'s> FurtherInputs<'s> {
                         &format!("one of {}", names.join(", ")),
                     );
                 };
-                values.push(detrend.taken_out(&found[lead..lead + left]));
+                values.push(detrend.detrended_values(&found[lead..lead + left]));
             }
             cut.push(if longest == 0 {
                 record
@@ -162,9 +162,9 @@ impl<'s> FurtherInputs<'s> {
         };
         let whole = |of: &dyn Fn(usize) -> Vec<f64>| -> Vec<f64> { (0..records.len()).flat_map(of).collect() };
         let mut names = vec!["e"];
-        let mut basis = vec![whole(&|k| Detrend::Mean.taken_out(records[k].input()))];
+        let mut basis = vec![whole(&|k| Detrend::Mean.detrended_values(records[k].input()))];
         for (channel, values) in self.all.iter().zip(&self.values) {
-            let own = whole(&|k| Detrend::Mean.taken_out(&values[k]));
+            let own = whole(&|k| Detrend::Mean.detrended_values(&values[k]));
             let power = dot(&own, &own);
             if power <= 0.0 {
                 return refuse(
@@ -186,7 +186,7 @@ impl<'s> FurtherInputs<'s> {
                     }
                 }
             }
-            if dot(&left, &left) <= MIN_OWN_PART * power {
+            if dot(&left, &left) <= MIN_UNEXPLAINED_SHARE * power {
                 return refuse(
                     format!("{} is a linear combination of {}", channel.name, names.join(" and ")),
                     format!(
@@ -208,7 +208,8 @@ impl<'s> FurtherInputs<'s> {
         let (sample_time, intersample) = sampling;
         let muscles = if neuromuscular { 2 } else { 0 };
         let of = |(channel, lead): (&SeenChannel, &usize)| {
-            let gains = |form: &Form| intersample.gains(usize::from(form.has_pole()) + muscles, form.degree());
+            let gains =
+                |form: &Form| intersample.numerator_length(usize::from(form.has_pole()) + muscles, form.degree());
             let most = channel.forms.iter().map(gains).max().unwrap_or(1);
             *lead + (LONGEST_DELAY_S / sample_time.s()).ceil() as usize + 2 + most
         };
@@ -228,9 +229,14 @@ impl<'s> FurtherInputs<'s> {
     }
 
     /// Returns a channel in a given form, with its preview and its delay range.
-    fn in_form(&self, index: usize, form: Form, (sample_time, intersample): (SampleTime, Intersample)) -> InForm {
+    fn channel_in_form(
+        &self,
+        index: usize,
+        form: Form,
+        (sample_time, intersample): (SampleTime, Intersample),
+    ) -> ChannelInForm {
         let lead_s = self.leads[index] as f64 * sample_time.s();
-        InForm {
+        ChannelInForm {
             index,
             form,
             lead_s,
@@ -239,9 +245,9 @@ impl<'s> FurtherInputs<'s> {
     }
 
     /// Returns the lines with their variances, starting from the responses of the ARX model.
-    pub fn weighed(
+    pub fn weighted_lines(
         &self,
-        at: &AtChannelLines<'_>,
+        at: &ChannelLineFitter<'_>,
         begun: &[Vec<Channel<'_>>],
         responses: &[Vec<MeasuredResponse>],
     ) -> Arc<ChannelLines> {
@@ -252,9 +258,9 @@ impl<'s> FurtherInputs<'s> {
         };
         let flexible = begun.iter().enumerate().filter_map(|(k, forms)| {
             let form = forms.first()?.form;
-            Some(self.in_form(k, form, at.sampling))
+            Some(self.channel_in_form(k, form, at.sampling))
         });
-        at.weighed((Form::LeadLag, &flexible.collect::<Vec<_>>()), |omega| {
+        at.weighted_lines((Form::LeadLag, &flexible.collect::<Vec<_>>()), |omega| {
             let turned = |(k, points): (usize, &Vec<MeasuredResponse>)| {
                 let lead_s = k
                     .checked_sub(1)
@@ -270,18 +276,18 @@ impl<'s> FurtherInputs<'s> {
     /// # Errors
     /// [`IdentError::SingularRegressors`] if the records do not distinguish the inputs.
     pub fn responses(&self, records: &[Record]) -> Result<Vec<Vec<MeasuredResponse>>, IdentError> {
-        let mut orders = first_orders(records, self.all.len() + 1, MAX_GAINS);
+        let mut orders = initial_orders(records, self.all.len() + 1, MAX_NB);
         loop {
-            if let Some(found) = self.regressed(records, orders) {
+            if let Some(found) = self.regress(records, orders) {
                 return Ok(found);
             }
-            orders = halved(orders).ok_or_else(|| IdentError::SingularRegressors {
+            orders = halve_orders(orders).ok_or_else(|| IdentError::SingularRegressors {
                 columns: format!("e, {} and their past samples", self.names().join(", ")),
             })?;
         }
     }
 
-    fn regressed(&self, records: &[Record], (na, nb): (usize, usize)) -> Option<Vec<Vec<MeasuredResponse>>> {
+    fn regress(&self, records: &[Record], (na, nb): (usize, usize)) -> Option<Vec<Vec<MeasuredResponse>>> {
         let sample_time = records[0].sample_time();
         let orders = hoid_model::Orders {
             na,
@@ -291,7 +297,7 @@ impl<'s> FurtherInputs<'s> {
         };
         // Relative to the end of the preview, the delay is longer by the preview.
         let own = |lead: &usize| InputOrders {
-            nb: (nb + lead).min(2 * MAX_GAINS),
+            nb: (nb + lead).min(2 * MAX_NB),
             nf: 0,
             nk: 0,
         };
@@ -321,14 +327,19 @@ impl<'s> FurtherInputs<'s> {
             weights: None,
             further,
         };
-        if criterion.residuals() <= 2 * criterion.parameters() {
+        if criterion.residual_count() <= 2 * criterion.parameter_count() {
             return None;
         }
         // An input with few lines determines only the response at these lines, and thus only few combinations of the
         // coefficients; the ridge makes the regression regular.
-        let fit = model.ridge(&criterion, RIDGE, sample_time)?;
+        let fit = model.fit_ridge(&criterion, RELATIVE_RIDGE, sample_time)?;
         let omega = frequencies(sample_time);
-        let of = |input| fit.frequency_response(input, &omega).iter().map(measured).collect();
+        let of = |input| {
+            fit.frequency_response(input, &omega)
+                .iter()
+                .map(measured_response)
+                .collect()
+        };
         Some((0..model.inputs.len()).map(of).collect())
     }
 
@@ -357,7 +368,7 @@ impl<'s> FurtherInputs<'s> {
                     continue;
                 };
                 let limits = coordinates::limits(form, neuromuscular, range, sampling.0);
-                let places = own_places(form, neuromuscular);
+                let places = own_coordinates(form, neuromuscular);
                 let cost = found.chi_squared + 2.0 * places.len() as f64;
                 forms.push((
                     cost,
@@ -384,16 +395,16 @@ impl<'s> FurtherInputs<'s> {
 ///
 /// # Errors
 /// The errors of [`hoid_model::FamilyOperator::new`].
-pub(super) fn with_responses(
+pub(super) fn add_responses(
     mut compared: Vec<ChannelFit>,
-    prediction: &Prediction<'_>,
+    prediction: &PredictionProblem<'_>,
     fit: &PredictionFit<'_>,
-    errors: &Errors,
+    errors: &EstimateErrors,
 ) -> Result<Vec<ChannelFit>, IdentError> {
     let layout = fit.layout();
-    let p = fit.parameters();
+    let p = fit.parameter_count();
     for (channel, own) in prediction.channels.iter().zip(&layout.channels) {
-        let places = layout.places_of(own, 0);
+        let places = layout.channel_indices(own, 0);
         let operator = layout.channel(fit.eta(), own, 0)?;
         let of = |c: &Covariances| -> Vec<f64> {
             let pairs = places.iter().flat_map(|&i| places.iter().map(move |&j| (i, j)));
@@ -411,7 +422,7 @@ pub(super) fn with_responses(
             run_to_run: errors.run_to_run,
         };
         let target = &mut compared[channel.index];
-        let shown_s = target.lead_s(layout.sample_time);
+        let shown_s = target.preview_time_s(layout.sample_time);
         let muscles = [Coordinate::LogOmega, Coordinate::LogZeta].map(Coordinate::parameter);
         let parameters = known.parameters().into_iter();
         let own = parameters.filter(|parameter| !muscles.contains(&parameter.name.as_str()));
@@ -460,7 +471,7 @@ impl FamilyFit {
         let mut total = vec![0.0; record.len()];
         for (channel, values) in channels.iter().zip(&seen.values) {
             let Some(found) = &channel.response else { continue };
-            let held = intersample.discrete(&found.operator, None, record.sample_time())?;
+            let held = intersample.discrete_model(&found.operator, None, record.sample_time())?;
             let mut response = vec![0.0; record.len()];
             fir(&held.b, held.nk, &values[0], &mut response);
             divide_in_place(&held.f, &mut response);

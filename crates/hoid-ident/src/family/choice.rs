@@ -32,7 +32,7 @@ pub struct FormFigures {
 }
 
 /// Difference from the smallest value of Akaike's criterion up to which there is no evidence against a form.
-pub const NO_EVIDENCE: f64 = 2.0;
+pub const NEGLIGIBLE_AIC_DIFFERENCE: f64 = 2.0;
 /// Weight below which a form is omitted from averages, because its contribution would be smaller than the error of the
 /// mean.
 pub const MIN_WEIGHT: f64 = 0.02;
@@ -45,7 +45,7 @@ pub(super) fn best_form(criteria: &[Option<f64>]) -> Option<usize> {
     let least = criteria.iter().flatten().copied().min_by(f64::total_cmp)?;
     criteria
         .iter()
-        .position(|c| c.is_some_and(|c| c - least <= NO_EVIDENCE))
+        .position(|c| c.is_some_and(|c| c - least <= NEGLIGIBLE_AIC_DIFFERENCE))
 }
 
 /// Returns the weight of each form; a criterion of `None` excludes a form, and `best` is the best form.

@@ -17,14 +17,14 @@ use crate::{
     grey_box::{objective::PhysicalCriterion, parametrisation::Parametrisation},
     linalg::{
         least_squares::dot,
-        products::{Lagged, gram},
+        products::{LaggedColumn, gram},
     },
 };
 
 /// Minimum number of records for which each record is a cluster.
 const MIN_RECORDS: usize = 5;
 /// Approximate total number of blocks into which fewer records are divided.
-const BLOCKS: usize = 8;
+const BLOCK_COUNT: usize = 8;
 /// Duration of the shortest block, s.
 const SHORTEST_BLOCK_S: f64 = 4.0;
 
@@ -72,7 +72,7 @@ impl Clusters {
         let mut parts = Vec::new();
         for record in 0..records {
             let mapped = criterion.model_of(eta, record)?;
-            let of_theta = criterion.of_record(&mapped, record);
+            let of_theta = criterion.record_criterion(&mapped, record);
             let residuals = of_theta.residuals_of(&mapped.theta, 0, workspace);
             let psi = of_theta.jacobian(&mapped.theta, 0, workspace);
             let positions = criterion.layout.positions(record);
@@ -80,12 +80,12 @@ impl Clusters {
             // Blocks longer than the memory of loop and noise have nearly independent scores.
             let wanted = match kind {
                 ClusterKind::Runs => 1,
-                ClusterKind::Blocks => BLOCKS.div_ceil(records).min(n / shortest.max(1)).max(1),
+                ClusterKind::Blocks => BLOCK_COUNT.div_ceil(records).min(n / shortest.max(1)).max(1),
             };
             for block in 0..wanted {
                 let span = block * n / wanted..(block + 1) * n / wanted;
                 // Products of the columns of psi and, in the last row, of the residuals with these columns.
-                let all = psi.iter().chain([&residuals]).map(|column| Lagged {
+                let all = psi.iter().chain([&residuals]).map(|column| LaggedColumn {
                     values: &column[span.clone()],
                     is_shift_of_previous: false,
                 });

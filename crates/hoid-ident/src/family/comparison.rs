@@ -3,7 +3,7 @@
 //! If an excitation was recorded, the forms are compared at its lines, otherwise by their prediction errors. All forms
 //! share one inflation kappa, so a form does not profit from a large kappa of its own. Without lines, the noise model
 //! biases the prediction errors: the best form is chosen as with lines, but its evidence against the other forms is
-//! reduced ([`bias_of_evidence`]). With little noise ([`super::low_noise`]) one form is assumed to be true, and a
+//! reduced ([`evidence_bias_ratio`]). With little noise ([`super::low_noise`]) one form is assumed to be true, and a
 //! parameter costs Schwarz's `ln n` (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464) instead of Akaike's 2. A form
 //! with undetermined parameters counts only if all forms have undetermined parameters.
 
@@ -15,21 +15,21 @@ use super::{
     covariances::{self, Covariances},
     diagnostics::MAX_DAMPING_RATIO,
     line_fit::LineFit,
-    prediction::Prediction,
+    prediction::PredictionProblem,
     prediction_fit::PredictionFit,
-    sensitivity::rivals,
+    sensitivity::alternative_fits,
 };
 use crate::{IdentError, criterion::Workspace};
 
 /// Difference of the criteria below which two forms count as equal.
-const EQUAL_CRITERIA: f64 = 0.05;
+const CRITERION_TOLERANCE: f64 = 0.05;
 /// Ratio of sums of squares up to which forms without noise count as equally good.
 const EQUAL_FIT_RATIO: f64 = 1.1;
 /// Number of standard errors by which a gain must differ from zero to count as determined.
 const MIN_STANDARD_ERRORS: f64 = 2.0;
 
 /// A form with its fits.
-pub(super) struct Tried<'a> {
+pub(super) struct TriedForm<'a> {
     pub form: Form,
     pub lines: Option<LineFit>,
     pub fit: Result<PredictionFit<'a>, IdentError>,
@@ -46,16 +46,16 @@ pub(super) struct Comparison {
 impl Comparison {
     /// Compares the forms, given in the order from the simplest.
     pub fn of(
-        tried: &[Tried<'_>],
-        prediction: &Prediction<'_>,
+        tried: &[TriedForm<'_>],
+        prediction: &PredictionProblem<'_>,
         highest_order: usize,
         workspace: &mut Workspace,
     ) -> Self {
         let counted = |criteria: &[Option<f64>]| {
             let mut counting = criteria.to_vec();
-            let noise_free = prediction.noise_free().is_some();
+            let noise_free = prediction.noise_free_share().is_some();
             if noise_free {
-                keep_best_fits(&mut counting, tried, prediction.equal());
+                keep_best_fits(&mut counting, tried, prediction.equality_threshold());
             }
             // If a form lacks a lag that the person has, the neuromuscular poles replace this lag.
             retain(&mut counting, |i| !neuromuscular_poles_are_lags(&tried[i]));
@@ -65,19 +65,19 @@ impl Comparison {
             if noise_free {
                 keep_simplest(&mut counting, tried);
             }
-            count_once(&mut counting, tried);
+            exclude_equivalent_form(&mut counting, tried);
             counting
         };
         let mut criteria = self::criteria(tried, prediction, 1.0);
         let best = best_form(&counted(&criteria));
-        if let Some(best) = best.filter(|_| compares_biased(tried, prediction)) {
-            let bias = bias_of_evidence(&tried[best], prediction, highest_order, workspace);
+        if let Some(best) = best.filter(|_| comparison_is_biased(tried, prediction)) {
+            let bias = evidence_bias_ratio(&tried[best], prediction, highest_order, workspace);
             criteria = self::criteria(tried, prediction, bias);
         }
         let weights = best.map_or(Vec::new(), |best| weights(&counted(&criteria), best));
         let figures = tried.iter().zip(criteria).enumerate();
         let figures =
-            figures.map(|(i, (t, criterion))| figures_of(t, criterion, weights.get(i).copied().unwrap_or(0.0)));
+            figures.map(|(i, (t, criterion))| form_figures(t, criterion, weights.get(i).copied().unwrap_or(0.0)));
         Self {
             best,
             figures: figures.collect(),
@@ -87,11 +87,11 @@ impl Comparison {
 
 /// Excludes the quadratic form if it is equivalent to the lead with a droop. The lead with a droop is the quadratic
 /// form with real zeros, so both forms can converge to the same operator, which must count only once.
-fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
+fn exclude_equivalent_form(counting: &mut [Option<f64>], tried: &[TriedForm<'_>]) {
     let place = |form: Form| tried.iter().position(|t| t.form == form);
     if let (Some(quadratic), Some(droop)) = (place(Form::QuadraticIntegral), place(Form::LeadDroop))
         && let (Some(one), Some(two)) = (counting[quadratic], counting[droop])
-        && (one - two).abs() < EQUAL_CRITERIA
+        && (one - two).abs() < CRITERION_TOLERANCE
     {
         counting[quadratic] = None;
     }
@@ -99,7 +99,7 @@ fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
 
 /// Keeps only the forms that fit equally well. Without noise, a wrong form has a residual many times larger than the
 /// right form, whichever parameters it determines. Sums of squares below `equal` count as equal.
-fn keep_best_fits(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
+fn keep_best_fits(counting: &mut [Option<f64>], tried: &[TriedForm<'_>], equal: f64) {
     let squares = |i: usize| {
         let fit = tried[i].fit.as_ref().ok();
         fit.map_or(f64::INFINITY, |fit| (fit.loss * fit.residuals as f64).max(equal))
@@ -110,9 +110,9 @@ fn keep_best_fits(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64)
 }
 
 /// Keeps only the forms with the fewest parameters.
-fn keep_simplest(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
+fn keep_simplest(counting: &mut [Option<f64>], tried: &[TriedForm<'_>]) {
     let fit = |i: usize| tried[i].fit.as_ref().ok();
-    let size = |i: usize| fit(i).map_or(usize::MAX, |fit| fit.layout().operator_elements());
+    let size = |i: usize| fit(i).map_or(usize::MAX, |fit| fit.layout().operator_element_count());
     let fewest = (0..tried.len()).filter(|i| counting[*i].is_some()).map(size).min();
     retain(counting, |i| Some(size(i)) == fewest);
 }
@@ -134,7 +134,7 @@ fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
 /// True if a combination of parameters is undetermined or a gain does not differ significantly from zero. The other
 /// parameters of the form are then meaningless, and a form with fewer parameters is equivalent.
 fn is_undetermined(fit: &PredictionFit<'_>) -> bool {
-    let p = fit.parameters();
+    let p = fit.parameter_count();
     let known = |covariances: Covariances| {
         let mut gains = fit
             .layout()
@@ -149,10 +149,10 @@ fn is_undetermined(fit: &PredictionFit<'_>) -> bool {
 
 /// True if the neuromuscular poles have become two separate lags, in the prediction error fit or in the fit at the
 /// lines.
-fn neuromuscular_poles_are_lags(tried: &Tried<'_>) -> bool {
+fn neuromuscular_poles_are_lags(tried: &TriedForm<'_>) -> bool {
     let lags = |operator: &FamilyOperator| {
         operator
-            .neuromuscular()
+            .neuromuscular_parameters()
             .is_some_and(|(_, zeta)| zeta > MAX_DAMPING_RATIO)
     };
     let of_fit = tried
@@ -164,14 +164,14 @@ fn neuromuscular_poles_are_lags(tried: &Tried<'_>) -> bool {
 }
 
 /// Returns the median of kappa over the forms, used for all forms so that their criteria are comparable.
-fn common_inflation(tried: &[Tried<'_>]) -> f64 {
+fn common_inflation(tried: &[TriedForm<'_>]) -> f64 {
     let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
     let mut all: Vec<f64> = fits.map(|fit| fit.inflation).collect();
     upper_median(&mut all).unwrap_or(1.0)
 }
 
 /// True if the forms are compared by prediction errors alone, so the noise model biases the comparison.
-fn compares_biased(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> bool {
+fn comparison_is_biased(tried: &[TriedForm<'_>], prediction: &PredictionProblem<'_>) -> bool {
     tried.len() > 1 && prediction.little_noise.is_none() && tried.iter().all(|t| t.lines.is_none())
 }
 
@@ -182,9 +182,9 @@ fn compares_biased(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> bool {
 /// wrong form may fit better than the right one because it compensates for that error. The likelihood ratio of two
 /// forms is a squared distance in units of the errors; if the bias enlarges the errors, this ratio decreases
 /// accordingly.
-fn bias_of_evidence(
-    best: &Tried<'_>,
-    prediction: &Prediction<'_>,
+fn evidence_bias_ratio(
+    best: &TriedForm<'_>,
+    prediction: &PredictionProblem<'_>,
     highest_order: usize,
     workspace: &mut Workspace,
 ) -> f64 {
@@ -196,7 +196,7 @@ fn bias_of_evidence(
             covariances::response_errors(&operator, Some(&own))
         };
         let before = errors(&covariances)?;
-        for other in rivals(prediction, fit, highest_order, workspace) {
+        for other in alternative_fits(prediction, fit, highest_order, workspace) {
             covariances.add_bias(fit, &other);
         }
         let ratios = errors(&covariances)?
@@ -209,7 +209,7 @@ fn bias_of_evidence(
 }
 
 /// Returns the criterion of each form; `None` for a form that could not be fitted.
-fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>, bias: f64) -> Vec<Option<f64>> {
+fn criteria(tried: &[TriedForm<'_>], prediction: &PredictionProblem<'_>, bias: f64) -> Vec<Option<f64>> {
     let little_noise = prediction.little_noise.is_some();
     let inflation = if little_noise {
         // The inflation of the form with the smallest loss is used, because the inflation of the other forms results
@@ -220,20 +220,20 @@ fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>, bias: f64) -> Vec<
     } else {
         bias * common_inflation(tried)
     };
-    let of = |tried: &Tried<'_>| {
+    let of = |tried: &TriedForm<'_>| {
         let fit = tried.fit.as_ref().ok()?;
         let n = fit.residuals as f64;
         let misfit = match &tried.lines {
             Some(of_lines) => of_lines.chi_squared,
-            None => n * fit.loss.max(prediction.equal() / n).ln() / inflation,
+            None => n * fit.loss.max(prediction.equality_threshold() / n).ln() / inflation,
         };
         let cost = if little_noise { n.ln() } else { 2.0 };
-        Some(misfit + cost * fit.layout().operator_elements() as f64)
+        Some(misfit + cost * fit.layout().operator_element_count() as f64)
     };
     tried.iter().map(of).collect()
 }
 
-fn figures_of(tried: &Tried<'_>, criterion: Option<f64>, weight: f64) -> FormFigures {
+fn form_figures(tried: &TriedForm<'_>, criterion: Option<f64>, weight: f64) -> FormFigures {
     FormFigures {
         form: tried.form,
         loss: tried.fit.as_ref().ok().map(|f| f.loss),

@@ -9,13 +9,13 @@ use hoid_model::{
 const LONGEST_LEAD_S: f64 = 30.0;
 /// Bounds of `1/T_I`, 1/s: a lag at the lower bound is practically an integration, a lag at the upper bound has hardly
 /// any effect.
-pub(super) const LAG_RATE: (f64, f64) = (1e-3, 30.0);
+pub(super) const LAG_RATE_LIMITS: (f64, f64) = (1e-3, 30.0);
 /// Largest droop frequency, rad/s.
-const LARGEST_DROOP: f64 = 10.0;
+const MAX_DROOP_RAD_S: f64 = 10.0;
 /// Bounds of the damping ratio: almost no damping at the lower bound, two separate lags at the upper bound.
-const DAMPING: (f64, f64) = (0.02, 5.0);
+const DAMPING_LIMITS: (f64, f64) = (0.02, 5.0);
 /// Lowest neuromuscular frequency, rad/s; a lower frequency would not describe a muscle.
-const LOWEST_FREQUENCY: f64 = 2.0;
+const MIN_NEUROMUSCULAR_RAD_S: f64 = 2.0;
 /// Largest omega_nm relative to the Nyquist frequency pi/Ts.
 const MAX_NYQUIST_SHARE: f64 = 0.95;
 
@@ -30,10 +30,10 @@ pub(crate) fn limits(
     let of = |coordinate: &Coordinate| match coordinate {
         Coordinate::Gain | Coordinate::Linear | Coordinate::Quadratic => (f64::NEG_INFINITY, f64::INFINITY),
         Coordinate::Lead => (0.0, LONGEST_LEAD_S),
-        Coordinate::LagRate => LAG_RATE,
-        Coordinate::Droop => (0.0, LARGEST_DROOP),
-        Coordinate::LogOmega => (LOWEST_FREQUENCY.min(0.5 * highest).ln(), highest.ln()),
-        Coordinate::LogZeta => (DAMPING.0.ln(), DAMPING.1.ln()),
+        Coordinate::LagRate => LAG_RATE_LIMITS,
+        Coordinate::Droop => (0.0, MAX_DROOP_RAD_S),
+        Coordinate::LogOmega => (MIN_NEUROMUSCULAR_RAD_S.min(0.5 * highest).ln(), highest.ln()),
+        Coordinate::LogZeta => (DAMPING_LIMITS.0.ln(), DAMPING_LIMITS.1.ln()),
         Coordinate::Delay => delay_range_s,
     };
     form.coordinates(neuromuscular).iter().map(of).collect()
@@ -41,7 +41,7 @@ pub(crate) fn limits(
 
 /// Density of the grid of starting points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Grid {
+pub(super) enum GridDensity {
     /// Grid for people, whose neuromuscular system is kept near the default by the prior.
     Default,
     /// Grid for a response that is known exactly and may belong to any operator.
@@ -49,7 +49,7 @@ pub(super) enum Grid {
 }
 
 /// Returns the starting values of a coordinate.
-fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: Grid) -> Vec<f64> {
+fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: GridDensity) -> Vec<f64> {
     let values: &[f64] = match coordinate {
         // The gain is computed from the other coordinates.
         Coordinate::Gain => &[1.0],
@@ -58,12 +58,12 @@ fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: Grid) -> 
         Coordinate::Linear => &[0.5, 1.5],
         Coordinate::Quadratic => &[0.05, 0.4],
         Coordinate::Droop => &[0.1, 0.6],
-        Coordinate::LogOmega if grid == Grid::Dense => &[1.9, 2.4, 2.9],
+        Coordinate::LogOmega if grid == GridDensity::Dense => &[1.9, 2.4, 2.9],
         Coordinate::LogOmega => &[2.35],
-        Coordinate::LogZeta if grid == Grid::Dense => &[-2.0, -1.2, -0.4],
+        Coordinate::LogZeta if grid == GridDensity::Dense => &[-2.0, -1.2, -0.4],
         Coordinate::LogZeta => &[-1.2],
         Coordinate::Delay => {
-            let steps = if grid == Grid::Dense { 8 } else { 4 };
+            let steps = if grid == GridDensity::Dense { 8 } else { 4 };
             return (0..=steps)
                 .map(|i| low + (high - low) * (i as f64 + 0.5) / (steps as f64 + 1.0))
                 .map(|tau| tau.min(high))
@@ -74,7 +74,12 @@ fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: Grid) -> 
 }
 
 /// Returns all combinations of the starting values for the coordinates of a form.
-pub(super) fn start_grid(form: Form, neuromuscular: bool, limits: &[(f64, f64)], density: Grid) -> Vec<Vec<f64>> {
+pub(super) fn start_grid(
+    form: Form,
+    neuromuscular: bool,
+    limits: &[(f64, f64)],
+    density: GridDensity,
+) -> Vec<Vec<f64>> {
     let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
     for (coordinate, bounds) in form.coordinates(neuromuscular).into_iter().zip(limits) {
         let values = start_values(coordinate, *bounds, density);
@@ -100,8 +105,8 @@ mod tests {
     fn starts_lie_within_the_limits() {
         for form in Form::ALL {
             for neuromuscular in [true, false] {
-                let limits = limits(form, neuromuscular, (0.05, 0.6), SampleTime::HUNDREDTH);
-                let grid = start_grid(form, neuromuscular, &limits, Grid::Default);
+                let limits = limits(form, neuromuscular, (0.05, 0.6), SampleTime::AT_100_HZ);
+                let grid = start_grid(form, neuromuscular, &limits, GridDensity::Default);
                 assert!(!grid.is_empty());
                 for start in grid {
                     assert_eq!(start.len(), limits.len());

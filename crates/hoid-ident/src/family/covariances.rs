@@ -20,7 +20,7 @@ use nalgebra::DMatrix;
 
 use super::{
     clusters::ClusterKind,
-    jackknife::{add_open_part, jackknife},
+    jackknife::{add_prior_contribution, jackknife},
     layout::FamilyLayout,
     prediction_fit::PredictionFit,
 };
@@ -30,9 +30,9 @@ use crate::{
 };
 
 /// Number of frequencies at which two responses are compared.
-const POINTS: usize = 24;
+const POINT_COUNT: usize = 24;
 /// Frequencies at which the errors of the response are averaged, rad/s.
-pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
+pub(super) const BAND_FREQUENCIES_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 
 /// Covariances of eta: from clusters, including the contribution of the prior, and from the model.
 #[derive(Debug, Clone)]
@@ -47,7 +47,10 @@ pub(super) struct Covariances {
 impl Covariances {
     /// Extracts the covariance of the operator coordinates in one record from the covariance of eta.
     pub fn of_operator(of_eta: &[f64], layout: &FamilyLayout, record: usize) -> Vec<f64> {
-        let (p, places) = (layout.limits().len(), &layout.positions(record)[..layout.coordinates()]);
+        let (p, places) = (
+            layout.limits().len(),
+            &layout.positions(record)[..layout.coordinate_count()],
+        );
         let pairs = places.iter().flat_map(|&i| places.iter().map(move |&j| i * p + j));
         pairs.map(|at| of_eta[at]).collect()
     }
@@ -65,9 +68,9 @@ impl Covariances {
     /// difference of the responses. In this case d is replaced by the [least squares
     /// difference](differences_from_response) that explains the difference of the responses.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
-        let p = fit.parameters();
+        let p = fit.parameter_count();
         let mut difference = vec![0.0; p];
-        let elements = fit.layout().operator_elements();
+        let elements = fit.layout().operator_element_count();
         let (found, of_channels): (Vec<_>, Vec<_>) =
             (differences(fit, other).into_iter()).partition(|(place, _)| *place < elements);
         let found = differences_from_response(fit, other, &found).unwrap_or(found);
@@ -100,7 +103,7 @@ impl Covariances {
     /// Widens the intervals by profile likelihood, which allow only for kappa. If the variance of an element is larger,
     /// the distances of the interval ends from the estimate are multiplied by the ratio of the standard errors.
     pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
-        let p = fit.parameters();
+        let p = fit.parameter_count();
         for (i, profile) in profiles.iter_mut().enumerate() {
             let Some((low, high)) = profile else { continue };
             let ratio =
@@ -114,13 +117,13 @@ impl Covariances {
     }
 }
 
-/// Returns the relative standard errors of the response at [`BAND_RAD_S`], the band of manual control.
+/// Returns the relative standard errors of the response at [`BAND_FREQUENCIES_RAD_S`], the band of manual control.
 pub(super) fn response_errors(
     operator: &FamilyOperator,
     covariance: Option<&[f64]>,
-) -> Option<[f64; BAND_RAD_S.len()]> {
+) -> Option<[f64; BAND_FREQUENCIES_RAD_S.len()]> {
     let covariance = covariance?;
-    Some(BAND_RAD_S.map(|omega| {
+    Some(BAND_FREQUENCIES_RAD_S.map(|omega| {
         let [[gain, _], [_, phase]] = operator.response_and_gradient(omega).relative_covariance(covariance);
         (gain + phase).sqrt()
     }))
@@ -130,15 +133,15 @@ pub(super) fn response_errors(
 /// is not at a bound and that the other estimate contains.
 fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
     let elements = fit.layout().noise_offset();
-    let free = fit.free().into_iter().filter(|place| *place < elements);
+    let free = fit.free_elements().into_iter().filter(|place| *place < elements);
     free.filter_map(|place| Some((place, fit.eta()[place] - other.get(place)?)))
         .collect()
 }
 
 /// Largest ratio of `J d` to the difference of two responses at which d is not replaced.
-const LARGEST_OVERSTATEMENT: f64 = 2.0;
+const MAX_LINEARISATION_RATIO: f64 = 2.0;
 /// Relative increase of the diagonal of `J' J`, which makes it regular.
-const RIDGE: f64 = 1e-9;
+const RELATIVE_RIDGE: f64 = 1e-9;
 
 /// Returns the least squares solution of `J d = H - H_other`, relative to |H|, over the band of manual control and an
 /// octave on each side. `None` if the given differences already explain the difference of the responses, or if some
@@ -149,8 +152,8 @@ fn differences_from_response(
     differences: &[(usize, f64)],
 ) -> Option<Vec<(usize, f64)>> {
     let layout = fit.layout();
-    let places = &layout.positions(0)[..layout.coordinates()];
-    if layout.operator_elements() != places.len() {
+    let places = &layout.positions(0)[..layout.coordinate_count()];
+    if layout.operator_element_count() != places.len() {
         return None;
     }
     let (here, there) = (layout.operator(fit.eta(), 0).ok()?, layout.operator(other, 0).ok()?);
@@ -176,9 +179,9 @@ fn solve_differences(
 ) -> Option<Vec<f64>> {
     let q = coordinates.len();
     let (mut total, mut linear) = (Linearisation::empty(q), 0.0);
-    let (low, high) = (0.5 * BAND_RAD_S[0], 2.0 * BAND_RAD_S[4]);
-    for k in 0..POINTS {
-        let omega = low * (high / low).powf(k as f64 / (POINTS - 1) as f64);
+    let (low, high) = (0.5 * BAND_FREQUENCIES_RAD_S[0], 2.0 * BAND_FREQUENCIES_RAD_S[4]);
+    for k in 0..POINT_COUNT {
+        let omega = low * (high / low).powf(k as f64 / (POINT_COUNT - 1) as f64);
         let response = here.response_and_gradient(omega);
         let slopes: Vec<Complex64> = (coordinates.iter())
             .map(|&i| response.gradient[i] / response.value)
@@ -187,10 +190,10 @@ fn solve_differences(
         linear += slopes.iter().zip(d).map(|(g, d)| g * d).sum::<Complex64>().norm_sqr();
         total.add_complex(1.0, off, &slopes);
     }
-    if linear <= LARGEST_OVERSTATEMENT * LARGEST_OVERSTATEMENT * total.sum_of_squares {
+    if linear <= MAX_LINEARISATION_RATIO * MAX_LINEARISATION_RATIO * total.sum_of_squares {
         return None;
     }
-    (0..q).for_each(|i| total.gram[i * q + i] *= 1.0 + RIDGE);
+    (0..q).for_each(|i| total.gram[i * q + i] *= 1.0 + RELATIVE_RIDGE);
     solve_symmetric(&total.gram, &total.descent)
 }
 
@@ -199,8 +202,8 @@ fn solve_differences(
 /// Elements at a bound, such as `1/T_I = 0`, are included. Holding them there would make the errors of the other
 /// elements too small, since the true value may be off the bound, and lead and gain depend on it.
 fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
-    let p = fit.parameters();
-    let sought = fit.not_fixed();
+    let p = fit.parameter_count();
+    let sought = fit.unfixed_elements();
     let mut inverse = vec![0.0; p * p];
     for &i in &sought {
         let mut unit = vec![0.0; p];
@@ -218,7 +221,7 @@ pub(super) fn is_regular(fit: &PredictionFit<'_>) -> bool {
 
 /// Returns the covariances of a fit; `None` if its information matrix is singular.
 pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
-    let p = fit.parameters();
+    let p = fit.parameter_count();
     let inverse = inverse(fit)?;
     let model_based: Vec<f64> = inverse.iter().map(|g| g * fit.innovation_variance).collect();
     let scale = fit.innovation_variance * fit.inflation;
@@ -226,8 +229,8 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
         ClusterKind::Runs => {
             // The contribution of the prior, H^-1 P H^-1; it is multiplied by the same inflated variance as the data.
             let mut open = vec![0.0; p * p];
-            add_open_part(&mut open, 1.0, &fit.criterion.penalty, fit.eta(), &inverse);
-            match over_clusters(fit) {
+            add_prior_contribution(&mut open, 1.0, &fit.criterion.penalty, fit.eta(), &inverse);
+            match cluster_covariance(fit) {
                 Some(by_runs) => by_runs.iter().zip(&open).map(|(j, open)| j + scale * open).collect(),
                 // Only one run determines some combination of elements; the scatter of this combination is unknown.
                 None => inverse.iter().map(|g| scale * g).collect(),
@@ -245,7 +248,7 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     };
     let factor = scale * (fit.weight_of_lines - counted);
     if fit.weight_of_lines > 0.0 {
-        add_lines_part(&mut clustered, factor, fit, &inverse);
+        add_line_contribution(&mut clustered, factor, fit, &inverse);
     }
     Some(Covariances {
         clustered,
@@ -255,9 +258,12 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
 }
 
 /// Adds `factor H^-1 L H^-1`, where L is the information of the lines.
-fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, inverse: &[f64]) {
-    let p = fit.parameters();
-    let l = fit.criterion.additional_at(fit.eta(), &mut Workspace::default()).gram;
+fn add_line_contribution(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, inverse: &[f64]) {
+    let p = fit.parameter_count();
+    let l = fit
+        .criterion
+        .linearise_additional(fit.eta(), &mut Workspace::default())
+        .gram;
     let (inverse, l) = (
         DMatrix::from_row_slice(p, p, inverse),
         DMatrix::from_row_slice(p, p, &l),
@@ -271,8 +277,8 @@ fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, 
 }
 
 /// Returns the jackknife covariance over clusters.
-fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
-    let (parts, sought) = (&fit.clusters.parts, fit.not_fixed());
+fn cluster_covariance(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
+    let (parts, sought) = (&fit.clusters.parts, fit.unfixed_elements());
     let steps: Option<Vec<Vec<f64>>> = (parts.iter())
         .map(|(g, big)| fit.solve(&sought, Some(big), g))
         .collect();
@@ -285,15 +291,15 @@ fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
 /// The data determine the response but hardly determine some coordinates. The ratio for single coordinates would depend
 /// on the poorly determined ones, and on the chance scatter of a few clusters.
 pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
-    let p = fit.parameters();
-    let (clustered, inverse) = (over_clusters(fit)?, inverse(fit)?);
+    let p = fit.parameter_count();
+    let (clustered, inverse) = (cluster_covariance(fit)?, inverse(fit)?);
     // The model-based variance without the contribution of the prior: H^-1 G H^-1.
     let mut by_model = inverse.clone();
-    add_open_part(&mut by_model, -1.0, &fit.criterion.penalty, fit.eta(), &inverse);
+    add_prior_contribution(&mut by_model, -1.0, &fit.criterion.penalty, fit.eta(), &inverse);
     let operator = fit.layout().operator(fit.eta(), 0).ok()?;
-    let places = &fit.layout().positions(0)[..fit.layout().coordinates()];
+    let places = &fit.layout().positions(0)[..fit.layout().coordinate_count()];
     let mut ratios = Vec::new();
-    for omega in BAND_RAD_S {
+    for omega in BAND_FREQUENCIES_RAD_S {
         let response = operator.response_and_gradient(omega);
         let parts: [fn(Complex64) -> f64; 2] = [|z| z.re, |z| z.im];
         for part in parts {

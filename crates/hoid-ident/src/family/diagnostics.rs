@@ -10,7 +10,7 @@ use super::{
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
     line_fit::LineFit,
-    parameter::{DC_GAIN, Parameter, min_weight},
+    parameter::{DC_GAIN_NAME, Parameter, min_weight},
     prior::OperatorPrior,
     result::{FreeModel, WeighedForm},
 };
@@ -19,7 +19,7 @@ use crate::{Termination, diagnostics::residuals::ResidualMeasures};
 /// chi^2 per degree of freedom at the lines above which the operator does not fit the describing function.
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
 /// Significance level of two tests: agreement between methods, and the form against a free model.
-const LEVEL: f64 = 0.01;
+const SIGNIFICANCE_LEVEL: f64 = 0.01;
 /// Relative excess of the loss over the loss of a free model above which a rejected form is reported.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
 /// Relative error of the response, at the frequency with the smallest error, above which the response counts as
@@ -28,12 +28,12 @@ pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
 /// Damping ratio above which the two neuromuscular poles count as separate lags: no muscle is so strongly damped.
 pub(super) const MAX_DAMPING_RATIO: f64 = 1.5;
 /// Smallest weight of the best form with which the form counts as determined.
-const SETTLED_WEIGHT: f64 = 0.95;
+const DETERMINED_FORM_WEIGHT: f64 = 0.95;
 /// Ratio of standard errors from clusters to model-based standard errors above which a note is added.
-const NOTED_ERROR_RATIO: f64 = 1.5;
+const REPORTED_ERROR_RATIO: f64 = 1.5;
 
 /// Shift of a parameter by the prior, in standard errors, above which the shift is reported.
-const NOTED_PULL: f64 = 0.5;
+const REPORTED_PULL: f64 = 0.5;
 
 /// Inputs of the diagnostics.
 pub(super) struct DiagnosticInputs<'a> {
@@ -72,7 +72,7 @@ pub(super) struct DiagnosticInputs<'a> {
 pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     let mut all = Vec::new();
     if !judged.termination.converged() {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "not-converged",
             format!("the search has {}", judged.termination),
         ));
@@ -85,19 +85,19 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     }
     let (tau, (low, high)) = judged.delay;
     if high > low && (tau <= low || tau >= high) {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "delay-at-bound",
             format!("the delay, {tau:.3} s, is at an end of its search range, {low} to {high} s; widen this range"),
         ));
     }
     if !judged.apart {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "inputs-together",
             "no excitation with separate lines distinguishes the error from the other inputs: the responses depend on \
              the assumed forms; record a target and a disturbance with separate lines, over whole periods",
         ));
     }
-    determined(judged, &mut all);
+    add_parameter_findings(judged, &mut all);
     all.extend(undetermined_form(judged.weighed));
     if let Some(share) = judged.noise_free {
         // The residuals are rounding errors of the data; residual tests and other methods do not apply to them.
@@ -113,8 +113,8 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     }
     all.extend(judged.residuals.findings());
     all.extend(judged.not_constant.clone());
-    methods(judged, &mut all);
-    if let Some(ratio) = judged.error_ratio.filter(|r| *r > NOTED_ERROR_RATIO) {
+    add_method_findings(judged, &mut all);
+    if let Some(ratio) = judged.error_ratio.filter(|r| *r > REPORTED_ERROR_RATIO) {
         let what = match judged.cluster_kind {
             ClusterKind::Runs => format!("{} runs", judged.clusters),
             ClusterKind::Blocks => format!("{} blocks of the records", judged.clusters),
@@ -132,8 +132,11 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
 
 /// Returns a finding about forms that the data do not distinguish; `None` if the form is determined.
 fn undetermined_form(weighed: &[WeighedForm]) -> Option<Finding> {
-    let best = weighed.first().filter(|best| best.weight < SETTLED_WEIGHT)?;
-    let mut all: Vec<&WeighedForm> = weighed.iter().filter(|w| w.weight >= 1.0 - SETTLED_WEIGHT).collect();
+    let best = weighed.first().filter(|best| best.weight < DETERMINED_FORM_WEIGHT)?;
+    let mut all: Vec<&WeighedForm> = weighed
+        .iter()
+        .filter(|w| w.weight >= 1.0 - DETERMINED_FORM_WEIGHT)
+        .collect();
     all.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     let named: Vec<String> = all.iter().map(|w| format!("{} {:.2}", w.form, w.weight)).collect();
     Some(Finding::note(
@@ -148,7 +151,7 @@ fn undetermined_form(weighed: &[WeighedForm]) -> Option<Finding> {
 }
 
 /// True if the parameter is at the end of its search range and therefore has no standard error.
-fn at_bound(parameter: &Parameter) -> bool {
+fn is_at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }
 
@@ -157,7 +160,7 @@ fn at_bound(parameter: &Parameter) -> bool {
 fn describe_pull(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
     let pull = prior.pull(parameter)?;
     let errors = pull.abs() * parameter.value / parameter.standard_error?;
-    (parameter.determined && errors > NOTED_PULL).then(|| {
+    (parameter.determined && errors > REPORTED_PULL).then(|| {
         let unit = if parameter.unit.is_empty() {
             String::new()
         } else {
@@ -182,16 +185,16 @@ struct FormParameters<'a> {
 
 impl<'a> FormParameters<'a> {
     /// Returns these parameters, grouped by the forms that have them.
-    fn all(parameters: &'a [Parameter], weighed: &[WeighedForm], dc_gain_share: f64) -> Vec<Self> {
+    fn grouped_by_forms(parameters: &'a [Parameter], weighed: &[WeighedForm], dc_gain_share: f64) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         let is_undetermined = |p: &&Parameter| !p.determined && p.interval.is_some_and(|(low, high)| low * high > 0.0);
-        for parameter in parameters.iter().filter(is_undetermined).filter(|p| !at_bound(p)) {
+        for parameter in parameters.iter().filter(is_undetermined).filter(|p| !is_at_bound(p)) {
             let forms = match parameter.averaged_over.as_slice() {
                 [] => weighed.first().map(|best| best.form).into_iter().collect(),
                 several => several.to_vec(),
             };
             let weight = match parameter.name.as_str() {
-                DC_GAIN => dc_gain_share,
+                DC_GAIN_NAME => dc_gain_share,
                 _ => (weighed.iter().filter(|of| forms.contains(&of.form)))
                     .map(|of| of.weight)
                     .sum(),
@@ -227,8 +230,8 @@ impl<'a> FormParameters<'a> {
     }
 }
 
-fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
-    let form_parameters = FormParameters::all(judged.parameters, judged.weighed, judged.dc_gain_share);
+fn add_parameter_findings(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
+    let form_parameters = FormParameters::grouped_by_forms(judged.parameters, judged.weighed, judged.dc_gain_share);
     let is_explained = |parameter: &Parameter| {
         form_parameters
             .iter()
@@ -282,7 +285,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::note("lag", words));
     }
     if let Some(zeta) = find("zeta_nm").filter(|z| z.value > MAX_DAMPING_RATIO) {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "neuromuscular-lag",
             format!(
                 "zeta_nm = {:.1}: the neuromuscular poles describe lags and carry no information about the \
@@ -295,7 +298,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     let mut open: Vec<&str> = Vec::new();
     for parameter in judged.parameters.iter().filter(|p| !p.determined && !is_explained(p)) {
         let name = parameter.name.as_str();
-        if matches!(name, "omega_nm" | "zeta_nm") && parameter.value > 0.0 && at_bound(parameter) {
+        if matches!(name, "omega_nm" | "zeta_nm") && parameter.value > 0.0 && is_at_bound(parameter) {
             open.push(name);
         } else if matches!(name, "omega_nm" | "zeta_nm") && parameter.prior_share > 0.5 {
             prior_alone.push(name);
@@ -328,19 +331,19 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     }
 }
 
-fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
+fn add_method_findings(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     if let Some(reduced) = judged.lines.and_then(LineFit::reduced_chi_squared)
         && reduced > LARGEST_REDUCED_CHI_SQUARED
     {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "describing-function",
             format!("the operator does not fit the describing function: chi^2 per degree of freedom is {reduced:.1}"),
         ));
     }
-    if let Some(agreement) = judged.agreement.filter(|a| a.p_value < LEVEL) {
-        let (who, most) = match agreement.worst() {
+    if let Some(agreement) = judged.agreement.filter(|a| a.p_value < SIGNIFICANCE_LEVEL) {
+        let (who, most) = match agreement.worst_pair() {
             Some(pair) => (
-                format!("{} and {}", pair.methods.0.words(), pair.methods.1.words()),
+                format!("{} and {}", pair.methods.0.phrase(), pair.methods.1.phrase()),
                 format!(
                     "; {} differs most, by {:.1} standard errors of the difference",
                     pair.most.0.name(),
@@ -349,7 +352,7 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             ),
             None => ("the methods".to_owned(), String::new()),
         };
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "agreement",
             format!("{who} do not agree (p = {:.2e}{most})", agreement.p_value),
         ));
@@ -366,9 +369,9 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     }
     if let Some(free) = judged.free_model
         && judged.loss > free.loss * (1.0 + LARGEST_EXCESS_LOSS)
-        && free.p_value < LEVEL
+        && free.p_value < SIGNIFICANCE_LEVEL
     {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "form-refuted",
             format!(
                 "a Box-Jenkins model of the same orders has a {:.1} % smaller loss (likelihood ratio {:.0} with {} \
@@ -417,7 +420,7 @@ mod tests {
             // This parameter is undetermined for another reason; the forms that have it are more likely than not.
             parameter("tau_e", &[Form::Lead, Form::Lag]),
         ];
-        let messages: Vec<String> = FormParameters::all(&all, &weighed, 1.0)
+        let messages: Vec<String> = FormParameters::grouped_by_forms(&all, &weighed, 1.0)
             .iter()
             .map(|of| of.finding().message)
             .collect();
@@ -426,8 +429,8 @@ mod tests {
         assert!(messages[1].contains("T_L; the intervals apply only if the form is lead or lead-lag (weight 0.49)"));
         // Forms in which K is another gain have evidence but no weight.
         let gain = [parameter("K", &[Form::Lead, Form::LeadLag, Form::Lag])];
-        assert!(FormParameters::all(&gain, &weighed, 1.0).is_empty());
-        let found = FormParameters::all(&gain, &weighed, 0.8);
+        assert!(FormParameters::grouped_by_forms(&gain, &weighed, 1.0).is_empty());
+        let found = FormParameters::grouped_by_forms(&gain, &weighed, 0.8);
         assert!(found[0].finding().message.contains("(weight 0.80)"));
     }
 }

@@ -5,7 +5,7 @@ use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, ope
 use super::{
     clusters::{ClusterKind, quantile},
     covariances::{self, Covariances},
-    parameter::{CoordinateEstimate, DC_GAIN, Parameter, min_weight},
+    parameter::{CoordinateEstimate, DC_GAIN_NAME, Parameter, min_weight},
     prediction_fit::PredictionFit,
     profile::profile_interval,
     result::{OperatorInForm, OperatorOfRecord, WeighedForm, title},
@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Errors of the estimate of eta.
-pub(super) struct Errors {
+pub(super) struct EstimateErrors {
     /// Covariances of eta; `None` if the information matrix is singular.
     pub covariances: Option<Covariances>,
     /// Interval by profile likelihood of each element of the operator; `None` if it was not computed.
@@ -30,7 +30,7 @@ pub(super) struct Errors {
     pub run_to_run: f64,
 }
 
-impl Errors {
+impl EstimateErrors {
     pub fn of(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Self {
         let covariances = covariances::covariances(fit);
         let quantile = quantile(fit.clusters.parts.len());
@@ -57,9 +57,9 @@ impl Errors {
     }
 
     /// Returns the largest ratio of a standard error from clusters to a model-based standard error.
-    pub fn largest_ratio(&self, fit: &PredictionFit<'_>) -> Option<f64> {
-        let (c, p) = (self.covariances.as_ref()?, fit.parameters());
-        let ratios = (0..fit.layout().operator_elements())
+    pub fn largest_error_ratio(&self, fit: &PredictionFit<'_>) -> Option<f64> {
+        let (c, p) = (self.covariances.as_ref()?, fit.parameter_count());
+        let ratios = (0..fit.layout().operator_element_count())
             .map(|i| (c.clustered[i * p + i] / c.model_based[i * p + i]).sqrt())
             .filter(|r| r.is_finite());
         ratios.max_by(f64::total_cmp)
@@ -74,8 +74,8 @@ fn profiles(
     quantile: f64,
     workspace: &mut Workspace,
 ) -> Vec<Option<(f64, f64)>> {
-    let p = fit.parameters();
-    let elements = fit.layout().operator_elements();
+    let p = fit.parameter_count();
+    let elements = fit.layout().operator_element_count();
     let mut profiles = vec![None; elements];
     let Some(covariances) = covariances else {
         return profiles;
@@ -97,18 +97,18 @@ fn profiles(
 }
 
 /// The estimated operator of a record with its errors, extracted from the estimate of eta.
-pub(super) struct Estimated {
+pub(super) struct EstimatedOperator {
     pub operator: FamilyOperator,
     pub covariance: Option<Vec<f64>>,
     pub model_based: Option<Vec<f64>>,
     pub parameters: Vec<Parameter>,
 }
 
-impl Estimated {
-    pub fn of(fit: &PredictionFit<'_>, errors: &Errors, record: usize) -> Result<Self, IdentError> {
+impl EstimatedOperator {
+    pub fn of(fit: &PredictionFit<'_>, errors: &EstimateErrors, record: usize) -> Result<Self, IdentError> {
         let layout = fit.layout();
         let operator = layout.operator(fit.eta(), record)?;
-        let places = &layout.positions(record)[..layout.coordinates()];
+        let places = &layout.positions(record)[..layout.coordinate_count()];
         let part = |c: &[f64]| Covariances::of_operator(c, layout, record);
         let covariances = errors.covariances.as_ref();
         let covariance = covariances.map(|c| part(&c.clustered));
@@ -165,26 +165,26 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
 }
 
 /// Returns the operator of a record, also in polynomial form, with its parameters averaged over the forms.
-pub(super) fn operator_of(
+pub(super) fn record_operator(
     fit: &PredictionFit<'_>,
-    errors: &Errors,
+    errors: &EstimateErrors,
     (weighed, dc_gain_share): (&[WeighedForm], f64),
     record: usize,
 ) -> Result<OperatorOfRecord, IdentError> {
-    let Estimated {
+    let EstimatedOperator {
         operator,
         covariance,
         model_based,
         parameters,
-    } = Estimated::of(fit, errors, record)?;
+    } = EstimatedOperator::of(fit, errors, record)?;
     let parameters: Vec<Parameter> = (parameters.into_iter())
-        .map(|own| averaged(&own, (weighed, dc_gain_share), record, fit.clusters.parts.len()).unwrap_or(own))
+        .map(|own| averaged_parameter(&own, (weighed, dc_gain_share), record, fit.clusters.parts.len()).unwrap_or(own))
         .collect();
     let layout = fit.layout();
-    let p = fit.parameters();
+    let p = fit.parameter_count();
     let mut mapped = fit.criterion.model_of(fit.eta(), record)?;
     // The polynomials describe the response from e to u, without the coefficients of further inputs.
-    mapped.theta.truncate(mapped.orders.parameters());
+    mapped.theta.truncate(mapped.orders.parameter_count());
     let of_theta =
         (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));
     let polynomial_fit = Fit {
@@ -225,35 +225,35 @@ pub(super) fn operator_of(
 /// the gain at zero frequency, far below the band, and K of another form is the gain in the band. K is not determined if
 /// forms with the other meaning are likely; `dc_gain_share` is the evidence for the forms with the meaning of the best
 /// form.
-fn averaged(
+fn averaged_parameter(
     own: &Parameter,
     (weighed, dc_gain_share): (&[WeighedForm], f64),
     record: usize,
     clusters: usize,
 ) -> Option<Parameter> {
     let lags = weighed.first()?.form.has_lag();
-    let is_dc_gain = own.name == DC_GAIN;
+    let is_dc_gain = own.name == DC_GAIN_NAME;
     let alike = weighed.iter().filter(|form| !is_dc_gain || form.form.has_lag() == lags);
     let each = alike.filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();
         Some((form.form, form.weight, all.find(|p| p.name == own.name)?))
     });
-    let found = Parameter::averaged(&each.collect::<Vec<_>>(), clusters)?;
+    let found = Parameter::average(&each.collect::<Vec<_>>(), clusters)?;
     Some(Parameter {
-        determined: found.determined && (!is_dc_gain || dc_gain_share > min_weight(DC_GAIN)),
+        determined: found.determined && (!is_dc_gain || dc_gain_share > min_weight(DC_GAIN_NAME)),
         ..found
     })
 }
 
 /// Returns the form of a fit with its weight and its operators as fitted, without averaging over forms.
-pub(super) fn in_form(
+pub(super) fn weighed_form(
     fit: &PredictionFit<'_>,
-    errors: &Errors,
+    errors: &EstimateErrors,
     weight: f64,
     separate: usize,
 ) -> Result<WeighedForm, IdentError> {
     let of = |record| {
-        Estimated::of(fit, errors, record).map(|found| OperatorInForm {
+        EstimatedOperator::of(fit, errors, record).map(|found| OperatorInForm {
             operator: found.operator,
             covariance: found.covariance,
             parameters: found.parameters,

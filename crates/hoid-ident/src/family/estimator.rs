@@ -7,19 +7,19 @@ use hoid_model::{Detrend, Form, Record, Structure};
 
 use super::{
     arx_response::ArxResponse,
-    assembly::{AtLines, Chosen, OtherForm},
+    assembly::{ChosenForm, LineResults, OtherForm},
     channel::{ChannelFit, SeenChannel},
-    channel_lines::{AtChannelLines, ChannelLines, InForm, have_separate_lines},
-    channels::{FurtherInputs, choice::Compared},
-    comparison::{Comparison, Tried},
-    coordinates::Grid,
+    channel_lines::{ChannelInForm, ChannelLineFitter, ChannelLines, have_separate_lines},
+    channels::{FurtherInputs, choice::LineSelection},
+    comparison::{Comparison, TriedForm},
+    coordinates::GridDensity,
     intersample::Intersample,
-    line_fit::{LineFit, by_simplicity},
+    line_fit::{LineFit, sort_by_simplicity},
     lines::LineData,
-    low_noise::{LittleNoise, Starts},
+    low_noise::{LowNoiseFits, Starts},
     noise::{Autoregression, NoiseProducts, Penalty},
     options::{FamilyEstimator, HIGHEST_NOISE_ORDER},
-    prediction::{NoiseOrders, Prediction},
+    prediction::{NoiseOrders, PredictionProblem},
     prediction_fit::PredictionFit,
     result::FamilyFit,
     starts::Start,
@@ -35,18 +35,18 @@ use crate::{
 const MAX_NOISE_PAIRS: usize = 60;
 
 /// Reason why the lines are not used if there is little noise.
-const TOO_LITTLE_NOISE: &str = "the noise is weaker than the leakage";
+const LOW_NOISE_REASON: &str = "the noise is weaker than the leakage";
 
 /// Prepared searches of all forms.
 struct PreparedSearches<'a> {
-    prediction: Prediction<'a>,
+    prediction: PredictionProblem<'a>,
     starts: Vec<Start>,
     noise: NoiseOrders,
     /// Comparison of the forms of each further input.
     channels: Vec<ChannelFit>,
     channel_lines: Option<Arc<ChannelLines>>,
     /// Further inputs with a response, in the forms selected at the lines.
-    in_form: Vec<InForm>,
+    in_form: Vec<ChannelInForm>,
     /// Reason why the lines are not used.
     no_lines: Option<String>,
 }
@@ -81,14 +81,14 @@ impl FamilyEstimator {
         describing: Option<Result<DescribingFunction, IdentError>>,
     ) -> Result<FamilyFit, IdentError> {
         let own = self.with_nd_for(records);
-        let (records, seen) = own.prepared(records)?;
+        let (records, seen) = own.prepare_records(records)?;
         // With further inputs, the ratio of u to e at a line depends on several responses.
         let (describing, no_lines) = match describing.filter(|_| seen.is_empty()) {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
             Some(Err(error)) => (None, Some(error.to_string())),
         };
-        let mut workspace = Workspace::of_thread();
+        let mut workspace = Workspace::borrow_from_thread();
         let PreparedSearches {
             prediction,
             starts,
@@ -97,21 +97,21 @@ impl FamilyEstimator {
             channel_lines,
             in_form,
             no_lines: why,
-        } = own.prepare(&records, &seen, describing.as_ref(), &mut workspace)?;
+        } = own.prepare_searches(&records, &seen, describing.as_ref(), &mut workspace)?;
         let no_lines = no_lines.or(why);
-        let at_lines = (channel_lines.as_ref()).map(|lines| own.at_lines(lines, &prediction));
+        let at_lines = (channel_lines.as_ref()).map(|lines| own.channel_line_fitter(lines, &prediction));
         let count = starts.len();
-        let mut tried: Vec<Tried<'_>> = Vec::with_capacity(count);
+        let mut tried: Vec<TriedForm<'_>> = Vec::with_capacity(count);
         for start in starts {
-            progress::step("forms", tried.len(), count);
-            let fit = own.best_of(&prediction, &start, noise, &mut workspace);
-            tried.push(Tried {
+            progress::report_step("forms", tried.len(), count);
+            let fit = own.fit_from_starts(&prediction, &start, noise, &mut workspace);
+            tried.push(TriedForm {
                 form: start.form,
                 lines: start.lines,
                 fit,
             });
         }
-        progress::step("forms", count, count);
+        progress::report_step("forms", count, count);
         let Comparison { best, figures } = Comparison::of(&tried, &prediction, *own.nd().end(), &mut workspace);
         let Some(best) = best else {
             return Err(tried
@@ -120,7 +120,7 @@ impl FamilyEstimator {
                 .unwrap_or(IdentError::NoFiniteLoss));
         };
         let weight = figures[best].weight;
-        let Tried { lines, fit, .. } = tried.remove(best);
+        let TriedForm { lines, fit, .. } = tried.remove(best);
         let weights = figures.iter().enumerate().filter(|(i, _)| *i != best);
         let others = tried.into_iter().zip(weights).filter(|(_, (_, f))| f.weight > 0.0);
         let others = others.map(|(tried, (_, figures))| {
@@ -130,10 +130,10 @@ impl FamilyEstimator {
                 weight: figures.weight,
             })
         });
-        let chosen = Chosen {
+        let chosen = ChosenForm {
             fit: fit?,
             weight,
-            lines: AtLines {
+            lines: LineResults {
                 describing: describing.as_ref(),
                 channels: at_lines,
                 in_form,
@@ -146,7 +146,7 @@ impl FamilyEstimator {
             channels,
             records: &records,
             excitation: own.excitation.as_deref(),
-            run_to_run: match prediction.noise_free() {
+            run_to_run: match prediction.noise_free_share() {
                 None => own.run_to_run,
                 Some(_) => 0.0,
             },
@@ -160,22 +160,22 @@ impl FamilyEstimator {
     ///
     /// # Errors
     /// Same as [`FamilyEstimator::fit`].
-    pub fn responds_to(&self, records: &[Record], channel: SeenChannel) -> Result<(ChannelFit, bool), IdentError> {
+    pub fn test_response(&self, records: &[Record], channel: SeenChannel) -> Result<(ChannelFit, bool), IdentError> {
         let asked = [channel.clone()];
         let with_channel = Self {
             channels: vec![channel],
             ..self.with_nd_for(records)
         };
-        let (records, seen) = with_channel.prepared(records)?;
-        let mut workspace = Workspace::of_thread();
-        let mut begun = with_channel.prepare(&records, &seen, None, &mut workspace)?;
+        let (records, seen) = with_channel.prepare_records(records)?;
+        let mut workspace = Workspace::borrow_from_thread();
+        let mut begun = with_channel.prepare_searches(&records, &seen, None, &mut workspace)?;
         let apart = have_separate_lines(begun.channel_lines.as_deref(), &asked);
         let found = begun.channels.pop().ok_or(IdentError::NoFiniteLoss)?;
         Ok((found, apart))
     }
 
     /// Returns the records with the trend of e and u removed, together with the further inputs.
-    fn prepared(&self, records: &[Record]) -> Result<(Vec<Record>, FurtherInputs<'_>), IdentError> {
+    fn prepare_records(&self, records: &[Record]) -> Result<(Vec<Record>, FurtherInputs<'_>), IdentError> {
         informative_data::common_sample_time(records)?;
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
         let (records, seen) = FurtherInputs::of(records, &self.channels, self.detrend)?;
@@ -184,8 +184,12 @@ impl FamilyEstimator {
     }
 
     /// Returns the data and settings common to all fits at the lines of several inputs.
-    fn at_lines<'l>(&'l self, lines: &'l Arc<ChannelLines>, prediction: &Prediction<'_>) -> AtChannelLines<'l> {
-        AtChannelLines {
+    fn channel_line_fitter<'l>(
+        &'l self,
+        lines: &'l Arc<ChannelLines>,
+        prediction: &PredictionProblem<'_>,
+    ) -> ChannelLineFitter<'l> {
+        ChannelLineFitter {
             lines,
             neuromuscular: self.neuromuscular,
             delay_range_s: prediction.delay_range_s,
@@ -197,7 +201,7 @@ impl FamilyEstimator {
 
     /// Prepares the searches of all forms: determines the starts, the orders of the noise model, and the further inputs
     /// with a response.
-    fn prepare<'a>(
+    fn prepare_searches<'a>(
         &self,
         records: &'a [Record],
         seen: &'a FurtherInputs<'_>,
@@ -228,17 +232,18 @@ impl FamilyEstimator {
             begun = seen.starting_forms(&responses, self.neuromuscular, sampling, &self.search)?;
             prediction.channels = begun.iter().filter_map(|forms| forms.first().cloned()).collect();
             let found = seen.lines(self.excitation.as_deref(), self.period_s);
-            channel_lines = found.map(|lines| seen.weighed(&self.at_lines(&lines, &prediction), &begun, &responses));
+            channel_lines = found
+                .map(|lines| seen.weighted_lines(&self.channel_line_fitter(&lines, &prediction), &begun, &responses));
             responses.swap_remove(0)
         };
         let mut starts = Vec::new();
         for &form in &forms {
-            starts.push(self.start(form, lines.as_ref(), &response, &prediction, workspace)?);
+            starts.push(self.prepare_start(form, lines.as_ref(), &response, &prediction, workspace)?);
         }
         let (mut channels, mut in_form) = (Vec::new(), Vec::new());
         if let Some(lines) = &channel_lines {
-            let at = self.at_lines(lines, &prediction);
-            let Compared {
+            let at = self.channel_line_fitter(lines, &prediction);
+            let LineSelection {
                 fits: compared,
                 channels: in_use,
                 in_form: forms_in_use,
@@ -250,12 +255,12 @@ impl FamilyEstimator {
                 let criterion = at.criterion(start.form, &forms_in_use);
                 let operator = criterion.operator(&found.coordinates)?;
                 start.coordinates.insert(0, operator.coordinates().to_vec());
-                start.lines = Some(LineFit::of_channels(operator, &found, criterion.penalty()));
+                start.lines = Some(LineFit::from_channels(operator, &found, criterion.penalty()));
             }
             (channels, prediction.channels, in_form) = (compared, in_use, forms_in_use);
         }
         let little_noise = match seen.is_empty() {
-            true => self.with_little_noise(&prediction, records, &mut starts, workspace)?,
+            true => self.low_noise_prediction(&prediction, records, &mut starts, workspace)?,
             false => None,
         };
         let mut no_lines = None;
@@ -263,15 +268,17 @@ impl FamilyEstimator {
             Some(found) => {
                 // The lines are not used, because leakage and aliasing at the lines exceed so little noise.
                 starts.iter_mut().for_each(|start| start.lines = None);
-                no_lines = lines.map(|_| TOO_LITTLE_NOISE.to_owned());
+                no_lines = lines.map(|_| LOW_NOISE_REASON.to_owned());
                 prediction = found;
-                prediction.noise_free().map(|_| (*self.nc.start(), *self.nd().start()))
+                prediction
+                    .noise_free_share()
+                    .map(|_| (*self.nc.start(), *self.nd().start()))
             }
             None => None,
         };
         let noise = noise.map_or_else(|| self.noise_orders(&prediction, &starts, workspace), Ok)?;
         if !seen.is_empty() && channel_lines.is_none() {
-            let least = self.smallest_residual(&prediction, &starts, noise.1, workspace)?;
+            let least = self.form_with_smallest_residual(&prediction, &starts, noise.1, workspace)?;
             let form = (starts[least].form, self.neuromuscular);
             let from = starts[least].coordinates.as_slice();
             channels = seen.choose(&mut prediction, begun, (form, from), noise, workspace)?;
@@ -295,11 +302,11 @@ impl FamilyEstimator {
         let prediction = self.prediction(self.intersample, records, &[form]).ok()?;
         self.check(records, prediction.first).ok()?;
         let response = ArxResponse::of(records).ok()?.points;
-        let workspace = &mut Workspace::of_thread();
-        let start = self.start(form, None, &response, &prediction, workspace).ok()?;
+        let workspace = &mut Workspace::borrow_from_thread();
+        let start = self.prepare_start(form, None, &response, &prediction, workspace).ok()?;
         let coordinates = start.coordinates.into_iter().next()?;
         let operator = (form, self.neuromuscular);
-        let series = prediction.unexplained(operator, &coordinates, workspace).ok()?;
+        let series = prediction.unexplained_output(operator, &coordinates, workspace).ok()?;
         let products = NoiseProducts::new(&series, highest);
         let order = products.best_order(1..=highest, Penalty::Schwarz)?;
         Some((coordinates, products.fit(order)?))
@@ -309,7 +316,7 @@ impl FamilyEstimator {
         let mut forms: Vec<Form> = (self.forms.iter().copied())
             .filter(|form| form.is_proper(self.neuromuscular))
             .collect();
-        by_simplicity(&mut forms);
+        sort_by_simplicity(&mut forms);
         forms.dedup();
         if forms.is_empty() {
             return Err(IdentError::BadOption {
@@ -327,19 +334,19 @@ impl FamilyEstimator {
         intersample: Intersample,
         records: &'a [Record],
         forms: &[Form],
-    ) -> Result<Prediction<'a>, IdentError> {
+    ) -> Result<PredictionProblem<'a>, IdentError> {
         let sample_time = records[0].sample_time();
         let shortest = intersample.shortest_delay_s(sample_time);
         let (low, high) = self.delay_range_s;
         let delay_range_s = (low.max(shortest), high.max(shortest));
-        let first = Prediction::first_residual(
+        let first = PredictionProblem::first_residual(
             &forms.iter().map(|form| (*form, self.neuromuscular)).collect::<Vec<_>>(),
             (*self.nc.end(), *self.nd().end()),
             delay_range_s,
             self.initial_state,
             (sample_time, intersample),
         )?;
-        Ok(Prediction {
+        Ok(PredictionProblem {
             data: Data::of(records),
             channels: Vec::new(),
             sample_time,
@@ -359,13 +366,13 @@ impl FamilyEstimator {
     /// Returns the data and settings for records with little noise; `None` if there is more noise. Determines the
     /// intersample behaviour of the error from the records, adds a level if the mean was removed, and replaces the
     /// starts by the results of output error searches.
-    fn with_little_noise<'a>(
+    fn low_noise_prediction<'a>(
         &self,
-        smooth: &Prediction<'_>,
+        smooth: &PredictionProblem<'_>,
         records: &'a [Record],
         starts: &mut [Start],
         workspace: &mut Workspace,
-    ) -> Result<Option<Prediction<'a>>, IdentError> {
+    ) -> Result<Option<PredictionProblem<'a>>, IdentError> {
         let forms: Vec<Form> = starts.iter().map(|start| start.form).collect();
         let with_level = |intersample| {
             let mut found = self.prediction(intersample, records, &forms)?;
@@ -374,36 +381,36 @@ impl FamilyEstimator {
             Ok::<_, IdentError>(found)
         };
         let mut from: Vec<Starts> = starts.iter().map(|s| (s.form, s.coordinates.clone())).collect();
-        let clean = ArxResponse::without_noise(records, self.delay_range_s.1);
+        let clean = ArxResponse::from_noise_free(records, self.delay_range_s.1);
         if let Some(clean) = &clean {
             for (form, coordinates) in &mut from {
-                let criterion = self.of_response(*form, &clean.points, &self.prior, smooth);
-                let found = criterion.minima(&self.search, Grid::Dense).into_iter().next();
+                let criterion = self.response_criterion(*form, &clean.points, &self.prior, smooth);
+                let found = criterion.minima(&self.search, GridDensity::Dense).into_iter().next();
                 coordinates.push(found.ok_or(IdentError::NoFiniteLoss)?.coordinates);
             }
         }
-        let mut search = |prediction: &Prediction<'_>, from: &[Starts]| {
-            LittleNoise::of(prediction, self.neuromuscular, from, clean.is_some(), workspace)
+        let mut search = |prediction: &PredictionProblem<'_>, from: &[Starts]| {
+            LowNoiseFits::of(prediction, self.neuromuscular, from, clean.is_some(), workspace)
         };
         let mut prediction = with_level(smooth.intersample)?;
         let Some(mut found) = search(&prediction, &from) else {
             return Ok(None);
         };
-        found.move_to_ends(&mut from, 0.0);
+        found.move_to_results(&mut from, 0.0);
         if self.intersample == Intersample::Auto {
             let held = with_level(Intersample::Zoh)?;
             if let Some(mut other) = search(&held, &from) {
-                let (course, is_known) = LittleNoise::intersample_of(&found, &other);
+                let (course, is_known) = LowNoiseFits::choose_intersample(&found, &other);
                 match course {
                     Intersample::Auto => {}
                     Intersample::Zoh => {
                         std::mem::swap(&mut found, &mut other);
                         prediction = held;
-                        found.move_to_ends(&mut from, 0.0);
+                        found.move_to_results(&mut from, 0.0);
                     }
                     Intersample::Foh => {
                         prediction = with_level(course)?;
-                        found.move_to_ends(&mut from, 0.5 * smooth.sample_time.s());
+                        found.move_to_results(&mut from, 0.5 * smooth.sample_time.s());
                     }
                 }
                 prediction.course_is_known = is_known;
@@ -477,9 +484,9 @@ impl FamilyEstimator {
     }
 
     /// Fits a form from all its starts by prediction error and returns the best fit.
-    fn best_of<'a>(
+    fn fit_from_starts<'a>(
         &self,
-        prediction: &Prediction<'a>,
+        prediction: &PredictionProblem<'a>,
         start: &Start,
         noise: NoiseOrders,
         workspace: &mut Workspace,

@@ -36,7 +36,7 @@ use hoid_model::{FamilyOperator, Record, uncertainty::Estimate};
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    jackknife::add_open_part, layout::FamilyLayout, noise::NoiseProducts, prediction::Prediction,
+    jackknife::add_prior_contribution, layout::FamilyLayout, noise::NoiseProducts, prediction::PredictionProblem,
     prediction_fit::PredictionFit,
 };
 use crate::{
@@ -51,9 +51,9 @@ use crate::{
 /// Maximum number of steps for given instruments.
 const MAX_STEPS: usize = 25;
 /// Length of a step, in standard errors, below which the iteration ends.
-const CONVERGED: f64 = 0.01;
+const STEP_TOLERANCE: f64 = 0.01;
 /// Maximum number of halvings of a step.
-const HALVINGS: usize = 6;
+const MAX_HALVINGS: usize = 6;
 
 /// The operator estimated by refined instrumental variables.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -89,7 +89,7 @@ struct Instruments {
 }
 
 /// Result of the search for a root of g with given instruments.
-struct Zero {
+struct Root {
     x: Vec<f64>,
     covariance: Option<Vec<f64>>,
     found: bool,
@@ -97,19 +97,19 @@ struct Zero {
 }
 
 /// Data common to all iterations.
-pub(super) struct Instrumental<'p, 'a> {
-    prediction: &'p Prediction<'a>,
+pub(super) struct InstrumentalSearch<'p, 'a> {
+    prediction: &'p PredictionProblem<'a>,
     /// The prediction error fit, which supplies the weighted prior, the limits and kappa.
     fit: &'p PredictionFit<'a>,
     inputs: Vec<NoiseFreeInput>,
     order: usize,
 }
 
-impl<'p, 'a> Instrumental<'p, 'a> {
+impl<'p, 'a> InstrumentalSearch<'p, 'a> {
     /// # Errors
     /// The errors of [`noise_free_inputs`]: the channel is missing, constant, or a signal of the loop.
     pub fn new(
-        prediction: &'p Prediction<'a>,
+        prediction: &'p PredictionProblem<'a>,
         fit: &'p PredictionFit<'a>,
         records: &[Record],
         excitation: &str,
@@ -135,8 +135,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             let within = x.iter().zip(self.limits());
             let x: Vec<f64> = within.map(|(v, (low, high))| v.clamp(*low, *high)).collect();
             let zero = self
-                .instruments_of(&x, workspace)
-                .and_then(|held| self.zero(&x, &held, workspace));
+                .compute_instruments(&x, workspace)
+                .and_then(|held| self.find_root(&x, &held, workspace));
             iterations += zero.as_ref().map_or(0, |zero| zero.steps);
             let found = zero.as_ref().is_ok_and(|zero| zero.found);
             if found || last.is_err() {
@@ -162,15 +162,15 @@ impl<'p, 'a> Instrumental<'p, 'a> {
     }
 
     fn limits(&self) -> &[(f64, f64)] {
-        &self.fit.criterion.limits[..self.fit.layout().coordinates()]
+        &self.fit.criterion.limits[..self.fit.layout().coordinate_count()]
     }
 
     /// Estimates D for the part of u that the operator does not explain.
-    fn noise(&self, x: &[f64], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
+    fn estimate_noise(&self, x: &[f64], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
         let layout = self.fit.layout();
         let left = self
             .prediction
-            .unexplained((layout.form, layout.neuromuscular), x, workspace)?;
+            .unexplained_output((layout.form, layout.neuromuscular), x, workspace)?;
         let found = NoiseProducts::new(&left, self.order).fit(self.order);
         found.map(|f| f.d).ok_or(IdentError::NoFiniteLoss)
     }
@@ -182,7 +182,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
     }
 
     /// Computes `eps` and `Psi` of one record, with the signals `data`.
-    fn of_record(
+    fn record_equation(
         &self,
         eta: &[f64],
         record: usize,
@@ -200,7 +200,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         };
         let eps = of_theta.residuals_of(&mapped.theta, 0, workspace);
         let by_theta = of_theta.jacobian(&mapped.theta, 0, workspace);
-        let columns = mapped.columns[..self.fit.layout().coordinates()].iter();
+        let columns = mapped.columns[..self.fit.layout().coordinate_count()].iter();
         let psi = columns
             .map(|column| {
                 let mut sum = vec![0.0; eps.len()];
@@ -214,8 +214,8 @@ impl<'p, 'a> Instrumental<'p, 'a> {
     }
 
     /// Computes Z and D from an auxiliary operator.
-    fn instruments_of(&self, x: &[f64], workspace: &mut Workspace) -> Result<Instruments, IdentError> {
-        let d = self.noise(x, workspace)?;
+    fn compute_instruments(&self, x: &[f64], workspace: &mut Workspace) -> Result<Instruments, IdentError> {
+        let d = self.estimate_noise(x, workspace)?;
         let (eta, p, first) = ([x, &d].concat(), x.len(), self.prediction.first);
         let mut z = vec![Vec::new(); p];
         let mut sample = 0;
@@ -233,7 +233,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
                 }
                 let e = &input.inputs[record];
                 let u = simulated_output(&mapped.orders, &mapped.theta, e);
-                let (_, made) = self.of_record(&eta, record, Data::new(e, &u), workspace)?;
+                let (_, made) = self.record_equation(&eta, record, Data::new(e, &u), workspace)?;
                 for (to, from) in z.iter_mut().zip(&made) {
                     to[begun + own.start..begun + own.end].copy_from_slice(&from[own.clone()]);
                 }
@@ -249,7 +249,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         let eta = [x, d].concat();
         let (mut eps, mut psi) = (Vec::new(), vec![Vec::new(); x.len()]);
         for (record, data) in self.prediction.data.iter().enumerate() {
-            let (own, of_own) = self.of_record(&eta, record, *data, workspace).ok()?;
+            let (own, of_own) = self.record_equation(&eta, record, *data, workspace).ok()?;
             eps.extend(own);
             psi.iter_mut().zip(of_own).for_each(|(all, one)| all.extend(one));
         }
@@ -266,7 +266,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
     }
 
     /// Searches for a root of g with given instruments, starting at x.
-    fn zero(&self, x: &[f64], held: &Instruments, workspace: &mut Workspace) -> Result<Zero, IdentError> {
+    fn find_root(&self, x: &[f64], held: &Instruments, workspace: &mut Workspace) -> Result<Root, IdentError> {
         let (limits, p) = (self.limits(), x.len());
         let mut x = x.to_vec();
         let mut at = self.equation(&x, &held.d, workspace).ok_or(IdentError::NoFiniteLoss)?;
@@ -283,10 +283,10 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             let variance = dot(eps, eps) / eps.len() as f64;
             let covariance = self.covariance(&x, &a, &held.products, variance);
             let (free, step) = self.step(&x, &a, &g).ok_or(IdentError::NoFiniteLoss)?;
-            let moved = length(&step, &metric, variance);
-            if moved <= CONVERGED || steps == MAX_STEPS {
-                let found = moved <= CONVERGED;
-                return Ok(Zero {
+            let moved = step_length(&step, &metric, variance);
+            if moved <= STEP_TOLERANCE || steps == MAX_STEPS {
+                let found = moved <= STEP_TOLERANCE;
+                return Ok(Root {
                     x,
                     covariance,
                     found,
@@ -312,13 +312,13 @@ impl<'p, 'a> Instrumental<'p, 'a> {
                     break Some((there, next));
                 }
                 share *= 0.5;
-                if share < 0.5_f64.powi(HALVINGS as i32) {
+                if share < 0.5_f64.powi(MAX_HALVINGS as i32) {
                     break None;
                 }
             };
             let Some((there, next)) = next else {
                 // No step decreases the merit function: there is no root in this direction.
-                return Ok(Zero {
+                return Ok(Root {
                     x,
                     covariance,
                     found: false,
@@ -380,11 +380,11 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             .filter(|penalty| inner(penalty.place))
             .collect();
         // The weights of the prior are w = kappa sigma^2/s^2, and w^2 s^2 = kappa sigma^2 w.
-        add_open_part(&mut covariance, scale, &penalty, x, &by_rows(&inverse));
+        add_prior_contribution(&mut covariance, scale, &penalty, x, &by_rows(&inverse));
         covariance.iter().all(|v| v.is_finite()).then_some(covariance)
     }
 
-    fn prior_shares(&self, zero: &Zero) -> Vec<f64> {
+    fn prior_shares(&self, zero: &Root) -> Vec<f64> {
         let p = zero.x.len();
         let mut shares = vec![0.0; p];
         for penalty in &self.fit.criterion.penalty {
@@ -400,7 +400,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
 
 /// Returns the length of a step s in standard errors, `sqrt(s' M s/sigma^2)`, for the metric M and the variance
 /// sigma^2.
-fn length(step: &[f64], metric: &DMatrix<f64>, variance: f64) -> f64 {
+fn step_length(step: &[f64], metric: &DMatrix<f64>, variance: f64) -> f64 {
     let s = DVector::from_column_slice(step);
     ((s.transpose() * metric * &s)[(0, 0)].max(0.0) / variance).sqrt()
 }
@@ -467,17 +467,17 @@ mod tests {
         let estimator = estimator();
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(estimator.detrend)).collect();
         let (form, noise) = ((Form::Lead, true), (0, NOISE_ORDER));
-        let first = Prediction::first_residual(
+        let first = PredictionProblem::first_residual(
             &[form],
             noise,
             estimator.delay_range_s,
             estimator.initial_state,
-            (SampleTime::SIXTIETH, Intersample::Auto),
+            (SampleTime::AT_60_HZ, Intersample::Auto),
         );
-        let prediction = Prediction {
+        let prediction = PredictionProblem {
             channels: Vec::new(),
             data: Data::of(&records),
-            sample_time: SampleTime::SIXTIETH,
+            sample_time: SampleTime::AT_60_HZ,
             intersample: Intersample::Auto,
             course_is_known: false,
             other_intersample: Vec::new(),
@@ -489,14 +489,14 @@ mod tests {
             individual: Vec::new(),
             search: estimator.search,
         };
-        let mut workspace = Workspace::of_thread();
+        let mut workspace = Workspace::borrow_from_thread();
         let start = [1.5, 0.5, 2.4, -1.2, 0.2];
         let fit = prediction.fit(form, noise, &start, &mut workspace).unwrap();
         let whole = NoiseFreeInput {
             inputs: records.iter().map(|r| r.input().to_vec()).collect(),
             samples: 0..usize::MAX,
         };
-        let method = Instrumental {
+        let method = InstrumentalSearch {
             prediction: &prediction,
             fit: &fit,
             inputs: vec![whole],
@@ -506,7 +506,7 @@ mod tests {
         let d = fit.eta()[fit.layout().noise_offset()..].to_vec();
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
-        let of_held = method.instruments_of(&minimum, &mut workspace).unwrap();
+        let of_held = method.compute_instruments(&minimum, &mut workspace).unwrap();
         // The autoregression of the remainder of u equals the noise model of the fit except for the effect of the
         // prior; the instruments equal Psi except for the states before the record.
         for (own, of_fit) in of_held.d.iter().zip(&d) {
@@ -516,17 +516,17 @@ mod tests {
             assert!(dot(a, b) / (dot(a, a) * dot(b, b)).sqrt() > 0.98);
         }
         let held = Instruments { z, d, products };
-        let zero = method.zero(&minimum, &held, &mut workspace).unwrap();
+        let zero = method.find_root(&minimum, &held, &mut workspace).unwrap();
         assert!(zero.found && zero.steps == 0 && zero.x == minimum);
         let covariance = zero.covariance.unwrap();
         let p = minimum.len();
         let away: Vec<f64> = (0..p).map(|i| minimum[i] + covariance[i * p + i].sqrt()).collect();
-        let zero = method.zero(&away, &held, &mut workspace).unwrap();
+        let zero = method.find_root(&away, &held, &mut workspace).unwrap();
         assert!(zero.found && zero.steps > 0);
         for i in 0..p {
             let error = covariance[i * p + i].sqrt();
             assert!(
-                (zero.x[i] - minimum[i]).abs() < CONVERGED * error,
+                (zero.x[i] - minimum[i]).abs() < STEP_TOLERANCE * error,
                 "{:?} {minimum:?}",
                 zero.x
             );

@@ -55,7 +55,7 @@ impl Intersample {
     }
 
     /// Returns the number of coefficients of B for an operator of this order whose numerator has this degree.
-    pub(super) fn gains(self, order: usize, degree: usize) -> usize {
+    pub(super) fn numerator_length(self, order: usize, degree: usize) -> usize {
         match self {
             Self::Auto | Self::Foh => order + 2,
             Self::Zoh if degree == order => order + 3,
@@ -65,16 +65,16 @@ impl Intersample {
 
     /// Returns the discrete-time model of an operator. `sample` is the number of whole samples of the delay (for a
     /// smooth error, of the delay plus half a sample); `None` computes them from the delay.
-    pub(super) fn discrete(
+    pub(super) fn discrete_model(
         self,
         operator: &FamilyOperator,
         sample: Option<usize>,
         sample_time: SampleTime,
     ) -> Result<HeldFamily, ModelError> {
         match (self, sample) {
-            (Self::Auto, Some(sample)) => operator.interpolate_within(sample, sample_time),
+            (Self::Auto, Some(sample)) => operator.interpolate_with_delay_samples(sample, sample_time),
             (Self::Auto, None) => operator.interpolate(sample_time),
-            (Self::Zoh, Some(sample)) => operator.zoh_within(sample, sample_time),
+            (Self::Zoh, Some(sample)) => operator.zoh_with_delay_samples(sample, sample_time),
             (Self::Zoh, None) => operator.zoh(sample_time),
             (Self::Foh, _) => {
                 let mut earlier = operator.coordinates().to_vec();
@@ -82,7 +82,7 @@ impl Intersample {
                     *delay -= 0.5 * sample_time.s();
                 }
                 let earlier = FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &earlier)?;
-                Self::Auto.discrete(&earlier, sample, sample_time)
+                Self::Auto.discrete_model(&earlier, sample, sample_time)
             }
         }
     }
@@ -105,10 +105,10 @@ mod tests {
         for course in Intersample::ALL {
             for (form, muscles, x) in forms {
                 let operator = FamilyOperator::new(form, muscles, x).unwrap();
-                let model = course.discrete(&operator, None, ts).unwrap();
+                let model = course.discrete_model(&operator, None, ts).unwrap();
                 assert_eq!(
                     model.b.len(),
-                    course.gains(model.f.len(), form.degree()),
+                    course.numerator_length(model.f.len(), form.degree()),
                     "{course} {form}"
                 );
                 for omega in [0.5, 3.0, 9.0] {
@@ -138,7 +138,7 @@ mod tests {
         for course in Intersample::ALL {
             let of = |x: &[f64]| {
                 let operator = FamilyOperator::new(Form::Lead, true, x).unwrap();
-                course.discrete(&operator, None, ts).unwrap()
+                course.discrete_model(&operator, None, ts).unwrap()
             };
             let exact = of(&x);
             for i in 0..x.len() {
@@ -160,10 +160,10 @@ mod tests {
     fn linear_interpolation_needs_a_minimum_delay() {
         let ts = SampleTime::new(0.02).unwrap();
         let operator = |tau: f64| FamilyOperator::new(Form::Gain, true, &[1.5, 2.4, -1.2, tau]).unwrap();
-        assert!(Intersample::Foh.discrete(&operator(0.009), None, ts).is_err());
+        assert!(Intersample::Foh.discrete_model(&operator(0.009), None, ts).is_err());
         let shortest = Intersample::Foh.shortest_delay_s(ts);
-        assert!(Intersample::Foh.discrete(&operator(shortest), None, ts).is_ok());
-        assert!(Intersample::Zoh.discrete(&operator(0.0), None, ts).is_ok());
+        assert!(Intersample::Foh.discrete_model(&operator(shortest), None, ts).is_ok());
+        assert!(Intersample::Zoh.discrete_model(&operator(0.0), None, ts).is_ok());
         assert!("cubic".parse::<Intersample>().is_err());
     }
 }

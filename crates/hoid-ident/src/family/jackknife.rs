@@ -30,7 +30,13 @@ pub(super) fn jackknife(others: &[Vec<f64>]) -> Option<Vec<f64>> {
 
 /// Adds the contribution `factor H^-1 P H^-1` of the prior to the covariance, with P evaluated at x; `inverse` is
 /// `H^-1` by rows.
-pub(super) fn add_open_part(covariance: &mut [f64], factor: f64, prior: &[Penalty], x: &[f64], inverse: &[f64]) {
+pub(super) fn add_prior_contribution(
+    covariance: &mut [f64],
+    factor: f64,
+    prior: &[Penalty],
+    x: &[f64],
+    inverse: &[f64],
+) {
     let p = x.len();
     for penalty in prior {
         let (place, weight) = (penalty.place, factor * penalty.curvature(x));
@@ -79,11 +85,11 @@ mod tests {
         };
         let mut total = product(&product(&inverse, &g), &inverse);
         let of_data = total.clone();
-        add_open_part(&mut total, 1.0, &prior, &x, &inverse);
+        add_prior_contribution(&mut total, 1.0, &prior, &x, &inverse);
         for (a, b) in total.iter().zip(&inverse) {
             assert!((a - b).abs() < 1e-15, "{total:?}");
         }
-        add_open_part(&mut total, -1.0, &prior, &x, &inverse);
+        add_prior_contribution(&mut total, -1.0, &prior, &x, &inverse);
         for (a, b) in total.iter().zip(&of_data) {
             assert!((a - b).abs() < 1e-15, "{total:?}");
         }

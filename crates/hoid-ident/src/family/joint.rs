@@ -26,11 +26,11 @@ use hoid_numerics::statistics::mean;
 
 use super::{
     channel_lines::ChannelCriterion,
-    covariances::{BAND_RAD_S, Covariances, covariances, response_errors},
+    covariances::{BAND_FREQUENCIES_RAD_S, Covariances, covariances, response_errors},
     layout::FamilyLayout,
     line_fit::LineFit,
     lines::LineData,
-    prediction::Prediction,
+    prediction::PredictionProblem,
     prediction_fit::PredictionFit,
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
@@ -38,25 +38,25 @@ use super::{
 use crate::{criterion::Workspace, grey_box::objective::AdditionalTerm, optimize::Objective};
 
 /// Lower bound of `V_L - V_P` relative to V_L, needed because V_L and V_P are estimates.
-const MIN_DIFFERENCE: f64 = 0.25;
+const MIN_RELATIVE_DIFFERENCE: f64 = 0.25;
 /// Minimum number of runs for a joint fit: the scatter of fewer runs does not determine the variances of the lines.
 const MIN_RUNS: usize = 3;
 /// Upper bound of the fraction s.
-const LARGEST_SHARE: f64 = 0.9;
+const MAX_LINE_SHARE: f64 = 0.9;
 
 /// The measurements at the lines that are fitted together with the samples.
-pub(super) enum Lines<'d> {
+pub(super) enum LineMeasurements<'d> {
     /// Describing function: the response to the error as the only input.
     Response(LineData<'d>),
     /// The responses to several inputs.
     Channels(Box<ChannelCriterion>),
 }
 
-impl Lines<'_> {
-    fn runs(&self) -> usize {
+impl LineMeasurements<'_> {
+    fn run_count(&self) -> usize {
         match self {
-            Self::Response(data) => data.runs(),
-            Self::Channels(criterion) => criterion.runs(),
+            Self::Response(data) => data.run_count(),
+            Self::Channels(criterion) => criterion.run_count(),
         }
     }
 
@@ -94,19 +94,19 @@ impl Lines<'_> {
 
 /// Returns the fit that includes the lines; `None` if the two fits agree within their errors, if the search fails, or
 /// with fewer than three runs.
-pub(super) fn with_lines<'a>(
-    prediction: &Prediction<'a>,
+pub(super) fn fit_with_lines<'a>(
+    prediction: &PredictionProblem<'a>,
     fit: &PredictionFit<'a>,
-    (lines, measured): (&LineFit, &Lines<'_>),
+    (lines, measured): (&LineFit, &LineMeasurements<'_>),
     workspace: &mut Workspace,
 ) -> Option<PredictionFit<'a>> {
-    if measured.runs() < MIN_RUNS {
+    if measured.run_count() < MIN_RUNS {
         return None;
     }
     let layout = fit.layout();
     // If chi^2 of the best fit is larger than expected, the variances of the lines are too small.
     let excess = lines.reduced_chi_squared().unwrap_or(1.0).max(1.0);
-    let weight = weight(fit, lines, excess)?;
+    let weight = line_weight(fit, lines, excess)?;
     let mut criterion = fit.criterion.clone();
     criterion.additional = Some(AdditionalTerm {
         criterion: measured.criterion(layout, excess, prediction.delay_range_s),
@@ -120,19 +120,19 @@ pub(super) fn with_lines<'a>(
 }
 
 /// Returns the weight w; `None` if it is zero or a variance is unknown.
-fn weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> {
+fn line_weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> {
     let operator = fit.layout().operator(fit.eta(), 0).ok()?;
     let own = Covariances::of_operator(&covariances(fit)?.clustered, fit.layout(), 0);
     let of_prediction = response_errors(&operator, Some(&own))?.map(|error| error * error);
     let of_lines = response_errors(&lines.operator, lines.by_lines.as_deref())?.map(|error| excess * error * error);
-    let q: Vec<f64> = (0..BAND_RAD_S.len())
+    let q: Vec<f64> = (0..BAND_FREQUENCIES_RAD_S.len())
         .map(|i| {
-            let [here, there] = [&operator, &lines.operator].map(|of| of.response(BAND_RAD_S[i]));
-            let expected = (of_lines[i] - of_prediction[i]).max(MIN_DIFFERENCE * of_lines[i]);
+            let [here, there] = [&operator, &lines.operator].map(|of| of.response(BAND_FREQUENCIES_RAD_S[i]));
+            let expected = (of_lines[i] - of_prediction[i]).max(MIN_RELATIVE_DIFFERENCE * of_lines[i]);
             ((there - here) / here).norm_sqr() / expected
         })
         .collect();
-    let share = (1.0 - 1.0 / mean(&q)).min(LARGEST_SHARE);
+    let share = (1.0 - 1.0 / mean(&q)).min(MAX_LINE_SHARE);
     let weight = share / (1.0 - share) * mean(&of_lines) / mean(&of_prediction);
     (weight.is_finite() && weight > 0.0).then_some(weight)
 }
@@ -158,7 +158,7 @@ mod tests {
     fn runs(n: u64) -> Vec<Record> {
         let mut scenario = Scenario::condition(Condition::C1);
         scenario.remnant.time_constant_s = 0.3;
-        scenario.remnant.strength = scenario.remnant.strength.changed(Some(0.3), None).unwrap();
+        scenario.remnant.strength = scenario.remnant.strength.with_level(Some(0.3), None).unwrap();
         let simulator = Simulator::new(&scenario).unwrap();
         let run = |replication| {
             let seed = RunSeed {
@@ -185,7 +185,7 @@ mod tests {
             };
             let fit = estimator.fit(&runs(8)).unwrap();
             let found = &fit.operator(0).operator;
-            let off = BAND_RAD_S.map(|omega| (found.response(omega) / truth.response(omega) - 1.0).norm());
+            let off = BAND_FREQUENCIES_RAD_S.map(|omega| (found.response(omega) / truth.response(omega) - 1.0).norm());
             off.into_iter().fold(0.0, f64::max)
         };
         let (biased, with_lines) = (fitted(None, 0), fitted(Some("f_t"), 0));
@@ -225,7 +225,7 @@ mod tests {
         let eta = [&TRUTH[..4], &[0.2837, -0.9, 0.1]].concat();
         let mut workspace = Workspace::default();
         let at = criterion.linearise(&eta, &mut workspace);
-        let additional = criterion.additional_at(&eta, &mut workspace);
+        let additional = criterion.linearise_additional(&eta, &mut workspace);
         assert!(additional.sum_of_squares > 0.0 && additional.sum_of_squares < at.sum_of_squares);
         assert_eq!((additional.descent[5], additional.descent[6]), (0.0, 0.0));
         for i in 0..eta.len() {

@@ -16,7 +16,7 @@ use hoid_model::{
 use super::intersample::Intersample;
 use crate::{
     criterion::further_input::InputOrders,
-    grey_box::parametrisation::{HeldSamples, Mapped, Parametrisation},
+    grey_box::parametrisation::{DelayIntervals, MappedPolynomials, Parametrisation},
 };
 
 /// Indices in eta of the parameters of each record.
@@ -106,7 +106,7 @@ impl FamilyLayout {
         self.limits.extend(noise);
         for record in 0..self.positions.len() {
             let of_channels: Vec<usize> = (self.channels.iter())
-                .flat_map(|channel| self.places_of(channel, record))
+                .flat_map(|channel| self.channel_indices(channel, record))
                 .collect();
             let positions = &mut self.positions[record];
             positions.extend(first..self.limits.len());
@@ -116,7 +116,7 @@ impl FamilyLayout {
     }
 
     /// Returns the index in eta of each coordinate of a channel, including the shared neuromuscular ones.
-    pub fn places_of(&self, channel: &ChannelInLayout, record: usize) -> Vec<usize> {
+    pub fn channel_indices(&self, channel: &ChannelInLayout, record: usize) -> Vec<usize> {
         let of_operator = self.form.coordinates(self.neuromuscular);
         let mut own = channel.place..;
         let place = |coordinate: Coordinate| match coordinate {
@@ -132,7 +132,7 @@ impl FamilyLayout {
 
     /// Returns the operator from a channel to u in a record.
     pub fn channel(&self, eta: &[f64], channel: &ChannelInLayout, record: usize) -> Result<FamilyOperator, ModelError> {
-        let x: Vec<f64> = (self.places_of(channel, record).iter())
+        let x: Vec<f64> = (self.channel_indices(channel, record).iter())
             .map(|&place| eta[place])
             .collect();
         FamilyOperator::new(channel.form, self.neuromuscular, &x)
@@ -144,24 +144,24 @@ impl FamilyLayout {
     }
 
     /// Returns the number of coordinates of one operator.
-    pub fn coordinates(&self) -> usize {
+    pub fn coordinate_count(&self) -> usize {
         self.form.coordinates(self.neuromuscular).len()
     }
 
     /// Returns the number of elements in eta that are coordinates of operators from e to u.
-    pub fn operator_elements(&self) -> usize {
+    pub fn operator_element_count(&self) -> usize {
         self.elements.len()
     }
 
     /// Returns the coordinates of the operator of a record.
     pub fn coordinates_of(&self, eta: &[f64], record: usize) -> Vec<f64> {
-        let own = &self.positions[record][..self.coordinates()];
+        let own = &self.positions[record][..self.coordinate_count()];
         own.iter().map(|&place| eta[place]).collect()
     }
 
     /// Returns eta with these coordinates for all records, the starting coordinates of the channels, and these
     /// coefficients of the noise model.
-    pub fn spread(&self, coordinates: &[f64], noise: &[f64]) -> Vec<f64> {
+    pub fn common_eta(&self, coordinates: &[f64], noise: &[f64]) -> Vec<f64> {
         let all = self.form.coordinates(self.neuromuscular);
         let value = |(coordinate, _): &(Coordinate, Option<usize>)| {
             let index = all.iter().position(|c| c == coordinate).unwrap_or(0);
@@ -179,7 +179,11 @@ impl FamilyLayout {
 
     /// Returns the nk of the longest delay within the bounds.
     pub fn longest_nk(&self) -> Result<usize, ModelError> {
-        let longest = self.delays().into_iter().map(|i| self.limits[i].1).fold(0.0, f64::max);
+        let longest = self
+            .delay_indices()
+            .into_iter()
+            .map(|i| self.limits[i].1)
+            .fold(0.0, f64::max);
         Ok(whole_samples(longest, self.sample_time)? + 1)
     }
 
@@ -197,7 +201,7 @@ impl Parametrisation for FamilyLayout {
         &self.limits
     }
 
-    fn delays(&self) -> Vec<usize> {
+    fn delay_indices(&self) -> Vec<usize> {
         let delay = |i: &usize| self.elements[*i].0 == Coordinate::Delay;
         let of_channels = self
             .channels
@@ -206,8 +210,8 @@ impl Parametrisation for FamilyLayout {
         (0..self.elements.len()).filter(delay).chain(of_channels).collect()
     }
 
-    fn delay_of(&self, record: usize) -> usize {
-        self.positions[record][self.coordinates() - 1]
+    fn delay_index(&self, record: usize) -> usize {
+        self.positions[record][self.coordinate_count() - 1]
     }
 
     fn sample_time(&self) -> SampleTime {
@@ -225,7 +229,7 @@ impl Parametrisation for FamilyLayout {
     fn orders(&self, nk: usize) -> Orders {
         Orders {
             na: 0,
-            nb: self.intersample.gains(self.order(), self.form.degree()),
+            nb: self.intersample.numerator_length(self.order(), self.form.degree()),
             nc: self.nc,
             nd: self.nd,
             nf: self.order(),
@@ -238,12 +242,12 @@ impl Parametrisation for FamilyLayout {
         Vec::from_iter((self.nc > 0).then_some(first..first + self.nc))
     }
 
-    fn further(&self) -> Vec<InputOrders> {
+    fn further_input_orders(&self) -> Vec<InputOrders> {
         let muscles = if self.neuromuscular { 2 } else { 0 };
         let orders = |channel: &ChannelInLayout| {
             let order = usize::from(channel.form.has_pole()) + muscles;
             InputOrders {
-                nb: self.intersample.gains(order, channel.form.degree()),
+                nb: self.intersample.numerator_length(order, channel.form.degree()),
                 nf: order,
                 nk: 1,
             }
@@ -251,11 +255,11 @@ impl Parametrisation for FamilyLayout {
         self.channels.iter().map(orders).collect()
     }
 
-    fn map(&self, eta: &[f64], record: usize, held: HeldSamples<'_>) -> Result<Mapped, ModelError> {
+    fn map(&self, eta: &[f64], record: usize, held: DelayIntervals<'_>) -> Result<MappedPolynomials, ModelError> {
         let operator = self.operator(eta, record)?;
         let found = self
             .intersample
-            .discrete(&operator, held.of(self.delay_of(record)), self.sample_time)?;
+            .discrete_model(&operator, held.of(self.delay_index(record)), self.sample_time)?;
         let noise = &eta[self.noise_offset()..];
         let orders = self.orders(found.nk);
         let mut theta = found.b.clone();
@@ -264,7 +268,7 @@ impl Parametrisation for FamilyLayout {
         // For each parameter: the derivatives of theta with respect to it, each with its index in theta.
         let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
         let (nb, noise_end) = (found.b.len(), found.b.len() + noise.len());
-        for i in 0..self.coordinates() {
+        for i in 0..self.coordinate_count() {
             let rows = found.jacobian.iter().enumerate();
             let at = |row: usize| if row < nb { row } else { noise_end + row - nb };
             slopes.push(rows.map(|(row, slope)| (at(row), slope[i])).collect());
@@ -274,7 +278,9 @@ impl Parametrisation for FamilyLayout {
         for channel in &self.channels {
             let operator = self.channel(eta, channel, record)?;
             let delay = channel.place + channel.limits.len() - 1;
-            let found = self.intersample.discrete(&operator, held.of(delay), self.sample_time)?;
+            let found = self
+                .intersample
+                .discrete_model(&operator, held.of(delay), self.sample_time)?;
             let from = theta.len();
             theta.extend_from_slice(&found.b);
             theta.extend_from_slice(&found.f);
@@ -293,7 +299,7 @@ impl Parametrisation for FamilyLayout {
             slopes.iter().for_each(|(place, slope)| column[*place] = *slope);
             column
         };
-        Ok(Mapped {
+        Ok(MappedPolynomials {
             orders,
             further,
             columns: slopes.iter().map(column).collect(),

@@ -4,7 +4,7 @@ use hoid_model::{FamilyOperator, Form, uncertainty::Estimate};
 
 use super::{
     channel_lines::ChannelMinimum,
-    jackknife::{add_open_part, jackknife},
+    jackknife::{add_prior_contribution, jackknife},
     lines::LineData,
     response_fit::{ResponseCriterion, ResponseMinimum},
 };
@@ -52,7 +52,7 @@ impl LineFit {
     }
 
     /// Creates the fit of the operator from a fit with several inputs.
-    pub(super) fn of_channels(operator: FamilyOperator, found: &ChannelMinimum, penalty: &[Penalty]) -> Self {
+    pub(super) fn from_channels(operator: FamilyOperator, found: &ChannelMinimum, penalty: &[Penalty]) -> Self {
         let (p, q) = (operator.coordinates().len(), found.coordinates.len());
         let by_lines = found.covariance.as_ref().map(|c| -> Vec<f64> {
             let pairs = (0..p).flat_map(|i| (0..p).map(move |j| i * q + j));
@@ -106,17 +106,17 @@ pub(super) fn line_fit(
     let found = criterion.fit(search)?;
     let (form, neuromuscular) = (criterion.form, criterion.neuromuscular);
     let operator_of = |x: &[f64]| FamilyOperator::new(form, neuromuscular, x);
-    let runs = lines.runs();
+    let runs = lines.run_count();
     let (mut others, mut held_out) = (Vec::new(), Vec::new());
     if runs >= 3 {
         // Each fit without one run serves as a held-out prediction and as a replication of the jackknife.
         for run in 0..runs {
-            let points = lines.without(run);
+            let points = lines.without_run(run);
             let Some(without) = criterion.with_points(&points).fit_from(&found.coordinates, search) else {
                 continue;
             };
             let operator = operator_of(&without.coordinates)?;
-            held_out.push(lines.chi_squared_of_run(run, |omega| criterion.sampled(&operator, omega)));
+            held_out.push(lines.chi_squared_of_run(run, |omega| criterion.sampled_response(&operator, omega)));
             others.push(without.coordinates);
         }
     }
@@ -128,7 +128,7 @@ pub(super) fn line_fit(
     let covariance = by_lines.clone().map(|by_lines| match by_runs {
         // All replications use the same prior, so their scatter does not include its contribution.
         Some(mut covariance) => {
-            add_open_part(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
+            add_prior_contribution(&mut covariance, 1.0, &criterion.penalty, &found.coordinates, &by_lines);
             covariance
         }
         None => by_lines,
@@ -152,6 +152,6 @@ pub(super) fn line_fit(
 
 /// Sorts the forms in the order of preference for equal fits: forms with fewer coordinates first; for the same number
 /// of coordinates, the forms of the family before alternative forms.
-pub(super) fn by_simplicity(forms: &mut [Form]) {
-    forms.sort_by_key(|form| (form.simplicity(), *form));
+pub(super) fn sort_by_simplicity(forms: &mut [Form]) {
+    forms.sort_by_key(|form| (form.coordinate_count(), *form));
 }

@@ -4,7 +4,7 @@
 //! small n the smallest of these variances would dominate the fit. The relative variances `r_j = v_j/|H_j|^2` are
 //! therefore shrunk towards the relative variance b_j of the remnant near the line, which is computed from many bins:
 //! `r_j <- (nu r_j + nu_0 c b_j)/(nu + nu_0)` with `nu = 2(n - 1)`. The factor c is the median of `r_j/b_j`, at least
-//! one, and represents differences between runs in excess of the remnant (moderated variances; G. K. Smyth,
+//! one, and represents differences between runs in excess of the remnant (shrunk_variance variances; G. K. Smyth,
 //! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
 
 use hoid_model::Complex64;
@@ -14,16 +14,18 @@ use super::response_fit::MeasuredResponse;
 use crate::frequency::DescribingFunction;
 
 /// Degrees of freedom nu_0 of the variance from neighbouring bins.
-const PRIOR_FREEDOM: f64 = 8.0;
+const PRIOR_DEGREES_OF_FREEDOM: f64 = 8.0;
 /// Minimum number of runs whose scatter is used.
 pub(super) const MIN_RUNS: usize = 3;
 
 /// Returns the variance of a line: the variance from the scatter of the runs, shrunk towards the variance of the
 /// remnant in neighbouring bins times `excess`. For fewer than three runs this is the variance of the remnant alone.
-pub(super) fn moderated(runs: usize, of_runs: Option<f64>, neighbour_variance: f64, excess: f64) -> f64 {
+pub(super) fn shrunk_variance(runs: usize, of_runs: Option<f64>, neighbour_variance: f64, excess: f64) -> f64 {
     let nu = 2.0 * (runs as f64 - 1.0);
     match of_runs {
-        Some(v) if runs >= MIN_RUNS => (nu * v + PRIOR_FREEDOM * excess * neighbour_variance) / (nu + PRIOR_FREEDOM),
+        Some(v) if runs >= MIN_RUNS => {
+            (nu * v + PRIOR_DEGREES_OF_FREEDOM * excess * neighbour_variance) / (nu + PRIOR_DEGREES_OF_FREEDOM)
+        }
         _ => neighbour_variance,
     }
 }
@@ -51,7 +53,7 @@ impl<'d> LineData<'d> {
             _ => 1.0,
         };
         let of_runs = |i: usize| lines[i].standard_error.map(|s| s * s);
-        let variance = |i: usize| moderated(runs, of_runs(i), neighbour_variance(i), excess);
+        let variance = |i: usize| shrunk_variance(runs, of_runs(i), neighbour_variance(i), excess);
         let point = |i: usize| MeasuredResponse {
             omega_rad_s: lines[i].omega_rad_s,
             response: lines[i].response,
@@ -63,13 +65,13 @@ impl<'d> LineData<'d> {
         }
     }
 
-    pub fn runs(&self) -> usize {
+    pub fn run_count(&self) -> usize {
         self.describing.runs.len()
     }
 
     /// Returns the points averaged over all runs except one, with the variances for this smaller number of runs.
-    pub fn without(&self, run: usize) -> Vec<MeasuredResponse> {
-        let n = self.runs() as f64;
+    pub fn without_run(&self, run: usize) -> Vec<MeasuredResponse> {
+        let n = self.run_count() as f64;
         let fewer = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| MeasuredResponse {
             response: line.response_without(run),
             variance: point.variance * n / (n - 1.0),
@@ -81,7 +83,7 @@ impl<'d> LineData<'d> {
     /// Returns chi^2 of one run for an operator that was fitted without this run; `sampled` returns the sampled
     /// response of this operator.
     pub fn chi_squared_of_run(&self, run: usize, sampled: impl Fn(f64) -> Complex64) -> f64 {
-        let n = self.runs() as f64;
+        let n = self.run_count() as f64;
         let of = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| {
             let (a, b) = line.ratio.0[run];
             let whole: Complex64 = line.ratio.0.iter().map(|(_, b)| b).sum();

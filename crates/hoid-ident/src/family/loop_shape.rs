@@ -19,16 +19,16 @@ use hoid_model::{
     uncertainty::Estimate,
 };
 
-use super::open_loop::{Crossover, followed_margin_deg};
+use super::open_loop::{Crossover, unwrapped_margin_deg};
 
 /// Frequency range in which crossings are searched, rad/s.
-const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
+const SEARCH_RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// Largest plausible phase margin of a person, deg.
 const LARGEST_MARGIN_DEG: f64 = 120.0;
 /// 95 % quantile of chi-squared with two degrees of freedom.
-const CHI_SQUARED: f64 = 5.991_464_547_107_979;
+const CHI_SQUARED_QUANTILE: f64 = 5.991_464_547_107_979;
 /// Number of frequencies at which the distance from -1 is computed.
-const POINTS: usize = 400;
+const POINT_COUNT: usize = 400;
 
 /// An operator at one frequency: its sampled response, and the covariance of the real and imaginary part of its
 /// relative error.
@@ -64,9 +64,9 @@ impl LoopShape {
         element: &ContinuousTransferFunction,
         sample_time: SampleTime,
     ) -> Self {
-        let highest = RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
+        let highest = SEARCH_RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
         let open_loop = |omega: f64| operator(omega).value * element.response(omega);
-        let found = crossings(open_loop, (RANGE_RAD_S.0.min(0.5 * highest), highest));
+        let found = crossings(open_loop, (SEARCH_RANGE_RAD_S.0.min(0.5 * highest), highest));
         let with_error = |value: f64, omega: f64, along: [f64; 2]| match operator(omega).relative {
             Some(c) => {
                 let [a, b] = along;
@@ -76,7 +76,7 @@ impl LoopShape {
         };
         let crossover = |c: &Crossing| {
             let there = Crossover::at(open_loop, c.omega_rad_s);
-            let [re, im] = [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| there.moved_by(d));
+            let [re, im] = [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| there.shift_for(d));
             let omega = c.omega_rad_s;
             (
                 with_error(omega, omega, [re[0], im[0]]),
@@ -98,9 +98,9 @@ impl LoopShape {
         let unstable = unstable_poles(|omega| operator(omega).value, element, highest);
         let first = found.gain.first().map(|c| c.omega_rad_s);
         Self {
-            followed_deg: first.map(|omega| followed_margin_deg(open_loop, omega)),
+            followed_deg: first.map(|omega| unwrapped_margin_deg(open_loop, omega)),
             distance: (unstable > Some(0))
-                .then(|| distance_from_the_limit(&operator, element, highest))
+                .then(|| distance_from_stability_limit(&operator, element, highest))
                 .flatten(),
             crossovers,
             gain_margin,
@@ -127,13 +127,13 @@ impl LoopShape {
     pub fn finding(&self, reach_deg: f64) -> Option<Finding> {
         let remedy = "check the controlled element, the signs and units of e and u, and the time shift between e and u";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {
-            return Some(Finding::doubt(
+            return Some(Finding::warning(
                 "no-crossover",
                 format!("with this controlled element, the loop gain does not cross 1 from above: {remedy}"),
             ));
         };
         if margin + reach_deg <= 0.0 || margin > LARGEST_MARGIN_DEG {
-            return Some(Finding::doubt(
+            return Some(Finding::warning(
                 "unstable-loop",
                 format!(
                     "the loop with this controlled element has a phase margin of {margin:.0} deg at {:.1} rad/s, \
@@ -146,23 +146,25 @@ impl LoopShape {
             return None;
         }
         let at = self.as_text();
-        Some(if self.distance.is_some_and(|distance| distance < CHI_SQUARED) {
-            Finding::note(
-                "unstable-loop",
-                format!(
-                    "the loop with this controlled element is not stable at the estimates ({at}), but may be stable \
+        Some(
+            if self.distance.is_some_and(|distance| distance < CHI_SQUARED_QUANTILE) {
+                Finding::note(
+                    "unstable-loop",
+                    format!(
+                        "the loop with this controlled element is not stable at the estimates ({at}), but may be stable \
                      within their errors"
-                ),
-            )
-        } else {
-            Finding::doubt(
-                "unstable-loop",
-                format!(
-                    "the loop with this controlled element is not stable ({at}), but a record of an unstable loop \
+                    ),
+                )
+            } else {
+                Finding::warning(
+                    "unstable-loop",
+                    format!(
+                        "the loop with this controlled element is not stable ({at}), but a record of an unstable loop \
                      would not remain bounded: {remedy}"
-                ),
-            )
-        })
+                    ),
+                )
+            },
+        )
     }
 
     /// Formats every crossover with its phase margin.
@@ -175,13 +177,14 @@ impl LoopShape {
 }
 
 /// Returns the smallest chi-squared of a change of the operator for which L passes through -1.
-fn distance_from_the_limit(
+fn distance_from_stability_limit(
     operator: &impl Fn(f64) -> KnownResponse,
     element: &ContinuousTransferFunction,
     highest: f64,
 ) -> Option<f64> {
-    let at = |i: usize| RANGE_RAD_S.0 * (highest / RANGE_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
-    let distances = (0..POINTS).filter_map(|i| {
+    let at =
+        |i: usize| SEARCH_RANGE_RAD_S.0 * (highest / SEARCH_RANGE_RAD_S.0).powf(i as f64 / (POINT_COUNT as f64 - 1.0));
+    let distances = (0..POINT_COUNT).filter_map(|i| {
         let omega = at(i);
         let known = operator(omega);
         let [[a, b], [_, c]] = known.relative?;
@@ -201,7 +204,7 @@ mod tests {
     use super::*;
 
     /// The element 2.5/s with a gain and a neuromuscular resonance at 9 rad/s: |L| is one at three frequencies.
-    fn resonant(omega: f64) -> Complex64 {
+    fn resonant_loop(omega: f64) -> Complex64 {
         let s = Complex64::new(0.0, omega);
         Complex64::from_polar(1.0, -0.15 * omega) * 81.0 / (s * s + s + 81.0)
     }
@@ -212,12 +215,12 @@ mod tests {
             value: of(omega),
             relative: variance.map(|v| [[v, 0.0], [0.0, v]]),
         };
-        LoopShape::of(known, &element, SampleTime::HUNDREDTH)
+        LoopShape::of(known, &element, SampleTime::AT_100_HZ)
     }
 
     #[test]
     fn loop_with_three_crossovers_is_unstable() {
-        let found = shape(resonant, Some(1e-4));
+        let found = shape(resonant_loop, Some(1e-4));
         assert_eq!((found.crossovers.len(), found.unstable_poles), (3, Some(2)));
         let [low, middle, high] = [0, 1, 2].map(|k| found.crossovers[k]);
         assert!(
@@ -236,11 +239,11 @@ mod tests {
             doubt.message
         );
         // With large errors the loop may be stable.
-        let note = shape(resonant, Some(0.3)).finding(1.0).unwrap();
+        let note = shape(resonant_loop, Some(0.3)).finding(1.0).unwrap();
         assert_eq!(note.severity, hoid_model::Severity::Note);
         // Without errors the values are used.
         assert_eq!(
-            shape(resonant, None).finding(1.0).unwrap().severity,
+            shape(resonant_loop, None).finding(1.0).unwrap().severity,
             hoid_model::Severity::Doubt
         );
     }

@@ -16,23 +16,23 @@
 use hoid_model::Form;
 
 use super::{
-    coordinates::{self, Grid},
+    coordinates::{self, GridDensity},
     intersample::Intersample,
-    prediction::{EQUAL_POWER, Prediction, ROUNDING_POWER},
+    prediction::{EQUAL_RESIDUAL_POWER, PredictionProblem, ROUNDING_POWER},
 };
 use crate::{SearchOptions, criterion::Workspace, optimize::Objective};
 
 /// Residual power of a start, relative to the power of u, below which output error searches are run.
-const LARGEST_AT_START: f64 = 0.05;
+const MAX_START_RESIDUAL_SHARE: f64 = 0.05;
 /// Relative residual power of the best form below which there is little noise: no operator explains u of a person so
 /// well.
 const LOW_NOISE_SHARE: f64 = 5e-3;
 /// Relative residual power below which the residual is rounding error and the search ends.
-const ROUNDING: f64 = 1e-25;
+const ROUNDING_SHARE: f64 = 1e-25;
 /// Number of grid points for further searches of a form whose residual is not yet small, and number of rounds of these
 /// searches. The second round uses the best form of the first round.
-const ADDITIONAL_STARTS: usize = 4;
-const ROUNDS: usize = 2;
+const ADDITIONAL_START_COUNT: usize = 4;
+const ROUND_COUNT: usize = 2;
 /// Ratio of the residual powers for two intersample behaviours below which the difference is decisive. For a continuous
 /// error neither model is right: the hold has the relative error `x^2/6` and linear interpolation `x^2/3` with
 /// `x = omega Ts/2`, so the ratio of the residual powers is only 1/4.
@@ -48,7 +48,7 @@ pub(super) type Starts = (Form, Vec<Vec<f64>>);
 
 /// Result of the searches for one form.
 #[derive(Debug, Clone)]
-pub(super) struct End {
+pub(super) struct SearchResult {
     pub coordinates: Vec<f64>,
     /// Residual power relative to the power of u.
     share: f64,
@@ -56,20 +56,20 @@ pub(super) struct End {
 
 /// Results of the output error searches of all forms, if there is little noise.
 #[derive(Debug, Clone)]
-pub(super) struct LittleNoise {
+pub(super) struct LowNoiseFits {
     /// Result of each form; `None` if its searches failed.
-    pub ends: Vec<Option<End>>,
+    pub ends: Vec<Option<SearchResult>>,
     /// Smallest residual power over all forms, relative to the power of u.
     pub share: f64,
     /// Smallest value of Schwarz's criterion over all forms.
     criterion: f64,
 }
 
-impl LittleNoise {
+impl LowNoiseFits {
     /// Searches all forms by output error; `None` if there is more noise. `clean` is true if a high-order ARX model
     /// leaves almost no noise; the searches are then run even from starts with a large residual.
     pub fn of(
-        prediction: &Prediction<'_>,
+        prediction: &PredictionProblem<'_>,
         neuromuscular: bool,
         starts: &[Starts],
         clean: bool,
@@ -87,7 +87,7 @@ impl LittleNoise {
             all.any(|(form, x)| {
                 search
                     .residual_power(form, x, workspace)
-                    .is_some_and(|share| share < LARGEST_AT_START)
+                    .is_some_and(|share| share < MAX_START_RESIDUAL_SHARE)
             })
         };
         if !clean && !near(workspace) {
@@ -95,9 +95,9 @@ impl LittleNoise {
         }
         let ends = starts
             .iter()
-            .map(|(form, starts)| search.least(*form, starts, workspace));
-        let mut ends: Vec<Option<End>> = ends.collect();
-        for round in 0..ROUNDS {
+            .map(|(form, starts)| search.best_result(*form, starts, workspace));
+        let mut ends: Vec<Option<SearchResult>> = ends.collect();
+        for round in 0..ROUND_COUNT {
             let Some((best, share)) = smallest_share(&ends).filter(|(_, share)| clean || *share < LOW_NOISE_SHARE)
             else {
                 break;
@@ -112,25 +112,25 @@ impl LittleNoise {
                 if known < ROUNDING_POWER || (known < OTHER_MINIMUM_RATIO * share && !none_is_found) {
                     continue;
                 }
-                let more = search.more_starts(*form, &best_known, workspace);
+                let more = search.grid_starts(*form, &best_known, workspace);
                 *end = search
-                    .least(*form, &more, workspace)
+                    .best_result(*form, &more, workspace)
                     .filter(|end| end.share < known)
                     .or(end.take());
             }
         }
         let (_, share) = smallest_share(&ends).filter(|(_, share)| *share < LOW_NOISE_SHARE)?;
-        let n = prediction.samples() as f64;
+        let n = prediction.sample_count() as f64;
         let criterion = (ends.iter().zip(starts)).filter_map(|(end, (form, _))| {
             let size = form.coordinates(neuromuscular).len() as f64;
-            Some(n * end.as_ref()?.share.max(EQUAL_POWER).ln() + n.ln() * size)
+            Some(n * end.as_ref()?.share.max(EQUAL_RESIDUAL_POWER).ln() + n.ln() * size)
         });
         let criterion = criterion.fold(f64::INFINITY, f64::min);
         Some(Self { ends, share, criterion })
     }
 
     /// Replaces the starts of each form by the result of its searches, with a delay that is longer by `later_s`.
-    pub fn move_to_ends(&self, starts: &mut [Starts], later_s: f64) {
+    pub fn move_to_results(&self, starts: &mut [Starts], later_s: f64) {
         for ((_, coordinates), end) in starts.iter_mut().zip(&self.ends) {
             if let Some(end) = end {
                 let mut end = end.coordinates.clone();
@@ -151,8 +151,8 @@ impl LittleNoise {
 
     /// Returns the intersample behaviour that fits better, given the searches with a smooth and with a held error, and
     /// whether the difference is decisive.
-    pub fn intersample_of(smooth: &Self, held: &Self) -> (Intersample, bool) {
-        match held.share.max(ROUNDING) / smooth.share.max(ROUNDING) {
+    pub fn choose_intersample(smooth: &Self, held: &Self) -> (Intersample, bool) {
+        match held.share.max(ROUNDING_SHARE) / smooth.share.max(ROUNDING_SHARE) {
             ratio if ratio < DECISIVE_RATIO => (Intersample::Zoh, true),
             ratio if ratio > 1.0 / DECISIVE_RATIO => (Intersample::Foh, true),
             _ if held.criterion < smooth.criterion => (Intersample::Zoh, false),
@@ -162,7 +162,7 @@ impl LittleNoise {
 }
 
 /// Returns the index and the relative residual power of the form with the smallest residual.
-fn smallest_share(ends: &[Option<End>]) -> Option<(usize, f64)> {
+fn smallest_share(ends: &[Option<SearchResult>]) -> Option<(usize, f64)> {
     let shares = ends
         .iter()
         .enumerate()
@@ -172,31 +172,31 @@ fn smallest_share(ends: &[Option<End>]) -> Option<(usize, f64)> {
 
 /// Output error searches for one intersample behaviour of the error.
 struct Search<'p, 'a> {
-    prediction: &'p Prediction<'a>,
+    prediction: &'p PredictionProblem<'a>,
     neuromuscular: bool,
     power: f64,
 }
 
 impl Search<'_, '_> {
     /// Searches from these coordinates and returns the best result.
-    fn least(&self, form: Form, starts: &[Vec<f64>], workspace: &mut Workspace) -> Option<End> {
+    fn best_result(&self, form: Form, starts: &[Vec<f64>], workspace: &mut Workspace) -> Option<SearchResult> {
         let criterion = self.prediction.criterion((form, self.neuromuscular), (0, 0));
         let search = SearchOptions {
             max_iterations: MAX_STEPS,
             ..self.prediction.search
         };
-        let mut best: Option<End> = None;
+        let mut best: Option<SearchResult> = None;
         for start in starts {
-            let eta = criterion.layout.spread(start, &[]);
+            let eta = criterion.layout.common_eta(start, &[]);
             let Some(end) = criterion.search(eta, &search, None, workspace) else {
                 continue;
             };
             let share = end.at.sum_of_squares / self.power;
             if best.as_ref().is_none_or(|known| share < known.share) {
                 let coordinates = criterion.layout.coordinates_of(&end.theta, 0);
-                best = Some(End { coordinates, share });
+                best = Some(SearchResult { coordinates, share });
             }
-            if share < ROUNDING {
+            if share < ROUNDING_SHARE {
                 break;
             }
         }
@@ -206,11 +206,11 @@ impl Search<'_, '_> {
     /// Returns those grid points of a form that leave the smallest residuals, each with its best gain. The grid is used
     /// as it is, and also with the neuromuscular system and the delay of another operator. Since u is linear in the
     /// gain, one step from a gain of zero gives the best gain.
-    fn more_starts(&self, form: Form, best_known: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
+    fn grid_starts(&self, form: Form, best_known: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
-        let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Default);
+        let mut grid = coordinates::start_grid(form, neuromuscular, &limits, GridDensity::Default);
         // The neuromuscular system and the delay are the last coordinates of every form.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
         let of_other = &best_known.1[best_known.1.len() - tail..];
@@ -222,7 +222,7 @@ impl Search<'_, '_> {
         let mut all: Vec<(f64, Vec<f64>)> = Vec::new();
         for mut point in grid {
             point[0] = 0.0;
-            let at = criterion.linearise(&criterion.layout.spread(&point, &[]), workspace);
+            let at = criterion.linearise(&criterion.layout.common_eta(&point, &[]), workspace);
             let gain = at.descent[0] / at.gram[0];
             let left = at.sum_of_squares - gain * at.descent[0];
             if gain.is_finite() && gain != 0.0 && left.is_finite() {
@@ -232,7 +232,7 @@ impl Search<'_, '_> {
         }
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
         all.into_iter()
-            .take(ADDITIONAL_STARTS)
+            .take(ADDITIONAL_START_COUNT)
             .map(|(_, point)| point)
             .collect()
     }
@@ -241,7 +241,7 @@ impl Search<'_, '_> {
     fn residual_power(&self, form: Form, coordinates: &[f64], workspace: &mut Workspace) -> Option<f64> {
         let left = self
             .prediction
-            .unexplained((form, self.neuromuscular), coordinates, workspace);
+            .unexplained_output((form, self.neuromuscular), coordinates, workspace);
         let squares: f64 = left.ok()?.iter().flatten().map(|v| v * v).sum();
         Some(squares / self.power)
     }
@@ -290,7 +290,7 @@ mod tests {
         .unwrap()
     }
 
-    fn fitted(record: Record) -> FamilyFit {
+    fn fit_record(record: Record) -> FamilyFit {
         let estimator = FamilyEstimator {
             forms: vec![Form::Gain, Form::Lead, Form::Lag, Form::LeadLag],
             ..FamilyEstimator::default()
@@ -298,7 +298,7 @@ mod tests {
         estimator.fit(&[record]).unwrap()
     }
 
-    fn worst(fit: &FamilyFit, delay_s: f64) -> f64 {
+    fn largest_error(fit: &FamilyFit, delay_s: f64) -> f64 {
         let x = fit.operator(0).operator.coordinates();
         let expected = [&X[..4], &[delay_s]].concat();
         assert_eq!(fit.form, Form::Lead);
@@ -308,12 +308,12 @@ mod tests {
     #[test]
     fn noise_free_operator_is_found_with_its_intersample_model() {
         let ts = SampleTime::new(0.025).unwrap();
-        let held = fitted(record(&truth().zoh(ts).unwrap(), 0.0));
-        assert!(worst(&held, 0.243) < 1e-10);
+        let held = fit_record(record(&truth().zoh(ts).unwrap(), 0.0));
+        assert!(largest_error(&held, 0.243) < 1e-10);
         assert_eq!((held.intersample, held.delay_if_linear_s(0)), (Intersample::Zoh, None));
         // A piecewise linear error; the delay is half a sample longer than this model shows.
-        let straight = fitted(record(&truth().interpolate(ts).unwrap(), 0.0));
-        assert!(worst(&straight, 0.243 + 0.0125) < 1e-10);
+        let straight = fit_record(record(&truth().interpolate(ts).unwrap(), 0.0));
+        assert!(largest_error(&straight, 0.243 + 0.0125) < 1e-10);
         assert_eq!(
             (straight.intersample, straight.delay_if_linear_s(0)),
             (Intersample::Foh, None)
@@ -329,7 +329,7 @@ mod tests {
     #[test]
     fn small_noise_is_modelled_and_errors_cover_the_truth() {
         let ts = SampleTime::new(0.025).unwrap();
-        let fit = fitted(record(&truth().zoh(ts).unwrap(), 1e-3));
+        let fit = fit_record(record(&truth().zoh(ts).unwrap(), 1e-3));
         let c = fit.operator(0).covariance.clone().unwrap();
         for (i, (x, t)) in fit.operator(0).operator.coordinates().iter().zip(X).enumerate() {
             let error = c[i * 6].sqrt();
@@ -369,34 +369,34 @@ mod tests {
     fn operator_remnant_is_not_treated_as_small_noise() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
-        let fit = fitted(record.detrended(Detrend::Mean));
+        let fit = fit_record(record.detrended(Detrend::Mean));
         assert_eq!((fit.intersample, fit.noise_free), (Intersample::Auto, None));
         let tau = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e").unwrap();
         assert!((fit.delay_if_linear_s(0).unwrap() - tau.value - 0.005).abs() < 1e-12);
     }
 
     #[test]
-    fn quarter_of_the_sum_of_squares_decides_nothing() {
-        let of = |share: f64, criterion: f64| LittleNoise {
+    fn residual_ratio_of_one_quarter_is_not_decisive() {
+        let of = |share: f64, criterion: f64| LowNoiseFits {
             ends: Vec::new(),
             share,
             criterion,
         };
         let smooth = of(1e-6, 0.0);
         assert_eq!(
-            LittleNoise::intersample_of(&smooth, &of(2.5e-7, -9.0)),
+            LowNoiseFits::choose_intersample(&smooth, &of(2.5e-7, -9.0)),
             (Intersample::Zoh, false)
         );
         assert_eq!(
-            LittleNoise::intersample_of(&smooth, &of(2.5e-7, 9.0)),
+            LowNoiseFits::choose_intersample(&smooth, &of(2.5e-7, 9.0)),
             (Intersample::Auto, false)
         );
         assert_eq!(
-            LittleNoise::intersample_of(&smooth, &of(0.0, -9.0)),
+            LowNoiseFits::choose_intersample(&smooth, &of(0.0, -9.0)),
             (Intersample::Zoh, true)
         );
         assert_eq!(
-            LittleNoise::intersample_of(&of(0.0, 0.0), &of(1e-9, 9.0)),
+            LowNoiseFits::choose_intersample(&of(0.0, 0.0), &of(1e-9, 9.0)),
             (Intersample::Foh, true)
         );
     }
@@ -408,7 +408,7 @@ mod tests {
         let x = [3.4, 0.72, 0.333, 2.13, -0.775, 0.398];
         let truth = FamilyOperator::new(Form::QuadraticIntegral, true, &x).unwrap();
         for (course, expected) in [(Intersample::Zoh, x[5]), (Intersample::Auto, x[5] + 0.0025)] {
-            let record = record_of(&course.discrete(&truth, None, ts).unwrap(), ts, (200, 6000), 0.0);
+            let record = record_of(&course.discrete_model(&truth, None, ts).unwrap(), ts, (200, 6000), 0.0);
             let estimator = FamilyEstimator {
                 forms: vec![Form::Lead2Lag, Form::QuadraticIntegral],
                 ..FamilyEstimator::default()

@@ -18,12 +18,12 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::clusters::{degrees_of_freedom, quantile};
 
 /// Number of bisection steps for each end of an interval.
-const HALVINGS: usize = 80;
+const BISECTION_STEPS: usize = 80;
 /// Distance from the intervals, in widths of their union, beyond which Student's distribution leaves less than a
-/// hundredth of [`TAIL`].
+/// hundredth of [`TAIL_PROBABILITY`].
 const TAIL_DISTANCE: f64 = 50.0;
 /// Probability in each tail outside the interval.
-const TAIL: f64 = 0.025;
+const TAIL_PROBABILITY: f64 = 0.025;
 
 /// Estimate of a quantity in one form.
 #[derive(Debug, Clone, Copy)]
@@ -76,13 +76,13 @@ impl Mixture {
 }
 
 /// Weight, estimate and interval of a form.
-type Part = (f64, f64, (f64, f64));
+type WeightedInterval = (f64, f64, (f64, f64));
 
 /// Returns the 95 % interval of the mixture; `None` if a form has no interval.
 fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
     let student = StudentsT::new(0.0, 1.0, degrees_of_freedom(clusters)).ok()?;
     let quantile = quantile(clusters);
-    let parts: Option<Vec<Part>> = (components.iter())
+    let parts: Option<Vec<WeightedInterval>> = (components.iter())
         .map(|c| Some((c.weight / total, c.estimate.value, c.interval?)))
         .collect();
     let parts = parts?;
@@ -106,7 +106,7 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
     let reach = TAIL_DISTANCE * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
     let place = |wanted: f64| {
         let (mut low, mut high) = (least - reach, most + reach);
-        for _ in 0..HALVINGS {
+        for _ in 0..BISECTION_STEPS {
             let middle = 0.5 * (low + high);
             if share(middle) < wanted {
                 low = middle;
@@ -122,22 +122,22 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
             found
         }
     };
-    let low = if share(least - reach) > TAIL {
+    let low = if share(least - reach) > TAIL_PROBABILITY {
         f64::NEG_INFINITY
     } else {
-        place(TAIL)
+        place(TAIL_PROBABILITY)
     };
-    let high = if share(most + reach) < 1.0 - TAIL {
+    let high = if share(most + reach) < 1.0 - TAIL_PROBABILITY {
         f64::INFINITY
     } else {
-        place(1.0 - TAIL)
+        place(1.0 - TAIL_PROBABILITY)
     };
     Some((low, high))
 }
 
 /// Returns estimate and interval for a larger standard error: the distances of the ends from the estimate grow in
 /// proportion to the standard error.
-pub(super) fn widened(
+pub(super) fn widen_interval(
     of: Estimate,
     interval: Option<(f64, f64)>,
     error: Option<f64>,

@@ -103,13 +103,13 @@ mod starts;
 
 pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
 pub use channel::{ChannelFit, ChannelForm, ChannelResponse, ChannelRole, SeenChannel};
-pub use choice::{FormFigures, MIN_WEIGHT, NO_EVIDENCE};
+pub use choice::{FormFigures, MIN_WEIGHT, NEGLIGIBLE_AIC_DIFFERENCE};
 pub use clusters::ClusterKind;
 pub use instrumental::InstrumentalFit;
 pub use intersample::Intersample;
 pub use line_fit::LineFit;
 pub use loop_shape::{KnownResponse, LoopShape};
-pub use of_polynomials::{FamilyConversion, family_of_polynomials};
+pub use of_polynomials::{FamilyConversion, family_from_polynomials};
 pub use open_loop::{Crossover, LoopMeasures, loop_measures};
 pub use options::{FamilyEstimator, HIGHEST_NOISE_ORDER};
 pub use parameter::Parameter;

@@ -10,11 +10,11 @@
 use crate::linalg::{
     gram::Gram,
     least_squares::solve_symmetric,
-    products::{Lagged, gram},
+    products::{LaggedColumn, gram},
 };
 
 /// Largest modulus of a root of C in a starting value.
-const LARGEST_ROOT: f64 = 0.999;
+const MAX_ROOT_MODULUS: f64 = 0.999;
 /// Factor by which larger roots are moved inwards, and maximum number of times that this is done.
 const ROOT_SHRINK_FACTOR: f64 = 0.98;
 const MAX_SHRINKS: usize = 200;
@@ -47,7 +47,7 @@ impl NoiseProducts {
         let mut count = 0;
         for v in series.iter().filter(|v| v.len() > highest) {
             count += v.len() - highest;
-            let lagged = (0..=highest).map(|lag| Lagged {
+            let lagged = (0..=highest).map(|lag| LaggedColumn {
                 values: &v[highest - lag..v.len() - lag],
                 is_shift_of_previous: lag > 0,
             });
@@ -130,7 +130,7 @@ pub(crate) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), lon
     let mut found = solve_symmetric(&gram, &right)?;
     // The coefficients c_k rho^k multiply all roots of C by rho.
     for _ in 0..MAX_SHRINKS {
-        if hoid_core::stability::roots_inside(&found[..nc], LARGEST_ROOT) {
+        if hoid_core::stability::roots_inside(&found[..nc], MAX_ROOT_MODULUS) {
             return Some(found);
         }
         let mut factor = 1.0;

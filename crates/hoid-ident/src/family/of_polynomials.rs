@@ -34,7 +34,7 @@ use crate::{
 };
 
 /// Candidate forms, in the order from the simplest.
-const FORMS: [Form; 6] = [
+const CANDIDATE_FORMS: [Form; 6] = [
     Form::Gain,
     Form::Lag,
     Form::Lead,
@@ -44,11 +44,11 @@ const FORMS: [Form; 6] = [
 ];
 /// Frequency range in which responses are compared, rad/s; the points are evenly spaced on a logarithmic scale.
 const BAND_RAD_S: (f64, f64) = (0.2, 30.0);
-const POINTS: usize = 30;
+const POINT_COUNT: usize = 30;
 /// Largest accepted relative deviation of an operator's response from the response of the polynomials.
 const LARGEST_MISMATCH: f64 = 0.1;
 /// Relative deviation up to which a form counts as exact.
-const EXACT: f64 = 1e-6;
+const EXACT_MISMATCH: f64 = 1e-6;
 /// Delays from which searches start, in samples relative to nk - 1.
 const DELAY_OFFSETS: [f64; 6] = [0.02, 0.5, 0.98, 2.5, 5.0, 10.0];
 /// Lead times from which searches start, s.
@@ -83,9 +83,9 @@ impl Fit {
     /// in the simplest exact or else the closest form.
     ///
     /// # Errors
-    /// Same as [`family_of_polynomials`].
+    /// Same as [`family_from_polynomials`].
     pub fn family_operator(&self, form: Option<Form>) -> Result<FamilyConversion, NotConvertible> {
-        family_of_polynomials(self.model(), self.covariance(), form)
+        family_from_polynomials(self.model(), self.covariance(), form)
     }
 }
 
@@ -96,7 +96,7 @@ impl Fit {
 /// [`NotConvertible`] for a nonfinite coefficient, poles in both A and F, no poles or more than three, an unstable
 /// pole, a pole on the negative real axis of z, nk = 0, a given form that does not have these poles, or if the response
 /// of the closest operator deviates by more than a tenth.
-pub fn family_of_polynomials(
+pub fn family_from_polynomials(
     model: &PolynomialModel,
     covariance: Option<&[f64]>,
     form: Option<Form>,
@@ -120,16 +120,19 @@ pub fn family_of_polynomials(
     let points = points(model);
     let forms: Vec<Form> = match form {
         Some(form) => vec![form],
-        None => FORMS.to_vec(),
+        None => CANDIDATE_FORMS.to_vec(),
     };
     let mut best: Option<(f64, Minimum, Form, &PoleAssignment)> = None;
     for form in forms {
         for reading in &pole_assignments {
-            let Some((mismatch, found)) = nearest(form, reading, &points, orders.nk, sample_time) else {
+            let Some((mismatch, found)) = fit_form(form, reading, &points, orders.nk, sample_time) else {
                 continue;
             };
             // Rounding must not replace a simple exact form by a more complex one.
-            if best.as_ref().is_none_or(|known| known.0 > EXACT && mismatch < known.0) {
+            if best
+                .as_ref()
+                .is_none_or(|known| known.0 > EXACT_MISMATCH && mismatch < known.0)
+            {
                 best = Some((mismatch, found, form, reading));
             }
         }
@@ -153,7 +156,7 @@ pub fn family_of_polynomials(
             ),
         });
     }
-    let criterion = Nearest::new(form, reading, &points, orders.nk, sample_time);
+    let criterion = ConversionCriterion::new(form, reading, &points, orders.nk, sample_time);
     let operator = FamilyOperator::new(form, reading.neuromuscular.is_some(), &found.theta).map_err(|error| {
         NotConvertible::NotOfTheFamily {
             reason: error.to_string(),
@@ -177,9 +180,9 @@ struct Point {
 
 fn points(model: &PolynomialModel) -> Vec<Point> {
     let highest = BAND_RAD_S.1.min(0.8 * model.sample_time().nyquist_rad_s());
-    (0..POINTS)
+    (0..POINT_COUNT)
         .map(|i| {
-            let omega_rad_s = BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
+            let omega_rad_s = BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINT_COUNT as f64 - 1.0));
             let (response, gradient) = model.response_and_gradient(omega_rad_s);
             Point {
                 omega_rad_s,
@@ -192,7 +195,7 @@ fn points(model: &PolynomialModel) -> Vec<Point> {
 
 /// Returns the operator of a form that is closest to the polynomials with these poles, and its mismatch; `None` if the
 /// form does not have these poles.
-fn nearest(
+fn fit_form(
     form: Form,
     reading: &PoleAssignment,
     points: &[Point],
@@ -204,7 +207,7 @@ fn nearest(
     if form.has_pole() != reading.lag.is_some() || !form.is_proper(neuromuscular) {
         return None;
     }
-    let criterion = Nearest::new(form, reading, points, nk, sample_time);
+    let criterion = ConversionCriterion::new(form, reading, points, nk, sample_time);
     let found = criterion
         .starts()
         .into_iter()
@@ -222,7 +225,7 @@ fn nearest(
 }
 
 /// The criterion as a function of the coordinates of a form.
-struct Nearest<'a> {
+struct ConversionCriterion<'a> {
     form: Form,
     reading: &'a PoleAssignment,
     points: &'a [Point],
@@ -231,7 +234,7 @@ struct Nearest<'a> {
     limits: Vec<(f64, f64)>,
 }
 
-impl<'a> Nearest<'a> {
+impl<'a> ConversionCriterion<'a> {
     fn new(form: Form, reading: &'a PoleAssignment, points: &'a [Point], nk: usize, sample_time: SampleTime) -> Self {
         let neuromuscular = reading.neuromuscular.is_some();
         let ts = sample_time.s();
@@ -371,7 +374,7 @@ fn response(held: &HeldFamily, angle: f64, p: usize) -> (Complex64, Vec<Complex6
     )
 }
 
-impl Objective for Nearest<'_> {
+impl Objective for ConversionCriterion<'_> {
     fn is_feasible(&self, x: &[f64]) -> bool {
         FamilyOperator::new(self.form, self.reading.neuromuscular.is_some(), x).is_ok()
     }
@@ -417,7 +420,7 @@ mod tests {
         PolynomialModel::new(Structure::OutputError, orders, ts(), [b, f].concat()).unwrap()
     }
 
-    fn exact(operator: &FamilyOperator) -> PolynomialModel {
+    fn exact_polynomials(operator: &FamilyOperator) -> PolynomialModel {
         let held = operator.zoh(ts()).unwrap();
         polynomials(held.nk, &held.b, &held.f)
     }
@@ -439,7 +442,7 @@ mod tests {
     #[test]
     fn exact_model_returns_its_operator() {
         for operator in operators() {
-            let found = family_of_polynomials(&exact(&operator), None, None).unwrap();
+            let found = family_from_polynomials(&exact_polynomials(&operator), None, None).unwrap();
             assert_eq!(found.operator.form(), operator.form());
             assert!(found.mismatch < 1e-8, "{}: {}", operator.form(), found.mismatch);
             for (a, b) in found.operator.coordinates().iter().zip(operator.coordinates()) {
@@ -451,7 +454,7 @@ mod tests {
 
     #[test]
     fn lag_is_assigned_to_the_real_pole_that_fits() {
-        let found = family_of_polynomials(&exact(&operators()[3]), None, None).unwrap();
+        let found = family_from_polynomials(&exact_polynomials(&operators()[3]), None, None).unwrap();
         assert_eq!(found.real_poles.len(), 1);
         assert_eq!(found.real_poles[0].role, PoleRole::Lag);
         assert!((found.real_poles[0].rate - 0.12).abs() < 1e-6);
@@ -459,7 +462,7 @@ mod tests {
         // assignment is exact. Any exact assignment has the same response, and the first one is used.
         let x = [5.0, 0.6, 0.12, 11.0_f64.ln(), 1.3_f64.ln(), 0.137];
         let overdamped = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();
-        let found = family_of_polynomials(&exact(&overdamped), None, None).unwrap();
+        let found = family_from_polynomials(&exact_polynomials(&overdamped), None, None).unwrap();
         assert_eq!(found.real_poles.len(), 3);
         assert!(found.mismatch < 1e-7);
         let lags = found.real_poles.iter().filter(|p| p.role == PoleRole::Lag).count();
@@ -470,19 +473,19 @@ mod tests {
     fn covariance_matches_finite_differences_of_the_coefficients() {
         // Each coefficient is changed by a small step; the coordinates change as dx/dtheta predicts.
         let operator = FamilyOperator::new(Form::LeadLag, true, &LEAD_LAG).unwrap();
-        let model = exact(&operator);
+        let model = exact_polynomials(&operator);
         let n = model.theta().len();
         for k in 0..n {
             let mut covariance = vec![0.0; n * n];
             covariance[k * n + k] = 1.0;
-            let found = family_of_polynomials(&model, Some(&covariance), Some(Form::LeadLag)).unwrap();
+            let found = family_from_polynomials(&model, Some(&covariance), Some(Form::LeadLag)).unwrap();
             let by_covariance = found.covariance.unwrap();
             let h = 1e-8;
             let at = |by: f64| {
                 let mut theta = model.theta().to_vec();
                 theta[k] += by;
                 let moved = PolynomialModel::new(model.structure(), model.orders(), ts(), theta).unwrap();
-                family_of_polynomials(&moved, None, Some(Form::LeadLag))
+                family_from_polynomials(&moved, None, Some(Form::LeadLag))
                     .unwrap()
                     .operator
             };
@@ -500,7 +503,7 @@ mod tests {
 
     #[test]
     fn polynomials_without_an_operator_are_refused() {
-        let refused = |m: &PolynomialModel, form| family_of_polynomials(m, None, form).unwrap_err().to_string();
+        let refused = |m: &PolynomialModel, form| family_from_polynomials(m, None, form).unwrap_err().to_string();
         // Four poles, an unstable pole, a negative pole, and no delay.
         let four = polynomials(9, &[0.1, 0.1], &[-0.5, 0.2, 0.0, 0.01]);
         assert!(refused(&four, None).contains("one to three poles, found 4"));
@@ -510,7 +513,7 @@ mod tests {
         // A resonance in B that no form has.
         let notch = polynomials(9, &[1.0, -1.98, 0.995], &[-1.7, 0.75]);
         assert!(refused(&notch, None).contains("the response of the nearest operator"));
-        let lead_lag = exact(&operators()[3]);
+        let lead_lag = exact_polynomials(&operators()[3]);
         assert!(refused(&lead_lag, Some(Form::Lead)).contains("does not match"));
     }
 }

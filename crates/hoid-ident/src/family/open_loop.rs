@@ -18,15 +18,15 @@ use hoid_model::{
 use super::{
     clusters::quantile,
     intersample::Intersample,
-    mixture::{Component, Mixture, widened},
+    mixture::{Component, Mixture, widen_interval},
 };
 
 /// Frequency range in which crossovers are searched, rad/s.
-const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
+const SEARCH_RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// 97.5 % quantile of the normal distribution.
-const NORMAL: f64 = 1.959_963_984_540_054;
+const NORMAL_QUANTILE: f64 = 1.959_963_984_540_054;
 /// Number of frequencies in the scan for a crossover.
-const POINTS: usize = 150;
+const POINT_COUNT: usize = 150;
 
 /// Crossover and phase margin with their standard errors.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,9 +50,9 @@ impl LoopMeasures {
         let [crossover_rad_s, phase_margin_deg] = both;
         Self {
             crossover_rad_s,
-            crossover_interval: symmetric_interval(crossover_rad_s, NORMAL),
+            crossover_interval: symmetric_interval(crossover_rad_s, NORMAL_QUANTILE),
             phase_margin_deg,
-            phase_margin_interval: symmetric_interval(phase_margin_deg, NORMAL),
+            phase_margin_interval: symmetric_interval(phase_margin_deg, NORMAL_QUANTILE),
             by_gain,
             of_person: both.map(|e| e.standard_error),
         }
@@ -86,9 +86,10 @@ impl LoopMeasures {
     #[must_use]
     pub fn as_of_person(self) -> Self {
         let [crossover, margin] = self.of_person;
-        let (crossover_rad_s, crossover_interval) = widened(self.crossover_rad_s, self.crossover_interval, crossover);
+        let (crossover_rad_s, crossover_interval) =
+            widen_interval(self.crossover_rad_s, self.crossover_interval, crossover);
         let (phase_margin_deg, phase_margin_interval) =
-            widened(self.phase_margin_deg, self.phase_margin_interval, margin);
+            widen_interval(self.phase_margin_deg, self.phase_margin_interval, margin);
         Self {
             crossover_rad_s,
             crossover_interval,
@@ -99,7 +100,7 @@ impl LoopMeasures {
     }
 
     /// Returns the measures as a weighted average over forms; `None` without forms.
-    pub(super) fn averaged(each: &[(f64, Self)], clusters: usize) -> Option<Self> {
+    pub(super) fn average(each: &[(f64, Self)], clusters: usize) -> Option<Self> {
         let [_, _, ..] = each else {
             return each.first().map(|(_, only)| *only);
         };
@@ -151,13 +152,15 @@ pub struct Crossover {
 impl Crossover {
     /// Returns the lowest crossover of a sampled open loop at which `|L|` falls below one; `None` if there is no such
     /// crossover.
-    pub fn lowest(open_loop: impl Fn(f64) -> Complex64, sample_time: SampleTime) -> Option<Self> {
-        let highest = RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
-        let at = |i: usize| RANGE_RAD_S.0 * (highest / RANGE_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
+    pub fn find_lowest(open_loop: impl Fn(f64) -> Complex64, sample_time: SampleTime) -> Option<Self> {
+        let highest = SEARCH_RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
+        let at = |i: usize| {
+            SEARCH_RANGE_RAD_S.0 * (highest / SEARCH_RANGE_RAD_S.0).powf(i as f64 / (POINT_COUNT as f64 - 1.0))
+        };
         let gain = |omega: f64| open_loop(omega).norm_sqr().ln();
         let mut low = (at(0), gain(at(0)));
         let mut bracket = None;
-        for i in 1..POINTS {
+        for i in 1..POINT_COUNT {
             let high = (at(i), gain(at(i)));
             if low.1 >= 0.0 && high.1 < 0.0 {
                 bracket = Some((low, high));
@@ -166,7 +169,7 @@ impl Crossover {
             low = high;
         }
         let (low, high) = bracket?;
-        Some(Self::at(&open_loop, zero_between(gain, low, high)))
+        Some(Self::at(&open_loop, find_root(gain, low, high)))
     }
 
     /// Creates the crossover at a frequency where `|L| = 1`.
@@ -187,7 +190,7 @@ impl Crossover {
 
     /// Returns the changes of the crossover frequency in rad/s and of the phase margin in deg for a relative change
     /// `dL/L` of the open loop.
-    pub fn moved_by(&self, relative: Complex64) -> [f64; 2] {
+    pub fn shift_for(&self, relative: Complex64) -> [f64; 2] {
         let by_crossover = -relative.re / self.slope.re;
         [by_crossover, (relative.im + self.slope.im * by_crossover).to_degrees()]
     }
@@ -195,15 +198,16 @@ impl Crossover {
 
 /// Returns the phase margin in deg at a crossover, with the phase unwrapped from low frequencies. The margin is not
 /// limited to a range of 360 deg; a negative value means an unstable loop.
-pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s: f64) -> f64 {
-    let at = |i: usize| RANGE_RAD_S.0 * (crossover_rad_s / RANGE_RAD_S.0).powf(i as f64 / POINTS as f64);
-    let mut last = open_loop(RANGE_RAD_S.0.min(crossover_rad_s));
+pub fn unwrapped_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s: f64) -> f64 {
+    let at =
+        |i: usize| SEARCH_RANGE_RAD_S.0 * (crossover_rad_s / SEARCH_RANGE_RAD_S.0).powf(i as f64 / POINT_COUNT as f64);
+    let mut last = open_loop(SEARCH_RANGE_RAD_S.0.min(crossover_rad_s));
     // The phase of a double integrator starts at -180 deg, where its principal value may have either sign.
     let mut phase = last.arg();
     if phase > FRAC_PI_3 {
         phase -= TAU;
     }
-    for i in 1..=POINTS {
+    for i in 1..=POINT_COUNT {
         let next = open_loop(at(i));
         phase += (next / last).arg();
         last = next;
@@ -213,7 +217,7 @@ pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s
 
 /// Returns the root of a function that is positive at `low` and negative at `high`, to rounding accuracy. Regula falsi,
 /// with halving of the function value at a retained end (M. Dowell and P. Jarratt, *BIT* 11 (1971) 168-174).
-fn zero_between(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
+fn find_root(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
     let (mut last, mut was_positive) = (low.0, None);
     for _ in 0..80 {
         let chord = (high.0 * low.1 - low.0 * high.1) / (low.1 - high.1);
@@ -250,10 +254,10 @@ pub fn loop_measures(
 ) -> Option<LoopMeasures> {
     let open_loop =
         |omega: f64| operator.response(omega) * intersample.response(omega, sample_time) * element.response(omega);
-    let found = Crossover::lowest(open_loop, sample_time)?;
+    let found = Crossover::find_lowest(open_loop, sample_time)?;
     let response = operator.response_and_gradient(found.omega_rad_s);
     let moved: Vec<[f64; 2]> = (response.gradient.iter())
-        .map(|g| found.moved_by(g / response.value))
+        .map(|g| found.shift_for(g / response.value))
         .collect();
     let estimate = |value: f64, of: usize| match covariance {
         Some(c) => {
@@ -263,7 +267,7 @@ pub fn loop_measures(
         None => Estimate::fixed(value),
     };
     let both = [estimate(found.omega_rad_s, 0), estimate(found.margin_deg, 1)];
-    Some(LoopMeasures::of(both, found.moved_by(Complex64::ONE)))
+    Some(LoopMeasures::of(both, found.shift_for(Complex64::ONE)))
 }
 
 #[cfg(test)]
@@ -297,10 +301,10 @@ mod tests {
         for (gain, delay) in [(20.0, 0.2), (10.0, 0.6), (2.0, 0.1)] {
             let open_loop = |w: f64| Complex64::new(0.0, -gain / w) * Complex64::from_polar(1.0, -delay * w);
             let expected = 90.0 - (gain * delay).to_degrees();
-            assert!((followed_margin_deg(open_loop, gain) - expected).abs() < 1e-9);
+            assert!((unwrapped_margin_deg(open_loop, gain) - expected).abs() < 1e-9);
         }
         let double = |w: f64| Complex64::new(-4.0 / (w * w), 0.0);
-        assert!(followed_margin_deg(double, 2.0).abs() < 1e-9);
+        assert!(unwrapped_margin_deg(double, 2.0).abs() < 1e-9);
     }
 
     #[test]
@@ -334,15 +338,15 @@ mod tests {
         let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
         for scale in [0.02, 0.1, 0.5] {
             let of = FamilyOperator::new(Form::LeadLag, true, &[scale * X[0], X[1], X[2], X[3], X[4], X[5]]).unwrap();
-            let open_loop = |w: f64| of.response(w) * AUTO.response(w, SampleTime::HUNDREDTH) * element.response(w);
-            let found = Crossover::lowest(open_loop, SampleTime::HUNDREDTH).unwrap();
+            let open_loop = |w: f64| of.response(w) * AUTO.response(w, SampleTime::AT_100_HZ) * element.response(w);
+            let found = Crossover::find_lowest(open_loop, SampleTime::AT_100_HZ).unwrap();
             assert!(
                 (open_loop(found.omega_rad_s).norm() - 1.0).abs() < 1e-12,
                 "{scale}: {found:?}"
             );
         }
         // For a step the root is still between the ends.
-        let step = zero_between(|x| if x < 0.3 { 1.0 } else { -3.0 }, (0.0, 1.0), (1.0, -3.0));
+        let step = find_root(|x| if x < 0.3 { 1.0 } else { -3.0 }, (0.0, 1.0), (1.0, -3.0));
         assert!((step - 0.3).abs() < 1e-6, "{step}");
     }
 
@@ -351,7 +355,7 @@ mod tests {
         let small = FamilyOperator::new(Form::Gain, true, &[1e-6, 2.4, -1.0, 0.1]).unwrap();
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 1.0]).unwrap();
         assert_eq!(
-            loop_measures(&small, None, &element, (SampleTime::HUNDREDTH, AUTO)),
+            loop_measures(&small, None, &element, (SampleTime::AT_100_HZ, AUTO)),
             None
         );
     }

@@ -8,7 +8,7 @@ use hoid_model::{Detrend, Form, MAX_ORDER, Record, operator_family::Coordinate};
 use super::{channel::SeenChannel, intersample::Intersample, prior::OperatorPrior};
 use crate::{
     IdentError, InitialState, SearchOptions,
-    diagnostics::RUN_TO_RUN,
+    diagnostics::RUN_TO_RUN_DEVIATION,
     order_selection::{NamedOrders, range_text},
     settings::{BatchOption, BatchOptions, Bounds, Kind, Setting},
     shared_options as shared,
@@ -20,8 +20,8 @@ pub const HIGHEST_NOISE_ORDER: usize = MAX_ORDER;
 /// must span the time in which the operator responds, or it biases the operator ([`super::sensitivity`]).
 const NOISE_SPAN_S: f64 = 0.5;
 /// Highest order of the default search at low rates, and for few samples.
-const LEAST_HIGHEST_ND: usize = 24;
-/// Number of samples for each order above [`LEAST_HIGHEST_ND`] in the default search: Akaike's criterion takes too high
+const MIN_HIGHEST_ND: usize = 24;
+/// Number of samples for each order above [`MIN_HIGHEST_ND`] in the default search: Akaike's criterion takes too high
 /// an order if the number of coefficients is not small compared with the number of samples.
 const SAMPLES_PER_ORDER: usize = 40;
 /// Highest nd that is searched by default if nc is above zero: an ARMA model needs few coefficients.
@@ -54,7 +54,7 @@ pub struct FamilyEstimator {
     /// Coordinates that are individual to each record; all other coordinates are common to all records.
     pub individual: Vec<Coordinate>,
     /// Relative variation of a person's gain from run to run. For fewer than five records it is added to the error
-    /// bars, since blocks of these records cannot show it. Default [`RUN_TO_RUN`].
+    /// bars, since blocks of these records cannot show it. Default [`RUN_TO_RUN_DEVIATION`].
     pub run_to_run: f64,
     /// Trend that is removed from e and u of each record before the fit, because an operator with a lag integrates an
     /// offset. Default: the mean.
@@ -68,7 +68,7 @@ pub struct FamilyEstimator {
 impl Default for FamilyEstimator {
     fn default() -> Self {
         Self {
-            forms: Form::OF_ERROR.to_vec(),
+            forms: Form::ERROR_FORMS.to_vec(),
             neuromuscular: true,
             prior: OperatorPrior::population(),
             delay_range_s: (0.02, 0.8),
@@ -79,7 +79,7 @@ impl Default for FamilyEstimator {
             excitation: None,
             period_s: None,
             individual: Vec::new(),
-            run_to_run: RUN_TO_RUN,
+            run_to_run: RUN_TO_RUN_DEVIATION,
             detrend: Detrend::Mean,
             initial_state: InitialState::Estimate,
             search: SearchOptions {
@@ -99,7 +99,7 @@ impl FamilyEstimator {
             .map_or(0, |record| (NOISE_SPAN_S / record.sample_time().s()).round() as usize);
         let highest = of_span
             .min(samples / SAMPLES_PER_ORDER)
-            .clamp(LEAST_HIGHEST_ND, HIGHEST_NOISE_ORDER);
+            .clamp(MIN_HIGHEST_ND, HIGHEST_NOISE_ORDER);
         let nd = self.nd.clone().unwrap_or(0..=highest);
         Self {
             nd: Some(nd),
@@ -109,7 +109,7 @@ impl FamilyEstimator {
 
     /// Candidate orders nd; of an estimator without them, those of few samples.
     pub(super) fn nd(&self) -> RangeInclusive<usize> {
-        self.nd.clone().unwrap_or(0..=LEAST_HIGHEST_ND)
+        self.nd.clone().unwrap_or(0..=MIN_HIGHEST_ND)
     }
 
     /// Sets the orders nc and nd of the noise model. If nc is not given it is zero. If nd is not given it is searched
@@ -144,22 +144,24 @@ impl BatchOptions for FamilyEstimator {
     fn options() -> Vec<BatchOption<Self>> {
         let default = Self::default();
         let mut all = vec![
-            shared::noise(|how: &mut Self, _, text| {
+            shared::noise_option(|how: &mut Self, _, text| {
                 if text == "arma" {
                     let orders = NamedOrders::from([("nc".to_owned(), 1..=2)]);
                     *how = how.clone().with_noise_orders(&orders)?;
                 }
                 Ok(())
             }),
-            shared::change(),
-            shared::form(|how: &mut Self, form| how.forms = form.map_or(Form::OF_ERROR.to_vec(), |form| vec![form]))
-                .printed("form", |how, _| Some(how.forms_as_text())),
-            shared::neuromuscular(|how: &mut Self| &mut how.neuromuscular)
-                .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
-            shared::prior("population", |how: &mut Self| &mut how.prior)
-                .printed("prior", |how, _| Some(how.prior.to_string())),
+            shared::change_option(),
+            shared::form_option(|how: &mut Self, form| {
+                how.forms = form.map_or(Form::ERROR_FORMS.to_vec(), |form| vec![form])
+            })
+            .with_formatter("form", |how, _| Some(how.forms_as_text())),
+            shared::neuromuscular_option(|how: &mut Self| &mut how.neuromuscular)
+                .with_formatter("neuromuscular", |how, _| Some(shared::yes_no_text(how.neuromuscular))),
+            shared::prior_option("population", |how: &mut Self| &mut how.prior)
+                .with_formatter("prior", |how, _| Some(how.prior.to_string())),
             BatchOption::new(
-                shared::orders("nc=0, nd up to 0.5 s (noise model)"),
+                shared::orders_setting("nc=0, nd up to 0.5 s (noise model)"),
                 |how: &mut Self, option, text| {
                     let mut named: NamedOrders = option.read(text)?;
                     if *how.nc.end() > 0 {
@@ -169,34 +171,39 @@ impl BatchOptions for FamilyEstimator {
                     Ok(())
                 },
             )
-            .printed("noise orders", |how, _| {
-                let nc = shared::range_words(&how.nc);
+            .with_formatter("noise orders", |how, _| {
+                let nc = shared::order_range_text(&how.nc);
                 let nd = match &how.nd {
-                    Some(nd) => format!("nd={}", shared::range_words(nd)),
+                    Some(nd) => format!("nd={}", shared::order_range_text(nd)),
                     None => format!("nd up to {NOISE_SPAN_S} s"),
                 };
                 Some(format!("nc={nc}, {nd}, by AIC"))
             }),
-            shared::delay_range(
+            shared::delay_range_option(
                 default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
                 |how| how.delay_range_s,
             ),
-            BatchOption::new(intersample(), |how: &mut Self, option, text| {
-                how.intersample = option.word(text)?;
+            BatchOption::new(intersample_setting(), |how: &mut Self, option, text| {
+                how.intersample = option.parse_choice(text)?;
                 Ok(())
             })
-            .printed("e between samples", |how, _| Some(how.intersample.name().to_owned())),
-            BatchOption::new(run_to_run(default.run_to_run), |how: &mut Self, option, text| {
-                how.run_to_run = option.read(text)?;
-                Ok(())
-            })
-            .printed("variation from run to run", |how, _| Some(how.run_to_run.to_string())),
-            BatchOption::new(role(), |how: &mut Self, option, text| {
+            .with_formatter("e between samples", |how, _| Some(how.intersample.name().to_owned())),
+            BatchOption::new(
+                run_to_run_setting(default.run_to_run),
+                |how: &mut Self, option, text| {
+                    how.run_to_run = option.read(text)?;
+                    Ok(())
+                },
+            )
+            .with_formatter("variation from run to run", |how, _| Some(how.run_to_run.to_string())),
+            BatchOption::new(role_setting(), |how: &mut Self, option, text| {
                 let typed: Vec<String> = option.read(text)?;
                 let mut channels: Vec<SeenChannel> = Vec::with_capacity(typed.len());
                 for part in &typed {
-                    let channel = part.parse::<SeenChannel>().map_err(|why| option.refused(part, &why))?;
+                    let channel = part
+                        .parse::<SeenChannel>()
+                        .map_err(|why| option.invalid_value(part, &why))?;
                     if channels.iter().any(|known| known.name == channel.name) {
                         return Err(option.error(format!("names {} twice", channel.name)));
                     }
@@ -205,28 +212,28 @@ impl BatchOptions for FamilyEstimator {
                 how.channels = channels;
                 Ok(())
             })
-            .printed("further inputs", |how, _| {
+            .with_formatter("further inputs", |how, _| {
                 let words: Vec<String> = how.channels.iter().map(SeenChannel::to_string).collect();
                 (!words.is_empty()).then(|| words.join(", "))
             }),
-            shared::individual(|how: &mut Self, option, names| {
+            shared::individual_parameters_option(|how: &mut Self, option, names| {
                 let coordinate = |name: &String| {
                     let expected = "K, T_L, T_I, omega_nm, zeta_nm or tau_e";
-                    Coordinate::of_parameter(name).ok_or_else(|| option.refused(name, expected))
+                    Coordinate::from_parameter(name).ok_or_else(|| option.invalid_value(name, expected))
                 };
                 how.individual = names.iter().map(coordinate).collect::<Result<_, _>>()?;
                 Ok(())
             })
-            .printed("individual", |how, _| {
+            .with_formatter("individual", |how, _| {
                 let names: Vec<&str> = how.individual.iter().map(|c| c.parameter()).collect();
                 (!names.is_empty()).then(|| names.join(", "))
             }),
-            shared::initial_state(|how: &mut Self, _, rule| {
+            shared::initial_state_option(|how: &mut Self, _, rule| {
                 how.initial_state = rule.unwrap_or_default();
                 Ok(())
             }),
         ];
-        all.extend(shared::search(default.search, |how: &mut Self| &mut how.search));
+        all.extend(shared::search_options(default.search, |how: &mut Self| &mut how.search));
         all
     }
 }
@@ -241,21 +248,21 @@ impl FamilyEstimator {
     }
 }
 
-fn intersample() -> Setting {
+fn intersample_setting() -> Setting {
     let help = "Behaviour of e between samples: held (zoh), linear (foh: e was logged from a faster or continuous \
                 signal; tau_e is half a sample longer), or (auto) zoh or foh if noise-free data show it, else smooth \
                 with the delay for a held e";
     Setting::new("intersample", Kind::Choice(&Intersample::NAMES), help).default("auto")
 }
 
-fn role() -> Setting {
+fn role_setting() -> Setting {
     let help = "Role of each input other than the error: r=feedforward (displayed target; r=feedforward:0.5 with 0.5 s \
                 of preview), motion, output; /FORM restricts the response to one form, such as \
                 r=feedforward/derivative";
     Setting::new("role", Kind::Names, help)
 }
 
-fn run_to_run(default: f64) -> Setting {
+fn run_to_run_setting(default: f64) -> Setting {
     let help = "Relative run-to-run variation of a person's gain; added to the error bars if there are fewer than five \
                 records";
     Setting::new("run_to_run", Kind::Number, help)

@@ -15,13 +15,13 @@ use hoid_model::{
     uncertainty::Estimate,
 };
 
-use super::mixture::{Component, Mixture, widened};
+use super::mixture::{Component, Mixture, widen_interval};
 
 /// Total weight of the forms with a parameter up to which the parameter counts as undetermined.
 const MIN_WEIGHT: f64 = 0.5;
 /// Name of the gain (at zero frequency in forms with a lag, in the band in other forms), and the total weight of the
 /// forms with the same meaning up to which it counts as undetermined.
-pub(super) const DC_GAIN: &str = "K";
+pub(super) const DC_GAIN_NAME: &str = "K";
 const MIN_WEIGHT_OF_DC_GAIN: f64 = 0.95;
 /// Largest ratio of the posterior to the prior variance of a determined parameter.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
@@ -30,7 +30,7 @@ const LARGEST_LOG_ERROR: f64 = 0.35;
 
 /// Returns the total weight of the forms with a parameter up to which the parameter counts as undetermined.
 pub(super) fn min_weight(name: &str) -> f64 {
-    if name == DC_GAIN {
+    if name == DC_GAIN_NAME {
         MIN_WEIGHT_OF_DC_GAIN
     } else {
         MIN_WEIGHT
@@ -65,7 +65,7 @@ impl Parameter {
     /// Returns the parameter with the standard error and interval for the person instead of for these runs.
     #[must_use]
     pub fn as_of_person(&self) -> Self {
-        let (estimate, interval) = widened(self.estimate(), self.interval, self.standard_error_person);
+        let (estimate, interval) = widen_interval(self.estimate(), self.interval, self.standard_error_person);
         Self {
             standard_error: estimate.standard_error,
             interval,
@@ -83,7 +83,7 @@ impl Parameter {
 
     /// Returns the weighted mean of a parameter over the forms. `each` contains form, weight and parameter, the best form
     /// first.
-    pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
+    pub(super) fn average(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
         // A parameter at a bound has no error and is omitted from the mean, but not from the interval.
         let all = each;
@@ -182,16 +182,16 @@ impl CoordinateEstimate<'_> {
                 ..made
             }
         };
-        self.operator.named().iter().map(made).collect()
+        self.operator.named_parameters().iter().map(made).collect()
     }
 
-    fn place(&self, wanted: Coordinate) -> Option<usize> {
+    fn coordinate_index(&self, wanted: Coordinate) -> Option<usize> {
         let all = self.operator.form().coordinates(self.operator.has_neuromuscular());
         all.iter().position(|c| *c == wanted)
     }
 
     /// Returns the standard error of a coordinate; `None` at a bound.
-    fn error(&self, i: usize) -> Option<f64> {
+    fn standard_error(&self, i: usize) -> Option<f64> {
         let x = self.operator.coordinates();
         let (low, high) = self.limits[i];
         let c = self.covariance?;
@@ -205,7 +205,7 @@ impl CoordinateEstimate<'_> {
         if let Some(profile) = self.profile[i] {
             return Some(profile);
         }
-        let s = self.error(i)?;
+        let s = self.standard_error(i)?;
         let (low, high) = self.limits[i];
         Some(((x - self.quantile * s).max(low), (x + self.quantile * s).min(high)))
     }
@@ -215,7 +215,7 @@ impl CoordinateEstimate<'_> {
         if self.prior_share[i] > LARGEST_PRIOR_SHARE {
             return false;
         }
-        let (Some(s), Some((low, high))) = (self.error(i), self.interval(i)) else {
+        let (Some(s), Some((low, high))) = (self.standard_error(i), self.interval(i)) else {
             return false;
         };
         match coordinate {
@@ -240,12 +240,12 @@ impl CoordinateEstimate<'_> {
             averaged_over: Vec::new(),
         };
         let Some(coordinate) = named.coordinate else {
-            return self.product(made);
+            return self.with_product_errors(made);
         };
-        let Some(i) = self.place(coordinate) else {
+        let Some(i) = self.coordinate_index(coordinate) else {
             return made;
         };
-        let s = self.error(i);
+        let s = self.standard_error(i);
         made.prior_share = self.prior_share[i];
         made.determined = self.is_determined(i);
         let interval = self.interval(i);
@@ -277,18 +277,21 @@ impl CoordinateEstimate<'_> {
     }
 
     /// Adds the errors of a parameter that is a product of two others: K = (K/T_I) T_I, or K_e_dot = K_e T_L.
-    fn product(&self, mut made: Parameter) -> Parameter {
+    fn with_product_errors(&self, mut made: Parameter) -> Parameter {
         let x = self.operator.coordinates();
         let p = x.len();
-        let (Some(c), Some(gain)) = (self.covariance, self.place(Coordinate::Gain)) else {
+        let (Some(c), Some(gain)) = (self.covariance, self.coordinate_index(Coordinate::Gain)) else {
             return made;
         };
-        let (other, sign) = match (self.place(Coordinate::LagRate), self.place(Coordinate::Lead)) {
+        let (other, sign) = match (
+            self.coordinate_index(Coordinate::LagRate),
+            self.coordinate_index(Coordinate::Lead),
+        ) {
             (Some(rate), _) => (rate, -1.0),
             (None, Some(lead)) => (lead, 1.0),
             (None, None) => return made,
         };
-        if self.error(gain).is_none() || self.error(other).is_none() {
+        if self.standard_error(gain).is_none() || self.standard_error(other).is_none() {
             if sign < 0.0 && x[other] <= self.limits[other].0 {
                 made.value = f64::INFINITY.copysign(x[gain]);
             }
@@ -359,7 +362,7 @@ mod tests {
     use super::*;
     use hoid_model::Form;
 
-    fn known(rate: f64, error: f64) -> Vec<Parameter> {
+    fn parameters_with_lag(rate: f64, error: f64) -> Vec<Parameter> {
         let operator = FamilyOperator::new(Form::LeadLag, true, &[5.0, 0.6, rate, 2.4, -1.2, 0.15]).unwrap();
         let mut covariance = vec![0.0; 36];
         for (i, s) in [0.2, 0.03, error, 0.1, 0.45, 0.01].iter().enumerate() {
@@ -390,7 +393,7 @@ mod tests {
 
     #[test]
     fn determined_lag_has_a_finite_interval() {
-        let all = known(0.2, 0.02);
+        let all = parameters_with_lag(0.2, 0.02);
         let t_i = of(&all, "T_I");
         assert_eq!((t_i.value, t_i.determined), (5.0, true));
         let (low, high) = t_i.interval.unwrap();
@@ -407,7 +410,7 @@ mod tests {
 
     #[test]
     fn gain_error_for_the_person_includes_run_to_run_variation() {
-        let all = known(0.2, 0.02);
+        let all = parameters_with_lag(0.2, 0.02);
         let (gain, tau) = (of(&all, "K_over_T_I"), of(&all, "tau_e"));
         assert!((gain.standard_error_person.unwrap() - 0.2_f64.hypot(0.25)).abs() < 1e-12);
         assert_eq!(tau.standard_error_person, tau.standard_error);
@@ -421,13 +424,13 @@ mod tests {
 
     #[test]
     fn parameter_is_averaged_over_the_forms_that_have_it() {
-        let near = known(0.2, 0.02);
+        let near = parameters_with_lag(0.2, 0.02);
         let mut far = of(&near, "tau_e").clone();
         far.value += 0.04;
         far.interval = far.interval.map(|(low, high)| (low + 0.04, high + 0.04));
         let tau = of(&near, "tau_e");
         let averaged = |weights: [f64; 2]| {
-            Parameter::averaged(
+            Parameter::average(
                 &[(Form::LeadLag, weights[0], tau), (Form::Lead2, weights[1], &far)],
                 1000,
             )
@@ -440,14 +443,14 @@ mod tests {
         assert_eq!(both.averaged_over, [Form::LeadLag, Form::Lead2]);
         // The forms without this parameter are more likely.
         assert!(!averaged([0.2, 0.2]).determined);
-        assert_eq!(Parameter::averaged(&[(Form::LeadLag, 1.0, tau)], 8).as_ref(), Some(tau));
-        assert_eq!(Parameter::averaged(&[], 8), None);
+        assert_eq!(Parameter::average(&[(Form::LeadLag, 1.0, tau)], 8).as_ref(), Some(tau));
+        assert_eq!(Parameter::average(&[], 8), None);
     }
 
     /// T_I of a pure integration has no error. It is not part of the mean, but the interval has no upper limit.
     #[test]
     fn interval_includes_a_weighted_form_at_a_bound() {
-        let known = known(0.2, 0.02);
+        let known = parameters_with_lag(0.2, 0.02);
         let lag = of(&known, "T_I");
         let infinite = Parameter {
             value: f64::INFINITY,
@@ -459,7 +462,7 @@ mod tests {
         };
         let averaged = |weight: f64| {
             let forms = [(Form::LeadLag, 1.0 - weight, lag), (Form::Lead2Lag, weight, &infinite)];
-            Parameter::averaged(&forms, 1000).unwrap()
+            Parameter::average(&forms, 1000).unwrap()
         };
         let found = averaged(0.3);
         assert_eq!((found.value, found.standard_error), (lag.value, lag.standard_error));
@@ -470,7 +473,7 @@ mod tests {
 
     #[test]
     fn undetermined_lag_has_no_upper_limit() {
-        let all = known(0.02, 0.03);
+        let all = parameters_with_lag(0.02, 0.03);
         for name in ["T_I", "K"] {
             let open = of(&all, name);
             assert!(!open.determined && open.interval.unwrap().1.is_infinite(), "{name}");
@@ -480,7 +483,7 @@ mod tests {
         // The prior determines the damping ratio, the data determine the frequency.
         assert!(!of(&all, "zeta_nm").determined && of(&all, "omega_nm").determined);
         // At the bound: a pure integration.
-        let at_bound = known(1e-3, 0.02);
+        let at_bound = parameters_with_lag(1e-3, 0.02);
         assert!(of(&at_bound, "T_I").value.is_infinite() && of(&at_bound, "K").value.is_infinite());
     }
 }

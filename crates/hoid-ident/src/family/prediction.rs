@@ -37,17 +37,17 @@ use crate::{
 /// Residual power relative to the power of u below which the residual is not noise but rounding errors of the file.
 pub(super) const ROUNDING_POWER: f64 = 1e-8;
 /// Relative residual power below which forms count as equal, because chance determines where a noise-free search ends.
-pub(super) const EQUAL_POWER: f64 = 1e-18;
+pub(super) const EQUAL_RESIDUAL_POWER: f64 = 1e-18;
 /// Maximum number of rounds in which the weight kappa sigma^2 of the prior is updated.
-const ROUNDS: usize = 3;
+const MAX_ROUNDS: usize = 3;
 /// Number of steps after which a search from a further start ends if its objective is above the known one.
-const FIRST_STEPS: usize = 30;
+const TRIAL_STEPS: usize = 30;
 /// Relative change of the weight of the prior below which no further round is needed.
-const CONVERGED: f64 = 0.05;
+const WEIGHT_TOLERANCE: f64 = 0.05;
 
 /// The records, and the settings common to all forms.
 #[derive(Debug, Clone)]
-pub(super) struct Prediction<'a> {
+pub(super) struct PredictionProblem<'a> {
     pub data: Vec<Data<'a>>,
     /// Further inputs.
     pub channels: Vec<Channel<'a>>,
@@ -72,7 +72,7 @@ pub(super) struct Prediction<'a> {
 /// Orders (nc, nd) of the noise model.
 pub(super) type NoiseOrders = (usize, usize);
 
-impl<'a> Prediction<'a> {
+impl<'a> PredictionProblem<'a> {
     /// Returns the first sample whose residual can be computed for all these forms and orders.
     pub fn first_residual(
         forms: &[(Form, bool)],
@@ -102,7 +102,7 @@ impl<'a> Prediction<'a> {
         let records = self.data.len();
         let sampling = (self.sample_time, self.intersample);
         FamilyLayout::new(form, noise, records, &self.individual, &limits, sampling)
-            .with_channels(&self.channels.iter().map(Channel::in_layout).collect::<Vec<_>>())
+            .with_channels(&self.channels.iter().map(Channel::layout_entry).collect::<Vec<_>>())
     }
 
     pub fn criterion(&self, form: (Form, bool), noise: NoiseOrders) -> PhysicalCriterion<'a, FamilyLayout> {
@@ -114,19 +114,19 @@ impl<'a> Prediction<'a> {
 
     /// Returns the part of u in each record that an operator does not explain: `v = u - Y e`, with the initial states
     /// of Y estimated.
-    pub fn unexplained(
+    pub fn unexplained_output(
         &self,
         form: (Form, bool),
         coordinates: &[f64],
         workspace: &mut Workspace,
     ) -> Result<Vec<Vec<f64>>, IdentError> {
         let criterion = self.criterion(form, (0, 0));
-        let eta = criterion.layout.spread(coordinates, &[]);
+        let eta = criterion.layout.common_eta(coordinates, &[]);
         (0..self.data.len())
             .map(|record| {
                 let mapped = criterion.model_of(&eta, record)?;
                 Ok(criterion
-                    .of_record(&mapped, record)
+                    .record_criterion(&mapped, record)
                     .residuals_of(&mapped.theta, 0, workspace))
             })
             .collect()
@@ -148,12 +148,12 @@ impl<'a> Prediction<'a> {
         found.ok_or(IdentError::NoFiniteLoss)
     }
 
-    /// Like [`Prediction::fit`], but returns `None` if the objective remains above `known`, the objective of a fit of the
-    /// same form from another start. The first steps decide: later rounds give the prior more weight, which increases
-    /// the objective.
+    /// Like [`PredictionProblem::fit`], but returns `None` if the objective remains above `known`, the objective of a fit
+    /// of the same form from another start. The first steps decide: later rounds give the prior more weight, which
+    /// increases the objective.
     ///
     /// # Errors
-    /// Same as [`Prediction::fit`].
+    /// Same as [`PredictionProblem::fit`].
     pub fn fit_below(
         &self,
         known: f64,
@@ -162,30 +162,30 @@ impl<'a> Prediction<'a> {
         start: &[f64],
         workspace: &mut Workspace,
     ) -> Result<Option<PredictionFit<'a>>, IdentError> {
-        let series = self.unexplained(form, start, workspace)?;
+        let series = self.unexplained_output(form, start, workspace)?;
         let products = NoiseProducts::new(&series, noise.1);
         let start_of_noise = match products.fit_up_to(noise.1) {
             Some(found) => found,
             // Only rounding errors remain: no noise model is needed.
-            None if self.noise_free().is_some() => Autoregression {
+            None if self.noise_free_share().is_some() => Autoregression {
                 d: vec![0.0; noise.1],
-                loss: self.rounding(),
+                loss: self.rounding_floor(),
             },
             None => return Err(IdentError::NoFiniteLoss),
         };
         let mut criterion = self.criterion(form, noise);
         let coefficients = [vec![0.0; noise.0], start_of_noise.d].concat();
-        let mut eta = criterion.layout.spread(start, &coefficients);
+        let mut eta = criterion.layout.common_eta(start, &coefficients);
         let unit = self.penalties(&criterion.layout);
         // The weight kappa sigma^2 of the prior is known only after a fit; a few rounds make the fit and the weight
         // consistent.
         let mut weight = start_of_noise.loss;
         let mut found = None;
-        for round in 0..ROUNDS {
+        for round in 0..MAX_ROUNDS {
             criterion.penalty = unit.iter().map(|p| p.weighted(weight)).collect();
             if round == 0 && known.is_finite() {
                 let first_steps = SearchOptions {
-                    max_iterations: FIRST_STEPS.min(self.search.max_iterations),
+                    max_iterations: TRIAL_STEPS.min(self.search.max_iterations),
                     ..self.search
                 };
                 let reached = criterion
@@ -200,14 +200,14 @@ impl<'a> Prediction<'a> {
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
             // Without a residual no step can decrease the loss.
-            if minimum.at.sum_of_squares < self.equal() {
+            if minimum.at.sum_of_squares < self.equality_threshold() {
                 minimum.termination.reason = Reason::ExactFit;
             }
             let fit = self.fit_at_minimum(criterion.clone(), minimum, workspace)?;
             let next = fit.innovation_variance * fit.inflation;
             eta = fit.minimum.theta.clone();
             found = Some(fit);
-            if unit.is_empty() || (next / weight - 1.0).abs() < CONVERGED || round + 1 == ROUNDS {
+            if unit.is_empty() || (next / weight - 1.0).abs() < WEIGHT_TOLERANCE || round + 1 == MAX_ROUNDS {
                 break;
             }
             weight = next;
@@ -256,7 +256,7 @@ impl<'a> Prediction<'a> {
     }
 
     /// Returns the number of samples that count.
-    pub fn samples(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
@@ -267,18 +267,19 @@ impl<'a> Prediction<'a> {
     }
 
     /// Returns the residual power relative to the power of u if the residual is not noise; `None` if there is noise.
-    pub fn noise_free(&self) -> Option<f64> {
+    pub fn noise_free_share(&self) -> Option<f64> {
         self.little_noise.filter(|share| *share < ROUNDING_POWER)
     }
 
     /// Returns the sum of squares below which forms count as equal; zero if there is noise.
-    pub fn equal(&self) -> f64 {
-        self.noise_free().map_or(0.0, |_| EQUAL_POWER * self.power())
+    pub fn equality_threshold(&self) -> f64 {
+        self.noise_free_share()
+            .map_or(0.0, |_| EQUAL_RESIDUAL_POWER * self.power())
     }
 
     /// Returns a mean square far below rounding errors, used in place of zero, whose logarithm does not exist.
-    fn rounding(&self) -> f64 {
-        f64::EPSILON.powi(2) * self.power() / self.samples().max(1) as f64
+    fn rounding_floor(&self) -> f64 {
+        f64::EPSILON.powi(2) * self.power() / self.sample_count().max(1) as f64
     }
 
     /// Returns the fit at a minimum: loss, innovation variance, clusters and their inflation.
@@ -288,13 +289,13 @@ impl<'a> Prediction<'a> {
         minimum: Minimum,
         workspace: &mut Workspace,
     ) -> Result<PredictionFit<'a>, IdentError> {
-        let (n, states) = (criterion.residuals(), criterion.states());
+        let (n, states) = (criterion.residual_count(), criterion.state_count());
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
-        let additional = criterion.additional_at(&minimum.theta, workspace).sum_of_squares;
+        let additional = criterion.linearise_additional(&minimum.theta, workspace).sum_of_squares;
         // The noise variance is computed from the residuals alone, without the prior and the lines.
         let mut squares = minimum.at.sum_of_squares - penalty - additional;
-        if self.noise_free().is_some() {
-            squares = squares.max(self.rounding() * n as f64);
+        if self.noise_free_share().is_some() {
+            squares = squares.max(self.rounding_floor() * n as f64);
         }
         let p = minimum.theta.len();
         let freedom = n

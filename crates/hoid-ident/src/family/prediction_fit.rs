@@ -50,20 +50,20 @@ impl PredictionFit<'_> {
         let mapped = self.criterion.model_of(self.eta(), record).ok()?;
         Some(
             self.criterion
-                .of_record(&mapped, record)
+                .record_criterion(&mapped, record)
                 .residuals_of(&mapped.theta, 0, workspace),
         )
     }
 
     /// Returns the number of elements of eta.
-    pub fn parameters(&self) -> usize {
+    pub fn parameter_count(&self) -> usize {
         self.minimum.theta.len()
     }
 
     /// Solves `(G + P - less) x = rhs` for the elements in `free`; all other elements of x are zero. `None` if the
     /// matrix is singular.
     pub fn solve(&self, free: &[usize], less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
-        let p = self.parameters();
+        let p = self.parameter_count();
         let gram = |i: usize, j: usize| {
             let own = self.minimum.at.gram[i * p + j];
             let held = if i == j { self.ridge * own } else { 0.0 };
@@ -82,7 +82,7 @@ impl PredictionFit<'_> {
     }
 
     /// Returns the indices in eta of the elements that are not at a bound.
-    pub fn free(&self) -> Vec<usize> {
+    pub fn free_elements(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         let eta = self.eta();
         (0..eta.len())
@@ -92,7 +92,7 @@ impl PredictionFit<'_> {
 
     /// Returns the indices in eta of the elements that are not fixed, including those at a bound. Their uncertainty
     /// contributes to the uncertainty of other elements, since the true value need not be at the bound.
-    pub fn not_fixed(&self) -> Vec<usize> {
+    pub fn unfixed_elements(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         (0..limits.len()).filter(|&i| limits[i].0 < limits[i].1).collect()
     }

@@ -58,7 +58,7 @@ fn coordinate_of(parameter: &str) -> Option<Coordinate> {
 }
 
 /// Source of the population prior.
-const NEUROMUSCULAR: &str = "published pilot data: D. T. McRuer et al., IEEE Trans. Man-Machine Systems 9 (1968) \
+const POPULATION_PRIOR_SOURCE: &str = "published pilot data: D. T. McRuer et al., IEEE Trans. Man-Machine Systems 9 (1968) \
                              61-71; P. M. T. Zaal et al., J. Guidance, Control, and Dynamics 32 (2009) 1089-1099";
 
 impl OperatorPrior {
@@ -74,7 +74,7 @@ impl OperatorPrior {
             parameter: parameter.to_owned(),
             centre,
             spread,
-            source: NEUROMUSCULAR.to_owned(),
+            source: POPULATION_PRIOR_SOURCE.to_owned(),
         };
         Self {
             entries: vec![
@@ -128,7 +128,7 @@ impl OperatorPrior {
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for a parameter that occurs twice.
-    pub fn of_parameters<'p>(
+    pub fn from_parameters<'p>(
         found: impl IntoIterator<Item = (&'p str, Estimate, bool)>,
         source: &str,
     ) -> Result<Self, IdentError> {
@@ -272,12 +272,12 @@ mod tests {
             ("zeta_nm", estimate(-0.1, Some(0.1)), true),
             ("tau_e", estimate(0.2, Some(1e-6)), true),
         ];
-        let prior = OperatorPrior::of_parameters(found, "a fit").unwrap();
+        let prior = OperatorPrior::from_parameters(found, "a fit").unwrap();
         assert_eq!(prior.to_string(), "T_L=0.5:0.1,tau_e=0.2:0.001");
         assert!(prior.entries().iter().all(|e| e.source == "a fit"));
-        let none = OperatorPrior::of_parameters(found[2..5].to_vec(), "a fit").unwrap();
+        let none = OperatorPrior::from_parameters(found[2..5].to_vec(), "a fit").unwrap();
         assert_eq!(none, OperatorPrior::none());
-        assert!(OperatorPrior::of_parameters([found[1], found[1]], "a fit").is_err());
+        assert!(OperatorPrior::from_parameters([found[1], found[1]], "a fit").is_err());
     }
 
     #[test]
@@ -295,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn removing_the_pull_of_a_prior_gives_the_fit_without_it() {
+    fn removing_the_prior_pull_gives_the_fit_without_prior() {
         // By hand: the data at ln 8 with three quarters of the information, the prior at ln 10.5.
         let (data, prior, share): (f64, f64, f64) = (8.0, 10.5, 0.25);
         let both = ((1.0 - share) * data.ln() + share * prior.ln()).exp();

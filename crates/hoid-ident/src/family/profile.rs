@@ -10,11 +10,11 @@ use super::prediction_fit::PredictionFit;
 use crate::{SearchOptions, criterion::Workspace};
 
 /// Number of bisection steps for each end of an interval.
-const HALVINGS: usize = 7;
+const BISECTION_STEPS: usize = 7;
 /// Maximum number of doublings of the step towards an end.
-const DOUBLINGS: usize = 8;
+const MAX_DOUBLINGS: usize = 8;
 /// Maximum number of steps and tolerance of the searches, which need only the accuracy of an interval.
-const SEARCH: (usize, f64) = (15, 1e-7);
+const SEARCH_LIMITS: (usize, f64) = (15, 1e-7);
 
 /// Returns the 95 % interval of one element of eta by profile likelihood, limited to the search range; `None` if a
 /// search fails.
@@ -29,8 +29,8 @@ pub(super) fn profile_interval(
     let level = fit.inflation * fit.innovation_variance * quantile * quantile;
     let least = fit.minimum.at.sum_of_squares;
     let search = SearchOptions {
-        max_iterations: SEARCH.0,
-        tolerance: SEARCH.1,
+        max_iterations: SEARCH_LIMITS.0,
+        tolerance: SEARCH_LIMITS.1,
         ..SearchOptions::default()
     };
     let x = fit.eta()[place];
@@ -50,7 +50,7 @@ pub(super) fn profile_interval(
         };
         let (mut inside, mut reach) = (x, step);
         let mut outside = None;
-        for _ in 0..DOUBLINGS {
+        for _ in 0..MAX_DOUBLINGS {
             let at = (x + direction * reach).clamp(low, high);
             if above(at)? {
                 outside = Some(at);
@@ -65,7 +65,7 @@ pub(super) fn profile_interval(
         let Some(mut outside) = outside else {
             return Some(bound);
         };
-        for _ in 0..HALVINGS {
+        for _ in 0..BISECTION_STEPS {
             let middle = 0.5 * (inside + outside);
             if above(middle)? {
                 outside = middle;

@@ -17,7 +17,7 @@ use hoid_model::{
 };
 
 use super::{
-    coordinates::{self, Grid},
+    coordinates::{self, GridDensity},
     intersample::Intersample,
     prior::OperatorPrior,
 };
@@ -30,9 +30,9 @@ use crate::{
 };
 
 /// Number of searches for a response that is known exactly, whose criterion has more minima with small values.
-const SEARCHES_OF_EXACT: usize = 30;
+const EXACT_RESPONSE_SEARCH_COUNT: usize = 30;
 /// Relative difference of chi^2 up to which two searches have ended in the same minimum.
-const SAME_MINIMUM: f64 = 1e-4;
+const SAME_MINIMUM_TOLERANCE: f64 = 1e-4;
 
 /// A measured response at one frequency, with its variance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,22 +107,22 @@ impl<'p> ResponseCriterion<'p> {
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
     pub fn fit(&self, search: &SearchOptions) -> Result<ResponseMinimum, IdentError> {
-        let found = self.minima(search, Grid::Default);
+        let found = self.minima(search, GridDensity::Default);
         found.into_iter().next().ok_or(IdentError::NoFiniteLoss)
     }
 
     /// Returns the different minima in which searches from the points of a grid end, best first; empty if all searches
     /// fail. chi^2 has local minima in delay and poles, so the search runs from the best point of each delay, with its
     /// best gain.
-    pub fn minima(&self, search: &SearchOptions, grid: Grid) -> Vec<ResponseMinimum> {
+    pub fn minima(&self, search: &SearchOptions, grid: GridDensity) -> Vec<ResponseMinimum> {
         let mut starts: Vec<(f64, Vec<f64>)> =
             coordinates::start_grid(self.form, self.neuromuscular, &self.limits, grid)
                 .into_iter()
-                .filter_map(|mut start| Some((self.best_gain(&mut start)?, start)))
+                .filter_map(|mut start| Some((self.optimise_gain(&mut start)?, start)))
                 .collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         match grid {
-            Grid::Default => {
+            GridDensity::Default => {
                 let mut delays = Vec::new();
                 starts.retain(|(_, start)| {
                     let delay = start.last().copied();
@@ -131,14 +131,15 @@ impl<'p> ResponseCriterion<'p> {
                     is_first
                 });
             }
-            Grid::Dense => starts.truncate(SEARCHES_OF_EXACT),
+            GridDensity::Dense => starts.truncate(EXACT_RESPONSE_SEARCH_COUNT),
         }
         let mut found: Vec<Minimum> = starts
             .into_iter()
             .filter_map(|(_, start)| minimise(self, start, search, None, &mut Workspace::default()))
             .collect();
         found.sort_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
-        found.dedup_by(|a, b| a.at.sum_of_squares - b.at.sum_of_squares <= SAME_MINIMUM * b.at.sum_of_squares);
+        found
+            .dedup_by(|a, b| a.at.sum_of_squares - b.at.sum_of_squares <= SAME_MINIMUM_TOLERANCE * b.at.sum_of_squares);
         found.into_iter().map(|minimum| self.result(minimum)).collect()
     }
 
@@ -151,7 +152,7 @@ impl<'p> ResponseCriterion<'p> {
     /// information matrix is singular.
     pub fn covariance(&self, minimum: &ResponseMinimum) -> Option<Vec<f64>> {
         let p = minimum.coordinates.len();
-        let free = self.inner(&minimum.coordinates);
+        let free = self.free_coordinates(&minimum.coordinates);
         let part: Vec<f64> = free
             .iter()
             .flat_map(|&i| free.iter().map(move |&j| (i, j)))
@@ -171,7 +172,7 @@ impl<'p> ResponseCriterion<'p> {
     /// without a covariance.
     pub fn prior_shares(&self, minimum: &ResponseMinimum) -> Vec<f64> {
         let x = &minimum.coordinates;
-        let (p, inner, covariance) = (x.len(), self.inner(x), self.covariance(minimum));
+        let (p, inner, covariance) = (x.len(), self.free_coordinates(x), self.covariance(minimum));
         let mut shares = vec![0.0; p];
         for penalty in &self.penalty {
             let i = penalty.place;
@@ -184,14 +185,14 @@ impl<'p> ResponseCriterion<'p> {
     }
 
     /// Returns the indices of the coordinates that are not at a bound.
-    fn inner(&self, x: &[f64]) -> Vec<usize> {
+    fn free_coordinates(&self, x: &[f64]) -> Vec<usize> {
         (0..x.len())
             .filter(|&i| self.limits[i].0 < x[i] && x[i] < self.limits[i].1)
             .collect()
     }
 
     /// Returns the sampled response of an operator.
-    pub fn sampled(&self, operator: &FamilyOperator, omega_rad_s: f64) -> Complex64 {
+    pub fn sampled_response(&self, operator: &FamilyOperator, omega_rad_s: f64) -> Complex64 {
         operator.response(omega_rad_s) * self.intersample.response(omega_rad_s, self.sample_time)
     }
 
@@ -213,7 +214,7 @@ impl<'p> ResponseCriterion<'p> {
     pub fn chi_squared(&self, x: &[f64]) -> Option<f64> {
         let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
         let of = |point: &MeasuredResponse| {
-            let model = self.sampled(&operator, point.omega_rad_s);
+            let model = self.sampled_response(&operator, point.omega_rad_s);
             2.0 * (point.response - model).norm_sqr() / point.variance
         };
         Some(self.points.iter().map(of).sum())
@@ -229,13 +230,13 @@ impl<'p> ResponseCriterion<'p> {
     }
 
     /// Sets the gain to its best value for the other coordinates, and returns the value of the criterion.
-    fn best_gain(&self, x: &mut [f64]) -> Option<f64> {
+    fn optimise_gain(&self, x: &mut [f64]) -> Option<f64> {
         debug_assert_eq!(self.form.coordinates(self.neuromuscular)[0], Coordinate::Gain);
         x[0] = 1.0;
         let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
         let (mut cross, mut power) = (0.0, 0.0);
         for point in self.points.iter() {
-            let model = self.sampled(&operator, point.omega_rad_s);
+            let model = self.sampled_response(&operator, point.omega_rad_s);
             cross += (model.conj() * point.response).re / point.variance;
             power += model.norm_sqr() / point.variance;
         }

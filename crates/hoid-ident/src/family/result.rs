@@ -191,12 +191,12 @@ impl FamilyFit {
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let each = self.weighed.iter().map(|form| {
             let of = form.of(record)?;
-            let found = self.measured(&of.operator, of.covariance.as_deref(), element)?;
+            let found = self.measures_of_operator(&of.operator, of.covariance.as_deref(), element)?;
             Some((form.weight, found))
         });
         let each: Vec<Option<(f64, LoopMeasures)>> = each.collect();
         each.first()?.as_ref()?;
-        LoopMeasures::averaged(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
+        LoopMeasures::average(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
     }
 
     /// Like [`Self::loop_measures`], for the best form only.
@@ -206,7 +206,7 @@ impl FamilyFit {
         element: &ContinuousTransferFunction,
     ) -> Option<LoopMeasures> {
         let of = self.operator(record);
-        self.measured(&of.operator, of.covariance.as_deref(), element)
+        self.measures_of_operator(&of.operator, of.covariance.as_deref(), element)
     }
 
     /// Returns the delay tau_e in s of a record for an error that is linear between samples, logged from a continuous
@@ -289,17 +289,17 @@ impl FamilyFit {
     /// without a crossover.
     pub fn loop_measures_at_lines(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let lines = self.lines.as_ref()?;
-        self.measured(&lines.operator, lines.covariance.as_deref(), element)
+        self.measures_of_operator(&lines.operator, lines.covariance.as_deref(), element)
     }
 
     /// Returns crossover frequency and phase margin of the operator estimated by refined instrumental variables; `None`
     /// without this operator or without a crossover.
     pub fn loop_measures_by_instruments(&self, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let found = self.instrumental.as_ref()?;
-        self.measured(&found.operator, found.covariance.as_deref(), element)
+        self.measures_of_operator(&found.operator, found.covariance.as_deref(), element)
     }
 
-    fn measured(
+    fn measures_of_operator(
         &self,
         operator: &FamilyOperator,
         covariance: Option<&[f64]>,

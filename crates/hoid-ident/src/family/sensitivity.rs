@@ -26,7 +26,7 @@ use hoid_model::operator_family::Coordinate;
 
 use super::{
     noise::{NoiseProducts, hannan_rissanen},
-    prediction::{NoiseOrders, Prediction},
+    prediction::{NoiseOrders, PredictionProblem},
     prediction_fit::PredictionFit,
 };
 use crate::criterion::Workspace;
@@ -34,7 +34,7 @@ use crate::criterion::Workspace;
 /// Orders (nc, nd) of the ARMA model.
 const ARMA_ORDERS: NoiseOrders = (4, 5);
 /// Prior share in the fit at the lines above which other noise models are also used.
-pub(super) const LARGEST_SHARE_AT_LINES: f64 = 0.25;
+pub(super) const LARGEST_PRIOR_SHARE_AT_LINES: f64 = 0.25;
 /// Weight of the squared differences that is added to one if there are no lines.
 pub(super) const EXTRA_WEIGHT_WITHOUT_LINES: f64 = 0.5;
 /// Additional standard deviations of parameters if there are no lines, for the bias that fits with other noise models
@@ -43,17 +43,17 @@ pub(super) const EXTRA_DEVIATIONS_WITHOUT_LINES: [(Coordinate, f64); 2] =
     [(Coordinate::LogOmega, 0.12), (Coordinate::LogZeta, 0.2)];
 /// Maximum number of steps and tolerance of the search with another noise model. The search need not converge, since
 /// only the size of the difference is used.
-const SEARCH: (usize, f64) = (25, 1e-6);
+const SEARCH_LIMITS: (usize, f64) = (25, 1e-6);
 
 /// Returns the elements of eta before the noise model for fits of the same form with other noise models, and with the
 /// other intersample behaviour if both fit; empty if there is no noise.
-pub(super) fn rivals(
-    prediction: &Prediction<'_>,
+pub(super) fn alternative_fits(
+    prediction: &PredictionProblem<'_>,
     fit: &PredictionFit<'_>,
     highest: usize,
     workspace: &mut Workspace,
 ) -> Vec<Vec<f64>> {
-    if prediction.noise_free().is_some() {
+    if prediction.noise_free_share().is_some() {
         return Vec::new();
     }
     let layout = fit.layout();
@@ -63,7 +63,7 @@ pub(super) fn rivals(
     orders.dedup();
     let elements = layout.noise_offset();
     let start = layout.coordinates_of(fit.eta(), 0);
-    let Ok(series) = prediction.unexplained((layout.form, layout.neuromuscular), &start, workspace) else {
+    let Ok(series) = prediction.unexplained_output((layout.form, layout.neuromuscular), &start, workspace) else {
         return Vec::new();
     };
     let mut others = Vec::new();
@@ -74,7 +74,7 @@ pub(super) fn rivals(
             hannan_rissanen(&series, (nc, nd), highest)
         };
         let Some(noise) = noise else { continue };
-        if let Some(found) = prediction.refit(fit, (nc, nd), &noise, SEARCH, workspace) {
+        if let Some(found) = prediction.refit(fit, (nc, nd), &noise, SEARCH_LIMITS, workspace) {
             others.push(found[..elements].to_vec());
         }
     }
@@ -82,6 +82,6 @@ pub(super) fn rivals(
         .other_intersample
         .iter()
         .find(|(form, _)| *form == layout.form);
-    others.extend(of_course.map(|(_, coordinates)| layout.spread(coordinates, &[])));
+    others.extend(of_course.map(|(_, coordinates)| layout.common_eta(coordinates, &[])));
     others
 }

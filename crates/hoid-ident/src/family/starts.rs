@@ -17,12 +17,12 @@
 use hoid_model::Form;
 
 use super::{
-    coordinates::Grid,
+    coordinates::GridDensity,
     line_fit::{LineFit, line_fit},
     lines::LineData,
     noise::{Autoregression, NoiseProducts, Penalty},
     options::FamilyEstimator,
-    prediction::{NoiseOrders, Prediction},
+    prediction::{NoiseOrders, PredictionProblem},
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
 };
@@ -30,9 +30,9 @@ use crate::{IdentError, criterion::Workspace};
 
 /// Number of minima for the response from which the prediction error search of a form runs; twice as many without a
 /// prior.
-const SEARCHES: usize = 2;
+const SEARCH_COUNT: usize = 2;
 /// Relative difference of the responses of two minima below which only one of them is a start.
-const SAME_RESPONSE: f64 = 0.1;
+const SAME_RESPONSE_TOLERANCE: f64 = 0.1;
 /// Order of the autoregression with which the minima for the response are compared.
 const FIRST_NOISE_ORDER: usize = 8;
 
@@ -47,12 +47,12 @@ pub(super) struct Start {
 
 impl FamilyEstimator {
     /// Returns the criterion for the measured response of a form.
-    pub(super) fn of_response<'p>(
+    pub(super) fn response_criterion<'p>(
         &self,
         form: Form,
         points: &'p [MeasuredResponse],
         prior: &OperatorPrior,
-        prediction: &Prediction<'_>,
+        prediction: &PredictionProblem<'_>,
     ) -> ResponseCriterion<'p> {
         ResponseCriterion::new(
             form,
@@ -66,12 +66,12 @@ impl FamilyEstimator {
 
     /// Returns the fit of a form at the lines and the starting coordinates of its searches: the coordinates of the fit
     /// at the lines, and the minima for the response of the ARX model that have the smallest prediction errors.
-    pub(super) fn start(
+    pub(super) fn prepare_start(
         &self,
         form: Form,
         lines: Option<&LineData<'_>>,
         response: &[MeasuredResponse],
-        prediction: &Prediction<'_>,
+        prediction: &PredictionProblem<'_>,
         workspace: &mut Workspace,
     ) -> Result<Start, IdentError> {
         let mut start = Start {
@@ -80,24 +80,24 @@ impl FamilyEstimator {
             coordinates: Vec::new(),
         };
         if let Some(lines) = lines {
-            let criterion = self.of_response(form, &lines.points, &self.prior, prediction);
+            let criterion = self.response_criterion(form, &lines.points, &self.prior, prediction);
             let (fit, found) = line_fit(lines, &criterion, &self.search)?;
             start.coordinates.push(found.coordinates);
             start.lines = Some(fit);
         }
         if !response.is_empty() {
-            let criterion = self.of_response(form, response, &self.prior, prediction);
+            let criterion = self.response_criterion(form, response, &self.prior, prediction);
             let (other, searches) = match self.prior.entries() {
-                [] => (OperatorPrior::population(), 2 * SEARCHES),
-                _ => (OperatorPrior::none(), SEARCHES),
+                [] => (OperatorPrior::population(), 2 * SEARCH_COUNT),
+                _ => (OperatorPrior::none(), SEARCH_COUNT),
             };
-            let other = self.of_response(form, response, &other, prediction);
-            let minima = [&criterion, &other].map(|c| c.minima(&self.search, Grid::Default));
+            let other = self.response_criterion(form, response, &other, prediction);
+            let minima = [&criterion, &other].map(|c| c.minima(&self.search, GridDensity::Default));
             let minima: Vec<Vec<f64>> = minima.into_iter().flatten().map(|found| found.coordinates).collect();
             let cost = |found: &[f64], workspace: &mut Workspace| {
-                let error = self.whitened(prediction, form, found, FIRST_NOISE_ORDER, workspace)?;
+                let error = self.residual_autoregression(prediction, form, found, FIRST_NOISE_ORDER, workspace)?;
                 let prior: f64 = criterion.penalty.iter().map(|penalty| penalty.at(found)).sum();
-                Some(prediction.samples() as f64 * error.loss.ln() + prior)
+                Some(prediction.sample_count() as f64 * error.loss.ln() + prior)
             };
             let mut minima: Vec<(f64, Vec<f64>)> = minima
                 .into_iter()
@@ -108,7 +108,7 @@ impl FamilyEstimator {
             for (_, found) in minima {
                 if !chosen
                     .iter()
-                    .any(|known| criterion.distance(known, &found) < SAME_RESPONSE)
+                    .any(|known| criterion.distance(known, &found) < SAME_RESPONSE_TOLERANCE)
                 {
                     chosen.push(found);
                 }
@@ -120,23 +120,23 @@ impl FamilyEstimator {
     }
 
     /// Returns the autoregression, of this order at most, of the part of u that an operator does not explain.
-    fn whitened(
+    fn residual_autoregression(
         &self,
-        prediction: &Prediction<'_>,
+        prediction: &PredictionProblem<'_>,
         form: Form,
         coordinates: &[f64],
         order: usize,
         workspace: &mut Workspace,
     ) -> Option<Autoregression> {
-        let series = prediction.unexplained((form, self.neuromuscular), coordinates, workspace);
+        let series = prediction.unexplained_output((form, self.neuromuscular), coordinates, workspace);
         NoiseProducts::new(&series.ok()?, order).fit_up_to(order)
     }
 
     /// Returns the index of the form with a start whose residual is smallest after whitening by an autoregression of
     /// this order.
-    pub(super) fn smallest_residual(
+    pub(super) fn form_with_smallest_residual(
         &self,
-        prediction: &Prediction<'_>,
+        prediction: &PredictionProblem<'_>,
         starts: &[Start],
         order: usize,
         workspace: &mut Workspace,
@@ -144,7 +144,7 @@ impl FamilyEstimator {
         let mut least: Option<(f64, usize)> = None;
         for (i, start) in starts.iter().enumerate() {
             for coordinates in &start.coordinates {
-                if let Some(found) = self.whitened(prediction, start.form, coordinates, order, workspace)
+                if let Some(found) = self.residual_autoregression(prediction, start.form, coordinates, order, workspace)
                     && least.is_none_or(|(loss, _)| found.loss < loss)
                 {
                     least = Some((found.loss, i));
@@ -157,7 +157,7 @@ impl FamilyEstimator {
     /// Selects the orders of the noise model by Akaike's criterion, for the form with the smallest residual.
     pub(super) fn noise_orders(
         &self,
-        prediction: &Prediction<'_>,
+        prediction: &PredictionProblem<'_>,
         starts: &[Start],
         workspace: &mut Workspace,
     ) -> Result<NoiseOrders, IdentError> {
@@ -168,7 +168,7 @@ impl FamilyEstimator {
         } in starts
         {
             for start in coordinates {
-                if let Ok(series) = prediction.unexplained((form, self.neuromuscular), start, workspace) {
+                if let Ok(series) = prediction.unexplained_output((form, self.neuromuscular), start, workspace) {
                     left.push((form, start, NoiseProducts::new(&series, highest)));
                 }
             }

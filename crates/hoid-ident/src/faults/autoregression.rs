@@ -2,7 +2,7 @@
 //!
 //! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` is fitted by least squares with bounded influence: a row counts
 //! only if neither x(t) nor any of its p past values exceeds [`OUTLIER_LIMIT`] robust deviations (Mallows' weights on
-//! the regressors) and, in later rounds, if eps does not exceed [`LARGEST_RESIDUAL`] times its robust scale (R. A.
+//! the regressors) and, in later rounds, if eps does not exceed [`MAX_RESIDUAL`] times its robust scale (R. A.
 //! Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*, 2006, sections 5.11 and 8.4). White noise of
 //! [`NOISE_FLOOR`] deviations of x is assumed in addition: it keeps the normal equations of a smooth channel regular,
 //! and smaller deviations are not faults.
@@ -11,14 +11,14 @@ use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
 /// Largest order of the autoregression; a short channel has a lower order.
-pub(super) const ORDER: usize = 16;
+pub(super) const MAX_ORDER: usize = 16;
 /// A row does not count if one of its values exceeds this number of deviations of the channel.
 const OUTLIER_LIMIT: f64 = 6.0;
 /// A row does not count if its residual exceeds this number of standard deviations of the residuals.
-const LARGEST_RESIDUAL: f64 = 4.0;
+const MAX_RESIDUAL: f64 = 4.0;
 /// Standard deviation of the additional white noise, relative to the deviation of the channel.
 pub(super) const NOISE_FLOOR: f64 = 1e-3;
-const ROUNDS: usize = 3;
+const ROUND_COUNT: usize = 3;
 /// Number of rows that is sufficient for estimating the coefficients; of a longer channel only every k-th row is used.
 const MAX_ROWS: usize = 40_000;
 
@@ -31,7 +31,7 @@ pub(super) struct Autoregression {
 impl Autoregression {
     /// Fits a centred channel with the given robust deviation; `None` if the channel is too short or constant.
     pub fn of(x: &[f64], deviation: f64) -> Option<Self> {
-        let p = ORDER.min(x.len() / 20);
+        let p = MAX_ORDER.min(x.len() / 20);
         if p == 0 || deviation <= 0.0 {
             return None;
         }
@@ -54,14 +54,11 @@ impl Autoregression {
         let mut found = Self {
             a: least_squares(x, &rows, p, NOISE_FLOOR * deviation)?,
         };
-        for _ in 1..ROUNDS {
+        for _ in 1..ROUND_COUNT {
             let all: Vec<f64> = rows.iter().map(|t| found.residual(x, *t)).collect();
             let scale = quantile(&mut all.iter().map(|e| e.abs()).collect::<Vec<_>>(), 0.5) / 0.674_489_75;
             let scale = scale.max(NOISE_FLOOR * deviation);
-            let kept = rows
-                .iter()
-                .zip(&all)
-                .filter(|(_, e)| e.abs() <= LARGEST_RESIDUAL * scale);
+            let kept = rows.iter().zip(&all).filter(|(_, e)| e.abs() <= MAX_RESIDUAL * scale);
             let kept: Vec<usize> = kept.map(|(t, _)| *t).collect();
             if kept.len() < 5 * p {
                 break;
@@ -110,11 +107,11 @@ fn least_squares(x: &[f64], rows: &[usize], p: usize, floor: f64) -> Option<Vec<
 
 #[cfg(test)]
 mod tests {
-    use super::{super::test_signals::autoregressive, *};
+    use super::{super::test_signals::autoregressive_signal, *};
 
     #[test]
     fn outliers_do_not_affect_the_fit() {
-        let clean = autoregressive(4000, 3);
+        let clean = autoregressive_signal(4000, 3);
         let fit = |x: &[f64]| Autoregression::of(x, 3.0).unwrap().a;
         let good = fit(&clean);
         assert!((good[1] + 1.6).abs() < 0.05 && (good[2] - 0.8).abs() < 0.08, "{good:?}");

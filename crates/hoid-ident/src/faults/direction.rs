@@ -5,17 +5,17 @@
 //!
 //! `u(k) = sum_{i=1..P} a_i u(k-i) + sum_{j=1..L} b_j e(k-j) + c + v(k)`
 //!
-//! and likewise e on u, with P = [`OWN_LAGS`] and L = [`OTHER_LAGS`] blocks. In a closed loop a prediction from past
+//! and likewise e on u, with P = [`OWN_LAG_COUNT`] and L = [`OTHER_LAG_COUNT`] blocks. In a closed loop a prediction from past
 //! samples is consistent for any feedback (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
 //! **Exchanged.** A person responds only after a delay of a tenth of a second or more; a controlled element responds
 //! immediately. The significance of lag j is the relative increase of the loss without it: for b_1,
 //! `R = (V_without - V)/V`. If e responds to u with a delay and u responds to e immediately, i.e. if `R` of u exceeds
-//! both [`IMMEDIATE_INCREASE`] and [`MIN_INCREASE_RATIO`] times `R` of e, input and output are exchanged. If neither
+//! both [`MIN_IMMEDIATE_INCREASE`] and [`MIN_INCREASE_RATIO`] times `R` of e, input and output are exchanged. If neither
 //! responds immediately, nothing is reported.
 //!
 //! **Sign.** A person's response to an error initially has the sign of the error: `sum_j b_j` is positive. The sign is
-//! wrong if the sum is more than [`SIGNIFICANTLY_NEGATIVE`] standard errors below zero.
+//! wrong if the sum is more than [`MIN_NEGATIVE_STANDARD_ERRORS`] standard errors below zero.
 
 use hoid_model::{FaultKind, Record};
 use hoid_numerics::statistics::mean;
@@ -25,14 +25,14 @@ use crate::linalg::least_squares::solve_symmetric;
 /// Length of a block, s.
 const BLOCK_S: f64 = 0.05;
 /// Numbers of past blocks in the regression: of the channel itself, and of the other channel.
-const OWN_LAGS: usize = 8;
-const OTHER_LAGS: usize = 12;
+const OWN_LAG_COUNT: usize = 8;
+const OTHER_LAG_COUNT: usize = 12;
 /// Relative increase of the loss without the first lag above which a response is immediate.
-const IMMEDIATE_INCREASE: f64 = 0.1;
+const MIN_IMMEDIATE_INCREASE: f64 = 0.1;
 /// For exchanged channels, minimum ratio of the increase of the loss for u to the increase for e.
 const MIN_INCREASE_RATIO: f64 = 20.0;
 /// The sum of the coefficients `b_j` counts as negative if it is more than this number of standard errors below zero.
-const SIGNIFICANTLY_NEGATIVE: f64 = 4.0;
+const MIN_NEGATIVE_STANDARD_ERRORS: f64 = 4.0;
 /// Minimum number of blocks for a test.
 const MIN_BLOCKS: usize = 200;
 
@@ -51,10 +51,10 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     }
     let of_output = CrossResponse::of(&u, &e)?;
     let of_input = CrossResponse::of(&e, &u)?;
-    if of_output.at_once > IMMEDIATE_INCREASE && of_output.at_once > MIN_INCREASE_RATIO * of_input.at_once {
+    if of_output.at_once > MIN_IMMEDIATE_INCREASE && of_output.at_once > MIN_INCREASE_RATIO * of_input.at_once {
         return Some((FaultKind::Exchanged, of_output.at_once / of_input.at_once));
     }
-    (of_output.sum < -SIGNIFICANTLY_NEGATIVE).then_some((FaultKind::Sign, -of_output.sum))
+    (of_output.sum < -MIN_NEGATIVE_STANDARD_ERRORS).then_some((FaultKind::Sign, -of_output.sum))
 }
 
 /// Response of one channel to another.
@@ -68,19 +68,19 @@ struct CrossResponse {
 impl CrossResponse {
     /// Estimates the response of y to x; `None` if the regression is singular.
     fn of(y: &[f64], x: &[f64]) -> Option<Self> {
-        let first = OWN_LAGS.max(OTHER_LAGS);
-        let size = OWN_LAGS + OTHER_LAGS + 1;
+        let first = OWN_LAG_COUNT.max(OTHER_LAG_COUNT);
+        let size = OWN_LAG_COUNT + OTHER_LAG_COUNT + 1;
         let n = y.len() - first;
         let mut gram = vec![0.0; size * size];
         let mut product = vec![0.0; size];
         let mut power = 0.0;
         let mut row = vec![1.0; size];
         for k in first..y.len() {
-            for i in 0..OWN_LAGS {
+            for i in 0..OWN_LAG_COUNT {
                 row[i] = y[k - 1 - i];
             }
-            for j in 0..OTHER_LAGS {
-                row[OWN_LAGS + j] = x[k - 1 - j];
+            for j in 0..OTHER_LAG_COUNT {
+                row[OWN_LAG_COUNT + j] = x[k - 1 - j];
             }
             for i in 0..size {
                 product[i] += row[i] * y[k];
@@ -110,11 +110,11 @@ impl CrossResponse {
             Some((power - explained, solution))
         };
         let (loss, solution) = without(None)?;
-        let (other, _) = without(Some(OWN_LAGS))?;
+        let (other, _) = without(Some(OWN_LAG_COUNT))?;
         let of_sum: Vec<f64> = (0..size)
-            .map(|i| f64::from((OWN_LAGS..OWN_LAGS + OTHER_LAGS).contains(&i)))
+            .map(|i| f64::from((OWN_LAG_COUNT..OWN_LAG_COUNT + OTHER_LAG_COUNT).contains(&i)))
             .collect();
-        let sum: f64 = solution[OWN_LAGS..OWN_LAGS + OTHER_LAGS].iter().sum();
+        let sum: f64 = solution[OWN_LAG_COUNT..OWN_LAG_COUNT + OTHER_LAG_COUNT].iter().sum();
         let along = solve_symmetric(&gram, &of_sum)?;
         let variance = loss / (n - size) as f64 * along.iter().zip(&of_sum).map(|(a, b)| a * b).sum::<f64>();
         let answer = Self {

@@ -65,12 +65,12 @@ impl Interpolation {
     }
 
     /// Returns the largest number of samples from `start` on that can be determined.
-    pub fn most(&self) -> usize {
+    pub fn max_samples(&self) -> usize {
         self.y.len()
     }
 
     /// Returns the decrease of the sum of squares if the first m samples are interpolated.
-    pub fn fall(&self, m: usize) -> f64 {
+    pub fn sum_decrease(&self, m: usize) -> f64 {
         self.y[..m].iter().map(|y| y * y).sum()
     }
 
@@ -86,7 +86,7 @@ impl Interpolation {
 }
 
 /// Updates the innovations after a change of the samples from `start` on.
-pub(super) fn apply(ar: &Autoregression, eps: &mut [f64], start: usize, delta: &[f64]) {
+pub(super) fn apply_change(ar: &Autoregression, eps: &mut [f64], start: usize, delta: &[f64]) {
     let p = ar.order();
     for (i, change) in delta.iter().enumerate() {
         for (lag, a) in ar.a.iter().enumerate() {
@@ -100,11 +100,11 @@ pub(super) fn apply(ar: &Autoregression, eps: &mut [f64], start: usize, delta: &
 
 #[cfg(test)]
 mod tests {
-    use super::{super::test_signals::autoregressive, *};
+    use super::{super::test_signals::autoregressive_signal, *};
 
     #[test]
     fn interpolated_values_minimise_the_sum_of_squares() {
-        let x = autoregressive(600, 5);
+        let x = autoregressive_signal(600, 5);
         let ar = Autoregression::of(&x, 3.0).unwrap();
         for (start, m) in [(300, 1), (300, 4), (3, 3), (596, 4)] {
             let eps = ar.residuals(&x);
@@ -114,11 +114,14 @@ mod tests {
             let delta = found.change(m);
             let at = |delta: &[f64]| {
                 let mut changed = eps.clone();
-                apply(&ar, &mut changed, start, delta);
+                apply_change(&ar, &mut changed, start, delta);
                 squares(&changed)
             };
             let least = at(&delta);
-            assert!((before - least - found.fall(m)).abs() < 1e-9 * before, "{start} {m}");
+            assert!(
+                (before - least - found.sum_decrease(m)).abs() < 1e-9 * before,
+                "{start} {m}"
+            );
             // The innovations equal the innovations of the changed channel.
             let mut changed = x.clone();
             delta.iter().enumerate().for_each(|(i, d)| changed[start + i] += d);

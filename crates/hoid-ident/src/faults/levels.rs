@@ -1,10 +1,10 @@
 //! Jumps of a channel: wraps, steps, and stretches in other units.
 //!
-//! A change from one sample to the next is *large* if it exceeds [`LARGE`] times the 99 % quantile of all changes.
+//! A change from one sample to the next is *large* if it exceeds [`LARGE_CHANGE`] times the 99 % quantile of all changes.
 //!
 //! **Wrap.** A channel with the modulus M leaves its range at one end and re-enters at the other: the size of every
 //! large change equals M to within twice that quantile. M is 360, 2 pi, 180, pi, 65536, 65535 or 4096, or the common
-//! size of four or more changes. In the last case, large changes less than [`BRIDGED_S`](super::limits::BRIDGED_S)
+//! size of four or more changes. In the last case, large changes less than [`MAX_BRIDGED_S`](super::limits::MAX_BRIDGED_S)
 //! apart are a spike; for a known modulus they are a turn there and back, and unwrapping repairs the channel in either
 //! case.
 //!
@@ -24,7 +24,7 @@ use super::{
     robust::{level_and_deviation, median, quantile},
 };
 
-const LARGE: f64 = 6.0;
+const LARGE_CHANGE: f64 = 6.0;
 /// Length of the spans before and after a step, s.
 const SPAN_S: f64 = 5.0;
 /// Minimum size of a step, relative to the larger deviation in the two spans.
@@ -33,7 +33,7 @@ const MIN_STEP: f64 = 6.0;
 const UNIT_FACTOR: f64 = 100.0;
 /// A sample belongs to a stretch in another unit if it exceeds this number of deviations of the remaining samples.
 const OUTLIER_LIMIT: f64 = 15.0;
-const MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
+const WRAP_MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
 /// Number of large changes of the same size from which this size is taken as an unknown modulus.
 const MIN_AGREEING_CHANGES: usize = 4;
 
@@ -54,7 +54,7 @@ fn typical_change(values: &[f64]) -> f64 {
 }
 
 /// Returns the modulus, the range of samples with wraps and the unwrapped channel; `None` if the channel does not wrap.
-pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
+pub(super) fn find_wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     let typical = typical_change(values);
     if values.len() < 100 || typical <= 0.0 {
         return None;
@@ -63,7 +63,7 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
         .windows(2)
         .enumerate()
         .map(|(t, w)| (t + 1, w[1] - w[0]))
-        .filter(|(_, change)| change.abs() > LARGE * typical)
+        .filter(|(_, change)| change.abs() > LARGE_CHANGE * typical)
         .collect();
     if jumps.is_empty() || 20 * jumps.len() > values.len() {
         return None;
@@ -73,11 +73,11 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
             .iter()
             .all(|(_, change)| (change.abs() - modulus).abs() <= 2.0 * typical)
     };
-    let known = MODULI.iter().copied().find(|m| near(*m));
+    let known = WRAP_MODULI.iter().copied().find(|m| near(*m));
     let own = || {
         let size = median(&jumps.iter().map(|(_, c)| c.abs()).collect::<Vec<_>>());
         let apart = jumps.windows(2).map(|w| (w[1].0 - w[0].0) as f64 * sample_time_s);
-        let spike = apart.fold(f64::INFINITY, f64::min) <= super::limits::BRIDGED_S;
+        let spike = apart.fold(f64::INFINITY, f64::min) <= super::limits::MAX_BRIDGED_S;
         (jumps.len() >= MIN_AGREEING_CHANGES && near(size) && !spike).then_some(size)
     };
     let modulus = known.or_else(own)?;
@@ -109,7 +109,7 @@ pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
     for t in span..n - span {
         let change = values[t] - values[t - 1];
-        if change.abs() <= LARGE * typical || found.last().is_some_and(|(last, ..)| t - last < span) {
+        if change.abs() <= LARGE_CHANGE * typical || found.last().is_some_and(|(last, ..)| t - last < span) {
             continue;
         }
         let (before, one) = level_and_deviation(&values[t - span..t]);
@@ -124,7 +124,7 @@ pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)
 
 /// Returns the stretches in which a channel is larger by orders of magnitude, each with the ratio to the typical size
 /// of the channel.
-pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f64)> {
+pub(super) fn scale_changes(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f64)> {
     let block = ((1.0 / sample_time_s) as usize).max(10);
     let n = values.len();
     if n < 5 * block {
@@ -191,10 +191,10 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
 
 #[cfg(test)]
 mod tests {
-    use super::{super::test_signals::autoregressive, *};
+    use super::{super::test_signals::autoregressive_signal, *};
 
     fn channel(seed: u64) -> Vec<f64> {
-        autoregressive(6000, seed)
+        autoregressive_signal(6000, seed)
     }
 
     #[test]
@@ -203,20 +203,22 @@ mod tests {
         let u: Vec<f64> = channel(4).iter().map(zone).collect();
         let at_rest = u.iter().filter(|v| **v == 0.0).count();
         assert!(at_rest > 3500, "{at_rest}");
-        assert_eq!(scales(&u, 0.01), []);
+        assert_eq!(scale_changes(&u, 0.01), []);
         let mut other = u;
         other[2000..2600].iter_mut().for_each(|v| *v *= 1000.0);
-        assert_eq!(scales(&other, 0.01).len(), 1);
+        assert_eq!(scale_changes(&other, 0.01).len(), 1);
     }
 
     #[test]
     fn clean_channel_has_no_wraps_steps_or_scale_changes() {
         for seed in 1..8 {
             let x = channel(seed);
-            assert!(wrap(&x, 0.01).is_none() && steps(&x, 0.01).is_empty() && scales(&x, 0.01).is_empty());
+            assert!(find_wrap(&x, 0.01).is_none() && steps(&x, 0.01).is_empty() && scale_changes(&x, 0.01).is_empty());
         }
         assert!(
-            wrap(&[1.0; 300], 0.01).is_none() && steps(&[], 0.01).is_empty() && scales(&[0.0; 999], 0.01).is_empty()
+            find_wrap(&[1.0; 300], 0.01).is_none()
+                && steps(&[], 0.01).is_empty()
+                && scale_changes(&[0.0; 999], 0.01).is_empty()
         );
     }
 
@@ -224,7 +226,7 @@ mod tests {
     fn wrapped_angle_is_unwrapped() {
         let x: Vec<f64> = channel(4).iter().map(|v| 5.0 * v + 132.0).collect();
         let wrapped: Vec<f64> = x.iter().map(|v| (v + 180.0).rem_euclid(360.0) - 180.0).collect();
-        let found = wrap(&wrapped, 0.01).unwrap();
+        let found = find_wrap(&wrapped, 0.01).unwrap();
         assert_eq!(found.modulus, 360.0);
         let offset = found.unwrapped[0] - x[0];
         assert!(
@@ -237,7 +239,7 @@ mod tests {
         let mut spiky = x;
         spiky[3000] += 250.0;
         spiky[900] -= 230.0;
-        assert!(wrap(&spiky, 0.01).is_none());
+        assert!(find_wrap(&spiky, 0.01).is_none());
     }
 
     #[test]
@@ -256,7 +258,7 @@ mod tests {
     fn temporary_scale_change_is_found() {
         let mut x = channel(6);
         x[2030..4777].iter_mut().for_each(|v| *v *= 1e6);
-        let found = scales(&x, 0.01);
+        let found = scale_changes(&x, 0.01);
         assert_eq!(found.len(), 1, "{found:?}");
         let (rows, factor) = &found[0];
         assert!(

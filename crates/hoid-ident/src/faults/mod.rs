@@ -23,7 +23,7 @@
 //! filtered by the muscles, and the statistics for spikes distinguish such pushes from faults.
 //!
 //! [`repair`] inspects a record and follows [`FaultHandling`](hoid_model::FaultHandling). By default it bridges faults
-//! of up to [`BRIDGED_S`], cuts the record at longer faults, and returns each segment of [`SHORTEST_S`] or more as a
+//! of up to [`MAX_BRIDGED_S`], cuts the record at longer faults, and returns each segment of [`MIN_SEGMENT_S`] or more as a
 //! record. If more than [`MAX_SPIKE_SHARE`] of the samples of a channel are spikes, they are reported and not bridged,
 //! because so many spikes contradict the assumptions about the channel.
 
@@ -45,8 +45,8 @@ mod test_signals;
 #[cfg(test)]
 mod tests;
 
-pub use limits::{BRIDGED_S, MAX_SPIKE_SHARE, SHORTEST_S};
-pub use repairing::{RepairedRecord, SLOWEST_S, repair};
-pub use resistant::{held, resistant};
+pub use limits::{MAX_BRIDGED_S, MAX_SPIKE_SHARE, MIN_SEGMENT_S};
+pub use repairing::{MAX_SAMPLE_TIME_S, RepairedRecord, repair};
+pub use resistant::{limited_record, limited_records};
 pub use rest::Rest;
-pub use slow::{PERIOD_S, without_slow};
+pub use slow::{SLOW_PERIOD_S, without_slow_components};

@@ -6,14 +6,14 @@ use hoid_model::{Channel, Fault, FaultAction, FaultHandling, FaultKind, Finding,
 
 use super::{
     direction::wrong_direction,
-    limits::{MAX_SPIKE_SHARE, SHORTEST_S},
-    search::{FaultSpan, search},
+    limits::{MAX_SPIKE_SHARE, MIN_SEGMENT_S},
+    search::{FaultSpan, find_faults},
     spikes,
 };
 use crate::frequency::COMMON_EXCITATIONS;
 
 /// Largest sample time with which a person can be identified, s.
-pub const SLOWEST_S: f64 = 0.5;
+pub const MAX_SAMPLE_TIME_S: f64 = 0.5;
 
 /// A record after the repair: one or more segments, with the faults and findings.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,14 +51,14 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     }
     // The statistics for faults use fixed times in seconds and would give many false alarms at a longer sample time.
     let ts = record.sample_time().s();
-    if ts > SLOWEST_S {
+    if ts > MAX_SAMPLE_TIME_S {
         return Ok(untouched(vec![all_of_it(record, FaultKind::TimeUnit, ts)]));
     }
     let (input, output, mut others) = record.clone().into_channels();
-    let of_excitation = excitations(&mut others, record);
+    let of_excitation = repair_excitations(&mut others, record);
     let mut channels: Vec<Channel> = input.into_iter().chain([output]).collect();
     let mut values: Vec<Vec<f64>> = channels.iter().map(|c| c.values.clone()).collect();
-    let places = search(&mut values, ts, handling == FaultHandling::Cut);
+    let places = find_faults(&mut values, ts, handling == FaultHandling::Cut);
     let of = |place: &FaultSpan, action: FaultAction| Fault {
         kind: place.kind,
         channel: place.channel.map_or_else(String::new, |c| channels[c].name.clone()),
@@ -78,14 +78,14 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
         faults.iter_mut().for_each(|fault| fault.action = FaultAction::Reported);
         return Ok(untouched(faults));
     }
-    let kept = segments(record.len(), &places, (SHORTEST_S / ts).ceil() as usize);
+    let kept = segments(record.len(), &places, (MIN_SEGMENT_S / ts).ceil() as usize);
     if kept.is_empty() {
         faults.iter_mut().for_each(|fault| fault.action = FaultAction::Reported);
         let mut nothing = untouched(faults);
         nothing.findings.push(Finding::undetermined(
             "faults",
             format!(
-                "{} has no fault-free span of {SHORTEST_S} s: the whole record is unusable",
+                "{} has no fault-free span of {MIN_SEGMENT_S} s: the whole record is unusable",
                 record.label()
             ),
         ));
@@ -98,7 +98,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     let (first, second) = (channels.next(), channels.next());
     let whole = match (first, second) {
         (Some(input), Some(output)) => Record::new(record.sample_time(), input, output)?,
-        (Some(output), None) => Record::of_output(record.sample_time(), output)?,
+        (Some(output), None) => Record::from_output(record.sample_time(), output)?,
         // A record always has an output.
         _ => record.clone(),
     };
@@ -127,7 +127,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
 
 /// Finds the spikes of the channels that have the name of a common excitation. The spikes are bridged: no model is
 /// fitted to such a channel, and only its lines are used.
-fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
+fn repair_excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
     let ts = record.sample_time().s();
     let mut all = Vec::new();
     for channel in others
@@ -135,7 +135,7 @@ fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
         .filter(|c| COMMON_EXCITATIONS.contains(&c.name.as_str()))
     {
         let mut values = channel.values.clone();
-        let found = spikes::find(&mut values, ts);
+        let found = spikes::find_spikes(&mut values, ts);
         let samples: usize = found.iter().map(|spike| spike.samples.len()).sum();
         let few = samples as f64 <= (MAX_SPIKE_SHARE * values.len() as f64).max(3.0);
         if few {

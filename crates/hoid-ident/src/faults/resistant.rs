@@ -5,7 +5,7 @@
 //! limit, `x(t) - r + c s sign(r)` (a two-sided version of the filter cleaner of R. D. Martin and D. J. Thomson, *Proc.
 //! IEEE* 70 (1982) 1097-1115). The sample with the largest error is moved first, and its neighbours are then examined
 //! again: an outlier affects the interpolation of its neighbours, which would otherwise be moved instead. This bounds
-//! the effect of any sample of e or u on subsequent filters, and thus its leverage on theta. c = [`LIMIT`]: in a normal
+//! the effect of any sample of e or u on subsequent filters, and thus its leverage on theta. c = [`INTERPOLATION_ERROR_LIMIT`]: in a normal
 //! channel one sample in 16 000 is moved. If a fit to this record differs from the fit to the original record, a few
 //! samples dominate the fit; if no sample is moved, the two fits are identical.
 
@@ -15,22 +15,22 @@ use hoid_model::Record;
 
 use super::{
     autoregression::{Autoregression, NOISE_FLOOR},
-    robust::{level_and_deviation, quantum},
-    spikes::scales,
+    robust::{level_and_deviation, quantisation_step},
+    spikes::innovation_scales,
 };
 
 /// Limit of the interpolation error of a sample, in standard deviations.
-const LIMIT: f64 = 4.0;
+const INTERPOLATION_ERROR_LIMIT: f64 = 4.0;
 
 /// Returns the record with limited samples; `None` if no sample is moved.
-pub fn resistant(record: &Record) -> Option<Record> {
+pub fn limited_record(record: &Record) -> Option<Record> {
     let ts = record.sample_time().s();
     let mut moved = false;
-    let held = record.clone().map_signals(|values| moved |= hold(values, ts));
+    let held = record.clone().map_signals(|values| moved |= limit_samples(values, ts));
     held.ok().filter(|_| moved)
 }
 
-fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
+fn limit_samples(values: &mut [f64], sample_time_s: f64) -> bool {
     let (level, deviation) = level_and_deviation(values);
     let x: Vec<f64> = values.iter().map(|v| v - level).collect();
     let Some(ar) = Autoregression::of(&x, deviation) else {
@@ -39,11 +39,15 @@ fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
     let mut eps = ar.residuals(&x);
     let norm = ar.norm();
     let window = ((1.0 / sample_time_s) as usize).clamp(64, 4096);
-    let sigma = scales(&eps, window, (NOISE_FLOOR * deviation).max(quantum(values)) * norm);
+    let sigma = innovation_scales(
+        &eps,
+        window,
+        (NOISE_FLOOR * deviation).max(quantisation_step(values)) * norm,
+    );
     let (p, n) = (ar.order(), x.len());
     let error =
         |eps: &[f64], t: usize| -> f64 { ar.a.iter().zip(&eps[t..]).map(|(a, e)| a * e).sum::<f64>() / (norm * norm) };
-    let most = |t: usize| LIMIT * sigma.at(t) / norm;
+    let most = |t: usize| INTERPOLATION_ERROR_LIMIT * sigma.at(t) / norm;
     let inside = p..n.saturating_sub(p);
     let mut queue: BinaryHeap<Excess> = inside
         .clone()
@@ -108,8 +112,8 @@ impl PartialEq for Excess {
 impl Eq for Excess {}
 
 /// Returns all records with limited samples; `None` if no sample of any record is moved.
-pub fn held(records: &[Record]) -> Option<Vec<Record>> {
-    let all: Vec<Option<Record>> = records.iter().map(resistant).collect();
+pub fn limited_records(records: &[Record]) -> Option<Vec<Record>> {
+    let all: Vec<Option<Record>> = records.iter().map(limited_record).collect();
     all.iter().any(Option::is_some).then(|| {
         let pairs = all.into_iter().zip(records);
         pairs
@@ -122,22 +126,22 @@ pub fn held(records: &[Record]) -> Option<Vec<Record>> {
 mod tests {
     use hoid_model::{Channel, SampleTime};
 
-    use super::{super::test_signals::autoregressive, *};
+    use super::{super::test_signals::autoregressive_signal, *};
 
     fn record(e: Vec<f64>) -> Record {
-        let u = autoregressive(e.len(), 77);
+        let u = autoregressive_signal(e.len(), 77);
         let ts = SampleTime::new(0.01).unwrap();
         Record::new(ts, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap()
     }
 
     #[test]
     fn influence_of_one_sample_is_bounded() {
-        let clean = autoregressive(3000, 21);
+        let clean = autoregressive_signal(3000, 21);
         let mut held = Vec::new();
         for size in [10.0, 1e3, 1e5] {
             let mut e = clean.clone();
             e[1700] += size;
-            let whole = resistant(&record(e)).unwrap();
+            let whole = limited_record(&record(e)).unwrap();
             held.push(whole.input()[1700]);
             // Its neighbours stay unchanged.
             let off = |t: usize| (whole.input()[t] - clean[t]).abs();
@@ -150,9 +154,9 @@ mod tests {
             "{held:?}"
         );
         assert!((held[1] - clean[1700]).abs() < 5.0);
-        let moved = resistant(&record(clean.clone()))
+        let moved = limited_record(&record(clean.clone()))
             .map_or(0, |r| r.input().iter().zip(&clean).filter(|(a, b)| a != b).count());
         assert!(moved <= 2, "{moved}");
-        assert!(resistant(&record(vec![1.0; 3000])).is_none_or(|r| r.input() == vec![1.0; 3000]));
+        assert!(limited_record(&record(vec![1.0; 3000])).is_none_or(|r| r.input() == vec![1.0; 3000]));
     }
 }

@@ -4,8 +4,8 @@
 //! recurs if the hand works in pulses and releases the stick between them. Pilots leave the stick there for up to half
 //! of the samples, and for seconds at a time. This is normal control and not a fault of the recording.
 //!
-//! The rest is the most frequent value, if it makes up at least [`SHARE`] of the samples, is reached at least
-//! [`VISITS`] times, and is at least [`ALONE`] times as frequent as any other value. The levels of a quantised channel
+//! The rest is the most frequent value, if it makes up at least [`MIN_REST_SHARE`] of the samples, is reached at least
+//! [`MIN_VISITS`] times, and is at least [`MIN_RATIO_TO_OTHERS`] times as frequent as any other value. The levels of a quantised channel
 //! have similar frequencies, and a frozen channel stops only once. The largest and the smallest value of the channel
 //! cannot be the rest.
 
@@ -13,9 +13,9 @@ use std::ops::Range;
 
 use super::robust::quantile;
 
-const SHARE: f64 = 0.1;
-const VISITS: usize = 10;
-const ALONE: f64 = 4.0;
+const MIN_REST_SHARE: f64 = 0.1;
+const MIN_VISITS: usize = 10;
+const MIN_RATIO_TO_OTHERS: f64 = 4.0;
 
 /// The rest of a stick.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,7 +43,7 @@ impl Rest {
         let (most, value) = counts[0];
         let next = counts.get(1).map_or(0, |(count, _)| *count);
         let share = most as f64 / values.len() as f64;
-        if share < SHARE || (most as f64) < ALONE * next as f64 || ends.contains(&value) {
+        if share < MIN_REST_SHARE || (most as f64) < MIN_RATIO_TO_OTHERS * next as f64 || ends.contains(&value) {
             return None;
         }
         let mut lengths: Vec<f64> = (runs(values).iter())
@@ -51,7 +51,7 @@ impl Rest {
             .map(|run| run.len() as f64)
             .collect();
         let visits = lengths.len();
-        (visits >= VISITS).then(|| Self {
+        (visits >= MIN_VISITS).then(|| Self {
             value,
             share,
             visits,
@@ -74,11 +74,11 @@ pub(super) fn runs(values: &[f64]) -> Vec<Range<usize>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::test_signals::autoregressive, *};
+    use super::{super::test_signals::autoregressive_signal, *};
 
     #[test]
     fn rest_is_found_only_in_dead_zones_and_pulses() {
-        let u = autoregressive(6000, 3);
+        let u = autoregressive_signal(6000, 3);
         assert_eq!(Rest::of(&u), None);
         let zone = |width: f64| -> Vec<f64> { u.iter().map(|v| v - v.clamp(-width, width)).collect() };
         let rest = Rest::of(&zone(1.5)).unwrap();

@@ -35,7 +35,7 @@ pub(super) fn level_and_deviation(values: &[f64]) -> (f64, f64) {
 }
 
 /// Returns the quantisation step of a channel that often holds its value; zero for a channel in full precision.
-pub(super) fn quantum(values: &[f64]) -> f64 {
+pub(super) fn quantisation_step(values: &[f64]) -> f64 {
     let changes = || values.windows(2).map(|w| (w[1] - w[0]).abs());
     let held = changes().filter(|c| *c == 0.0).count();
     if 20 * held < values.len() {
@@ -49,11 +49,11 @@ pub(super) fn quantum(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::test_signals::autoregressive, *};
+    use super::{super::test_signals::autoregressive_signal, *};
 
     #[test]
     fn robust_scale_of_normal_resting_and_constant_channels() {
-        let normal: Vec<f64> = autoregressive(4000, 9)
+        let normal: Vec<f64> = autoregressive_signal(4000, 9)
             .windows(3)
             .map(|w| w[2] - 1.6 * w[1] + 0.8 * w[0] + 3.0)
             .collect();
@@ -70,7 +70,7 @@ mod tests {
             .for_each(|(k, v)| *v = if k % 2 == 0 { 2.0 } else { -2.0 });
         assert!(level_and_deviation(&resting).1 > 1.0);
         assert_eq!(level_and_deviation(&[4.0; 9]), (4.0, 0.0));
-        assert_eq!(quantum(&[0.0, 0.0, 0.5, 0.5, 1.0]), 0.5);
-        assert_eq!(quantum(&[0.0, 0.1, 0.5]), 0.0);
+        assert_eq!(quantisation_step(&[0.0, 0.0, 0.5, 0.5, 1.0]), 0.5);
+        assert_eq!(quantisation_step(&[0.0, 0.1, 0.5]), 0.0);
     }
 }

@@ -10,7 +10,7 @@ use hoid_model::{FaultAction, FaultKind};
 
 use super::{
     holds, levels,
-    limits::{BRIDGED_S, MAX_SPIKE_SHARE},
+    limits::{MAX_BRIDGED_S, MAX_SPIKE_SHARE},
     spikes,
 };
 
@@ -30,9 +30,9 @@ pub(super) struct FaultSpan {
 
 /// Finds the faults of the channels of one record and returns them in order of time, each with its action. Channels
 /// that wrap are unwrapped. Short faults are bridged, or cut out if `cut` is true.
-pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultSpan, FaultAction)> {
+pub(super) fn find_faults(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultSpan, FaultAction)> {
     let n = values.first().map_or(0, Vec::len);
-    let long = |samples: &Range<usize>| samples.len() as f64 * ts > BRIDGED_S * (1.0 + 1e-9);
+    let long = |samples: &Range<usize>| samples.len() as f64 * ts > MAX_BRIDGED_S * (1.0 + 1e-9);
     let repaired = |samples: &Range<usize>| {
         if cut || long(samples) {
             FaultAction::Cut
@@ -42,7 +42,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultS
     };
     let mut found: Vec<(FaultSpan, FaultAction)> = Vec::new();
     for (channel, values) in values.iter_mut().enumerate() {
-        if let Some(wrap) = levels::wrap(values, ts) {
+        if let Some(wrap) = levels::find_wrap(values, ts) {
             *values = wrap.unwrapped;
             let place = FaultSpan {
                 kind: FaultKind::Wrap,
@@ -55,7 +55,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultS
         }
     }
     let mut out = vec![false; n];
-    for place in lasting(values, ts) {
+    for place in lasting_faults(values, ts) {
         let action = repaired(&place.samples);
         match (action, place.channel) {
             (FaultAction::Bridged, Some(channel)) => spikes::bridge(&mut values[channel], place.samples.clone()),
@@ -78,7 +78,7 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultS
                 };
                 found.push((place, FaultAction::Cut));
             }
-            of_channel.extend(spikes::find(part, ts).into_iter().map(|spike| FaultSpan {
+            of_channel.extend(spikes::find_spikes(part, ts).into_iter().map(|spike| FaultSpan {
                 kind: FaultKind::Spike,
                 channel: Some(channel),
                 samples: stretch.start + spike.samples.start..stretch.start + spike.samples.end,
@@ -105,11 +105,11 @@ pub(super) fn search(values: &mut [Vec<f64>], ts: f64, cut: bool) -> Vec<(FaultS
 }
 
 /// Returns stretches in other units, idle stretches and frozen channels.
-fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
+fn lasting_faults(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     let mut all: Vec<FaultSpan> = Vec::new();
     for (channel, values) in values.iter().enumerate() {
         all.extend(
-            levels::scales(values, ts)
+            levels::scale_changes(values, ts)
                 .into_iter()
                 .map(|(samples, factor)| FaultSpan {
                     kind: FaultKind::Scale,
@@ -124,18 +124,22 @@ fn lasting(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     if both.len() > 1 {
         let mut out = vec![false; both[0].len()];
         all.iter().for_each(|place| out[place.samples.clone()].fill(true));
-        all.extend(holds::idle(&both, &out, ts).into_iter().map(|samples| FaultSpan {
-            kind: FaultKind::Idle,
-            channel: None,
-            size: samples.len() as f64 * ts,
-            samples,
-            deviations: None,
-        }));
+        all.extend(
+            holds::idle_stretches(&both, &out, ts)
+                .into_iter()
+                .map(|samples| FaultSpan {
+                    kind: FaultKind::Idle,
+                    channel: None,
+                    size: samples.len() as f64 * ts,
+                    samples,
+                    deviations: None,
+                }),
+        );
     }
     let known: Vec<Range<usize>> = all.iter().map(|place| place.samples.clone()).collect();
     for (channel, values) in values.iter().enumerate() {
         let other = both.iter().enumerate().find(|(c, _)| *c != channel).map(|(_, v)| *v);
-        for hold in holds::frozen(values, other, ts) {
+        for hold in holds::frozen_holds(values, other, ts) {
             if known
                 .iter()
                 .any(|k| k.start < hold.samples.end && hold.samples.start < k.end)

@@ -19,7 +19,7 @@
 //!    than [`MIN_ADVANTAGE_SHARE`] of the reduction, or the pushes leave more than [`MIN_SUM_RATIO`] times as much
 //!    (several faulty samples of a smooth channel give a few more large innovations than there are pushes, and their
 //!    squares make up nearly all of S);
-//! 3. leaves no innovation beyond [`LARGEST_INNOVATION`] sigma (or at most a twentieth of S);
+//! 3. leaves no innovation beyond [`MAX_INNOVATION`] sigma (or at most a twentieth of S);
 //! 4. moves a sample by more than [`MIN_CHANGE`] deviations of the channel, and by more than two of its quantisation
 //!    steps.
 //!
@@ -36,8 +36,8 @@ use std::ops::Range;
 
 use super::{
     autoregression::{Autoregression, NOISE_FLOOR},
-    interpolation::{Interpolation, apply},
-    robust::{level_and_deviation, median, quantum},
+    interpolation::{Interpolation, apply_change},
+    robust::{level_and_deviation, median, quantisation_step},
 };
 
 /// Square root of the minimum reduction of S.
@@ -50,14 +50,14 @@ const MIN_ADVANTAGE_SHARE: f64 = 0.2;
 /// advantage of faults is less than the share [`MIN_ADVANTAGE_SHARE`].
 const MIN_SUM_RATIO: f64 = 20.0;
 /// Largest innovation that may remain after interpolation, as a multiple of sigma.
-const LARGEST_INNOVATION: f64 = 5.0;
+const MAX_INNOVATION: f64 = 5.0;
 /// Innovation at which a search for a fault starts, as a multiple of sigma.
-const SEED: f64 = 4.0;
+const START_INNOVATION: f64 = 4.0;
 /// Minimum change of a faulty sample by interpolation, relative to the deviation of the channel.
 const MIN_CHANGE: f64 = 1.5;
 /// Deviation that no person reaches within a few samples, in robust deviations of the channel.
 const IMPOSSIBLE_DEVIATION: f64 = 20.0;
-const ROUNDS: usize = 4;
+const MAX_ROUNDS: usize = 4;
 
 /// A spike: samples that are not part of the signal.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,29 +70,29 @@ pub(super) struct Spike {
 }
 
 /// Finds the spikes of a channel and bridges them.
-pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
+pub(super) fn find_spikes(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     let (level, deviation) = level_and_deviation(values);
     let mut x: Vec<f64> = values.iter().map(|v| v - level).collect();
-    let step = quantum(values);
+    let step = quantisation_step(values);
     let window = ((1.0 / sample_time_s) as usize).clamp(64, 4096);
     // A spike is at most as long as a fault that is bridged, and has at most 12 samples.
-    let longest = ((super::limits::BRIDGED_S / sample_time_s).round() as usize).clamp(1, 12);
+    let longest = ((super::limits::MAX_BRIDGED_S / sample_time_s).round() as usize).clamp(1, 12);
     let mut found: Vec<Spike> = Vec::new();
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let Some(ar) = Autoregression::of(&x, deviation) else {
             break;
         };
         let mut eps = ar.residuals(&x);
-        let sigma = scales(&eps, window, (NOISE_FLOOR * deviation).max(step) * ar.norm());
+        let sigma = innovation_scales(&eps, window, (NOISE_FLOOR * deviation).max(step) * ar.norm());
         let search = Search {
             ar: &ar,
             sigma: &sigma,
             smallest: (MIN_CHANGE * deviation).max(2.0 * step),
             deviation,
             longest,
-            reach: reach(&ar),
+            reach: effective_length(&ar),
         };
-        let mut new = search.round(&mut x, &mut eps);
+        let mut new = search.search_round(&mut x, &mut eps);
         new.extend(search.search_start(&mut x));
         if new.is_empty() {
             break;
@@ -104,7 +104,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
             values[t] = level + x[t];
         }
     }
-    joined(found)
+    join_adjacent(found)
 }
 
 /// Replaces these samples by an interpolation from their neighbours.
@@ -116,14 +116,14 @@ pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     };
     let eps = ar.residuals(&x);
     let found = Interpolation::new(&ar, &eps, samples.start, samples.len());
-    let m = found.most();
+    let m = found.max_samples();
     for (t, change) in samples.zip(found.change(m)) {
         values[t] += change;
     }
 }
 
 /// Returns the lag up to which the coefficients of the autoregression make up 95 % of `|a|^2`.
-fn reach(ar: &Autoregression) -> usize {
+fn effective_length(ar: &Autoregression) -> usize {
     let total = ar.norm().powi(2);
     let mut sum = 0.0;
     let held = ar.a.iter().position(|a| {
@@ -135,7 +135,7 @@ fn reach(ar: &Autoregression) -> usize {
 
 /// Returns the scale of the innovations in each window: the largest of the scales of the window, its neighbours and the
 /// whole channel, and at least `least`.
-pub(super) fn scales(eps: &[f64], window: usize, least: f64) -> Scales {
+pub(super) fn innovation_scales(eps: &[f64], window: usize, least: f64) -> Scales {
     let sizes: Vec<f64> = eps.iter().map(|e| e.abs()).collect();
     let of = |part: &[f64]| median(part) / 0.674_489_75;
     let all = of(&sizes).max(least);
@@ -177,7 +177,7 @@ impl Search<'_> {
         let length = x.len().min(8 * p);
         let mut backwards: Vec<f64> = x[..length].iter().rev().copied().collect();
         let mut eps = self.ar.residuals(&backwards);
-        let found = self.round(&mut backwards, &mut eps);
+        let found = self.search_round(&mut backwards, &mut eps);
         let mut kept = Vec::new();
         for spike in found.into_iter().filter(|spike| spike.samples.start >= length - p) {
             let samples = length - spike.samples.end..length - spike.samples.start;
@@ -189,17 +189,17 @@ impl Search<'_> {
         kept
     }
 
-    fn round(&self, x: &mut [f64], eps: &mut [f64]) -> Vec<Spike> {
+    fn search_round(&self, x: &mut [f64], eps: &mut [f64]) -> Vec<Spike> {
         let mut found = Vec::new();
         let mut t = self.ar.order();
         while t < x.len() {
-            if eps[t].abs() <= SEED * self.sigma.at(t) {
+            if eps[t].abs() <= START_INNOVATION * self.sigma.at(t) {
                 t += 1;
                 continue;
             }
             match self.at(x, eps, t) {
                 Some((spike, delta)) => {
-                    apply(self.ar, eps, t, &delta);
+                    apply_change(self.ar, eps, t, &delta);
                     for (k, change) in spike.samples.clone().zip(&delta) {
                         x[k] += change;
                     }
@@ -216,8 +216,8 @@ impl Search<'_> {
     fn at(&self, x: &[f64], eps: &[f64], start: usize) -> Option<(Spike, Vec<f64>)> {
         let sigma = self.sigma.at(start);
         let all = Interpolation::new(self.ar, eps, start, self.longest);
-        for m in 1..=all.most() {
-            let fall = all.fall(m) / (sigma * sigma);
+        for m in 1..=all.max_samples() {
+            let fall = all.sum_decrease(m) / (sigma * sigma);
             if fall < ROOT_OF_MIN_REDUCTION * ROOT_OF_MIN_REDUCTION {
                 continue;
             }
@@ -231,7 +231,7 @@ impl Search<'_> {
                 continue;
             }
             let mut after = eps[rows.start..(start + m + self.ar.order()).min(eps.len())].to_vec();
-            self.apply_from(&mut after, rows.start, start, &delta);
+            self.apply_change_from(&mut after, rows.start, start, &delta);
             let left: Vec<f64> = after[..rows.len()].iter().map(|e| (e / sigma).powi(2)).collect();
             let mut before: Vec<f64> = eps[rows].iter().map(|e| (e / sigma).powi(2)).collect();
             let total: f64 = before.iter().sum();
@@ -240,7 +240,7 @@ impl Search<'_> {
             let left_by_pushes: f64 = before.iter().skip(m).sum();
             let better = left_by_pushes - left_by_faults;
             let largest = left.iter().copied().fold(0.0, f64::max);
-            let clean = largest <= LARGEST_INNOVATION * LARGEST_INNOVATION || left_by_faults <= 0.05 * total;
+            let clean = largest <= MAX_INNOVATION * MAX_INNOVATION || left_by_faults <= 0.05 * total;
             let decisive = left_by_pushes > MIN_SUM_RATIO * left_by_faults.max(left.len() as f64);
             let is_fault = clean
                 && better > ROOT_OF_MIN_ADVANTAGE * ROOT_OF_MIN_ADVANTAGE
@@ -262,8 +262,8 @@ impl Search<'_> {
         None
     }
 
-    /// Updates the innovations as [`apply`] does, for an array that starts at row `first`.
-    fn apply_from(&self, eps: &mut [f64], first: usize, start: usize, delta: &[f64]) {
+    /// Updates the innovations as [`apply_change`] does, for an array that starts at row `first`.
+    fn apply_change_from(&self, eps: &mut [f64], first: usize, start: usize, delta: &[f64]) {
         for (i, change) in delta.iter().enumerate() {
             for (lag, a) in self.ar.a.iter().enumerate() {
                 let row = (start + i + lag).checked_sub(first);
@@ -276,7 +276,7 @@ impl Search<'_> {
 }
 
 /// Joins adjacent spikes into one.
-fn joined(mut all: Vec<Spike>) -> Vec<Spike> {
+fn join_adjacent(mut all: Vec<Spike>) -> Vec<Spike> {
     all.sort_by_key(|spike| spike.samples.start);
     let mut joined: Vec<Spike> = Vec::new();
     for spike in all {
@@ -296,15 +296,15 @@ fn joined(mut all: Vec<Spike>) -> Vec<Spike> {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::test_signals::autoregressive, *};
+    use super::{super::test_signals::autoregressive_signal, *};
 
     #[test]
     fn spike_is_found_and_response_to_a_push_is_not() {
-        let clean = autoregressive(4000, 11);
-        assert!(find(&mut clean.clone(), 0.01).is_empty());
+        let clean = autoregressive_signal(4000, 11);
+        assert!(find_spikes(&mut clean.clone(), 0.01).is_empty());
         let mut faulty = clean.clone();
         faulty[2000] += 30.0;
-        let found = find(&mut faulty, 0.01);
+        let found = find_spikes(&mut faulty, 0.01);
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].samples, 2000..2001);
         assert!((found[0].size - 30.0).abs() < 3.0, "{found:?}");
@@ -317,16 +317,16 @@ mod tests {
             *v += one;
             (one, two) = (1.6 * one - 0.8 * two, one);
         }
-        assert!(find(&mut pushed, 0.01).is_empty());
+        assert!(find_spikes(&mut pushed, 0.01).is_empty());
     }
 
     #[test]
     fn adjacent_and_boundary_spikes_are_found() {
-        let clean = autoregressive(3000, 2);
+        let clean = autoregressive_signal(3000, 2);
         for places in [&[5_usize, 6, 7][..], &[2999], &[0], &[1000, 1004], &[1500, 1514, 1530]] {
             let mut faulty = clean.clone();
             places.iter().for_each(|t| faulty[*t] += 150.0);
-            let found = find(&mut faulty, 0.01);
+            let found = find_spikes(&mut faulty, 0.01);
             for t in places {
                 assert!(found.iter().any(|s| s.samples.contains(t)), "{places:?} {found:?}");
             }
@@ -337,14 +337,14 @@ mod tests {
 
     #[test]
     fn empty_constant_and_short_channels_have_no_spikes() {
-        assert!(find(&mut [], 0.01).is_empty());
-        assert!(find(&mut [1.0; 500], 0.01).is_empty());
-        assert!(find(&mut [1.0, 2.0, 3.0], 0.01).is_empty());
+        assert!(find_spikes(&mut [], 0.01).is_empty());
+        assert!(find_spikes(&mut [1.0; 500], 0.01).is_empty());
+        assert!(find_spikes(&mut [1.0, 2.0, 3.0], 0.01).is_empty());
     }
 
     #[test]
     fn bridge_is_the_conditional_expectation() {
-        let clean = autoregressive(2000, 8);
+        let clean = autoregressive_signal(2000, 8);
         let mut broken = clean.clone();
         broken[700..705].fill(1e3);
         bridge(&mut broken, 700..705);

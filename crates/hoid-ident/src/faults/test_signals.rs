@@ -1,7 +1,7 @@
 //! A channel for the tests of this folder.
 
 /// `x(t) = 1.6 x(t-1) - 0.8 x(t-2) + eps(t)` with eps of unit variance, nearly normal.
-pub fn autoregressive(n: usize, seed: u64) -> Vec<f64> {
+pub fn autoregressive_signal(n: usize, seed: u64) -> Vec<f64> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
     let mut draw = || {
         state = state

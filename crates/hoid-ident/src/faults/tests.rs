@@ -21,17 +21,17 @@ fn run(condition: Condition, seed: u64) -> Record {
 }
 
 /// Returns the record with changed signals.
-fn with(record: &Record, change: impl FnOnce(&mut Vec<f64>, &mut Vec<f64>)) -> Record {
+fn with_signals(record: &Record, change: impl FnOnce(&mut Vec<f64>, &mut Vec<f64>)) -> Record {
     let (mut e, mut u) = (record.input().to_vec(), record.output().to_vec());
     change(&mut e, &mut u);
     Record::new(record.sample_time(), Channel::new("e", "", e), Channel::new("u", "", u)).unwrap()
 }
 
-fn repaired(record: &Record) -> RepairedRecord {
+fn repair_by_bridging(record: &Record) -> RepairedRecord {
     repair(record, FaultHandling::Bridge).unwrap()
 }
 
-fn kinds(found: &[Fault]) -> Vec<FaultKind> {
+fn fault_kinds(found: &[Fault]) -> Vec<FaultKind> {
     found.iter().map(|f| f.kind).collect()
 }
 
@@ -39,7 +39,7 @@ fn kinds(found: &[Fault]) -> Vec<FaultKind> {
 fn clean_runs_have_no_faults_and_are_unchanged() {
     for condition in Condition::ALL {
         let record = run(condition, 17);
-        let found = repaired(&record);
+        let found = repair_by_bridging(&record);
         assert!(
             found.faults.is_empty() && found.findings.is_empty(),
             "{condition:?} {:?}",
@@ -54,9 +54,9 @@ fn clean_runs_have_no_faults_and_are_unchanged() {
             let person = Person::draw(&population, &task, plant, None, remnant, 40 + k as u64, 0).unwrap();
             let record = person.run(1).unwrap().record;
             assert!(
-                repaired(&record).faults.is_empty(),
+                repair_by_bridging(&record).faults.is_empty(),
                 "{remnant} {plant:?} {:?}",
-                repaired(&record).faults
+                repair_by_bridging(&record).faults
             );
         }
     }
@@ -67,11 +67,11 @@ fn short_bursts_of_any_sign_are_found() {
     for signs in [&[-1.0, 1.0][..], &[1.0, 1.0], &[1.0, -1.0, 1.0, 1.0, -1.0], &[1.0; 8]] {
         for place in [490, 4000] {
             let clean = run(Condition::C1, 5);
-            let record = with(&clean, |e, _| {
+            let record = with_signals(&clean, |e, _| {
                 (0..signs.len()).for_each(|k| e[place + k] += 7.0 * signs[k]);
             });
-            let found = repaired(&record);
-            assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{signs:?} {place}");
+            let found = repair_by_bridging(&record);
+            assert_eq!(fault_kinds(&found.faults), [FaultKind::Spike], "{signs:?} {place}");
             let fault = &found.faults[0];
             let first = (fault.from_s - record.time_s(place)) / record.sample_time().s();
             assert!(first.abs() < 1.5 && fault.samples <= signs.len() + 2, "{fault}");
@@ -85,9 +85,9 @@ fn short_bursts_of_any_sign_are_found() {
 fn spike_of_the_error_is_found_and_bridged() {
     for (condition, place) in [(Condition::C1, 4000), (Condition::C3, 700), (Condition::C6, 7000)] {
         let clean = run(condition, 5);
-        let record = with(&clean, |e, _| e[place] = 30.0);
-        let found = repaired(&record);
-        assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{:?}", found.faults);
+        let record = with_signals(&clean, |e, _| e[place] = 30.0);
+        let found = repair_by_bridging(&record);
+        assert_eq!(fault_kinds(&found.faults), [FaultKind::Spike], "{:?}", found.faults);
         let fault = &found.faults[0];
         assert_eq!((fault.channel.as_str(), fault.action), ("e", FaultAction::Bridged));
         assert_eq!(fault.from_s, record.time_s(place));
@@ -109,20 +109,20 @@ fn spike_of_the_error_is_found_and_bridged() {
 fn spike_of_the_output_is_found() {
     let clean = run(Condition::C1, 9);
     let deviation = (clean.output().iter().map(|u| u * u).sum::<f64>() / clean.len() as f64).sqrt();
-    let found = repaired(&with(&clean, |_, u| u[3000] += 10.0 * deviation));
-    assert_eq!(kinds(&found.faults), [FaultKind::Spike], "{:?}", found.faults);
+    let found = repair_by_bridging(&with_signals(&clean, |_, u| u[3000] += 10.0 * deviation));
+    assert_eq!(fault_kinds(&found.faults), [FaultKind::Spike], "{:?}", found.faults);
     assert_eq!(found.faults[0].channel, "u");
 }
 
 #[test]
 fn idle_span_before_a_run_is_cut() {
     let clean = run(Condition::C1, 3);
-    let record = with(&clean, |e, u| {
+    let record = with_signals(&clean, |e, u| {
         e.splice(0..0, vec![0.0; 1500]);
         u.splice(0..0, vec![0.0; 1500]);
     });
-    let found = repaired(&record);
-    assert_eq!(kinds(&found.faults), [FaultKind::Idle], "{:?}", found.faults);
+    let found = repair_by_bridging(&record);
+    assert_eq!(fault_kinds(&found.faults), [FaultKind::Idle], "{:?}", found.faults);
     assert_eq!((found.faults[0].action, found.segments.len()), (FaultAction::Cut, 1));
     assert!((found.segments[0].time_s(0) - 15.0).abs() < 0.1);
     assert_eq!(found.findings[0].severity, Severity::Note);
@@ -131,25 +131,27 @@ fn idle_span_before_a_run_is_cut() {
 #[test]
 fn frozen_output_scale_change_and_step_cut_the_record() {
     let clean = run(Condition::C1, 4);
-    let frozen = repaired(&with(&clean, |_, u| {
+    let frozen = repair_by_bridging(&with_signals(&clean, |_, u| {
         let held = u[2000];
         u[2000..2400].fill(held);
     }));
-    assert_eq!(kinds(&frozen.faults), [FaultKind::Frozen], "{:?}", frozen.faults);
+    assert_eq!(fault_kinds(&frozen.faults), [FaultKind::Frozen], "{:?}", frozen.faults);
     assert_eq!((frozen.faults[0].samples, frozen.segments.len()), (400, 2));
-    let scaled = repaired(&with(&clean, |e, u| {
+    let scaled = repair_by_bridging(&with_signals(&clean, |e, u| {
         e[1000..3000].iter_mut().for_each(|v| *v *= 1e6);
         u[1000..3000].iter_mut().for_each(|v| *v *= 1e6);
     }));
     assert!(
-        kinds(&scaled.faults).iter().all(|k| *k == FaultKind::Scale),
+        fault_kinds(&scaled.faults).iter().all(|k| *k == FaultKind::Scale),
         "{:?}",
         scaled.faults
     );
     let largest = |r: &Record| r.input().iter().fold(0.0_f64, |m, v| m.max(v.abs()));
     assert!(scaled.segments.iter().all(|r| largest(r) < 100.0));
-    let stepped = repaired(&with(&clean, |e, _| e[4000..].iter_mut().for_each(|v| *v += 40.0)));
-    assert_eq!(kinds(&stepped.faults), [FaultKind::Step], "{:?}", stepped.faults);
+    let stepped = repair_by_bridging(&with_signals(&clean, |e, _| {
+        e[4000..].iter_mut().for_each(|v| *v += 40.0)
+    }));
+    assert_eq!(fault_kinds(&stepped.faults), [FaultKind::Step], "{:?}", stepped.faults);
     assert_eq!(stepped.segments.iter().map(Record::len).sum::<usize>(), clean.len());
 }
 
@@ -162,14 +164,14 @@ fn time_in_milliseconds_is_not_determined() {
         Channel::new("u", "", clean.output().to_vec()),
     )
     .unwrap();
-    let found = repaired(&record);
-    assert_eq!(kinds(&found.faults), [FaultKind::TimeUnit]);
+    let found = repair_by_bridging(&record);
+    assert_eq!(fault_kinds(&found.faults), [FaultKind::TimeUnit]);
     // A wait of 50 samples is not reported as an idle stretch of 500 s.
-    let waits = with(&record, |e, u| {
+    let waits = with_signals(&record, |e, u| {
         e[400..450].fill(0.0);
         u[400..450].fill(0.0);
     });
-    assert_eq!(kinds(&repaired(&waits).faults), [FaultKind::TimeUnit]);
+    assert_eq!(fault_kinds(&repair_by_bridging(&waits).faults), [FaultKind::TimeUnit]);
     assert_eq!(found.findings[0].severity, Severity::Undetermined);
 }
 
@@ -178,14 +180,14 @@ fn unusable_record_is_undetermined() {
     let ts = SampleTime::new(0.01).unwrap();
     let active = |t: usize| t % 300 < 100;
     let bursts = |seed| -> Vec<f64> {
-        let all = super::test_signals::autoregressive(3000, seed);
+        let all = super::test_signals::autoregressive_signal(3000, seed);
         all.iter()
             .enumerate()
             .map(|(t, v)| if active(t) { *v } else { 0.0 })
             .collect()
     };
     let record = Record::new(ts, Channel::new("e", "", bursts(3)), Channel::new("u", "", bursts(4))).unwrap();
-    let found = repaired(&record);
+    let found = repair_by_bridging(&record);
     assert_eq!(found.findings[0].severity, Severity::Doubt, "{:?}", found.findings);
     assert_eq!(
         found.findings.last().unwrap().severity,
@@ -199,18 +201,18 @@ fn unusable_record_is_undetermined() {
 #[test]
 fn output_only_and_short_records_are_accepted() {
     let ts = SampleTime::new(0.01).unwrap();
-    let mut u = super::test_signals::autoregressive(3000, 3);
+    let mut u = super::test_signals::autoregressive_signal(3000, 3);
     u[1000] += 50.0;
-    let record = Record::of_output(ts, Channel::new("u", "", u)).unwrap();
-    assert_eq!(kinds(&repaired(&record).faults), [FaultKind::Spike]);
-    let short = Record::of_output(ts, Channel::new("u", "", vec![1.0, 5.0, 2.0])).unwrap();
-    assert!(repaired(&short).faults.is_empty());
+    let record = Record::from_output(ts, Channel::new("u", "", u)).unwrap();
+    assert_eq!(fault_kinds(&repair_by_bridging(&record).faults), [FaultKind::Spike]);
+    let short = Record::from_output(ts, Channel::new("u", "", vec![1.0, 5.0, 2.0])).unwrap();
+    assert!(repair_by_bridging(&short).faults.is_empty());
 }
 
 #[test]
 fn exchanged_channels_and_wrong_sign_are_found() {
-    let exchanged = |r: &Record| with(r, std::mem::swap);
-    let turned = |r: &Record| with(r, |_, u| u.iter_mut().for_each(|v| *v = -*v));
+    let exchanged = |r: &Record| with_signals(r, std::mem::swap);
+    let turned = |r: &Record| with_signals(r, |_, u| u.iter_mut().for_each(|v| *v = -*v));
     let (population, task) = (Population::default(), Task::default());
     let people = Plant::ALL.map(|plant| {
         let person = Person::draw(&population, &task, plant, None, RemnantKind::BroadBand, 7, 0).unwrap();
@@ -218,9 +220,12 @@ fn exchanged_channels_and_wrong_sign_are_found() {
     });
     let runs = [Condition::C1, Condition::C2].map(|c| run(c, 8));
     for record in runs.iter().chain(&people) {
-        assert_eq!(kinds(&repaired(&exchanged(record)).faults), [FaultKind::Exchanged]);
-        let found = repaired(&turned(record));
-        assert_eq!(kinds(&found.faults), [FaultKind::Sign]);
+        assert_eq!(
+            fault_kinds(&repair_by_bridging(&exchanged(record)).faults),
+            [FaultKind::Exchanged]
+        );
+        let found = repair_by_bridging(&turned(record));
+        assert_eq!(fault_kinds(&found.faults), [FaultKind::Sign]);
         assert_eq!(found.findings[0].severity, Severity::Doubt);
     }
 }

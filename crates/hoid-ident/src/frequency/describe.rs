@@ -4,11 +4,11 @@ use hoid_model::{Channel, Complex64, Record, uncertainty::Estimate};
 use hoid_numerics::statistics::root_mean_square;
 
 use super::{
-    excitation::{Excitation, channel_of, refuse},
+    excitation::{Excitation, channel_values, refuse},
     options::{Averaging, DescribingOptions, Realisation},
-    ratio::{Ratio, deviation, mean},
-    remnant::{Control, RemnantBand, share_and_ratio, spectrum},
-    window::{Window, advanced},
+    ratio::{Ratio, mean, standard_deviation},
+    remnant::{ControlSpectrum, RemnantBand, remnant_share_and_noise_ratio, spectrum},
+    window::{Window, shifted_coefficients},
 };
 use crate::{IdentError, informative_data::common_sample_time};
 
@@ -17,7 +17,7 @@ use crate::{IdentError, informative_data::common_sample_time};
 const MIN_LINE_AMPLITUDE: f64 = 1e-12;
 
 /// Number of bins at non-excited frequencies from which the remnant at a line is estimated.
-const NEIGHBOURS: usize = 8;
+const NEIGHBOUR_COUNT: usize = 8;
 
 /// The describing function H at one line.
 #[derive(Debug, Clone, PartialEq)]
@@ -162,9 +162,9 @@ pub fn describe(
         line.neighbour_error = neighbour_error(&runs, line, excitation.harmonics());
     }
 
-    let controls: Vec<Control<'_>> = runs
+    let controls: Vec<ControlSpectrum<'_>> = runs
         .iter()
-        .map(|run| Control {
+        .map(|run| ControlSpectrum {
             coefficients: &run.u,
             window: run.window,
         })
@@ -174,7 +174,8 @@ pub fn describe(
         .iter()
         .zip(&controls)
         .map(|(run, control)| {
-            let (share, ratio) = share_and_ratio(control, excitation.harmonics(), ts_s, &remnant_spectrum);
+            let (share, ratio) =
+                remnant_share_and_noise_ratio(control, excitation.harmonics(), ts_s, &remnant_spectrum);
             RunSummary {
                 label: run.label.clone(),
                 periods: run.window.periods,
@@ -198,7 +199,7 @@ pub fn describe(
 }
 
 fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions) -> Result<Vec<Run>, IdentError> {
-    let window = Window::of_span(record, options.from_s, options.to_s, excitation.period_s())?;
+    let window = Window::from_span(record, options.from_s, options.to_s, excitation.period_s())?;
     let bin = |n: usize| n.saturating_mul(window.periods);
     let beyond = |n: &&usize| bin(**n).saturating_mul(2) >= window.samples;
     if let Some(n) = excitation.harmonics().iter().find(beyond) {
@@ -226,15 +227,19 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
         }
     }
     let reference = match &options.averaging {
-        Averaging::Reference { channel } => Some(channel_of(record, channel, "the channel of the excitation")?),
+        Averaging::Reference { channel } => Some(channel_values(record, channel, "the channel of the excitation")?),
         _ => None,
     };
     let element = match &options.element {
         None => None,
         Some(element) => {
-            let output = channel_of(record, &element.output, "the output of the controlled element")?;
+            let output = channel_values(record, &element.output, "the output of the controlled element")?;
             let disturbance = match &element.disturbance {
-                Some(name) => Some(channel_of(record, name, "the disturbance of the controlled element")?),
+                Some(name) => Some(channel_values(
+                    record,
+                    name,
+                    "the disturbance of the controlled element",
+                )?),
                 None => None,
             };
             Some((output, disturbance))
@@ -245,11 +250,11 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
         Realisation::Period => window.single_periods(),
     };
     let run = |window: Window| -> Result<Run, IdentError> {
-        let (e, _) = window.samples_of(record.input(), 0.0);
-        let (u, late) = window.samples_of(record.output(), options.offset_samples);
+        let (e, _) = window.shifted_samples(record.input(), 0.0);
+        let (u, late) = window.shifted_samples(record.output(), options.offset_samples);
         let channel = |name: &str, values: &[f64]| Channel::new(name, "", values.to_vec());
         let pair = Record::new(record.sample_time(), channel("e", e), channel("u", u))?.detrended(options.detrend);
-        let control = advanced(pair.output(), late);
+        let control = shifted_coefficients(pair.output(), late);
         let element = element.map(|(output, disturbance)| {
             let mut input = control.clone();
             if let Some(d) = disturbance {
@@ -262,7 +267,7 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
         Ok(Run {
             label: record.label().to_owned(),
             window,
-            e: advanced(pair.input(), 0.0),
+            e: shifted_coefficients(pair.input(), 0.0),
             u: control,
             reference: reference.map(|r| window.coefficients(r, 0.0)),
             element,
@@ -350,8 +355,8 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
             omega_rad_s,
         });
     }
-    let per_run = ratio.per_run();
-    let parts = |get: fn(&Complex64) -> f64| deviation(&per_run.iter().map(get).collect::<Vec<f64>>());
+    let per_run = ratio.run_ratios();
+    let parts = |get: fn(&Complex64) -> f64| standard_deviation(&per_run.iter().map(get).collect::<Vec<f64>>());
     let spread = parts(|h| h.re).zip(parts(|h| h.im)).map(|(re, im)| re.hypot(im));
     Ok(Line {
         omega_rad_s,
@@ -378,7 +383,7 @@ fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
         let at = line.harmonic * periods;
         let mut nearby_bins: Vec<usize> = (1..run.e.len()).filter(|&k| !is_line(k)).collect();
         nearby_bins.sort_by_key(|k| k.abs_diff(at));
-        nearby_bins.truncate(NEIGHBOURS);
+        nearby_bins.truncate(NEIGHBOUR_COUNT);
         let power = |k: &usize| (run.u[*k] - line.response * run.e[*k]).norm_sqr();
         let mean = nearby_bins.iter().map(power).sum::<f64>() / nearby_bins.len() as f64;
         // Squared modulus of the weight of the run in the average, such as |D_i|^2.

@@ -16,7 +16,7 @@ use hoid_model::{ContinuousTransferFunction, Detrend, Record, Verdict, uncertain
 use super::{
     describe::{DescribingFunction, describe},
     diagnostics::{DiagnosticInputs, findings},
-    excitation::{Excitation, LineSearch, refuse},
+    excitation::{Excitation, LineDetectionOptions, refuse},
     gain_lead_delay::GainLeadDelayOptions,
     open_loop::DescribingMargins,
     options::{Averaging, DescribingOptions, Realisation},
@@ -88,7 +88,7 @@ impl Description {
 /// Computes the description of one or several records: describing function, margins and verdict.
 ///
 /// # Errors
-/// [`IdentError::BadOption`] if no excitation is found, and the errors of [`describe()`] and [`Excitation::found_in`].
+/// [`IdentError::BadOption`] if no excitation is found, and the errors of [`describe()`] and [`Excitation::detect`].
 pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result<Description, IdentError> {
     let (from_s, to_s) = (options.from_s, options.to_s);
     let cut = |r: &Record| match (from_s, to_s) {
@@ -104,7 +104,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
     let (excitation, channel) = excitation_of(first, options)?;
     let periods: Result<Vec<usize>, IdentError> = parts
         .iter()
-        .map(|part| Window::of_span(part, None, None, excitation.period_s()).map(|w| w.periods))
+        .map(|part| Window::from_span(part, None, None, excitation.period_s()).map(|w| w.periods))
         .collect();
     let realisation = match (parts.len() >= MIN_RUNS, periods?.iter().sum::<usize>()) {
         (false, 2..) => Realisation::Period,
@@ -126,7 +126,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         ..DescribingOptions::default()
     };
     let function = describe(records, &excitation, &describing)?;
-    let delay_s = delay_of(&function);
+    let delay_s = fitted_delay_s(&function);
     let open_loop = options
         .controlled_element
         .as_ref()
@@ -154,7 +154,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
 
 /// Returns the delay of a gain-lead-delay model fitted to the lines; if the lead is negative, the delay of a model
 /// without a lead. Returns zero if the fit fails or the delay is not plausible.
-fn delay_of(function: &DescribingFunction) -> f64 {
+fn fitted_delay_s(function: &DescribingFunction) -> f64 {
     let fit = |lead| {
         let options = GainLeadDelayOptions {
             lead,
@@ -172,9 +172,9 @@ fn delay_of(function: &DescribingFunction) -> f64 {
 
 /// Returns the excitation and the name of its channel, which is `None` if only the lines are known.
 fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excitation, Option<String>), IdentError> {
-    let search = LineSearch {
+    let search = LineDetectionOptions {
         period_s: options.period_s,
-        ..LineSearch::default()
+        ..LineDetectionOptions::default()
     };
     let given = match (&options.lines_rad_s, options.period_s) {
         (None, _) => None,
@@ -190,7 +190,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
     if let Some(channel) = &options.excitation {
         let found = match given {
             Some(given) => given,
-            None => Excitation::found_in(record, channel, &search)?,
+            None => Excitation::detect(record, channel, &search)?,
         };
         return Ok((found, Some(channel.clone())));
     }
@@ -201,7 +201,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
     };
     let mut reason = None;
     for name in there() {
-        match (Excitation::found_in(record, name, &search), &given) {
+        match (Excitation::detect(record, name, &search), &given) {
             (Ok(found), None) => return Ok((found, Some(name.to_owned()))),
             (Ok(found), Some(given)) if found == *given => return Ok((found, Some(name.to_owned()))),
             (Ok(_), Some(_)) => {}

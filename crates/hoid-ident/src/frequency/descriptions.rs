@@ -11,7 +11,7 @@ use hoid_sim::{RunSeed, Simulator};
 use super::*;
 use crate::IdentError;
 
-const PERIOD: usize = 200;
+const PERIOD_SAMPLES: usize = 200;
 const HARMONICS: [usize; 5] = [2, 5, 9, 14, 23];
 
 fn runs(n: u64) -> Vec<Record> {
@@ -31,13 +31,13 @@ fn element() -> ContinuousTransferFunction {
     initial.controlled_element.transfer_function().unwrap()
 }
 
-fn kinds(found: &Description) -> Vec<&'static str> {
+fn finding_kinds(found: &Description) -> Vec<&'static str> {
     found.verdict.findings().iter().map(|f| f.kind).collect()
 }
 
 /// Returns sample k of an excitation with five lines and a period of 20 s.
 fn excitation(k: usize) -> f64 {
-    let wave = |h: usize| (TAU * (h * k) as f64 / PERIOD as f64 + h as f64).sin();
+    let wave = |h: usize| (TAU * (h * k) as f64 / PERIOD_SAMPLES as f64 + h as f64).sin();
     HARMONICS.iter().map(|h| wave(*h)).sum()
 }
 
@@ -68,7 +68,7 @@ fn record(samples: usize, e: impl Fn(usize) -> f64, u: impl Fn(usize) -> f64) ->
 }
 
 #[test]
-fn defaults_describe_several_runs() {
+fn default_options_describe_several_runs() {
     let (records, element) = (runs(5), element());
     let options = DescriptionOptions {
         controlled_element: Some(element.clone()),
@@ -112,22 +112,22 @@ fn defaults_describe_several_runs() {
 }
 
 #[test]
-fn single_run_is_doubtful_with_a_reason() {
+fn single_run_is_doubtful() {
     let records = runs(1);
     let found = describe_runs(&records, &DescriptionOptions::default()).unwrap();
     assert_eq!((found.realisation, found.function.runs.len()), (Realisation::Record, 1));
     assert_eq!(
-        (found.verdict.level, kinds(&found)),
+        (found.verdict.level, finding_kinds(&found)),
         (VerdictLevel::Doubtful, vec!["few-runs"])
     );
     assert!(found.phases_deg().iter().all(|p| p.standard_error.is_none()));
     // Four periods of one run, with little noise.
-    let rough = noise(3, 4 * PERIOD);
-    let one = record(4 * PERIOD, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
+    let rough = noise(3, 4 * PERIOD_SAMPLES);
+    let one = record(4 * PERIOD_SAMPLES, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
     let found = describe_runs(std::slice::from_ref(&one), &DescriptionOptions::default()).unwrap();
     assert_eq!((found.realisation, found.function.runs.len()), (Realisation::Period, 4));
     assert_eq!(
-        (found.verdict.level, kinds(&found)),
+        (found.verdict.level, finding_kinds(&found)),
         (VerdictLevel::Trustworthy, vec!["periods-as-runs"])
     );
     // The zero target r is skipped in the search for the excitation.
@@ -138,7 +138,10 @@ fn single_run_is_doubtful_with_a_reason() {
         ..DescriptionOptions::default()
     };
     let found = describe_runs(&[one], &span).unwrap();
-    assert_eq!((found.function.runs.len(), kinds(&found)), (2, vec!["few-runs"]));
+    assert_eq!(
+        (found.function.runs.len(), finding_kinds(&found)),
+        (2, vec!["few-runs"])
+    );
 }
 
 #[test]
@@ -148,36 +151,38 @@ fn unrelated_runs_are_not_determined() {
     // error is 0.011.
     let mut followed = 0;
     for stream in 0..400 {
-        let u = noise(stream, 2 * PERIOD);
-        let found = describe_runs(&[record(2 * PERIOD, excitation, |k| u[k])], &options).unwrap();
+        let u = noise(stream, 2 * PERIOD_SAMPLES);
+        let found = describe_runs(&[record(2 * PERIOD_SAMPLES, excitation, |k| u[k])], &options).unwrap();
         if found.verdict.level == VerdictLevel::NotDetermined {
-            assert!(kinds(&found).contains(&"unrelated"));
+            assert!(finding_kinds(&found).contains(&"unrelated"));
         } else {
             followed += 1;
         }
     }
     assert!((7..=33).contains(&followed), "{followed}");
     // Some lines are lost in noise, others are not.
-    let slow = |k: usize| (TAU * (2 * k) as f64 / PERIOD as f64).sin() + (TAU * (5 * k) as f64 / PERIOD as f64).sin();
+    let slow = |k: usize| {
+        (TAU * (2 * k) as f64 / PERIOD_SAMPLES as f64).sin() + (TAU * (5 * k) as f64 / PERIOD_SAMPLES as f64).sin()
+    };
     let runs: Vec<Record> = (0..6)
         .map(|i| {
-            let rough = noise(900 + i, PERIOD);
-            record(PERIOD, excitation, |k| slow(k) + 0.5 * rough[k])
+            let rough = noise(900 + i, PERIOD_SAMPLES);
+            record(PERIOD_SAMPLES, excitation, |k| slow(k) + 0.5 * rough[k])
         })
         .collect();
     let found = describe_runs(&runs, &options).unwrap();
     assert_eq!(
-        (found.verdict.level, kinds(&found)),
+        (found.verdict.level, finding_kinds(&found)),
         (VerdictLevel::Doubtful, vec!["low-coherence"])
     );
 }
 
 #[test]
 fn crossover_outside_the_measured_lines_is_doubtful() {
-    let rough: Vec<Vec<f64>> = (0..4).map(|i| noise(50 + i, PERIOD)).collect();
+    let rough: Vec<Vec<f64>> = (0..4).map(|i| noise(50 + i, PERIOD_SAMPLES)).collect();
     let runs: Vec<Record> = rough
         .iter()
-        .map(|n| record(PERIOD, excitation, |k| 2.0 * excitation(k) + 0.1 * n[k]))
+        .map(|n| record(PERIOD_SAMPLES, excitation, |k| 2.0 * excitation(k) + 0.1 * n[k]))
         .collect();
     let with = |text: &str| {
         let options = DescriptionOptions {
@@ -196,7 +201,7 @@ fn crossover_outside_the_measured_lines_is_doubtful() {
         ("0.05s/(s+1)", "below"),
     ] {
         let found = with(text);
-        assert_eq!(kinds(&found), ["no-crossover"]);
+        assert_eq!(finding_kinds(&found), ["no-crossover"]);
         assert_eq!(found.verdict.level, VerdictLevel::Doubtful);
         assert!(found.verdict.to_string().contains(expected), "{}", found.verdict);
     }
@@ -204,19 +209,21 @@ fn crossover_outside_the_measured_lines_is_doubtful() {
 
 #[test]
 fn faults_of_the_excitation_are_reported() {
-    let rough = noise(7, 4 * PERIOD);
+    let rough = noise(7, 4 * PERIOD_SAMPLES);
     let of = |samples| record(samples, excitation, |k| 2.0 * excitation(k) + 0.1 * rough[k]);
     // A measured disturbance with noise: its share of the power is 0.0025 of 2.5025.
     let measured = Channel::new(
         "w",
         "",
-        (0..4 * PERIOD).map(|k| excitation(k) + 0.05 * rough[k]).collect(),
+        (0..4 * PERIOD_SAMPLES)
+            .map(|k| excitation(k) + 0.05 * rough[k])
+            .collect(),
     );
     let noisy = DescriptionOptions {
         excitation: Some("w".to_owned()),
         ..DescriptionOptions::default()
     };
-    let found = describe_runs(&[of(4 * PERIOD).with_channel(measured).unwrap()], &noisy).unwrap();
+    let found = describe_runs(&[of(4 * PERIOD_SAMPLES).with_channel(measured).unwrap()], &noisy).unwrap();
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
     assert!(
         found.verdict.to_string().contains("w of run has 0.10 % of its power"),
@@ -230,22 +237,22 @@ fn faults_of_the_excitation_are_reported() {
         period_s: Some(20.0),
         ..DescriptionOptions::default()
     };
-    let found = describe_runs(&[of(4 * PERIOD)], &missing).unwrap();
-    assert_eq!(kinds(&found), ["leakage", "periods-as-runs"]);
+    let found = describe_runs(&[of(4 * PERIOD_SAMPLES)], &missing).unwrap();
+    assert_eq!(finding_kinds(&found), ["leakage", "periods-as-runs"]);
     assert_eq!(found.verdict.level, VerdictLevel::Doubtful);
     // Without the channel of the excitation the average has no reference.
     let alone = DescriptionOptions {
         excitation: None,
         ..missing.clone()
     };
-    let found = describe_runs(&[of(4 * PERIOD)], &alone).unwrap();
-    assert!(found.channel.is_none() && kinds(&found).contains(&"no-reference"));
+    let found = describe_runs(&[of(4 * PERIOD_SAMPLES)], &alone).unwrap();
+    assert!(found.channel.is_none() && finding_kinds(&found).contains(&"no-reference"));
     let late = DescriptionOptions {
         offset_samples: 1.002,
         ..DescriptionOptions::default()
     };
-    let found = describe_runs(&[of(4 * PERIOD)], &late).unwrap();
-    assert!(kinds(&found).contains(&"offset-not-whole"));
+    let found = describe_runs(&[of(4 * PERIOD_SAMPLES)], &late).unwrap();
+    assert!(finding_kinds(&found).contains(&"offset-not-whole"));
 }
 
 #[test]
@@ -255,7 +262,7 @@ fn invalid_requests_are_refused() {
     let message =
         |records: &[Record], options: &DescriptionOptions| describe_runs(records, options).unwrap_err().to_string();
     let ts = SampleTime::new(0.1).unwrap();
-    let wave: Vec<f64> = (0..PERIOD).map(excitation).collect();
+    let wave: Vec<f64> = (0..PERIOD_SAMPLES).map(excitation).collect();
     let bare = Record::new(ts, Channel::new("e", "", wave.clone()), Channel::new("u", "", wave)).unwrap();
     let text = message(std::slice::from_ref(&bare), &options);
     assert!(
@@ -273,9 +280,9 @@ fn invalid_requests_are_refused() {
     };
     assert!(message(&[bare], &named).contains("one of e, u"));
     // The span is not a whole number of periods; this is reported for the channel that exists.
-    let half = record(PERIOD * 5 / 4, excitation, excitation);
+    let half = record(PERIOD_SAMPLES * 5 / 4, excitation, excitation);
     assert!(message(&[half], &options).contains("whole periods"));
-    let twice = record(PERIOD, excitation, |k| 2.0 * excitation(k));
+    let twice = record(PERIOD_SAMPLES, excitation, |k| 2.0 * excitation(k));
     let nonsense = DescriptionOptions {
         from_s: Some(5.0),
         to_s: Some(1.0),

@@ -23,7 +23,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
     describe::DescribingFunction,
-    excitation::{Excitation, channel_of},
+    excitation::{Excitation, channel_values},
     open_loop::{DescribingMargins, OpenLoop},
     options::Realisation,
     spectrum::{coefficients, power},
@@ -34,10 +34,10 @@ use crate::IdentError;
 /// Significance level of the tests against chance.
 const SIGNIFICANCE_LEVEL: f64 = 0.05;
 /// Share of the power of the excitation outside its lines above which the cause cannot be rounding in the file.
-const LEAKAGE: f64 = 1e-4;
-const MUCH_LEAKAGE: f64 = 1e-2;
+const MAX_ROUNDING_LEAKAGE: f64 = 1e-4;
+const LARGE_LEAKAGE: f64 = 1e-2;
 /// An offset may have been meant to be an integer number of samples if its distance from an integer is in this range.
-const NEAR_INTEGER: (f64, f64) = (1e-6, 0.05);
+const NEAR_INTEGER_RANGE: (f64, f64) = (1e-6, 0.05);
 
 /// Input data of the diagnostics.
 pub(super) struct DiagnosticInputs<'a> {
@@ -73,10 +73,10 @@ fn probability_by_chance(coherences: &[f64], n: usize) -> Option<f64> {
 /// Returns all findings about the describing function of these records.
 pub(super) fn findings(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Vec<Finding>, IdentError> {
     let mut findings = Vec::new();
-    findings.extend(of_runs(found, records.len()));
-    findings.extend(of_coherence(found));
+    findings.extend(runs_finding(found, records.len()));
+    findings.extend(coherence_finding(found));
     if let Some((open_loop, margins)) = found.in_loop {
-        findings.extend(of_loop(open_loop, margins));
+        findings.extend(loop_findings(open_loop, margins));
     }
     if found.channel.is_none() {
         findings.push(Finding::note(
@@ -85,10 +85,10 @@ pub(super) fn findings(found: &DiagnosticInputs<'_>, records: &[Record]) -> Resu
              the remnant is large compared with e",
         ));
     }
-    findings.extend(leakage(found, records)?);
+    findings.extend(leakage_finding(found, records)?);
     let offset = found.offset_samples;
     let off = (offset - offset.round()).abs();
-    if NEAR_INTEGER.0 < off && off < NEAR_INTEGER.1 {
+    if NEAR_INTEGER_RANGE.0 < off && off < NEAR_INTEGER_RANGE.1 {
         findings.push(Finding::note(
             "offset-not-whole",
             format!(
@@ -100,7 +100,7 @@ pub(super) fn findings(found: &DiagnosticInputs<'_>, records: &[Record]) -> Resu
     Ok(findings)
 }
 
-fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
+fn runs_finding(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
     let (n, periods) = (found.function.runs.len(), found.realisation == Realisation::Period);
     let what = match (periods, records) {
         (true, 1) => "periods of one run",
@@ -108,11 +108,11 @@ fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
         (false, _) => "runs",
     };
     match n {
-        1 => Some(Finding::doubt(
+        1 => Some(Finding::warning(
             "few-runs",
             "one period of one run gives neither errors nor coherence: record more runs or longer runs",
         )),
-        2 => Some(Finding::doubt(
+        2 => Some(Finding::warning(
             "few-runs",
             format!(
                 "the errors come from only two {what} and may be wrong by up to a factor of six at individual lines: \
@@ -130,7 +130,7 @@ fn of_runs(found: &DiagnosticInputs<'_>, records: usize) -> Option<Finding> {
     }
 }
 
-fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
+fn coherence_finding(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     let n = found.function.runs.len();
     // Without the excitation, the coherence is between e and u, which is large in any closed loop.
     found.channel?;
@@ -170,14 +170,14 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     };
     Some(
         if 2 * low.len() >= lines.len() || low.iter().any(is_next_to_crossover) {
-            Finding::doubt("low-coherence", words)
+            Finding::warning("low-coherence", words)
         } else {
             Finding::note("low-coherence", words)
         },
     )
 }
 
-fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
+fn loop_findings(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     let sizes: Vec<f64> = open_loop.response.iter().map(|l| l.norm()).collect();
     let (Some(low), Some(high)) = (open_loop.omega_rad_s.first(), open_loop.omega_rad_s.last()) else {
         return Vec::new();
@@ -190,7 +190,7 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
         } else {
             "the open-loop gain does not cross 1 from above between the lines".to_owned()
         };
-        return vec![Finding::doubt(
+        return vec![Finding::warning(
             "no-crossover",
             format!("{where_}; check that the controlled element is correct and in the units of the record"),
         )];
@@ -208,7 +208,7 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     }
     let large = |name: &str, unit: &str, e: hoid_model::uncertainty::Estimate, part: f64| {
         let s = e.standard_error.filter(|s| *s >= part * e.value.abs())?;
-        Some(Finding::doubt(
+        Some(Finding::warning(
             "large-error",
             format!(
                 "the {name} of {:.3} {unit} has a standard error of {s:.3} {unit}",
@@ -227,14 +227,14 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
 
 /// Returns a finding if the excitation has power at frequencies other than its lines. Causes are a span that is not a
 /// whole number of periods, a damaged file, or noise in the measured channel.
-fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Finding>, IdentError> {
+fn leakage_finding(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Finding>, IdentError> {
     let Some(channel) = found.channel else {
         return Ok(None);
     };
     let mut worst: Option<(f64, &str)> = None;
     for record in records {
-        let values = channel_of(record, channel, "the channel of the excitation")?;
-        let window = Window::of_span(record, None, None, found.excitation.period_s())?;
+        let values = channel_values(record, channel, "the channel of the excitation")?;
+        let window = Window::from_span(record, None, None, found.excitation.period_s())?;
         let (x, n) = (coefficients(values), values.len());
         let all: f64 = (1..x.len()).map(|k| power(&x, k, n)).sum();
         let lines = found.excitation.harmonics().iter().map(|h| h * window.periods);
@@ -244,14 +244,14 @@ fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Fi
             worst = Some((off, record.label()));
         }
     }
-    Ok(worst.filter(|(off, _)| *off > LEAKAGE).map(|(off, label)| {
+    Ok(worst.filter(|(off, _)| *off > MAX_ROUNDING_LEAKAGE).map(|(off, label)| {
         let words = format!(
             "{channel} of {label} has {:.2} % of its power at non-excited frequencies: the span is not a whole number \
              of periods, lines are missing, or {channel} is a noisy measurement",
             100.0 * off
         );
-        match off > MUCH_LEAKAGE {
-            true => Finding::doubt("leakage", words),
+        match off > LARGE_LEAKAGE {
+            true => Finding::warning("leakage", words),
             false => Finding::note("leakage", words),
         }
     }))

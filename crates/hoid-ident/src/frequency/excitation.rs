@@ -18,9 +18,9 @@ use super::{
 use crate::IdentError;
 
 /// Largest distance of a line from a harmonic that counts as rounding, in units of the fundamental frequency.
-const ROUNDING: f64 = 1e-4;
+const HARMONIC_TOLERANCE: f64 = 1e-4;
 /// Minimum share of the power of a channel at its lines.
-const SHARE_OF_LINES: f64 = 0.99;
+const MIN_LINE_POWER_SHARE: f64 = 0.99;
 
 /// An excitation with lines at harmonics of one period.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,14 +31,14 @@ pub struct Excitation {
 
 /// Criteria for finding the lines of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LineSearch {
+pub struct LineDetectionOptions {
     /// Period T in s; if `None`, the shortest period that has all found lines as harmonics.
     pub period_s: Option<f64>,
     /// Minimum amplitude of a line relative to the largest line. Default 0.01.
     pub least_amplitude: f64,
 }
 
-impl Default for LineSearch {
+impl Default for LineDetectionOptions {
     fn default() -> Self {
         Self {
             period_s: None,
@@ -53,7 +53,7 @@ impl Excitation {
     /// # Errors
     /// [`IdentError::BadOption`] if there are no harmonics, if a harmonic is 0 or occurs twice, or if the period is not
     /// positive.
-    pub fn of_harmonics(harmonics: &[usize], period_s: f64) -> Result<Self, IdentError> {
+    pub fn from_harmonics(harmonics: &[usize], period_s: f64) -> Result<Self, IdentError> {
         if !(period_s.is_finite() && period_s > 0.0) {
             return refuse(
                 "the period of the excitation in s",
@@ -85,13 +85,13 @@ impl Excitation {
     /// Creates an excitation from the lines omega_k in rad/s, each within 1e-4 of a harmonic of the period T in s.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an invalid line, and the errors of [`Excitation::of_harmonics`].
+    /// [`IdentError::BadOption`] for an invalid line, and the errors of [`Excitation::from_harmonics`].
     pub fn new(omega_rad_s: &[f64], period_s: f64) -> Result<Self, IdentError> {
         let mut harmonics = Vec::with_capacity(omega_rad_s.len());
         for &omega in omega_rad_s {
             let n = omega * period_s / TAU;
             // This also rejects `NaN`.
-            if !((n - n.round()).abs() <= ROUNDING && (0.5..1e9).contains(&n)) {
+            if !((n - n.round()).abs() <= HARMONIC_TOLERANCE && (0.5..1e9).contains(&n)) {
                 let nearest = n.round().max(1.0) * TAU / period_s;
                 return refuse(
                     "a line of the excitation in rad/s",
@@ -101,14 +101,14 @@ impl Excitation {
             }
             harmonics.push(n.round() as usize);
         }
-        Self::of_harmonics(&harmonics, period_s)
+        Self::from_harmonics(&harmonics, period_s)
     }
 
     /// Returns the lines of a forcing function with the period T in s.
     ///
     /// # Errors
     /// The errors of [`Excitation::new`].
-    pub fn of_forcing_function(forcing: &ForcingFunction, period_s: f64) -> Result<Self, IdentError> {
+    pub fn from_forcing_function(forcing: &ForcingFunction, period_s: f64) -> Result<Self, IdentError> {
         let omega: Vec<f64> = forcing
             .sinusoids()
             .iter()
@@ -126,8 +126,8 @@ impl Excitation {
     /// [`IdentError::BadOption`] if the channel does not exist or its power is not concentrated at lines, as for noise
     /// or for a span that is not a whole number of periods; [`IdentError::NoExcitation`] for a constant channel;
     /// [`IdentError::NotWholePeriods`] if the span is not a whole number of the given periods.
-    pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {
-        let values = channel_of(record, channel, EXCITATION_OPTION)?;
+    pub fn detect(record: &Record, channel: &str, search: &LineDetectionOptions) -> Result<Self, IdentError> {
+        let values = channel_values(record, channel, EXCITATION_OPTION)?;
         if !(search.least_amplitude > 0.0 && search.least_amplitude <= 1.0) {
             return refuse(
                 "the smallest amplitude of a line",
@@ -155,7 +155,7 @@ impl Excitation {
         let bins: Vec<usize> = (1..=powers.len()).filter(|k| powers[k - 1] >= threshold).collect();
         let held = bins.iter().map(|k| powers[k - 1]).sum::<f64>() / total;
         let dense = bins.windows(2).filter(|w| w[1] == w[0] + 1).count();
-        if held < SHARE_OF_LINES || 2 * dense > bins.len() {
+        if held < MIN_LINE_POWER_SHARE || 2 * dense > bins.len() {
             return refuse(
                 &format!("the lines of channel {channel} of record {}", record.label()),
                 format!(
@@ -179,7 +179,7 @@ impl Excitation {
         }
         let harmonics: Vec<usize> = bins.iter().map(|k| k / common).collect();
         let period_s = search.period_s.unwrap_or(span_s / common as f64);
-        Self::of_harmonics(&harmonics, period_s)
+        Self::from_harmonics(&harmonics, period_s)
     }
 
     /// Returns the harmonics n_k in ascending order.
@@ -216,13 +216,13 @@ pub fn check_excitation(records: &[Record], channel: &str) -> Result<(), IdentEr
     }
     let first = records
         .first()
-        .map(|record| channel_of(record, channel, EXCITATION_OPTION));
+        .map(|record| channel_values(record, channel, EXCITATION_OPTION));
     first.map_or(Ok(()), |found| found.map(|_| ()))
 }
 
 /// Returns the values of a channel by its name. The error names the available channels; `what` describes the channel in
 /// the error.
-pub(super) fn channel_of<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
+pub(super) fn channel_values<'r>(record: &'r Record, channel: &str, what: &str) -> Result<&'r [f64], IdentError> {
     match record.channel(channel) {
         Some(values) => Ok(values),
         None => {
@@ -251,13 +251,13 @@ mod tests {
     use super::*;
 
     fn record(values: Vec<f64>) -> Record {
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let zero = vec![0.0; values.len()];
         Record::new(ts, Channel::new("e", "deg", values), Channel::new("u", "deg", zero)).unwrap()
     }
 
     fn reference(samples: usize, noise: f64) -> Record {
-        let f = ForcingFunction::reference().samples(0.0, SampleTime::HUNDREDTH, samples);
+        let f = ForcingFunction::reference().samples(0.0, SampleTime::AT_100_HZ, samples);
         // A fixed sequence that looks like noise.
         let rough = |k: usize| noise * (k as f64 * k as f64 * 0.7).sin();
         record(f.iter().enumerate().map(|(k, v)| v + rough(k)).collect())
@@ -265,10 +265,10 @@ mod tests {
 
     #[test]
     fn lines_of_the_forcing_function_are_found() {
-        let given = Excitation::of_forcing_function(&ForcingFunction::reference(), 81.92).unwrap();
+        let given = Excitation::from_forcing_function(&ForcingFunction::reference(), 81.92).unwrap();
         assert_eq!(given.harmonics(), [3, 5, 8, 13, 22, 34, 53, 86, 139, 229]);
         for (samples, noise) in [(8192, 0.0), (16384, 0.0), (8192, 0.02)] {
-            let found = Excitation::found_in(&reference(samples, noise), "e", &LineSearch::default()).unwrap();
+            let found = Excitation::detect(&reference(samples, noise), "e", &LineDetectionOptions::default()).unwrap();
             assert_eq!(found.harmonics(), given.harmonics());
             assert!((found.period_s() - 81.92).abs() < 1e-9);
         }
@@ -279,41 +279,41 @@ mod tests {
     #[test]
     fn span_with_leakage_is_refused() {
         for samples in [4096, 8000, 8150] {
-            let refused = Excitation::found_in(&reference(samples, 0.0), "e", &LineSearch::default());
+            let refused = Excitation::detect(&reference(samples, 0.0), "e", &LineDetectionOptions::default());
             assert!(
                 matches!(refused, Err(IdentError::BadOption { .. })),
                 "{samples}: {refused:?}"
             );
         }
-        let search = LineSearch {
+        let search = LineDetectionOptions {
             period_s: Some(81.92),
-            ..LineSearch::default()
+            ..LineDetectionOptions::default()
         };
         for samples in [4096, 8191] {
-            let refused = Excitation::found_in(&reference(samples, 0.0), "e", &search);
+            let refused = Excitation::detect(&reference(samples, 0.0), "e", &search);
             assert!(matches!(refused, Err(IdentError::NotWholePeriods { .. })));
         }
         // With twice the period, the lines would also be harmonics; this is refused.
-        let wrong = LineSearch {
+        let wrong = LineDetectionOptions {
             period_s: Some(40.96),
-            ..LineSearch::default()
+            ..LineDetectionOptions::default()
         };
-        assert!(Excitation::found_in(&reference(8192, 0.0), "e", &wrong).is_err());
+        assert!(Excitation::detect(&reference(8192, 0.0), "e", &wrong).is_err());
     }
 
     #[test]
     fn signals_and_lists_without_lines_are_refused() {
-        let search = LineSearch::default();
+        let search = LineDetectionOptions::default();
         assert!(matches!(
-            Excitation::found_in(&record(vec![2.5; 100]), "e", &search),
+            Excitation::detect(&record(vec![2.5; 100]), "e", &search),
             Err(IdentError::NoExcitation { .. })
         ));
-        assert!(Excitation::found_in(&record(vec![1.0, 2.0, 4.0]), "f_t", &search).is_err());
-        assert!(Excitation::of_harmonics(&[], 1.0).is_err());
-        assert!(Excitation::of_harmonics(&[0, 1], 1.0).is_err());
-        assert!(Excitation::of_harmonics(&[3, 1, 3], 1.0).is_err());
+        assert!(Excitation::detect(&record(vec![1.0, 2.0, 4.0]), "f_t", &search).is_err());
+        assert!(Excitation::from_harmonics(&[], 1.0).is_err());
+        assert!(Excitation::from_harmonics(&[0, 1], 1.0).is_err());
+        assert!(Excitation::from_harmonics(&[3, 1, 3], 1.0).is_err());
         for period in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(Excitation::of_harmonics(&[1], period).is_err());
+            assert!(Excitation::from_harmonics(&[1], period).is_err());
             assert!(Excitation::new(&[1.0], period).is_err());
         }
         assert!(Excitation::new(&[1.0, f64::NAN], TAU).is_err());

@@ -75,7 +75,7 @@ impl GainLeadDelay {
 const STEPS_PER_TURN: f64 = 40.0;
 /// Number of golden section steps, each of which multiplies the bracket by 0.618: from a fortieth of a turn down to the
 /// rounding errors of the criterion.
-const REFINEMENTS: usize = 60;
+const REFINEMENT_STEPS: usize = 60;
 const MAX_STEPS: f64 = 1e5;
 
 /// The best K and K T_L for one delay, and the criterion for them.
@@ -119,13 +119,13 @@ impl DescribingFunction {
         }
         let weights = self.weights(options.weights)?;
         let solve = |response: &[Complex64]| {
-            let problem = Problem {
+            let problem = LeastSquaresProblem {
                 omega: &omega,
                 response,
                 weights: &weights,
                 lead: options.lead,
             };
-            problem.lowest(options.delay_range_s, steps.ceil().max(2.0) as usize)
+            problem.best_solution(options.delay_range_s, steps.ceil().max(2.0) as usize)
         };
         let response: Vec<Complex64> = self.lines.iter().map(|l| l.response).collect();
         let best = solve(&response);
@@ -169,14 +169,14 @@ impl DescribingFunction {
     }
 }
 
-struct Problem<'a> {
+struct LeastSquaresProblem<'a> {
     omega: &'a [f64],
     response: &'a [Complex64],
     weights: &'a [f64],
     lead: bool,
 }
 
-impl Problem<'_> {
+impl LeastSquaresProblem<'_> {
     /// Returns the best K and K T_L for a delay, from the normal equations of two unknowns with the columns `c` and
     /// `j omega c`, where `c = e^{-j omega tau}/H`. Since the product of the two columns is imaginary, they are
     /// orthogonal.
@@ -206,7 +206,7 @@ impl Problem<'_> {
     }
 
     /// Returns the solution at the best delay of a scan, refined by golden section search.
-    fn lowest(&self, (shortest, longest): (f64, f64), steps: usize) -> Solution {
+    fn best_solution(&self, (shortest, longest): (f64, f64), steps: usize) -> Solution {
         let step = (longest - shortest) / steps as f64;
         let mut best = self.at(shortest);
         for i in 1..=steps {
@@ -217,7 +217,7 @@ impl Problem<'_> {
         }
         let (mut low, mut high) = ((best.delay_s - step).max(shortest), (best.delay_s + step).min(longest));
         let part = 0.5 * (5.0_f64.sqrt() - 1.0);
-        for _ in 0..REFINEMENTS {
+        for _ in 0..REFINEMENT_STEPS {
             let (a, b) = (high - part * (high - low), low + part * (high - low));
             let (at_a, at_b) = (self.at(a), self.at(b));
             for candidate in [at_a, at_b] {
@@ -251,13 +251,13 @@ mod tests {
                 misfit: 0.0,
             };
             let response: Vec<Complex64> = omega.iter().map(|w| model.response(*w)).collect();
-            let problem = Problem {
+            let problem = LeastSquaresProblem {
                 omega: &omega,
                 response: &response,
                 weights: &weights,
                 lead: true,
             };
-            let found = problem.lowest((0.0, 1.0), 40);
+            let found = problem.best_solution((0.0, 1.0), 40);
             // The criterion is flat to rounding within 1e-8 of its lowest point.
             assert!((found.delay_s - delay).abs() < 1e-7, "{}", found.delay_s);
             assert!((found.gain - gain).abs() < 1e-6 && (found.gain_lead / found.gain - lead).abs() < 1e-6);

@@ -64,7 +64,7 @@ pub(crate) use window::Window;
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
 pub use description::{COMMON_EXCITATIONS, Description, DescriptionOptions, describe_runs};
 pub use diagnostics::chance_coherence;
-pub use excitation::{Excitation, LineSearch, check_excitation};
+pub use excitation::{Excitation, LineDetectionOptions, check_excitation};
 pub use gain_lead_delay::{GainLeadDelay, GainLeadDelayOptions, LineWeights};
 pub use open_loop::{Crossover, DescribingMargins, OpenLoop};
 pub use options::{Averaging, DescribingOptions, MeasuredElement, Realisation};

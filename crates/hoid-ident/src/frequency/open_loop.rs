@@ -16,7 +16,7 @@ use hoid_model::{Complex64, ContinuousTransferFunction, uncertainty::Estimate};
 use super::{
     DescribingFunction,
     excitation::refuse,
-    ratio::{deviation, jackknife},
+    ratio::{jackknife, standard_deviation},
 };
 use crate::IdentError;
 
@@ -72,7 +72,7 @@ impl DescribingFunction {
     /// response of the controlled element with its hold.
     pub fn open_loop_with(&self, element: impl Fn(f64) -> Complex64) -> OpenLoop {
         let known: Vec<Complex64> = self.lines.iter().map(|l| element(l.omega_rad_s)).collect();
-        self.loop_of(|k, _| known[k], |k, _| known[k])
+        self.build_open_loop(|k, _| known[k], |k, _| known[k])
     }
 
     /// Returns the open loop with the controlled element estimated from the records.
@@ -88,11 +88,11 @@ impl DescribingFunction {
                 "an output channel, named in the options of describe",
             );
         }
-        let per_run: Vec<Vec<Complex64>> = ratios.iter().map(|r| r.per_run()).collect();
-        Ok(self.loop_of(|k, without| ratios[k].value(without), |k, i| per_run[k][i]))
+        let per_run: Vec<Vec<Complex64>> = ratios.iter().map(|r| r.run_ratios()).collect();
+        Ok(self.build_open_loop(|k, without| ratios[k].value(without), |k, i| per_run[k][i]))
     }
 
-    fn loop_of(
+    fn build_open_loop(
         &self,
         element: impl Fn(usize, Option<usize>) -> Complex64,
         of_run: impl Fn(usize, usize) -> Complex64,
@@ -143,7 +143,7 @@ impl OpenLoop {
         };
         let spread = |get: fn(&Crossover) -> f64| {
             let known: Vec<f64> = per_run.iter().flatten().map(get).collect();
-            deviation(&known)
+            standard_deviation(&known)
         };
         DescribingMargins {
             crossover_rad_s: estimate(|c| c.omega_rad_s),

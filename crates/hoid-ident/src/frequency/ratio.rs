@@ -10,14 +10,14 @@
 //! without run i (B. Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3).
 
 use hoid_model::{Complex64, uncertainty::Estimate};
-use hoid_numerics::statistics::{self, sample_variance, squared_deviations};
+use hoid_numerics::statistics::{self, sample_variance, sum_of_squared_deviations};
 
 /// Terms of the numerator and the denominator, one pair for each run.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Ratio(pub Vec<(Complex64, Complex64)>);
 
 impl Ratio {
-    fn sums(&self, without: Option<usize>) -> (Complex64, Complex64) {
+    fn numerator_and_denominator(&self, without: Option<usize>) -> (Complex64, Complex64) {
         let zero = Complex64::new(0.0, 0.0);
         let kept = self.0.iter().enumerate().filter(|(i, _)| Some(*i) != without);
         kept.fold((zero, zero), |(a, b), (_, term)| (a + term.0, b + term.1))
@@ -25,19 +25,19 @@ impl Ratio {
 
     /// Returns H from all runs, or from all runs except one.
     pub fn value(&self, without: Option<usize>) -> Complex64 {
-        let (a, b) = self.sums(without);
+        let (a, b) = self.numerator_and_denominator(without);
         a / b
     }
 
     /// Returns the ratio `a_i/b_i` of each run.
-    pub fn per_run(&self) -> Vec<Complex64> {
+    pub fn run_ratios(&self) -> Vec<Complex64> {
         self.0.iter().map(|(a, b)| a / b).collect()
     }
 
     /// Returns the standard error sigma; `None` for one run.
     pub fn standard_error(&self) -> Option<f64> {
         let n = self.0.len() as f64;
-        let (a, b) = self.sums(None);
+        let (a, b) = self.numerator_and_denominator(None);
         let h = a / b;
         let squares: f64 = self.0.iter().map(|(a, b)| (a - h * b).norm_sqr()).sum();
         (n > 1.0).then(|| (n / (n - 1.0) * squares).sqrt() / b.norm())
@@ -47,7 +47,7 @@ impl Ratio {
     /// if the region is unbounded.
     pub fn confidence_disc(&self, probability: f64) -> Option<(Complex64, f64)> {
         let n = self.0.len() as f64;
-        let (a, b) = self.sums(None);
+        let (a, b) = self.numerator_and_denominator(None);
         // Quantile of F(2, 2(n - 1)) in closed form.
         let level = (n - 1.0) * ((1.0 - probability).powf(-1.0 / (n - 1.0)) - 1.0);
         let scale = n * level / (n - 1.0);
@@ -75,21 +75,21 @@ pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     if n < 2 || known.len() < n {
         return Estimate::fixed(value);
     }
-    Estimate::with_variance(value, squared_deviations(&known) * (n as f64 - 1.0) / n as f64)
+    Estimate::with_variance(value, sum_of_squared_deviations(&known) * (n as f64 - 1.0) / n as f64)
 }
 
 /// Returns the mean of values with its standard error, computed from their scatter; there is no standard error for a
 /// single value.
 pub(super) fn mean(values: &[f64]) -> Estimate {
     let value = statistics::mean(values);
-    match deviation(values) {
+    match standard_deviation(values) {
         Some(s) => Estimate::with_variance(value, s * s / values.len() as f64),
         None => Estimate::fixed(value),
     }
 }
 
 /// Returns the standard deviation of values with the divisor n - 1; `None` for fewer than two values.
-pub(super) fn deviation(values: &[f64]) -> Option<f64> {
+pub(super) fn standard_deviation(values: &[f64]) -> Option<f64> {
     (values.len() > 1).then(|| sample_variance(values).sqrt())
 }
 

@@ -36,13 +36,13 @@ impl RemnantBand {
 }
 
 /// Fourier coefficients of u in one run.
-pub(super) struct Control<'a> {
+pub(super) struct ControlSpectrum<'a> {
     pub coefficients: &'a [Complex64],
     pub window: Window,
 }
 
-impl Control<'_> {
-    fn width_rad_s(&self, ts_s: f64) -> f64 {
+impl ControlSpectrum<'_> {
+    fn bin_width_rad_s(&self, ts_s: f64) -> f64 {
         TAU / (self.window.samples as f64 * ts_s)
     }
 
@@ -55,7 +55,7 @@ impl Control<'_> {
     }
 
     /// Returns the variance of u, and the part of it at non-excited frequencies.
-    fn powers(&self, harmonics: &[usize]) -> (f64, f64) {
+    fn total_and_remnant_power(&self, harmonics: &[usize]) -> (f64, f64) {
         let bins = 1..self.coefficients.len();
         let all: f64 = bins.clone().map(|k| self.power(k)).sum();
         let off: f64 = bins
@@ -68,13 +68,18 @@ impl Control<'_> {
 
 /// Returns the mean density in bands with the width of `neighbours` bins of the shortest window, over the non-excited
 /// bins of all runs.
-pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, neighbours: usize) -> Vec<RemnantBand> {
-    let widest = runs.iter().map(|r| r.width_rad_s(ts_s)).fold(0.0, f64::max);
+pub(super) fn spectrum(
+    runs: &[ControlSpectrum<'_>],
+    harmonics: &[usize],
+    ts_s: f64,
+    neighbours: usize,
+) -> Vec<RemnantBand> {
+    let widest = runs.iter().map(|r| r.bin_width_rad_s(ts_s)).fold(0.0, f64::max);
     let band_rad_s = widest * neighbours.max(1) as f64;
     // For each band: sum of frequencies, sum of densities, and number of bins.
     let mut bands: Vec<(f64, f64, usize)> = Vec::new();
     for run in runs {
-        let width = run.width_rad_s(ts_s);
+        let width = run.bin_width_rad_s(ts_s);
         for k in (1..run.coefficients.len()).filter(|k| !run.is_line(*k, harmonics)) {
             let omega = k as f64 * width;
             // The shift by half a bin assigns a frequency at the edge of two bands to the lower band, regardless of
@@ -96,14 +101,14 @@ pub(super) fn spectrum(runs: &[Control<'_>], harmonics: &[usize], ts_s: f64, nei
 }
 
 /// Returns, for one run, the share of the power of u at non-excited frequencies and the noise ratio.
-pub(super) fn share_and_ratio(
-    run: &Control<'_>,
+pub(super) fn remnant_share_and_noise_ratio(
+    run: &ControlSpectrum<'_>,
     harmonics: &[usize],
     ts_s: f64,
     spectrum: &[RemnantBand],
 ) -> (f64, f64) {
-    let (all, off) = run.powers(harmonics);
-    let width = run.width_rad_s(ts_s);
+    let (all, off) = run.total_and_remnant_power(harmonics);
+    let width = run.bin_width_rad_s(ts_s);
     let at_lines: f64 = harmonics
         .iter()
         .map(|h| (h * run.window.periods) as f64 * width)
@@ -140,19 +145,19 @@ mod tests {
             samples: n,
             periods: 2,
         };
-        let run = Control {
+        let run = ControlSpectrum {
             coefficients: &c,
             window,
         };
         let harmonics = [3, 5, 40];
-        let (all, off) = run.powers(&harmonics);
+        let (all, off) = run.total_and_remnant_power(&harmonics);
         let on: f64 = [6, 10, 80].iter().map(|k| power(&c, *k, n)).sum();
         assert!((all - on - off).abs() < 1e-14);
         let ts = 0.1;
         let width = TAU / (n as f64 * ts);
         for neighbours in [1, 7, 1000] {
             let bands = spectrum(
-                &[Control {
+                &[ControlSpectrum {
                     coefficients: &c,
                     window,
                 }],
@@ -164,7 +169,7 @@ mod tests {
             assert!((sum - off).abs() < 1e-14 * n as f64, "{neighbours}");
             assert_eq!(bands.iter().map(|b| b.values).sum::<usize>(), 256 - 3);
             assert!(bands.windows(2).all(|b| b[0].omega_rad_s < b[1].omega_rad_s));
-            let (share, ratio) = share_and_ratio(&run, &harmonics, ts, &bands);
+            let (share, ratio) = remnant_share_and_noise_ratio(&run, &harmonics, ts, &bands);
             assert!((share - off / all).abs() < 1e-15 && ratio > share);
         }
         assert_eq!(density_at(&[], 1.0), 0.0);

@@ -37,7 +37,7 @@ fn runs(scenario: &Scenario, cell: u64, n: u64) -> Vec<Record> {
 }
 
 fn lines() -> Excitation {
-    Excitation::of_forcing_function(&Scenario::condition(Condition::C1).forcing, PERIOD_S).unwrap()
+    Excitation::from_forcing_function(&Scenario::condition(Condition::C1).forcing, PERIOD_S).unwrap()
 }
 
 /// Returns the discrete model of the operator with its hold.
@@ -199,7 +199,7 @@ fn remnant_spectrum_matches_the_simulated_remnant() {
         // divided by 1 + L.
         let filter = RemnantFilter::new(k_n, 0.06, 1).unwrap();
         let filter = filter
-            .discrete(scenario.sample_time, RemnantDiscretisation::ZeroOrderHold)
+            .discretise(scenario.sample_time, RemnantDiscretisation::ZeroOrderHold)
             .unwrap();
         let (h, plant) = (operator(&scenario), element(&scenario));
         let (mut chi_square, mut bands) = (0.0, 0);
@@ -290,7 +290,7 @@ fn weights_and_ranges_are_checked() {
     assert!(one.measured_open_loop().is_err());
     let single = describe(
         &runs(&scenario, 0, 1),
-        &Excitation::of_harmonics(&[5], PERIOD_S).unwrap(),
+        &Excitation::from_harmonics(&[5], PERIOD_S).unwrap(),
         &DescribingOptions::default(),
     )
     .unwrap();

@@ -35,7 +35,7 @@ fn element_is_found_despite_disturbance_and_offset() {
         }),
         ..DescribingOptions::default()
     };
-    let excitation = Excitation::of_harmonics(&[3, 7], 10.0).unwrap();
+    let excitation = Excitation::from_harmonics(&[3, 7], 10.0).unwrap();
     let found = describe(&[record], &excitation, &options).unwrap();
     for line in &found.lines {
         let z = Complex64::from_polar(1.0, 0.1 * line.omega_rad_s);
@@ -54,7 +54,7 @@ fn degenerate_input_is_refused() {
             .collect()
     };
     let options = DescribingOptions::default();
-    let at = |harmonics: &[usize]| Excitation::of_harmonics(harmonics, 10.0).unwrap();
+    let at = |harmonics: &[usize]| Excitation::from_harmonics(harmonics, 10.0).unwrap();
     let error = |record: Record, excitation: &Excitation| describe(&[record], excitation, &options).unwrap_err();
     let good = record(wave(3.0), wave(3.0)).unwrap();
     let found = describe(std::slice::from_ref(&good), &at(&[3]), &options).unwrap();
@@ -81,17 +81,17 @@ fn degenerate_input_is_refused() {
         error(record(wave(3.0), vec![1.0; 100]).unwrap(), &at(&[3])),
         IdentError::NoExcitation { .. }
     ));
-    let half = Excitation::of_harmonics(&[1], 20.0).unwrap();
+    let half = Excitation::from_harmonics(&[1], 20.0).unwrap();
     assert!(matches!(error(good.clone(), &half), IdentError::NotWholePeriods { .. }));
     // The period is shorter than a sample.
-    let short = Excitation::of_harmonics(&[1], 0.01).unwrap();
+    let short = Excitation::from_harmonics(&[1], 0.01).unwrap();
     assert!(matches!(
         error(good.clone(), &short),
         IdentError::LineBeyondNyquist { .. }
     ));
     // A record with NaN cannot be created.
     assert!(record(vec![f64::NAN; 100], wave(3.0)).is_err());
-    let alone = Record::of_output(SampleTime::new(0.1).unwrap(), Channel::new("u", "deg", wave(3.0))).unwrap();
+    let alone = Record::from_output(SampleTime::new(0.1).unwrap(), Channel::new("u", "deg", wave(3.0))).unwrap();
     assert!(matches!(error(alone, &at(&[3])), IdentError::BadOption { .. }));
 
     // The mean of the span is removed, not the mean of the record.

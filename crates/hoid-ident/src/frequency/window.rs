@@ -53,7 +53,12 @@ pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> R
 
 impl Window {
     /// Returns the window of the samples with `from_s <= t < to_s`, which must cover whole periods.
-    pub fn of_span(record: &Record, from_s: Option<f64>, to_s: Option<f64>, period_s: f64) -> Result<Self, IdentError> {
+    pub fn from_span(
+        record: &Record,
+        from_s: Option<f64>,
+        to_s: Option<f64>,
+        period_s: f64,
+    ) -> Result<Self, IdentError> {
         let ts = record.sample_time().s();
         let start_s = record.time_s(0);
         let part = record.span(from_s.unwrap_or(start_s), to_s.unwrap_or(f64::INFINITY))?;
@@ -78,7 +83,7 @@ impl Window {
 
     /// Returns the samples of a channel that is `offset` samples late, shifted to the window, and the part of the
     /// offset that remains after the shift.
-    pub fn samples_of(self, values: &[f64], offset: f64) -> (&[f64], f64) {
+    pub fn shifted_samples(self, values: &[f64], offset: f64) -> (&[f64], f64) {
         let whole = offset.floor();
         let start = self.first as f64 + whole;
         if start >= 0.0 && start + self.samples as f64 <= values.len() as f64 {
@@ -90,13 +95,13 @@ impl Window {
 
     /// Returns the Fourier coefficients of a channel that is `offset` samples late.
     pub fn coefficients(self, values: &[f64], offset: f64) -> Vec<Complex64> {
-        let (samples, rest) = self.samples_of(values, offset);
-        advanced(samples, rest)
+        let (samples, rest) = self.shifted_samples(values, offset);
+        shifted_coefficients(samples, rest)
     }
 }
 
 /// Returns the Fourier coefficients of samples that are `offset` samples late.
-pub(super) fn advanced(samples: &[f64], offset: f64) -> Vec<Complex64> {
+pub(super) fn shifted_coefficients(samples: &[f64], offset: f64) -> Vec<Complex64> {
     let mut x = coefficients(samples);
     if offset != 0.0 {
         let turn = TAU * offset / samples.len() as f64;
@@ -115,7 +120,7 @@ mod tests {
 
     fn record(n: usize, ts: f64) -> Record {
         let x = Channel::new("u", "deg", (0..n).map(|k| k as f64).collect());
-        Record::of_output(SampleTime::new(ts).unwrap(), x)
+        Record::from_output(SampleTime::new(ts).unwrap(), x)
             .unwrap()
             .starting_at(-1.0)
     }
@@ -123,22 +128,22 @@ mod tests {
     #[test]
     fn only_spans_of_whole_periods_are_accepted() {
         let r = record(1000, 0.01);
-        let w = Window::of_span(&r, Some(0.0), Some(6.0), 2.0).unwrap();
+        let w = Window::from_span(&r, Some(0.0), Some(6.0), 2.0).unwrap();
         assert_eq!((w.first, w.samples, w.periods), (100, 600, 3));
         let parts = w.single_periods();
         assert_eq!(parts.iter().map(|p| p.first).collect::<Vec<_>>(), [100, 300, 500]);
         assert!(parts.iter().all(|p| p.samples == 200 && p.periods == 1));
-        assert_eq!(Window::of_span(&r, None, None, 2.5).unwrap().periods, 4);
+        assert_eq!(Window::from_span(&r, None, None, 2.5).unwrap().periods, 4);
         // 10/3 s are 333.3 samples; three periods fill the whole record.
-        assert_eq!(Window::of_span(&r, None, None, 10.0 / 3.0).unwrap().periods, 3);
-        let message = Window::of_span(&r, None, None, 3.0).unwrap_err().to_string();
+        assert_eq!(Window::from_span(&r, None, None, 10.0 / 3.0).unwrap().periods, 3);
+        let message = Window::from_span(&r, None, None, 3.0).unwrap_err().to_string();
         assert!(
             message.contains("use 9 s, the longest span of whole periods: 3 periods from -1 s to 8 s"),
             "{message}"
         );
-        let message = Window::of_span(&r, None, None, 20.0).unwrap_err().to_string();
+        let message = Window::from_span(&r, None, None, 20.0).unwrap_err().to_string();
         assert!(message.contains("at least 20 s"), "{message}");
-        assert!(Window::of_span(&r, Some(50.0), None, 2.0).is_err());
+        assert!(Window::from_span(&r, Some(50.0), None, 2.0).is_err());
     }
 
     #[test]

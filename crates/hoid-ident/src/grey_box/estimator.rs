@@ -3,7 +3,7 @@
 use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHEST_ORDER};
 
 use super::{
-    layout::{self, Layout, TIME_CONSTANT},
+    layout::{self, Layout, TIME_CONSTANT_SLOT},
     objective::PhysicalCriterion,
     options::GreyBox,
     parametrisation::Parametrisation,
@@ -15,7 +15,7 @@ use crate::{
     criterion::{Data, Workspace, first_residual, output_variance},
     fit::Physical,
     informative_data,
-    linalg::information::inverse_of_free,
+    linalg::information::inverse_information_of_free,
     optimize::{Minimum, Objective, lies_in_basin},
     progress,
 };
@@ -53,13 +53,13 @@ impl GreyBox {
         for criterion in &criteria {
             self.check_records(criterion, records)?;
         }
-        let mut workspace = Workspace::of_thread();
+        let mut workspace = Workspace::borrow_from_thread();
         let Some(highest) = criteria.last() else {
             return Err(IdentError::NoFiniteLoss);
         };
         let mut starts = starts::grid(highest, self.starts.max(1), &mut workspace);
         let nearest = starts.first().cloned();
-        starts.extend(nearest.and_then(|nearest| starts::box_jenkins(records, &nearest, highest)));
+        starts.extend(nearest.and_then(|nearest| starts::box_jenkins_start(records, &nearest, highest)));
 
         if let [criterion] = criteria.as_slice() {
             let fit = self.fit_order(criterion, &starts, None, &self.search, &mut workspace)?;
@@ -76,7 +76,7 @@ impl GreyBox {
         let mut error = None;
         let mut best: Option<(usize, GreyBoxFit)> = None;
         for (i, criterion) in criteria.iter().enumerate() {
-            progress::step("remnant orders", i, criteria.len());
+            progress::report_step("remnant orders", i, criteria.len());
             let eta = before.as_ref().map(|fit| fit.eta.as_slice());
             let found = self.fit_order(criterion, &starts, eta, &quick, &mut workspace);
             candidates.push(candidate(criterion, found.as_ref()));
@@ -133,8 +133,8 @@ impl GreyBox {
     }
 
     fn check_records(&self, criterion: &PhysicalCriterion<'_, Layout>, records: &[Record]) -> Result<(), IdentError> {
-        let unknowns = criterion.layout.names.len() + criterion.states();
-        if criterion.residuals() > unknowns {
+        let unknowns = criterion.layout.names.len() + criterion.state_count();
+        if criterion.residual_count() > unknowns {
             return Ok(());
         }
         Err(IdentError::TooFewSamples {
@@ -163,7 +163,7 @@ impl GreyBox {
         for start in starts {
             let eta = starts::complete(criterion, start, &time_constants, workspace);
             if criterion.layout.order > 0 {
-                time_constants = vec![eta[criterion.layout.positions[0][TIME_CONSTANT]]];
+                time_constants = vec![eta[criterion.layout.positions[0][TIME_CONSTANT_SLOT]]];
             }
             etas.push((start.label.clone(), eta));
         }
@@ -197,14 +197,14 @@ impl GreyBox {
         let eta = minimum.theta;
         let p = eta.len();
         let not_fixed = layout.limits.iter().filter(|(low, high)| low < high).count();
-        let (n, states) = (criterion.residuals(), criterion.states());
+        let (n, states) = (criterion.residual_count(), criterion.state_count());
         let sum_of_squares = minimum.at.sum_of_squares;
         let innovation_variance = sum_of_squares / (n - not_fixed - states) as f64;
-        let free = criterion.free(&eta, &minimum.at.descent);
+        let free = criterion.free_elements(&eta, &minimum.at.descent);
         let covariance = if minimum.termination.reason == Reason::ExactFit {
             None
         } else {
-            let inverse = inverse_of_free(&minimum.at.gram, &free, &layout.names)?;
+            let inverse = inverse_information_of_free(&minimum.at.gram, &free, &layout.names)?;
             Some(inverse.iter().map(|g| innovation_variance * g).collect::<Vec<f64>>())
         };
         let mut fits = Vec::with_capacity(criterion.data.len());

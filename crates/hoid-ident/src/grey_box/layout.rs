@@ -9,24 +9,24 @@ use std::{collections::BTreeMap, ops::Range};
 
 use hoid_model::{
     ModelError, Orders, SampleTime,
-    delayed_operator::{delayed_operator_and_jacobian_within, whole_samples},
+    delayed_operator::{delayed_operator_and_jacobian_with_delay_samples, whole_samples},
     remnant_noise::remnant_noise,
 };
 
-use super::parametrisation::{HeldSamples, Mapped, Parametrisation};
+use super::parametrisation::{DelayIntervals, MappedPolynomials, Parametrisation};
 use crate::{Constraint, IdentError};
 
 /// Number of slots of a model with a remnant filter.
-pub(crate) const SLOTS: usize = 6;
+pub(crate) const SLOT_COUNT: usize = 6;
 /// Slot of the lead: K_e_dot or T_L.
-pub(crate) const LEAD: usize = 1;
+pub(crate) const LEAD_SLOT: usize = 1;
 /// Slot of the delay.
-pub(crate) const DELAY: usize = 4;
+pub(crate) const DELAY_SLOT: usize = 4;
 /// Slot of the remnant's time constant.
-pub(crate) const TIME_CONSTANT: usize = 5;
+pub(crate) const TIME_CONSTANT_SLOT: usize = 5;
 
 /// Names of the parameters that can be constrained or estimated individually for each record.
-pub const GREY_BOX_NAMES: [&str; 7] = ["K_e", "K_e_dot", "T_L", "omega_nm", "zeta_nm", "tau_e", "T_n"];
+pub const GREY_BOX_PARAMETER_NAMES: [&str; 7] = ["K_e", "K_e_dot", "T_L", "omega_nm", "zeta_nm", "tau_e", "T_n"];
 
 /// Bounds of zeta_nm. Beyond the bounds the two poles are effectively independent.
 const ZETA_LIMITS: (f64, f64) = (1e-4, 20.0);
@@ -52,7 +52,7 @@ pub(crate) struct Layout {
     pub lead: Lead,
     pub sample_time: SampleTime,
     /// Index in eta of each slot, for each record.
-    pub positions: Vec<[usize; SLOTS]>,
+    pub positions: Vec<[usize; SLOT_COUNT]>,
     /// Name of each element of eta; the name of an individual parameter contains the number of its record.
     pub names: Vec<String>,
     /// Bounds of each element of eta.
@@ -67,7 +67,7 @@ pub(crate) struct Layout {
 pub(crate) struct Polynomials {
     pub orders: Orders,
     pub theta: Vec<f64>,
-    pub jacobian: Vec<[f64; SLOTS]>,
+    pub jacobian: Vec<[f64; SLOT_COUNT]>,
 }
 
 /// Returns the orders of the Box-Jenkins model that contains the grey box as a special case.
@@ -92,16 +92,16 @@ impl Layout {
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
         for name in constraints.keys().chain(individual) {
-            if !GREY_BOX_NAMES.contains(&name.as_str()) {
+            if !GREY_BOX_PARAMETER_NAMES.contains(&name.as_str()) {
                 return Err(IdentError::UnknownParameter {
                     name: name.clone(),
-                    available: GREY_BOX_NAMES.join(", "),
+                    available: GREY_BOX_PARAMETER_NAMES.join(", "),
                 });
             }
         }
         let asked = |name: &str| constraints.contains_key(name) || individual.iter().any(|n| n == name);
         if constraints.contains_key("T_L") && asked("K_e_dot") {
-            return Err(bad(
+            return Err(constraint_error(
                 "T_L",
                 "a constraint on K_e_dot = K_e T_L as well",
                 "one of the two constraints".to_owned(),
@@ -112,7 +112,7 @@ impl Layout {
             order,
             lead,
             sample_time,
-            positions: vec![[usize::MAX; SLOTS]; records],
+            positions: vec![[usize::MAX; SLOT_COUNT]; records],
             names: Vec::new(),
             limits: Vec::new(),
             slots: Vec::new(),
@@ -163,29 +163,29 @@ impl Layout {
         let widest = match slot {
             2 => (1e-3, MAX_NYQUIST_SHARE * self.sample_time.nyquist_rad_s()),
             3 => ZETA_LIMITS,
-            DELAY => (0.0, f64::INFINITY),
-            TIME_CONSTANT => (TIME_CONSTANT_LIMITS.0 * ts, TIME_CONSTANT_LIMITS.1 * ts),
+            DELAY_SLOT => (0.0, f64::INFINITY),
+            TIME_CONSTANT_SLOT => (TIME_CONSTANT_LIMITS.0 * ts, TIME_CONSTANT_LIMITS.1 * ts),
             _ => (f64::NEG_INFINITY, f64::INFINITY),
         };
         let range = Constraint::Between(delay_range_s.0, delay_range_s.1);
         let constraint = match constraints.get(name) {
             Some(constraint) => *constraint,
-            None if slot == DELAY => range,
+            None if slot == DELAY_SLOT => range,
             None => Constraint::Between(widest.0, widest.1),
         };
         let (low, high) = constraint.limits();
         let within = (low.max(widest.0), high.min(widest.1));
         let meaning = within.0 <= within.1 && within.0 < f64::INFINITY && within.1 > f64::NEG_INFINITY;
         let fixed_elsewhere = low == high && within != (low, high);
-        if !constraint.is_sound() || !meaning || fixed_elsewhere {
+        if !constraint.is_valid() || !meaning || fixed_elsewhere {
             let expected = format!(
                 "a finite value, or a lower and an upper bound, within {:.6} to {:.6}",
                 widest.0, widest.1
             );
-            return Err(bad(name, &format!("{constraint:?}"), expected));
+            return Err(constraint_error(name, &format!("{constraint:?}"), expected));
         }
-        if slot == DELAY && !within.1.is_finite() {
-            return Err(bad(
+        if slot == DELAY_SLOT && !within.1.is_finite() {
+            return Err(constraint_error(
                 name,
                 &format!("{constraint:?}"),
                 "a finite upper bound: the longest delay".to_owned(),
@@ -195,32 +195,44 @@ impl Layout {
     }
 
     /// Returns the number of parameters of one record.
-    pub fn slots_in_use(&self) -> usize {
-        if self.order == 0 { TIME_CONSTANT } else { SLOTS }
+    pub fn used_slot_count(&self) -> usize {
+        if self.order == 0 {
+            TIME_CONSTANT_SLOT
+        } else {
+            SLOT_COUNT
+        }
     }
 
     /// Returns nk for the longest possible delay.
     pub fn longest_nk(&self) -> Result<usize, ModelError> {
-        let longest = self.delays().into_iter().map(|i| self.limits[i].1).fold(0.0, f64::max);
+        let longest = self
+            .delay_indices()
+            .into_iter()
+            .map(|i| self.limits[i].1)
+            .fold(0.0, f64::max);
         Ok(whole_samples(longest, self.sample_time)? + 1)
     }
 
     /// Returns the eta in which every record has these parameters.
-    pub fn spread(&self, slots: &[f64; SLOTS]) -> Vec<f64> {
+    pub fn common_eta(&self, slots: &[f64; SLOT_COUNT]) -> Vec<f64> {
         self.slots.iter().map(|&slot| slots[slot]).collect()
     }
 
     /// Returns the parameters of one record; T_n is 0 for a model without T_n.
-    pub fn of_record(&self, eta: &[f64], record: usize) -> [f64; SLOTS] {
-        let mut values = [0.0; SLOTS];
-        for (value, &position) in values.iter_mut().zip(&self.positions[record]).take(self.slots_in_use()) {
+    pub fn record_slots(&self, eta: &[f64], record: usize) -> [f64; SLOT_COUNT] {
+        let mut values = [0.0; SLOT_COUNT];
+        for (value, &position) in values
+            .iter_mut()
+            .zip(&self.positions[record])
+            .take(self.used_slot_count())
+        {
             *value = eta[position];
         }
         values
     }
 
     /// Returns `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e]` from the slots of one record.
-    pub fn operator(&self, slots: &[f64; SLOTS]) -> [f64; 5] {
+    pub fn operator(&self, slots: &[f64; SLOT_COUNT]) -> [f64; 5] {
         let [k_e, lead, omega, zeta, tau, _] = *slots;
         let k_e_dot = match self.lead {
             Lead::RateGain => lead,
@@ -232,14 +244,14 @@ impl Layout {
     /// Returns the polynomials of one record. `sample` is the sampling interval that contains tau_e, if the caller has
     /// chosen one.
     pub fn polynomials(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Polynomials, ModelError> {
-        let slots = self.of_record(eta, record);
+        let slots = self.record_slots(eta, record);
         let operator = self.operator(&slots);
         let sample = match sample {
             Some(sample) => sample,
-            None => whole_samples(operator[DELAY], self.sample_time)?,
+            None => whole_samples(operator[DELAY_SLOT], self.sample_time)?,
         };
-        let (held, by_operator) = delayed_operator_and_jacobian_within(sample, operator, self.sample_time)?;
-        let noise = remnant_noise(slots[TIME_CONSTANT], self.order, self.sample_time)?;
+        let (held, by_operator) = delayed_operator_and_jacobian_with_delay_samples(sample, operator, self.sample_time)?;
+        let noise = remnant_noise(slots[TIME_CONSTANT_SLOT], self.order, self.sample_time)?;
         let mut theta = held.b.to_vec();
         theta.extend_from_slice(&noise.c);
         theta.extend_from_slice(&noise.d);
@@ -248,10 +260,17 @@ impl Layout {
             let [k_e, k_e_dot, omega, zeta, tau] = row;
             match self.lead {
                 Lead::RateGain => [k_e, k_e_dot, omega, zeta, tau, 0.0],
-                Lead::Time => [k_e + slots[LEAD] * k_e_dot, slots[0] * k_e_dot, omega, zeta, tau, 0.0],
+                Lead::Time => [
+                    k_e + slots[LEAD_SLOT] * k_e_dot,
+                    slots[0] * k_e_dot,
+                    omega,
+                    zeta,
+                    tau,
+                    0.0,
+                ],
             }
         };
-        let mut jacobian: Vec<[f64; SLOTS]> = by_operator[..3].iter().map(|r| row_of_operator(*r)).collect();
+        let mut jacobian: Vec<[f64; SLOT_COUNT]> = by_operator[..3].iter().map(|r| row_of_operator(*r)).collect();
         jacobian.extend(
             noise
                 .c_slope
@@ -270,19 +289,19 @@ impl Layout {
 
 impl Parametrisation for Layout {
     fn positions(&self, record: usize) -> &[usize] {
-        &self.positions[record][..self.slots_in_use()]
+        &self.positions[record][..self.used_slot_count()]
     }
 
     fn limits(&self) -> &[(f64, f64)] {
         &self.limits
     }
 
-    fn delays(&self) -> Vec<usize> {
-        (0..self.slots.len()).filter(|&i| self.slots[i] == DELAY).collect()
+    fn delay_indices(&self) -> Vec<usize> {
+        (0..self.slots.len()).filter(|&i| self.slots[i] == DELAY_SLOT).collect()
     }
 
-    fn delay_of(&self, record: usize) -> usize {
-        self.positions[record][DELAY]
+    fn delay_index(&self, record: usize) -> usize {
+        self.positions[record][DELAY_SLOT]
     }
 
     fn sample_time(&self) -> SampleTime {
@@ -297,16 +316,16 @@ impl Parametrisation for Layout {
         Vec::new()
     }
 
-    fn map(&self, eta: &[f64], record: usize, held: HeldSamples<'_>) -> Result<Mapped, ModelError> {
-        let sample = held.of(self.delay_of(record));
+    fn map(&self, eta: &[f64], record: usize, held: DelayIntervals<'_>) -> Result<MappedPolynomials, ModelError> {
+        let sample = held.of(self.delay_index(record));
         let Polynomials {
             orders,
             theta,
             jacobian,
         } = self.polynomials(eta, record, sample)?;
         let column = |slot: usize| -> Vec<f64> { jacobian.iter().map(|row| row[slot]).collect() };
-        let columns = (0..self.slots_in_use()).map(column).collect();
-        Ok(Mapped {
+        let columns = (0..self.used_slot_count()).map(column).collect();
+        Ok(MappedPolynomials {
             orders,
             further: Vec::new(),
             theta,
@@ -315,7 +334,7 @@ impl Parametrisation for Layout {
     }
 }
 
-fn bad(name: &str, found: &str, expected: String) -> IdentError {
+fn constraint_error(name: &str, found: &str, expected: String) -> IdentError {
     IdentError::BadOption {
         option: format!("the constraint on {name}"),
         found: found.to_owned(),
@@ -341,7 +360,7 @@ mod tests {
             (0.05, 0.6),
             &constraints,
             &individual,
-            SampleTime::HUNDREDTH,
+            SampleTime::AT_100_HZ,
         )
     }
 
@@ -357,9 +376,9 @@ mod tests {
                 "K_e[1]", "K_e[2]", "K_e_dot", "omega_nm", "zeta_nm", "tau_e[1]", "tau_e[2]"
             ]
         );
-        assert_eq!(mixed.delays(), [5, 6]);
+        assert_eq!(mixed.delay_indices(), [5, 6]);
         let eta = [1.0, 2.0, 3.0, 4.0, 5.0, 0.1, 0.2];
-        assert_eq!(mixed.of_record(&eta, 1), [2.0, 3.0, 4.0, 5.0, 0.2, 0.0]);
+        assert_eq!(mixed.record_slots(&eta, 1), [2.0, 3.0, 4.0, 5.0, 0.2, 0.0]);
         assert_eq!(mixed.longest_nk().unwrap(), 61);
         // With one record, no parameter is individual.
         assert_eq!(layout(1, 1, &[], &["K_e"]).unwrap().names[0], "K_e");

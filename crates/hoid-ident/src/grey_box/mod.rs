@@ -32,6 +32,6 @@ pub(crate) mod parametrisation;
 mod result;
 mod starts;
 
-pub use layout::GREY_BOX_NAMES;
+pub use layout::GREY_BOX_PARAMETER_NAMES;
 pub use options::GreyBox;
 pub use result::{GreyBoxFit, OrderCandidate, OrderFigures};

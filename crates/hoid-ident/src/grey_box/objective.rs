@@ -18,7 +18,7 @@ use crate::{
     optimize::{Minimum, Objective, SearchOptions, minimise},
 };
 
-use super::parametrisation::{HeldSamples, Mapped, Parametrisation};
+use super::parametrisation::{DelayIntervals, MappedPolynomials, Parametrisation};
 
 /// Criterion for one or several records.
 #[derive(Debug, Clone)]
@@ -29,8 +29,8 @@ pub(crate) struct PhysicalCriterion<'a, P> {
     pub further: Vec<Vec<&'a [f64]>>,
     pub initial: InitialState,
     pub first: usize,
-    /// Sampling interval to which each delay of [`Parametrisation::delays`] is restricted; `None` if the delay itself
-    /// determines its interval.
+    /// Sampling interval to which each delay of [`Parametrisation::delay_indices`] is restricted; `None` if the delay
+    /// itself determines its interval.
     pub samples: Option<Vec<usize>>,
     pub limits: Vec<(f64, f64)>,
     /// Prior knowledge, in units of squared residuals; empty if there is none.
@@ -145,7 +145,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
     }
 
     /// Returns the contribution of the additional measurements to the criterion at eta; zero if there are none.
-    pub fn additional_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
+    pub fn linearise_additional(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let mut own = Linearisation::empty(eta.len());
         if let Some(additional) = &self.additional {
             additional.add_to(eta, &mut own, workspace);
@@ -153,22 +153,22 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         own
     }
 
-    pub fn residuals(&self) -> usize {
+    pub fn residual_count(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
     /// Returns the number of initial states of all records.
-    pub fn states(&self) -> usize {
-        let further = self.layout.further();
+    pub fn state_count(&self) -> usize {
+        let further = self.layout.further_input_orders();
         let of_record = |record: usize| {
             self.with_data((self.layout.orders(1), &further), record, self.data[record])
-                .states()
+                .state_count()
         };
         (0..self.data.len()).map(of_record).sum()
     }
 
     /// Returns the criterion of one record as a function of theta.
-    pub fn of_record(&self, mapped: &Mapped, record: usize) -> Criterion<'a> {
+    pub fn record_criterion(&self, mapped: &MappedPolynomials, record: usize) -> Criterion<'a> {
         self.with_data((mapped.orders, &mapped.further), record, self.data[record])
     }
 
@@ -188,25 +188,25 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         };
         Criterion {
             further: further.iter().zip(&self.further).map(input).collect(),
-            ..Criterion::of_record(orders, data, self.initial, self.first)
+            ..Criterion::for_record(orders, data, self.initial, self.first)
         }
     }
 
-    fn polynomials(&self, eta: &[f64], record: usize) -> Option<Mapped> {
-        let delays = self.layout.delays();
+    fn polynomials(&self, eta: &[f64], record: usize) -> Option<MappedPolynomials> {
+        let delays = self.layout.delay_indices();
         let held = match &self.samples {
-            Some(samples) => HeldSamples {
+            Some(samples) => DelayIntervals {
                 delays: &delays,
                 samples,
             },
-            None => HeldSamples::default(),
+            None => DelayIntervals::default(),
         };
         self.layout.map(eta, record, held).ok()
     }
 
     /// Returns ranges of successive records whose parameters have the same indices in eta. All records of a range have
     /// the same polynomials.
-    fn of_same_places(&self) -> impl Iterator<Item = Range<usize>> {
+    fn ranges_with_equal_positions(&self) -> impl Iterator<Item = Range<usize>> {
         let records = 0..self.data.len();
         let mut next = records.start;
         std::iter::from_fn(move || {
@@ -221,7 +221,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
 
     /// Sets K_e and K_e_dot to their optimum for the other parameters in eta and returns the sum of squares; the
     /// residual is affine in these gains. All records must have the same parameters, with K_e_dot as a coordinate.
-    pub fn best_gains(&self, eta: &mut [f64], workspace: &mut Workspace) -> Option<f64> {
+    pub fn optimise_gains(&self, eta: &mut [f64], workspace: &mut Workspace) -> Option<f64> {
         eta[..2].fill(0.0);
         if !self.is_feasible(eta) {
             return None;
@@ -253,13 +253,13 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         if minimum.termination.converged() {
             return Some(minimum);
         }
-        Some(self.search_by_samples(minimum, options, workspace))
+        Some(self.search_in_intervals(minimum, options, workspace))
     }
 
     /// Searches within single sampling intervals of the delays, and moves to a neighbouring interval as long as the
     /// loss decreases.
-    fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
-        let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
+    fn search_in_intervals(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
+        let (delays, ts) = (self.layout.delay_indices(), self.layout.sample_time().s());
         let interval_start = self.layout.first_interval_start();
         let place = |delay_s: f64| delay_s / ts - interval_start;
         let border = |n: usize| (n as f64 + interval_start) * ts;
@@ -287,10 +287,10 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
             for (k, &i) in delays.iter().enumerate() {
                 let position = place(best.theta[i]);
                 let neighbours = [
-                    (position <= samples[k] as f64 + NEAR_BORDER)
+                    (position <= samples[k] as f64 + BORDER_DISTANCE_SAMPLES)
                         .then(|| samples[k].checked_sub(1))
                         .flatten(),
-                    (position >= (samples[k] + 1) as f64 - NEAR_BORDER).then_some(samples[k] + 1),
+                    (position >= (samples[k] + 1) as f64 - BORDER_DISTANCE_SAMPLES).then_some(samples[k] + 1),
                 ];
                 for neighbour in neighbours.into_iter().flatten() {
                     let mut there = samples.clone();
@@ -316,32 +316,32 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
 
     /// Returns the elements of eta that have a variance, i.e. that are not fixed and not at a bound set by the user. A
     /// kink of the loss is not a bound.
-    pub fn free(&self, eta: &[f64], descent: &[f64]) -> Vec<usize> {
+    pub fn free_elements(&self, eta: &[f64], descent: &[f64]) -> Vec<usize> {
         crate::optimize::free_parameters(self, eta, descent)
     }
 
     /// Returns the polynomials of a record for a given eta.
-    pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Mapped, IdentError> {
-        Ok(self.layout.map(eta, record, HeldSamples::default())?)
+    pub fn model_of(&self, eta: &[f64], record: usize) -> Result<MappedPolynomials, IdentError> {
+        Ok(self.layout.map(eta, record, DelayIntervals::default())?)
     }
 }
 
 /// Distance from the border of a sampling interval, in samples, below which the next interval is tried.
-const NEAR_BORDER: f64 = 1e-6;
+const BORDER_DISTANCE_SAMPLES: f64 = 1e-6;
 
 impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
     fn is_feasible(&self, eta: &[f64]) -> bool {
         eta.iter().all(|v| v.is_finite())
-            && self.of_same_places().all(|records| {
+            && self.ranges_with_equal_positions().all(|records| {
                 self.polynomials(eta, records.start)
-                    .is_some_and(|p| self.of_record(&p, records.start).is_feasible(&p.theta))
+                    .is_some_and(|p| self.record_criterion(&p, records.start).is_feasible(&p.theta))
             })
     }
 
     fn linearise(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let p = eta.len();
         let mut total = Linearisation::empty(p);
-        for records in self.of_same_places() {
+        for records in self.ranges_with_equal_positions() {
             let Some(polynomials) = self.polynomials(eta, records.start) else {
                 // The polynomials are missing only if eta is not feasible.
                 total.sum_of_squares = f64::NAN;
@@ -352,7 +352,7 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
             let columns = &polynomials.columns;
             for record in records {
                 let of_theta = self
-                    .of_record(&polynomials, record)
+                    .record_criterion(&polynomials, record)
                     .linearise(&polynomials.theta, workspace);
                 total.sum_of_squares += of_theta.sum_of_squares;
                 for (i, &place) in positions.iter().enumerate() {
@@ -429,19 +429,19 @@ mod tests {
         ] {
             for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
                 let layout =
-                    Layout::new(order, 2, (0.05, 0.6), &constraints, &individual, SampleTime::HUNDREDTH).unwrap();
+                    Layout::new(order, 2, (0.05, 0.6), &constraints, &individual, SampleTime::AT_100_HZ).unwrap();
                 let first = first_residual(
                     &super::super::layout::orders(order, layout.longest_nk().unwrap()),
                     initial,
                 );
                 let data = signals.iter().map(|(e, u)| Data::new(e, u)).collect();
                 let criterion = PhysicalCriterion::new(layout, data, initial, first);
-                let mut eta = criterion.layout.spread(&[0.3, 0.05, 12.0, 0.4, 0.2837, 0.05]);
+                let mut eta = criterion.layout.common_eta(&[0.3, 0.05, 12.0, 0.4, 0.2837, 0.05]);
                 // The individual parameters differ from record to record.
                 for (i, value) in eta.iter_mut().enumerate() {
                     *value *= 1.0 + 0.01 * i as f64;
                 }
-                let mut ws = Workspace::of_thread();
+                let mut ws = Workspace::borrow_from_thread();
                 let at = criterion.linearise(&eta, &mut ws);
                 for i in 0..eta.len() {
                     let h = 1e-5 * eta[i];
@@ -467,11 +467,11 @@ mod tests {
     #[test]
     fn loss_is_continuous_in_the_delay() {
         let signals = signals(600);
-        let layout = Layout::new(2, 2, (0.05, 0.6), &BTreeMap::new(), &[], SampleTime::HUNDREDTH).unwrap();
+        let layout = Layout::new(2, 2, (0.05, 0.6), &BTreeMap::new(), &[], SampleTime::AT_100_HZ).unwrap();
         let first = first_residual(&super::super::layout::orders(2, 61), InitialState::Estimate);
         let data = signals.iter().map(|(e, u)| Data::new(e, u)).collect();
         let criterion = PhysicalCriterion::new(layout, data, InitialState::Estimate, first);
-        let mut ws = Workspace::of_thread();
+        let mut ws = Workspace::borrow_from_thread();
         let mut loss = |tau: f64| {
             criterion
                 .linearise(&[0.3, 0.05, 12.0, 0.4, tau, 0.05], &mut ws)

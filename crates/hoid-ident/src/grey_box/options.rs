@@ -19,8 +19,8 @@ pub struct GreyBox {
     pub order: RangeInclusive<usize>,
     /// Smallest and largest delay tau_e in s. Default 0.05 to 0.6.
     pub delay_range_s: (f64, f64),
-    /// Fixed and bounded parameters by name ([`GREY_BOX_NAMES`](super::GREY_BOX_NAMES)). Either T_L or K_e_dot can be
-    /// constrained, not both.
+    /// Fixed and bounded parameters by name ([`GREY_BOX_PARAMETER_NAMES`](super::GREY_BOX_PARAMETER_NAMES)). Either T_L
+    /// or K_e_dot can be constrained, not both.
     pub constraints: BTreeMap<String, Constraint>,
     /// Names of the parameters that differ between records; all others are common to the records.
     pub individual: Vec<String>,
@@ -58,44 +58,45 @@ impl BatchOptions for GreyBox {
     fn options() -> Vec<BatchOption<Self>> {
         let default = Self::default();
         let mut all = vec![
-            shared::noise(|_: &mut Self, _, _| Ok(())).printed("noise", |_, _| Some("remnant".to_owned())),
-            shared::change(),
-            BatchOption::new(remnant_order(), |how: &mut Self, option, text| {
+            shared::noise_option(|_: &mut Self, _, _| Ok(()))
+                .with_formatter("noise", |_, _| Some("remnant".to_owned())),
+            shared::change_option(),
+            BatchOption::new(remnant_order_setting(), |how: &mut Self, option, text| {
                 how.order = option.read(text)?;
                 Ok(())
             })
-            .printed("remnant order m", |how, _| {
-                let order = shared::range_words(&how.order);
+            .with_formatter("remnant order m", |how, _| {
+                let order = shared::order_range_text(&how.order);
                 let one = how.order.start() == how.order.end();
                 Some(if one { order } else { format!("{order}, by BIC") })
             }),
-            shared::delay_range(
+            shared::delay_range_option(
                 default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
                 |how| how.delay_range_s,
             ),
-            shared::individual(|how: &mut Self, _, names| {
+            shared::individual_parameters_option(|how: &mut Self, _, names| {
                 how.individual = names;
                 Ok(())
             })
-            .printed("individual", |how, _| {
+            .with_formatter("individual", |how, _| {
                 (!how.individual.is_empty()).then(|| how.individual.join(", "))
             }),
-            shared::initial_state(|how: &mut Self, _, rule| {
+            shared::initial_state_option(|how: &mut Self, _, rule| {
                 how.initial_state = rule.unwrap_or_default();
                 Ok(())
             }),
         ];
-        all.extend(shared::constraints(
+        all.extend(shared::constraint_options(
             |how: &mut Self| &mut how.constraints,
             |how| &how.constraints,
         ));
-        all.extend(shared::search(default.search, |how: &mut Self| &mut how.search));
+        all.extend(shared::search_options(default.search, |how: &mut Self| &mut how.search));
         all
     }
 }
 
-fn remnant_order() -> Setting {
+fn remnant_order_setting() -> Setting {
     let help = "Order m of the remnant, or a range to search";
-    Setting::new("remnant_order", Kind::Counts, help).default(&shared::range_words(&DEFAULT_ORDERS))
+    Setting::new("remnant_order", Kind::Counts, help).default(&shared::order_range_text(&DEFAULT_ORDERS))
 }

@@ -9,7 +9,7 @@ use crate::criterion::further_input::InputOrders;
 /// Orders and theta of one record for a given eta, and the derivatives of theta, with a column for each slot of the
 /// record.
 #[derive(Debug, Clone)]
-pub(crate) struct Mapped {
+pub(crate) struct MappedPolynomials {
     pub orders: Orders,
     /// Orders of the further inputs, whose coefficients are at the end of theta.
     pub further: Vec<InputOrders>,
@@ -19,13 +19,13 @@ pub(crate) struct Mapped {
 
 /// Sampling intervals to which the delays are restricted; empty if there is no restriction.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct HeldSamples<'s> {
+pub(crate) struct DelayIntervals<'s> {
     /// Indices of the delays in eta.
     pub delays: &'s [usize],
     pub samples: &'s [usize],
 }
 
-impl HeldSamples<'_> {
+impl DelayIntervals<'_> {
     /// Returns the sampling interval chosen for the delay at index `place` of eta; `None` if there is no restriction.
     pub fn of(&self, place: usize) -> Option<usize> {
         let index = self.delays.iter().position(|&delay| delay == place)?;
@@ -33,7 +33,7 @@ impl HeldSamples<'_> {
     }
 }
 
-impl Mapped {
+impl MappedPolynomials {
     /// Returns the covariance of theta by rows, `J C J'`, from the covariance C of eta; `places` are the indices in eta
     /// of the slots of the record.
     pub fn covariance_of_theta(&self, of_eta: &[f64], p: usize, places: &[usize]) -> Vec<f64> {
@@ -62,9 +62,9 @@ pub(crate) trait Parametrisation: Clone {
     /// Returns the lower and the upper bound of each element of eta.
     fn limits(&self) -> &[(f64, f64)];
     /// Returns the indices of the delays in eta.
-    fn delays(&self) -> Vec<usize>;
+    fn delay_indices(&self) -> Vec<usize>;
     /// Returns the index in eta of the delay of a record.
-    fn delay_of(&self, record: usize) -> usize;
+    fn delay_index(&self, record: usize) -> usize;
     /// Returns the sample time.
     fn sample_time(&self) -> SampleTime;
     /// Returns the delay in samples at which the sampling interval 0 starts: -0.5 if e is interpolated (the response is
@@ -78,7 +78,7 @@ pub(crate) trait Parametrisation: Clone {
     /// limits.
     fn stable_blocks(&self) -> Vec<Range<usize>>;
     /// Returns the orders of the further inputs at their shortest delays; there are none by default.
-    fn further(&self) -> Vec<InputOrders> {
+    fn further_input_orders(&self) -> Vec<InputOrders> {
         Vec::new()
     }
     /// Returns the polynomials of one record, with its delays in the given sampling intervals. Records with the same
@@ -86,7 +86,7 @@ pub(crate) trait Parametrisation: Clone {
     ///
     /// # Errors
     /// [`ModelError`] if there is no model for this eta.
-    fn map(&self, eta: &[f64], record: usize, held: HeldSamples<'_>) -> Result<Mapped, ModelError>;
+    fn map(&self, eta: &[f64], record: usize, held: DelayIntervals<'_>) -> Result<MappedPolynomials, ModelError>;
 }
 
 #[cfg(test)]
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn covariance_of_a_linear_map_matches_hand_calculation() {
         // theta = [x + 2 y, x - y] of eta = [y, other, x].
-        let mapped = Mapped {
+        let mapped = MappedPolynomials {
             orders: Orders::default(),
             further: Vec::new(),
             theta: vec![0.0; 2],

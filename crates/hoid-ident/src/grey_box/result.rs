@@ -9,7 +9,7 @@ use hoid_model::{
 
 use crate::{Fit, Termination};
 
-use super::layout::{DELAY, LEAD, Layout, Lead, TIME_CONSTANT};
+use super::layout::{DELAY_SLOT, LEAD_SLOT, Layout, Lead, TIME_CONSTANT_SLOT};
 
 /// A candidate order m of the remnant filter.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -88,14 +88,14 @@ impl GreyBoxFit {
 
     /// Returns the estimate of a quantity that depends on the gain and the lead. `by_gain` is its derivative with
     /// respect to K_e, `by_lead` its derivative with respect to the coordinate of the lead.
-    fn of_gains(&self, record: usize, value: f64, by_gain: f64, by_lead: f64) -> Estimate {
+    fn gain_quantity_estimate(&self, record: usize, value: f64, by_gain: f64, by_lead: f64) -> Estimate {
         let places = &self.layout.positions[record];
         let used = |place: usize, by: f64| by != 0.0 && self.free.contains(&place);
         match &self.covariance {
-            Some(c) if used(places[0], by_gain) || used(places[LEAD], by_lead) => {
+            Some(c) if used(places[0], by_gain) || used(places[LEAD_SLOT], by_lead) => {
                 let mut gradient = vec![0.0; self.eta.len()];
                 gradient[places[0]] += by_gain;
-                gradient[places[LEAD]] += by_lead;
+                gradient[places[LEAD_SLOT]] += by_lead;
                 Estimate::with_variance(value, variance_along(&gradient, c))
             }
             _ => Estimate::fixed(value),
@@ -108,8 +108,8 @@ impl GreyBoxFit {
     /// # Errors
     /// [`NotConvertible::ZeroGain`] if K_e is zero, so there is no T_L.
     pub fn operator(&self, record: usize) -> Result<OperatorEstimate, NotConvertible> {
-        let record = self.known(record);
-        let slots = self.layout.of_record(&self.eta, record);
+        let record = self.record_index(record);
+        let slots = self.layout.record_slots(&self.eta, record);
         let [k_e, k_e_dot, ..] = self.layout.operator(&slots);
         if k_e == 0.0 {
             return Err(NotConvertible::ZeroGain);
@@ -118,10 +118,13 @@ impl GreyBoxFit {
         let places = self.layout.positions[record];
         let (t_l_s, k_e_dot) = match self.layout.lead {
             Lead::RateGain => (
-                self.of_gains(record, t_l, -t_l / k_e, 1.0 / k_e),
-                self.estimate(places[LEAD]),
+                self.gain_quantity_estimate(record, t_l, -t_l / k_e, 1.0 / k_e),
+                self.estimate(places[LEAD_SLOT]),
             ),
-            Lead::Time => (self.estimate(places[LEAD]), self.of_gains(record, k_e_dot, t_l, k_e)),
+            Lead::Time => (
+                self.estimate(places[LEAD_SLOT]),
+                self.gain_quantity_estimate(record, k_e_dot, t_l, k_e),
+            ),
         };
         Ok(OperatorEstimate {
             k_e: self.estimate(places[0]),
@@ -129,7 +132,7 @@ impl GreyBoxFit {
             k_e_dot,
             omega_nm_rad_s: self.estimate(places[2]),
             zeta_nm: self.estimate(places[3]),
-            tau_e_s: self.estimate(places[DELAY]),
+            tau_e_s: self.estimate(places[DELAY_SLOT]),
         })
     }
 
@@ -150,7 +153,7 @@ impl GreyBoxFit {
         if self.layout.order == 0 {
             return None;
         }
-        let place = self.layout.positions[self.known(record)][TIME_CONSTANT];
+        let place = self.layout.positions[self.record_index(record)][TIME_CONSTANT_SLOT];
         let noise = remnant_noise(self.eta[place], self.layout.order, self.layout.sample_time).ok()?;
         let sigma = self.innovation_variance().sqrt();
         let k_n = sigma / noise.gain;
@@ -173,37 +176,37 @@ impl GreyBoxFit {
     /// and the frequency response with its confidence bands. Its covariance `J P J'` is singular, since theta has more
     /// elements than eta. Use the methods of [`GreyBoxFit`] for parameters, criteria, operator and remnant.
     pub fn polynomial_fit(&self, record: usize) -> &Fit {
-        &self.fits[self.known(record)]
+        &self.fits[self.record_index(record)]
     }
 
-    fn known(&self, record: usize) -> usize {
+    fn record_index(&self, record: usize) -> usize {
         record.min(self.fits.len() - 1)
     }
 
     /// Returns the fit that contains the results common to all records.
-    fn whole(&self) -> &Fit {
+    fn common_fit(&self) -> &Fit {
         &self.fits[0]
     }
 
     /// Returns the loss `V = sum eps^2 / n` over the n residuals that count.
     pub fn loss(&self) -> f64 {
-        self.whole().loss()
+        self.common_fit().loss()
     }
 
     /// Returns the unbiased innovation variance `sum eps^2 / (n - p - s)` with p parameters and s estimated initial
     /// states.
     pub fn innovation_variance(&self) -> f64 {
-        self.whole().innovation_variance()
+        self.common_fit().innovation_variance()
     }
 
     /// Returns the number n of residuals.
     pub fn residual_count(&self) -> usize {
-        self.whole().residual_count()
+        self.common_fit().residual_count()
     }
 
     /// Returns the number s of estimated initial states, over all records.
     pub fn state_count(&self) -> usize {
-        self.whole().state_count()
+        self.common_fit().state_count()
     }
 
     /// Returns the number p of parameters that were not fixed.
@@ -213,21 +216,21 @@ impl GreyBoxFit {
 
     /// Returns how the search ended.
     pub fn termination(&self) -> Termination {
-        self.whole().termination()
+        self.common_fit().termination()
     }
 
     /// Returns the name of the start that led to this minimum.
     pub fn start(&self) -> &str {
-        self.whole().start()
+        self.common_fit().start()
     }
 
     /// Returns Akaike's criterion `n ln V + 2 p`.
     pub fn aic(&self) -> f64 {
-        self.whole().aic()
+        self.common_fit().aic()
     }
 
     /// Returns Schwarz's (Bayesian) criterion `n ln V + p ln n`.
     pub fn bic(&self) -> f64 {
-        self.whole().bic()
+        self.common_fit().bic()
     }
 }

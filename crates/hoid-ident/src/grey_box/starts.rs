@@ -15,7 +15,7 @@ use hoid_model::{Record, Structure};
 use crate::{Estimator, criterion::Workspace};
 
 use super::{
-    layout::{DELAY, LEAD, Layout, Lead, SLOTS, TIME_CONSTANT},
+    layout::{DELAY_SLOT, LEAD_SLOT, Layout, Lead, SLOT_COUNT, TIME_CONSTANT_SLOT},
     objective::PhysicalCriterion,
 };
 
@@ -26,7 +26,7 @@ const DEFAULT_OMEGA: f64 = 11.0;
 /// Damping ratio for the ranking of the delays.
 const DEFAULT_ZETA: f64 = 0.4;
 /// Number of delays at which several frequencies and damping ratios are tried.
-const BEST_DELAYS: usize = 2;
+const BEST_DELAY_COUNT: usize = 2;
 /// Neuromuscular frequencies of the grid, rad/s.
 const GRID_OMEGA: [f64; 3] = [6.0, 11.0, 20.0];
 /// Damping ratios of the grid.
@@ -41,7 +41,7 @@ const MIN_DELAYS: usize = 3;
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
     pub label: String,
-    pub slots: [f64; SLOTS],
+    pub slots: [f64; SLOT_COUNT],
 }
 
 /// Returns a criterion for the same data in which all records have the same parameters, with K_e_dot as a coordinate.
@@ -60,10 +60,10 @@ pub(crate) fn common_parameter_criterion<'a>(
             (low.min(b.0), high.max(b.1))
         })
     };
-    let used = if order == 0 { TIME_CONSTANT } else { SLOTS };
+    let used = if order == 0 { TIME_CONSTANT_SLOT } else { SLOT_COUNT };
     let limits: Vec<(f64, f64)> = (0..used)
         .map(|slot| match slot {
-            0 | LEAD => (f64::NEG_INFINITY, f64::INFINITY),
+            0 | LEAD_SLOT => (f64::NEG_INFINITY, f64::INFINITY),
             _ => of_slot(slot),
         })
         .collect();
@@ -84,7 +84,7 @@ pub(crate) fn common_parameter_criterion<'a>(
 pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, workspace: &mut Workspace) -> Vec<Start> {
     let scout = common_parameter_criterion(criterion, criterion.layout.order.min(1));
     let bounded = |slot: usize, value: f64| value.clamp(scout.limits[slot].0, scout.limits[slot].1);
-    let (low, high) = scout.limits[DELAY];
+    let (low, high) = scout.limits[DELAY_SLOT];
     let intervals = match high - low {
         width if width > 0.0 => ((width / GRID_DELAY_S).ceil() as usize).max(MIN_DELAYS - 1),
         _ => 0,
@@ -92,7 +92,7 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     let t_n = if scout.layout.order == 0 {
         0.0
     } else {
-        bounded(TIME_CONSTANT, GRID_TIME_CONSTANT_S[0])
+        bounded(TIME_CONSTANT_SLOT, GRID_TIME_CONSTANT_S[0])
     };
     let delays: Vec<f64> = (0..=intervals)
         .map(|i| low + (high - low) * i as f64 / intervals.max(1) as f64)
@@ -100,7 +100,7 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     let mut ranked = |tau: f64, omega: f64, zeta: f64| {
         let (omega, zeta) = (bounded(2, omega), bounded(3, zeta));
         let mut slots = [0.0, 0.0, omega, zeta, tau, t_n];
-        let value = scout.best_gains(&mut slots[..scout.limits.len()], workspace)?;
+        let value = scout.optimise_gains(&mut slots[..scout.limits.len()], workspace)?;
         let label = format!("grid tau_e {tau:.3} s, omega_nm {omega} rad/s, zeta_nm {zeta}");
         Some((Start { label, slots }, value))
     };
@@ -110,7 +110,9 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
         .filter_map(|tau| ranked(tau, DEFAULT_OMEGA, DEFAULT_ZETA))
         .collect();
     by_loss(&mut points);
-    let best: Vec<f64> = (leading(&points, BEST_DELAYS).iter()).map(|s| s.slots[DELAY]).collect();
+    let best: Vec<f64> = (select_starts(&points, BEST_DELAY_COUNT).iter())
+        .map(|s| s.slots[DELAY_SLOT])
+        .collect();
     for tau in best {
         for omega in GRID_OMEGA {
             points.extend(GRID_ZETA.iter().filter_map(|&zeta| ranked(tau, omega, zeta)));
@@ -118,13 +120,13 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     }
     by_loss(&mut points);
     points.dedup_by(|a, b| a.0.label == b.0.label);
-    leading(&points, starts)
+    select_starts(&points, starts)
 }
 
 /// Returns the first n points with a positive lead, and the first point of all if its lead is negative. A negative lead
 /// with a shorter delay imitates the phase of an operator with a positive lead and causes a local minimum.
-fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
-    let has_lead = |s: &Start| s.slots[0] * s.slots[LEAD] >= 0.0;
+fn select_starts(points: &[(Start, f64)], n: usize) -> Vec<Start> {
+    let has_lead = |s: &Start| s.slots[0] * s.slots[LEAD_SLOT] >= 0.0;
     let mut chosen: Vec<Start> = points
         .iter()
         .map(|(s, _)| s)
@@ -138,13 +140,13 @@ fn leading(points: &[(Start, f64)], n: usize) -> Vec<Start> {
 
 /// Returns the operator of a Box-Jenkins fit at the delay of `nearest`; `None` if the fit does not correspond to an
 /// operator.
-pub(crate) fn box_jenkins(
+pub(crate) fn box_jenkins_start(
     records: &[Record],
     nearest: &Start,
     criterion: &PhysicalCriterion<'_, Layout>,
 ) -> Option<Start> {
     let ts = criterion.layout.sample_time.s();
-    let nk = (nearest.slots[DELAY] / ts).round() as usize + 1;
+    let nk = (nearest.slots[DELAY_SLOT] / ts).round() as usize + 1;
     let mut estimator = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk));
     estimator.initial_state = Some(criterion.initial);
     estimator.search.tolerance = 1e-6;
@@ -155,8 +157,8 @@ pub(crate) fn box_jenkins(
         o.k_e_dot.value,
         o.omega_nm_rad_s.value,
         o.zeta_nm.value,
-        nearest.slots[DELAY],
-        nearest.slots[TIME_CONSTANT],
+        nearest.slots[DELAY_SLOT],
+        nearest.slots[TIME_CONSTANT_SLOT],
     ];
     (o.zeta_nm.value > 0.0).then(|| Start {
         label: format!("box-jenkins nk {nk}"),
@@ -175,11 +177,11 @@ pub(crate) fn complete(
     let mut slots = start.slots;
     if layout.order > 0 {
         let scout = common_parameter_criterion(criterion, layout.order);
-        let (low, high) = scout.limits[TIME_CONSTANT];
+        let (low, high) = scout.limits[TIME_CONSTANT_SLOT];
         let tried = time_constants_s.iter().map(|&t| {
             let mut eta = start.slots.to_vec();
-            eta[TIME_CONSTANT] = t.clamp(low, high);
-            let value = scout.best_gains(&mut eta, workspace);
+            eta[TIME_CONSTANT_SLOT] = t.clamp(low, high);
+            let value = scout.optimise_gains(&mut eta, workspace);
             (eta, value.unwrap_or(f64::INFINITY))
         });
         if let Some((eta, value)) = tried.min_by(|a, b| a.1.total_cmp(&b.1))
@@ -190,7 +192,11 @@ pub(crate) fn complete(
     }
     if layout.lead == Lead::Time {
         // If K_e is zero the lead time constant is not defined; one second is used.
-        slots[LEAD] = if slots[0] == 0.0 { 1.0 } else { slots[LEAD] / slots[0] };
+        slots[LEAD_SLOT] = if slots[0] == 0.0 {
+            1.0
+        } else {
+            slots[LEAD_SLOT] / slots[0]
+        };
     }
-    layout.spread(&slots)
+    layout.common_eta(&slots)
 }

@@ -5,7 +5,7 @@ use hoid_core::{
     filter::{divide_in_place, fir},
     stability::MAX_ORDER,
 };
-use hoid_model::{Orders, polynomial::reflected_inside};
+use hoid_model::{Orders, polynomial::reflect_roots_inside};
 
 use crate::criterion::{Criterion, Data, InitialState, Workspace, first_residual};
 
@@ -31,8 +31,8 @@ pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace:
     if data.iter().any(|d| d.u.len() <= equation_error.first) {
         return None;
     }
-    let (theta, _) = equation_error.best_linear_part(&vec![0.0; orders.parameters()], workspace)?;
-    reflected_inside(&theta[..orders.na])
+    let (theta, _) = equation_error.best_linear_part(&vec![0.0; orders.parameter_count()], workspace)?;
+    reflect_roots_inside(&theta[..orders.na])
 }
 
 /// Returns F fitted to the noise-free response of a high-order ARX model.
@@ -50,11 +50,15 @@ pub(crate) fn reduced_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) 
         first: criterion.first.max(first_residual(&orders, InitialState::Estimate)),
         ..criterion.clone()
     };
-    if high.data.iter().any(|d| d.u.len() <= high.first + orders.parameters()) {
+    if high
+        .data
+        .iter()
+        .any(|d| d.u.len() <= high.first + orders.parameter_count())
+    {
         return None;
     }
-    let (theta, _) = high.best_linear_part(&vec![0.0; orders.parameters()], workspace)?;
-    let a = reflected_inside(&theta[..orders.na])?;
+    let (theta, _) = high.best_linear_part(&vec![0.0; orders.parameter_count()], workspace)?;
+    let a = reflect_roots_inside(&theta[..orders.na])?;
     let responses: Vec<Vec<f64>> = high
         .data
         .iter()

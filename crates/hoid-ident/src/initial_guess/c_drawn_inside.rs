@@ -5,7 +5,7 @@ use hoid_model::{Complex64, Orders, polynomial};
 
 /// Returns starts for a search that ended with a root of C on the unit circle: theta with the roots of C moved towards
 /// the origin, `c_i rho^i`, and theta with all roots of C replaced by their mean.
-pub(crate) fn starts_with_c_inside(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
+pub(crate) fn starts_with_reduced_c_roots(o: &Orders, theta: &[f64]) -> Vec<Vec<f64>> {
     let block = o.na + o.nb..o.na + o.nb + o.nc;
     let c = &theta[block.clone()];
     let mut all = Vec::new();

@@ -21,13 +21,13 @@ use crate::{
 /// Minimum number of samples of each averaged record.
 const MIN_AVERAGED_SAMPLES: usize = 800;
 /// Largest number K of samples that are averaged.
-const LARGEST_FACTOR: usize = 8;
+const LARGEST_AVERAGING_FACTOR: usize = 8;
 /// Largest number of coefficients of D for the averaged records.
 const LARGEST_ND: usize = 2;
 /// Number of points of the pole grid from which searches on the averaged records are made.
-const SEARCHED_POINTS: usize = 2;
+const SEARCHED_POINT_COUNT: usize = 2;
 /// Limits of the searches on the averaged records.
-const SEARCH: SearchOptions = SearchOptions {
+const SEARCH_OPTIONS: SearchOptions = SearchOptions {
     method: SearchMethod::LevenbergMarquardt,
     max_iterations: 30,
     tolerance: 1e-6,
@@ -61,7 +61,7 @@ pub(crate) fn slow_poles(criterion: &Criterion<'_>, sample_time: SampleTime, wor
         };
         continuation.update(there, workspace);
     }
-    continuation.slow()
+    continuation.into_slow_poles()
 }
 
 /// The averaged records of a criterion.
@@ -76,7 +76,7 @@ impl AveragedRecords {
     /// Averages the records of a criterion; `None` if they are too short, or if the model has poles outside F.
     pub fn of(criterion: &Criterion<'_>, sample_time: SampleTime) -> Option<Self> {
         let shortest = criterion.data.iter().map(|d| d.u.len()).min().unwrap_or(0);
-        let factor = (shortest / MIN_AVERAGED_SAMPLES).min(LARGEST_FACTOR);
+        let factor = (shortest / MIN_AVERAGED_SAMPLES).min(LARGEST_AVERAGING_FACTOR);
         let o = criterion.orders;
         if factor < 2 || o.nf == 0 || o.na > 0 {
             return None;
@@ -88,7 +88,7 @@ impl AveragedRecords {
             nk: o.nk / factor,
             ..Orders::default()
         };
-        let needed = first_residual(&orders, InitialState::Estimate) + orders.parameters() + orders.nf;
+        let needed = first_residual(&orders, InitialState::Estimate) + orders.parameter_count() + orders.nf;
         let sample_time = SampleTime::new(sample_time.s() * factor as f64).ok()?;
         (shortest / factor > needed).then(|| Self {
             factor,
@@ -142,12 +142,12 @@ impl<'c> Continuation<'c> {
             ranked: Vec::new(),
             searches: None,
         };
-        continuation.next_trial();
+        continuation.start_next_trial();
         continuation
     }
 
     /// Proceeds to the next point of the grid or, after the last point, to the searches.
-    fn next_trial(&mut self) {
+    fn start_next_trial(&mut self) {
         let o = &self.averaged_criterion.orders;
         let start = |noise: &[f64], f: &[f64], left| {
             Start::with_unknown("pole grid", [&vec![0.0; o.nb], noise, f].concat(), left)
@@ -160,26 +160,26 @@ impl<'c> Continuation<'c> {
         if self.trial.is_none() {
             let mut ranked = std::mem::take(&mut self.ranked);
             ranked.sort_by(|a, b| a.value.total_cmp(&b.value));
-            ranked.truncate(SEARCHED_POINTS);
-            let starts = ranked.into_iter().map(|start| start.with_own_noise(o)).collect();
+            ranked.truncate(SEARCHED_POINT_COUNT);
+            let starts = ranked.into_iter().map(|start| start.with_unknown_noise(o)).collect();
             self.searches = Some(MultiStart::new(
                 self.averaged_criterion,
                 *o,
-                &SEARCH,
-                SEARCHED_POINTS,
+                &SEARCH_OPTIONS,
+                SEARCHED_POINT_COUNT,
                 starts,
             ));
         }
     }
 
     /// Returns the poles that the search has found, converted to the original sample time.
-    pub fn slow(self) -> SlowPoles {
+    pub fn into_slow_poles(self) -> SlowPoles {
         let o = &self.averaged_criterion.orders;
         let mut minima = self.searches.map(|searches| searches.minima).unwrap_or_default();
         minima.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
         let f: Vec<Vec<f64>> = minima
             .into_iter()
-            .filter_map(|(_, minimum)| root_of_poles(&minimum.theta[o.parameters() - o.nf..], self.factor))
+            .filter_map(|(_, minimum)| root_of_poles(&minimum.theta[o.parameter_count() - o.nf..], self.factor))
             .filter(|f| hoid_core::stability::roots_inside(f, 1.0))
             .collect();
         let slow = |f: &Vec<f64>| {
@@ -230,13 +230,13 @@ impl LinearisationClient for Continuation<'_> {
         let known = trial.value.is_finite();
         if self.noise.is_none() && known {
             // The ranking starts again at the first point, now with the noise model.
-            self.noise = Some(trial.theta[Block::D.place(o)].to_vec());
+            self.noise = Some(trial.theta[Block::D.range(o)].to_vec());
             self.tried = 0;
         } else {
             self.ranked.extend(known.then_some(trial));
             self.tried += 1;
         }
-        self.next_trial();
+        self.start_next_trial();
     }
 }
 

@@ -22,7 +22,7 @@
 //! minimum is used. Short records and larger models have more minima than these starts find; for them, other starts are
 //! tried afterwards ([`crate::initial_guess::broad`]).
 
-use hoid_model::{Orders, SampleTime, polynomial::reflected_inside};
+use hoid_model::{Orders, SampleTime, polynomial::reflect_roots_inside};
 
 use super::{
     arx_poles::{arx_poles, reduced_arx, steiglitz_mcbride},
@@ -39,7 +39,7 @@ use crate::{
 };
 
 /// Number of candidates that are completed with their own noise model.
-const COMPLETED_CANDIDATES: usize = 4;
+const COMPLETED_CANDIDATE_COUNT: usize = 4;
 
 /// Returns the starts, each with the polynomials that are still unknown.
 pub(crate) fn initial_guesses(
@@ -58,7 +58,7 @@ pub(crate) fn initial_guesses_with_poles(
     sample_time: SampleTime,
     workspace: &mut Workspace,
 ) -> Vec<Start> {
-    let starts = from_poles(slow, criterion, sample_time, workspace);
+    let starts = starts_from_poles(slow, criterion, sample_time, workspace);
     if shared_poles::may_share_poles(&criterion.orders) {
         return shared_poles::initial_guesses(criterion, starts, workspace);
     }
@@ -66,17 +66,17 @@ pub(crate) fn initial_guesses_with_poles(
 }
 
 /// Returns the starts from all candidates for F, or for a model without F.
-fn from_poles(
+fn starts_from_poles(
     slow: SlowPoles,
     criterion: &Criterion<'_>,
     sample_time: SampleTime,
     workspace: &mut Workspace,
 ) -> Vec<Start> {
     if criterion.orders.nb == 0 {
-        return time_series(criterion, workspace);
+        return time_series_starts(criterion, workspace);
     }
     if criterion.orders.nf == 0 {
-        return completed(criterion, vec![("linear".to_owned(), Vec::new())], workspace);
+        return completed_starts(criterion, vec![("linear".to_owned(), Vec::new())], workspace);
     }
     let mut proposals: Vec<(String, Vec<f64>)> = slow
         .f
@@ -84,7 +84,7 @@ fn from_poles(
         .map(|f| ("low-pass continuation".to_owned(), f))
         .collect();
     if proposals.is_empty() {
-        proposals = ranked_grid(criterion, sample_time, COMPLETED_CANDIDATES, workspace);
+        proposals = ranked_grid(criterion, sample_time, COMPLETED_CANDIDATE_COUNT, workspace);
     }
     if !slow.complete
         && let Some(f) = arx_poles(criterion, &criterion.data, workspace)
@@ -97,7 +97,7 @@ fn from_poles(
             proposals.push(("high-order arx".to_owned(), f));
         }
     }
-    let mut starts = completed(criterion, proposals, workspace);
+    let mut starts = completed_starts(criterion, proposals, workspace);
     if !slow.complete
         && let Some(mut theta) = instrument_chain(criterion).filter(|theta| criterion.is_feasible(theta))
         && let Some((linear, value)) = criterion.best_linear_part(&theta, workspace)
@@ -110,14 +110,18 @@ fn from_poles(
 
 /// Returns starts from candidates for F with their own A, B and noise model. A, B and the noise model are computed here
 /// if the model has A or C; otherwise they are still unknown in the starts.
-fn completed(criterion: &Criterion<'_>, proposals: Vec<(String, Vec<f64>)>, workspace: &mut Workspace) -> Vec<Start> {
+fn completed_starts(
+    criterion: &Criterion<'_>,
+    proposals: Vec<(String, Vec<f64>)>,
+    workspace: &mut Workspace,
+) -> Vec<Start> {
     let o = &criterion.orders;
     let in_steps = o.na + o.nc == 0 && criterion.initial != InitialState::Backcast;
     proposals
         .into_iter()
         .filter_map(|(label, f)| {
             if in_steps {
-                return Some(Start::of_poles(&label, o, &f));
+                return Some(Start::from_poles(&label, o, &f));
             }
             let (theta, value) = complete(criterion, &f, workspace)?;
             Some(Start::complete(&label, theta, value))
@@ -142,7 +146,7 @@ fn ranked_grid(
         .into_iter()
         .filter_map(|(label, f)| {
             let mut theta = reference.clone();
-            theta[o.parameters() - o.nf..].copy_from_slice(&f);
+            theta[o.parameter_count() - o.nf..].copy_from_slice(&f);
             let (_, value) = criterion.best_linear_part(&theta, workspace)?;
             Some((label, f, value))
         })
@@ -193,7 +197,7 @@ fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> 
 /// Returns starts for a model of the output alone, `u = (C/A) eps`. The first start has A and C from the
 /// Hannan-Rissanen method; A and C partly cancel if roots of C are near the unit circle and the long autoregression is
 /// too short. The other starts have A from an autoregression, with the same C and with C = 1.
-fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
+fn time_series_starts(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let outputs: Vec<Vec<f64>> = criterion.data.iter().map(|d| d.u.to_vec()).collect();
     let (c, a) = noise_model(&outputs, o.nc, o.na);
@@ -204,7 +208,7 @@ fn time_series(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Star
         proposals.push(("autoregression, C = 1", alone, vec![0.0; o.nc]));
     }
     let start = |(label, a, c): (&str, Vec<f64>, Vec<f64>)| {
-        let mut theta = if o.na > 0 { reflected_inside(&a)? } else { a };
+        let mut theta = if o.na > 0 { reflect_roots_inside(&a)? } else { a };
         theta.extend(c);
         let value = criterion.linearise(&theta, workspace).sum_of_squares;
         Some(Start::complete(label, theta, value))
@@ -264,7 +268,7 @@ mod tests {
         // noise biases both. A model with additional poles for the noise is not biased.
         assert!(off(&arx) > 0.05 && off(&refined) > 0.05, "{arx:?} {refined:?}");
         assert!(off(&reduced) < 0.02, "{reduced:?}");
-        let starts = initial_guesses(&criterion, SampleTime::HUNDREDTH, &mut workspace);
+        let starts = initial_guesses(&criterion, SampleTime::AT_100_HZ, &mut workspace);
         for label in ["steiglitz-mcbride", "high-order arx", "instruments"] {
             assert!(starts.iter().any(|s| s.label == label), "{label}");
         }

@@ -24,7 +24,7 @@ pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
     if o.nb == 0 || (o.na > 0 && o.nf > 0) {
         return None;
     }
-    let problem = IvProblem::new(&o, criterion.data.clone(), Source::measured(&criterion.data));
+    let problem = IvProblem::new(&o, criterion.data.clone(), Source::measured_inputs(&criterion.data));
     let white_orders = Orders { nc: 0, nd: 0, ..o };
     let white = Criterion {
         orders: white_orders,
@@ -33,22 +33,22 @@ pub(crate) fn instrument_chain(criterion: &Criterion<'_>) -> Option<Vec<f64>> {
         weights: None,
         ..criterion.clone()
     };
-    let needed = white.first + 2 * o.parameters();
+    let needed = white.first + 2 * o.parameter_count();
     if criterion.data.iter().any(|d| d.u.len() <= needed) {
         return None;
     }
     let mut system = problem.least_squares(Prefilter::default()).ok()?;
     for _ in 0..2 {
-        let (stable, _) = problem.stabilised(&system).ok()?;
+        let (stable, _) = problem.stabilise(&system).ok()?;
         let equation = problem.equation(Prefilter::default(), &stable);
         system = problem.solve(&equation).ok()?;
     }
     if o.nf > 0 {
-        (system, _) = problem.stabilised(&system).ok()?;
+        (system, _) = problem.stabilise(&system).ok()?;
     }
     let (poles, b) = system.split_at(problem.poles);
     let (a, f) = if o.na > 0 { (poles, &[][..]) } else { (&[][..], poles) };
-    let mut workspace = Workspace::of_thread();
+    let mut workspace = Workspace::borrow_from_thread();
     let left: Vec<Vec<f64>> = (0..white.data.len())
         .map(|record| white.residuals_of(&[a, b, f].concat(), record, &mut workspace))
         .collect();
@@ -65,7 +65,7 @@ mod tests {
     use crate::criterion::Data;
 
     /// Zero-mean numbers of a linear congruential generator (D. E. Knuth, MMIX).
-    fn white(n: usize, mut state: u64) -> Vec<f64> {
+    fn white_noise(n: usize, mut state: u64) -> Vec<f64> {
         (0..n)
             .map(|_| {
                 state = state
@@ -90,7 +90,7 @@ mod tests {
     #[test]
     fn chain_approximates_box_jenkins_and_armax_models() {
         let n = 20_000;
-        let (e, eps) = (white(n, 1), white(n, 2));
+        let (e, eps) = (white_noise(n, 1), white_noise(n, 2));
         let (b, f, c, d) = ([1.0, 0.5], [-1.5, 0.7], [0.5], [-0.8]);
         let mut w = vec![0.0; n];
         fir(&b, 2, &e, &mut w);
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn unsuitable_orders_and_signals_give_no_start() {
-        let (e, u) = (white(50, 1), white(50, 2));
+        let (e, u) = (white_noise(50, 1), white_noise(50, 2));
         let base = Orders {
             nb: 1,
             nd: 1,

@@ -29,8 +29,8 @@ pub(crate) fn pole_grid(nf: usize, sample_time: SampleTime) -> Vec<(String, Vec<
 /// Real poles of the grid over the unit disc, denser for slow poles.
 const REAL_POLES: [f64; 7] = [0.985, 0.95, 0.88, 0.7, 0.3, -0.5, -0.95];
 /// Angles in rad of the pole pairs of the grid over the unit disc; each angle is combined with every radius.
-const ANGLES: [f64; 8] = [0.05, 0.1, 0.2, 0.4, 0.8, 1.3, 2.0, 2.6];
-const RADII: [f64; 2] = [0.98, 0.85];
+const POLE_ANGLES: [f64; 8] = [0.05, 0.1, 0.2, 0.4, 0.8, 1.3, 2.0, 2.6];
+const POLE_RADII: [f64; 2] = [0.98, 0.85];
 /// Third pole in the grid over the unit disc for nf > 2: slow, like the lag of an operator, or fast.
 const THIRD_POLES: [f64; 2] = [0.95, EXTRA_POLE];
 
@@ -41,8 +41,8 @@ const ZERO_ANGLES: [f64; 7] = [0.1, 0.3, 0.7, 1.2, 1.7, 2.2, 2.7];
 const ZERO_RADIUS: f64 = 0.9;
 
 /// Returns candidates for F with poles over the whole unit disc: slow and fast, real and in pairs.
-pub(crate) fn anywhere(nf: usize) -> Vec<Vec<f64>> {
-    let two = real_and_pairs(nf, &REAL_POLES, &ANGLES, &RADII);
+pub(crate) fn unit_disc_grid(nf: usize) -> Vec<Vec<f64>> {
+    let two = real_and_paired_roots(nf, &REAL_POLES, &POLE_ANGLES, &POLE_RADII);
     let third = if nf > 2 { &THIRD_POLES[..] } else { &THIRD_POLES[..1] };
     let complete = |poles: &Vec<Complex64>, third: f64| {
         let mut poles = poles.clone();
@@ -59,8 +59,8 @@ pub(crate) fn anywhere(nf: usize) -> Vec<Vec<f64>> {
 
 /// Returns candidates for C with roots over the whole unit disc, also close to the unit circle; roots beyond the second
 /// are zero.
-pub(crate) fn noise_zeros(nc: usize) -> Vec<Vec<f64>> {
-    real_and_pairs(nc, &REAL_ZEROS, &ZERO_ANGLES, &[ZERO_RADIUS])
+pub(crate) fn noise_zero_grid(nc: usize) -> Vec<Vec<f64>> {
+    real_and_paired_roots(nc, &REAL_ZEROS, &ZERO_ANGLES, &[ZERO_RADIUS])
         .into_iter()
         .map(|mut roots| {
             roots.resize(nc, Complex64::new(0.0, 0.0));
@@ -71,7 +71,7 @@ pub(crate) fn noise_zeros(nc: usize) -> Vec<Vec<f64>> {
 
 /// Returns every combination of two real roots, including double roots, and every complex pair. For a count of one,
 /// returns the single roots; for a count of zero, one empty set.
-fn real_and_pairs(count: usize, real: &[f64], angles: &[f64], radii: &[f64]) -> Vec<Vec<Complex64>> {
+fn real_and_paired_roots(count: usize, real: &[f64], angles: &[f64], radii: &[f64]) -> Vec<Vec<Complex64>> {
     let at = |x: f64| Complex64::new(x, 0.0);
     match count {
         0 => vec![Vec::new()],
@@ -108,12 +108,12 @@ mod tests {
     #[test]
     fn pole_grids_are_stable_and_have_the_requested_order() {
         for (order, places) in [(0, 1), (1, 7), (2, 44), (3, 88), (4, 88)] {
-            let grid = anywhere(order);
+            let grid = unit_disc_grid(order);
             assert_eq!(grid.len(), places);
             assert!(grid.iter().all(|f| f.len() == order && roots_inside(f, 1.0)));
         }
         for (order, places) in [(0, 1), (1, 6), (2, 28), (5, 28)] {
-            let grid = noise_zeros(order);
+            let grid = noise_zero_grid(order);
             assert_eq!(grid.len(), places);
             assert!(grid.iter().all(|c| c.len() == order && roots_inside(c, 1.0)));
         }

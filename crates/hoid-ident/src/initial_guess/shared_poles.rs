@@ -25,9 +25,9 @@ use crate::{
 };
 
 /// Number of starts with the smallest loss from which search steps are made.
-const TRIED_STARTS: usize = 8;
+const TRIED_START_COUNT: usize = 8;
 /// Number of search steps from each start that is tried.
-const STEPS: usize = 8;
+const STEP_COUNT: usize = 8;
 /// Largest number of real poles and pole pairs that are assigned in all ways.
 const MAX_GROUPS: usize = 6;
 
@@ -40,16 +40,16 @@ pub(crate) fn may_share_poles(o: &Orders) -> bool {
 /// results with their sums of squares.
 pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, workspace: &mut Workspace) -> Vec<Start> {
     let mut starts = others;
-    starts.extend(from_instruments(criterion, workspace));
-    starts.extend(from_long_arx(criterion, workspace));
+    starts.extend(starts_from_instruments(criterion, workspace));
+    starts.extend(starts_from_long_arx(criterion, workspace));
     starts.sort_by(|a, b| a.value.total_cmp(&b.value));
     let options = SearchOptions {
-        max_iterations: STEPS,
+        max_iterations: STEP_COUNT,
         ..SearchOptions::default()
     };
     starts
         .into_iter()
-        .take(TRIED_STARTS)
+        .take(TRIED_START_COUNT)
         .filter_map(|start| {
             let end = minimise(criterion, start.theta, &options, None, workspace)?;
             Some(Start::complete(&start.label, end.theta, end.at.sum_of_squares))
@@ -57,7 +57,7 @@ pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, wor
         .collect()
 }
 
-fn from_instruments(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
+fn starts_from_instruments(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     let pooled = Criterion {
         orders: Orders {
@@ -77,13 +77,19 @@ fn from_instruments(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec
     pole_assignments(&poles, o.na)
         .into_iter()
         .filter_map(|(a, f)| {
-            let linear = [&coefficients(&a), b].concat();
-            start("instruments", criterion, linear, &coefficients(&f), workspace)
+            let linear = [&polynomial_coefficients(&a), b].concat();
+            build_start(
+                "instruments",
+                criterion,
+                linear,
+                &polynomial_coefficients(&f),
+                workspace,
+            )
         })
         .collect()
 }
 
-fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
+fn starts_from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Start> {
     let o = criterion.orders;
     if o.nd == 0 {
         return Vec::new();
@@ -106,10 +112,10 @@ fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<St
     let mut starts = Vec::new();
     for (d, rest) in pole_assignments(&poles, o.nd) {
         for (f, _) in pole_assignments(&rest, o.nf) {
-            let f = coefficients(&f);
-            let whitening = [&vec![0.0; o.na + o.nb], &coefficients(&d)[..], &f].concat();
+            let f = polynomial_coefficients(&f);
+            let whitening = [&vec![0.0; o.na + o.nb], &polynomial_coefficients(&d)[..], &f].concat();
             let solved = coloured.best_linear_part(&whitening, workspace);
-            starts.extend(solved.and_then(|(linear, _)| start("long arx", criterion, linear, &f, workspace)));
+            starts.extend(solved.and_then(|(linear, _)| build_start("long arx", criterion, linear, &f, workspace)));
         }
     }
     starts
@@ -117,7 +123,7 @@ fn from_long_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<St
 
 /// Returns a start for given A, B and F. The noise model is estimated from the residual, and A and B are then estimated
 /// again with this noise model.
-fn start(
+fn build_start(
     label: &str,
     criterion: &Criterion<'_>,
     linear: Vec<f64>,
@@ -140,7 +146,7 @@ fn start(
     Some(Start::complete(label, theta, value))
 }
 
-fn coefficients(roots: &[Complex64]) -> Vec<f64> {
+fn polynomial_coefficients(roots: &[Complex64]) -> Vec<f64> {
     polynomial::from_roots(roots)[1..].to_vec()
 }
 
@@ -181,7 +187,7 @@ mod tests {
         assert_eq!(pole_assignments(&poles, 1).len(), 2);
         assert_eq!(pole_assignments(&poles, 0), [(vec![], poles.to_vec())]);
         assert!(pole_assignments(&pair, 1).is_empty());
-        assert_eq!(coefficients(&pair).len(), 2);
-        assert!(coefficients(&[]).is_empty());
+        assert_eq!(polynomial_coefficients(&pair).len(), 2);
+        assert!(polynomial_coefficients(&[]).is_empty());
     }
 }

@@ -7,14 +7,14 @@ pub(crate) type Columns = Vec<Vec<f64>>;
 
 /// A column counts as a linear combination of previous columns if its independent part has less than this share of its
 /// amplitude. Columns that are orthogonalised twice are accurate to 1e-15.
-const OWN_PART: f64 = 1e-10;
+const MIN_INDEPENDENT_SHARE: f64 = 1e-10;
 /// Largest length of an artificial past, in samples.
-const MAX_PAST: usize = 256;
+const MAX_PAST_SAMPLES: usize = 256;
 
 /// Returns the signal with an artificial past, and the length of this past. The past is the signal reflected at its
 /// first sample and faded in, so simulations start without a jump.
 pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
-    let length = MAX_PAST.min(x.len().saturating_sub(1));
+    let length = MAX_PAST_SAMPLES.min(x.len().saturating_sub(1));
     let fade = |k: usize| 0.5 + 0.5 * (std::f64::consts::PI * k as f64 / (length + 1) as f64).cos();
     let mut extended: Vec<f64> = (1..=length).rev().map(|k| fade(k) * (2.0 * x[0] - x[k])).collect();
     extended.extend_from_slice(x);
@@ -23,7 +23,7 @@ pub(super) fn with_past(x: &[f64]) -> (Vec<f64>, usize) {
 
 /// Returns an orthonormal basis of the columns (two passes of Gram-Schmidt), and the indices of the linearly
 /// independent columns.
-pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
+pub(super) fn orthonormal_basis(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
     let mut q: Columns = Vec::new();
     let mut kept = Vec::new();
     for (index, column) in columns.iter().enumerate() {
@@ -37,7 +37,7 @@ pub(super) fn orthonormal(columns: &[Vec<f64>]) -> (Columns, Vec<usize>) {
         }
         let rest = dot(&own, &own).sqrt();
         // The comparison also rejects `NaN`.
-        if rest > OWN_PART * size {
+        if rest > MIN_INDEPENDENT_SHARE * size {
             own.iter_mut().for_each(|v| *v /= rest);
             q.push(own);
             kept.push(index);
@@ -71,7 +71,7 @@ mod tests {
     fn artificial_past_joins_the_record_smoothly() {
         let x = wave(2000, 0.01);
         let (extended, past) = with_past(&x);
-        assert_eq!(past, MAX_PAST);
+        assert_eq!(past, MAX_PAST_SAMPLES);
         assert_eq!(extended[past..], x);
         let steepest = extended.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
         assert!(steepest < 0.03, "{steepest}");
@@ -83,7 +83,7 @@ mod tests {
     fn dependent_columns_are_excluded_from_the_basis() {
         let (a, b) = (wave(100, 0.2), wave(100, 0.9));
         let sum: Vec<f64> = a.iter().zip(&b).map(|(x, y)| x - 3.0 * y).collect();
-        let (basis, kept) = orthonormal(&[a, vec![0.0; 100], b, sum, vec![f64::NAN; 100]]);
+        let (basis, kept) = orthonormal_basis(&[a, vec![0.0; 100], b, sum, vec![f64::NAN; 100]]);
         assert_eq!(kept, [0, 2]);
         assert!(dot(&basis[0], &basis[1]).abs() < 1e-14);
     }

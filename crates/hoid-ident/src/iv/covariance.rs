@@ -7,7 +7,7 @@
 //! Ljung's eq. 15.29, `lambda (Z'Z)^-1`, for Z = Phi.
 
 use hoid_core::filter::{divide_in_place, multiply};
-use hoid_model::polynomial::reflected_inside;
+use hoid_model::polynomial::reflect_roots_inside;
 use nalgebra::DMatrix;
 
 use super::columns::{Columns, split_by_record};
@@ -17,12 +17,12 @@ use crate::{linalg::least_squares::dot, noise_model::noise_model};
 const MAX_ORDER: usize = 30;
 
 /// Fits a long autoregression `D r = eps` to a residual and returns D and the variance of eps.
-fn coloured_noise(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
+fn fit_autoregression(residual: &[Vec<f64>], parameters: usize) -> (Vec<f64>, f64) {
     let n: usize = residual.iter().map(Vec::len).sum();
     let shortest = residual.iter().map(Vec::len).min().unwrap_or(0);
     let order = MAX_ORDER.min(shortest / 10);
     let (_, d) = noise_model(residual, 0, order);
-    let d = reflected_inside(&d).unwrap_or_default();
+    let d = reflect_roots_inside(&d).unwrap_or_default();
     let mut total = 0.0;
     let mut rows = 0;
     for r in residual {
@@ -46,7 +46,7 @@ pub(super) fn covariance(
     residual: &[Vec<f64>],
 ) -> Option<Vec<f64>> {
     let p = z.len();
-    let (d, lambda) = coloured_noise(residual, p);
+    let (d, lambda) = fit_autoregression(residual, p);
     // The columns are scaled to unit length, so the units of the parameters have no effect on the inverse.
     let length = |column: &Vec<f64>| dot(column, column).sqrt();
     let (of_z, of_phi): (Vec<f64>, Vec<f64>) = (z.iter().map(length).collect(), phi.iter().map(length).collect());
@@ -89,7 +89,7 @@ mod tests {
             .collect()
     }
 
-    fn white(n: usize) -> Vec<f64> {
+    fn white_noise(n: usize) -> Vec<f64> {
         // A linear congruential generator (D. E. Knuth, MMIX), shifted to zero mean.
         let mut state = 7_u64;
         (0..n)
@@ -104,7 +104,7 @@ mod tests {
 
     #[test]
     fn white_residuals_give_the_least_squares_covariance() {
-        let residual = white(5000);
+        let residual = white_noise(5000);
         let z = vec![wave(5000, 0.1), wave(5000, 0.7)];
         let found = covariance(&z, &z, |_| true, &[residual]).unwrap();
         let gram = DMatrix::from_fn(2, 2, |i, j| dot(&z[i], &z[j]));
@@ -119,7 +119,7 @@ mod tests {
 
     #[test]
     fn covariance_uses_the_spectrum_at_the_instrument_frequency() {
-        let mut residual = white(20_000);
+        let mut residual = white_noise(20_000);
         divide_in_place(&[-0.9], &mut residual);
         for w in [0.05_f64, 0.5, 2.5] {
             let z = vec![(0..20_000).map(|t| (w * f64::from(t)).sin()).collect::<Vec<f64>>()];

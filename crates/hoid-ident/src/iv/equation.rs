@@ -12,11 +12,11 @@ use std::{borrow::Cow, ops::Range};
 use hoid_core::filter::{divide_in_place, fir, multiply};
 use hoid_model::{
     Orders,
-    polynomial::{product, reflected_inside},
+    polynomial::{product, reflect_roots_inside},
     polynomial_model::monic,
 };
 
-use super::columns::{Columns, orthonormal, with_past};
+use super::columns::{Columns, orthonormal_basis, with_past};
 use crate::{
     IdentError,
     criterion::Data,
@@ -56,7 +56,7 @@ pub(crate) struct Source<'a> {
 
 impl<'a> Source<'a> {
     /// Returns the measured inputs as a source for all samples.
-    pub fn measured(data: &[Data<'a>]) -> Vec<Self> {
+    pub fn measured_inputs(data: &[Data<'a>]) -> Vec<Self> {
         vec![Self {
             inputs: data.iter().map(|d| Cow::Borrowed(d.e)).collect(),
             samples: 0..usize::MAX,
@@ -119,7 +119,7 @@ impl<'a> IvProblem<'a> {
     }
 
     /// Returns the number of rows of each record in the equation, for a filter with this order of D.
-    pub fn rows(&self, order_of_d: usize) -> Vec<usize> {
+    pub fn row_counts(&self, order_of_d: usize) -> Vec<usize> {
         self.data
             .iter()
             .map(|d| (d.u.len() - self.first).saturating_sub(order_of_d))
@@ -201,7 +201,7 @@ impl<'a> IvProblem<'a> {
     fn rows_of(&self, samples: &Range<usize>, order_of_d: usize) -> Vec<Range<usize>> {
         let (mut sample, mut row) = (0, 0);
         let mut found = Vec::new();
-        for (data, rows) in self.data.iter().zip(self.rows(order_of_d)) {
+        for (data, rows) in self.data.iter().zip(self.row_counts(order_of_d)) {
             let first = sample + data.u.len() - rows;
             let within = |s: usize| row + s.clamp(first, first + rows) - first;
             found.push(within(samples.start)..within(samples.end));
@@ -230,7 +230,7 @@ impl<'a> IvProblem<'a> {
             weights: None,
             level: false,
         };
-        let rows = self.rows(filter.d.len());
+        let rows = self.row_counts(filter.d.len());
         rows.into_iter()
             .map(|n| (InitialStateResponses::of(&past, n), n))
             .collect()
@@ -248,7 +248,7 @@ impl<'a> IvProblem<'a> {
             add_scaled(&mut eps, -t, column);
         }
         let mut at = 0;
-        for n in self.rows(filter.d.len()) {
+        for n in self.row_counts(filter.d.len()) {
             // d/df_i of F C eps = D (F u - B e): the second term of psi_fi is eps(t-i)/F.
             let mut through = eps[at..at + n].to_vec();
             divide_in_place(filter.f, &mut through);
@@ -286,7 +286,7 @@ impl<'a> IvProblem<'a> {
     /// # Errors
     /// [`IdentError::SingularInstruments`] if the instruments are linearly dependent.
     pub fn basis(&self, z: &Columns) -> Result<Columns, IdentError> {
-        let (q, kept) = orthonormal(z);
+        let (q, kept) = orthonormal_basis(z);
         if let Some(lost) = (0..z.len()).find(|i| !kept.contains(i)) {
             let dependence = if dot(&z[lost], &z[lost]) == 0.0 {
                 format!("the instrument of {} is zero", self.names[lost])
@@ -336,8 +336,8 @@ impl<'a> IvProblem<'a> {
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`] if the roots cannot be found.
-    pub fn stabilised(&self, system: &[f64]) -> Result<(Vec<f64>, bool), IdentError> {
-        let mut stable = reflected_inside(&system[..self.poles]).ok_or(IdentError::NoFiniteLoss)?;
+    pub fn stabilise(&self, system: &[f64]) -> Result<(Vec<f64>, bool), IdentError> {
+        let mut stable = reflect_roots_inside(&system[..self.poles]).ok_or(IdentError::NoFiniteLoss)?;
         let moved = stable != system[..self.poles];
         stable.extend_from_slice(&system[self.poles..]);
         Ok((stable, moved))

@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{
     Fit, IdentError, InitialState, Reason,
-    assembled_fit::{Solution, assembled_fit},
+    assembled_fit::{Solution, assemble_fit},
     criterion::{Criterion, Data, Workspace, first_residual},
     informative_data::{check_degrees_of_freedom, check_record, common_sample_time},
     linalg::least_squares::dot,
@@ -72,9 +72,9 @@ impl InstrumentalVariable {
         };
         check_degrees_of_freedom(&criterion, records)?;
         let sources = match &self.instruments {
-            Instruments::Simulated => Source::measured(&criterion.data),
+            Instruments::Simulated => Source::measured_inputs(&criterion.data),
             Instruments::External(name) => {
-                external_signal::noise_free(&external_signal::signals(records, name)?, &criterion.data)
+                external_signal::noise_free_sources(&external_signal::external_signals(records, name)?, &criterion.data)
             }
         };
         let problem = IvProblem::new(&self.orders, criterion.data.clone(), sources);
@@ -93,7 +93,7 @@ impl InstrumentalVariable {
         solution: IvSolution,
         sample_time: SampleTime,
     ) -> Result<Fit, IdentError> {
-        let mut workspace = Workspace::of_thread();
+        let mut workspace = Workspace::borrow_from_thread();
         let sum_of_squares: f64 = (0..criterion.data.len())
             .map(|record| {
                 let eps = criterion.residuals_of(&solution.theta, record, &mut workspace);
@@ -119,7 +119,7 @@ impl InstrumentalVariable {
         Ok(Fit {
             covariance: solution.covariance.filter(|_| !exact),
             instrumented: true,
-            ..assembled_fit(criterion, self.method.structure(), sample_time, minimum)?
+            ..assemble_fit(criterion, self.method.structure(), sample_time, minimum)?
         })
     }
 
@@ -128,10 +128,10 @@ impl InstrumentalVariable {
     fn check_rows(&self, problem: &IvProblem<'_>, records: &[Record]) -> Result<(), IdentError> {
         let o = &self.orders;
         let states = o.nf + o.nc;
-        let each = problem.rows(o.nd);
+        let each = problem.row_counts(o.nd);
         let rows: usize = each.iter().sum();
         let short = each.iter().position(|n| *n <= states);
-        if rows > o.parameters() + states * records.len() && short.is_none() {
+        if rows > o.parameter_count() + states * records.len() && short.is_none() {
             return Ok(());
         }
         let record = &records[short.unwrap_or(0)];
@@ -139,7 +139,7 @@ impl InstrumentalVariable {
             label: record.label().to_owned(),
             samples: record.len(),
             orders: o.to_string(),
-            needed: problem.first + o.nd + states + o.parameters().div_ceil(records.len()),
+            needed: problem.first + o.nd + states + o.parameter_count().div_ceil(records.len()),
         })
     }
 

@@ -31,28 +31,28 @@ use crate::{
 };
 
 use super::{
-    columns::{orthonormal, split_by_record, with_past},
+    columns::{orthonormal_basis, split_by_record, with_past},
     equation::Source,
 };
 
 /// Candidate time constants of the filters in samples; the time constant with the smallest residual is used.
 const TIME_CONSTANTS: [f64; 3] = [4.0, 16.0, 64.0];
 /// Number of filters, if the records are long enough.
-const FILTERS: usize = 24;
+const FILTER_COUNT: usize = 24;
 /// Minimum number of samples for each filter.
 const MIN_SAMPLES_PER_FILTER: usize = 10;
 /// Number of blocks; the input in each block is computed with weights from the other blocks.
-const BLOCKS: usize = 4;
+const BLOCK_COUNT: usize = 4;
 /// Ridge factor in the equations for the weights, needed if the output of a filter is concentrated in one block. The
 /// scale of an instrument does not matter.
-const RIDGE: f64 = 0.02;
+const RIDGE_FACTOR: f64 = 0.02;
 
 /// Returns the external signal of each record.
 ///
 /// # Errors
 /// [`IdentError::NoChannel`] if a record does not have the channel, [`IdentError::NoExcitation`] if it is constant,
 /// [`IdentError::BadOption`] if it is the input or the output.
-pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [f64]>, IdentError> {
+pub(super) fn external_signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [f64]>, IdentError> {
     let found: Vec<&[f64]> = records
         .iter()
         .map(|record| {
@@ -88,19 +88,20 @@ pub(super) fn signals<'a>(records: &'a [Record], name: &str) -> Result<Vec<&'a [
 
 /// Returns the part of each input that follows the external signals, once for each block of samples, with weights
 /// computed from the other blocks.
-pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Source<'a>> {
+pub(super) fn noise_free_sources<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Source<'a>> {
     let inputs: Vec<&[f64]> = data.iter().map(|d| d.e).collect();
     let lengths: Vec<usize> = inputs.iter().map(|e| e.len()).collect();
     let samples: usize = lengths.iter().sum();
     let target = inputs.concat();
     let basis = best_basis(external, &inputs);
     let whole: Vec<f64> = basis.iter().map(|q| dot(q, &target)).collect();
-    (0..BLOCKS)
+    (0..BLOCK_COUNT)
         .map(|k| {
-            let block = k * samples / BLOCKS..(k + 1) * samples / BLOCKS;
+            let block = k * samples / BLOCK_COUNT..(k + 1) * samples / BLOCK_COUNT;
             // The weights come from the other blocks. The noise of this block does not affect them, so it is not
             // correlated with the instrument.
-            let weights = weights_of_others(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
+            let weights =
+                weights_outside_block(&basis, &whole, &target, block.clone()).unwrap_or_else(|| whole.clone());
             let sum = combination(&basis, &weights, samples);
             Source {
                 inputs: split_by_record(&sum, &lengths).into_iter().map(Cow::Owned).collect(),
@@ -111,7 +112,7 @@ pub(super) fn noise_free<'a>(external: &[&[f64]], data: &[Data<'a>]) -> Vec<Sour
 }
 
 /// Returns least-squares weights from the samples outside a block, shrunk slightly towards zero.
-fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: Range<usize>) -> Option<Vec<f64>> {
+fn weights_outside_block(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: Range<usize>) -> Option<Vec<f64>> {
     let p = basis.len();
     let mut gram = vec![0.0; p * p];
     let mut right = whole.to_vec();
@@ -121,7 +122,7 @@ fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: R
         // orthonormal over all samples, so its Gram matrix is the identity.
         right[i] -= dot(inside, &target[block.clone()]);
         for j in 0..p {
-            let unit = if i == j { 1.0 + RIDGE } else { 0.0 };
+            let unit = if i == j { 1.0 + RIDGE_FACTOR } else { 0.0 };
             gram[i * p + j] = unit - dot(inside, &basis[j][block.clone()]);
         }
     }
@@ -129,7 +130,7 @@ fn weights_of_others(basis: &[Vec<f64>], whole: &[f64], target: &[f64], block: R
 }
 
 /// Returns the part of each target that follows its driving signal, estimated with one filter for all records.
-pub(super) fn following(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
+pub(super) fn driven_parts(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let lengths: Vec<usize> = targets.iter().map(|t| t.len()).collect();
     let target = targets.concat();
     let basis = best_basis(driving, targets);
@@ -149,10 +150,10 @@ fn combination(basis: &[Vec<f64>], weights: &[f64], samples: usize) -> Vec<f64> 
 /// largest share of the targets.
 fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
     let target = targets.concat();
-    let filters = FILTERS.min(target.len() / MIN_SAMPLES_PER_FILTER).max(1);
+    let filters = FILTER_COUNT.min(target.len() / MIN_SAMPLES_PER_FILTER).max(1);
     let mut best = (-1.0, Vec::new());
     for time_constant in TIME_CONSTANTS {
-        let (basis, _) = orthonormal(&laguerre(driving, (-1.0 / time_constant).exp(), filters));
+        let (basis, _) = orthonormal_basis(&laguerre_outputs(driving, (-1.0 / time_constant).exp(), filters));
         let explained: f64 = basis.iter().map(|q| dot(q, &target).powi(2)).sum();
         if explained > best.0 {
             best = (explained, basis);
@@ -162,7 +163,7 @@ fn best_basis(driving: &[&[f64]], targets: &[&[f64]]) -> Vec<Vec<f64>> {
 }
 
 /// Returns the outputs of the Laguerre filters with the pole p, over all records.
-fn laguerre(driving: &[&[f64]], p: f64, filters: usize) -> Vec<Vec<f64>> {
+fn laguerre_outputs(driving: &[&[f64]], p: f64, filters: usize) -> Vec<Vec<f64>> {
     let mut columns: Vec<Vec<f64>> = vec![Vec::new(); filters];
     for x in driving {
         let gain = (1.0 - p * p).sqrt();
@@ -192,7 +193,7 @@ mod tests {
         let mut impulse = vec![0.0; 4000];
         // The impulse comes after the samples from which the artificial past is computed.
         impulse[300] = 1.0;
-        let columns = laguerre(&[&impulse], 0.9, 12);
+        let columns = laguerre_outputs(&[&impulse], 0.9, 12);
         for (i, a) in columns.iter().enumerate() {
             for (j, b) in columns.iter().enumerate() {
                 // 0.9^4000 is below rounding.
@@ -210,7 +211,7 @@ mod tests {
         let mut y = vec![0.0; x.len()];
         hoid_core::filter::fir(&[0.1], 20, &x, &mut y);
         divide_in_place(&[-1.7, 0.8], &mut y);
-        let found = following(&[&x], &[&y]);
+        let found = driven_parts(&[&x], &[&y]);
         let rest: f64 = found[0].iter().zip(&y).skip(200).map(|(a, b)| (a - b).powi(2)).sum();
         assert!(rest < 1e-4 * dot(&y, &y), "{}", rest / dot(&y, &y));
     }

@@ -21,7 +21,7 @@ pub enum Instruments {
 
 impl Instruments {
     /// Parses the value of an option: `simulated`, or the name of a channel.
-    pub fn of_text(text: &str) -> Self {
+    pub fn from_text(text: &str) -> Self {
         match text {
             "simulated" => Self::Simulated,
             channel => Self::External(channel.to_owned()),

@@ -24,7 +24,7 @@ pub(crate) struct NoiseFreeInput {
 /// constant, and [`IdentError::BadOption`] if it is a signal of the loop.
 pub(crate) fn noise_free_inputs(records: &[Record], channel: &str) -> Result<Vec<NoiseFreeInput>, IdentError> {
     let data = Data::of(records);
-    let made = external_signal::noise_free(&external_signal::signals(records, channel)?, &data);
+    let made = external_signal::noise_free_sources(&external_signal::external_signals(records, channel)?, &data);
     let of = |source: super::equation::Source<'_>| NoiseFreeInput {
         inputs: source.inputs.into_iter().map(std::borrow::Cow::into_owned).collect(),
         samples: source.samples,

@@ -47,23 +47,23 @@ use crate::{
 /// Largest number of search steps with given instruments.
 const SEARCH_STEPS: usize = 30;
 /// Number of iterations used by the extrapolation, and the ridge factor of their combination.
-const EXTRAPOLATED_ITERATES: usize = 5;
-const RIDGE: f64 = 1e-10;
+const EXTRAPOLATION_POINT_COUNT: usize = 5;
+const RIDGE_FACTOR: f64 = 1e-10;
 /// Tolerance of the search with given instruments, as a share of the tolerance of the iteration.
 const INNER_TOLERANCE_FACTOR: f64 = 1e-2;
 /// A pole with at least this radius counts as being on the unit circle.
-const ON_CIRCLE: f64 = 1.0 - 1e-7;
+const MIN_RADIUS_ON_CIRCLE: f64 = 1.0 - 1e-7;
 /// Largest negligible step in standard errors, over all parameters together.
 const NEGLIGIBLE_STEP: f64 = 0.5;
 /// The iteration counts as divergent after this number of successive steps without a reduction of the step length by
-/// the factor `GAIN`.
-const MAX_STEPS_WITHOUT_GAIN: usize = 12;
-const GAIN: f64 = 0.9;
+/// the factor `REDUCTION_FACTOR`.
+const MAX_STEPS_WITHOUT_REDUCTION: usize = 12;
+const REDUCTION_FACTOR: f64 = 0.9;
 /// If a step is longer than this multiple of the shortest step, the extrapolation has diverged.
 const DIVERGENCE_RATIO: f64 = 10.0;
 
 /// The objective `|Q' eps(theta)|^2` for given instruments and a given noise model.
-struct GivenInstruments<'p, 'a> {
+struct InstrumentObjective<'p, 'a> {
     problem: &'p IvProblem<'a>,
     noise: &'p NoiseModel,
     q: Columns,
@@ -71,7 +71,7 @@ struct GivenInstruments<'p, 'a> {
     power: f64,
 }
 
-impl Objective for GivenInstruments<'_, '_> {
+impl Objective for InstrumentObjective<'_, '_> {
     fn is_feasible(&self, system: &[f64]) -> bool {
         system.iter().all(|v| v.is_finite()) && roots_inside(&system[..self.problem.poles], 1.0)
     }
@@ -128,7 +128,7 @@ pub(super) fn solve_nonlinear_form(
         let equation = problem.equation(noise.prefilter(&system[..problem.poles]), &system);
         let residual = equation.residual(&system);
         let variance = dot(&residual, &residual) / residual.len() as f64;
-        let objective = GivenInstruments {
+        let objective = InstrumentObjective {
             problem,
             noise: &noise,
             q: problem.basis(&equation.z)?,
@@ -139,13 +139,13 @@ pub(super) fn solve_nonlinear_form(
         iterations += 1;
         without_gain += 1;
         let step: Vec<f64> = end.theta.iter().zip(&system).map(|(a, b)| a - b).collect();
-        let lengths = products(&equation.z);
+        let lengths = gram_by_rows(&equation.z);
         let moved = (squared_length(&lengths, &step) / variance).sqrt();
         let least = nearest.as_ref().map_or(f64::INFINITY, |(least, _)| *least);
         let next = extrapolation.next(&system, step, &lengths);
         let inside = objective.is_feasible(&next);
         if moved < least {
-            if moved < GAIN * least {
+            if moved < REDUCTION_FACTOR * least {
                 without_gain = 0;
             }
             let there = LastIterate {
@@ -153,14 +153,15 @@ pub(super) fn solve_nonlinear_form(
                 system: end.theta.clone(),
                 equation,
                 termination: Termination {
-                    reason: reason(moved, limits.tolerance, &end.theta[..problem.poles]),
+                    reason: end_reason(moved, limits.tolerance, &end.theta[..problem.poles]),
                     iterations,
                 },
             };
             nearest = Some((moved, there));
         }
-        let ended =
-            moved <= limits.tolerance || iterations >= limits.max_iterations || without_gain >= MAX_STEPS_WITHOUT_GAIN;
+        let ended = moved <= limits.tolerance
+            || iterations >= limits.max_iterations
+            || without_gain >= MAX_STEPS_WITHOUT_REDUCTION;
         if let (true, Some((_, mut last))) = (ended, nearest.take_if(|_| ended)) {
             last.noise = noise_of(&last.system);
             last.termination.iterations = iterations;
@@ -179,10 +180,10 @@ pub(super) fn solve_nonlinear_form(
 }
 
 /// Returns the reason for ending an iteration whose next step has the length `moved` in standard errors.
-fn reason(moved: f64, tolerance: f64, f: &[f64]) -> Reason {
+fn end_reason(moved: f64, tolerance: f64, f: &[f64]) -> Reason {
     if moved > NEGLIGIBLE_STEP {
         Reason::IterationLimit
-    } else if !roots_inside(f, ON_CIRCLE) {
+    } else if !roots_inside(f, MIN_RADIUS_ON_CIRCLE) {
         Reason::Border
     } else if moved <= tolerance {
         Reason::Settled
@@ -207,8 +208,8 @@ impl Extrapolation {
         let p = point.len();
         if let Some((point_before, step_before)) = self.last.take() {
             self.differences
-                .push((minus(point, &point_before), minus(&step, &step_before)));
-            if self.differences.len() > EXTRAPOLATED_ITERATES.min(p) {
+                .push((difference(point, &point_before), difference(&step, &step_before)));
+            if self.differences.len() > EXTRAPOLATION_POINT_COUNT.min(p) {
                 self.differences.remove(0);
             }
         }
@@ -220,7 +221,7 @@ impl Extrapolation {
             .enumerate()
             .flat_map(|(i, w)| {
                 let row = self.differences.iter().enumerate();
-                row.map(move |(j, (_, df))| dot(w, df) * if i == j { 1.0 + RIDGE } else { 1.0 })
+                row.map(move |(j, (_, df))| dot(w, df) * if i == j { 1.0 + RIDGE_FACTOR } else { 1.0 })
             })
             .collect();
         let right: Vec<f64> = weighed.iter().map(|w| dot(w, &step)).collect();
@@ -235,12 +236,12 @@ impl Extrapolation {
     }
 }
 
-fn minus(a: &[f64], b: &[f64]) -> Vec<f64> {
+fn difference(a: &[f64], b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a - b).collect()
 }
 
 /// Returns `Z'Z` by rows.
-fn products(z: &Columns) -> Vec<f64> {
+fn gram_by_rows(z: &Columns) -> Vec<f64> {
     z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect()
 }
 

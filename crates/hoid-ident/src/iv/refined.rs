@@ -18,31 +18,31 @@ use crate::{
 use super::{
     algorithm::IterationLimits,
     equation::{IvProblem, Prefilter},
-    external_signal::following,
+    external_signal::driven_parts,
     last_iterate::{LastIterate, NoiseModel},
     own_poles::solve_nonlinear_form,
 };
 
 /// Number of iterations for the start.
-const START_ROUNDS: usize = 5;
+const START_ITERATIONS: usize = 5;
 /// Number of iterations after which only half of each step is taken, to damp oscillations.
-const FULL_STEPS: usize = 20;
+const FULL_STEP_COUNT: usize = 20;
 /// A zero of the equation does not belong to the operator if its residual variance exceeds the smallest residual
 /// variance by this factor.
 const MAX_VARIANCE_RATIO: f64 = 1.15;
 /// Steps smaller than this share of the output are only rounding errors.
-const ROUNDING: f64 = 1e-12;
+const ROUNDING_SHARE: f64 = 1e-12;
 
 /// Runs the iteration and, if it does not converge, continues in the nonlinear form ([`super::own_poles`]). `noise_of`
 /// returns the noise model of a system.
-pub(super) fn settle(
+pub(super) fn iterate_to_convergence(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
     mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
 ) -> Result<LastIterate, IdentError> {
     let mut whitest = SmallestResidual::default();
     let plain = iterate(limits, problem, &mut noise_of, &mut whitest)?;
-    if plain.termination.converged() || limits.max_iterations <= FULL_STEPS {
+    if plain.termination.converged() || limits.max_iterations <= FULL_STEP_COUNT {
         return Ok(plain);
     }
     // The nonlinear form starts from the last iterate. If the result is far from the operator, it starts again from the
@@ -51,7 +51,7 @@ pub(super) fn settle(
     let starts = [
         plain.system.clone(),
         whitest.system.unwrap_or_default(),
-        problem.stabilised(&start(problem)?)?.0,
+        problem.stabilise(&initial_system(problem)?)?.0,
     ];
     let (mut best, mut rank) = (plain, (f64::INFINITY, f64::INFINITY));
     for from in starts.iter().filter(|from| !from.is_empty()) {
@@ -103,7 +103,7 @@ fn iterate(
     mut noise_of: impl FnMut(&[f64]) -> NoiseModel,
     whitest: &mut SmallestResidual,
 ) -> Result<LastIterate, IdentError> {
-    let (mut system, _) = problem.stabilised(&start(problem)?)?;
+    let (mut system, _) = problem.stabilise(&initial_system(problem)?)?;
     let mut iterations = 0;
     loop {
         let noise = noise_of(&system);
@@ -119,7 +119,7 @@ fn iterate(
         let variance = dot(&residual, &residual) / residual.len() as f64;
         let moved = dot(&step, &step);
         let settled = moved <= limits.tolerance * limits.tolerance * variance
-            || moved <= ROUNDING * ROUNDING * dot(&equation.y, &equation.y);
+            || moved <= ROUNDING_SHARE * ROUNDING_SHARE * dot(&equation.y, &equation.y);
         let own = equation.residual(&system);
         let of_system = dot(&own, &own) / own.len() as f64;
         if of_system < whitest.variance {
@@ -129,7 +129,7 @@ fn iterate(
             };
         }
         // The next iteration simulates with F and filters with 1/F, which requires stable poles.
-        let (next, reflected) = problem.stabilised(&next)?;
+        let (next, reflected) = problem.stabilise(&next)?;
         let reason = match (settled || iterations >= limits.max_iterations, reflected, settled) {
             (true, true, _) => Some(Reason::UnstableEstimate),
             (true, false, true) => Some(Reason::Settled),
@@ -146,22 +146,22 @@ fn iterate(
         }
         // A fixed-point iteration can alternate between two systems; half steps damp this and do not change the fixed
         // point.
-        let share = if iterations > FULL_STEPS { 0.5 } else { 1.0 };
+        let share = if iterations > FULL_STEP_COUNT { 0.5 } else { 1.0 };
         for (s, n) in system.iter_mut().zip(&next) {
             *s += share * (n - *s);
         }
-        (system, _) = problem.stabilised(&system)?;
+        (system, _) = problem.stabilise(&system)?;
     }
 }
 
-fn start(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> {
-    match of_noise_free_parts(problem) {
+fn initial_system(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> {
+    match system_from_noise_free_parts(problem) {
         Ok(system) => Ok(system),
         Err(_) => problem.least_squares(Prefilter::default()),
     }
 }
 
-fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> {
+fn system_from_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> {
     let Some(source) = problem.sources.first() else {
         return problem.least_squares(Prefilter::default());
     };
@@ -171,12 +171,12 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
     let outputs: Vec<&[f64]> = problem.data.iter().map(|d| d.u).collect();
     // In a closed loop e contains noise. The parts of e and u that follow the noise-free input contain no noise, so
     // least squares on these parts is consistent, apart from the error of the expansion.
-    let clean = following(&driving, &outputs);
+    let clean = driven_parts(&driving, &outputs);
     let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data::new(e, u)).collect();
     let parts = problem.of(data, Vec::new());
     let mut system = parts.least_squares(Prefilter::default())?;
-    for _ in 0..START_ROUNDS {
-        (system, _) = parts.stabilised(&system)?;
+    for _ in 0..START_ITERATIONS {
+        (system, _) = parts.stabilise(&system)?;
         let filter = Prefilter {
             f: &system[..parts.poles],
             ..Prefilter::default()

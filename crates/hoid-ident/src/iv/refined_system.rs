@@ -15,7 +15,7 @@ use super::{
 use crate::{criterion::Criterion, noise_model::noise_model};
 
 /// Limits of the iteration; the tolerance is large, because a start need not be accurate.
-const LIMITS: IterationLimits = IterationLimits {
+const ITERATION_LIMITS: IterationLimits = IterationLimits {
     max_iterations: 30,
     tolerance: 1e-2,
 };
@@ -27,8 +27,8 @@ pub(crate) fn refined_system(criterion: &Criterion<'_>, nd: usize) -> Option<Vec
     if o.na > 0 || o.nb == 0 || o.nf == 0 {
         return None;
     }
-    let problem = IvProblem::new(&o, criterion.data.clone(), Source::measured(&criterion.data));
-    let needed = problem.first + nd + o.parameters() + o.nf;
+    let problem = IvProblem::new(&o, criterion.data.clone(), Source::measured_inputs(&criterion.data));
+    let needed = problem.first + nd + o.parameter_count() + o.nf;
     if criterion.data.iter().any(|d| d.u.len() <= needed) {
         return None;
     }
@@ -37,5 +37,5 @@ pub(crate) fn refined_system(criterion: &Criterion<'_>, nd: usize) -> Option<Vec
         let (c, d) = noise_model(&simulation_error(&[b, poles].concat(), criterion), 0, nd);
         NoiseModel { c, d }
     };
-    Some(plain_iteration(LIMITS, &problem, noise_of).ok()?.system)
+    Some(plain_iteration(ITERATION_LIMITS, &problem, noise_of).ok()?.system)
 }

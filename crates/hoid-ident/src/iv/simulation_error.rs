@@ -19,7 +19,7 @@ pub(super) fn simulation_error(theta: &[f64], criterion: &Criterion<'_>) -> Vec<
         first: first_residual(&orders, InitialState::Estimate),
         ..criterion.clone()
     };
-    let mut workspace = Workspace::of_thread();
+    let mut workspace = Workspace::borrow_from_thread();
     (0..criterion.data.len())
         .map(|record| simulating.residuals_of(theta, record, &mut workspace))
         .collect()

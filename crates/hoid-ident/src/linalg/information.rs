@@ -58,7 +58,11 @@ pub(crate) fn inverse_information(gram: &[f64], names: &[String]) -> Result<Vec<
 ///
 /// # Errors
 /// The errors of [`inverse_information`].
-pub(crate) fn inverse_of_free(gram: &[f64], free: &[usize], names: &[String]) -> Result<Vec<f64>, IdentError> {
+pub(crate) fn inverse_information_of_free(
+    gram: &[f64],
+    free: &[usize],
+    names: &[String],
+) -> Result<Vec<f64>, IdentError> {
     let p = names.len();
     if free.is_empty() {
         return Ok(vec![0.0; p * p]);
@@ -132,10 +136,10 @@ mod tests {
     #[test]
     fn fixed_parameters_have_no_variance() {
         let g = gram(&columns());
-        let part = inverse_of_free(&g, &[0, 2], &names()).unwrap();
+        let part = inverse_information_of_free(&g, &[0, 2], &names()).unwrap();
         let two = inverse_information(&[g[0], g[2], g[6], g[8]], &["b0", "f1"].map(String::from)).unwrap();
         assert_eq!([part[0], part[2], part[6], part[8]], two.as_slice());
         assert!([1, 3, 4, 5, 7].iter().all(|&i| part[i] == 0.0));
-        assert_eq!(inverse_of_free(&g, &[], &names()).unwrap(), vec![0.0; 9]);
+        assert_eq!(inverse_information_of_free(&g, &[], &names()).unwrap(), vec![0.0; 9]);
     }
 }

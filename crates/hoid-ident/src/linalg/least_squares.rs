@@ -103,18 +103,18 @@ impl LeastSquares {
         }
     }
 
-    fn columns(&self) -> usize {
+    fn column_count(&self) -> usize {
         self.pivots.len()
     }
 
     /// True if all columns are linearly independent.
     pub fn has_full_rank(&self) -> bool {
-        self.rank == self.columns()
+        self.rank == self.column_count()
     }
 
     /// Returns the least-squares solution, which is valid only if the rank is full.
     pub fn solution(&self) -> Vec<f64> {
-        let p = self.columns();
+        let p = self.column_count();
         let scaled = self.back_substitute(&self.qty[..p]);
         let mut theta = vec![0.0; p];
         for (k, &j) in self.pivots.iter().enumerate() {
@@ -125,7 +125,7 @@ impl LeastSquares {
 
     /// Returns `(X' X)^-1` by rows, which is valid only if the rank is full.
     pub fn inverse_gram(&self) -> Vec<f64> {
-        let p = self.columns();
+        let p = self.column_count();
         // First the columns of R^-1, then R^-1 R^-T.
         let inverse: Vec<Vec<f64>> = (0..p)
             .map(|i| {
@@ -145,7 +145,7 @@ impl LeastSquares {
     }
 
     fn back_substitute(&self, rhs: &[f64]) -> Vec<f64> {
-        let p = self.columns();
+        let p = self.column_count();
         let mut x = rhs.to_vec();
         for i in (0..p).rev() {
             for j in i + 1..p {
@@ -159,7 +159,7 @@ impl LeastSquares {
     /// Returns a description of the linearly dependent columns by name, each with the columns that it is a combination
     /// of.
     pub fn describe_dependence(&self, names: &[String]) -> String {
-        let p = self.columns();
+        let p = self.column_count();
         let sentences: Vec<String> = (self.rank..p)
             .map(|k| {
                 let name = &names[self.pivots[k]];
@@ -244,7 +244,7 @@ mod tests {
     }
 
     #[test]
-    fn recovers_exact_coefficients_of_any_scale() {
+    fn exact_coefficients_of_any_scale_are_recovered() {
         let (mut x, mut y) = example();
         let ls = LeastSquares::factor(&mut x, &mut y);
         assert!(ls.has_full_rank());

@@ -18,7 +18,7 @@ use crate::linalg::least_squares::add_scaled;
 /// Number of samples that are read at a time, such that the samples of all columns remain in the first-level cache. It
 /// is a multiple of eight, the largest number of partial sums of a product. The last digits of sums over residuals
 /// depend on it, since these sums are completed after each stretch.
-const STRETCH: usize = 512;
+const STRETCH_LENGTH: usize = 512;
 
 /// Products of one column with four, two or one other columns.
 #[derive(Debug, Clone, Copy)]
@@ -63,8 +63,11 @@ impl<F: FourLanes> Tile<F> {
         let kind = s0;
         match self.count {
             4 => {
-                let blocks = fours(x).iter().zip(fours(column(a))).zip(fours(column(b)));
-                for ((((x, a), b), c), d) in blocks.zip(fours(column(c))).zip(fours(column(d))) {
+                let blocks = chunks_of_four(x)
+                    .iter()
+                    .zip(chunks_of_four(column(a)))
+                    .zip(chunks_of_four(column(b)));
+                for ((((x, a), b), c), d) in blocks.zip(chunks_of_four(column(c))).zip(chunks_of_four(column(d))) {
                     let x = kind.load(x);
                     s0 = s0 + x * kind.load(a);
                     s1 = s1 + x * kind.load(b);
@@ -73,14 +76,18 @@ impl<F: FourLanes> Tile<F> {
                 }
             }
             2 => {
-                for ((x, a), b) in fours(x).iter().zip(fours(column(a))).zip(fours(column(b))) {
+                for ((x, a), b) in chunks_of_four(x)
+                    .iter()
+                    .zip(chunks_of_four(column(a)))
+                    .zip(chunks_of_four(column(b)))
+                {
                     let x = kind.load(x);
                     s0 = s0 + x * kind.load(a);
                     s1 = s1 + x * kind.load(b);
                 }
             }
             _ => {
-                for ([x, later_x], [a, later_a]) in eights(x).iter().zip(eights(column(a))) {
+                for ([x, later_x], [a, later_a]) in chunks_of_eight(x).iter().zip(chunks_of_eight(column(a))) {
                     s0 = s0 + kind.load(x) * kind.load(a);
                     s1 = s1 + kind.load(later_x) * kind.load(later_a);
                 }
@@ -100,37 +107,39 @@ impl<F: FourLanes> Tile<F> {
         };
         let from = x.len() - x.len() % block;
         let rest: f64 = x[from..].iter().zip(&y[from..]).map(|(x, y)| x * y).sum();
-        in_order(sums) + rest
+        sum_in_order(sums) + rest
     }
 }
 
 /// Adds the partial sums in a fixed order.
 #[inline(always)]
-fn in_order<F: FourLanes>(sums: F) -> f64 {
+fn sum_in_order<F: FourLanes>(sums: F) -> f64 {
     let s = sums.to_array();
     (s[0] + s[2]) + (s[1] + s[3])
 }
 
 #[inline(always)]
-fn fours(x: &[f64]) -> &[[f64; 4]] {
+fn chunks_of_four(x: &[f64]) -> &[[f64; 4]] {
     x.as_chunks().0
 }
 
 #[inline(always)]
-fn eights(x: &[f64]) -> &[[[f64; 4]; 2]] {
-    fours(x).as_chunks().0
+fn chunks_of_eight(x: &[f64]) -> &[[[f64; 4]; 2]] {
+    chunks_of_four(x).as_chunks().0
 }
 
 /// Returns the ranges of samples of the stretches into which n samples are divided.
 fn stretches(n: usize) -> impl Iterator<Item = Range<usize>> {
-    (0..n).step_by(STRETCH).map(move |from| from..n.min(from + STRETCH))
+    (0..n)
+        .step_by(STRETCH_LENGTH)
+        .map(move |from| from..n.min(from + STRETCH_LENGTH))
 }
 
 /// Returns the sum of all elements of x.
 #[inline(always)]
 fn sum<F: FourLanes>(x: &[f64], zero: F) -> f64 {
     let (mut s0, mut s1) = (zero, zero);
-    for [a, b] in eights(x) {
+    for [a, b] in chunks_of_eight(x) {
         s0 = s0 + zero.load(a);
         s1 = s1 + zero.load(b);
     }
@@ -141,10 +150,10 @@ fn sum<F: FourLanes>(x: &[f64], zero: F) -> f64 {
 
 /// Returns the sum of the squared distances of the elements of x from the mean.
 #[inline(always)]
-fn squares<F: FourLanes>(x: &[f64], mean: f64, zero: F) -> f64 {
+fn sum_of_squares<F: FourLanes>(x: &[f64], mean: f64, zero: F) -> f64 {
     let (mut s0, mut s1) = (zero, zero);
     let means = zero.splat(mean);
-    for [a, b] in eights(x) {
+    for [a, b] in chunks_of_eight(x) {
         let (a, b) = (zero.load(a) - means, zero.load(b) - means);
         s0 = s0 + a * a;
         s1 = s1 + b * b;
@@ -173,7 +182,7 @@ impl FourLaneTask for Variance<'_, '_> {
             total += sum(x, zero);
         }
         for x in spans {
-            squared += squares(x, total / n, zero);
+            squared += sum_of_squares(x, total / n, zero);
         }
         squared / n
     }
@@ -181,7 +190,7 @@ impl FourLaneTask for Variance<'_, '_> {
 
 /// A column of a regression, with a mark if it is a shift of the previous column.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Lagged<'a> {
+pub(crate) struct LaggedColumn<'a> {
     pub values: &'a [f64],
     /// True if the column is the previous column delayed by one sample.
     pub is_shift_of_previous: bool,
@@ -191,11 +200,11 @@ pub(crate) struct Lagged<'a> {
 ///
 /// A column that is not a shift of the previous column is multiplied by all columns. In each remaining pair both
 /// columns are shifts, so their product follows from the product of the two columns before them.
-pub(crate) fn gram(columns: &[Lagged<'_>]) -> Vec<f64> {
+pub(crate) fn gram(columns: &[LaggedColumn<'_>]) -> Vec<f64> {
     with_four_lanes(Gram(columns))
 }
 
-struct Gram<'c, 'a>(&'c [Lagged<'a>]);
+struct Gram<'c, 'a>(&'c [LaggedColumn<'a>]);
 
 impl FourLaneTask for Gram<'_, '_> {
     type Output = Vec<f64>;
@@ -216,8 +225,8 @@ impl FourLaneTask for Gram<'_, '_> {
             Tile::cover(i, &others, zero, &mut tiles);
         }
         match columns {
-            &[u, u1, u2, e, e1] if [u, u1, u2, e, e1].map(|c| c.is_shift_of_previous) == TWO_OF_EACH => {
-                add_two_of_each(&mut tiles, [u, u1, u2, e, e1].map(|c| c.values));
+            &[u, u1, u2, e, e1] if [u, u1, u2, e, e1].map(|c| c.is_shift_of_previous) == COMMON_SHIFTS => {
+                add_common_products(&mut tiles, [u, u1, u2, e, e1].map(|c| c.values));
             }
             _ => {
                 for stretch in stretches(columns.first().map_or(0, |column| column.values.len())) {
@@ -236,7 +245,7 @@ impl FourLaneTask for Gram<'_, '_> {
         }
         for i in 0..p {
             for j in (0..=i).filter(|j| columns[i].is_shift_of_previous && columns[*j].is_shift_of_previous) {
-                let product = gram[(i - 1) * p + j - 1] + ends(columns, i, j);
+                let product = gram[(i - 1) * p + j - 1] + end_difference(columns, i, j);
                 (gram[i * p + j], gram[j * p + i]) = (product, product);
             }
         }
@@ -245,7 +254,7 @@ impl FourLaneTask for Gram<'_, '_> {
 }
 
 /// Returns the product of columns i and j minus the product of columns i - 1 and j - 1, if i and j are shifts.
-fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
+fn end_difference(columns: &[LaggedColumn<'_>], i: usize, j: usize) -> f64 {
     let (x, y) = (columns[i - 1].values, columns[j - 1].values);
     let last = x.len() - 1;
     columns[i].values[0] * columns[j].values[0] - x[last] * y[last]
@@ -253,12 +262,12 @@ fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
 
 /// Marks of the columns that are shifts, in the most frequent regression: an output with two lags, and an input with
 /// one.
-const TWO_OF_EACH: [bool; 5] = [false, true, true, false, true];
+const COMMON_SHIFTS: [bool; 5] = [false, true, true, false, true];
 
-/// Adds the products of the regression [`TWO_OF_EACH`] in one pass, which reads five numbers for nine products;
+/// Adds the products of the regression [`COMMON_SHIFTS`] in one pass, which reads five numbers for nine products;
 /// separate tiles would read twelve.
 #[inline(always)]
-fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
+fn add_common_products<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
     // The tiles are u with the first four columns, u with the last column, and e with the last four columns.
     let [by_u, by_u_alone, by_e] = tiles else { return };
     let [mut uu, mut uu1, mut uu2, mut ue] = by_u.sums;
@@ -267,8 +276,11 @@ fn add_two_of_each<F: FourLanes>(tiles: &mut [Tile<F>], columns: [&[f64]; 5]) {
     let kind = uu;
     let [u, u1, u2, e, e1] = columns;
     let whole = u.len() - u.len() % 8;
-    let blocks = fours(&u[..whole]).iter().zip(fours(u1)).zip(fours(u2));
-    for ((((u, u1), u2), e), e1) in blocks.zip(fours(e)).zip(fours(e1)) {
+    let blocks = chunks_of_four(&u[..whole])
+        .iter()
+        .zip(chunks_of_four(u1))
+        .zip(chunks_of_four(u2));
+    for ((((u, u1), u2), e), e1) in blocks.zip(chunks_of_four(e)).zip(chunks_of_four(e1)) {
         let (u, e) = (kind.load(u), kind.load(e));
         uu = uu + u * u;
         ue = ue + u * e;
@@ -311,7 +323,7 @@ impl ResidualProducts {
 
     /// Adds the sums for the residuals `y - sum_k factors_k x_k`; only one stretch of the residuals is in memory at a
     /// time. The first column is y.
-    pub fn add(&mut self, columns: &[Lagged<'_>], factors: &[f64]) {
+    pub fn add(&mut self, columns: &[LaggedColumn<'_>], factors: &[f64]) {
         with_four_lanes(Residuals {
             columns,
             factors,
@@ -321,7 +333,7 @@ impl ResidualProducts {
 }
 
 struct Residuals<'c, 'a> {
-    columns: &'c [Lagged<'a>],
+    columns: &'c [LaggedColumn<'a>],
     factors: &'c [f64],
     of: &'c mut ResidualProducts,
 }
@@ -337,12 +349,12 @@ impl FourLaneTask for Residuals<'_, '_> {
         let mut tiles = Vec::with_capacity(columns.len());
         Tile::cover(0, &[0], zero, &mut tiles);
         Tile::cover(0, &inputs, zero, &mut tiles);
-        let mut residual = [0.0; STRETCH];
+        let mut residual = [0.0; STRETCH_LENGTH];
         for stretch in stretches(columns[0].values.len()) {
             let measured = |j: usize| &columns[j].values[stretch.clone()];
-            if let (STRETCH, &[a, b, c, d]) = (stretch.len(), factors) {
+            if let (STRETCH_LENGTH, &[a, b, c, d]) = (stretch.len(), factors) {
                 let five = [measured(0), measured(1), measured(2), measured(3), measured(4)];
-                let (squares, products) = of_four_inputs(five, [a, b, c, d], zero);
+                let (squares, products) = four_input_products(five, [a, b, c, d], zero);
                 of.squares += squares;
                 add_scaled(&mut of.products, 1.0, &products);
                 continue;
@@ -369,14 +381,14 @@ impl FourLaneTask for Residuals<'_, '_> {
 /// Returns the sum of squares of the residuals and their products with four columns over a whole stretch; all sums are
 /// kept in registers.
 #[inline(always)]
-fn of_four_inputs<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
+fn four_input_products<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F) -> (f64, [f64; 4]) {
     let [y, a, b, c, d] = columns;
     let [ka, kb, kc, kd] = factors;
     let (ka, kb, kc, kd) = (zero.splat(ka), zero.splat(kb), zero.splat(kc), zero.splat(kd));
     let (mut rr, mut rr_later) = (zero, zero);
     let (mut ra, mut rb, mut rc, mut rd) = (zero, zero, zero, zero);
-    let blocks = fours(y).iter().zip(fours(a)).zip(fours(b));
-    for ((((y, a), b), c), d) in blocks.zip(fours(c)).zip(fours(d)) {
+    let blocks = chunks_of_four(y).iter().zip(chunks_of_four(a)).zip(chunks_of_four(b));
+    for ((((y, a), b), c), d) in blocks.zip(chunks_of_four(c)).zip(chunks_of_four(d)) {
         let (a, b, c, d) = (zero.load(a), zero.load(b), zero.load(c), zero.load(d));
         let r = zero.load(y) - ((ka * a + kb * b) + (kc * c + kd * d));
         (rr, rr_later) = (rr_later, rr + r * r);
@@ -385,8 +397,8 @@ fn of_four_inputs<F: FourLanes>(columns: [&[f64]; 5], factors: [f64; 4], zero: F
         rc = rc + r * c;
         rd = rd + r * d;
     }
-    let products = [in_order(ra), in_order(rb), in_order(rc), in_order(rd)];
-    (in_order(rr + rr_later), products)
+    let products = [sum_in_order(ra), sum_in_order(rb), sum_in_order(rc), sum_in_order(rd)];
+    (sum_in_order(rr + rr_later), products)
 }
 
 /// Computes `y -= sum_k factors_k x_k`.

@@ -54,7 +54,7 @@ impl<'s> MultiStart<'s> {
             searching: None,
             minima: Vec::new(),
         };
-        if searches.incomplete().is_none() {
+        if searches.first_incomplete().is_none() {
             searches.rank();
         }
         searches
@@ -64,13 +64,13 @@ impl<'s> MultiStart<'s> {
     pub fn evaluation_point(&self) -> Option<&[f64]> {
         match &self.searching {
             Some((_, descent)) => Some(descent.evaluation_point()),
-            None => self.incomplete().map(|at| self.starts[at].theta.as_slice()),
+            None => self.first_incomplete().map(|at| self.starts[at].theta.as_slice()),
         }
     }
 
     /// Returns the polynomial for which derivatives are needed; `None` for all polynomials.
     pub fn block(&self) -> Option<Block> {
-        self.incomplete().and_then(|at| self.starts[at].next_block())
+        self.first_incomplete().and_then(|at| self.starts[at].next_block())
     }
 
     /// Continues with the linearisation at [`MultiStart::evaluation_point`].
@@ -88,16 +88,16 @@ impl<'s> MultiStart<'s> {
                     self.start_next_search();
                 }
             }
-        } else if let Some(at) = self.incomplete() {
+        } else if let Some(at) = self.first_incomplete() {
             self.starts[at].update(&self.orders, &there);
-            if self.incomplete().is_none() {
+            if self.first_incomplete().is_none() {
                 self.rank();
             }
         }
     }
 
     /// Returns the index of the first start with unknown polynomials; `None` if all starts are complete.
-    fn incomplete(&self) -> Option<usize> {
+    fn first_incomplete(&self) -> Option<usize> {
         self.starts.iter().position(|start| start.next_block().is_some())
     }
 
@@ -125,7 +125,7 @@ impl<'s> MultiStart<'s> {
     }
 
     /// Returns the lowest minimum and the label of its start.
-    pub fn lowest(self) -> Option<(String, Minimum)> {
+    pub fn lowest_minimum(self) -> Option<(String, Minimum)> {
         let lowest =
             |a: &(String, Minimum), b: &(String, Minimum)| a.1.at.sum_of_squares.total_cmp(&b.1.at.sum_of_squares);
         self.minima.into_iter().min_by(lowest)

@@ -32,7 +32,7 @@ impl Start {
 
     /// Creates a start from F, for a model without A and C. The unknowns are B with white noise, D from the residual,
     /// and B again with this noise model.
-    pub fn of_poles(label: &str, o: &Orders, f: &[f64]) -> Self {
+    pub fn from_poles(label: &str, o: &Orders, f: &[f64]) -> Self {
         let left = if o.nd > 0 {
             vec![Block::B, Block::D, Block::B]
         } else {
@@ -52,7 +52,7 @@ impl Start {
     }
 
     /// Marks D, and then B with this noise model, as unknown; no effect on a model without D.
-    pub fn with_own_noise(mut self, o: &Orders) -> Self {
+    pub fn with_unknown_noise(mut self, o: &Orders) -> Self {
         if o.nd > 0 {
             self.left = vec![Block::B, Block::D];
         }
@@ -68,7 +68,7 @@ impl Start {
     /// one least-squares step computes either polynomial while the others are fixed.
     pub fn update(&mut self, o: &Orders, there: &Linearisation) {
         let Some(block) = self.left.pop() else { return };
-        let (p, place) = (self.theta.len(), block.place(o));
+        let (p, place) = (self.theta.len(), block.range(o));
         let rows = place.clone().map(|i| &there.gram[i * p..(i + 1) * p]);
         let gram: Vec<f64> = rows.flat_map(|row| &row[place.clone()]).copied().collect();
         let descent = &there.descent[place.clone()];

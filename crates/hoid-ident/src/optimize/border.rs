@@ -28,7 +28,7 @@ impl GaussNewton<'_> {
     /// border of stability; `None` if this continuation fails or is not predicted to end below the rival.
     pub fn finish(mut self, reason: Reason, workspace: &mut Workspace) -> Option<Minimum> {
         let reason = if self.options.method == SearchMethod::Automatic && reason == Reason::NoDescent {
-            self.follow_the_border(workspace)?
+            self.follow_border(workspace)?
         } else {
             reason
         };
@@ -44,7 +44,7 @@ impl GaussNewton<'_> {
 
     /// Continues in coordinates in which the border of stability is a bound, and returns the reason for the end. `None`
     /// if the loss is not finite, or if the search is not predicted to end below the rival.
-    fn follow_the_border(&mut self, workspace: &mut Workspace) -> Option<Reason> {
+    fn follow_border(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
             return Some(Reason::NoDescent);
         };

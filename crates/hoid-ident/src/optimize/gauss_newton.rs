@@ -10,11 +10,11 @@ use crate::criterion::Workspace;
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
 /// Predicted relative decrease of the loss below which the second derivative is estimated from the gradients.
-const SMALL_DECREASE: f64 = 1e-2;
+const SECANT_DECREASE_LIMIT: f64 = 1e-2;
 
 /// Relative decrease of the loss that may be hidden by rounding: filters with poles near the unit circle lose five of
 /// the sixteen digits.
-const ROUNDING: f64 = 1e-10;
+const ROUNDING_DECREASE: f64 = 1e-10;
 
 /// A search that is driven by its caller, so several searches can run in parallel lanes.
 pub(crate) struct GaussNewton<'s> {
@@ -137,13 +137,13 @@ impl<'s> GaussNewton<'s> {
                     self.move_to(there);
                     self.iterate()
                 } else {
-                    self.try_share(delta, 0.5 * factor)
+                    self.try_fraction(delta, 0.5 * factor)
                 }
             }
             Trial::Last => {
                 // The predicted decrease may be less than the rounding error of the loss, so a small increase is
                 // accepted.
-                if finite && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + ROUNDING) {
+                if finite && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + ROUNDING_DECREASE) {
                     self.move_to(there);
                 }
                 Progress::Ended(Some(Reason::SmallDecrease))
@@ -153,7 +153,7 @@ impl<'s> GaussNewton<'s> {
 
     fn move_to(&mut self, there: Linearisation) {
         if self.options.method == SearchMethod::Automatic
-            && self.predicted_decrease <= SMALL_DECREASE * self.at.sum_of_squares
+            && self.predicted_decrease <= SECANT_DECREASE_LIMIT * self.at.sum_of_squares
         {
             self.update_secant(&there);
         } else {
@@ -231,7 +231,7 @@ impl<'s> GaussNewton<'s> {
             SearchMethod::SteepestDescent => self.scaled_gradient(),
         };
         match delta {
-            Some(delta) => self.try_share(delta, 1.0),
+            Some(delta) => self.try_fraction(delta, 1.0),
             None => self.give_up(),
         }
     }
@@ -266,7 +266,7 @@ impl<'s> GaussNewton<'s> {
     }
 
     /// Halves the fraction of a step until its end has a predictor, and requests the derivatives there.
-    fn try_share(&mut self, delta: Vec<f64>, mut factor: f64) -> Progress {
+    fn try_fraction(&mut self, delta: Vec<f64>, mut factor: f64) -> Progress {
         while factor > 1e-12 {
             if self.try_step(&delta, factor) {
                 self.trial = Trial::Share { delta, factor };
@@ -279,7 +279,7 @@ impl<'s> GaussNewton<'s> {
 
     fn give_up(&self) -> Progress {
         // The predicted decrease may be hidden by the rounding of the loss.
-        let lost = self.predicted_decrease <= ROUNDING * self.at.sum_of_squares;
+        let lost = self.predicted_decrease <= ROUNDING_DECREASE * self.at.sum_of_squares;
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
@@ -301,7 +301,7 @@ impl<'s> GaussNewton<'s> {
     /// sum of squares that the quadratic model predicts. `None` if the matrix is not positive definite.
     fn damped_step(&self, mu: f64, secant: &[f64]) -> Option<Step> {
         let p = self.theta.len();
-        let mut free = self.free();
+        let mut free = self.free_indices();
         loop {
             let mut delta = vec![0.0; p];
             if !free.is_empty() {
@@ -339,7 +339,7 @@ impl<'s> GaussNewton<'s> {
     fn scaled_gradient(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let mut delta = vec![0.0; p];
-        for i in self.free() {
+        for i in self.free_indices() {
             let curvature = self.at.gram[i * p + i];
             if curvature > 0.0 {
                 delta[i] = self.at.descent[i] / curvature;
@@ -366,7 +366,7 @@ impl<'s> GaussNewton<'s> {
         (predicted >= 0.0 && delta.iter().all(|s| s.is_finite())).then_some(Step { delta, predicted })
     }
 
-    fn free(&self) -> Vec<usize> {
+    fn free_indices(&self) -> Vec<usize> {
         free_parameters(self.objective, &self.theta, &self.at.descent)
     }
 }

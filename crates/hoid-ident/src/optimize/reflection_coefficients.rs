@@ -17,7 +17,7 @@ use crate::optimize::objective::{Linearisation, Objective};
 
 /// Largest absolute value of a reflection coefficient: at this value, a root is so close to the unit circle that it
 /// counts as being on it for any record.
-pub(crate) const BORDER: f64 = 1.0 - 1e-8;
+pub(crate) const MAX_REFLECTION_COEFFICIENT: f64 = 1.0 - 1e-8;
 
 /// An objective in which the polynomials that must be stable are replaced by their reflection coefficients.
 pub(crate) struct StableCoordinates<'o> {
@@ -38,10 +38,10 @@ impl<'o> StableCoordinates<'o> {
         let mut limits = objective.limits().map_or(vec![unlimited; theta.len()], <[_]>::to_vec);
         let mut kappa = theta.to_vec();
         for block in &blocks {
-            limits[block.clone()].fill((-BORDER, BORDER));
+            limits[block.clone()].fill((-MAX_REFLECTION_COEFFICIENT, MAX_REFLECTION_COEFFICIENT));
             let reflected = reflection_coefficients(&theta[block.clone()])?;
             for (k, value) in kappa[block.clone()].iter_mut().zip(reflected) {
-                *k = value.clamp(-BORDER, BORDER);
+                *k = value.clamp(-MAX_REFLECTION_COEFFICIENT, MAX_REFLECTION_COEFFICIENT);
             }
         }
         let coordinates = Self {
@@ -64,7 +64,7 @@ impl<'o> StableCoordinates<'o> {
     /// True if a reflection coefficient is at its bound.
     pub fn is_on_border(&self, kappa: &[f64]) -> bool {
         let mut coefficients = self.blocks.iter().flat_map(|block| &kappa[block.clone()]);
-        coefficients.any(|k| k.abs() >= BORDER)
+        coefficients.any(|k| k.abs() >= MAX_REFLECTION_COEFFICIENT)
     }
 }
 

@@ -16,15 +16,15 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::{
     Fit, IdentError, Reason, Termination,
-    assembled_fit::{Solution, assembled_fit},
+    assembled_fit::{Solution, assemble_fit},
     criterion::{Criterion, Data},
     linalg::least_squares::{LeastSquares, add_scaled},
-    linalg::products::{Lagged, ResidualProducts, gram},
+    linalg::products::{LaggedColumn, ResidualProducts, gram},
 };
 
 /// Largest condition number (an upper bound, `p tr(G^-1)`) for which the scaled normal matrix is used. At this limit
 /// the refined solution loses three digits, and the covariance keeps nine.
-const WELL_CONDITIONED: f64 = 1e7;
+const MAX_CONDITION_NUMBER: f64 = 1e7;
 
 /// A fit is exact if the power of the residuals is below this share of the power of the output.
 const EXACT_FIT_SHARE: f64 = 1e-12;
@@ -54,7 +54,7 @@ pub(crate) fn fit(structure: Structure, criterion: &Criterion<'_>, sample_time: 
         },
         start: "none needed".to_owned(),
     };
-    let fit = assembled_fit(criterion, structure, sample_time, solution)?;
+    let fit = assemble_fit(criterion, structure, sample_time, solution)?;
     let sigma2 = fit.innovation_variance;
     Ok(fit.with_covariance(sigma2, &solved.inverse_gram))
 }
@@ -63,12 +63,12 @@ pub(crate) fn fit(structure: Structure, criterion: &Criterion<'_>, sample_time: 
 fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regression, IdentError> {
     let levels: Vec<usize> = (0..data.len()).filter(|k| data[*k].level).collect();
     if levels.is_empty()
-        && let Some(solved) = by_normal_equations(orders, data, first)
+        && let Some(solved) = solve_normal_equations(orders, data, first)
     {
         return Ok(solved);
     }
     let rows: usize = data.iter().map(|d| d.u.len() - first).sum();
-    let mut columns = Vec::with_capacity((orders.parameters() + levels.len()) * rows);
+    let mut columns = Vec::with_capacity((orders.parameter_count() + levels.len()) * rows);
     let mut lagged = |signal: &[f64], lag: usize, sign: f64| {
         columns.extend(std::iter::repeat_n(
             0.0,
@@ -113,13 +113,13 @@ fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regressio
 }
 
 /// Returns the columns of one record: the output u(t), then u(t-1) .. u(t-na) without their sign and e(t-nk) ...
-fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>> {
+fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<LaggedColumn<'a>> {
     let n = data.u.len();
-    let outputs = (0..=orders.na).map(|lag| Lagged {
+    let outputs = (0..=orders.na).map(|lag| LaggedColumn {
         values: &data.u[first - lag..n - lag],
         is_shift_of_previous: lag > 0,
     });
-    let inputs = (0..orders.nb).map(|j| Lagged {
+    let inputs = (0..orders.nb).map(|j| LaggedColumn {
         values: &data.e[first - orders.nk - j..n - orders.nk - j],
         is_shift_of_previous: j > 0,
     });
@@ -127,7 +127,7 @@ fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>
 }
 
 /// Solves the regression by refined normal equations; `None` if QR is required instead.
-fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Option<Regression> {
+fn solve_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Option<Regression> {
     let p = orders.na + orders.nb;
     if p == 0 || first < orders.first_regressed_sample() {
         return None;
@@ -149,7 +149,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
     let factor = scaled.cholesky()?;
     let inverse = factor.inverse();
     // The comparison also rejects `NaN`.
-    let well_conditioned = p as f64 * inverse.trace() < WELL_CONDITIONED;
+    let well_conditioned = p as f64 * inverse.trace() < MAX_CONDITION_NUMBER;
     if !well_conditioned {
         return None;
     }

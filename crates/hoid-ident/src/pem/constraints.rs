@@ -28,7 +28,7 @@ pub(crate) struct ConstrainedCriterion<'c, 'a> {
 
 impl ConstrainedCriterion<'_, '_> {
     /// Returns the sum of squared residuals without the prior.
-    pub fn without_prior(&self, theta: &[f64], at: &Linearisation) -> f64 {
+    pub fn sum_without_prior(&self, theta: &[f64], at: &Linearisation) -> f64 {
         at.sum_of_squares - self.penalty(theta)
     }
 

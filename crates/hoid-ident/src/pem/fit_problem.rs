@@ -1,13 +1,13 @@
 //! Search for the lowest minimum from all starts of one fit, and the fit at this minimum.
 
-use hoid_model::{SampleTime, polynomial::reflected_inside};
+use hoid_model::{SampleTime, polynomial::reflect_roots_inside};
 
 use crate::{
     Fit, IdentError, Loss, Reason,
-    assembled_fit::{Solution, assembled_fit, is_fixed_or_bounded},
+    assembled_fit::{Solution, assemble_fit, fixed_or_bounded_flags},
     criterion::{Block, Criterion, Workspace},
-    initial_guess::c_drawn_inside::starts_with_c_inside,
-    linalg::information::inverse_of_free,
+    initial_guess::c_drawn_inside::starts_with_reduced_c_roots,
+    linalg::information::inverse_information_of_free,
     multistart::{LinearisationClient, MultiStart, Start},
     optimize::{Linearisation, Objective, free_parameters, minimise},
     pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings, lower_minimum::lower_minimum, robust},
@@ -36,7 +36,7 @@ impl<'q, 'a> FitProblem<'q, 'a> {
             Some(theta) => vec![Start::complete("given", checked_start(theta, constrained)?, 0.0)],
             None => own_starts()
                 .into_iter()
-                .filter_map(|start| stabilised(start, constrained))
+                .filter_map(|start| stabilise(start, constrained))
                 .collect(),
         };
         let (orders, most) = (settings.orders, settings.starts.max(1));
@@ -57,13 +57,13 @@ impl<'q, 'a> FitProblem<'q, 'a> {
         let Self {
             settings, constrained, ..
         } = self;
-        let (mut start, mut minimum) = self.searches.lowest().ok_or(IdentError::NoFiniteLoss)?;
+        let (mut start, mut minimum) = self.searches.lowest_minimum().ok_or(IdentError::NoFiniteLoss)?;
         if let Some((label, lower)) = lower_minimum(settings, constrained, &minimum, workspace) {
             (start, minimum) = (label, lower);
         }
         if settings.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
             // If the search ended on the border of stability, the loss often has a lower minimum inside.
-            let inside = starts_with_c_inside(&settings.orders, &minimum.theta);
+            let inside = starts_with_reduced_c_roots(&settings.orders, &minimum.theta);
             let known = minimum.at.sum_of_squares;
             let others = inside
                 .into_iter()
@@ -89,27 +89,27 @@ impl<'q, 'a> FitProblem<'q, 'a> {
         }
         let free = free_parameters(constrained, &minimum.theta, &minimum.at.descent);
         let solution = Solution {
-            sum_of_squares: constrained.without_prior(&minimum.theta, &minimum.at),
-            is_fixed_or_bounded: is_fixed_or_bounded(&free, settings.orders.parameters()),
+            sum_of_squares: constrained.sum_without_prior(&minimum.theta, &minimum.at),
+            is_fixed_or_bounded: fixed_or_bounded_flags(&free, settings.orders.parameter_count()),
             theta: minimum.theta,
             termination: minimum.termination,
             start,
         };
-        let fit = assembled_fit(constrained.criterion, settings.structure, self.sample_time, solution)?;
+        let fit = assemble_fit(constrained.criterion, settings.structure, self.sample_time, solution)?;
         if exact {
             return Ok(fit);
         }
-        let inverse = inverse_of_free(&minimum.at.gram, &free, &settings.orders.parameter_names())?;
+        let inverse = inverse_information_of_free(&minimum.at.gram, &free, &settings.orders.parameter_names())?;
         let sigma2 = fit.innovation_variance;
         Ok(fit.with_covariance(sigma2, &inverse))
     }
 }
 
 /// Returns the start, with a stable A if stability is required; `None` if the roots of A cannot be found.
-fn stabilised(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> Option<Start> {
+fn stabilise(mut start: Start, constrained: &ConstrainedCriterion<'_, '_>) -> Option<Start> {
     if constrained.stable {
         let na = constrained.criterion.orders.na;
-        let a = reflected_inside(&start.theta[..na])?;
+        let a = reflect_roots_inside(&start.theta[..na])?;
         start.theta[..na].copy_from_slice(&a);
     }
     Some(start)
@@ -121,12 +121,12 @@ fn checked_start(theta: &[f64], constrained: &ConstrainedCriterion<'_, '_>) -> R
     let bad = |reason: &str| IdentError::BadStart {
         reason: reason.to_owned(),
     };
-    if theta.len() != orders.parameters() {
+    if theta.len() != orders.parameter_count() {
         return Err(bad(&format!(
             "it has {} coefficients, but the orders {} need {}",
             theta.len(),
             orders,
-            orders.parameters()
+            orders.parameter_count()
         )));
     }
     if !constrained.is_feasible(theta) {

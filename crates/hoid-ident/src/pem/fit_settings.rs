@@ -65,11 +65,11 @@ impl FitSettings {
     }
 
     /// Returns the criterion with the constraints and the priors.
-    pub fn constrained<'c, 'a>(&self, criterion: &'c Criterion<'a>) -> ConstrainedCriterion<'c, 'a> {
+    pub fn constrained_criterion<'c, 'a>(&self, criterion: &'c Criterion<'a>) -> ConstrainedCriterion<'c, 'a> {
         let names = self.orders.parameter_names();
         let unlimited = (f64::NEG_INFINITY, f64::INFINITY);
         let limit = |name: &String| self.constraints.get(name).map_or(unlimited, |c| c.limits());
-        let n = criterion.residuals() as f64;
+        let n = criterion.residual_count() as f64;
         let guess = |(i, name): (usize, &String)| {
             let prior = self.priors.get(name)?;
             Some((

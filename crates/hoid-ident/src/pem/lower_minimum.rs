@@ -19,16 +19,16 @@ use crate::{
 
 /// Largest number of residuals for which a lower minimum is searched for with every model. Longer records use this
 /// number of residuals for the first steps.
-const SPAN: usize = 1000;
+const MAX_SPAN_RESIDUALS: usize = 1000;
 /// Largest order of D that does not make a model larger than the operator.
-const LARGEST_ND: usize = 4;
+const MAX_OPERATOR_ND: usize = 4;
 /// Number of starts with the smallest loss from which a few steps are made.
-const RANKED_STARTS: usize = 24;
+const RANKED_START_COUNT: usize = 24;
 /// Number of steps from each start before the best searches are completed.
-const STEPS: usize = 8;
+const STEP_COUNT: usize = 8;
 /// Largest number of searches that are completed on the whole record.
-const COMPLETED_SEARCHES: usize = 8;
-/// Values that replace [`RANKED_STARTS`] and [`COMPLETED_SEARCHES`] for a record longer than [`SPAN`].
+const MAX_COMPLETED_SEARCHES: usize = 8;
+/// Values that replace [`RANKED_START_COUNT`] and [`MAX_COMPLETED_SEARCHES`] for a record longer than [`MAX_SPAN_RESIDUALS`].
 const COUNTS_FOR_LONG_RECORD: [usize; 2] = [12, 3];
 /// Minimum relative decrease of the loss for which a minimum counts as lower.
 const MIN_DECREASE: f64 = 1e-7;
@@ -47,14 +47,14 @@ pub(crate) fn lower_minimum(
         return None;
     }
     let part = first_span(criterion);
-    let on_part = settings.constrained(&part);
-    let whole = part.residuals() == criterion.residuals();
+    let on_part = settings.constrained_criterion(&part);
+    let whole = part.residual_count() == criterion.residual_count();
     let few = SearchOptions {
-        max_iterations: STEPS,
+        max_iterations: STEP_COUNT,
         ..settings.search
     };
     let [most_tried, most_finished] = if whole {
-        [RANKED_STARTS, COMPLETED_SEARCHES]
+        [RANKED_START_COUNT, MAX_COMPLETED_SEARCHES]
     } else {
         COUNTS_FOR_LONG_RECORD
     };
@@ -83,18 +83,18 @@ pub(crate) fn lower_minimum(
 /// True for models with F and without A, if the records are short or the model has more coefficients than the operator.
 fn may_have_more_minima(criterion: &Criterion<'_>) -> bool {
     let o = criterion.orders;
-    let larger = o.nb > 2 || o.nc > 0 || o.nd > LARGEST_ND || o.nf > 2;
-    o.na == 0 && o.nb > 0 && o.nf > 0 && (larger || criterion.residuals() <= SPAN)
+    let larger = o.nb > 2 || o.nc > 0 || o.nd > MAX_OPERATOR_ND || o.nf > 2;
+    o.na == 0 && o.nb > 0 && o.nf > 0 && (larger || criterion.residual_count() <= MAX_SPAN_RESIDUALS)
 }
 
-/// Returns the criterion for about the first [`SPAN`] residuals: records in their order, with the last of them
+/// Returns the criterion for about the first [`MAX_SPAN_RESIDUALS`] residuals: records in their order, with the last of them
 /// truncated.
 fn first_span<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
-    let mut left = SPAN;
+    let mut left = MAX_SPAN_RESIDUALS;
     let mut data = Vec::new();
     for d in &criterion.data {
         // A part of a record shorter than this carries little information in addition to its initial states.
-        if left < SPAN / 10 {
+        if left < MAX_SPAN_RESIDUALS / 10 {
             break;
         }
         let n = d.u.len().min(criterion.first + left);

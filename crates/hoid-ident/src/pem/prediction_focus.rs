@@ -16,8 +16,8 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
     if settings.is_linear() {
         return arx::fit(settings.structure, &criterion, sample_time);
     }
-    let mut workspace = Workspace::of_thread();
-    let constrained = settings.constrained(&criterion);
+    let mut workspace = Workspace::borrow_from_thread();
+    let constrained = settings.constrained_criterion(&criterion);
     let own_starts = || initial_guesses(&criterion, sample_time, &mut workspace);
     let mut problem = FitProblem::new(settings, &constrained, sample_time, own_starts)?;
     while let Some(theta) = problem.evaluation_point() {

@@ -11,7 +11,7 @@
 //! so theta becomes biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986,
 //! section 6.3: the influence is the product of the influence of the residual and the influence of position). To bound
 //! the influence of position as well, the estimator first limits each sample of e and u by its neighbours
-//! ([`crate::faults::resistant`]); in a normal channel one sample in 16 000 is changed, so the efficiency of the loss
+//! ([`crate::faults::limited_record`]); in a normal channel one sample in 16 000 is changed, so the efficiency of the loss
 //! is retained.
 //!
 //! The covariance is `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi (Huber,
@@ -22,9 +22,9 @@ use hoid_numerics::statistics::upper_median;
 
 use crate::{
     Fit, IdentError, Reason, Termination,
-    assembled_fit::{Solution, assembled_fit, is_fixed_or_bounded},
+    assembled_fit::{Solution, assemble_fit, fixed_or_bounded_flags},
     criterion::{Criterion, Workspace},
-    linalg::{information::inverse_of_free, least_squares::dot},
+    linalg::{information::inverse_information_of_free, least_squares::dot},
     optimize::{Minimum, Objective, free_parameters, minimise},
     pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings},
 };
@@ -33,10 +33,10 @@ use crate::{
 const SCALE_ROUNDS: usize = 10;
 
 /// Largest number of rounds of reweighting.
-const ROUNDS: usize = 50;
+const MAX_ROUNDS: usize = 50;
 
 /// The rounds end when theta changes by less than this number of standard errors.
-const CONVERGED: f64 = 1e-5;
+const CONVERGENCE_TOLERANCE: f64 = 1e-5;
 
 /// State of the reweighting: threshold, scale and number of rounds.
 #[derive(Debug)]
@@ -62,7 +62,7 @@ impl Reweighting {
         // If the scale is estimated in every round, it can alternate with the weights; with a fixed scale each round
         // decreases Huber's loss.
         if self.round < SCALE_ROUNDS {
-            self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;
+            self.scale = median_absolute_residual(residuals) / 0.674_489_750_196_081_7;
         }
         self.round += 1;
         let bound = self.threshold * self.scale;
@@ -102,7 +102,7 @@ pub(crate) fn fit(
     let mut rounds = Reweighting::new(threshold);
     let mut residuals = all_residuals(criterion, &minimum.theta, workspace);
     let (mut iterations, mut settled) = (minimum.termination.iterations, false);
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_ROUNDS {
         let Some(weights) = rounds.next(&residuals) else { break };
         let weighted = Criterion {
             weights: Some(&weights),
@@ -123,7 +123,8 @@ pub(crate) fn fit(
         let curvature: f64 = (0..p)
             .map(|i| step[i] * dot(&next.at.gram[i * p..(i + 1) * p], &step))
             .sum();
-        settled = curvature * criterion.residuals() as f64 <= CONVERGED * CONVERGED * next.at.sum_of_squares;
+        settled = curvature * criterion.residual_count() as f64
+            <= CONVERGENCE_TOLERANCE * CONVERGENCE_TOLERANCE * next.at.sum_of_squares;
         minimum = next;
         residuals = all_residuals(&weighted, &minimum.theta, workspace);
         if settled {
@@ -138,17 +139,17 @@ pub(crate) fn fit(
     let names = criterion.orders.parameter_names();
     // The covariance uses the unweighted psi (Huber 1981, eq. 7.6.8); the weights enter through `variance`.
     let plain = constrained.linearise(&minimum.theta, workspace);
-    let inverse = inverse_of_free(&plain.gram, &free, &names)?;
-    let variance = rounds.variance(&residuals, names.len() + criterion.states());
+    let inverse = inverse_information_of_free(&plain.gram, &free, &names)?;
+    let variance = rounds.variance(&residuals, names.len() + criterion.state_count());
     let sum_of_squares = residuals.iter().map(|r| dot(r, r)).sum();
     let solution = Solution {
-        is_fixed_or_bounded: is_fixed_or_bounded(&free, names.len()),
+        is_fixed_or_bounded: fixed_or_bounded_flags(&free, names.len()),
         theta: minimum.theta,
         sum_of_squares,
         termination: Termination { reason, iterations },
         start,
     };
-    let fit = assembled_fit(criterion, settings.structure, sample_time, solution)?;
+    let fit = assemble_fit(criterion, settings.structure, sample_time, solution)?;
     Ok(Fit {
         innovation_variance: rounds.scale * rounds.scale,
         robust: true,
@@ -162,7 +163,7 @@ fn all_residuals(criterion: &Criterion<'_>, theta: &[f64], workspace: &mut Works
         .collect()
 }
 
-fn median_absolute(residuals: &[Vec<f64>]) -> f64 {
+fn median_absolute_residual(residuals: &[Vec<f64>]) -> f64 {
     let mut sizes: Vec<f64> = residuals.iter().flatten().map(|r| r.abs()).collect();
     upper_median(&mut sizes).unwrap_or(0.0)
 }
@@ -208,7 +209,7 @@ mod tests {
         assert!((variance - 1.0 / 0.95).abs() < 0.02, "{variance}");
     }
 
-    fn simulated(replication: u64) -> Record {
+    fn simulated_record(replication: u64) -> Record {
         let streams = RunSeed {
             seed: 4711,
             replication,
@@ -237,7 +238,7 @@ mod tests {
 
     #[test]
     fn one_outlier_moves_estimates_less_than_half_an_error() {
-        let clean = simulated(1);
+        let clean = simulated_record(1);
         let fit = |record: Record| box_jenkins(HUBER).fit(&[record]).unwrap().operator().unwrap();
         let before = fit(clean.clone());
         for of_input in [true, false] {
@@ -264,7 +265,7 @@ mod tests {
         // (1978) 1251-1271).
         let (mut squares, mut count) = (0.0, 0.0);
         for replication in 10..26 {
-            let record = [simulated(replication)];
+            let record = [simulated_record(replication)];
             let plain = box_jenkins(Loss::Quadratic).fit(&record).unwrap();
             let robust = box_jenkins(HUBER).fit(&record).unwrap();
             for ((_, a), (_, b)) in plain.parameters().into_iter().zip(robust.parameters()) {
@@ -280,7 +281,7 @@ mod tests {
     #[test]
     fn data_that_cannot_be_limited_are_fitted_unchanged() {
         // The neighbours of a sample carry no information about a constant error, and there is no response to find.
-        let clean = simulated(2);
+        let clean = simulated_record(2);
         let e = Channel::new("e", "", vec![1.0; clean.len()]);
         let u = Channel::new("u", "", clean.output().to_vec());
         let record = [Record::new(clean.sample_time(), e, u).unwrap()];

@@ -39,8 +39,8 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
             ..Orders::default()
         },
         start: None,
-        constraints: as_poles_of_f(&settings.constraints),
-        priors: as_poles_of_f(&settings.priors),
+        constraints: rename_a_to_f(&settings.constraints),
+        priors: rename_a_to_f(&settings.priors),
         stable: false,
         ..settings.clone()
     };
@@ -48,8 +48,8 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
     let held = fixed_coefficients(simulated.model(), &o);
     let of_noise = FitSettings {
         start: None,
-        constraints: of_noise_model(&settings.constraints).chain(held).collect(),
-        priors: of_noise_model(&settings.priors).collect(),
+        constraints: noise_model_entries(&settings.constraints).chain(held).collect(),
+        priors: noise_model_entries(&settings.priors).collect(),
         ..settings.clone()
     };
     let fit = prediction_focus::fit(&of_noise, records, first)?;
@@ -78,7 +78,7 @@ pub(crate) fn fit(settings: &FitSettings, records: &[Record], first: usize) -> R
 }
 
 /// Renames the coefficients of A to coefficients of F, which contains these poles in the simulation, and omits C and D.
-fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
+fn rename_a_to_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
     named
         .iter()
         .filter(|(name, _)| !name.starts_with(['c', 'd']))
@@ -87,7 +87,7 @@ fn as_poles_of_f<T: Copy>(named: &BTreeMap<String, T>) -> BTreeMap<String, T> {
 }
 
 /// Returns the entries for coefficients of C and D.
-fn of_noise_model<T: Copy>(named: &BTreeMap<String, T>) -> impl Iterator<Item = (String, T)> {
+fn noise_model_entries<T: Copy>(named: &BTreeMap<String, T>) -> impl Iterator<Item = (String, T)> {
     let of_noise = named.iter().filter(|(name, _)| name.starts_with(['c', 'd']));
     of_noise.map(|(name, value)| (name.clone(), *value))
 }
@@ -125,10 +125,13 @@ fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> R
     let theta = simulated.model().theta();
     let q = theta.len();
     let (mut gram, mut coloured) = (vec![0.0; q * q], vec![0.0; q * q]);
-    let mut workspace = Workspace::of_thread();
+    let mut workspace = Workspace::borrow_from_thread();
     for record in 0..records.len() {
         let psi = criterion.jacobian(theta, record, &mut workspace);
-        let filtered: Vec<Vec<f64>> = psi.iter().map(|x| backwards(model.c(), &poles[1..], x)).collect();
+        let filtered: Vec<Vec<f64>> = psi
+            .iter()
+            .map(|x| filter_backwards(model.c(), &poles[1..], x))
+            .collect();
         for i in 0..q {
             for j in 0..q {
                 gram[i * q + j] += dot(&psi[i], &psi[j]);
@@ -145,7 +148,7 @@ fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> R
     let sandwich = times(&times(&inverse, &coloured), &inverse);
     // theta of the simulation is [b, f]; theta of the structure is [a, b, c, d, f].
     let o = fit.orders();
-    let p = o.parameters();
+    let p = o.parameter_count();
     let pole_at = if o.na > 0 { 0 } else { p - o.nf };
     let place = |i: usize| if i < o.nb { o.na + i } else { pole_at + i - o.nb };
     let mut covariance = of_noise.clone();
@@ -158,7 +161,7 @@ fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> R
 }
 
 /// Applies `(C/D)` to x backwards in time.
-fn backwards(c: &[f64], d: &[f64], x: &[f64]) -> Vec<f64> {
+fn filter_backwards(c: &[f64], d: &[f64], x: &[f64]) -> Vec<f64> {
     let mut reversed: Vec<f64> = x.iter().rev().copied().collect();
     divide_in_place(d, &mut reversed);
     let mut y = reversed.clone();

@@ -6,16 +6,16 @@ use super::setting::Setting;
 use crate::IdentError;
 
 /// Function that sets an option of an estimator from its text.
-type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
+type ValueSetter<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
 /// Function that returns the value of an option as text for a given sample time; `None` if the value is not printed.
-type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
+type ValueFormatter<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 
 /// An option of an estimator `E`; invalid texts give errors of type `X`.
 pub struct BatchOption<E, X = IdentError> {
     /// Name, type, default, bounds and help text.
     pub setting: Setting,
-    set: Set<E, X>,
-    printed: Option<(&'static str, Words<E>)>,
+    set: ValueSetter<E, X>,
+    printed: Option<(&'static str, ValueFormatter<E>)>,
 }
 
 /// An estimator that declares its options.
@@ -36,7 +36,11 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
 
     /// Returns the option so that it is also printed among the settings in use, under this name.
     #[must_use]
-    pub fn printed(self, name: &'static str, words: impl Fn(&E, SampleTime) -> Option<String> + 'static) -> Self {
+    pub fn with_formatter(
+        self,
+        name: &'static str,
+        words: impl Fn(&E, SampleTime) -> Option<String> + 'static,
+    ) -> Self {
         Self {
             printed: Some((name, Box::new(words))),
             ..self
@@ -52,14 +56,14 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
     }
 
     /// Returns the name and the value as printed; `None` if the option is not printed.
-    pub fn words(&self, of: &E, sample_time: SampleTime) -> Option<(&'static str, String)> {
+    pub fn formatted_value(&self, of: &E, sample_time: SampleTime) -> Option<(&'static str, String)> {
         let (name, words) = self.printed.as_ref()?;
         Some((*name, words(of, sample_time)?))
     }
 
     /// Returns the same option with another parser.
     #[must_use]
-    pub fn read_by(self, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
+    pub fn with_parser(self, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
         Self {
             set: Box::new(set),
             ..self
@@ -67,7 +71,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
     }
 
     /// Returns the same option for an estimator that contains this estimator.
-    pub fn within<W: 'static, Y: From<X> + 'static>(
+    pub fn nested<W: 'static, Y: From<X> + 'static>(
         self,
         part: fn(&W) -> &E,
         part_mut: fn(&mut W) -> &mut E,
@@ -76,7 +80,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         BatchOption {
             setting,
             set: Box::new(move |whole, setting, text| set(part_mut(whole), setting, text).map_err(Y::from)),
-            printed: printed.map(|(name, words)| -> (&'static str, Words<W>) {
+            printed: printed.map(|(name, words)| -> (&'static str, ValueFormatter<W>) {
                 (
                     name,
                     Box::new(move |whole, sample_time| words(part(whole), sample_time)),

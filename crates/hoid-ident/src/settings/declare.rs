@@ -91,7 +91,7 @@ mod tests {
 
     settings! {
         /// Options that several methods share.
-        pub struct Shared {
+        pub struct SharedOptions {
             /// Multiple of the standard deviation
             #[setting(bounds(Bounds::Positive), default("none"))]
             pub limit: Option<f64> = None,
@@ -100,7 +100,7 @@ mod tests {
 
     settings! {
         /// Options of a method.
-        pub struct Own {
+        pub struct OwnOptions {
             /// Range of the delay,
             /// both ends included
             #[setting(name("delay"), unit("s"), bounds(Bounds::NonNegative))]
@@ -108,13 +108,13 @@ mod tests {
         }
         groups {
             /// Shared data.
-            pub shared: Shared,
+            pub shared: SharedOptions,
         }
     }
 
     #[test]
     fn declared_settings_can_be_listed_set_and_read() {
-        let mut own = Own::default();
+        let mut own = OwnOptions::default();
         let list = own.list();
         assert_eq!(list.iter().map(|s| s.name).collect::<Vec<_>>(), ["delay", "limit"]);
         assert_eq!(

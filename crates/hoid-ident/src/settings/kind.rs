@@ -66,7 +66,7 @@ pub enum Bounds {
 
 impl Bounds {
     /// True if the number is within the bounds.
-    pub fn hold(self, x: f64) -> bool {
+    pub fn contains(self, x: f64) -> bool {
         match self {
             Self::Any => !x.is_nan(),
             Self::Finite => x.is_finite(),

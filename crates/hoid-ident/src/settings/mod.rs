@@ -38,9 +38,9 @@ mod value;
 
 pub use batch_option::{BatchOption, BatchOptions};
 pub use kind::{Bounds, Kind};
-pub use range::{DelayRange, OneOrSpan};
+pub use range::{DelayRange, NumberOrSpan};
 pub use setting::{MethodSpec, Setting};
-pub use value::{Value, named_pairs};
+pub use value::{Value, parse_named_pairs};
 
 use crate::IdentError;
 

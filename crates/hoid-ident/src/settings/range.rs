@@ -37,9 +37,9 @@ impl Value for RangeInclusive<usize> {
 
 /// A non-negative number, or `LO..HI` of such numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct OneOrSpan(pub f64, pub f64);
+pub struct NumberOrSpan(pub f64, pub f64);
 
-impl Value for OneOrSpan {
+impl Value for NumberOrSpan {
     const KIND: Kind = Kind::NumberOrSpan;
 
     fn read(text: &str) -> Result<Self, String> {
@@ -74,13 +74,13 @@ pub enum DelayRange {
 
 impl DelayRange {
     /// Returns `nk`, the delay in samples, or, if it is missing, `delay_s`, the delay in seconds.
-    pub fn given(nk: Option<&Self>, delay_s: Option<OneOrSpan>) -> Option<Self> {
+    pub fn from_options(nk: Option<&Self>, delay_s: Option<NumberOrSpan>) -> Option<Self> {
         nk.cloned()
-            .or(delay_s.map(|OneOrSpan(low, high)| Self::Seconds(low, high)))
+            .or(delay_s.map(|NumberOrSpan(low, high)| Self::Seconds(low, high)))
     }
 
     /// Returns the range of nk; a delay tau_e in seconds gives nk = tau_e/Ts + 1.
-    pub fn samples(&self, sample_time: SampleTime) -> RangeInclusive<usize> {
+    pub fn nk_range(&self, sample_time: SampleTime) -> RangeInclusive<usize> {
         match self {
             Self::Samples(range) => range.clone(),
             Self::Seconds(low, high) => sample_time.nk(*low)..=sample_time.nk(*high),
@@ -92,7 +92,7 @@ impl fmt::Display for DelayRange {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Samples(range) => write!(f, "{} samples", range.text().unwrap_or_default()),
-            Self::Seconds(low, high) => write!(f, "{} s", OneOrSpan(*low, *high).text().unwrap_or_default()),
+            Self::Seconds(low, high) => write!(f, "{} s", NumberOrSpan(*low, *high).text().unwrap_or_default()),
         }
     }
 }
@@ -112,8 +112,8 @@ impl Value for DelayRange {
             part.strip_suffix('s').unwrap_or(part).trim_end().to_owned()
         };
         let (low, high) = text.split_once("..").unwrap_or((text, text));
-        match OneOrSpan::read(&format!("{}..{}", seconds(low), seconds(high))) {
-            Ok(OneOrSpan(low, high)) if low >= 0.0 => Ok(Self::Seconds(low, high)),
+        match NumberOrSpan::read(&format!("{}..{}", seconds(low), seconds(high))) {
+            Ok(NumberOrSpan(low, high)) if low >= 0.0 => Ok(Self::Seconds(low, high)),
             _ => Err(expected()),
         }
     }
@@ -135,7 +135,7 @@ impl FromStr for DelayRange {
     }
 }
 
-impl FromStr for OneOrSpan {
+impl FromStr for NumberOrSpan {
     type Err = String;
 
     /// Parses one nonnegative number, or two as `LO..HI`.
@@ -161,18 +161,18 @@ mod tests {
         for bad in ["", "x", "-1", "5..4", "1..", "1.5"] {
             assert!(Counts::read(bad).is_err(), "{bad}");
         }
-        assert_eq!(OneOrSpan::read(".28"), Ok(OneOrSpan(0.28, 0.28)));
-        assert_eq!(OneOrSpan::read("0.1..0.4"), Ok(OneOrSpan(0.1, 0.4)));
+        assert_eq!(NumberOrSpan::read(".28"), Ok(NumberOrSpan(0.28, 0.28)));
+        assert_eq!(NumberOrSpan::read("0.1..0.4"), Ok(NumberOrSpan(0.1, 0.4)));
         for bad in ["", "s", "0.4..0.1", "NaN", "inf", "0.28s"] {
-            assert!(OneOrSpan::read(bad).is_err(), "{bad}");
+            assert!(NumberOrSpan::read(bad).is_err(), "{bad}");
         }
-        assert!("-0.1".parse::<OneOrSpan>().is_err());
+        assert!("-0.1".parse::<NumberOrSpan>().is_err());
     }
 
     #[test]
     fn delay_range_text_is_parsed() {
         let ts = SampleTime::new(0.01).unwrap();
-        let nk = |text: &str| DelayRange::read(text).unwrap().samples(ts);
+        let nk = |text: &str| DelayRange::read(text).unwrap().nk_range(ts);
         assert_eq!((nk("29"), nk("0.28s"), nk(" 0.28 s")), (29..=29, 29..=29, 29..=29));
         assert_eq!(
             (nk("20..40"), nk("0.1s..0.4s"), nk("0.1..0.4s")),

@@ -87,9 +87,9 @@ impl Setting {
     /// # Errors
     /// [`IdentError::BadOption`] if the text is invalid or the value is out of bounds.
     pub fn read<V: Value>(&self, text: &str) -> Result<V, IdentError> {
-        let bad = |expected: String| self.refused(text, &expected);
+        let bad = |expected: String| self.invalid_value(text, &expected);
         let value = V::read(text.trim()).map_err(bad)?;
-        match value.numbers().into_iter().all(|x| self.bounds.hold(x)) {
+        match value.numbers().into_iter().all(|x| self.bounds.contains(x)) {
             true => Ok(value),
             false => Err(bad(self.bounds.to_string())),
         }
@@ -101,15 +101,15 @@ impl Setting {
     ///
     /// # Errors
     /// [`IdentError::BadOption`] with the available words if the text is none of them.
-    pub fn word<T: NamedChoice>(&self, text: &str) -> Result<T, IdentError> {
-        T::of_name(&text.replace('_', "-")).map_err(|_| {
+    pub fn parse_choice<T: NamedChoice>(&self, text: &str) -> Result<T, IdentError> {
+        T::from_name(&text.replace('_', "-")).map_err(|_| {
             let words: Vec<&str> = T::CHOICES.iter().map(|choice| choice.choice_name()).collect();
-            self.refused(text, &format!("one of {}", words.join(", ")))
+            self.invalid_value(text, &format!("one of {}", words.join(", ")))
         })
     }
 
     /// Returns the error for an invalid text; `expected` describes a valid value.
-    pub fn refused(&self, text: &str, expected: &str) -> IdentError {
+    pub fn invalid_value(&self, text: &str, expected: &str) -> IdentError {
         IdentError::BadOption {
             option: self.name.to_owned(),
             found: text.to_owned(),

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_core::{predictor::Regressor, recursion::Stable};
+use hoid_core::{predictor::Regressor, recursion::StablePolynomials};
 
 use super::kind::Kind;
 use crate::{Constraint, Prior};
@@ -188,7 +188,7 @@ impl Value for Vec<String> {
 ///
 /// # Errors
 /// A description of the expected value.
-pub fn named_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
+pub fn parse_named_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
     let mut pairs: Vec<(String, String)> = Vec::new();
     for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {
         let (name, value) = item
@@ -215,7 +215,7 @@ impl<V: Value> Value for BTreeMap<String, V> {
             Ok(value) => Ok((name, value)),
             Err(expected) => Err(format!("for {name}: {expected}")),
         };
-        named_pairs(text)?.into_iter().map(value).collect()
+        parse_named_pairs(text)?.into_iter().map(value).collect()
     }
 
     fn text(&self) -> Option<String> {
@@ -232,7 +232,7 @@ impl<V: Value> Value for BTreeMap<String, V> {
 }
 
 /// Parses one word of a list; the words of a second list are also accepted.
-fn choice<T: Copy>(text: &str, words: &[(&str, T)], others: &[(&str, T)]) -> Result<T, String> {
+fn parse_word<T: Copy>(text: &str, words: &[(&str, T)], others: &[(&str, T)]) -> Result<T, String> {
     let plain = text.to_ascii_lowercase().replace('_', "-");
     let known = || words.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ");
     words
@@ -250,7 +250,7 @@ macro_rules! choices {
             const KIND: Kind = Kind::Choice(&[$($word),+]);
 
             fn read(text: &str) -> Result<Self, String> {
-                choice(text, &[$(($word, $value)),+], &[$($(($alias, $other)),+)?])
+                parse_word(text, &[$(($word, $value)),+], &[$($(($alias, $other)),+)?])
             }
 
             fn text(&self) -> Option<String> {
@@ -261,14 +261,14 @@ macro_rules! choices {
 }
 
 choices!(Regressor { "gradient" = Regressor::Gradient, "cascade" = Regressor::Cascade, "pseudo-linear" = Regressor::PseudoLinear });
-choices!(Stable { "predictor" = Stable::Predictor, "noise" = Stable::PredictorAndNoise } also { "predictor-and-noise" = Stable::PredictorAndNoise });
+choices!(StablePolynomials { "predictor" = StablePolynomials::Predictor, "noise" = StablePolynomials::PredictorAndNoise } also { "predictor-and-noise" = StablePolynomials::PredictorAndNoise });
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// A value that is written and parsed again is unchanged.
-    fn returns<V: Value + PartialEq + std::fmt::Debug>(text: &str, value: V) {
+    fn assert_round_trip<V: Value + PartialEq + std::fmt::Debug>(text: &str, value: V) {
         assert_eq!(V::read(text), Ok(value));
         let read = V::read(text).ok().and_then(|v| v.text()).unwrap_or_default();
         assert_eq!(V::read(&read), V::read(text), "{text} {read}");
@@ -276,28 +276,28 @@ mod tests {
 
     #[test]
     fn value_text_round_trips() {
-        returns("true", true);
-        returns("17", 17_usize);
-        returns("0.1", 0.1);
-        returns("1e6", 1e6);
-        returns("inf", f64::INFINITY);
-        returns("-3..4.5", (-3.0, 4.5));
-        returns("5..", Constraint::Between(5.0, f64::INFINITY));
-        returns("..0.99", Constraint::Between(f64::NEG_INFINITY, 0.99));
-        returns(
+        assert_round_trip("true", true);
+        assert_round_trip("17", 17_usize);
+        assert_round_trip("0.1", 0.1);
+        assert_round_trip("1e6", 1e6);
+        assert_round_trip("inf", f64::INFINITY);
+        assert_round_trip("-3..4.5", (-3.0, 4.5));
+        assert_round_trip("5..", Constraint::Between(5.0, f64::INFINITY));
+        assert_round_trip("..0.99", Constraint::Between(f64::NEG_INFINITY, 0.99));
+        assert_round_trip(
             "-1.9:0.5",
             Prior {
                 value: -1.9,
                 weight: 0.5,
             },
         );
-        returns("K, T_L", vec!["K".to_owned(), "T_L".to_owned()]);
-        returns("noise", Stable::PredictorAndNoise);
-        returns(
+        assert_round_trip("K, T_L", vec!["K".to_owned(), "T_L".to_owned()]);
+        assert_round_trip("noise", StablePolynomials::PredictorAndNoise);
+        assert_round_trip(
             "K_e=0.01, f1=2",
             BTreeMap::from([("K_e".to_owned(), 0.01), ("f1".to_owned(), 2.0)]),
         );
-        returns("2", Some(2_usize));
+        assert_round_trip("2", Some(2_usize));
         assert_eq!(1e6.text().as_deref(), Some("1e6"));
         assert_eq!(None::<f64>.text(), None);
     }
@@ -311,7 +311,10 @@ mod tests {
             assert!(Prior::read(bad).is_err(), "{bad}");
         }
         assert!(Vec::<String>::read("K,,T_L").is_err());
-        assert_eq!(Stable::read("all"), Err("one of predictor, noise".to_owned()));
+        assert_eq!(
+            StablePolynomials::read("all"),
+            Err("one of predictor, noise".to_owned())
+        );
         let named = |text| BTreeMap::<String, f64>::read(text);
         assert!(named("").is_err() && named("b0").is_err() && named("b0=1,b0=2").is_err());
         assert_eq!(named("b0=x"), Err("for b0: a number".to_owned()));

@@ -27,7 +27,7 @@ fn record(n: usize, noise: f64, seed: u64) -> Record {
         u[t] = w[t] + v[t] + x[t] + 1.5;
     }
     Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "", e),
         Channel::new("u", "", u),
     )

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hoid_model::{Form, SampleTime, operator_family::Coordinate};
 
-use super::layout::{Element, Layout};
+use super::layout::{Layout, ThetaElement};
 use crate::{Constraint, IdentError, family::coordinates};
 
 /// Bounds of zeta_nm. Beyond the bounds the two poles are effectively independent.
@@ -20,16 +20,16 @@ const END_SHARE: f64 = 0.05;
 /// change cannot be distinguished from this one, and its likelihood would be a staircase in t_M with a step for each
 /// sample (at this rate the slope varies by 2 % with the position of t_M between two samples, at twice the rate by 50
 /// %).
-pub(crate) const FASTEST_DEFAULT_RATE: f64 = 2.0;
+pub(crate) const MAX_DEFAULT_RATE_TIMES_TS: f64 = 2.0;
 /// Largest admissible rate times the sample time.
-const FASTEST_RATE: f64 = 10.0;
+const MAX_RATE_TIMES_TS: f64 = 10.0;
 /// Smallest rate times the time span: 8 to 92 % of the change fill the span (2 ln 12 = 5.0), so the change can hardly
 /// be distinguished from a line.
-const SLOWEST_RATE: f64 = 5.0;
+const MIN_RATE_TIMES_SPAN: f64 = 5.0;
 
 /// Quantities that determine the bounds.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Frame {
+pub(crate) struct BoundInputs {
     pub ts_s: f64,
     /// Time span common to all records, s.
     pub span_s: (f64, f64),
@@ -43,7 +43,7 @@ pub(crate) struct Frame {
 /// constraint.
 pub(crate) fn limits(
     layout: &Layout,
-    frame: &Frame,
+    frame: &BoundInputs,
     constraints: &BTreeMap<String, Constraint>,
 ) -> Result<Vec<(f64, f64)>, IdentError> {
     let names = layout.names();
@@ -60,14 +60,14 @@ pub(crate) fn limits(
         let (low, high) = asked.map_or(default, Constraint::limits);
         let within = (low.max(widest.0), high.min(widest.1));
         let moved = low == high && within != (low, high);
-        if asked.is_some_and(|c| !c.is_sound()) || within.0 > within.1 || moved {
+        if asked.is_some_and(|c| !c.is_valid()) || within.0 > within.1 || moved {
             return Err(IdentError::BadOption {
                 option: format!("the constraint on {name}"),
                 found: format!("{low} to {high}"),
                 expected: format!("a value or a range within {:.6} to {:.6}", widest.0, widest.1),
             });
         }
-        let ends = [within.0, within.1].map(|end| layout.of_typed(place, end));
+        let ends = [within.0, within.1].map(|end| layout.theta_from_user_value(place, end));
         result.push((ends[0].min(ends[1]), ends[0].max(ends[1])));
     }
     Ok(result)
@@ -76,7 +76,7 @@ pub(crate) fn limits(
 type Range = (f64, f64);
 
 /// Returns the admissible range of a parameter and its default search range, in the units in which users give it.
-fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Range), IdentError> {
+fn ranges(layout: &Layout, frame: &BoundInputs, element: ThetaElement) -> Result<(Range, Range), IdentError> {
     let (from, to) = frame.span_s;
     let span = to - from;
     let sample_time = SampleTime::new(frame.ts_s)?;
@@ -89,19 +89,19 @@ fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Ra
     let known = layout.form == Form::Lead;
     let all = (f64::NEG_INFINITY, f64::INFINITY);
     Ok(match element {
-        Element::Midpoint => ((from, to), (from + END_SHARE * span, to - END_SHARE * span)),
-        Element::LogRate => {
-            let slowest = (SLOWEST_RATE / span).min(FASTEST_DEFAULT_RATE / frame.ts_s);
+        ThetaElement::Midpoint => ((from, to), (from + END_SHARE * span, to - END_SHARE * span)),
+        ThetaElement::LogRate => {
+            let slowest = (MIN_RATE_TIMES_SPAN / span).min(MAX_DEFAULT_RATE_TIMES_TS / frame.ts_s);
             (
-                (slowest, FASTEST_RATE / frame.ts_s),
-                (slowest, FASTEST_DEFAULT_RATE / frame.ts_s),
+                (slowest, MAX_RATE_TIMES_TS / frame.ts_s),
+                (slowest, MAX_DEFAULT_RATE_TIMES_TS / frame.ts_s),
             )
         }
-        Element::Constant(Coordinate::LagRate) => {
+        ThetaElement::Constant(Coordinate::LagRate) => {
             let (low, high) = of_family(Coordinate::LagRate).unwrap_or(all);
             (LAG_LIMITS_S, (1.0 / high, 1.0 / low))
         }
-        Element::Constant(coordinate @ (Coordinate::LogOmega | Coordinate::LogZeta)) => {
+        ThetaElement::Constant(coordinate @ (Coordinate::LogOmega | Coordinate::LogZeta)) => {
             let widest = if coordinate == Coordinate::LogOmega {
                 (1e-3, MAX_NYQUIST_SHARE * std::f64::consts::PI / frame.ts_s)
             } else {
@@ -110,8 +110,8 @@ fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Ra
             let of_family = of_family(coordinate).map(|(low, high)| (low.exp(), high.exp()));
             (widest, if known { widest } else { of_family.unwrap_or(widest) })
         }
-        Element::Constant(Coordinate::Delay) => (frame.delay_range_s, frame.delay_range_s),
-        Element::Varying(..) | Element::Constant(_) | Element::Noise(_) => (all, all),
+        ThetaElement::Constant(Coordinate::Delay) => (frame.delay_range_s, frame.delay_range_s),
+        ThetaElement::Varying(..) | ThetaElement::Constant(_) | ThetaElement::Noise(_) => (all, all),
     })
 }
 
@@ -119,8 +119,8 @@ fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Ra
 mod tests {
     use super::*;
 
-    fn frame() -> Frame {
-        Frame {
+    fn frame() -> BoundInputs {
+        BoundInputs {
             ts_s: 0.01,
             span_s: (0.0, 80.0),
             delay_range_s: (0.05, 0.6),

@@ -7,14 +7,14 @@ use hoid_model::{
 };
 
 use super::{
-    instant::Instant,
+    instant::SigmoidPoint,
     layout::{Layout, MAX_VARYING},
 };
 
 /// A parameter with its name, unit and estimate.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NamedEstimate {
-    /// Name, such as K, T_L or T_I, as in [`FamilyOperator::named`].
+    /// Name, such as K, T_L or T_I, as in [`FamilyOperator::named_parameters`].
     #[serde(deserialize_with = "hoid_model::interned::name")]
     pub name: hoid_model::interned::Name,
     /// Unit; empty if there is none.
@@ -42,7 +42,7 @@ impl ChangedOperator {
 
     /// Returns the parameters with the names of the thesis; `None` for forms other than a gain and a lead with the
     /// neuromuscular part.
-    pub fn lead(&self) -> Option<OperatorEstimate> {
+    pub fn operator_estimate(&self) -> Option<OperatorEstimate> {
         if self.operator.form() != Form::Lead {
             return None;
         }
@@ -71,26 +71,26 @@ pub(super) struct ThetaEstimate<'a> {
 
 impl ThetaEstimate<'_> {
     /// Returns the operator before (0) or after (1) the change.
-    pub fn end(&self, end: usize) -> Result<ChangedOperator, ModelError> {
+    pub fn operator_at_end(&self, end: usize) -> Result<ChangedOperator, ModelError> {
         let mut values = [0.0; MAX_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(self.layout.varying) {
-            *value = self.theta[Layout::ends(i)[end]];
+            *value = self.theta[Layout::end_indices(i)[end]];
         }
         let operator = self.layout.operator(self.theta, &values)?;
         let of = |gradient: &[f64]| {
             let mut whole = self.constant_part(gradient);
             for (i, slope) in gradient.iter().enumerate().take(self.layout.varying) {
-                whole[Layout::ends(i)[end]] = *slope;
+                whole[Layout::end_indices(i)[end]] = *slope;
             }
             (whole, 0.0)
         };
-        let parameters = self.named(&operator, |_| true, of);
+        let parameters = self.named_estimates(&operator, |_| true, of);
         Ok(ChangedOperator { operator, parameters })
     }
 
     /// Returns the changing parameters at the time `time_s`, with their standard errors.
     pub fn at(&self, time_s: f64) -> Vec<NamedEstimate> {
-        let here = Instant::at(self.layout, self.theta, time_s);
+        let here = SigmoidPoint::at(self.layout, self.theta, time_s);
         // An operator between two valid operators is always valid.
         let Ok(operator) = self.layout.operator(self.theta, &here.values) else {
             return Vec::new();
@@ -99,7 +99,7 @@ impl ThetaEstimate<'_> {
             let mut whole = self.constant_part(gradient);
             let mut by_share = 0.0;
             for (i, slope) in gradient.iter().enumerate().take(self.layout.varying) {
-                let [first, last] = Layout::ends(i);
+                let [first, last] = Layout::end_indices(i);
                 (whole[first], whole[last]) = (slope * (1.0 - here.share), slope * here.share);
                 by_share += slope * (self.theta[last] - self.theta[first]);
             }
@@ -116,13 +116,18 @@ impl ThetaEstimate<'_> {
             (whole, of_time)
         };
         let changes = |gradient: &[f64]| gradient[..self.layout.varying].iter().any(|slope| *slope != 0.0);
-        self.named(&operator, changes, of)
+        self.named_estimates(&operator, changes, of)
     }
 
     /// Converts the part of a gradient for the parameters that do not change to a gradient with respect to theta.
     fn constant_part(&self, gradient: &[f64]) -> Vec<f64> {
         let mut whole = vec![0.0; self.theta.len()];
-        for (place, slope) in self.layout.poles().into_iter().zip(&gradient[self.layout.varying..]) {
+        for (place, slope) in self
+            .layout
+            .pole_indices()
+            .into_iter()
+            .zip(&gradient[self.layout.varying..])
+        {
             // theta contains omega_nm and zeta_nm, not their logarithms.
             let logarithmic = self
                 .layout
@@ -135,7 +140,7 @@ impl ThetaEstimate<'_> {
 
     /// Returns the parameters of an operator for which `wanted` accepts the gradient. `of` converts a gradient with
     /// respect to the coordinates to a gradient with respect to theta, and returns a variance to be added.
-    fn named(
+    fn named_estimates(
         &self,
         operator: &FamilyOperator,
         wanted: impl Fn(&[f64]) -> bool,

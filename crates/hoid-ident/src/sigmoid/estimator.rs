@@ -3,13 +3,13 @@
 use hoid_model::{Record, SampleTime, Structure, delayed_operator::whole_samples};
 
 use super::{
-    bounds::{Frame, limits},
+    bounds::{BoundInputs, limits},
     fit::SigmoidFit,
-    layout::{Element, Layout},
+    layout::{Layout, ThetaElement},
     objective::{ChangeCriterion, Data},
     options::SigmoidChange,
     prior,
-    search::{best_minimum, search, without_change},
+    search::{best_minimum, minimum_without_change, search},
     starts,
 };
 use crate::{
@@ -41,7 +41,7 @@ impl SigmoidChange {
         let off_level = off_level.as_deref().unwrap_or(records);
         let guess = match self.start {
             Some(_) => None,
-            None => self.of_one_operator().first_guess(off_level, MAX_NOISE_ORDER),
+            None => self.estimator_without_change().first_guess(off_level, MAX_NOISE_ORDER),
         };
         let order = guess.as_ref().map(|(_, noise)| noise.d.len());
         let guess = guess.map(|(coordinates, _)| coordinates);
@@ -62,7 +62,7 @@ impl SigmoidChange {
     }
 
     /// Returns the estimator for an operator without a change, whose result gives a start.
-    fn of_one_operator(&self) -> FamilyEstimator {
+    fn estimator_without_change(&self) -> FamilyEstimator {
         FamilyEstimator {
             forms: vec![self.form],
             neuromuscular: self.neuromuscular,
@@ -88,7 +88,7 @@ impl SigmoidChange {
         }
         let starts = self.starts(&criterion, off_level, guess)?;
         if let Some((_, theta)) = starts.first() {
-            criterion.penalty = prior::scaled_at_start(&criterion, &unit, theta);
+            criterion.penalty = prior::penalties_at_start(&criterion, &unit, theta);
         }
         let (mut start, minimum) = best_minimum(starts, &criterion, &self.search)?;
         let settled = |criterion: &mut ChangeCriterion<'_>, minimum| {
@@ -97,7 +97,7 @@ impl SigmoidChange {
         let (mut minimum, mut levels) = settled(&mut criterion, minimum)?;
         let (mut lower, mut stay) = (0, false);
         loop {
-            let constant = without_change(&criterion, &minimum.theta, &self.search)?;
+            let constant = minimum_without_change(&criterion, &minimum.theta, &self.search)?;
             let mut found = SigmoidFit::new(&criterion, &minimum, start.clone(), &constant, levels)?;
             let walk = self
                 .likelihood_intervals
@@ -189,13 +189,13 @@ impl SigmoidChange {
                 expected: "records whose time axes overlap around the change, because all share one t_M".to_owned(),
             });
         }
-        let frame = Frame {
+        let frame = BoundInputs {
             ts_s: sample_time.s(),
             span_s,
             delay_range_s: self.delay_range_s,
         };
         let limits = limits(&layout, &frame, &self.constraints)?;
-        let longest = whole_samples(limits[layout.delay].1, sample_time)? + layout.reach().max(1);
+        let longest = whole_samples(limits[layout.delay].1, sample_time)? + layout.direct_sample_count().max(1);
         let orders = layout.orders(longest);
         let criterion = ChangeCriterion {
             first: longest + layout.nd,
@@ -219,8 +219,8 @@ impl SigmoidChange {
         for record in records {
             check_record(Structure::BoxJenkins, &orders, record, criterion.first)?;
         }
-        let unknowns = criterion.limits.len() + criterion.states();
-        if criterion.residuals() <= unknowns {
+        let unknowns = criterion.limits.len() + criterion.state_count();
+        if criterion.residual_count() <= unknowns {
             return Err(IdentError::TooFewSamples {
                 label: records[0].label().to_owned(),
                 samples: records[0].len(),
@@ -243,9 +243,9 @@ impl SigmoidChange {
                 names.join(", ")
             ));
         }
-        let positive = |(place, element): (usize, &Element)| match element {
-            Element::LogRate => Some(place),
-            Element::Constant(_) if place != layout.delay => Some(place),
+        let positive = |(place, element): (usize, &ThetaElement)| match element {
+            ThetaElement::LogRate => Some(place),
+            ThetaElement::Constant(_) if place != layout.delay => Some(place),
             _ => None,
         };
         for place in layout.elements().iter().enumerate().filter_map(positive) {
@@ -260,6 +260,8 @@ impl SigmoidChange {
             return bad(format!("{} = {}, expected a finite number", names[i], start[i]));
         }
         let typed = start.iter().enumerate();
-        Ok(typed.map(|(place, value)| layout.of_typed(place, *value)).collect())
+        Ok(typed
+            .map(|(place, value)| layout.theta_from_user_value(place, *value))
+            .collect())
     }
 }

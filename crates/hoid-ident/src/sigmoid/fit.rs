@@ -4,7 +4,7 @@ use hoid_model::{Form, Record, SampleTime, Structure, uncertainty::Estimate};
 
 use super::{
     ends::{ChangedOperator, NamedEstimate, ThetaEstimate, estimate},
-    inference::{Comparison, Remark, constant_operator, inference},
+    inference::{Comparison, Remark, constant_operator, infer},
     layout::Layout,
     objective::{ChangeCriterion, Data},
     profile_likelihood::{Interval, Profile, profile_likelihood_interval},
@@ -27,7 +27,7 @@ pub struct ChangeParameter {
 
 /// The changing parameters at one time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GainsAt {
+pub struct InstantGains {
     /// Time on the axis of the record, s.
     pub time_s: f64,
     /// K_e, T_L and K_e_dot for a gain and a lead; for other forms K (and K_over_T_I with a lag), followed by T_L and
@@ -35,7 +35,7 @@ pub struct GainsAt {
     pub gains: Vec<NamedEstimate>,
 }
 
-impl GainsAt {
+impl InstantGains {
     /// Returns a gain by its name.
     pub fn get(&self, name: &str) -> Option<Estimate> {
         self.gains.iter().find(|g| g.name == name).map(|g| g.estimate)
@@ -97,7 +97,7 @@ impl SigmoidFit {
         constant: &Minimum,
         levels: Option<[f64; 2]>,
     ) -> Result<Self, IdentError> {
-        let found = inference(criterion, minimum, constant)?;
+        let found = infer(criterion, minimum, constant)?;
         let known = ThetaEstimate {
             layout: &criterion.layout,
             theta: &minimum.theta,
@@ -110,13 +110,13 @@ impl SigmoidFit {
             sample_time: criterion.sample_time,
             first: criterion.first,
             level: criterion.level,
-            loss: squares / criterion.residuals() as f64,
-            initial: known.end(0)?,
-            last: known.end(1)?,
+            loss: squares / criterion.residual_count() as f64,
+            initial: known.operator_at_end(0)?,
+            last: known.operator_at_end(1)?,
             innovation_variance: found.innovation_variance,
             levels,
-            residuals: criterion.residuals(),
-            states: criterion.states(),
+            residuals: criterion.residual_count(),
+            states: criterion.state_count(),
             termination: minimum.termination,
             start,
             comparison: found.comparison,
@@ -160,8 +160,8 @@ impl SigmoidFit {
     }
 
     fn estimate_of(&self, i: usize) -> Estimate {
-        let value = self.layout.typed(i, self.theta[i]);
-        let has_error = self.remarks[i].is_none_or(Remark::leaves_an_error);
+        let value = self.layout.to_user_value(i, self.theta[i]);
+        let has_error = self.remarks[i].is_none_or(Remark::has_standard_error);
         match self.covariance() {
             Some(c) if has_error => estimate(value, c[i * self.theta.len() + i]),
             _ => Estimate::fixed(value),
@@ -172,7 +172,7 @@ impl SigmoidFit {
     /// contains zeros for fixed parameters. `None` for an exact fit.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
-        let scale: Vec<f64> = (0..p).map(|i| self.layout.typed_slope(i, self.theta[i])).collect();
+        let scale: Vec<f64> = (0..p).map(|i| self.layout.user_value_slope(i, self.theta[i])).collect();
         let c = self.covariance.as_ref()?;
         Some((0..p * p).map(|k| c[k] * scale[k / p] * scale[k % p]).collect())
     }
@@ -186,7 +186,7 @@ impl SigmoidFit {
         stay: bool,
     ) -> Option<Vec<f64>> {
         let p = self.theta.len();
-        if !self.change_found() {
+        if !self.has_change() {
             return None;
         }
         let (midpoint, log_rate) = (self.layout.midpoint, self.layout.log_rate);
@@ -236,12 +236,12 @@ impl SigmoidFit {
         self.change_point
     }
 
-    /// Returns the operator before the change, which is valid only if [`SigmoidFit::change_found`] is true.
+    /// Returns the operator before the change, which is valid only if [`SigmoidFit::has_change`] is true.
     pub fn initial_operator(&self) -> &ChangedOperator {
         &self.initial
     }
 
-    /// Returns the operator after the change, which is valid only if [`SigmoidFit::change_found`] is true.
+    /// Returns the operator after the change, which is valid only if [`SigmoidFit::has_change`] is true.
     pub fn last_operator(&self) -> &ChangedOperator {
         &self.last
     }
@@ -258,7 +258,7 @@ impl SigmoidFit {
 
     /// True if the BIC justifies the additional parameters of the change. Otherwise t_M and G have no meaning
     /// ([`Remark::NoChange`]), and [`SigmoidFit::constant_operator`] describes the records.
-    pub fn change_found(&self) -> bool {
+    pub fn has_change(&self) -> bool {
         self.comparison.bic_difference > 0.0
     }
 
@@ -268,7 +268,7 @@ impl SigmoidFit {
     /// The errors are computed by the delta method and include the errors of t_M and G. At a change point the sigmoid
     /// is not linear over the interval of t_M; there t_M contributes `step^2 p (1 - p)` to the variance, where p is the
     /// probability that the change has happened.
-    pub fn gains_at(&self, time_s: f64) -> GainsAt {
+    pub fn gains_at(&self, time_s: f64) -> InstantGains {
         let known = ThetaEstimate {
             layout: &self.layout,
             theta: &self.theta,
@@ -279,16 +279,16 @@ impl SigmoidFit {
             }),
         };
         let mut gains = known.at(time_s);
-        if !self.change_found() {
+        if !self.has_change() {
             for gain in &mut gains {
                 gain.estimate = self.constant.get(gain.name).unwrap_or(gain.estimate);
             }
         }
-        GainsAt { time_s, gains }
+        InstantGains { time_s, gains }
     }
 
     /// Returns [`SigmoidFit::gains_at`] at every sample of a record.
-    pub fn trace(&self, record: &Record) -> Vec<GainsAt> {
+    pub fn trace(&self, record: &Record) -> Vec<InstantGains> {
         record.times_s().into_iter().map(|t| self.gains_at(t)).collect()
     }
 
@@ -340,7 +340,7 @@ impl SigmoidFit {
     /// [`IdentError::MixedSampling`] if the record has another sample time than the fit, [`IdentError::TooFewSamples`]
     /// if the record is too short.
     pub fn residuals(&self, record: &Record) -> Result<Series, IdentError> {
-        self.errors_of(self.layout, &self.theta, record)
+        self.residual_series(self.layout, &self.theta, record)
     }
 
     /// Returns the simulated output of the operator without the noise model; the initial state minimises the simulation
@@ -350,7 +350,7 @@ impl SigmoidFit {
     /// The errors of [`SigmoidFit::residuals`].
     pub fn simulate(&self, record: &Record) -> Result<Series, IdentError> {
         let silent = Layout { nd: 0, ..self.layout };
-        let errors = self.errors_of(silent, &self.theta[..self.layout.noise], record)?;
+        let errors = self.residual_series(silent, &self.theta[..self.layout.noise], record)?;
         let output = &record.output()[errors.first..];
         Ok(Series {
             first: errors.first,
@@ -366,7 +366,7 @@ impl SigmoidFit {
         Some(Estimate::with_variance(value, variance))
     }
 
-    fn errors_of(&self, layout: Layout, theta: &[f64], record: &Record) -> Result<Series, IdentError> {
+    fn residual_series(&self, layout: Layout, theta: &[f64], record: &Record) -> Result<Series, IdentError> {
         let criterion = self.criterion(layout, record)?;
         let values = criterion.residuals_of(theta, 0).ok_or(IdentError::NoFiniteLoss)?;
         let first = criterion.first;

@@ -13,13 +13,13 @@ use crate::{Estimator, Fit, SearchMethod, SearchOptions};
 /// the period of the poles.
 const DELAY_STEP_S: f64 = 0.06;
 /// Limits of the searches in the first and the last third of the records, whose results need not be exact.
-const COARSE: SearchOptions = SearchOptions {
+const COARSE_SEARCH: SearchOptions = SearchOptions {
     method: SearchMethod::LevenbergMarquardt,
     max_iterations: 15,
     tolerance: 1e-6,
 };
 /// Poles of the grid: omega_nm in rad/s, zeta_nm.
-const GRID: [(f64, f64); 3] = [(6.0, 0.4), (11.0, 0.4), (18.0, 0.4)];
+const POLE_GRID: [(f64, f64); 3] = [(6.0, 0.4), (11.0, 0.4), (18.0, 0.4)];
 /// Values of 1/T_I in the grid, 1/s.
 const LAG_RATES: [f64; 3] = [0.05, 0.25, 1.2];
 /// Coefficient d1 of candidates that do not come from a third of the records.
@@ -33,10 +33,10 @@ pub(super) struct PoleCandidate {
 }
 
 /// Returns the candidates of the grid for a form of the operator family.
-pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
+pub(super) fn family_grid_candidates(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
     let (layout, ts) = (&criterion.layout, criterion.sample_time.s());
     let muscles: &[(f64, f64)] = if layout.neuromuscular_indices.is_some() {
-        &GRID
+        &POLE_GRID
     } else {
         &[(0.0, 0.0)]
     };
@@ -56,7 +56,7 @@ pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
                 if layout.nd > 0 {
                     theta[layout.noise] = GRID_D1;
                 }
-                within_limits(criterion, &mut theta);
+                clamp_to_limits(criterion, &mut theta);
                 all.push(PoleCandidate {
                     label: format!("grid, tau_e = {:.3} s", theta[layout.delay]),
                     theta,
@@ -68,7 +68,7 @@ pub(super) fn of_family(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
 }
 
 /// Returns the candidate with the poles and the delay of one operator for all records, given by its coordinates.
-pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> PoleCandidate {
+pub(super) fn guess_candidate(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> PoleCandidate {
     let layout = &criterion.layout;
     let mut theta = vec![0.0; layout.len()];
     let of_form = layout.form.coordinates(layout.neuromuscular);
@@ -90,7 +90,7 @@ pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> 
     if layout.nd > 0 {
         theta[layout.noise] = GRID_D1;
     }
-    within_limits(criterion, &mut theta);
+    clamp_to_limits(criterion, &mut theta);
     PoleCandidate {
         label: format!("one operator, tau_e = {:.3} s", theta[layout.delay]),
         theta,
@@ -98,7 +98,7 @@ pub(super) fn of_guess(criterion: &ChangeCriterion<'_>, coordinates: &[f64]) -> 
 }
 
 /// Returns the candidates from the first and the last third of the records.
-pub(super) fn of_windows(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<PoleCandidate> {
+pub(super) fn window_candidates(criterion: &ChangeCriterion<'_>, records: &[Record]) -> Vec<PoleCandidate> {
     let third = |record: &Record, part: usize| {
         let (from, to) = (record.time_s(0), record.time_s(record.len()));
         let length = (to - from) / 3.0;
@@ -144,7 +144,7 @@ fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize, start: Op
     };
     let estimator = Estimator {
         starts: 1,
-        search: COARSE,
+        search: COARSE_SEARCH,
         start,
         ..Estimator::new(Structure::BoxJenkins, orders)
     };
@@ -153,7 +153,7 @@ fn fit(criterion: &ChangeCriterion<'_>, windows: &[Record], nk: usize, start: Op
 }
 
 /// Returns the candidates of the grid for a gain and a lead.
-pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
+pub(super) fn grid_candidates(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
     let ts = criterion.sample_time.s();
     let mut d = vec![0.0; criterion.layout.nd];
     if let Some(d1) = d.first_mut() {
@@ -161,7 +161,7 @@ pub(super) fn of_grid(criterion: &ChangeCriterion<'_>) -> Vec<PoleCandidate> {
     }
     let mut all = Vec::new();
     for nk in delays(criterion) {
-        for (omega, zeta) in GRID {
+        for (omega, zeta) in POLE_GRID {
             let operator = OperatorParameters {
                 k_e: 0.0,
                 t_l_s: 0.0,
@@ -195,11 +195,11 @@ fn frozen_theta(criterion: &ChangeCriterion<'_>, operator: &OperatorParameters, 
     }
     theta[layout.delay] = operator.tau_e_s;
     theta[layout.noise..].copy_from_slice(d);
-    within_limits(criterion, &mut theta);
+    clamp_to_limits(criterion, &mut theta);
     theta
 }
 
-fn within_limits(criterion: &ChangeCriterion<'_>, theta: &mut [f64]) {
+fn clamp_to_limits(criterion: &ChangeCriterion<'_>, theta: &mut [f64]) {
     for (t, (low, high)) in theta.iter_mut().zip(&criterion.limits) {
         *t = t.max(*low).min(*high);
     }

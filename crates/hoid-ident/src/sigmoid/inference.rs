@@ -6,7 +6,7 @@
 use std::fmt;
 
 use super::{
-    bounds::FASTEST_DEFAULT_RATE,
+    bounds::MAX_DEFAULT_RATE_TIMES_TS,
     ends::{ChangedOperator, ThetaEstimate},
     layout::Layout,
     objective::ChangeCriterion,
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::{
     IdentError, Reason,
-    linalg::information::inverse_of_free,
+    linalg::information::inverse_information_of_free,
     optimize::{Linearisation, Minimum, free_parameters},
 };
 
@@ -41,11 +41,11 @@ pub enum Remark {
 }
 
 /// Largest ratio of posterior to prior variance for which a parameter counts as determined by the data.
-const LARGEST_PRIOR_SHARE: f64 = 0.5;
+const MAX_PRIOR_SHARE: f64 = 0.5;
 
 impl Remark {
     /// True if a parameter with this remark still has a standard error.
-    pub(super) fn leaves_an_error(self) -> bool {
+    pub(super) fn has_standard_error(self) -> bool {
         self == Self::PriorAlone
     }
 }
@@ -95,7 +95,7 @@ pub(super) struct Inference {
 ///
 /// # Errors
 /// [`IdentError::SingularInformation`] if the data do not determine all parameters.
-pub(super) fn inference(
+pub(super) fn infer(
     criterion: &ChangeCriterion<'_>,
     minimum: &Minimum,
     constant: &Minimum,
@@ -104,10 +104,10 @@ pub(super) fn inference(
     let p = theta.len();
     let layout = &criterion.layout;
     let (midpoint, log_rate) = (layout.midpoint, layout.log_rate);
-    let n = criterion.residuals();
+    let n = criterion.residual_count();
     let sum_of_squares = minimum.at.sum_of_squares;
     let innovation_variance = prior::innovation_variance(criterion, minimum);
-    let of_the_change = layout.of_the_change().into_iter();
+    let of_the_change = layout.change_indices().into_iter();
     let extra_parameters = of_the_change
         .filter(|&i| criterion.limits[i].0 < criterion.limits[i].1)
         .count();
@@ -129,7 +129,7 @@ pub(super) fn inference(
             match i {
                 _ if low == high => Some(Remark::Fixed),
                 _ if i <= log_rate && !change_found => Some(Remark::NoChange),
-                _ if i == log_rate && theta[i] >= fastest(criterion) => Some(Remark::Abrupt),
+                _ if i == log_rate && theta[i] >= fastest_log_rate(criterion) => Some(Remark::Abrupt),
                 _ if theta[i] <= low || theta[i] >= high => Some(Remark::AtBound),
                 _ => None,
             }
@@ -158,7 +158,7 @@ pub(super) fn inference(
         for penalty in &criterion.penalty {
             let i = penalty.place;
             let share = covariance[i * p + i] * penalty.curvature(theta) / innovation_variance;
-            if share > LARGEST_PRIOR_SHARE {
+            if share > MAX_PRIOR_SHARE {
                 remarks[i] = remarks[i].or(Some(Remark::PriorAlone));
             }
         }
@@ -173,8 +173,8 @@ pub(super) fn inference(
 }
 
 /// Returns the smallest ln G at which the change counts as abrupt: the upper bound less a margin for rounding.
-fn fastest(criterion: &ChangeCriterion<'_>) -> f64 {
-    (FASTEST_DEFAULT_RATE / criterion.sample_time.s()).ln() - 1e-9
+fn fastest_log_rate(criterion: &ChangeCriterion<'_>) -> f64 {
+    (MAX_DEFAULT_RATE_TIMES_TS / criterion.sample_time.s()).ln() - 1e-9
 }
 
 /// Inverts the information matrix of the free parameters. If the matrix is singular, t_M and G are removed first, since
@@ -187,13 +187,13 @@ fn invert(
 ) -> Result<Vec<f64>, IdentError> {
     let names = layout.names();
     let of_time = [layout.midpoint, layout.log_rate];
-    match inverse_of_free(&at.gram, free, &names) {
+    match inverse_information_of_free(&at.gram, free, &names) {
         Err(IdentError::SingularInformation { .. }) if of_time.iter().any(|i| free.contains(i)) => {
             free.retain(|i| !of_time.contains(i));
             for i in of_time {
                 remarks[i] = remarks[i].or(Some(Remark::Undetermined));
             }
-            inverse_of_free(&at.gram, free, &names)
+            inverse_information_of_free(&at.gram, free, &names)
         }
         other => other,
     }
@@ -213,17 +213,17 @@ pub(super) fn constant_operator(
         changes: false,
         ..criterion.clone()
     };
-    for place in layout.of_the_change() {
+    for place in layout.change_indices() {
         constant.limits[place] = (theta[place], theta[place]);
     }
     let free = free_parameters(&constant, theta, &minimum.at.descent);
     let covariance = if minimum.termination.reason == Reason::ExactFit {
         None
     } else {
-        let freedom = criterion.residuals() - free.len() - criterion.states();
+        let freedom = criterion.residual_count() - free.len() - criterion.state_count();
         let squares = minimum.at.sum_of_squares - constant.penalty_at(theta);
         let variance = squares / freedom as f64;
-        let mut inverse = inverse_of_free(&minimum.at.gram, &free, &layout.names())?;
+        let mut inverse = inverse_information_of_free(&minimum.at.gram, &free, &layout.names())?;
         inverse.iter_mut().for_each(|c| *c *= variance);
         Some(inverse)
     };
@@ -233,5 +233,5 @@ pub(super) fn constant_operator(
         covariance: covariance.as_deref(),
         change_point: None,
     };
-    Ok(known.end(0)?)
+    Ok(known.operator_at_end(0)?)
 }

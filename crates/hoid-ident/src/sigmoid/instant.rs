@@ -1,6 +1,6 @@
 //! The sigmoid (eq. 5) and the numerator of the operator at one time.
 
-use hoid_model::operator_family::POWERS;
+use hoid_model::operator_family::POWER_COUNT;
 
 use super::layout::{Layout, MAX_VARYING};
 
@@ -9,7 +9,7 @@ const UNDERFLOW_ARGUMENT: f64 = 746.0;
 
 /// The sigmoid and the changing parameters at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Instant {
+pub(crate) struct SigmoidPoint {
     /// Share of the change that has taken place.
     pub share: f64,
     /// Derivative of the share with respect to t_M, 1/s.
@@ -19,12 +19,12 @@ pub(crate) struct Instant {
     /// Parameters of the numerator, starting with the gain.
     pub values: [f64; MAX_VARYING],
     /// The numerator divided by its gain, in ascending powers of s.
-    pub shape: [f64; POWERS],
+    pub shape: [f64; POWER_COUNT],
     /// Derivatives of the shape with respect to all parameters except the gain.
-    pub slopes: [[f64; POWERS]; 2],
+    pub slopes: [[f64; POWER_COUNT]; 2],
 }
 
-impl Instant {
+impl SigmoidPoint {
     /// Evaluates eq. 5 at the time `t_s`, like [`hoid_model::schedule::Schedule::value`].
     pub fn at(layout: &Layout, theta: &[f64], t_s: f64) -> Self {
         let rate = theta[layout.log_rate].exp();
@@ -40,7 +40,7 @@ impl Instant {
         let slope = rest / (1.0 + far);
         let mut values = [0.0; MAX_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(layout.varying) {
-            let [first, last] = Layout::ends(i);
+            let [first, last] = Layout::end_indices(i);
             let part = (theta[last] - theta[first]) * rest;
             *value = if x < 0.0 {
                 theta[first] + part
@@ -56,7 +56,7 @@ impl Instant {
     pub fn constant(layout: &Layout, theta: &[f64]) -> Self {
         let mut values = [0.0; MAX_VARYING];
         for (i, value) in values.iter_mut().enumerate().take(layout.varying) {
-            *value = theta[Layout::ends(i)[0]];
+            *value = theta[Layout::end_indices(i)[0]];
         }
         Self::of(layout, values, 0.0, [0.0; 2])
     }
@@ -89,13 +89,13 @@ mod tests {
 
     use super::*;
 
-    fn lead(nd: usize) -> Layout {
+    fn lead_layout(nd: usize) -> Layout {
         Layout::new(Form::Lead, true, nd)
     }
 
     #[test]
     fn sigmoid_is_bit_identical_to_the_schedule() {
-        let layout = lead(0);
+        let layout = lead_layout(0);
         for rate in [0.5, 100.0] {
             let theta = [0.09, 0.07, 0.4, 1.2, 40.96, f64::ln(rate), 11.25, 0.35, 0.28];
             let schedule = Schedule::Sigmoid {
@@ -103,7 +103,7 @@ mod tests {
                 midpoint_s: 40.96,
             };
             for t in [0.0, 20.0, 40.9, 40.95, 40.96, 40.97, 43.0, 81.91] {
-                let here = Instant::at(&layout, &theta, t);
+                let here = SigmoidPoint::at(&layout, &theta, t);
                 assert_eq!(here.values[0], schedule.value(0.09, 0.07, t));
                 assert_eq!(here.values[1], schedule.value(0.4, 1.2, t));
                 assert!((here.share - schedule.value(0.0, 1.0, t)).abs() < 1e-16);
@@ -113,15 +113,15 @@ mod tests {
 
     #[test]
     fn derivatives_of_the_share_agree_with_finite_differences() {
-        let layout = lead(0);
+        let layout = lead_layout(0);
         let theta = [0.09, 0.07, 0.4, 1.2, 40.96, f64::ln(3.0), 11.25, 0.35, 0.28];
         for t in [39.0, 40.9, 40.96, 41.5, 44.0] {
-            let here = Instant::at(&layout, &theta, t);
+            let here = SigmoidPoint::at(&layout, &theta, t);
             for (i, exact) in [(layout.midpoint, here.by_midpoint), (layout.log_rate, here.by_log_rate)] {
                 let shifted = |h: f64| {
                     let mut moved = theta;
                     moved[i] += h;
-                    Instant::at(&layout, &moved, t).share
+                    SigmoidPoint::at(&layout, &moved, t).share
                 };
                 let h = 1e-3;
                 let difference =

@@ -54,7 +54,7 @@ pub(crate) struct Layout {
 
 /// Meaning of an element of theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Element {
+pub(crate) enum ThetaElement {
     /// A coordinate of the numerator before (0) or after (1) the change.
     Varying(Coordinate, usize),
     Midpoint,
@@ -68,7 +68,7 @@ pub(crate) enum Element {
 
 impl Layout {
     pub fn new(form: Form, neuromuscular: bool, nd: usize) -> Self {
-        let varying = 1 + form.varying_beside_gain();
+        let varying = 1 + form.shape_coordinate_count();
         let midpoint = 2 * varying;
         let mut next = midpoint + 2;
         let mut take = |count: usize| {
@@ -99,18 +99,18 @@ impl Layout {
     }
 
     /// Returns the indices of the i-th parameter of the numerator before and after the change.
-    pub fn ends(i: usize) -> [usize; 2] {
+    pub fn end_indices(i: usize) -> [usize; 2] {
         [2 * i, 2 * i + 1]
     }
 
     /// Returns the indices of the parameters that a model without a change does not have.
-    pub fn of_the_change(&self) -> Vec<usize> {
-        let last = (0..self.varying).map(|i| Self::ends(i)[1]);
+    pub fn change_indices(&self) -> Vec<usize> {
+        let last = (0..self.varying).map(|i| Self::end_indices(i)[1]);
         last.chain([self.midpoint, self.log_rate]).collect()
     }
 
     /// Returns the indices of the poles and the delay, which determine the responses.
-    pub fn poles(&self) -> Vec<usize> {
+    pub fn pole_indices(&self) -> Vec<usize> {
         let muscles = self.neuromuscular_indices.into_iter().flatten();
         self.lag.into_iter().chain(muscles).chain([self.delay]).collect()
     }
@@ -126,13 +126,13 @@ impl Layout {
     }
 
     /// Returns the number of samples after nk during which past errors still act directly, not only through the state.
-    pub fn reach(&self) -> usize {
+    pub fn direct_sample_count(&self) -> usize {
         if self.has_direct_part() { 2 } else { 0 }
     }
 
     /// Returns the number of pieces of a sampling interval within each of which the response is a smooth function of
     /// the delay. The direct part has a kink in the middle of the interval ([`hoid_model::operator_family`], `zoh`).
-    pub fn pieces(&self) -> usize {
+    pub fn piece_count(&self) -> usize {
         if self.has_direct_part() { 2 } else { 1 }
     }
 
@@ -142,24 +142,24 @@ impl Layout {
     }
 
     /// Returns the meaning of each element of theta.
-    pub fn elements(&self) -> Vec<Element> {
+    pub fn elements(&self) -> Vec<ThetaElement> {
         let all = self.coordinates();
         let (varying, constant) = all.split_at(self.varying);
         let ends = varying
             .iter()
-            .flat_map(|c| [Element::Varying(*c, 0), Element::Varying(*c, 1)]);
-        ends.chain([Element::Midpoint, Element::LogRate])
-            .chain(constant.iter().map(|c| Element::Constant(*c)))
-            .chain((1..=self.nd).map(Element::Noise))
+            .flat_map(|c| [ThetaElement::Varying(*c, 0), ThetaElement::Varying(*c, 1)]);
+        ends.chain([ThetaElement::Midpoint, ThetaElement::LogRate])
+            .chain(constant.iter().map(|c| ThetaElement::Constant(*c)))
+            .chain((1..=self.nd).map(ThetaElement::Noise))
             .collect()
     }
 
     /// Returns the name and unit of each parameter as typed and reported: G, T_I, omega_nm and zeta_nm, not their
     /// transformed values.
     pub fn names_and_units(&self) -> Vec<(String, &'static str)> {
-        let of = |element: Element| match element {
-            Element::Varying(coordinate, end) => {
-                let name = self.parameter(coordinate);
+        let of = |element: ThetaElement| match element {
+            ThetaElement::Varying(coordinate, end) => {
+                let name = self.parameter_name(coordinate);
                 // A name such as c_1 already ends with a digit.
                 let sign = if name.ends_with('1') || name.ends_with('2') {
                     "_"
@@ -168,13 +168,13 @@ impl Layout {
                 };
                 (format!("{name}{sign}{}", end + 1), self.unit(name))
             }
-            Element::Midpoint => ("t_M".to_owned(), "s"),
-            Element::LogRate => ("G".to_owned(), "1/s"),
-            Element::Constant(coordinate) => {
-                let name = self.parameter(coordinate);
+            ThetaElement::Midpoint => ("t_M".to_owned(), "s"),
+            ThetaElement::LogRate => ("G".to_owned(), "1/s"),
+            ThetaElement::Constant(coordinate) => {
+                let name = self.parameter_name(coordinate);
                 (name.to_owned(), self.unit(name))
             }
-            Element::Noise(i) => (format!("d{i}"), ""),
+            ThetaElement::Noise(i) => (format!("d{i}"), ""),
         };
         self.elements().into_iter().map(of).collect()
     }
@@ -184,11 +184,11 @@ impl Layout {
     }
 
     /// Returns the name under which a coordinate is reported.
-    fn parameter(&self, coordinate: Coordinate) -> &'static str {
+    fn parameter_name(&self, coordinate: Coordinate) -> &'static str {
         match (coordinate, self.form) {
             (Coordinate::Gain, Form::Lead) => "K_e",
             (Coordinate::Gain, form) if form.has_lag() => "K_over_T_I",
-            (Coordinate::Gain, form) => form.gain().0,
+            (Coordinate::Gain, form) => form.gain_name_and_unit().0,
             _ => coordinate.parameter(),
         }
     }
@@ -202,7 +202,7 @@ impl Layout {
 
     /// Converts a number as typed by the user to an element of theta: G to ln G, T_I to 1/T_I. All other numbers stay
     /// the same.
-    pub fn of_typed(&self, place: usize, value: f64) -> f64 {
+    pub fn theta_from_user_value(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.ln(),
             _ if Some(place) == self.lag => 1.0 / value,
@@ -210,7 +210,7 @@ impl Layout {
         }
     }
 
-    pub fn typed(&self, place: usize, value: f64) -> f64 {
+    pub fn to_user_value(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.exp(),
             _ if Some(place) == self.lag => 1.0 / value,
@@ -219,7 +219,7 @@ impl Layout {
     }
 
     /// Returns the derivative of the reported number with respect to its element of theta.
-    pub fn typed_slope(&self, place: usize, value: f64) -> f64 {
+    pub fn user_value_slope(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.exp(),
             _ if Some(place) == self.lag => -1.0 / (value * value),
@@ -260,7 +260,7 @@ impl Layout {
 mod tests {
     use super::*;
 
-    fn lead(nd: usize) -> Layout {
+    fn lead_layout(nd: usize) -> Layout {
         Layout::new(Form::Lead, true, nd)
     }
 
@@ -268,9 +268,9 @@ mod tests {
     fn gain_and_lead_layout_has_the_documented_order() {
         let known = SIGMOID_NAMES.map(|(name, unit)| (name.to_owned(), unit));
         let d1 = ("d1".to_owned(), "");
-        assert_eq!(lead(1).names_and_units(), [&known[..], &[d1]].concat());
-        assert_eq!(lead(1).of_the_change(), [1, 3, 4, 5]);
-        assert_eq!(lead(1).poles(), [6, 7, 8]);
+        assert_eq!(lead_layout(1).names_and_units(), [&known[..], &[d1]].concat());
+        assert_eq!(lead_layout(1).change_indices(), [1, 3, 4, 5]);
+        assert_eq!(lead_layout(1).pole_indices(), [6, 7, 8]);
     }
 
     #[test]
@@ -284,16 +284,16 @@ mod tests {
                     (layout.len(), layout.len()),
                     "{form}"
                 );
-                assert_eq!(elements[layout.midpoint], Element::Midpoint);
-                assert_eq!(elements[layout.log_rate], Element::LogRate);
-                assert_eq!(elements[layout.delay], Element::Constant(Coordinate::Delay));
-                assert_eq!(elements[layout.noise], Element::Noise(1));
+                assert_eq!(elements[layout.midpoint], ThetaElement::Midpoint);
+                assert_eq!(elements[layout.log_rate], ThetaElement::LogRate);
+                assert_eq!(elements[layout.delay], ThetaElement::Constant(Coordinate::Delay));
+                assert_eq!(elements[layout.noise], ThetaElement::Noise(1));
                 if let Some(place) = layout.lag {
-                    assert_eq!(elements[place], Element::Constant(Coordinate::LagRate));
+                    assert_eq!(elements[place], ThetaElement::Constant(Coordinate::LagRate));
                 }
                 if let Some([omega, zeta]) = layout.neuromuscular_indices {
-                    assert_eq!(elements[omega], Element::Constant(Coordinate::LogOmega));
-                    assert_eq!(elements[zeta], Element::Constant(Coordinate::LogZeta));
+                    assert_eq!(elements[omega], ThetaElement::Constant(Coordinate::LogOmega));
+                    assert_eq!(elements[zeta], ThetaElement::Constant(Coordinate::LogZeta));
                 }
                 let mut names = layout.names();
                 names.sort();

@@ -57,7 +57,7 @@ mod starts;
 mod unit_operator;
 
 pub use ends::{ChangedOperator, NamedEstimate};
-pub use fit::{ChangeParameter, GainsAt, SigmoidFit};
+pub use fit::{ChangeParameter, InstantGains, SigmoidFit};
 pub use inference::{Comparison, Remark};
 pub use layout::SIGMOID_NAMES;
 pub use noise_level::NoiseLevel;

@@ -19,11 +19,11 @@ pub enum NoiseLevel {
 }
 
 /// Smallest ratio of the two levels; a smaller ratio indicates a record without noise on one side of the change.
-const SMALLEST_RATIO: f64 = 1e-3;
+const MIN_LEVEL_RATIO: f64 = 1e-3;
 
 /// Returns `[sigma_1, sigma_2]` from the residuals and from the share of the change at each residual; `None` if the
 /// residuals on one side of the change are zero or the levels cannot be determined.
-pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64; 2]> {
+pub(crate) fn noise_levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64; 2]> {
     let pairs = || residuals.iter().flatten().zip(shares.iter().flatten());
     // The search starts from the weighted mean squares before and after the change.
     let side = |weight: &dyn Fn(f64) -> f64| {
@@ -70,7 +70,7 @@ pub(crate) fn levels(residuals: &[Vec<f64>], shares: &[Vec<f64>]) -> Option<[f64
         }
     }
     let ratio = sigma[0].min(sigma[1]) / sigma[0].max(sigma[1]);
-    (ratio >= SMALLEST_RATIO).then_some(sigma)
+    (ratio >= MIN_LEVEL_RATIO).then_some(sigma)
 }
 
 /// Returns weights `1/sigma(t)`, scaled to the geometric mean 1 over all residuals, so the weighted sum of squares can
@@ -104,7 +104,7 @@ mod tests {
     fn exact_noise_levels_are_recovered() {
         for sigma in [[0.01, 0.02], [3.0, 1.0], [1.0, 1.0]] {
             let (eps, shares) = record(sigma);
-            let found = levels(&eps, &shares).unwrap();
+            let found = noise_levels(&eps, &shares).unwrap();
             for (a, b) in found.iter().zip(sigma) {
                 assert!((a - b).abs() < 1e-8 * b, "{found:?} {sigma:?}");
             }
@@ -114,7 +114,7 @@ mod tests {
     #[test]
     fn geometric_mean_of_the_weights_is_one() {
         let (eps, shares) = record([0.01, 0.02]);
-        let weights = weights(levels(&eps, &shares).unwrap(), &shares);
+        let weights = weights(noise_levels(&eps, &shares).unwrap(), &shares);
         let sum: f64 = weights[0].iter().map(|w| w.ln()).sum();
         assert!(sum.abs() < 1e-9);
         // The weighted residuals have the same size throughout.
@@ -125,8 +125,8 @@ mod tests {
     #[test]
     fn zero_noise_or_a_missing_side_gives_no_levels() {
         let (eps, shares) = record([0.01, 0.02]);
-        assert_eq!(levels(&[vec![0.0; 400]], &shares), None);
-        assert_eq!(levels(&eps, &[vec![0.0; 400]]), None);
-        assert_eq!(levels(&[vec![f64::NAN; 400]], &shares), None);
+        assert_eq!(noise_levels(&[vec![0.0; 400]], &shares), None);
+        assert_eq!(noise_levels(&eps, &[vec![0.0; 400]]), None);
+        assert_eq!(noise_levels(&[vec![f64::NAN; 400]], &shares), None);
     }
 }

@@ -29,7 +29,7 @@
 
 use hoid_model::{Form, SampleTime, uncertainty::variance_along};
 
-use super::{instant::Instant, layout::Layout, unit_operator::UnitOperator};
+use super::{instant::SigmoidPoint, layout::Layout, unit_operator::UnitOperator};
 use crate::{
     criterion::Workspace,
     grey_box::objective::Penalty,
@@ -55,7 +55,7 @@ pub(crate) struct ChangeCriterion<'a> {
     /// First sample with a residual; at least the largest nk plus nd.
     pub first: usize,
     pub limits: Vec<(f64, f64)>,
-    /// Piece of a sampling interval to which the delay is restricted ([`Layout::pieces`]); `None` if the delay itself
+    /// Piece of a sampling interval to which the delay is restricted ([`Layout::piece_count`]); `None` if the delay itself
     /// determines the piece.
     pub piece: Option<usize>,
     /// False for a model without a change, whose initial parameters are valid throughout.
@@ -77,7 +77,7 @@ pub(crate) struct Pass {
     /// Responses y_i to the input.
     y: Vec<Vec<f64>>,
     /// Numerators at each sample, starting at the first regressed sample.
-    gains: Vec<Instant>,
+    gains: Vec<SigmoidPoint>,
     /// `u - w`, starting at the first regressed sample.
     v: Vec<f64>,
     /// Weighted residuals.
@@ -88,7 +88,7 @@ pub(crate) struct Pass {
 }
 
 /// Returns `sum_i of(instant, i) y_i` with the length of the shortest y_i.
-fn combined(gains: &[Instant], y: &[&[f64]], of: impl Fn(&Instant, usize) -> f64) -> Vec<f64> {
+fn combine(gains: &[SigmoidPoint], y: &[&[f64]], of: impl Fn(&SigmoidPoint, usize) -> f64) -> Vec<f64> {
     let length = y.iter().map(|y| y.len()).fold(gains.len(), usize::min);
     (0..length)
         .map(|t| {
@@ -100,12 +100,12 @@ fn combined(gains: &[Instant], y: &[&[f64]], of: impl Fn(&Instant, usize) -> f64
 
 impl ChangeCriterion<'_> {
     /// Returns the number of residuals in all records.
-    pub fn residuals(&self) -> usize {
+    pub fn residual_count(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
     /// Returns the number of initial states and levels in all records.
-    pub fn states(&self) -> usize {
+    pub fn state_count(&self) -> usize {
         (self.layout.order() + usize::from(self.level)) * self.data.len()
     }
 
@@ -117,7 +117,7 @@ impl ChangeCriterion<'_> {
     /// Returns the penalties of the prior. For a model without a change, the penalties of the parameters that only a
     /// change has are left out.
     fn penalties(&self) -> impl Iterator<Item = &Penalty> {
-        let last = self.layout.of_the_change();
+        let last = self.layout.change_indices();
         (self.penalty.iter()).filter(move |penalty| self.changes || !last.contains(&penalty.place))
     }
 
@@ -131,7 +131,7 @@ impl ChangeCriterion<'_> {
     }
 
     /// Returns `D x` with the weights of the record, for a signal that starts at the first regressed sample.
-    fn whitened(&self, theta: &[f64], record: usize, x: &[f64]) -> Vec<f64> {
+    fn whiten(&self, theta: &[f64], record: usize, x: &[f64]) -> Vec<f64> {
         let nd = self.layout.nd;
         let mut y = x[nd..].to_vec();
         for (i, &d) in theta[self.layout.noise..].iter().enumerate() {
@@ -148,15 +148,15 @@ impl ChangeCriterion<'_> {
     }
 
     /// Returns the delayed numerators at each sample, starting at the first regressed sample.
-    fn gains(&self, theta: &[f64], record: usize) -> Vec<Instant> {
+    fn sigmoid_points(&self, theta: &[f64], record: usize) -> Vec<SigmoidPoint> {
         let (from, data) = (self.first - self.layout.nd, self.data[record]);
         let at = |t: usize| data.start_s + t as f64 * self.sample_time.s() - theta[self.layout.delay];
         (from..data.u.len())
             .map(|t| {
                 if !self.changes {
-                    return Instant::constant(&self.layout, theta);
+                    return SigmoidPoint::constant(&self.layout, theta);
                 }
-                Instant::at(&self.layout, theta, at(t))
+                SigmoidPoint::at(&self.layout, theta, at(t))
             })
             .collect()
     }
@@ -167,13 +167,13 @@ impl ChangeCriterion<'_> {
         let layout = &self.layout;
         let (nd, past_errors) = (layout.nd, layout.order());
         let (n, from) = (data.u.len(), self.first - nd);
-        if unit.nk + layout.reach() > from || self.first >= n {
+        if unit.nk + layout.direct_sample_count() > from || self.first >= n {
             return None;
         }
         // Index of the oldest unknown error. With a direct part the errors act for two more samples.
         let oldest = match layout.form {
             Form::Lead => 0,
-            _ => from - unit.nk - layout.reach(),
+            _ => from - unit.nk - layout.direct_sample_count(),
         };
         let mut input = vec![0.0; past_errors];
         input.extend_from_slice(&data.e[..n - unit.nk]);
@@ -181,11 +181,11 @@ impl ChangeCriterion<'_> {
         let mut y: Vec<Vec<f64>> = (0..powers).map(|i| unit.response(i, &input)).collect();
         // Sample t has the index t - nk + past_errors.
         let input_start = from + past_errors - unit.nk;
-        let gains = self.gains(theta, record);
-        let respond = |y: &[&[f64]]| combined(&gains, y, Instant::numerator);
+        let gains = self.sigmoid_points(theta, record);
+        let respond = |y: &[&[f64]]| combine(&gains, y, SigmoidPoint::numerator);
         let w = respond(&y.iter().map(|y| &y[input_start..]).collect::<Vec<_>>());
         let mut v: Vec<f64> = data.u[from..].iter().zip(&w).map(|(u, w)| u - w).collect();
-        let mut eps = self.whitened(theta, record, &v);
+        let mut eps = self.whiten(theta, record, &v);
 
         // Responses to the unknown errors, starting with the oldest error.
         let h: Vec<Vec<f64>> = (0..powers).map(|i| unit.impulse_response(i, input.len())).collect();
@@ -204,7 +204,7 @@ impl ChangeCriterion<'_> {
         if self.level {
             free.push(vec![1.0; n - from]);
         }
-        let columns = free.iter().map(|x| self.whitened(theta, record, x)).collect();
+        let columns = free.iter().map(|x| self.whiten(theta, record, x)).collect();
         let (basis, taken) = eliminate(columns, &mut eps);
         for (&(x, _), column) in taken.iter().zip(&free) {
             add_scaled(&mut v, -x, column);
@@ -250,24 +250,24 @@ impl ChangeCriterion<'_> {
         // Derivatives with respect to the gain; derivatives with respect to each other parameter, divided by the gain.
         let along: Vec<Vec<f64>> = (0..layout.varying)
             .map(|j| match j.checked_sub(1) {
-                None => combined(gains, &y, |g, i| g.shape[i]),
-                Some(j) => combined(gains, &y, |g, i| g.slopes[j][i]),
+                None => combine(gains, &y, |g, i| g.shape[i]),
+                Some(j) => combine(gains, &y, |g, i| g.slopes[j][i]),
             })
             .collect();
         let steps: Vec<f64> = (0..layout.varying)
-            .map(Layout::ends)
+            .map(Layout::end_indices)
             .map(|[first, last]| theta[last] - theta[first])
             .collect();
-        let mapped = |of: &dyn Fn(usize, &Instant) -> f64| {
+        let mapped = |of: &dyn Fn(usize, &SigmoidPoint) -> f64| {
             let values: Vec<f64> = gains.iter().enumerate().map(|(t, g)| of(t, g)).collect();
-            self.whitened(theta, record, &values)
+            self.whiten(theta, record, &values)
         };
-        let by_share = |t: usize, g: &Instant| {
+        let by_share = |t: usize, g: &SigmoidPoint| {
             (1..layout.varying).fold(steps[0] * along[0][t], |sum, j| sum + steps[j] * g.gain() * along[j][t])
         };
         let mut columns = vec![Vec::new(); theta.len()];
         for (j, along) in along.iter().enumerate() {
-            let [first, last] = Layout::ends(j);
+            let [first, last] = Layout::end_indices(j);
             if j == 0 {
                 columns[first] = mapped(&|t, g| (1.0 - g.share) * along[t]);
                 columns[last] = mapped(&|t, g| g.share * along[t]);
@@ -278,12 +278,12 @@ impl ChangeCriterion<'_> {
         }
         columns[layout.midpoint] = mapped(&|t, g| g.by_midpoint * by_share(t, g));
         columns[layout.log_rate] = mapped(&|t, g| g.by_log_rate * by_share(t, g));
-        for (p, place) in layout.poles().into_iter().enumerate() {
+        for (p, place) in layout.pole_indices().into_iter().enumerate() {
             let slopes: Vec<Vec<f64>> = (0..y.len())
                 .map(|i| pass.unit.slope(i, p, &pass.input, &pass.y[i]))
                 .collect();
             let slopes: Vec<&[f64]> = slopes.iter().map(|slope| &slope[input_start..]).collect();
-            columns[place] = self.whitened(theta, record, &combined(gains, &slopes, Instant::numerator));
+            columns[place] = self.whiten(theta, record, &combine(gains, &slopes, SigmoidPoint::numerator));
         }
         // A longer delay also delays the change.
         let (head, tail) = columns.split_at_mut(layout.delay);
@@ -358,7 +358,7 @@ impl Objective for ChangeCriterion<'_> {
                 .neuromuscular_indices
                 .is_none_or(|[_, zeta]| theta[zeta] > 0.0)
             && UnitOperator::of(&self.layout, theta, self.piece, self.sample_time)
-                .is_some_and(|unit| unit.nk + self.layout.reach() + self.layout.nd <= self.first)
+                .is_some_and(|unit| unit.nk + self.layout.direct_sample_count() + self.layout.nd <= self.first)
     }
 
     fn linearise(&self, theta: &[f64], _: &mut Workspace) -> Linearisation {

@@ -99,39 +99,39 @@ impl BatchOptions for SigmoidChange {
     fn options() -> Vec<BatchOption<Self>> {
         let default = Self::default();
         let mut all = vec![
-            shared::noise(|_: &mut Self, _, _| Ok(())),
-            shared::change().printed("change", |_, _| Some("sigmoid".to_owned())),
-            shared::form(|how: &mut Self, form| how.form = form.unwrap_or(Self::default().form))
-                .printed("form", |how, _| Some(how.form.name().to_owned())),
-            shared::neuromuscular(|how: &mut Self| &mut how.neuromuscular)
-                .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
-            shared::prior("none", |how: &mut Self| &mut how.prior)
-                .printed("prior", |how, _| Some(how.prior.to_string())),
-            BatchOption::new(shared::orders("nd=1..12"), |how: &mut Self, option, text| {
+            shared::noise_option(|_: &mut Self, _, _| Ok(())),
+            shared::change_option().with_formatter("change", |_, _| Some("sigmoid".to_owned())),
+            shared::form_option(|how: &mut Self, form| how.form = form.unwrap_or(Self::default().form))
+                .with_formatter("form", |how, _| Some(how.form.name().to_owned())),
+            shared::neuromuscular_option(|how: &mut Self| &mut how.neuromuscular)
+                .with_formatter("neuromuscular", |how, _| Some(shared::yes_no_text(how.neuromuscular))),
+            shared::prior_option("none", |how: &mut Self| &mut how.prior)
+                .with_formatter("prior", |how, _| Some(how.prior.to_string())),
+            BatchOption::new(shared::orders_setting("nd=1..12"), |how: &mut Self, option, text| {
                 *how = how.clone().with_noise_orders(&option.read(text)?)?;
                 Ok(())
             })
-            .printed("orders", |how, _| {
+            .with_formatter("orders", |how, _| {
                 Some(how.nd.map_or("nd=1..12".to_owned(), |nd| format!("nd={nd}")))
             }),
-            shared::delay_range(
+            shared::delay_range_option(
                 default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
                 |how| how.delay_range_s,
             ),
-            shared::initial_state(|_: &mut Self, option, rule| match rule {
+            shared::initial_state_option(|_: &mut Self, option, rule| match rule {
                 None | Some(InitialState::Estimate) => Ok(()),
                 Some(other) => {
                     let expected = "auto or estimate: a fit with a change estimates the initial states";
-                    Err(option.refused(other.name(), expected))
+                    Err(option.invalid_value(other.name(), expected))
                 }
             }),
         ];
-        all.extend(shared::constraints(
+        all.extend(shared::constraint_options(
             |how: &mut Self| &mut how.constraints,
             |how| &how.constraints,
         ));
-        all.extend(shared::search(default.search, |how: &mut Self| &mut how.search));
+        all.extend(shared::search_options(default.search, |how: &mut Self| &mut how.search));
         all
     }
 }

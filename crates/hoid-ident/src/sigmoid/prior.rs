@@ -5,9 +5,9 @@
 //! variance of the fit; fit and sigma^2 are computed alternately.
 
 use super::{
-    layout::{Element, Layout},
+    layout::{Layout, ThetaElement},
     objective::ChangeCriterion,
-    reweighting::with_levels,
+    reweighting::reweight,
     search::search,
 };
 use crate::{
@@ -18,9 +18,9 @@ use crate::{
 };
 
 /// Largest number of rounds in which sigma^2 of the prior is updated.
-const ROUNDS: usize = 3;
+const MAX_ROUNDS: usize = 3;
 /// Relative change of sigma^2 below which no further round is necessary.
-const CONVERGED: f64 = 0.05;
+const CONVERGENCE_TOLERANCE: f64 = 0.05;
 
 /// Returns the penalties of all elements of theta that have a prior, for the innovation variance 1.
 pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> {
@@ -28,8 +28,8 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
     let elements = layout.elements();
     let places = |penalty: Penalty| {
         let coordinate = all[penalty.place];
-        let is_own = move |element: &Element| match element {
-            Element::Varying(own, _) | Element::Constant(own) => *own == coordinate,
+        let is_own = move |element: &ThetaElement| match element {
+            ThetaElement::Varying(own, _) | ThetaElement::Constant(own) => *own == coordinate,
             _ => false,
         };
         // theta contains omega_nm and zeta_nm, whereas the family uses their logarithms.
@@ -46,7 +46,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
 }
 
 /// Returns the penalties for this innovation variance.
-pub(super) fn weighted(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
+pub(super) fn scaled_penalties(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
     unit.iter().map(|p| p.weighted(variance)).collect()
 }
 
@@ -54,7 +54,7 @@ pub(super) fn weighted(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
 pub(super) fn innovation_variance(criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> f64 {
     let not_fixed = criterion.limits.iter().filter(|(low, high)| low < high).count();
     let squares = minimum.at.sum_of_squares - criterion.penalty_at(&minimum.theta);
-    squares / (criterion.residuals() - not_fixed - criterion.states()) as f64
+    squares / (criterion.residual_count() - not_fixed - criterion.state_count()) as f64
 }
 
 /// Returns the minimum and its noise levels, with the prior scaled by the innovation variance at this minimum.
@@ -70,16 +70,16 @@ pub(super) fn minimum_with_scaled_prior(
 ) -> Result<(Minimum, Option<[f64; 2]>), IdentError> {
     let levelled = |criterion: &mut ChangeCriterion<'_>, minimum| match noise_level {
         NoiseLevel::Constant => Ok((minimum, None)),
-        NoiseLevel::Changing => with_levels(criterion, minimum, options),
+        NoiseLevel::Changing => reweight(criterion, minimum, options),
     };
     let (mut minimum, mut levels) = levelled(criterion, found)?;
-    for _ in 1..ROUNDS {
+    for _ in 1..MAX_ROUNDS {
         let Some(now) = criterion.penalty.first() else { break };
         let variance = innovation_variance(criterion, &minimum);
-        if (variance / now.variance - 1.0).abs() < CONVERGED || variance <= 0.0 {
+        if (variance / now.variance - 1.0).abs() < CONVERGENCE_TOLERANCE || variance <= 0.0 {
             break;
         }
-        criterion.penalty = weighted(unit, variance);
+        criterion.penalty = scaled_penalties(unit, variance);
         let next = search(criterion, minimum.theta.clone(), options, None).ok_or(IdentError::NoFiniteLoss)?;
         let before = minimum.termination.iterations;
         (minimum, levels) = levelled(criterion, next)?;
@@ -89,15 +89,15 @@ pub(super) fn minimum_with_scaled_prior(
 }
 
 /// Returns the prior scaled with the innovation variance at a start.
-pub(super) fn scaled_at_start(criterion: &ChangeCriterion<'_>, unit: &[Penalty], theta: &[f64]) -> Vec<Penalty> {
+pub(super) fn penalties_at_start(criterion: &ChangeCriterion<'_>, unit: &[Penalty], theta: &[f64]) -> Vec<Penalty> {
     if unit.is_empty() {
         return Vec::new();
     }
     let mut workspace = crate::criterion::Workspace::default();
     let squares = criterion.linearise(theta, &mut workspace).sum_of_squares;
-    let variance = squares / criterion.residuals() as f64;
+    let variance = squares / criterion.residual_count() as f64;
     if variance.is_finite() {
-        weighted(unit, variance)
+        scaled_penalties(unit, variance)
     } else {
         Vec::new()
     }

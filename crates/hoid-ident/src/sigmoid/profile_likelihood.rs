@@ -13,17 +13,17 @@ use crate::optimize::{Minimum, SearchMethod, SearchOptions};
 /// 95 % quantile of chi-square with one degree of freedom.
 const CHI_SQUARE_95: f64 = 3.841;
 /// 95 % quantile of the larger of two exponential variables with mean 2.
-const CHANGE_POINT: f64 = 7.352;
+const CHANGE_POINT_QUANTILE_95: f64 = 7.352;
 /// The walk continues up to this multiple of the quantile, since the loss need not increase monotonically.
-const WELL_OUTSIDE: f64 = 2.0;
+const WALK_LIMIT_FACTOR: f64 = 2.0;
 /// Growth factor of the steps along the profile.
-const GROWTH: f64 = 1.5;
+const STEP_GROWTH: f64 = 1.5;
 /// First step along the profile, in standard errors.
 const FIRST_STEP: f64 = 0.5;
 /// Largest number of points on each side of the minimum; the largest step can be hundreds of times the first.
 const MAX_POINTS: usize = 40;
 /// Number of halvings of the last step, which determine the end of the interval to a sixteenth of this step.
-const HALVINGS: usize = 4;
+const HALVING_COUNT: usize = 4;
 
 /// Ends of a 95 % interval; an open end is the bound of the parameter, or infinity for a rate.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -60,11 +60,11 @@ pub(crate) fn profile_likelihood_interval(
     stay: bool,
 ) -> Profile {
     let quantile = if change_point && place == criterion.layout.midpoint {
-        CHANGE_POINT
+        CHANGE_POINT_QUANTILE_95
     } else {
         CHI_SQUARE_95
     };
-    let n = criterion.residuals() as f64;
+    let n = criterion.residual_count() as f64;
     let options = SearchOptions {
         method: SearchMethod::LevenbergMarquardt,
         max_iterations: 30,
@@ -96,7 +96,7 @@ pub(crate) fn profile_likelihood_interval(
         let mut step = first_step;
         for _ in 0..MAX_POINTS {
             let value = (from[place] + sign * step).clamp(low, high);
-            step *= GROWTH;
+            step *= STEP_GROWTH;
             let Some((loss, theta)) = at(value, &from) else { break };
             // A lower loss than at the given minimum, by more than a tenth of the quantile in the statistic: the walk
             // continues, and its lowest point is returned.
@@ -109,7 +109,7 @@ pub(crate) fn profile_likelihood_interval(
             } else if outside.is_none() {
                 outside = Some(value);
             }
-            if loss > WELL_OUTSIDE * quantile || value == bound {
+            if loss > WALK_LIMIT_FACTOR * quantile || value == bound {
                 break;
             }
             from = theta;
@@ -118,7 +118,7 @@ pub(crate) fn profile_likelihood_interval(
             continue;
         }
         let Some(mut beyond) = outside else { continue };
-        for _ in 0..HALVINGS {
+        for _ in 0..HALVING_COUNT {
             let middle = 0.5 * (inside[place] + beyond);
             match at(middle, &inside) {
                 Some((loss, theta)) if loss <= quantile => inside = theta,

@@ -8,7 +8,7 @@
 use hoid_model::Form;
 
 use super::{
-    instant::Instant,
+    instant::SigmoidPoint,
     layout::{Layout, MAX_VARYING},
     objective::ChangeCriterion,
     unit_operator::UnitOperator,
@@ -18,9 +18,9 @@ use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
 /// Time before the first residual of the ranking, in time constants of the poles.
 const SETTLING_TIME_CONSTANTS: f64 = 4.0;
 /// Rate of decay that is assumed if there is no neuromuscular part, 1/s.
-const FAST_RATE: f64 = 10.0;
+const DEFAULT_DECAY_RATE: f64 = 10.0;
 /// Lead time constants tried for a squared lead, s: first value, factor, number.
-const LEADS_S: (f64, f64, usize) = (0.02, 1.12, 60);
+const LEAD_SCAN_S: (f64, f64, usize) = (0.02, 1.12, 60);
 
 /// Responses for given poles, delay and noise model.
 pub(super) struct Ranking<'c, 'a> {
@@ -36,7 +36,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         let unit = UnitOperator::of(layout, theta, None, criterion.sample_time)?;
         let decay = layout
             .neuromuscular_indices
-            .map_or(FAST_RATE, |[omega, zeta]| theta[omega] * theta[zeta]);
+            .map_or(DEFAULT_DECAY_RATE, |[omega, zeta]| theta[omega] * theta[zeta]);
         let ts = criterion.sample_time.s();
         let mut signals = Vec::with_capacity(criterion.data.len());
         for data in &criterion.data {
@@ -61,7 +61,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
     /// theta, by least squares. t_M and G come from the theta `change`. If `change` is `None`, the parameters before
     /// and after the change are equal.
     pub fn best_gains(&self, change: Option<&[f64]>) -> Option<(f64, Vec<f64>)> {
-        let powers = self.powers();
+        let powers = self.power_count();
         let ends = if change.is_some() { 2 } else { 1 };
         let of_states = if self.has_slow_state() { self.signals.len() } else { 0 };
         let count = ends * powers + of_states;
@@ -70,23 +70,23 @@ impl<'c, 'a> Ranking<'c, 'a> {
         let mut power = 0.0;
         for (record, (_, y, u)) in self.signals.iter().enumerate() {
             let mut columns: Vec<Vec<f64>> = match change {
-                None => y.iter().map(|y| self.whitened(y)).collect(),
+                None => y.iter().map(|y| self.whiten(y)).collect(),
                 Some(theta) => {
-                    let share = self.shares(theta, record);
+                    let share = self.change_shares(theta, record);
                     let split = |y: &Vec<f64>| -> [Vec<f64>; 2] {
                         let last: Vec<f64> = y.iter().zip(&share).map(|(y, s)| s * y).collect();
                         let initial: Vec<f64> = y.iter().zip(&last).map(|(y, l)| y - l).collect();
-                        [self.whitened(&initial), self.whitened(&last)]
+                        [self.whiten(&initial), self.whiten(&last)]
                     };
                     y.iter().flat_map(split).collect()
                 }
             };
             if of_states > 0 {
-                columns.push(self.whitened(&self.slow_state(u.len())));
+                columns.push(self.whiten(&self.slow_state(u.len())));
             }
             // The initial states of other records have no effect on this record.
             let place = |i: usize| if i < ends * powers { i } else { i + record };
-            let target = self.whitened(u);
+            let target = self.whiten(u);
             power += dot(&target, &target);
             for i in 0..columns.len() {
                 rhs[place(i)] += dot(&columns[i], &target);
@@ -108,14 +108,14 @@ impl<'c, 'a> Ranking<'c, 'a> {
             let metric = |i: usize, j: usize| gram[place(i) * count + place(j)];
             let of_end = parameters(self.criterion.layout.form, &numerator, metric);
             for (i, value) in of_end.into_iter().enumerate().take(self.criterion.layout.varying) {
-                values[Layout::ends(i)[end]] = value;
+                values[Layout::end_indices(i)[end]] = value;
             }
         }
         (rank.is_finite() && values.iter().all(|g| g.is_finite())).then_some((rank, values))
     }
 
     /// Returns the part of u in each record that neither the operator of theta nor its initial state explains.
-    pub fn unexplained(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
+    pub fn unexplained_output(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
         let (layout, mut all) = (&self.criterion.layout, Vec::new());
         for (record, (first, y, u)) in self.signals.iter().enumerate() {
             let times = self.times(theta, record, *first, u.len());
@@ -124,7 +124,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
                 .zip(times)
                 .enumerate()
                 .map(|(k, (u, t))| {
-                    let here = Instant::at(layout, theta, t);
+                    let here = SigmoidPoint::at(layout, theta, t);
                     (0..y.len()).fold(*u, |v, i| v - here.numerator(i) * y[i][k])
                 })
                 .collect();
@@ -138,7 +138,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         all.iter().flatten().all(|v| v.is_finite()).then_some(all)
     }
 
-    fn powers(&self) -> usize {
+    fn power_count(&self) -> usize {
         self.criterion.layout.form.degree() + 1
     }
 
@@ -163,15 +163,15 @@ impl<'c, 'a> Ranking<'c, 'a> {
         (0..n).map(move |k| start_s + (from + k) as f64 * ts - delay)
     }
 
-    fn shares(&self, theta: &[f64], record: usize) -> Vec<f64> {
+    fn change_shares(&self, theta: &[f64], record: usize) -> Vec<f64> {
         let (first, _, u) = &self.signals[record];
         let times = self.times(theta, record, *first, u.len());
         times
-            .map(|t| Instant::at(&self.criterion.layout, theta, t).share)
+            .map(|t| SigmoidPoint::at(&self.criterion.layout, theta, t).share)
             .collect()
     }
 
-    fn whitened(&self, x: &[f64]) -> Vec<f64> {
+    fn whiten(&self, x: &[f64]) -> Vec<f64> {
         let nd = self.criterion.layout.nd;
         let mut y = x[nd..].to_vec();
         for (i, &d) in self.theta[self.criterion.layout.noise..].iter().enumerate() {
@@ -197,7 +197,7 @@ fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f
             [over(n[first], shape[first]), 0.0, 0.0]
         }
         Form::DerivativeLead => [n[1], over(n[2], n[1]), 0.0],
-        Form::Lead2 | Form::Lead2Lag => square_of_a_lead(form, n, metric),
+        Form::Lead2 | Form::Lead2Lag => squared_lead(form, n, metric),
         Form::LeadDroop => {
             // n = k (alpha, 1 + T alpha, T): k is a root of k^2 - n_1 k + n_0 n_2.
             let root = (n[1] * n[1] - 4.0 * n[0] * n[2]).max(0.0).sqrt();
@@ -208,12 +208,12 @@ fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f
 }
 
 /// Returns the gain k and the lead time constant T for which `k (1, 2 T, T^2)` is nearest to n.
-fn square_of_a_lead(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MAX_VARYING] {
+fn squared_lead(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f64; MAX_VARYING] {
     let product = |a: &[f64], b: &[f64]| {
         let pairs = (0..3).flat_map(|i| (0..3).map(move |j| (i, j)));
         pairs.map(|(i, j)| a[i] * metric(i, j) * b[j]).sum::<f64>()
     };
-    let (mut t, by, count) = LEADS_S;
+    let (mut t, by, count) = LEAD_SCAN_S;
     let (mut best, mut gained) = ([n[0], 0.0, 0.0], f64::NEG_INFINITY);
     for _ in 0..count {
         let (shape, _) = form.shape(&[t, 0.0]);
@@ -238,7 +238,7 @@ mod tests {
             let (shape, _) = form.shape(&x[1..]);
             let n: Vec<f64> = shape.iter().map(|m| 3.0 * m).collect();
             let found = parameters(form, &n, |i, j| f64::from(u8::from(i == j)));
-            for i in 0..=form.varying_beside_gain() {
+            for i in 0..=form.shape_coordinate_count() {
                 assert!((found[i] - x[i]).abs() < 1e-12, "{form}: {found:?}");
             }
         }

@@ -3,8 +3,8 @@
 //! ([`super::noise_level`]).
 
 use super::{
-    instant::Instant,
-    noise_level::{levels, weights},
+    instant::SigmoidPoint,
+    noise_level::{noise_levels, weights},
     objective::{ChangeCriterion, Data},
     search::search,
 };
@@ -15,10 +15,10 @@ use crate::{
 };
 
 /// Largest number of rounds of fit and noise levels.
-const ROUNDS: usize = 20;
+const MAX_ROUNDS: usize = 20;
 /// The rounds end when the relative change of the ratio of the levels is below this limit; the standard error of the
 /// ratio is about `1/sqrt n`, i.e. 1 % for 10000 residuals.
-const CONVERGED: f64 = 1e-6;
+const CONVERGENCE_TOLERANCE: f64 = 1e-6;
 /// Negligible relative change of the loss: it changes the log-likelihood of 10000 residuals by 0.005.
 const NEGLIGIBLE_CHANGE: f64 = 1e-6;
 
@@ -27,23 +27,23 @@ const NEGLIGIBLE_CHANGE: f64 = 1e-6;
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`] if a search fails.
-pub(super) fn with_levels(
+pub(super) fn reweight(
     criterion: &mut ChangeCriterion<'_>,
     mut minimum: Minimum,
     options: &SearchOptions,
 ) -> Result<(Minimum, Option<[f64; 2]>), IdentError> {
     let mut levels = None;
     let mut iterations = minimum.termination.iterations;
-    for round in 0..ROUNDS {
+    for round in 0..MAX_ROUNDS {
         let Some(found) = levels_at(criterion, &minimum.theta) else {
             break;
         };
         let before = levels.replace(found);
         let ratio = |s: [f64; 2]| s[1] / s[0];
-        if before.is_some_and(|b: [f64; 2]| (ratio(found) / ratio(b) - 1.0).abs() < CONVERGED) {
+        if before.is_some_and(|b: [f64; 2]| (ratio(found) / ratio(b) - 1.0).abs() < CONVERGENCE_TOLERANCE) {
             break;
         }
-        let weights = weights(found, &shares(criterion, &minimum.theta));
+        let weights = weights(found, &change_shares(criterion, &minimum.theta));
         let kept = criterion.weights.replace(weights);
         let next = search(criterion, minimum.theta.clone(), options, None).ok_or(IdentError::NoFiniteLoss)?;
         iterations += next.termination.iterations;
@@ -55,7 +55,7 @@ pub(super) fn with_levels(
             break;
         }
         minimum = next;
-        if round + 1 == ROUNDS && change < -NEGLIGIBLE_CHANGE && minimum.termination.converged() {
+        if round + 1 == MAX_ROUNDS && change < -NEGLIGIBLE_CHANGE && minimum.termination.converged() {
             minimum.termination.reason = Reason::IterationLimit;
         }
     }
@@ -65,11 +65,11 @@ pub(super) fn with_levels(
 
 /// Returns the share of the change at the time of each residual. The delay is not subtracted, because the remnant is
 /// not delayed.
-fn shares(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<Vec<f64>> {
+fn change_shares(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<Vec<f64>> {
     let ts = criterion.sample_time.s();
     let of = |d: &Data<'_>| {
         (criterion.first..d.u.len())
-            .map(|t| Instant::at(&criterion.layout, theta, d.start_s + t as f64 * ts).share)
+            .map(|t| SigmoidPoint::at(&criterion.layout, theta, d.start_s + t as f64 * ts).share)
             .collect()
     };
     criterion.data.iter().map(of).collect()
@@ -83,5 +83,5 @@ fn levels_at(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Option<[f64; 2]>
     let size: f64 = residuals.iter().map(|r| dot(r, r)).sum();
     let power = criterion.output_power();
     // Residuals that are only rounding errors have no noise level.
-    (size > 1e-24 * power).then(|| levels(&residuals, &shares(criterion, theta)))?
+    (size > 1e-24 * power).then(|| noise_levels(&residuals, &change_shares(criterion, theta)))?
 }

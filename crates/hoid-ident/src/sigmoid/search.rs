@@ -12,7 +12,7 @@ use crate::{
 const SHORT_SEARCH_STEPS: usize = 30;
 /// Distance of the delay from the border of a piece of the sampling interval, relative to the length of the piece,
 /// below which the neighbouring piece is tried.
-const NEAR_BORDER: f64 = 1e-6;
+const BORDER_DISTANCE: f64 = 1e-6;
 
 /// Returns the lowest minimum found from these starts and the name of its start. A short search is made from each
 /// start; only the best is completed.
@@ -31,7 +31,7 @@ pub(super) fn best_minimum(
     let mut best: Option<(String, Minimum)> = None;
     for (label, theta) in starts {
         let known = best.as_ref().map(|(_, b)| b.at.sum_of_squares);
-        let Some(minimum) = minimise(criterion, theta, &look, known, &mut Workspace::of_thread()) else {
+        let Some(minimum) = minimise(criterion, theta, &look, known, &mut Workspace::borrow_from_thread()) else {
             continue;
         };
         if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
@@ -51,7 +51,7 @@ pub(super) fn best_minimum(
 ///
 /// # Errors
 /// [`IdentError::NoFiniteLoss`] if the search fails.
-pub(super) fn without_change(
+pub(super) fn minimum_without_change(
     criterion: &ChangeCriterion<'_>,
     theta: &[f64],
     options: &SearchOptions,
@@ -60,8 +60,8 @@ pub(super) fn without_change(
         changes: false,
         ..criterion.clone()
     };
-    let start = starts::without_change(&constant, theta);
-    for place in constant.layout.of_the_change() {
+    let start = starts::start_without_change(&constant, theta);
+    for place in constant.layout.change_indices() {
         constant.limits[place] = (start[place], start[place]);
     }
     search(&constant, start, options, None).ok_or(IdentError::NoFiniteLoss)
@@ -75,14 +75,14 @@ pub(super) fn search(
     options: &SearchOptions,
     rival: Option<f64>,
 ) -> Option<Minimum> {
-    let mut workspace = Workspace::of_thread();
+    let mut workspace = Workspace::borrow_from_thread();
     let minimum = minimise(criterion, theta, options, rival, &mut workspace)?;
     let delay = criterion.layout.delay;
     let (low, high) = criterion.limits[delay];
     if minimum.termination.converged() || low == high {
         return Some(minimum);
     }
-    let length = criterion.sample_time.s() / criterion.layout.pieces() as f64;
+    let length = criterion.sample_time.s() / criterion.layout.piece_count() as f64;
     let mut inside = |piece: usize, theta: &[f64]| {
         let mut within = criterion.clone();
         within.piece = Some(piece);
@@ -92,7 +92,7 @@ pub(super) fn search(
         );
         minimise(&within, theta.to_vec(), options, None, &mut workspace)
     };
-    let mut piece = (minimum.theta[delay] / length + NEAR_BORDER).floor() as usize;
+    let mut piece = (minimum.theta[delay] / length + BORDER_DISTANCE).floor() as usize;
     let mut iterations = minimum.termination.iterations;
     let mut best = inside(piece, &minimum.theta)?;
     iterations += best.termination.iterations;
@@ -100,10 +100,10 @@ pub(super) fn search(
     for _ in 0..100 {
         let position = best.theta[delay] / length;
         let neighbours = [
-            (position <= piece as f64 + NEAR_BORDER)
+            (position <= piece as f64 + BORDER_DISTANCE)
                 .then(|| piece.checked_sub(1))
                 .flatten(),
-            (position >= (piece + 1) as f64 - NEAR_BORDER).then_some(piece + 1),
+            (position >= (piece + 1) as f64 - BORDER_DISTANCE).then_some(piece + 1),
         ];
         let better = neighbours.into_iter().flatten().find_map(|there| {
             if (there + 1) as f64 * length <= low || there as f64 * length >= high {

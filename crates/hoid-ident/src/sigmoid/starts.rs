@@ -8,7 +8,7 @@
 use hoid_model::{Form, Record};
 
 use super::{
-    frozen::{PoleCandidate, of_family, of_grid, of_guess, of_windows},
+    frozen::{PoleCandidate, family_grid_candidates, grid_candidates, guess_candidate, window_candidates},
     objective::ChangeCriterion,
     ranking::Ranking,
 };
@@ -17,10 +17,10 @@ use crate::family::noise::NoiseProducts;
 /// Rates G of the grid, 1/s.
 const RATES: [f64; 3] = [0.5, 5.0, 100.0];
 /// Number of times t_M in the grid.
-const MIDPOINTS: usize = 12;
+const MIDPOINT_COUNT: usize = 12;
 /// Largest number of delays of the grid for which starts are made, each with its best poles: a search corrects poles
 /// more easily than delays.
-const BEST_DELAYS: usize = 4;
+const MAX_DELAYS: usize = 4;
 
 /// A start with its label.
 #[derive(Debug, Clone)]
@@ -42,20 +42,20 @@ pub(crate) fn initial_guesses(
     rates.dedup();
     // The best poles for the medium rate are used for all rates.
     let middling = rates[rates.len() / 2];
-    let guessed = guess.map(|guess| of_guess(criterion, guess));
+    let guessed = guess.map(|guess| guess_candidate(criterion, guess));
     let frozen = match criterion.layout.form {
         Form::Lead => {
-            let mut frozen = of_windows(criterion, records);
+            let mut frozen = window_candidates(criterion, records);
             frozen.extend(guessed.and_then(|guess| with_noise(criterion, guess, middling)));
             if frozen.is_empty() {
-                frozen = of_grid(criterion);
+                frozen = grid_candidates(criterion);
             }
             let ranked = frozen
                 .into_iter()
-                .filter_map(|f| Some((on_grid(criterion, &f, middling)?.0, f)));
+                .filter_map(|f| Some((best_on_grid(criterion, &f, middling)?.0, f)));
             ranked.min_by(|a, b| a.0.total_cmp(&b.0)).into_iter().collect()
         }
-        _ => best_of_family(criterion, guessed, middling),
+        _ => best_family_candidates(criterion, guessed, middling),
     };
     let mut starts: Vec<Start> = frozen
         .iter()
@@ -70,13 +70,13 @@ pub(crate) fn initial_guesses(
 
 /// Returns the best candidate for each of the best delays, from a grid and a guess, each with the noise model of its
 /// residuals.
-fn best_of_family(
+fn best_family_candidates(
     criterion: &ChangeCriterion<'_>,
     guessed: Option<PoleCandidate>,
     log_rate: f64,
 ) -> Vec<(f64, PoleCandidate)> {
-    let ranked = |frozen: PoleCandidate| Some((on_grid(criterion, &frozen, log_rate)?.0, frozen));
-    let grid = of_family(criterion).into_iter().chain(guessed);
+    let ranked = |frozen: PoleCandidate| Some((best_on_grid(criterion, &frozen, log_rate)?.0, frozen));
+    let grid = family_grid_candidates(criterion).into_iter().chain(guessed);
     let mut all: Vec<(f64, PoleCandidate)> = grid.filter_map(ranked).collect();
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     let delay = |frozen: &PoleCandidate| frozen.theta[criterion.layout.delay];
@@ -86,7 +86,7 @@ fn best_of_family(
         tried.push(delay(frozen));
         is_new
     });
-    all.truncate(BEST_DELAYS);
+    all.truncate(MAX_DELAYS);
     let noise = |(rank, frozen): (f64, PoleCandidate)| Some((rank, with_noise(criterion, frozen, log_rate)?));
     all.into_iter().filter_map(noise).collect()
 }
@@ -95,8 +95,8 @@ fn best_of_family(
 /// numerator can be computed for these poles.
 fn with_noise(criterion: &ChangeCriterion<'_>, mut frozen: PoleCandidate, log_rate: f64) -> Option<PoleCandidate> {
     let (nd, noise) = (criterion.layout.nd, criterion.layout.noise);
-    let (_, theta, ranking) = on_grid(criterion, &frozen, log_rate)?;
-    let series = ranking.unexplained(&theta)?;
+    let (_, theta, ranking) = best_on_grid(criterion, &frozen, log_rate)?;
+    let series = ranking.unexplained_output(&theta)?;
     if let Some(found) = NoiseProducts::new(&series, nd).fit(nd) {
         frozen.theta[noise..].copy_from_slice(&found.d);
     }
@@ -105,7 +105,7 @@ fn with_noise(criterion: &ChangeCriterion<'_>, mut frozen: PoleCandidate, log_ra
 
 /// Returns a start for the model without a change, with the poles, the delay and the noise model of the model with a
 /// change.
-pub(crate) fn without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<f64> {
+pub(crate) fn start_without_change(criterion: &ChangeCriterion<'_>, theta: &[f64]) -> Vec<f64> {
     let mut theta = theta.to_vec();
     if let Some(ranking) = Ranking::new(criterion, &theta)
         && let Some((_, values)) = ranking.best_gains(None)
@@ -127,11 +127,11 @@ fn rank_at(ranking: &Ranking<'_, '_>, theta: &[f64], t_m: f64) -> Option<(f64, V
 /// Returns the distance between neighbouring t_M of the grid, s.
 fn grid_step(criterion: &ChangeCriterion<'_>) -> f64 {
     let (low, high) = criterion.limits[criterion.layout.midpoint];
-    (high - low) / MIDPOINTS as f64
+    (high - low) / MIDPOINT_COUNT as f64
 }
 
 /// Returns the sum of squares and theta at the best t_M of the grid for the given ln G, and the ranking used.
-fn on_grid<'c, 'a>(
+fn best_on_grid<'c, 'a>(
     criterion: &'c ChangeCriterion<'a>,
     frozen: &PoleCandidate,
     log_rate: f64,
@@ -140,7 +140,7 @@ fn on_grid<'c, 'a>(
     theta[criterion.layout.log_rate] = log_rate;
     let ranking = Ranking::new(criterion, &theta)?;
     let (low, high) = criterion.limits[criterion.layout.midpoint];
-    let count = if low < high { MIDPOINTS } else { 1 };
+    let count = if low < high { MIDPOINT_COUNT } else { 1 };
     let grid = (0..count).filter_map(|i| rank_at(&ranking, &theta, low + (i as f64 + 0.5) * grid_step(criterion)));
     let (rank, best) = grid.min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some((rank, best, ranking))
@@ -148,7 +148,7 @@ fn on_grid<'c, 'a>(
 
 /// Returns the start with the best t_M for the given ln G.
 fn best_midpoint(criterion: &ChangeCriterion<'_>, frozen: &PoleCandidate, log_rate: f64) -> Option<Start> {
-    let (rank, theta, ranking) = on_grid(criterion, frozen, log_rate)?;
+    let (rank, theta, ranking) = best_on_grid(criterion, frozen, log_rate)?;
     let (low, high) = criterion.limits[criterion.layout.midpoint];
     let (mut best, mut step) = ((rank, theta), grid_step(criterion));
     // t_M is refined to a tenth of the width of the change, or to one sample if that is longer.

@@ -3,12 +3,12 @@
 //!
 //! `F y_i = B_i q^-nk e`, `F dy_i/dp = (dB_i/dp) q^-nk e - (dF/dp) y_i`, where p is 1/T_I, omega_nm, zeta_nm or tau_e.
 //! For a gain and a lead, B and F come from [`hoid_model::delayed_operator`]; for other forms they come from
-//! [`FamilyOperator::zoh_powers_within`](hoid_model::FamilyOperator::zoh_powers_within).
+//! [`FamilyOperator::zoh_powers_with_delay_samples`](hoid_model::FamilyOperator::zoh_powers_with_delay_samples).
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
     Form, SampleTime,
-    delayed_operator::{delayed_operator_and_jacobian_within, whole_samples},
+    delayed_operator::{delayed_operator_and_jacobian_with_delay_samples, whole_samples},
 };
 
 use super::layout::Layout;
@@ -21,32 +21,32 @@ pub(crate) struct UnitOperator {
     /// Coefficients of B for each power of s.
     pub b: Vec<Vec<f64>>,
     pub f: Vec<f64>,
-    /// Derivatives of B for each power of s, with respect to each element of [`Layout::poles`].
+    /// Derivatives of B for each power of s, with respect to each element of [`Layout::pole_indices`].
     b_slopes: Vec<Vec<Vec<f64>>>,
-    /// Derivatives of F with respect to each element of [`Layout::poles`].
+    /// Derivatives of F with respect to each element of [`Layout::pole_indices`].
     f_slopes: Vec<Vec<f64>>,
 }
 
 impl UnitOperator {
     /// Returns the operators for theta; `None` if theta is invalid. The delay may be restricted to a piece of a
-    /// sampling interval ([`Layout::pieces`]).
+    /// sampling interval ([`Layout::piece_count`]).
     pub fn of(layout: &Layout, theta: &[f64], piece: Option<usize>, ts: SampleTime) -> Option<Self> {
         let sample = match piece {
-            Some(piece) => piece / layout.pieces(),
+            Some(piece) => piece / layout.piece_count(),
             None => whole_samples(theta[layout.delay], ts).ok()?,
         };
         match (layout.form, layout.neuromuscular_indices) {
             (Form::Lead, Some([omega, zeta])) => {
-                Self::of_lead([theta[omega], theta[zeta], theta[layout.delay]], sample, ts)
+                Self::from_lead([theta[omega], theta[zeta], theta[layout.delay]], sample, ts)
             }
-            _ => Self::of_family(layout, theta, sample, ts),
+            _ => Self::from_family(layout, theta, sample, ts),
         }
     }
 
-    fn of_lead([omega, zeta, delay]: [f64; 3], sample: usize, ts: SampleTime) -> Option<Self> {
+    fn from_lead([omega, zeta, delay]: [f64; 3], sample: usize, ts: SampleTime) -> Option<Self> {
         let at = |gains: [f64; 2]| [gains[0], gains[1], omega, zeta, delay];
-        let (held, by_gain) = delayed_operator_and_jacobian_within(sample, at([1.0, 0.0]), ts).ok()?;
-        let (_, by_rate) = delayed_operator_and_jacobian_within(sample, at([0.0, 1.0]), ts).ok()?;
+        let (held, by_gain) = delayed_operator_and_jacobian_with_delay_samples(sample, at([1.0, 0.0]), ts).ok()?;
+        let (_, by_rate) = delayed_operator_and_jacobian_with_delay_samples(sample, at([0.0, 1.0]), ts).ok()?;
         let jacobians = [by_gain, by_rate];
         let column = |side: usize, j: usize| (0..3).map(|i| jacobians[side][i][j]).collect::<Vec<f64>>();
         Some(Self {
@@ -62,13 +62,13 @@ impl UnitOperator {
         })
     }
 
-    fn of_family(layout: &Layout, theta: &[f64], sample: usize, ts: SampleTime) -> Option<Self> {
+    fn from_family(layout: &Layout, theta: &[f64], sample: usize, ts: SampleTime) -> Option<Self> {
         // The numerator of this operator has no effect on the result.
         let operator = layout.operator(theta, &[1.0; 3]).ok()?;
-        let powers = operator.zoh_powers_within(sample, ts).ok()?;
+        let powers = operator.zoh_powers_with_delay_samples(sample, ts).ok()?;
         // Derivatives of the family coordinates with respect to theta.
         let scale: Vec<(usize, f64)> = layout
-            .poles()
+            .pole_indices()
             .into_iter()
             .enumerate()
             .map(|(p, place)| {
@@ -77,7 +77,7 @@ impl UnitOperator {
             })
             .collect();
         let nb = powers[0].b.len();
-        let slopes = |rows: &[[f64; hoid_model::operator_family::PARTIALS]]| -> Vec<Vec<f64>> {
+        let slopes = |rows: &[[f64; hoid_model::operator_family::PARTIAL_COUNT]]| -> Vec<Vec<f64>> {
             scale
                 .iter()
                 .map(|&(column, by)| rows.iter().map(|row| by * row[column]).collect())
@@ -100,7 +100,7 @@ impl UnitOperator {
         y
     }
 
-    /// Returns the derivative of `y_i` with respect to element p of [`Layout::poles`].
+    /// Returns the derivative of `y_i` with respect to element p of [`Layout::pole_indices`].
     pub fn slope(&self, i: usize, p: usize, input: &[f64], y: &[f64]) -> Vec<f64> {
         let mut x = vec![0.0; input.len()];
         fir(&self.b_slopes[i][p], 0, input, &mut x);
@@ -137,12 +137,12 @@ mod tests {
     #[test]
     fn family_lead_form_matches_the_delayed_operator() {
         let layout = Layout::new(Form::Lead, true, 0);
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         for (omega, zeta, delay) in [(11.25, 0.35, 0.1234), (6.0, 1.4, 0.2), (30.0, 0.1, 0.305)] {
             let theta = [0.09, 0.07, 0.4, 1.2, 5.0, 0.0, omega, zeta, delay];
             let sample = whole_samples(delay, ts).unwrap();
             let known = UnitOperator::of(&layout, &theta, None, ts).unwrap();
-            let family = UnitOperator::of_family(&layout, &theta, sample, ts).unwrap();
+            let family = UnitOperator::from_family(&layout, &theta, sample, ts).unwrap();
             assert_eq!((known.nk, known.b.len()), (family.nk, family.b.len()));
             let flat = |unit: &UnitOperator| -> Vec<Vec<f64>> {
                 let slopes = unit.b_slopes.iter().flatten().cloned();
@@ -169,7 +169,7 @@ mod tests {
         let of = |place: usize, value: f64| {
             let mut wrong = theta;
             wrong[place] = value;
-            UnitOperator::of(&layout, &wrong, None, SampleTime::HUNDREDTH)
+            UnitOperator::of(&layout, &wrong, None, SampleTime::AT_100_HZ)
         };
         assert!(of(layout.delay, 0.2).is_some());
         assert!(of(layout.delay, -0.2).is_none() && of(7, -11.0).is_none() && of(6, f64::NAN).is_none());

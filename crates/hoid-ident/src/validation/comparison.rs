@@ -2,12 +2,12 @@
 
 use std::fmt;
 
-use hoid_model::{Record, numbers::significant, polynomial::product, polynomial_model::monic};
+use hoid_model::{Record, numbers::format_significant, polynomial::product, polynomial_model::monic};
 
 use super::{
     correlation::{Correlation, autocorrelation, centred, cross_correlation},
     goodness_of_fit::{ErrorSums, GoodnessOfFit},
-    whiteness::{LARGEST_LAG, LjungBox, ljung_box},
+    whiteness::{LjungBox, MAX_LAG, ljung_box},
 };
 use crate::{Fit, IdentError, Series};
 
@@ -39,9 +39,9 @@ pub struct Validation {
     pub predicted: Vec<f64>,
     /// VAF and NRMSE.
     pub quality: GoodnessOfFit,
-    /// Residual autocorrelation at the lags 1 to [`LARGEST_LAG`].
+    /// Residual autocorrelation at the lags 1 to [`MAX_LAG`].
     pub autocorrelation: Correlation,
-    /// Cross-correlation of residuals and input at the lags from minus to plus [`LARGEST_LAG`]; empty without an input.
+    /// Cross-correlation of residuals and input at the lags from minus to plus [`MAX_LAG`]; empty without an input.
     pub cross_correlation: Correlation,
     /// Whiteness test of the residuals; `None` unless there are more lags than coefficients of the noise model.
     pub ljung_box: Option<LjungBox>,
@@ -84,9 +84,9 @@ impl fmt::Display for Validation {
             Some(test) => writeln!(
                 f,
                 "whiteness          Q = {} with {} degrees of freedom, p = {}: residuals {} at the 1 % level",
-                significant(test.statistic, 3),
+                format_significant(test.statistic, 3),
                 test.degrees_of_freedom,
-                significant(test.p_value, 2),
+                format_significant(test.p_value, 2),
                 if found.coloured_residuals { "coloured" } else { "white" }
             )?,
             None => writeln!(
@@ -127,23 +127,25 @@ impl Fit {
         let (first, simulated, predicted) = self.model_outputs(record)?;
         let output = &record.output()[first..];
         let residuals = centred(output.iter().zip(&predicted).map(|(u, p)| u - p).collect());
-        let autocorrelation = autocorrelation(&residuals, LARGEST_LAG);
+        let autocorrelation = autocorrelation(&residuals, MAX_LAG);
         let o = self.orders();
         let of_noise = |name: &str| name.starts_with(['a', 'c', 'd']);
         let free = o
             .parameter_names()
             .iter()
-            .zip(self.held())
+            .zip(self.fixed_or_bounded_flags())
             .filter(|(name, held)| of_noise(name) && !**held)
             .count();
         // The noise model of a grey box has a single parameter, T_n.
         let free = if self.is_grey_box() { free.min(1) } else { free };
         Ok(Validation {
             ljung_box: ljung_box(&autocorrelation, residuals.len(), free),
-            quality: ErrorSums::default().and(output, &simulated, &predicted).quality(),
+            quality: ErrorSums::default()
+                .with_record(output, &simulated, &predicted)
+                .quality(),
             autocorrelation,
             cross_correlation: match record.input_channel() {
-                Some(input) => cross_correlation(&residuals, &centred(input.values[first..].to_vec()), LARGEST_LAG),
+                Some(input) => cross_correlation(&residuals, &centred(input.values[first..].to_vec()), MAX_LAG),
                 None => Correlation {
                     lags: Vec::new(),
                     values: Vec::new(),
@@ -209,7 +211,7 @@ impl Fit {
     pub fn quality(&self, records: &[Record]) -> Result<GoodnessOfFit, IdentError> {
         let all = records.iter().try_fold(ErrorSums::default(), |all, record| {
             let (first, simulated, predicted) = self.model_outputs(record)?;
-            Ok::<_, IdentError>(all.and(&record.output()[first..], &simulated, &predicted))
+            Ok::<_, IdentError>(all.with_record(&record.output()[first..], &simulated, &predicted))
         });
         all.map(|all| all.quality())
     }
@@ -219,7 +221,7 @@ impl GoodnessOfFit {
     /// Returns the result of [`Fit::quality`] for several records, computed from their existing validations.
     pub fn pooled<'a>(validated: impl Iterator<Item = (&'a Record, &'a Validation)>) -> Self {
         let with = |all: ErrorSums, (record, v): (&'a Record, &'a Validation)| {
-            all.and(&record.output()[v.first..], &v.simulated, &v.predicted)
+            all.with_record(&record.output()[v.first..], &v.simulated, &v.predicted)
         };
         validated.fold(ErrorSums::default(), with).quality()
     }

@@ -20,17 +20,17 @@ pub struct Correlation {
 
 /// Number of samples that are processed for all lags before the next samples, so the samples remain in the processor
 /// cache.
-const BLOCK: usize = 8192;
+const BLOCK_LENGTH: usize = 8192;
 
 /// Returns `sum_t x(t) y(t - k)` for each lag k, over all t for which both samples exist; x and y have the same length.
 fn covariances_at(x: &[f64], y: &[f64], lags: &[i64]) -> Vec<f64> {
     let n = x.len();
     let mut sums = vec![0.0; lags.len()];
-    for from in (0..n).step_by(BLOCK) {
+    for from in (0..n).step_by(BLOCK_LENGTH) {
         for (sum, &lag) in sums.iter_mut().zip(lags) {
             let (late, early) = (lag.max(0).unsigned_abs() as usize, lag.min(0).unsigned_abs() as usize);
             let first = from.max(late);
-            let end = (from + BLOCK).min(n.saturating_sub(early));
+            let end = (from + BLOCK_LENGTH).min(n.saturating_sub(early));
             if first < end {
                 *sum += dot(&x[first..end], &y[first + early - late..end + early - late]);
             }
@@ -47,7 +47,7 @@ pub(super) fn centred(mut x: Vec<f64>) -> Vec<f64> {
 }
 
 /// Returns the covariances divided by `size`, or zeros if `size` is not positive.
-fn relative_to(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
+fn normalise(size: f64, mut covariances: Vec<f64>) -> Vec<f64> {
     covariances
         .iter_mut()
         .for_each(|c| *c = if size > 0.0 { *c / size } else { 0.0 });
@@ -59,7 +59,7 @@ pub(super) fn autocorrelation(x: &[f64], largest: usize) -> Correlation {
     let power = covariances_at(x, x, &[0])[0];
     let lags: Vec<i64> = (1..=largest.min(x.len().saturating_sub(1)) as i64).collect();
     Correlation {
-        values: relative_to(power, covariances_at(x, x, &lags)),
+        values: normalise(power, covariances_at(x, x, &lags)),
         lags,
         bound_99: Z_99 / (x.len() as f64).sqrt(),
     }
@@ -74,7 +74,7 @@ pub(super) fn cross_correlation(x: &[f64], y: &[f64], largest: usize) -> Correla
     let (of_x, of_y) = (covariances_at(x, x, &reach), covariances_at(y, y, &reach));
     let zero = of_x.first().zip(of_y.first()).map_or(0.0, |(x, y)| x * y);
     let size = zero.sqrt();
-    let values = relative_to(size, covariances_at(x, y, &lags));
+    let values = normalise(size, covariances_at(x, y, &lags));
     let sum: f64 = zero + 2.0 * of_x.iter().zip(&of_y).skip(1).map(|(x, y)| x * y).sum::<f64>();
     let variance = if size > 0.0 {
         (sum / (size * size)).max(0.0) / x.len() as f64
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn blockwise_covariances_equal_plain_sums() {
-        let n = 2 * BLOCK + 77;
+        let n = 2 * BLOCK_LENGTH + 77;
         let x: Vec<f64> = (0..n).map(|t| (0.37 * t as f64).sin()).collect();
         let y: Vec<f64> = (0..n).map(|t| (0.11 * t as f64).cos()).collect();
         let lags = [
@@ -103,8 +103,8 @@ mod tests {
             -1,
             50,
             -50,
-            BLOCK as i64 + 3,
-            -(BLOCK as i64) - 3,
+            BLOCK_LENGTH as i64 + 3,
+            -(BLOCK_LENGTH as i64) - 3,
             n as i64 - 1,
             1 - n as i64,
             n as i64,

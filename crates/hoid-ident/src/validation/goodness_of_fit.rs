@@ -26,10 +26,10 @@ pub(super) struct ErrorSums {
 
 impl ErrorSums {
     /// Returns the sums after adding a record.
-    pub fn and(self, measured: &[f64], simulated: &[f64], predicted: &[f64]) -> Self {
+    pub fn with_record(self, measured: &[f64], simulated: &[f64], predicted: &[f64]) -> Self {
         Self {
             power: self.power + dot(measured, measured),
-            spread: self.spread + spread_of(measured),
+            spread: self.spread + squared_deviations(measured),
             of_simulation: self.of_simulation + squared_distance(measured, simulated),
             of_prediction: self.of_prediction + squared_distance(measured, predicted),
         }
@@ -37,26 +37,26 @@ impl ErrorSums {
 
     pub fn quality(&self) -> GoodnessOfFit {
         GoodnessOfFit {
-            vaf_simulation: vaf_of(self.of_simulation, self.power),
-            vaf_prediction: vaf_of(self.of_prediction, self.power),
-            nrmse_simulation: nrmse_of(self.of_simulation, self.spread),
-            nrmse_prediction: nrmse_of(self.of_prediction, self.spread),
+            vaf_simulation: vaf_from_sums(self.of_simulation, self.power),
+            vaf_prediction: vaf_from_sums(self.of_prediction, self.power),
+            nrmse_simulation: nrmse_from_sums(self.of_simulation, self.spread),
+            nrmse_prediction: nrmse_from_sums(self.of_prediction, self.spread),
         }
     }
 }
 
 /// Returns the variance accounted for (eq. 39), %; zero if the measured signal is zero.
 pub fn vaf(measured: &[f64], model: &[f64]) -> f64 {
-    vaf_of(squared_distance(measured, model), dot(measured, measured))
+    vaf_from_sums(squared_distance(measured, model), dot(measured, measured))
 }
 
 /// Returns the NRMSE fit, %; zero if the measured signal is constant.
 pub fn nrmse_fit(measured: &[f64], model: &[f64]) -> f64 {
-    nrmse_of(squared_distance(measured, model), spread_of(measured))
+    nrmse_from_sums(squared_distance(measured, model), squared_deviations(measured))
 }
 
 /// Returns the sum of the squared deviations from the mean.
-fn spread_of(x: &[f64]) -> f64 {
+fn squared_deviations(x: &[f64]) -> f64 {
     if x.is_empty() {
         0.0
     } else {
@@ -64,7 +64,7 @@ fn spread_of(x: &[f64]) -> f64 {
     }
 }
 
-fn vaf_of(squared_error: f64, power: f64) -> f64 {
+fn vaf_from_sums(squared_error: f64, power: f64) -> f64 {
     if power == 0.0 {
         0.0
     } else {
@@ -72,7 +72,7 @@ fn vaf_of(squared_error: f64, power: f64) -> f64 {
     }
 }
 
-fn nrmse_of(squared_error: f64, spread: f64) -> f64 {
+fn nrmse_from_sums(squared_error: f64, spread: f64) -> f64 {
     if spread == 0.0 {
         0.0
     } else {

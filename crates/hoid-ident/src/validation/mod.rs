@@ -26,4 +26,4 @@ mod whiteness;
 pub use comparison::{MAX_OUTSIDE_SHARE, ResidualDiagnostics, Validation};
 pub use correlation::Correlation;
 pub use goodness_of_fit::{GoodnessOfFit, nrmse_fit, vaf};
-pub use whiteness::{LARGEST_LAG, LjungBox, whiteness};
+pub use whiteness::{LjungBox, MAX_LAG, whiteness};

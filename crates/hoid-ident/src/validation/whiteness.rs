@@ -5,12 +5,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::correlation::{Correlation, autocorrelation, centred};
 
 /// Largest lag of the residual tests, samples.
-pub const LARGEST_LAG: usize = 50;
+pub const MAX_LAG: usize = 50;
 
 /// Result of the Ljung-Box test for white residuals.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LjungBox {
-    /// `Q = n (n + 2) sum_k r_k^2/(n - k)` over the lags 1 to [`LARGEST_LAG`].
+    /// `Q = n (n + 2) sum_k r_k^2/(n - k)` over the lags 1 to [`MAX_LAG`].
     pub statistic: f64,
     /// Number of lags minus the number of free coefficients of the noise model (the coefficients of A, C and D).
     pub degrees_of_freedom: usize,
@@ -22,7 +22,7 @@ pub struct LjungBox {
 /// there are more lags than coefficients.
 pub fn whiteness(residuals: &[f64], free: usize) -> Option<LjungBox> {
     let residuals = centred(residuals.to_vec());
-    ljung_box(&autocorrelation(&residuals, LARGEST_LAG), residuals.len(), free)
+    ljung_box(&autocorrelation(&residuals, MAX_LAG), residuals.len(), free)
 }
 
 /// Applies the Ljung-Box test to the autocorrelation of n residuals.

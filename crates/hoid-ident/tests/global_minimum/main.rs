@@ -23,7 +23,7 @@ use systems::System;
 /// Largest relative loss above the reference at which the reference counts as reached.
 const MAX_EXCESS_LOSS: f64 = 1e-6;
 /// Modulus above which a root counts as being on the unit circle.
-const ON_CIRCLE: f64 = 1.0 - 1e-4;
+const MIN_RADIUS_ON_CIRCLE: f64 = 1.0 - 1e-4;
 /// Distance below which two roots cancel each other.
 const CANCELLATION_DISTANCE: f64 = 0.01;
 
@@ -38,7 +38,7 @@ struct Outcome {
 
 impl Outcome {
     fn of(number: u64, restarts: usize) -> Self {
-        let mut system = System::numbered(number);
+        let mut system = System::with_number(number);
         let record = std::slice::from_ref(&system.record);
         let estimator = Estimator::new(Structure::BoxJenkins, system.orders);
         let started = Instant::now();
@@ -101,7 +101,7 @@ fn is_regular(fit: &Fit) -> bool {
         roots(&monic(m.d())),
         roots(&monic(m.f())),
     );
-    let inside = c.iter().chain(&f).all(|z| z.norm() < ON_CIRCLE);
+    let inside = c.iter().chain(&f).all(|z| z.norm() < MIN_RADIUS_ON_CIRCLE);
     let apart = |p: &[Complex64], q: &[Complex64]| {
         p.iter()
             .all(|z| q.iter().all(|w| (z - w).norm() > CANCELLATION_DISTANCE))

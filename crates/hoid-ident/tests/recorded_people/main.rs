@@ -7,7 +7,7 @@ use hoid_ident::{Estimator, InstrumentalVariable, Instruments, IvMethod};
 use hoid_model::{Channel, Orders, Record, SampleTime, Structure};
 
 /// Returns the trials of a person and a controlled element: e = r - y, paired with the u of the next row.
-fn trials(cell: &str) -> Option<Vec<Record>> {
+fn read_trials(cell: &str) -> Option<Vec<Record>> {
     let dir = std::env::var_os("HOID_HUMAN_DATA")?;
     let mut files: Vec<_> = std::fs::read_dir(dir)
         .ok()?
@@ -21,12 +21,12 @@ fn trials(cell: &str) -> Option<Vec<Record>> {
     Some(
         files
             .iter()
-            .map(|path| trial(&std::fs::read_to_string(path).unwrap()))
+            .map(|path| parse_trial(&std::fs::read_to_string(path).unwrap()))
             .collect(),
     )
 }
 
-fn trial(text: &str) -> Record {
+fn parse_trial(text: &str) -> Record {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let rows: Vec<Vec<f64>> = lines
@@ -56,7 +56,7 @@ fn trial(text: &str) -> Record {
 #[ignore = "minutes; prints the table of all cells"]
 fn converged_fits_predict_about_as_well_as_pem() {
     for cell in ["P03_fo", "P05_fo", "P09_fo", "P03_so", "P05_so", "P09_so"] {
-        let Some(records) = trials(cell) else {
+        let Some(records) = read_trials(cell) else {
             eprintln!("skipped: HOID_HUMAN_DATA names no directory of recordings");
             return;
         };

@@ -11,7 +11,7 @@
 
 use std::borrow::Cow;
 
-use crate::time::sampling::every;
+use crate::time::sampling::median_stride;
 
 /// Maximum and minimum number of rows of a part to which a line is fitted.
 const MAX_PART_ROWS: usize = 256;
@@ -21,7 +21,7 @@ const MIN_PAUSE_STEPS: f64 = 10.0;
 /// Maximum distance in rows between an excess step and the row that appears not to advance.
 const MAX_ROW_DISTANCE: usize = 4;
 /// Number of times from which the phase at the start of a grid is estimated.
-const START_TIMES: usize = 8;
+const START_PHASE_ROWS: usize = 8;
 
 /// Positions of the rows on an evenly spaced grid.
 pub(crate) struct Grid {
@@ -59,7 +59,10 @@ impl Grid {
         // The median of single steps is exact if there is no jitter; the median over spans of sixteen steps averages
         // out jitter, if few rows are missing.
         let median = |length: usize| {
-            let spans = times.iter().zip(times.iter().skip(length)).step_by(every(times.len()));
+            let spans = times
+                .iter()
+                .zip(times.iter().skip(length))
+                .step_by(median_stride(times.len()));
             let mut spans: Vec<f64> = spans.map(|(from, to)| (to - from) / length as f64).collect();
             let middle = spans.len() / 2;
             (!spans.is_empty()).then(|| *spans.select_nth_unstable_by(middle, f64::total_cmp).1)
@@ -73,7 +76,7 @@ impl Grid {
         let mut steps = vec![1.0; rows.len()];
         if sample_time_s.is_finite() {
             for pull in [0.1, 0.02] {
-                follow(&times, sample_time_s, pull, &mut steps);
+                track_clock(&times, sample_time_s, pull, &mut steps);
                 let slope = slope(&times, &steps);
                 if slope.is_finite() && slope > 0.0 {
                     sample_time_s = slope;
@@ -154,26 +157,26 @@ fn is_even(times: &[f64], steps: &[f64], ts: f64) -> bool {
     clippy::arithmetic_side_effects,
     reason = "`times` and `steps` are equally long, and all indices are below their length"
 )]
-fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
+fn track_clock(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
     // The phase at the start of a grid is estimated from several times, since a single time deviates by its jitter.
     let origin = |i: usize| {
         let ahead = times[i..]
             .iter()
-            .take(START_TIMES)
+            .take(START_PHASE_ROWS)
             .enumerate()
             .map(|(j, t)| t - j as f64 * ts);
         let near: Vec<f64> = ahead.filter(|t| (t - times[i]).abs() < 1.5 * ts).collect();
         near.iter().sum::<f64>() / near.len() as f64
     };
-    let (mut phase, mut known) = (origin(0), START_TIMES as f64);
+    let (mut phase, mut known) = (origin(0), START_PHASE_ROWS as f64);
     for i in 1..times.len() {
         let mut step = ((times[i] - phase) / ts).round();
         if step >= MIN_PAUSE_STEPS {
             let anew = origin(i);
             step = ((anew - phase) / ts).round();
-            (phase, known) = (anew, START_TIMES as f64);
+            (phase, known) = (anew, START_PHASE_ROWS as f64);
         } else {
             phase += step * ts;
             phase += f64::max(pull, 1.0 / (known + 1.0)) * (times[i] - phase);

@@ -14,15 +14,15 @@ use super::grid::Grid;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals, row_range, runs};
 use super::values::Levels;
-use hoid_model::numbers::counted;
+use hoid_model::numbers::count_with_noun;
 
-use crate::wording::short;
+use crate::wording::format_short;
 
 /// Finds the rows whose time does not advance: rows that equal the row before, and rows with other values.
-pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+pub(super) fn check_non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let same = |row: &usize| {
         let repeats = |signal: &Signal<'_>| {
-            let step = signal.step_to(*row);
+            let step = signal.values_around_step(*row);
             step.is_some_and(|(before, value)| value == before || value.is_nan())
         };
         *row > 0 && signals.columns.iter().all(repeats)
@@ -31,7 +31,7 @@ pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut
     // After the time was set back, many rows are earlier than the latest time; only those that are not later than the
     // row before are reported.
     let falls = |row: &usize| {
-        let step = signals.time.and_then(|time| time.step_to(*row));
+        let step = signals.time.and_then(|time| time.values_around_step(*row));
         step.is_none_or(|(before, time)| time <= before)
     };
     let mut others: Vec<usize> = others
@@ -43,7 +43,7 @@ pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut
         (QualityIssueKind::Repeated, repeated),
         (QualityIssueKind::Unordered, others),
     ] {
-        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&row_range(*row))).collect();
+        let places: Vec<RowSpan> = rows.iter().map(|row| signals.row_span(&row_range(*row))).collect();
         let Some(first) = places.first() else { continue };
         let what = if kind == QualityIssueKind::Repeated {
             "duplicated, including the time"
@@ -54,12 +54,12 @@ pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut
             kind,
             channel: String::new(),
             rows: rows.len(),
-            share: rows.len() as f64 / signals.rows() as f64,
+            share: rows.len() as f64 / signals.row_count() as f64,
             size: rows.len() as f64,
             unit: "rows".to_owned(),
             text: format!(
                 "{} {} {what}; the first is {}",
-                counted(rows.len(), "row"),
+                count_with_noun(rows.len(), "row"),
                 if rows.len() == 1 { "is" } else { "are" },
                 at(first)
             ),
@@ -68,8 +68,13 @@ pub(super) fn non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut
     }
 }
 
-pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Grid>, found: &mut Vec<QualityIssue>) {
-    let rows = signals.rows();
+pub(super) fn check_stalls(
+    signals: &Signals<'_>,
+    levels: &[Levels],
+    grid: Option<&Grid>,
+    found: &mut Vec<QualityIssue>,
+) {
+    let rows = signals.row_count();
     let moves = |(signal, _): &(&Signal<'_>, &Levels)| {
         let mut finite = signal.values.iter().filter(|v| v.is_finite());
         let first = finite.next();
@@ -119,7 +124,7 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
         .into_iter()
         .filter(|run| run.len() > limit)
         .collect();
-    let places: Vec<RowSpan> = stalled.iter().map(|run| signals.place(run)).collect();
+    let places: Vec<RowSpan> = stalled.iter().map(|run| signals.row_span(run)).collect();
     let seconds = |place: &RowSpan| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
     let Some(longest) = places.iter().max_by(|a, b| {
         (a.rows, seconds(a))
@@ -139,12 +144,12 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
         unit: "s".to_owned(),
         text: format!(
             "all channels hold their values in {} ({} %), in {}; the longest hold lasts {} from {}",
-            counted(total, "row"),
-            short(100.0 * total as f64 / rows as f64),
-            counted(places.len(), "place"),
+            count_with_noun(total, "row"),
+            format_short(100.0 * total as f64 / rows as f64),
+            count_with_noun(places.len(), "place"),
             match longest.from_s {
-                Some(_) => format!("{} s", short(size)),
-                None => counted(longest.rows, "row"),
+                Some(_) => format!("{} s", format_short(size)),
+                None => count_with_noun(longest.rows, "row"),
             },
             at(longest)
         ),

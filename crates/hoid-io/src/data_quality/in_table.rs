@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use super::issue::{QualityIssue, QualityIssueKind};
-use super::search::{is_clock_name, issues_of};
+use super::search::{find_issues, is_clock_name};
 use super::signals::{Signal, Signals};
 use crate::IoError;
 use crate::record::ReadOptions;
@@ -44,7 +44,7 @@ pub(crate) fn issues_of_signals(
     used.dedup();
     // A sampling frequency given for resampling is not the nominal rate of the recorder.
     let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
-    let mut found = of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
+    let mut found = issues_of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
     // One term of a difference may be constant, such as a zero reference, without being a problem.
     let names = |one: &QualityIssue, at: usize| table.columns.get(at).is_some_and(|column| column.name == one.channel);
     let constant: Vec<QualityIssue> = found
@@ -83,7 +83,7 @@ fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> R
 }
 
 /// Returns the problems with some columns of a table.
-fn of_columns<'a>(
+fn issues_of_columns<'a>(
     table: &'a Table<'_>,
     used: &[usize],
     time: Option<usize>,
@@ -94,7 +94,7 @@ fn of_columns<'a>(
     // recording.
     let own: Vec<(&Column, Cow<'_, [f64]>)> = (used.iter())
         .filter_map(|at| table.columns.get(*at))
-        .map(|column| (column, column.own_values(rows.clone())))
+        .map(|column| (column, column.recorded_values(rows.clone())))
         .collect();
     let signal = |column: &'a Column| Signal {
         name: &column.name,
@@ -103,7 +103,7 @@ fn of_columns<'a>(
     let is_clock = |(at, column): &(usize, &Column)| Some(*at) != time && is_clock_name(&column.name);
     let clocks = table.columns.iter().enumerate().filter(is_clock);
     let time = time.and_then(|time| table.columns.get(time));
-    let mut found = issues_of(&Signals {
+    let mut found = find_issues(&Signals {
         columns: own
             .iter()
             .map(|(column, values)| Signal {

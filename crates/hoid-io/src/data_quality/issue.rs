@@ -4,10 +4,10 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::wording::decimal;
+use crate::wording::format_decimal;
 
 /// Maximum number of locations of a problem written as JSON; further locations are only counted.
-const PLACES_WRITTEN: usize = 100;
+const MAX_WRITTEN_PLACES: usize = 100;
 
 /// Kind of a data-quality problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -41,7 +41,7 @@ pub enum QualityIssueKind {
 impl QualityIssueKind {
     /// Kinds of problems that are located in part of a record, which can be excluded; a clock error or a constant
     /// channel affects the whole record.
-    pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
+    pub const MASKABLE_KINDS: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
     /// Returns the remedy for the problem.
     pub fn remedy(self) -> &'static str {
@@ -128,7 +128,7 @@ impl fmt::Display for QualityIssue {
 impl Serialize for QualityIssue {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         #[derive(Serialize)]
-        struct Written<'a> {
+        struct SerializedIssue<'a> {
             kind: QualityIssueKind,
             channel: &'a str,
             rows: usize,
@@ -140,7 +140,7 @@ impl Serialize for QualityIssue {
             place_count: usize,
             places: &'a [RowSpan],
         }
-        Written {
+        SerializedIssue {
             kind: self.kind,
             channel: &self.channel,
             rows: self.rows,
@@ -150,7 +150,7 @@ impl Serialize for QualityIssue {
             text: &self.text,
             remedy: self.kind.remedy(),
             place_count: self.places.len(),
-            places: self.places.get(..PLACES_WRITTEN).unwrap_or(&self.places),
+            places: self.places.get(..MAX_WRITTEN_PLACES).unwrap_or(&self.places),
         }
         .serialize(serializer)
     }
@@ -159,7 +159,7 @@ impl Serialize for QualityIssue {
 /// Formats a location, such as "row 12 (0.11 s)".
 pub(super) fn at(place: &RowSpan) -> String {
     match place.from_s {
-        Some(s) => format!("row {} ({} s)", place.row, decimal(s)),
+        Some(s) => format!("row {} ({} s)", place.row, format_decimal(s)),
         None => format!("row {}", place.row),
     }
 }

@@ -27,8 +27,8 @@ mod values;
 pub(crate) use grid::Grid;
 pub(crate) use in_table::{issues_of_record, issues_of_signals};
 pub use issue::{QualityIssue, QualityIssueKind, RowSpan};
-pub use search::quality_of_record;
-pub(crate) use search::{is_clock_name, issues_of};
+pub use search::issues_of_channels;
+pub(crate) use search::{find_issues, is_clock_name};
 pub(crate) use signals::{Signal, Signals};
 pub(crate) use values::{Levels, saturation_limits};
 

@@ -9,20 +9,20 @@ use super::values::Levels;
 use super::{holds, timing, values};
 
 /// Returns all problems found in columns that share a time.
-pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
+pub(crate) fn find_issues(signals: &Signals<'_>) -> Vec<QualityIssue> {
     let mut found = Vec::new();
-    if signals.rows() == 0 {
+    if signals.row_count() == 0 {
         return found;
     }
     let grid = signals.time.map(|time| Grid::of(time.values));
     if let Some(grid) = &grid {
-        holds::non_advancing_rows(signals, grid, &mut found);
-        timing::find(signals, grid, &mut found);
+        holds::check_non_advancing_rows(signals, grid, &mut found);
+        timing::check_timing(signals, grid, &mut found);
     }
     let levels: Vec<Levels> = signals.columns.iter().map(|signal| Levels::of(signal.values)).collect();
-    holds::stalls(signals, &levels, grid.as_ref(), &mut found);
+    holds::check_stalls(signals, &levels, grid.as_ref(), &mut found);
     for (signal, levels) in signals.columns.iter().zip(&levels) {
-        values::find(signals, *signal, levels, &mut found);
+        values::check_values(signals, *signal, levels, &mut found);
     }
     found.sort_by(|a, b| (a.kind, &a.channel).cmp(&(b.kind, &b.channel)));
     found
@@ -30,7 +30,7 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
 
 /// Returns the problems with the values of e and u: stalls, saturation, quantisation, constants. The times are not
 /// examined, since the samples of a record are always evenly spaced.
-pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
+pub fn issues_of_channels(record: &Record) -> Vec<QualityIssue> {
     let channels = record.input_channel().into_iter().chain([record.output_channel()]);
     let columns = channels
         .map(|channel| Signal {
@@ -38,7 +38,7 @@ pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
             values: &channel.values,
         })
         .collect();
-    issues_of(&Signals {
+    find_issues(&Signals {
         columns,
         nominal_hz: Some(1.0 / record.sample_time().s()),
         ..Signals::default()

@@ -14,13 +14,14 @@ pub(crate) struct Signal<'a> {
 
 impl Signal<'_> {
     /// Returns the values in the row before a row and in the row; `None` for the first row.
-    pub(super) fn step_to(&self, row: usize) -> Option<(f64, f64)> {
+    pub(super) fn values_around_step(&self, row: usize) -> Option<(f64, f64)> {
         Some((*self.values.get(row.checked_sub(1)?)?, *self.values.get(row)?))
     }
 
     /// True if the value of a row equals the value of the row before.
     pub(super) fn repeats(&self, row: usize) -> bool {
-        self.step_to(row).is_some_and(|(before, value)| value == before)
+        self.values_around_step(row)
+            .is_some_and(|(before, value)| value == before)
     }
 }
 
@@ -58,13 +59,13 @@ pub(super) fn runs(holds: impl Iterator<Item = bool>) -> Vec<Range<usize>> {
 
 impl Signals<'_> {
     /// Returns the number of rows.
-    pub(super) fn rows(&self) -> usize {
+    pub(super) fn row_count(&self) -> usize {
         let lengths = self.columns.iter().chain(&self.time).map(|signal| signal.values.len());
         lengths.min().unwrap_or(0)
     }
 
     /// Returns the time of a row, s; `None` if it is unknown.
-    pub(super) fn at_s(&self, row: usize) -> Option<f64> {
+    pub(super) fn time_s(&self, row: usize) -> Option<f64> {
         match (&self.time, self.nominal_hz) {
             (Some(time), _) => time.values.get(row).copied().filter(|t| t.is_finite()),
             (None, Some(hz)) => Some(row as f64 / hz).filter(|t| t.is_finite()),
@@ -72,12 +73,14 @@ impl Signals<'_> {
         }
     }
 
-    pub(super) fn place(&self, rows: &Range<usize>) -> RowSpan {
+    pub(super) fn row_span(&self, rows: &Range<usize>) -> RowSpan {
         RowSpan {
             row: self.before.saturating_add(rows.start).saturating_add(1),
             rows: rows.len(),
-            from_s: self.at_s(rows.start),
-            to_s: self.at_s(rows.end).or_else(|| self.at_s(rows.end.saturating_sub(1))),
+            from_s: self.time_s(rows.start),
+            to_s: self
+                .time_s(rows.end)
+                .or_else(|| self.time_s(rows.end.saturating_sub(1))),
         }
     }
 }

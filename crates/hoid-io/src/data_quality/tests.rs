@@ -2,9 +2,9 @@ use super::*;
 use crate::table::Precision;
 
 /// Pseudo-random numbers between -1 and 1, the same in every run.
-struct Arbitrary(u64);
+struct RandomNumbers(u64);
 
-impl Arbitrary {
+impl RandomNumbers {
     fn next(&mut self) -> f64 {
         self.0 = self
             .0
@@ -17,14 +17,14 @@ impl Arbitrary {
 const TS: f64 = 0.01;
 const N: usize = 4000;
 
-fn even() -> Vec<f64> {
+fn even_times() -> Vec<f64> {
     (0..N).map(|k| k as f64 * TS).collect()
 }
 
 /// Two smooth channels of different frequencies.
-fn smooth() -> [Vec<f64>; 2] {
+fn smooth_channels() -> [Vec<f64>; 2] {
     let wave = |omega: f64| {
-        even()
+        even_times()
             .iter()
             .map(|t| (omega * t).sin() + 0.3 * (2.7 * omega * t + 1.0).cos())
             .collect()
@@ -32,22 +32,22 @@ fn smooth() -> [Vec<f64>; 2] {
     [wave(0.6), wave(1.9)]
 }
 
-fn look(t: &[f64], e: &[f64], u: &[f64]) -> Vec<QualityIssue> {
-    issues_of(&Signals {
+fn issues_in(t: &[f64], e: &[f64], u: &[f64]) -> Vec<QualityIssue> {
+    find_issues(&Signals {
         columns: vec![Signal { name: "e", values: e }, Signal { name: "u", values: u }],
         time: Some(Signal { name: "t", values: t }),
         ..Signals::default()
     })
 }
 
-fn kinds(found: &[QualityIssue]) -> Vec<QualityIssueKind> {
+fn issue_kinds(found: &[QualityIssue]) -> Vec<QualityIssueKind> {
     found.iter().map(|one| one.kind).collect()
 }
 
 #[test]
 fn smooth_and_quiet_channels_have_no_faults() {
-    let [e, u] = smooth();
-    assert_eq!(look(&even(), &e, &u), []);
+    let [e, u] = smooth_channels();
+    assert_eq!(issues_in(&even_times(), &e, &u), []);
     // Slow values far from zero, printed with few decimals.
     let printed = |values: &[f64]| {
         values
@@ -55,12 +55,12 @@ fn smooth_and_quiet_channels_have_no_faults() {
             .map(|v| (v * 1e4).round() / 1e4 + 50.0)
             .collect::<Vec<_>>()
     };
-    assert_eq!(look(&even(), &printed(&e), &printed(&u)), []);
+    assert_eq!(issues_in(&even_times(), &printed(&e), &printed(&u)), []);
     // The hand rests for a third of the time.
     let mut resting = u.clone();
     let at = resting[1000];
     resting[1000..2300].fill(at);
-    assert_eq!(look(&even(), &e, &resting), []);
+    assert_eq!(issues_in(&even_times(), &e, &resting), []);
     // Times that are rounded when printed, or in single precision.
     let rounded: Vec<f64> = (0..N).map(|k| (k as f64 / 60.0 * 1e4).round() / 1e4).collect();
     let mut precision = Precision::default();
@@ -73,24 +73,24 @@ fn smooth_and_quiet_channels_have_no_faults() {
         precision,
         ..Signals::default()
     };
-    assert_eq!(issues_of(&signals), []);
+    assert_eq!(find_issues(&signals), []);
     let single: Vec<f64> = (0..N).map(|k| f64::from((k as f64 * TS) as f32)).collect();
-    assert_eq!(look(&single, &e, &u), []);
+    assert_eq!(issues_in(&single, &e, &u), []);
 }
 
 #[test]
 fn gaps_are_found_despite_large_jitter() {
-    let mut any = Arbitrary(3);
-    let mut t: Vec<f64> = even().iter().map(|t| t + 0.45 * TS * any.next()).collect();
-    let [mut e, mut u] = smooth();
+    let mut any = RandomNumbers(3);
+    let mut t: Vec<f64> = even_times().iter().map(|t| t + 0.45 * TS * any.next()).collect();
+    let [mut e, mut u] = smooth_channels();
     // The rows are removed from the end, so that the remaining row numbers stay valid.
     for (row, missing) in [(3000, 1), (2000, 7), (1000, 1), (500, 150)] {
         for column in [&mut t, &mut e, &mut u] {
             column.drain(row..row + missing);
         }
     }
-    let found = look(&t, &e, &u);
-    assert_eq!(kinds(&found), [QualityIssueKind::Gap, QualityIssueKind::Jitter]);
+    let found = issues_in(&t, &e, &u);
+    assert_eq!(issue_kinds(&found), [QualityIssueKind::Gap, QualityIssueKind::Jitter]);
     let places: Vec<(usize, usize)> = found[0].places.iter().map(|place| (place.row, place.rows)).collect();
     assert_eq!(places, [(500, 150), (850, 1), (1849, 7), (2842, 1)]);
     assert_eq!(found[0].rows, 159);
@@ -104,18 +104,18 @@ fn gaps_are_found_despite_large_jitter() {
 
 #[test]
 fn stalls_and_repeated_rows_are_found() {
-    let [mut e, mut u] = smooth();
+    let [mut e, mut u] = smooth_channels();
     let (held_e, held_u) = (e[700], u[700]);
     e[700..792].fill(held_e);
     u[700..792].fill(held_u);
-    let found = look(&even(), &e, &u);
-    assert_eq!(kinds(&found), [QualityIssueKind::Stalled]);
+    let found = issues_in(&even_times(), &e, &u);
+    assert_eq!(issue_kinds(&found), [QualityIssueKind::Stalled]);
     let place = found[0].places[0];
     assert_eq!((found[0].places.len(), place.row, place.rows), (1, 702, 91));
     assert!((found[0].size - 0.91).abs() < 1e-9);
     // Quantised channels also hold their values, but a stall lasts longer.
     let steps = |values: &[f64]| values.iter().map(|v| (v * 20.0).round() / 20.0).collect::<Vec<_>>();
-    let coarse = look(&even(), &steps(&e), &steps(&u));
+    let coarse = issues_in(&even_times(), &steps(&e), &steps(&u));
     let stalls: Vec<&QualityIssue> = coarse
         .iter()
         .filter(|one| one.kind == QualityIssueKind::Stalled)
@@ -126,30 +126,30 @@ fn stalls_and_repeated_rows_are_found() {
             .all(|one| one.places.iter().all(|place| (700..=792).contains(&place.row))),
         "{stalls:?}"
     );
-    let [mut e, mut u] = smooth();
-    let mut t = even();
+    let [mut e, mut u] = smooth_channels();
+    let mut t = even_times();
     for column in [&mut t, &mut e, &mut u] {
         for row in [2000, 10] {
             column.insert(row, column[row - 1]);
         }
     }
-    let found = look(&t, &e, &u);
-    assert_eq!(kinds(&found), [QualityIssueKind::Repeated]);
+    let found = issues_in(&t, &e, &u);
+    assert_eq!(issue_kinds(&found), [QualityIssueKind::Repeated]);
     assert_eq!(
         found[0].places.iter().map(|place| place.row).collect::<Vec<_>>(),
         [11, 2002]
     );
     t[100] = t[20];
-    assert!(kinds(&look(&t, &e, &u)).contains(&QualityIssueKind::Unordered));
+    assert!(issue_kinds(&issues_in(&t, &e, &u)).contains(&QualityIssueKind::Unordered));
 }
 
 #[test]
 fn saturation_and_quantisation_are_found() {
-    let [e, u] = smooth();
+    let [e, u] = smooth_channels();
     let clipped: Vec<f64> = u.iter().map(|v| v.clamp(-0.9, 1.0)).collect();
-    let found = look(&even(), &e, &clipped);
+    let found = issues_in(&even_times(), &e, &clipped);
     assert_eq!(
-        kinds(&found),
+        issue_kinds(&found),
         [QualityIssueKind::Saturated, QualityIssueKind::Saturated]
     );
     for (one, value) in found.iter().zip([-0.9, 1.0]) {
@@ -162,17 +162,19 @@ fn saturation_and_quantisation_are_found() {
                 .iter()
                 .map(|v| ((v * levels / 2.6 + phase).round() - phase) * 2.6 / levels)
                 .collect();
-            let found = look(&even(), &e, &steps);
+            let found = issues_in(&even_times(), &e, &steps);
             assert!(
-                kinds(&found).iter().all(|kind| *kind == QualityIssueKind::Quantised),
+                issue_kinds(&found)
+                    .iter()
+                    .all(|kind| *kind == QualityIssueKind::Quantised),
                 "{levels} {phase}: {found:?}"
             );
         }
     }
     let both: Vec<f64> = clipped.iter().map(|v| (v * 40.0).round() / 40.0).collect();
-    let found = look(&even(), &e, &both);
+    let found = issues_in(&even_times(), &e, &both);
     assert_eq!(
-        kinds(&found),
+        issue_kinds(&found),
         [
             QualityIssueKind::Saturated,
             QualityIssueKind::Saturated,
@@ -184,25 +186,25 @@ fn saturation_and_quantisation_are_found() {
 
 #[test]
 fn clock_errors_and_drift_are_found() {
-    let [e, u] = smooth();
-    let slow: Vec<f64> = even().iter().map(|t| 0.998 * t).collect();
-    let found = look(&slow, &e, &u);
-    assert_eq!(kinds(&found), [QualityIssueKind::Clock]);
+    let [e, u] = smooth_channels();
+    let slow: Vec<f64> = even_times().iter().map(|t| 0.998 * t).collect();
+    let found = issues_in(&slow, &e, &u);
+    assert_eq!(issue_kinds(&found), [QualityIssueKind::Clock]);
     assert!(
         (found[0].size - 0.002).abs() < 1e-4 && found[0].text.contains("slow by 0.2"),
         "{}",
         found[0]
     );
-    let drifting: Vec<f64> = even().iter().map(|t| t + 5e-5 * t * t).collect();
-    let found = look(&drifting, &e, &u);
+    let drifting: Vec<f64> = even_times().iter().map(|t| t + 5e-5 * t * t).collect();
+    let found = issues_in(&drifting, &e, &u);
     // The rate changes by 1e-4 per second over 40 s; the centres of the first and the last third are 2/3 of this time
     // apart.
     let drift = found.iter().find(|one| one.kind == QualityIssueKind::Drift).unwrap();
     assert!((drift.size - 40.0 * 2.0 / 3.0 * 1e-4).abs() < 2e-4, "{}", drift.size);
-    let t = even();
+    let t = even_times();
     let other: Vec<f64> = t.iter().map(|t| 7e5 + 1.001e3 * t).collect();
     let with = |nominal_hz| {
-        issues_of(&Signals {
+        find_issues(&Signals {
             columns: vec![Signal { name: "e", values: &e }, Signal { name: "u", values: &u }],
             time: Some(Signal { name: "t", values: &t }),
             clocks: vec![Signal {
@@ -215,7 +217,7 @@ fn clock_errors_and_drift_are_found() {
     };
     let found = with(None);
     assert_eq!(
-        (kinds(&found), found[0].channel.as_str()),
+        (issue_kinds(&found), found[0].channel.as_str()),
         (vec![QualityIssueKind::Clock], "time_ms")
     );
     assert!((found[0].size - 1e-3).abs() < 1e-9);
@@ -223,8 +225,8 @@ fn clock_errors_and_drift_are_found() {
 }
 
 #[test]
-fn arbitrary_data_never_panic() {
-    let mut any = Arbitrary(11);
+fn arbitrary_data_do_not_cause_a_panic() {
+    let mut any = RandomNumbers(11);
     let odd = [
         f64::NAN,
         f64::INFINITY,
@@ -251,15 +253,18 @@ fn arbitrary_data_never_panic() {
                 .collect()
         };
         let (t, e, u) = (column(), column(), column());
-        for one in look(&t, &e, &u) {
+        for one in issues_in(&t, &e, &u) {
             assert!(!one.text.is_empty() && one.kind.remedy().len() > 5);
         }
     }
     let gone = vec![f64::NAN; 5];
-    let found = look(&gone, &gone, &gone);
-    assert_eq!(kinds(&found), [QualityIssueKind::Missing, QualityIssueKind::Missing]);
-    assert_eq!(look(&[], &[], &[]), []);
-    assert_eq!(look(&[0.0], &[1.0], &[1.0]), []);
+    let found = issues_in(&gone, &gone, &gone);
+    assert_eq!(
+        issue_kinds(&found),
+        [QualityIssueKind::Missing, QualityIssueKind::Missing]
+    );
+    assert_eq!(issues_in(&[], &[], &[]), []);
+    assert_eq!(issues_in(&[0.0], &[1.0], &[1.0]), []);
 }
 
 /// In a recording of hours, all values are sorted only if values are repeated in the first rows. A later value of
@@ -269,6 +274,6 @@ fn late_outlier_raises_no_issue() {
     let mut u: Vec<f64> = (0..(1 << 20) + 1000).map(|k| (0.37 * f64::from(k)).sin()).collect();
     u[(1 << 20) + 500] = 1e30;
     let channel = hoid_model::Channel::new("u", "", u);
-    let record = hoid_model::Record::of_output(hoid_model::SampleTime::HUNDREDTH, channel).unwrap();
-    assert!(quality_of_record(&record).is_empty());
+    let record = hoid_model::Record::from_output(hoid_model::SampleTime::AT_100_HZ, channel).unwrap();
+    assert!(issues_of_channels(&record).is_empty());
 }

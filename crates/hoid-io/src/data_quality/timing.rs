@@ -4,21 +4,21 @@ use super::grid::{Grid, slope};
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signals, row_range};
 use crate::table::Precision;
-use hoid_model::numbers::counted;
+use hoid_model::numbers::count_with_noun;
 
-use crate::wording::{decimal, short};
+use crate::wording::{format_decimal, format_short};
 
 /// Deviation from the grid, in sample times, above which jitter is reported; the module `time::sampling` has the same
 /// limit.
-const JITTER: f64 = 1e-3;
+const JITTER_LIMIT: f64 = 1e-3;
 /// Relative deviation of a clock from a given rate above which the deviation is reported; crystals are accurate to
 /// 1e-4.
 const MAX_RATE_DEVIATION: f64 = 2e-4;
 /// Limits of the relative deviation from the nearest common rate, if no rate was given: a deviation between them is
 /// reported as a clock error, while a larger one means another rate.
-const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
+const COMMON_RATE_DEVIATION_LIMITS: (f64, f64) = (5e-4, 1e-2);
 /// Common sampling rates of recorders, Hz.
-const COMMON_HZ: [f64; 42] = [
+const COMMON_RATES_HZ: [f64; 42] = [
     1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 12.5, 15.0, 16.0, 20.0, 24.0, 25.0, 29.97, 30.0, 32.0, 40.0, 50.0, 59.94, 60.0,
     64.0, 75.0, 80.0, 90.0, 100.0, 119.88, 120.0, 125.0, 128.0, 144.0, 150.0, 200.0, 240.0, 250.0, 256.0, 300.0, 400.0,
     500.0, 512.0, 600.0, 1000.0, 1024.0, 2000.0,
@@ -26,7 +26,7 @@ const COMMON_HZ: [f64; 42] = [
 
 /// Returns the largest rounding error of a time: one unit of the last printed digit; if all times are single-precision
 /// numbers, at least the resolution of single precision.
-fn rounding(t: &[f64], precision: Precision) -> f64 {
+fn rounding_error(t: &[f64], precision: Precision) -> f64 {
     let largest = t
         .iter()
         .copied()
@@ -37,18 +37,20 @@ fn rounding(t: &[f64], precision: Precision) -> f64 {
     precision.unit(largest).max(ulp)
 }
 
-pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+pub(super) fn check_timing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     let Some(time) = signals.time else { return };
     let (t, ts) = (time.values, grid.sample_time_s);
     if !(ts > 0.0 && ts.is_finite()) {
         return;
     }
-    let rows = signals.rows();
+    let rows = signals.row_count();
     check_gaps(signals, grid, found);
-    let unit = rounding(t, signals.precision).min(ts);
+    let unit = rounding_error(t, signals.precision).min(ts);
     let jitter = grid.jitter(t);
-    if let Some((rms, worst, row)) = jitter.filter(|(_, worst, _)| *worst > (JITTER * ts).max(unit * (1.0 + 1e-6))) {
-        let place = signals.place(&row_range(row));
+    if let Some((rms, worst, row)) =
+        jitter.filter(|(_, worst, _)| *worst > (JITTER_LIMIT * ts).max(unit * (1.0 + 1e-6)))
+    {
+        let place = signals.row_span(&row_range(row));
         found.push(QualityIssue {
             kind: QualityIssueKind::Jitter,
             channel: String::new(),
@@ -58,10 +60,10 @@ pub(super) fn find(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIs
             unit: "s".to_owned(),
             text: format!(
                 "t has a jitter of {} s RMS about an even grid of {} s ({} % of the sample time); the largest deviation is {} s at {}",
-                short(rms),
-                short(ts),
-                short(100.0 * rms / ts),
-                short(worst),
+                format_short(rms),
+                format_short(ts),
+                format_short(100.0 * rms / ts),
+                format_short(worst),
                 at(&place)
             ),
             places: vec![place],
@@ -78,9 +80,9 @@ fn check_gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>)
         .gaps()
         .map(|(before, after, missing)| RowSpan {
             rows: missing as usize,
-            from_s: signals.at_s(before),
-            to_s: signals.at_s(after),
-            ..signals.place(&row_range(before))
+            from_s: signals.time_s(before),
+            to_s: signals.time_s(after),
+            ..signals.row_span(&row_range(before))
         })
         .collect();
     let Some(first) = places.first() else { return };
@@ -93,15 +95,15 @@ fn check_gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>)
         kind: QualityIssueKind::Gap,
         channel: String::new(),
         rows: missing,
-        share: missing as f64 / (missing as f64 + signals.rows() as f64),
+        share: missing as f64 / (missing as f64 + signals.row_count() as f64),
         size: longest,
         unit: "s".to_owned(),
         text: format!(
             "{} missing in {}, the first after {}; the longest step is {} s",
-            counted(missing, "row"),
-            counted(places.len(), "place"),
+            count_with_noun(missing, "row"),
+            count_with_noun(places.len(), "place"),
             at(first),
-            short(longest)
+            format_short(longest)
         ),
         places,
     });
@@ -114,12 +116,12 @@ fn check_rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &m
     let uncertain = 5.0 * (rms * 12_f64.sqrt() / n.powf(1.5)).max(unit / n / 5.0) / ts;
     let hz = 1.0 / ts;
     let typical = || {
-        COMMON_HZ
+        COMMON_RATES_HZ
             .into_iter()
             .min_by(|a, b| (a / hz).ln().abs().total_cmp(&(b / hz).ln().abs()))
             .filter(|typical| {
                 let off = (hz / typical - 1.0).abs();
-                off > OFF_COMMON.0 && off < OFF_COMMON.1
+                off > COMMON_RATE_DEVIATION_LIMITS.0 && off < COMMON_RATE_DEVIATION_LIMITS.1
             })
     };
     let (expected, given) = match signals.nominal_hz {
@@ -145,14 +147,14 @@ fn check_rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &m
     found.push(QualityIssue {
         kind: QualityIssueKind::Clock,
         channel: String::new(),
-        rows: signals.rows(),
+        rows: signals.row_count(),
         share: 1.0,
         size: off,
         unit: "1".to_owned(),
         text: format!(
             "t gives {hz:.4} Hz, {what} {} Hz: the clock of t runs {way} by {} %{unless}",
-            short(expected),
-            short(100.0 * off.abs())
+            format_short(expected),
+            format_short(100.0 * off.abs())
         ),
         places: Vec::new(),
     });
@@ -180,15 +182,15 @@ fn check_drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &
     found.push(QualityIssue {
         kind: QualityIssueKind::Drift,
         channel: String::new(),
-        rows: signals.rows(),
+        rows: signals.row_count(),
         share: 1.0,
         size: change,
         unit: "1".to_owned(),
         text: format!(
             "the sample time changes over the record: {} s in the first third, {} s in the last third ({} %)",
-            decimal(first),
-            decimal(last),
-            short(100.0 * change)
+            format_decimal(first),
+            format_decimal(last),
+            format_short(100.0 * change)
         ),
         places: Vec::new(),
     });
@@ -223,14 +225,14 @@ fn check_second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
         found.push(QualityIssue {
             kind: QualityIssueKind::Clock,
             channel: clock.name.to_owned(),
-            rows: signals.rows(),
+            rows: signals.row_count(),
             share: 1.0,
             size: off,
             unit: "1".to_owned(),
             text: format!(
                 "{} runs {} % {} than t: one of the two clocks is wrong",
                 clock.name,
-                short(100.0 * off.abs()),
+                format_short(100.0 * off.abs()),
                 if off > 0.0 { "faster" } else { "slower" }
             ),
             places: Vec::new(),

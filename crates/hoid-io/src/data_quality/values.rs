@@ -1,6 +1,6 @@
 //! Saturation, quantisation, constants and missing values of one channel.
 //!
-//! A channel is quantised if at most half of its finite values are distinct (of a long channel, see [`EXAMINED`]) and
+//! A channel is quantised if at most half of its finite values are distinct (of a long channel, see [`EXAMINED_ROWS`]) and
 //! the distinct values lie on a grid within `1e-3 q`, where q is the smallest step between two of them. The smallest
 //! and the largest value need not be on the grid: they may be the end stops of a stick.
 //!
@@ -16,24 +16,24 @@ use std::ops::Range;
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals, runs};
 use crate::time::sampling::steps;
-use hoid_model::numbers::counted;
+use hoid_model::numbers::count_with_noun;
 
-use crate::wording::short;
+use crate::wording::format_short;
 
 /// Smallest reported quantisation step, relative to the standard deviation; its quantisation noise has 1e-5 of the
 /// power of the signal.
 const MIN_QUANTUM_RATIO: f64 = 1e-2;
 /// Number of consecutive rows at the extreme that count as saturation, for channels in full precision and for quantised
 /// channels.
-const SATURATED_ROWS: (usize, usize) = (3, 5);
+const MIN_SATURATED_ROWS: (usize, usize) = (3, 5);
 /// Smallest ratio, in a saturated quantised channel, of the number of rows at the limit to the average number at each
 /// of the next three levels.
-const PEAK: usize = 6;
+const MIN_PEAK_RATIO: usize = 6;
 
 /// Number of rows at the start of a long channel (hours of recording) that are examined first. If more than half of
 /// their values are distinct, the channel counts as full precision, because sorting all values would take longer than
 /// reading them.
-const EXAMINED: usize = 1 << 20;
+const EXAMINED_ROWS: usize = 1 << 20;
 
 /// A saturation limit of a channel.
 pub(crate) struct SaturationLimit {
@@ -46,7 +46,7 @@ pub(crate) struct SaturationLimit {
 
 impl SaturationLimit {
     /// Returns the number of rows at the limit.
-    pub(crate) fn rows(&self) -> usize {
+    pub(crate) fn row_count(&self) -> usize {
         self.stays.iter().map(Range::len).sum()
     }
 }
@@ -63,28 +63,28 @@ pub(crate) struct Levels {
 
 impl Levels {
     /// Number of levels kept at each end of a channel in full precision.
-    const LEVELS_AT_EACH_END: usize = 4;
+    const LEVELS_PER_END: usize = 4;
 
     pub(crate) fn of(values: &[f64]) -> Self {
-        Self::examined(values, EXAMINED)
+        Self::from_first_values(values, EXAMINED_ROWS)
     }
 
     /// Determines the levels; if most of the first `most` values are distinct, all values count as distinct.
-    fn examined(values: &[f64], most: usize) -> Self {
+    fn from_first_values(values: &[f64], most: usize) -> Self {
         let rows = values.len();
         let finite = values.iter().filter(|v| v.is_finite()).count();
         if let Some((start, [_, ..])) = values.split_at_checked(most) {
-            let first = distinct(start);
-            if first.len() > most / 2 && first.len() > 2 * Self::LEVELS_AT_EACH_END {
+            let first = distinct_values(start);
+            if first.len() > most / 2 && first.len() > 2 * Self::LEVELS_PER_END {
                 return Self {
                     count: rows,
                     rows,
                     finite,
-                    kept: ends(values, &first),
+                    kept: end_levels(values, &first),
                 };
             }
         }
-        let mut levels = distinct(values);
+        let mut levels = distinct_values(values);
         let count = levels.len();
         if count > rows / 2 {
             keep_only_ends(&mut levels);
@@ -124,7 +124,7 @@ impl Levels {
 }
 
 /// Returns the distinct finite values in increasing order.
-fn distinct(values: &[f64]) -> Vec<f64> {
+fn distinct_values(values: &[f64]) -> Vec<f64> {
     let mut levels: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     levels.sort_unstable_by(f64::total_cmp);
     levels.dedup();
@@ -144,24 +144,24 @@ fn distinct(values: &[f64]) -> Vec<f64> {
 
 /// Returns the levels at both ends of all values. Only values at or beyond the end levels of `first`, the distinct
 /// values of the first rows, are sorted.
-fn ends(values: &[f64], first: &[f64]) -> Vec<f64> {
+fn end_levels(values: &[f64], first: &[f64]) -> Vec<f64> {
     let (lower, upper) = (
-        first.get(Levels::LEVELS_AT_EACH_END - 1),
-        first.iter().nth_back(Levels::LEVELS_AT_EACH_END - 1),
+        first.get(Levels::LEVELS_PER_END - 1),
+        first.iter().nth_back(Levels::LEVELS_PER_END - 1),
     );
     let is_outer = |v: &f64| lower.is_some_and(|lower| v <= lower) || upper.is_some_and(|upper| v >= upper);
     let outer: Vec<f64> = values.iter().copied().filter(is_outer).collect();
     // Relative to a later value of another order of magnitude, the end levels of `first` may count as a single level.
-    let mut levels = distinct(&outer);
+    let mut levels = distinct_values(&outer);
     keep_only_ends(&mut levels);
     levels
 }
 
 /// Removes all levels but those at both ends.
 fn keep_only_ends(levels: &mut Vec<f64>) {
-    let upper = levels.len().saturating_sub(Levels::LEVELS_AT_EACH_END);
-    if upper > Levels::LEVELS_AT_EACH_END {
-        levels.drain(Levels::LEVELS_AT_EACH_END..upper);
+    let upper = levels.len().saturating_sub(Levels::LEVELS_PER_END);
+    if upper > Levels::LEVELS_PER_END {
+        levels.drain(Levels::LEVELS_PER_END..upper);
     }
 }
 
@@ -189,11 +189,13 @@ pub(crate) fn saturation_limits(values: &[f64], levels: &Levels) -> Vec<Saturati
                 .map(Range::len)
         };
         let longest = inner().max().unwrap_or(0);
-        let stayed = inner().filter(|length| *length >= SATURATED_ROWS.0).count();
+        let stayed = inner().filter(|length| *length >= MIN_SATURATED_ROWS.0).count();
         let is_rail = if coarse {
-            longest >= SATURATED_ROWS.1 && rows.saturating_mul(3) >= PEAK.saturating_mul(next_count) && stayed > 1
+            longest >= MIN_SATURATED_ROWS.1
+                && rows.saturating_mul(3) >= MIN_PEAK_RATIO.saturating_mul(next_count)
+                && stayed > 1
         } else {
-            longest >= SATURATED_ROWS.0
+            longest >= MIN_SATURATED_ROWS.0
         };
         is_rail.then_some(SaturationLimit {
             value: extreme,
@@ -204,7 +206,7 @@ pub(crate) fn saturation_limits(values: &[f64], levels: &Levels) -> Vec<Saturati
     [rail(false), rail(true)].into_iter().flatten().collect()
 }
 
-pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, found: &mut Vec<QualityIssue>) {
+pub(super) fn check_values(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, found: &mut Vec<QualityIssue>) {
     let values = signal.values;
     let n = values.len();
     let name = signal.name;
@@ -220,37 +222,44 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
             text,
         });
     };
-    missing(signals, signal, &mut tell);
+    check_missing(signals, signal, &mut tell);
     let finite = || values.iter().filter(|v| v.is_finite());
     let Some(first) = finite().next() else { return };
     if finite().all(|v| v == first) {
         if n > 1 {
-            let text = format!("{name} is constant: {}", short(*first));
+            let text = format!("{name} is constant: {}", format_short(*first));
             tell(
                 QualityIssueKind::Constant,
                 n,
                 0.0,
                 "",
-                vec![signals.place(&(0..n))],
+                vec![signals.row_span(&(0..n))],
                 text,
             );
         }
         return;
     }
     for rail in saturation_limits(values, levels) {
-        let places: Vec<RowSpan> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
+        let places: Vec<RowSpan> = rail.stays.iter().map(|stay| signals.row_span(stay)).collect();
         let seconds = |place: &RowSpan| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
         let longest = places.iter().map(seconds).fold(0.0, f64::max);
         let text = format!(
             "{name} stays at its {} value, {}, in {} ({} %), in {}; the first is {}",
             if rail.is_upper { "largest" } else { "smallest" },
-            short(rail.value),
-            counted(rail.rows(), "row"),
-            short(100.0 * rail.rows() as f64 / n as f64),
-            counted(places.len(), "place"),
+            format_short(rail.value),
+            count_with_noun(rail.row_count(), "row"),
+            format_short(100.0 * rail.row_count() as f64 / n as f64),
+            count_with_noun(places.len(), "place"),
             places.first().map(at).unwrap_or_default()
         );
-        tell(QualityIssueKind::Saturated, rail.rows(), longest, "s", places, text);
+        tell(
+            QualityIssueKind::Saturated,
+            rail.row_count(),
+            longest,
+            "s",
+            places,
+            text,
+        );
     }
     let count = levels.finite as f64;
     let mean = finite().map(|v| v / count).sum::<f64>();
@@ -261,27 +270,27 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
     {
         let text = format!(
             "{name} is quantised: {count} levels in steps of {} ({} % of its standard deviation)",
-            short(step),
-            short(100.0 * step / deviation)
+            format_short(step),
+            format_short(100.0 * step / deviation)
         );
         tell(QualityIssueKind::Quantised, n, step, "", Vec::new(), text);
     }
 }
 
-fn missing(
+fn check_missing(
     signals: &Signals<'_>,
     signal: Signal<'_>,
     tell: &mut impl FnMut(QualityIssueKind, usize, f64, &str, Vec<RowSpan>, String),
 ) {
     let gone = runs(signal.values.iter().map(|v| !v.is_finite()));
-    let places: Vec<RowSpan> = gone.iter().map(|run| signals.place(run)).collect();
+    let places: Vec<RowSpan> = gone.iter().map(|run| signals.row_span(run)).collect();
     let Some(first) = places.first() else { return };
     let rows: usize = gone.iter().map(Range::len).sum();
     let text = format!(
         "{} has no finite value in {} ({} %); the first is {}",
         signal.name,
-        counted(rows, "row"),
-        short(100.0 * rows as f64 / signal.values.len() as f64),
+        count_with_noun(rows, "row"),
+        format_short(100.0 * rows as f64 / signal.values.len() as f64),
         at(first)
     );
     tell(QualityIssueKind::Missing, rows, rows as f64, "rows", places, text);
@@ -294,11 +303,11 @@ mod tests {
     /// An outlier of another order of magnitude after the first rows: relative to it, the lowest levels count as a
     /// single level.
     #[test]
-    fn outlier_in_a_long_channel_is_no_saturation() {
+    fn outlier_in_a_long_channel_is_not_saturation() {
         for outlier in [1e30, -1e30, 1e308] {
             let mut values: Vec<f64> = (0..200).map(|k| (0.37 * f64::from(k)).sin()).collect();
             (values[150], values[151]) = (outlier, -0.5 * outlier);
-            let quick = Levels::examined(&values, 64);
+            let quick = Levels::from_first_values(&values, 64);
             assert!(quick.kept.len() < 4 && saturation_limits(&values, &quick).is_empty());
         }
     }
@@ -310,7 +319,7 @@ mod tests {
         values[3000..3005].fill(2.0);
         values[3500] = f64::NAN;
         for most in [64, 1000, 3999] {
-            let (quick, all) = (Levels::examined(&values, most), Levels::of(&values));
+            let (quick, all) = (Levels::from_first_values(&values, most), Levels::of(&values));
             assert_eq!((&quick.kept, quick.finite), (&all.kept, 3999));
             assert!(!quick.is_quantised() && quick.quantum().is_none());
             let found = saturation_limits(&values, &quick);
@@ -320,7 +329,7 @@ mod tests {
         // All rows of the quantised channel are examined, because its largest level occurs in one of the last rows.
         let mut coarse: Vec<f64> = values.iter().map(|v| (10.0 * v).round() / 10.0).collect();
         coarse[3990] = 7.0;
-        let found = Levels::examined(&coarse, 64);
+        let found = Levels::from_first_values(&coarse, 64);
         assert!(found.is_quantised() && found.kept.last() == Some(&7.0));
     }
 }

@@ -8,8 +8,8 @@ use std::{
 use zip::{CompressionMethod, DateTime, ZipWriter, result::ZipError, write::SimpleFileOptions};
 
 use super::{
-    description::{FmiVersion, MODEL, description},
-    settings::{FMU_SETTINGS, FmuSettings},
+    description::{FmiVersion, MODEL_IDENTIFIER, description},
+    settings::{FMU_SETTINGS_FILE, FmuSettings},
 };
 use crate::{IoError, read_bytes, write_atomically};
 
@@ -27,9 +27,9 @@ struct Platform {
     ending: &'static str,
 }
 
-/// First bytes of a little-endian 64-bit ELF file; each entry of LINUX starts with a value of its machine field.
-const ELF: &[u8] = b"\x7fELF\x02\x01";
-const LINUX: [(u16, Platform); 2] = [
+/// First bytes of a little-endian 64-bit ELF file; each entry of LINUX_PLATFORMS starts with a value of its machine field.
+const ELF_MAGIC: &[u8] = b"\x7fELF\x02\x01";
+const LINUX_PLATFORMS: [(u16, Platform); 2] = [
     (
         62,
         Platform {
@@ -47,15 +47,15 @@ const LINUX: [(u16, Platform); 2] = [
         },
     ),
 ];
-const WINDOWS: Platform = Platform {
+const WINDOWS_PLATFORM: Platform = Platform {
     fmi2_folder: "win64",
     fmi3_folder: "x86_64-windows",
     ending: "dll",
 };
-const MACHINE_OF_WINDOWS: u16 = 0x8664;
-/// Magic number of 64-bit Mach-O; each entry of MAC starts with a CPU type.
-const MACH_O: &[u8] = b"\xcf\xfa\xed\xfe";
-const MAC: [(u32, Platform); 2] = [
+const WINDOWS_MACHINE: u16 = 0x8664;
+/// Magic number of 64-bit Mach-O; each entry of MAC_PLATFORMS starts with a CPU type.
+const MACH_O_MAGIC: &[u8] = b"\xcf\xfa\xed\xfe";
+const MAC_PLATFORMS: [(u32, Platform); 2] = [
     (
         0x0100_0007,
         Platform {
@@ -76,9 +76,9 @@ const MAC: [(u32, Platform); 2] = [
 
 /// Functions that the library of an FMU exports: one each of the C interface of hoid, of FMI 2 and of FMI 3. On every
 /// platform the symbol table contains their names, each terminated by a null byte.
-const FUNCTIONS: [&str; 3] = ["hoid_abi_version", "fmi2Instantiate", "fmi3InstantiateCoSimulation"];
+const EXPORTED_FUNCTIONS: [&str; 3] = ["hoid_abi_version", "fmi2Instantiate", "fmi3InstantiateCoSimulation"];
 
-fn exports(bytes: &[u8], function: &str) -> bool {
+fn exports_function(bytes: &[u8], function: &str) -> bool {
     let name = [function.as_bytes(), &[0]].concat();
     bytes.windows(name.len()).any(|part| part == name)
 }
@@ -96,18 +96,24 @@ fn u32_at(bytes: &[u8], at: usize) -> Option<u32> {
 impl Platform {
     /// Determines the platform from the header of a shared library (ELF, PE or Mach-O).
     fn of(bytes: &[u8]) -> Option<Self> {
-        if bytes.starts_with(ELF) {
+        if bytes.starts_with(ELF_MAGIC) {
             let machine = u16_at(bytes, 18)?;
-            return LINUX.into_iter().find(|(known, _)| *known == machine).map(|(_, p)| p);
+            return LINUX_PLATFORMS
+                .into_iter()
+                .find(|(known, _)| *known == machine)
+                .map(|(_, p)| p);
         }
-        if bytes.starts_with(MACH_O) {
+        if bytes.starts_with(MACH_O_MAGIC) {
             let machine = u32_at(bytes, 4)?;
-            return MAC.into_iter().find(|(known, _)| *known == machine).map(|(_, p)| p);
+            return MAC_PLATFORMS
+                .into_iter()
+                .find(|(known, _)| *known == machine)
+                .map(|(_, p)| p);
         }
         let head = u32_at(bytes, 0x3c).filter(|_| bytes.starts_with(b"MZ"))? as usize;
         let end = head.checked_add(4)?;
         let is_one = bytes.get(head..end)? == b"PE\0\0";
-        (is_one && u16_at(bytes, end)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
+        (is_one && u16_at(bytes, end)? == WINDOWS_MACHINE).then_some(WINDOWS_PLATFORM)
     }
 }
 
@@ -122,7 +128,10 @@ impl Library {
         let platform = Platform::of(&bytes).ok_or_else(|| IoError::NoLibrary {
             file: path.display().to_string(),
         })?;
-        if let Some(missing) = FUNCTIONS.into_iter().find(|function| !exports(&bytes, function)) {
+        if let Some(missing) = EXPORTED_FUNCTIONS
+            .into_iter()
+            .find(|function| !exports_function(&bytes, function))
+        {
             return Err(IoError::OtherLibrary {
                 file: path.display().to_string(),
                 missing,
@@ -154,7 +163,7 @@ pub fn write_fmu(
     let text = settings.text();
     let mut parts: Vec<(String, &[u8])> = vec![
         ("modelDescription.xml".to_owned(), xml.as_bytes()),
-        (format!("resources/{FMU_SETTINGS}"), text.as_bytes()),
+        (format!("resources/{FMU_SETTINGS_FILE}"), text.as_bytes()),
     ];
     for library in libraries {
         let platform = library.platform;
@@ -162,7 +171,7 @@ pub fn write_fmu(
             FmiVersion::Two => platform.fmi2_folder,
             FmiVersion::Three => platform.fmi3_folder,
         };
-        let name = format!("binaries/{folder}/{MODEL}.{}", platform.ending);
+        let name = format!("binaries/{folder}/{MODEL_IDENTIFIER}.{}", platform.ending);
         if parts.iter().any(|(other, _)| *other == name) {
             return Err(wrong(format!(
                 "two libraries are for {folder}; give only one for each platform"
@@ -170,11 +179,11 @@ pub fn write_fmu(
         }
         parts.push((name, &library.bytes));
     }
-    let packed = compressed(&parts).map_err(|error| wrong(error.to_string()))?;
+    let packed = zip_archive(&parts).map_err(|error| wrong(error.to_string()))?;
     write_atomically(path, |file| file.write_all(&packed))
 }
 
-fn compressed(parts: &[(String, &[u8])]) -> Result<Vec<u8>, ZipError> {
+fn zip_archive(parts: &[(String, &[u8])]) -> Result<Vec<u8>, ZipError> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default())
@@ -198,19 +207,19 @@ mod tests {
     use crate::fmu::FmuKind;
 
     /// Returns headers of libraries as the operating systems define them, followed by the names of the functions.
-    fn heads() -> [(Vec<u8>, &'static str, &'static str); 5] {
+    fn library_headers() -> [(Vec<u8>, &'static str, &'static str); 5] {
         let elf = |machine: u16| {
             let mut bytes = vec![0; 64];
-            bytes[..6].copy_from_slice(ELF);
+            bytes[..6].copy_from_slice(ELF_MAGIC);
             bytes[18..20].copy_from_slice(&machine.to_le_bytes());
             bytes
         };
-        let mac = |machine: u32| [MACH_O, &machine.to_le_bytes()].concat();
+        let mac = |machine: u32| [MACH_O_MAGIC, &machine.to_le_bytes()].concat();
         let mut windows = vec![0; 0x100];
         windows[..2].copy_from_slice(b"MZ");
         windows[0x3c] = 0x80;
         windows[0x80..0x86].copy_from_slice(b"PE\0\0\x64\x86");
-        let names = FUNCTIONS.map(|name| format!("\0{name}")).concat() + "\0";
+        let names = EXPORTED_FUNCTIONS.map(|name| format!("\0{name}")).concat() + "\0";
         [
             (elf(62), "linux64/hoid.so", "x86_64-linux/hoid.so"),
             (elf(183), "aarch64-linux/hoid.so", "aarch64-linux/hoid.so"),
@@ -228,7 +237,7 @@ mod tests {
     #[test]
     fn libraries_are_stored_in_their_platform_folder() {
         let folder = tempfile::tempdir().unwrap();
-        let files: Vec<_> = (heads().into_iter().enumerate())
+        let files: Vec<_> = (library_headers().into_iter().enumerate())
             .map(|(i, (bytes, ..))| {
                 let path = folder.path().join(format!("{i}"));
                 fs::write(&path, bytes).unwrap();
@@ -247,7 +256,7 @@ mod tests {
             write_fmu(&path, version, &settings, &read(), 0.01).unwrap();
             let written = fs::read(&path).unwrap();
             let mut archive = ZipArchive::new(Cursor::new(&written)).unwrap();
-            for (bytes, fmi2_folder, fmi3_folder) in heads() {
+            for (bytes, fmi2_folder, fmi3_folder) in library_headers() {
                 let place = if version == FmiVersion::Two {
                     fmi2_folder
                 } else {
@@ -276,7 +285,7 @@ mod tests {
     fn other_files_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
-        for (bytes, ..) in heads() {
+        for (bytes, ..) in library_headers() {
             for length in 0..bytes.len().min(0x86) {
                 assert!(Platform::of(&bytes[..length]).is_none() || length >= 8, "{length}");
             }
@@ -290,8 +299,8 @@ mod tests {
         }
         assert!(Library::read(&folder.path().join("nowhere")).is_err());
         // A library that contains only part of a function name is refused.
-        for (bytes, ..) in heads() {
-            let text = String::from_utf8_lossy(FUNCTIONS[1].as_bytes()).into_owned();
+        for (bytes, ..) in library_headers() {
+            let text = String::from_utf8_lossy(EXPORTED_FUNCTIONS[1].as_bytes()).into_owned();
             let place = bytes.windows(text.len()).position(|w| w == text.as_bytes()).unwrap();
             let mut other = bytes.clone();
             other[place] = b'F';

@@ -19,9 +19,9 @@ hoid_model::named_choice!(FmiVersion, "version of FMI", 2, {
 });
 
 /// Name of the library in an FMU.
-pub(super) const MODEL: &str = "hoid";
+pub(super) const MODEL_IDENTIFIER: &str = "hoid";
 /// Units, each with its nonzero exponents of the SI base units and rad, and its factor if this is not 1.
-const UNITS: [(&str, &str); 3] = [
+const UNIT_DEFINITIONS: [(&str, &str); 3] = [
     ("s", r#"s="1""#),
     ("rad/s", r#"s="-1" rad="1""#),
     ("deg", r#"rad="1" factor="0.017453292519943295""#),
@@ -64,11 +64,11 @@ pub(super) fn description(version: FmiVersion, kind: FmuKind, variables: &[FmuVa
     };
     let _ = writeln!(
         xml,
-        "  <CoSimulation modelIdentifier=\"{MODEL}\" canHandleVariableCommunicationStepSize=\"true\" \
+        "  <CoSimulation modelIdentifier=\"{MODEL_IDENTIFIER}\" canHandleVariableCommunicationStepSize=\"true\" \
          canGetAndSet{state}=\"true\" canSerialize{state}=\"true\"/>"
     );
     xml.push_str("  <UnitDefinitions>\n");
-    for (name, exponents) in UNITS {
+    for (name, exponents) in UNIT_DEFINITIONS {
         let _ = writeln!(xml, "    <Unit name=\"{name}\"><{unit_tag} {exponents}/></Unit>");
     }
     xml.push_str("  </UnitDefinitions>\n");
@@ -76,8 +76,8 @@ pub(super) fn description(version: FmiVersion, kind: FmuKind, variables: &[FmuVa
     xml.push_str("  <ModelVariables>\n");
     for (reference, variable) in variables.iter().enumerate() {
         match version {
-            FmiVersion::Two => scalar_variable(&mut xml, reference, variable),
-            FmiVersion::Three => typed_variable(&mut xml, reference, variable),
+            FmiVersion::Two => write_scalar_variable(&mut xml, reference, variable),
+            FmiVersion::Three => write_typed_variable(&mut xml, reference, variable),
         }
     }
     if version == FmiVersion::Three {
@@ -127,7 +127,7 @@ fn attributes(variable: &FmuVariable) -> &'static str {
     }
 }
 
-fn unit(variable: &FmuVariable) -> String {
+fn unit_attribute(variable: &FmuVariable) -> String {
     if variable.unit.is_empty() {
         String::new()
     } else {
@@ -135,16 +135,16 @@ fn unit(variable: &FmuVariable) -> String {
     }
 }
 
-fn scalar_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
+fn write_scalar_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
     let start = |text: String| match variable.role {
         Role::Output => String::new(),
         Role::Parameter | Role::Input => format!(" start=\"{text}\""),
     };
     let typed = match &variable.start {
-        FmuStart::Real(value) => format!("<Real{}{}/>", unit(variable), start(value.to_string())),
+        FmuStart::Real(value) => format!("<Real{}{}/>", unit_attribute(variable), start(value.to_string())),
         FmuStart::Integer(value) => format!("<Integer{}/>", start(value.to_string())),
         FmuStart::Boolean(value) => format!("<Boolean{}/>", start(value.to_string())),
-        FmuStart::Text(text) => format!("<String{}/>", start(escaped(text))),
+        FmuStart::Text(text) => format!("<String{}/>", start(escape_xml(text))),
     };
     let _ = writeln!(
         xml,
@@ -155,7 +155,7 @@ fn scalar_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
     );
 }
 
-fn typed_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
+fn write_typed_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
     let start = |text: String| match variable.role {
         Role::Output => String::new(),
         Role::Parameter | Role::Input => format!(" start=\"{text}\""),
@@ -170,7 +170,7 @@ fn typed_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
         FmuStart::Real(value) => writeln!(
             xml,
             "    <Float64 {attributes}{}{}/>",
-            unit(variable),
+            unit_attribute(variable),
             start(value.to_string())
         ),
         FmuStart::Integer(value) => writeln!(xml, "    <Int32 {attributes}{}/>", start(value.to_string())),
@@ -178,13 +178,13 @@ fn typed_variable(xml: &mut String, reference: usize, variable: &FmuVariable) {
         FmuStart::Text(text) => writeln!(
             xml,
             "    <String {attributes}><Start value=\"{}\"/></String>",
-            escaped(text)
+            escape_xml(text)
         ),
     };
 }
 
 /// Escapes text for use in an attribute.
-fn escaped(text: &str) -> String {
+fn escape_xml(text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

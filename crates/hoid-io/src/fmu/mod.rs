@@ -20,5 +20,5 @@ mod variables;
 
 pub use archive::{Library, write_fmu};
 pub use description::FmiVersion;
-pub use settings::{FMU_SETTINGS, FmuSettings};
-pub use variables::{DETERMINED, FmuKind, FmuStart, FmuVariable, Role};
+pub use settings::{FMU_SETTINGS_FILE, FmuSettings};
+pub use variables::{DETERMINED_VARIABLES, FmuKind, FmuStart, FmuVariable, Role};

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::variables::{FmuKind, FmuStart, FmuVariable, Role};
 
 /// Name of the settings file among the resources.
-pub const FMU_SETTINGS: &str = "hoid.json";
+pub const FMU_SETTINGS_FILE: &str = "hoid.json";
 
 /// Settings of an FMU.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -78,7 +78,7 @@ impl FmuSettings {
     /// # Errors
     /// A description of the problem in the text.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let settings: Self = serde_json::from_str(text).map_err(|error| format!("{FMU_SETTINGS}: {error}"))?;
+        let settings: Self = serde_json::from_str(text).map_err(|error| format!("{FMU_SETTINGS_FILE}: {error}"))?;
         settings.kind()?;
         Ok(settings)
     }
@@ -95,7 +95,7 @@ impl FmuSettings {
     /// # Errors
     /// A message if the kind is invalid.
     pub fn kind(&self) -> Result<FmuKind, String> {
-        FmuKind::of_name(&self.kind).map_err(|error| format!("{FMU_SETTINGS}: {error}"))
+        FmuKind::from_name(&self.kind).map_err(|error| format!("{FMU_SETTINGS_FILE}: {error}"))
     }
 
     /// Returns the variables with the start values of this FMU.
@@ -107,14 +107,14 @@ impl FmuSettings {
         for (name, given) in &self.parameters {
             let parameter = (all.iter_mut())
                 .find(|variable| variable.role == Role::Parameter && variable.name == name)
-                .ok_or_else(|| format!("{FMU_SETTINGS}: the FMU has no parameter {name}"))?;
+                .ok_or_else(|| format!("{FMU_SETTINGS_FILE}: the FMU has no parameter {name}"))?;
             parameter.start = match (&parameter.start, given) {
                 (FmuStart::Real(_), SettingValue::Real(value)) => FmuStart::Real(*value),
                 (FmuStart::Real(_), SettingValue::Integer(value)) => FmuStart::Real(f64::from(*value)),
                 (FmuStart::Integer(_), SettingValue::Integer(value)) => FmuStart::Integer(*value),
                 (FmuStart::Boolean(_), SettingValue::Boolean(value)) => FmuStart::Boolean(*value),
                 (FmuStart::Text(_), SettingValue::Text(text)) => FmuStart::Text(text.clone()),
-                _ => return Err(format!("{FMU_SETTINGS}: the parameter {name} has the wrong type")),
+                _ => return Err(format!("{FMU_SETTINGS_FILE}: the parameter {name} has the wrong type")),
             };
         }
         Ok(all)
@@ -145,7 +145,10 @@ mod tests {
             assert!(wrong.variables().is_err());
         }
         for wrong in ["", "{}", "{\"kind\": \"cat\"}"] {
-            assert!(FmuSettings::parse(wrong).unwrap_err().contains(FMU_SETTINGS), "{wrong}");
+            assert!(
+                FmuSettings::parse(wrong).unwrap_err().contains(FMU_SETTINGS_FILE),
+                "{wrong}"
+            );
         }
     }
 }

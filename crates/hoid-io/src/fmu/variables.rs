@@ -2,7 +2,7 @@
 
 /// Names of the variables that indicate for each parameter of the operator whether the data determine it, in the order
 /// of the parameters.
-pub const DETERMINED: [&str; 6] = [
+pub const DETERMINED_VARIABLES: [&str; 6] = [
     "K_e_determined",
     "T_L_determined",
     "K_e_dot_determined",
@@ -78,13 +78,13 @@ impl FmuKind {
     /// Returns the variables in the order of their value references: parameters, inputs, outputs.
     pub fn variables(self) -> Vec<FmuVariable> {
         match self {
-            Self::Tracker => tracker(),
-            Self::Operator => operator(),
+            Self::Tracker => tracker_variables(),
+            Self::Operator => operator_variables(),
         }
     }
 }
 
-fn tracker() -> Vec<FmuVariable> {
+fn tracker_variables() -> Vec<FmuVariable> {
     use FmuStart::{Boolean, Integer, Real, Text};
     let parameter = |name, unit, start, help| variable(Role::Parameter, name, unit, start, help);
     let input = |name, help| variable(Role::Input, name, "", Real(0.0), help);
@@ -153,7 +153,7 @@ fn tracker() -> Vec<FmuVariable> {
         all.push(output(name, unit, Real(f64::NAN), help));
         all.push(output(error, unit, Real(f64::NAN), error_help));
     }
-    for name in DETERMINED {
+    for name in DETERMINED_VARIABLES {
         all.push(output(
             name,
             "",
@@ -191,7 +191,7 @@ fn tracker() -> Vec<FmuVariable> {
     all
 }
 
-fn operator() -> Vec<FmuVariable> {
+fn operator_variables() -> Vec<FmuVariable> {
     use FmuStart::{Integer, Real};
     vec![
         variable(Role::Parameter, "seed", "", Integer(0), "seed of the remnant"),

@@ -17,7 +17,7 @@ use crate::table::Cell;
 
 /// Number of directories searched: the directory of the recording and, above it, the directories of session, person and
 /// data set.
-const DIRECTORIES: usize = 4;
+const SEARCHED_DIRECTORY_COUNT: usize = 4;
 
 /// Content of the JSON file of a recording.
 #[derive(Deserialize)]
@@ -59,23 +59,27 @@ fn sidecar(path: &Path) -> Option<Sidecar> {
     let entities: Vec<&str> = entities.split('_').collect();
     let absolute = std::path::absolute(path).ok()?;
     // The nearest directory takes precedence, and in it the name with the most entities.
-    absolute.ancestors().skip(1).take(DIRECTORIES).find_map(|directory| {
-        let mut found: Vec<(usize, PathBuf)> = Vec::new();
-        for entry in fs::read_dir(directory).ok()?.flatten() {
-            let path = entry.path();
-            let name = entry.file_name();
-            let Some(name) = name.to_str().and_then(|name| name.strip_suffix(".json")) else {
-                continue;
-            };
-            let (own, own_suffix) = name.rsplit_once('_').unwrap_or(("", name));
-            let own: Vec<&str> = own.split('_').filter(|entity| !entity.is_empty()).collect();
-            if own_suffix == suffix && own.iter().all(|entity| entities.contains(entity)) {
-                found.push((own.len(), path));
+    absolute
+        .ancestors()
+        .skip(1)
+        .take(SEARCHED_DIRECTORY_COUNT)
+        .find_map(|directory| {
+            let mut found: Vec<(usize, PathBuf)> = Vec::new();
+            for entry in fs::read_dir(directory).ok()?.flatten() {
+                let path = entry.path();
+                let name = entry.file_name();
+                let Some(name) = name.to_str().and_then(|name| name.strip_suffix(".json")) else {
+                    continue;
+                };
+                let (own, own_suffix) = name.rsplit_once('_').unwrap_or(("", name));
+                let own: Vec<&str> = own.split('_').filter(|entity| !entity.is_empty()).collect();
+                if own_suffix == suffix && own.iter().all(|entity| entities.contains(entity)) {
+                    found.push((own.len(), path));
+                }
             }
-        }
-        found.sort_unstable_by(|a, b| b.cmp(a));
-        found.iter().find_map(|(_, path)| Sidecar::read(path))
-    })
+            found.sort_unstable_by(|a, b| b.cmp(a));
+            found.iter().find_map(|(_, path)| Sidecar::read(path))
+        })
 }
 
 /// Returns names and units of the columns from the table of channels of a motion recording; empty if there is none.

@@ -1,6 +1,6 @@
 //! Memory limit of a file of any format, because a crafted file of a few bytes can decompress to any length.
 //!
-//! A file of n bytes may decompress to `48 MB + 64 n`, at most 16 GB. The environment variable [`UNPACKED`], in
+//! A file of n bytes may decompress to `48 MB + 64 n`, at most 16 GB. The environment variable [`LIMIT_VARIABLE`], in
 //! megabytes, replaces this limit if it is larger. Parsing a settings file takes many times the memory of its text
 //! (TOML up to a hundred times, JSON less). The text may therefore have at most 2 MB (TOML) or 10 MB (JSON), or a
 //! fraction of the limit in the environment variable if that is larger.
@@ -12,13 +12,13 @@ use crate::IoError;
 /// MB.
 const MIN_BUDGET_BYTES: u64 = 48 << 20;
 /// Additional decompressed bytes allowed per byte of the file.
-const FACTOR: u64 = 64;
+const BUDGET_BYTES_PER_FILE_BYTE: u64 = 64;
 /// Largest number of bytes to which a file may decompress, regardless of its size.
-const CEILING: u64 = 16 << 30;
+const MAX_BUDGET_BYTES: u64 = 16 << 30;
 /// Environment variable that raises the limit, in MB.
-const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
+const LIMIT_VARIABLE: &str = "HOID_MAX_UNPACKED_MB";
 /// Memory that a text takes in addition to its characters, in bytes.
-const TEXT: u64 = 64;
+const TEXT_OVERHEAD_BYTES: u64 = 64;
 /// Maximum nesting of structures.
 pub(super) const MAX_NESTING: usize = 32;
 
@@ -32,11 +32,11 @@ pub(super) struct Budget {
 impl Budget {
     /// Returns the budget of a file of the given size in bytes.
     pub(super) fn of(file_bytes: usize) -> Self {
-        let by_size = MIN_BUDGET_BYTES.saturating_add(FACTOR.saturating_mul(file_bytes as u64));
-        Self::up_to(by_size.min(CEILING).max(raised().unwrap_or(0)))
+        let by_size = MIN_BUDGET_BYTES.saturating_add(BUDGET_BYTES_PER_FILE_BYTE.saturating_mul(file_bytes as u64));
+        Self::with_limit(by_size.min(MAX_BUDGET_BYTES).max(configured_limit().unwrap_or(0)))
     }
 
-    fn up_to(all: u64) -> Self {
+    fn with_limit(all: u64) -> Self {
         Self { remaining: all, all }
     }
 
@@ -64,27 +64,32 @@ impl Budget {
 
     /// Reserves the memory of `count` texts with `bytes` bytes in total.
     pub(super) fn take_texts(&mut self, count: usize, bytes: usize, file: &str) -> Result<(), IoError> {
-        self.take(TEXT.saturating_mul(count as u64).saturating_add(bytes as u64), file)
+        self.take(
+            TEXT_OVERHEAD_BYTES
+                .saturating_mul(count as u64)
+                .saturating_add(bytes as u64),
+            file,
+        )
     }
 }
 
 /// Returns the limit in the environment variable in bytes; `None` if it is not set.
-fn raised() -> Option<u64> {
-    let megabytes: u64 = std::env::var(UNPACKED).ok()?.trim().parse().ok()?;
+fn configured_limit() -> Option<u64> {
+    let megabytes: u64 = std::env::var(LIMIT_VARIABLE).ok()?.trim().parse().ok()?;
     megabytes.checked_mul(1 << 20)
 }
 
 /// Text format of a settings file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Settings {
+pub(crate) enum SettingsFormat {
     Json,
     Toml,
 }
 
-impl Settings {
+impl SettingsFormat {
     /// Returns the number by which the limit in the environment variable is divided to obtain the maximum length of the
     /// text.
-    pub(crate) fn share(self) -> u64 {
+    pub(crate) fn limit_divisor(self) -> u64 {
         match self {
             Self::Json => 32,
             Self::Toml => 128,
@@ -92,12 +97,12 @@ impl Settings {
     }
 
     /// Returns the maximum length of the text in bytes.
-    pub(crate) fn longest(self) -> u64 {
+    pub(crate) fn max_bytes(self) -> u64 {
         let typical = match self {
             Self::Json => 10 << 20,
             Self::Toml => 2 << 20,
         };
-        let most = raised().and_then(|raised| raised.checked_div(self.share()));
+        let most = configured_limit().and_then(|raised| raised.checked_div(self.limit_divisor()));
         most.map_or(typical, |most| typical.max(most))
     }
 }
@@ -117,8 +122,8 @@ mod tests {
         assert!(Budget::of(1000).take_texts(1_000_000, 1_000_000, "a.mat").is_err());
         // A larger file may decompress to more.
         Budget::of(10 << 20).take(1 << 29, "a.mat").unwrap();
-        assert!(Budget::of(usize::MAX).take(CEILING + 1, "a.mat").is_err());
-        let message = Budget::up_to(1).take(2, "a.mat").unwrap_err().to_string();
-        assert!(message.contains(UNPACKED), "{message}");
+        assert!(Budget::of(usize::MAX).take(MAX_BUDGET_BYTES + 1, "a.mat").is_err());
+        let message = Budget::with_limit(1).take(2, "a.mat").unwrap_err().to_string();
+        assert!(message.contains(LIMIT_VARIABLE), "{message}");
     }
 }

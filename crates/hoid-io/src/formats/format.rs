@@ -11,7 +11,7 @@ use super::arrays::{Contents, output_table_of, table_of};
 use crate::IoError;
 use crate::record::{ReadOptions, topics, trials};
 use crate::results::{OutputTable, TableSchema, Values};
-use crate::table::{Table, check_selected, selected};
+use crate::table::{Table, check_selected, select_columns};
 use crate::time::with_time;
 
 /// A file format.
@@ -21,9 +21,9 @@ pub(crate) struct Format {
     /// Extensions in lower case, the default one first.
     pub(super) extensions: &'static [&'static str],
     /// Reader of the format.
-    pub(crate) reading: Reading,
+    pub(crate) reading: FormatReader,
     /// Writer of a table of results.
-    pub(crate) writing: Writing,
+    pub(crate) writing: FormatWriter,
     /// Writer of a record; `None` if a record is written as a table of its channels.
     pub(crate) record: Option<RecordWriter>,
 }
@@ -35,13 +35,13 @@ type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
 /// Function that reads all arrays of a file with their paths.
 type ArraysReader = fn(Vec<u8>, &str) -> Result<Contents, IoError>;
 /// Function that starts a file to be written row by row.
-type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
+type RowWriterStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
 /// Function that writes columns of equal length.
 pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;
 type RecordWriter = fn(&mut dyn Write, &Record) -> io::Result<()>;
 
 /// Structure of a file of this format, and the functions that read it.
-pub(crate) enum Reading {
+pub(crate) enum FormatReader {
     /// One flat table.
     Table {
         /// Reader of the numeric columns, for a record.
@@ -54,9 +54,9 @@ pub(crate) enum Reading {
 }
 
 /// Kind of writer of the format.
-pub(crate) enum Writing {
+pub(crate) enum FormatWriter {
     /// Rows are written in groups, in bounded memory.
-    Rows(RowsStart),
+    Rows(RowWriterStart),
     /// Each column is written as one array preceded by its length: all rows must be known before writing.
     Columns(ColumnsWriter),
     /// Files are only read; the text describes the format, such as "hoid only reads this format".
@@ -66,7 +66,7 @@ pub(crate) enum Writing {
 /// Writer of a file in groups of rows. The file is borrowed only during each call.
 pub(crate) trait RowWriter {
     /// Writes a group of rows as columns of equal length.
-    fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()>;
+    fn write_rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()>;
     /// Completes the file.
     fn finish(self: Box<Self>, file: &mut dyn Write) -> io::Result<()>;
 }
@@ -74,7 +74,7 @@ pub(crate) trait RowWriter {
 impl Format {
     /// True if tables and records can be written.
     pub(super) fn is_written(&self) -> bool {
-        !matches!(self.writing, Writing::ReadOnly(_))
+        !matches!(self.writing, FormatWriter::ReadOnly(_))
     }
 
     /// Reads the columns of a record.
@@ -85,10 +85,10 @@ impl Format {
         options: &ReadOptions,
     ) -> Result<Table<'a>, IoError> {
         match self.reading {
-            Reading::Table { record, .. } => with_time_and_selection(record(bytes, file)?, false, options),
-            Reading::Arrays(read) => {
+            FormatReader::Table { record, .. } => with_time_and_selection(record(bytes, file)?, false, options),
+            FormatReader::Arrays(read) => {
                 let contents = read(std::mem::take(bytes), file)?;
-                let (contents, is_trial) = trials::of_contents(contents, options.trial.as_ref(), file)?;
+                let (contents, is_trial) = trials::select_trial_in_contents(contents, options.trial.as_ref(), file)?;
                 with_time_and_selection(table_of(contents, options, file)?, is_trial, options)
             }
         }
@@ -97,8 +97,8 @@ impl Format {
     /// Reads a table of results.
     pub(crate) fn results(&self, bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
         match self.reading {
-            Reading::Table { results, .. } => results(bytes, file),
-            Reading::Arrays(read) => output_table_of(read(bytes, file)?, file),
+            FormatReader::Table { results, .. } => results(bytes, file),
+            FormatReader::Arrays(read) => output_table_of(read(bytes, file)?, file),
         }
     }
 }
@@ -111,7 +111,7 @@ pub(super) fn with_time_and_selection<'a>(
 ) -> Result<Table<'a>, IoError> {
     let table = with_time(table, options.time.as_ref())?;
     check_selected(&table.names(), options, table.source.file())?;
-    let table = selected(table, |_, name| name == "t" || options.wants(name));
+    let table = select_columns(table, |_, name| name == "t" || options.needs_column(name));
     // With a given sampling frequency the samples are counted: no time column is needed, and a time that restarts is
     // ignored.
     let by_itself = options.trial.is_none() && options.sampling_hz.is_some();
@@ -120,7 +120,7 @@ pub(super) fn with_time_and_selection<'a>(
     }
     let table = match options.trial {
         Some(_) => table,
-        None => topics::joined(table, options),
+        None => topics::join_topics(table, options),
     };
     trials::select_trial(table, options.trial.as_ref())
 }

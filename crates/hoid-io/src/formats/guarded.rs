@@ -17,8 +17,8 @@ thread_local! {
 }
 
 /// Returns the result of a third-party reader; a panic becomes [`IoError::Damaged`].
-pub(super) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) -> Result<T, IoError> {
-    without_panic(read).unwrap_or_else(|what| {
+pub(super) fn guard_read<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) -> Result<T, IoError> {
+    catch_panic(read).unwrap_or_else(|what| {
         Err(IoError::Damaged {
             file: file.to_owned(),
             found: format!("it could not be read to the end ({})", short_error(&what)),
@@ -30,7 +30,7 @@ pub(super) fn guarded<T>(file: &str, read: impl FnOnce() -> Result<T, IoError>) 
 ///
 /// The panic hook is replaced once per process. The new hook prints nothing on a thread that is reading, and reports
 /// all other panics as before.
-fn without_panic<T>(read: impl FnOnce() -> T) -> Result<T, String> {
+fn catch_panic<T>(read: impl FnOnce() -> T) -> Result<T, String> {
     static HOOK: Once = Once::new();
     // The hook cannot be replaced while the thread is panicking.
     if !thread::panicking() {
@@ -58,10 +58,10 @@ mod tests {
 
     #[test]
     fn panic_becomes_an_error_message() {
-        assert_eq!(without_panic(|| 1), Ok(1));
-        let nested = without_panic(|| {
+        assert_eq!(catch_panic(|| 1), Ok(1));
+        let nested = catch_panic(|| {
             assert_eq!(
-                without_panic(|| -> u8 { panic!("of {}", "two parts") }),
+                catch_panic(|| -> u8 { panic!("of {}", "two parts") }),
                 Err("of two parts".into())
             );
             assert!(READING.get());

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
-use super::format::{Format, Writing, with_time_and_selection};
-use super::{ALL, bids, csv, packed};
+use super::format::{Format, FormatWriter, with_time_and_selection};
+use super::{FORMATS, bids, csv, packed};
 use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::Table;
@@ -15,14 +15,14 @@ use crate::table::Table;
 /// Returns the extensions of the files that can be read, for help texts and messages:
 /// `.csv (also as .txt), .tsv, ... or .xdf`.
 #[must_use]
-pub fn readable_endings() -> String {
-    extensions(ALL)
+pub fn readable_extensions() -> String {
+    extensions(FORMATS)
 }
 
 /// Returns the extensions of the files that can be written, for help texts and messages.
 #[must_use]
-pub fn writable_endings() -> String {
-    let written: Vec<&Format> = ALL.iter().copied().filter(|format| format.is_written()).collect();
+pub fn writable_extensions() -> String {
+    let written: Vec<&Format> = FORMATS.iter().copied().filter(|format| format.is_written()).collect();
     extensions(&written)
 }
 
@@ -43,10 +43,10 @@ fn extensions(formats: &[&Format]) -> String {
 }
 
 /// Remedies for files of other programs, by extension. In Python, `pyhoid.read` reads the formats with the remedy
-/// `PYTHON`.
-const ELSEWHERE: [(&[&str], &str); 12] = [
+/// `PYTHON_REMEDY`.
+const UNSUPPORTED_FORMAT_REMEDIES: [(&[&str], &str); 12] = [
     (&["gz", "zip", "bz2", "xz", "zst"], "unpack it first"),
-    (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON),
+    (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON_REMEDY),
     (
         &["mcap"],
         "read its topics with the Python package mcap and make a pyhoid.Record from them",
@@ -83,27 +83,28 @@ const ELSEWHERE: [(&[&str], &str); 12] = [
     (&["mlx", "slx"], "save the variables in MATLAB: save run1.mat e u t"),
 ];
 /// The remedy for files that pyhoid reads.
-const PYTHON: &str = "save it as CSV or Parquet, or read it in Python with pyhoid.read";
+const PYTHON_REMEDY: &str = "save it as CSV or Parquet, or read it in Python with pyhoid.read";
 
 /// Returns the extension of a file in lower case.
-fn ending_of(path: &Path) -> Option<String> {
+fn extension_of(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
 }
 
 /// Returns the format that corresponds to the extension of a file.
 fn format_of(path: &Path) -> Option<&'static Format> {
-    let ending = ending_of(path)?;
-    ALL.iter()
+    let ending = extension_of(path)?;
+    FORMATS
+        .iter()
         .copied()
         .find(|format| format.extensions.contains(&ending.as_str()))
 }
 
 /// Returns the error for an extension that belongs to no format, with the `expected` extensions and, if there is one,
 /// the remedy.
-fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
+fn unknown_format_error(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     IoError::UnknownFormat {
         file: path.display().to_string(),
-        found: ending_of(path).map_or(String::from("the name has no extension"), |ending| {
+        found: extension_of(path).map_or(String::from("the name has no extension"), |ending| {
             format!(".{ending} is not the extension of a record format")
         }),
         expected,
@@ -112,22 +113,24 @@ fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
 }
 
 /// Returns the error for a file that will be read and whose extension belongs to no format.
-fn not_readable(path: &Path) -> IoError {
-    let ending = ending_of(path).unwrap_or_default();
-    let elsewhere = ELSEWHERE.iter().find(|(endings, _)| endings.contains(&ending.as_str()));
-    unknown(path, readable_endings(), elsewhere.map(|(_, remedy)| *remedy))
+fn unreadable_format_error(path: &Path) -> IoError {
+    let ending = extension_of(path).unwrap_or_default();
+    let elsewhere = UNSUPPORTED_FORMAT_REMEDIES
+        .iter()
+        .find(|(endings, _)| endings.contains(&ending.as_str()));
+    unknown_format_error(path, readable_extensions(), elsewhere.map(|(_, remedy)| *remedy))
 }
 
 /// Returns the format of a file that will be read: the format of its extension, or text if the extension belongs to no
 /// format and the file starts with a table. Many programs write text files with the extension `.dat` or `.log`, or
 /// without an extension.
 fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
-    let inner = packed::inner(path);
+    let inner = packed::path_without_gz(path);
     match format_of(inner.as_deref().unwrap_or(path)) {
         // Binary formats compress their columns themselves.
         Some(format) if inner.is_none() || format.name == csv::CSV.name => Ok(format),
         None if starts_with_table(path, inner.is_some()) => Ok(&csv::CSV),
-        _ => Err(not_readable(path)),
+        _ => Err(unreadable_format_error(path)),
     }
 }
 
@@ -162,9 +165,9 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
             file: path.display().to_string(),
         }),
         Some(known) if !known.is_file() => Ok(format_of(path).unwrap_or(&csv::CSV)),
-        _ => format_of(path).ok_or_else(|| unknown(path, writable_endings(), None)),
+        _ => format_of(path).ok_or_else(|| unknown_format_error(path, writable_extensions(), None)),
     }?;
-    let Writing::ReadOnly(what) = format.writing else {
+    let FormatWriter::ReadOnly(what) = format.writing else {
         return Ok(format);
     };
     Err(IoError::UnknownFormat {
@@ -173,20 +176,20 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
             ".{} cannot be written ({what})",
             format.extensions.first().copied().unwrap_or_default()
         ),
-        expected: writable_endings(),
+        expected: writable_extensions(),
         remedy: String::new(),
     })
 }
 
 /// Returns the format of a file and its bytes. A text compressed by gzip is decompressed, and a BIDS table gets a
 /// header.
-pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoError> {
+pub(crate) fn read_with_format(path: &Path) -> Result<(&'static Format, Vec<u8>), IoError> {
     let file = path.display().to_string();
     if path.is_dir() {
         return Err(IoError::Directory { file });
     }
     let format = format_to_read(path)?;
-    let inner = packed::inner(path);
+    let inner = packed::path_without_gz(path);
     let read = |path| {
         fs::read(path).map_err(|source| IoError::Unreadable {
             file: file.clone(),
@@ -195,11 +198,11 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoErro
     };
     let mut bytes = match (&inner, format.name == csv::CSV.name) {
         (Some(_), _) => {
-            let bytes = packed::decompressed(&read(path)?, &file)?;
+            let bytes = packed::decompress(&read(path)?, &file)?;
             csv::LineLimit::default().add(&bytes, &file)?;
             bytes
         }
-        (None, true) => csv::whole_text(path, &file)?,
+        (None, true) => csv::read_whole_text(path, &file)?,
         (None, false) => read(path)?,
     };
     if format.extensions == csv::TSV.extensions {
@@ -213,12 +216,12 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoErro
 ///
 /// # Errors
 /// [`IoError::Unreadable`]; [`IoError::LongLine`].
-pub(crate) fn long_text<'a>(
+pub(crate) fn read_long_text<'a>(
     path: &Path,
     file: &'a str,
     options: &ReadOptions,
 ) -> Result<Option<(&'static Format, Table<'a>)>, IoError> {
-    let is_text = |format: &&Format| packed::inner(path).is_none() && format.name == csv::CSV.name;
+    let is_text = |format: &&Format| packed::path_without_gz(path).is_none() && format.name == csv::CSV.name;
     let Some(format) = format_to_read(path).ok().filter(is_text) else {
         return Ok(None);
     };
@@ -235,10 +238,10 @@ pub(crate) fn table_of_file<'a>(
     bytes: &'a mut Vec<u8>,
     options: &ReadOptions,
 ) -> Result<Table<'a>, IoError> {
-    if let Some((_, table)) = long_text(path, file, options)? {
+    if let Some((_, table)) = read_long_text(path, file, options)? {
         return with_time_and_selection(table, false, options);
     }
-    let (format, read) = bytes_of(path)?;
+    let (format, read) = read_with_format(path)?;
     *bytes = read;
     format.table(bytes, file, options)
 }
@@ -249,17 +252,21 @@ mod tests {
 
     #[test]
     fn each_extension_belongs_to_one_format() {
-        let mut endings: Vec<&str> = ALL.iter().flat_map(|format| format.extensions).copied().collect();
+        let mut endings: Vec<&str> = FORMATS.iter().flat_map(|format| format.extensions).copied().collect();
         let count = endings.len();
         endings.sort_unstable();
         endings.dedup();
         assert_eq!(endings.len(), count);
-        assert!(ALL.iter().all(|format| !format.extensions.is_empty()));
+        assert!(FORMATS.iter().all(|format| !format.extensions.is_empty()));
     }
 
     #[test]
     fn each_unsupported_extension_has_one_remedy() {
-        let mut endings: Vec<&str> = ELSEWHERE.iter().flat_map(|(endings, _)| *endings).copied().collect();
+        let mut endings: Vec<&str> = UNSUPPORTED_FORMAT_REMEDIES
+            .iter()
+            .flat_map(|(endings, _)| *endings)
+            .copied()
+            .collect();
         assert!(
             endings
                 .iter()
@@ -287,7 +294,7 @@ mod tests {
             extensions(&[&csv::CSV, &csv::TSV, &csv::TSV]),
             ".csv (also as .txt), .tsv or .tsv"
         );
-        assert!(readable_endings().contains(".xdf"));
-        assert!(!writable_endings().contains(".xdf"));
+        assert!(readable_extensions().contains(".xdf"));
+        assert!(!writable_extensions().contains(".xdf"));
     }
 }

@@ -1,6 +1,6 @@
 //! The file formats, one module per format, and their common parts.
 //!
-//! To add a format, write a module with a [`Format`] and add its `mod` line and its entry in [`ALL`] here.
+//! To add a format, write a module with a [`Format`] and add its `mod` line and its entry in [`FORMATS`] here.
 //!
 //! | module | contents |
 //! |---|---|
@@ -30,14 +30,14 @@ mod packed;
 mod parquet;
 mod xdf;
 
-pub(crate) use budget::Settings;
+pub(crate) use budget::SettingsFormat;
 pub(crate) use csv::write_record as write_record_as_csv;
-pub(crate) use format::{ColumnsWriter, Format, Reading, RowWriter, Writing};
-pub(crate) use lookup::{bytes_of, format_to_write, long_text, table_of_file};
-pub use lookup::{readable_endings, writable_endings};
+pub(crate) use format::{ColumnsWriter, Format, FormatReader, FormatWriter, RowWriter};
+pub(crate) use lookup::{format_to_write, read_long_text, read_with_format, table_of_file};
+pub use lookup::{readable_extensions, writable_extensions};
 
 /// All formats, in the order in which messages list them. No two formats share an extension.
-const ALL: &[&Format] = &[
+const FORMATS: &[&Format] = &[
     &csv::CSV,
     &csv::TSV,
     &parquet::PARQUET,

@@ -12,13 +12,13 @@ use crate::IoError;
 const PART_BYTES: usize = 1 << 16;
 
 /// Returns the path without `.gz`; `None` if the file has another extension.
-pub(super) fn inner(path: &Path) -> Option<PathBuf> {
+pub(super) fn path_without_gz(path: &Path) -> Option<PathBuf> {
     let packed = path.extension()?.eq_ignore_ascii_case("gz");
     packed.then(|| path.with_extension(""))
 }
 
 /// Decompresses gzip data.
-pub(super) fn decompressed(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
+pub(super) fn decompress(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
     let mut budget = Budget::of(bytes.len());
     let mut reader = MultiGzDecoder::new(bytes);
     let mut text = Vec::new();

@@ -66,7 +66,9 @@ impl WholeFile {
                 let direct = fs::OpenOptions::new().write(true).open(&place);
                 direct.map(|file| (file, None))
             }
-            known => part(place, known.map(|k| k.permissions())).map(|(file, part_file)| (file, Some(part_file))),
+            known => {
+                create_part(place, known.map(|k| k.permissions())).map(|(file, part_file)| (file, Some(part_file)))
+            }
         };
         match opened {
             Ok((file, part_file)) => Ok(Self {
@@ -108,7 +110,7 @@ impl PartFile {
     }
 }
 
-fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, PartFile)> {
+fn create_part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, PartFile)> {
     let (file, part) = Part::create_in(&directory_of(&place)?)?;
     Ok((
         file,

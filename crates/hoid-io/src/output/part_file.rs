@@ -19,7 +19,7 @@ const SUFFIX: &str = ".part";
 
 /// Maximum number of attempts to create a temporary file, in case another process removes it before it is locked;
 /// normally one attempt suffices.
-const ATTEMPTS: usize = 16;
+const MAX_ATTEMPTS: usize = 16;
 
 /// Temporary files of this process, and the directories that this process has cleaned.
 struct PartFiles {
@@ -32,14 +32,14 @@ static KNOWN: Mutex<PartFiles> = Mutex::new(PartFiles {
     swept: BTreeSet::new(),
 });
 
-fn known() -> MutexGuard<'static, PartFiles> {
+fn lock_part_files() -> MutexGuard<'static, PartFiles> {
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Removes the temporary files of this process. It must be called on an interrupt, since values are not dropped when a
 /// process exits.
 pub fn remove_unfinished_files() {
-    for part in std::mem::take(&mut known().parts) {
+    for part in std::mem::take(&mut lock_part_files().parts) {
         // A file that has already been renamed needs no removal; one that cannot be removed now is removed by a later
         // process.
         let _ = fs::remove_file(part);
@@ -56,16 +56,16 @@ impl Part {
     /// are removed from the directory.
     pub(super) fn create_in(directory: &Path) -> io::Result<(File, Self)> {
         sweep_once(directory);
-        let mut made = make(directory)?;
-        for _ in 1..ATTEMPTS {
+        let mut made = create_temporary_file(directory)?;
+        for _ in 1..MAX_ATTEMPTS {
             // If the file cannot be locked, locks are not supported, and no process removes the file.
             if made.as_file().lock().is_err() || made.path().exists() {
                 break;
             }
-            made = make(directory)?;
+            made = create_temporary_file(directory)?;
         }
         let (file, path) = made.into_parts();
-        known().parts.insert(path.to_path_buf());
+        lock_part_files().parts.insert(path.to_path_buf());
         Ok((file, Self { path: Some(path) }))
     }
 
@@ -78,7 +78,7 @@ impl Part {
         let part = NamedTempFile::from_parts(file, path);
         let set = permissions.map_or(Ok(()), |permissions| fs::set_permissions(part.path(), permissions));
         let persisted = set.and_then(|()| part.persist(place).map(drop).map_err(|error| error.error));
-        known().parts.remove(&name);
+        lock_part_files().parts.remove(&name);
         persisted
     }
 }
@@ -86,14 +86,14 @@ impl Part {
 impl Drop for Part {
     fn drop(&mut self) {
         if let Some(path) = &self.path {
-            known().parts.remove(&path.to_path_buf());
+            lock_part_files().parts.remove(&path.to_path_buf());
         }
     }
 }
 
 /// Creates a file with default permissions (according to the umask), since temporary files are otherwise private to
 /// their owner.
-fn make(directory: &Path) -> io::Result<NamedTempFile> {
+fn create_temporary_file(directory: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);
     #[cfg(unix)]
@@ -117,7 +117,7 @@ fn without_path(error: io::Error) -> io::Error {
 /// Removes temporary files that processes left in a directory when they ended, the first time this process writes to it.
 fn sweep_once(directory: &Path) {
     let directory = fs::canonicalize(directory).unwrap_or_else(|_| directory.to_owned());
-    if known().swept.insert(directory.clone()) {
+    if lock_part_files().swept.insert(directory.clone()) {
         sweep(&directory);
     }
 }
@@ -180,8 +180,8 @@ mod tests {
         let (_file, part) = Part::create_in(dir.path()).unwrap();
         // Only the file in this directory is examined: other tests have temporary files in progress.
         let own = part.path.as_ref().unwrap().to_path_buf();
-        assert!(known().parts.contains(&own) && own.exists());
+        assert!(lock_part_files().parts.contains(&own) && own.exists());
         drop(part);
-        assert!(!known().parts.contains(&own) && !own.exists());
+        assert!(!lock_part_files().parts.contains(&own) && !own.exists());
     }
 }

@@ -67,12 +67,12 @@ pub fn check_output_directory(directory: &Path, inputs: &[&Path]) -> Result<(), 
             input: input.display().to_string(),
         });
     }
-    let tried = nearest(directory).and_then(|there| Part::create_in(&there).map(drop));
+    let tried = nearest_existing(directory).and_then(|there| Part::create_in(&there).map(drop));
     tried.map_err(|source| IoError::Unwritable { file: file(), source })
 }
 
 /// Returns the directory if it exists, otherwise its nearest existing parent.
-fn nearest(directory: &Path) -> io::Result<PathBuf> {
+fn nearest_existing(directory: &Path) -> io::Result<PathBuf> {
     let mut at = directory;
     loop {
         match fs::metadata(at) {
@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_output_that_is_an_input_is_refused_by_any_name() {
+    fn output_equal_to_an_input_is_refused_under_any_name() {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
         fs::write(path("in.csv"), "t,e,u\n").unwrap();

@@ -8,12 +8,12 @@
 
 use std::str::FromStr;
 
-use hoid_model::resampling::{Kernel, PASS};
+use hoid_model::resampling::{Kernel, PASS_BAND_EDGE};
 
 use super::record_parts::RecordParts;
 use super::step::Step;
 use crate::IoError;
-use crate::wording::decimal;
+use crate::wording::format_decimal;
 
 /// Largest distance from a whole number of samples at which an offset counts as a whole number.
 const INTEGER_TOLERANCE: f64 = 1e-6;
@@ -53,12 +53,12 @@ struct Shift {
 
 impl RecordParts {
     #[expect(clippy::indexing_slicing, reason = "`find` returns indices of channels")]
-    pub(super) fn offset(&mut self, offset: &std::collections::BTreeMap<String, Offset>) -> Result<(), IoError> {
-        const STEP: &str = "offset";
+    pub(super) fn apply_offsets(&mut self, offset: &std::collections::BTreeMap<String, Offset>) -> Result<(), IoError> {
+        const STEP_NAME: &str = "offset";
         let ts = self.sample_time.s();
         let named = offset.iter().map(|(name, offset)| (name.clone(), *offset));
         let shifts: Vec<(usize, Shift)> = self
-            .find(STEP, named)?
+            .find_channels(STEP_NAME, named)?
             .into_iter()
             .map(|(channel, offset)| {
                 let samples = match offset {
@@ -76,10 +76,16 @@ impl RecordParts {
         }
         if let Some((channel, shift)) = shifts.iter().find(|(_, shift)| !shift.samples.is_finite()) {
             let found = format!("{}={}", self.channels[*channel].name, shift.samples);
-            return Err(self.error(STEP, found, "a finite number of samples or seconds"));
+            return Err(self.error(STEP_NAME, found, "a finite number of samples or seconds"));
         }
-        let kernel = Kernel::interpolating();
-        let half = |shift: Shift| if shift.interpolated { kernel.half() as f64 } else { 0.0 };
+        let kernel = Kernel::for_interpolation();
+        let half = |shift: Shift| {
+            if shift.interpolated {
+                kernel.samples_per_side() as f64
+            } else {
+                0.0
+            }
+        };
         let last = self.len() as f64 - 1.0;
         // First and last row for which every channel has the samples it needs. They are floating-point numbers, since
         // an offset may be arbitrarily large.
@@ -91,15 +97,15 @@ impl RecordParts {
         if from > to {
             let each: Vec<String> = shifts
                 .iter()
-                .map(|(channel, shift)| format!("{}={}", self.channels[*channel].name, decimal(shift.samples)))
+                .map(|(channel, shift)| format!("{}={}", self.channels[*channel].name, format_decimal(shift.samples)))
                 .collect();
             let more = if shifts.iter().any(|(_, shift)| shift.interpolated) {
-                format!(" (and {} to each side for interpolation)", kernel.half())
+                format!(" (and {} to each side for interpolation)", kernel.samples_per_side())
             } else {
                 String::new()
             };
             return Err(self.error(
-                STEP,
+                STEP_NAME,
                 format!(
                     "{} samples{more} in a record of {} samples",
                     each.join(", "),
@@ -133,7 +139,7 @@ impl RecordParts {
                 samples: shift.samples,
                 seconds: shift.samples * ts,
                 interpolated: shift.interpolated,
-                pass_hz: shift.interpolated.then_some(PASS * 0.5 / ts),
+                pass_hz: shift.interpolated.then_some(PASS_BAND_EDGE * 0.5 / ts),
                 cut_samples: cut,
             });
         }

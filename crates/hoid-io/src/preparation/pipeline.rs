@@ -45,9 +45,9 @@ impl Preparation {
         let mut parts = RecordParts::new(record);
         parts.declare_units(&self.units)?;
         parts.scale(&self.scale)?;
-        parts.offset(&self.offset)?;
-        let mut parts = parts.rate(self.rate)?;
-        parts.run_in(begin_s, self.run_in_s)?;
+        parts.apply_offsets(&self.offset)?;
+        let mut parts = parts.change_rate(self.rate)?;
+        parts.drop_run_in(begin_s, self.run_in_s)?;
         parts.detrended(self.detrend)
     }
 }

@@ -16,16 +16,16 @@
 
 use hoid_model::{
     Detrend, SampleTime,
-    resampling::{Kernel, PASS, STOP_DB},
+    resampling::{Kernel, PASS_BAND_EDGE, STOP_BAND_ATTENUATION_DB},
 };
 
 use super::record_parts::RecordParts;
 use super::step::Step;
 use crate::IoError;
-use crate::wording::decimal;
+use crate::wording::format_decimal;
 
 /// Maximum ratio of the new sampling frequency to the old one.
-const LARGEST_FACTOR: f64 = 100.0;
+const MAX_RATE_RATIO: f64 = 100.0;
 
 /// New sampling rate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -40,7 +40,7 @@ pub enum NewRate {
 }
 
 impl RecordParts {
-    pub(super) fn rate(mut self, rate: NewRate) -> Result<Self, IoError> {
+    pub(super) fn change_rate(mut self, rate: NewRate) -> Result<Self, IoError> {
         match rate {
             NewRate::Kept | NewRate::Decimated(1) => {}
             NewRate::Decimated(factor) => return self.decimated(factor),
@@ -75,11 +75,11 @@ impl RecordParts {
         }
         let factor = new.s() / old.s();
         let (length, last) = (self.len(), self.len() as f64 - 1.0);
-        if factor < 1.0 / LARGEST_FACTOR {
+        if factor < 1.0 / MAX_RATE_RATIO {
             return Err(self.error(
                 step,
-                format!("{} samples from one sample", decimal(1.0 / factor)),
-                format!("at most {LARGEST_FACTOR}"),
+                format!("{} samples from one sample", format_decimal(1.0 / factor)),
+                format!("at most {MAX_RATE_RATIO}"),
             ));
         }
         let too_long = |parts: &Self| {
@@ -87,18 +87,18 @@ impl RecordParts {
                 step,
                 format!(
                     "{length} samples for a filter that extends {} samples to each side",
-                    Kernel::limiting((1.0 / factor).min(1.0), usize::MAX)
-                        .map_or_else(|| "too many".to_owned(), |kernel| kernel.half().to_string())
+                    Kernel::for_resampling((1.0 / factor).min(1.0), usize::MAX)
+                        .map_or_else(|| "too many".to_owned(), |kernel| kernel.samples_per_side().to_string())
                 ),
                 "a longer record, or a smaller change of the rate",
             )
         };
         let kernel = if factor > 1.0 {
-            Kernel::limiting(1.0 / factor, length).ok_or_else(|| too_long(self))?
+            Kernel::for_resampling(1.0 / factor, length).ok_or_else(|| too_long(self))?
         } else {
-            Kernel::interpolating()
+            Kernel::for_interpolation()
         };
-        let half = kernel.half() as f64;
+        let half = kernel.samples_per_side() as f64;
         // The new grid starts at the first sample of the record; only samples whose filter lies within the record, up
         // to rounding, are used.
         let first = ((half - 1e-10) / factor).ceil();
@@ -118,10 +118,10 @@ impl RecordParts {
             factor,
             from_hz: 1.0 / old.s(),
             to_hz: 1.0 / new.s(),
-            pass_hz: PASS * nyquist_hz,
+            pass_hz: PASS_BAND_EDGE * nyquist_hz,
             stop_hz: (factor > 1.0).then_some(nyquist_hz),
-            stop_db: STOP_DB,
-            taps: kernel.half().saturating_mul(2).saturating_add(1),
+            stop_db: STOP_BAND_ATTENUATION_DB,
+            taps: kernel.samples_per_side().saturating_mul(2).saturating_add(1),
             cut_s,
             delay_s: 0.5 * (new.s() - old.s()),
             input_lead_s: 0.0,

@@ -4,7 +4,7 @@ use hoid_model::{Channel, Detrend, ModelError, Record, SampleTime};
 
 use super::step::Step;
 use crate::IoError;
-use crate::wording::list;
+use crate::wording::list_names;
 
 /// A record separated into its channels, and the steps applied to it.
 pub(super) struct RecordParts {
@@ -46,7 +46,7 @@ impl RecordParts {
     }
 
     /// Returns the index of each channel that a step names, with the value that the step gives for it.
-    pub(super) fn find<T: Copy>(
+    pub(super) fn find_channels<T: Copy>(
         &self,
         step: &'static str,
         named: impl Iterator<Item = (String, T)>,
@@ -64,7 +64,7 @@ impl RecordParts {
                 return Err(self.error(
                     step,
                     format!("there is no channel \"{name}\""),
-                    format!("one of {}, or e for the input and u for the output", list(&names)),
+                    format!("one of {}, or e for the input and u for the output", list_names(&names)),
                 ));
             };
             if found.iter().any(|(known, _)| *known == channel) {
@@ -109,14 +109,14 @@ impl RecordParts {
         let mut record = if has_input {
             Record::new(sample_time, next()?, next()?)
         } else {
-            Record::of_output(sample_time, next()?)
+            Record::from_output(sample_time, next()?)
         }
         .map_err(model)?
         .starting_at(start_s);
         for channel in channels {
             record = record.with_channel(channel).map_err(model)?;
         }
-        if let Some(how) = Step::of_detrend(how) {
+        if let Some(how) = Step::from_detrend(how) {
             steps.push(how);
         }
         let record = record.labelled(label.clone()).detrended(how);

@@ -10,10 +10,10 @@ use std::str::FromStr;
 use super::record_parts::RecordParts;
 use super::step::Step;
 use crate::IoError;
-use crate::wording::decimal;
+use crate::wording::format_decimal;
 
 /// Known units: name, kind, and size in multiples of the first unit of the kind.
-const UNITS: [(&str, &str, f64); 18] = [
+const KNOWN_UNITS: [(&str, &str, f64); 18] = [
     ("rad", "angle", 1.0),
     ("mrad", "angle", 1e-3),
     ("deg", "angle", PI / 180.0),
@@ -35,7 +35,7 @@ const UNITS: [(&str, &str, f64); 18] = [
 ];
 
 /// Other spellings of known units.
-const OTHER_NAMES: [(&[&str], &str); 9] = [
+const UNIT_ALIASES: [(&[&str], &str); 9] = [
     (&["degree", "degrees", "degs", "°"], "deg"),
     (&["radian", "radians", "rads"], "rad"),
     (&["meter", "metre", "meters", "metres"], "m"),
@@ -48,9 +48,9 @@ const OTHER_NAMES: [(&[&str], &str); 9] = [
 ];
 
 /// Returns the standard name of a unit; an unknown unit is returned unchanged.
-fn canonical(unit: &str) -> &str {
+fn canonical_unit(unit: &str) -> &str {
     let small = unit.to_lowercase();
-    let other = OTHER_NAMES
+    let other = UNIT_ALIASES
         .into_iter()
         .find(|(names, _)| names.contains(&small.as_str()));
     other.map_or(unit, |(_, canonical)| canonical)
@@ -74,7 +74,7 @@ impl Scaling {
     /// [`IoError::Scaling`] unless the factor is finite and not 0.
     pub fn by(factor: f64, unit: Option<&str>) -> Result<Self, IoError> {
         if factor == 0.0 || !factor.is_finite() {
-            return Err(refused(
+            return Err(scaling_error(
                 &factor.to_string(),
                 "a finite nonzero factor, since a channel times 0 carries no information",
             ));
@@ -82,7 +82,7 @@ impl Scaling {
         Ok(Self {
             factor,
             from: None,
-            to: unit.map(canonical).map(str::to_owned),
+            to: unit.map(canonical_unit).map(str::to_owned),
         })
     }
 
@@ -108,22 +108,22 @@ impl FromStr for Scaling {
             Some((left, right)) => (left.trim(), Some(right.trim())),
             None => (text.trim(), None),
         };
-        let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == canonical(name));
+        let known = |name: &str| KNOWN_UNITS.into_iter().find(|(unit, ..)| *unit == canonical_unit(name));
         // The left part is tried as a number first: "1:deg" sets the unit and changes no value.
         if let Ok(factor) = left.parse::<f64>() {
             if right == Some("") {
-                return Err(refused(text, "a unit after the colon, such as 12.5:deg"));
+                return Err(scaling_error(text, "a unit after the colon, such as 12.5:deg"));
             }
             return Self::by(factor, right).map_err(|_| {
-                refused(
+                scaling_error(
                     text,
                     "a finite nonzero factor, since a channel times 0 carries no information",
                 )
             });
         }
         let (Some(from), Some(to)) = (known(left), right.and_then(known)) else {
-            let names: Vec<&str> = UNITS.iter().map(|(name, ..)| *name).collect();
-            return Err(refused(
+            let names: Vec<&str> = KNOWN_UNITS.iter().map(|(name, ..)| *name).collect();
+            return Err(scaling_error(
                 text,
                 &format!(
                     "a factor (12.5), a factor and a unit (12.5:deg), or two units (rad:deg); known units: {}",
@@ -132,7 +132,7 @@ impl FromStr for Scaling {
             ));
         };
         if from.1 != to.1 {
-            return Err(refused(
+            return Err(scaling_error(
                 text,
                 &format!(
                     "two units of the same kind, but {} is a unit of {} and {} is a unit of {}",
@@ -148,7 +148,7 @@ impl FromStr for Scaling {
     }
 }
 
-fn refused(found: &str, expected: &str) -> IoError {
+fn scaling_error(found: &str, expected: &str) -> IoError {
     IoError::Scaling {
         found: found.to_owned(),
         expected: expected.to_owned(),
@@ -159,15 +159,15 @@ impl RecordParts {
     /// Sets the units declared for channels; a declared unit that contradicts the file is an error.
     #[expect(clippy::indexing_slicing, reason = "`find` returns indices of channels")]
     pub(super) fn declare_units(&mut self, units: &std::collections::BTreeMap<String, String>) -> Result<(), IoError> {
-        const STEP: &str = "unit";
+        const STEP_NAME: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));
-        for (channel, unit) in self.find(STEP, named)? {
-            let unit = canonical(unit);
+        for (channel, unit) in self.find_channels(STEP_NAME, named)? {
+            let unit = canonical_unit(unit);
             let known = self.channels[channel].unit.clone();
-            if !known.is_empty() && canonical(&known) != unit {
+            if !known.is_empty() && canonical_unit(&known) != unit {
                 let name = &self.channels[channel].name;
                 return Err(self.error(
-                    STEP,
+                    STEP_NAME,
                     format!("{name} is in {known} according to its file, but declared to be in {unit}"),
                     format!("the unit of the file; convert it with --scale {name}={known}:{unit}"),
                 ));
@@ -179,21 +179,24 @@ impl RecordParts {
 
     #[expect(clippy::indexing_slicing, reason = "`find` returns indices of channels")]
     pub(super) fn scale(&mut self, scale: &std::collections::BTreeMap<String, Scaling>) -> Result<(), IoError> {
-        const STEP: &str = "scale";
+        const STEP_NAME: &str = "scale";
         let named = scale.iter().map(|(name, scaling)| (name.clone(), scaling));
-        for (channel, scaling) in self.find(STEP, named)? {
+        for (channel, scaling) in self.find_channels(STEP_NAME, named)? {
             let found = self.channels[channel].unit.clone();
             if let Some(from) = scaling
                 .from
-                .filter(|from| !found.is_empty() && *from != canonical(&found))
+                .filter(|from| !found.is_empty() && *from != canonical_unit(&found))
             {
                 return Err(self.error(
-                    STEP,
+                    STEP_NAME,
                     format!(
                         "{} is in {found} according to its file, but the conversion is from {from}",
                         self.channels[channel].name
                     ),
-                    format!("the unit of the file, or a factor such as {}", decimal(scaling.factor)),
+                    format!(
+                        "the unit of the file, or a factor such as {}",
+                        format_decimal(scaling.factor)
+                    ),
                 ));
             }
             let channel = &mut self.channels[channel];

@@ -2,10 +2,10 @@
 
 use std::fmt;
 
-use hoid_model::{Decimated, Detrend, numbers::counted};
+use hoid_model::{Decimated, Detrend, numbers::count_with_noun};
 use serde::Serialize;
 
-use crate::wording::{decimal, short};
+use crate::wording::{format_decimal, format_short};
 
 /// A preparation step that was applied to a record, or a repair made in reading.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -127,7 +127,7 @@ pub enum Step {
 
 impl Step {
     /// Returns the step for a removed trend; `None` if no trend was removed.
-    pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
+    pub(super) fn from_detrend(how: Detrend) -> Option<Self> {
         match how {
             Detrend::None => None,
             Detrend::Mean | Detrend::Linear => Some(Self::Detrend { how: how.name() }),
@@ -173,14 +173,14 @@ impl fmt::Display for Step {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::DropRepeated { rows, first_row } => {
-                let rows = counted(*rows, "repeated row");
+                let rows = count_with_noun(*rows, "repeated row");
                 write!(f, "{rows} dropped; the first is row {first_row}")
             }
             Self::Mask { what, from_s, to_s } => write!(
                 f,
                 "only {} to {} s used, between rows masked as {}",
-                decimal(*from_s),
-                decimal(*to_s),
+                format_decimal(*from_s),
+                format_decimal(*to_s),
                 what.join(" or ")
             ),
             Self::Sparse {
@@ -194,20 +194,20 @@ impl fmt::Display for Step {
                 write!(
                     f,
                     "column {channel}: {} recorded, {} between them ",
-                    counted(*own, "value"),
-                    counted(*rows, "row")
+                    count_with_noun(*own, "value"),
+                    count_with_noun(*rows, "row")
                 )?;
                 match *how {
                     "drop" => write!(f, "dropped"),
                     "hold" => write!(f, "filled with the last value"),
                     _ => write!(f, "interpolated linearly"),
                 }?;
-                write!(f, "; at most {} s between values", decimal(*longest_s))?;
+                write!(f, "; at most {} s between values", format_decimal(*longest_s))?;
                 mean_age_s.iter().try_for_each(|age| {
                     write!(
                         f,
                         "; a value is {} s old on average, which delays the signal by as much",
-                        short(*age)
+                        format_short(*age)
                     )
                 })
             }
@@ -218,7 +218,7 @@ impl fmt::Display for Step {
             } => write!(
                 f,
                 "column {channel}: {} bridged linearly, at most {longest} in a row",
-                counted(*values, "missing value")
+                count_with_noun(*values, "missing value")
             ),
             Self::Interpolate {
                 from_samples,
@@ -229,10 +229,10 @@ impl fmt::Display for Step {
                 f,
                 "resampled linearly from {from_samples} samples to {to_samples} at {} Hz; the longest step between two samples is \
                  {longest_step_s:.6} s",
-                decimal(*to_hz)
+                format_decimal(*to_hz)
             ),
             Self::Scale { channel, factor, unit } => {
-                write!(f, "{channel} multiplied by {}", decimal(*factor))?;
+                write!(f, "{channel} multiplied by {}", format_decimal(*factor))?;
                 unit.iter().try_for_each(|unit| write!(f, " (now in {unit})"))
             }
             Self::Offset {
@@ -248,17 +248,17 @@ impl fmt::Display for Step {
                 write!(
                     f,
                     "{channel} moved {way} by {} {unit} ({} s)",
-                    decimal(samples.abs()),
-                    decimal(seconds.abs())
+                    format_decimal(samples.abs()),
+                    format_decimal(seconds.abs())
                 )?;
                 if let (true, Some(pass)) = (interpolated, pass_hz) {
                     write!(
                         f,
                         ", interpolated by a sinc function (error below 1e-4 up to {} Hz)",
-                        decimal(*pass)
+                        format_decimal(*pass)
                     )?;
                 }
-                let start = counted(*start, "sample");
+                let start = count_with_noun(*start, "sample");
                 write!(f, "; {start} cut at the start, {end} at the end")
             }
             Self::Rate {
@@ -276,12 +276,12 @@ impl fmt::Display for Step {
                 "{} Hz, filtered and decimated by {} to {} Hz: a linear-phase filter of {taps} samples on all \
                  channels, pass band to {} Hz, {stop_db} dB from {} Hz; each input sample is taken in the middle \
                  of its hold, {} s later, to keep the delay of the old rate",
-                decimal(*from_hz),
-                decimal(*factor),
-                decimal(*to_hz),
-                decimal(*pass_hz),
-                decimal(*stop_hz),
-                decimal(*input_lead_s)
+                format_decimal(*from_hz),
+                format_decimal(*factor),
+                format_decimal(*to_hz),
+                format_decimal(*pass_hz),
+                format_decimal(*stop_hz),
+                format_decimal(*input_lead_s)
             ),
             Self::Rate {
                 from_hz,
@@ -297,24 +297,28 @@ impl fmt::Display for Step {
                 write!(
                     f,
                     "{} Hz to {} Hz by a linear-phase filter of {taps} samples on all channels, pass band to {} Hz",
-                    decimal(*from_hz),
-                    decimal(*to_hz),
-                    decimal(*pass_hz)
+                    format_decimal(*from_hz),
+                    format_decimal(*to_hz),
+                    format_decimal(*pass_hz)
                 )?;
                 if let Some(stop) = stop_hz {
-                    write!(f, ", {stop_db} dB from {} Hz", decimal(*stop))?;
+                    write!(f, ", {stop_db} dB from {} Hz", format_decimal(*stop))?;
                 }
                 write!(
                     f,
                     "; {} s cut at the start, {} s at the end; the hold at the new rate makes the delay of a model {} by {} s",
-                    decimal(cut_s.0),
-                    decimal(cut_s.1),
+                    format_decimal(cut_s.0),
+                    format_decimal(cut_s.1),
                     if *delay_s > 0.0 { "shorter" } else { "longer" },
-                    decimal(delay_s.abs())
+                    format_decimal(delay_s.abs())
                 )
             }
             Self::RunIn { seconds, samples } => {
-                write!(f, "run-in of {} s dropped ({samples} samples)", decimal(*seconds))
+                write!(
+                    f,
+                    "run-in of {} s dropped ({samples} samples)",
+                    format_decimal(*seconds)
+                )
             }
             Self::Detrend { how: "mean" } => write!(f, "mean of input and output removed"),
             Self::Detrend { .. } => write!(f, "linear trend of input and output removed"),

@@ -32,25 +32,25 @@ fn record(n: usize, e: impl Fn(f64) -> f64, u: impl Fn(f64) -> f64) -> Record {
         .starting_at(3.0)
 }
 
-fn with(change: impl FnOnce(&mut Preparation)) -> Preparation {
+fn preparation_with(change: impl FnOnce(&mut Preparation)) -> Preparation {
     let mut preparation = Preparation::default();
     change(&mut preparation);
     preparation
 }
 
-fn moved(channel: &str, offset: Offset) -> Preparation {
-    with(|p| p.offset = BTreeMap::from([(channel.to_owned(), offset)]))
+fn offset_preparation(channel: &str, offset: Offset) -> Preparation {
+    preparation_with(|p| p.offset = BTreeMap::from([(channel.to_owned(), offset)]))
 }
 
-fn scaled(channel: &str, scaling: Scaling) -> Preparation {
-    with(|p| p.scale = BTreeMap::from([(channel.to_owned(), scaling)]))
+fn scaling_preparation(channel: &str, scaling: Scaling) -> Preparation {
+    preparation_with(|p| p.scale = BTreeMap::from([(channel.to_owned(), scaling)]))
 }
 
 fn message(preparation: &Preparation, n: usize) -> String {
     preparation.apply(record(n, signal, signal)).unwrap_err().to_string()
 }
 
-fn largest(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
+fn max_deviation(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {
     a.iter().enumerate().map(|(k, v)| (v - b(k)).abs()).fold(0.0, f64::max)
 }
 
@@ -63,7 +63,7 @@ fn default_preparation_changes_nothing() {
 
 #[test]
 fn scaling_changes_values_and_units() {
-    let preparation = with(|p| {
+    let preparation = preparation_with(|p| {
         p.scale.insert("e".into(), "rad:deg".parse().unwrap());
         p.scale.insert("stick".into(), "12.5:deg".parse().unwrap());
     });
@@ -79,7 +79,7 @@ fn scaling_changes_values_and_units() {
     }
     let typed: Scaling = "Radians:degrees".parse().unwrap();
     assert_eq!(typed, "rad:deg".parse().unwrap());
-    let declared = with(|p| {
+    let declared = preparation_with(|p| {
         p.units.insert("e".into(), "degs".into());
         p.units.insert("stick".into(), "counts".into());
     });
@@ -104,20 +104,20 @@ fn scaling_changes_values_and_units() {
         let message = bad.parse::<Scaling>().unwrap_err().to_string();
         assert!(message.contains("expected"), "{bad}: {message}");
     }
-    let unknown = scaled("q", Scaling::by(2.0, None).unwrap());
+    let unknown = scaling_preparation("q", Scaling::by(2.0, None).unwrap());
     assert_eq!(
         message(&unknown, 5),
         "run: scale: there is no channel \"q\", expected one of r-y, stick, or e for the input and u for the output"
     );
-    let twice = with(|p| {
+    let twice = preparation_with(|p| {
         for name in ["e", "r-y"] {
             p.scale.insert(name.into(), Scaling::by(2.0, None).unwrap());
         }
     });
     assert!(message(&twice, 5).contains("named twice"));
     let ts = SampleTime::new(TS).unwrap();
-    let in_deg = Record::of_output(ts, Channel::new("u", "deg", vec![1.0])).unwrap();
-    let contradicted = scaled("u", "rad:deg".parse().unwrap());
+    let in_deg = Record::from_output(ts, Channel::new("u", "deg", vec![1.0])).unwrap();
+    let contradicted = scaling_preparation("u", "rad:deg".parse().unwrap());
     let message = contradicted.apply(in_deg).unwrap_err().to_string();
     assert!(message.contains("in deg according to its file"), "{message}");
 }
@@ -126,7 +126,7 @@ fn scaling_changes_values_and_units() {
 fn whole_sample_offsets_shift_rows_exactly() {
     // The output is two samples late in the file.
     let late = record(100, signal, |t| signal(t - 2.0 * TS));
-    let preparation = moved("u", Offset::Samples(2.0));
+    let preparation = offset_preparation("u", Offset::Samples(2.0));
     let (found, steps) = preparation.apply(late.clone()).unwrap();
     assert_eq!(found.output(), &late.output()[2..]);
     assert_eq!(found.input(), &late.input()[..98]);
@@ -140,7 +140,7 @@ fn whole_sample_offsets_shift_rows_exactly() {
         }
     ));
     // An offset in s, for a channel that was recorded early: the same number of rows is cut at the other end.
-    let early = moved("e", Offset::Seconds(-0.02));
+    let early = offset_preparation("e", Offset::Seconds(-0.02));
     let (found, _) = early.apply(late.clone()).unwrap();
     assert_eq!(found.input(), &late.input()[..98]);
     assert_eq!(found.output(), &late.output()[2..]);
@@ -148,17 +148,17 @@ fn whole_sample_offsets_shift_rows_exactly() {
 }
 
 #[test]
-fn fractional_offsets_interpolate_band_limited() {
+fn fractional_offsets_use_band_limited_interpolation() {
     for offset in [0.5, 1.0 / 3.0, -0.71, 3.017] {
         let n = 600;
         let late = record(n, signal, |t| signal(t - offset * TS));
-        let preparation = moved("u", Offset::Samples(offset));
+        let preparation = offset_preparation("u", Offset::Samples(offset));
         let (found, steps) = preparation.apply(late).unwrap();
         let start_s = found.time_s(0) - 3.0;
         // The sum of the amplitudes is 3, with a relative error of 1e-4.
-        let error = largest(found.output(), |k| signal(start_s + k as f64 * TS));
+        let error = max_deviation(found.output(), |k| signal(start_s + k as f64 * TS));
         assert!(error < 3e-4, "{offset}: {error:e}");
-        assert!(largest(found.input(), |k| signal(start_s + k as f64 * TS)) < 1e-12);
+        assert!(max_deviation(found.input(), |k| signal(start_s + k as f64 * TS)) < 1e-12);
         // The ends are cut, and no values are extrapolated.
         let Step::Offset {
             cut_samples: (start, end),
@@ -175,12 +175,12 @@ fn fractional_offsets_interpolate_band_limited() {
 fn decimation_matches_the_model_crate() {
     for factor in [2_usize, 3, 10] {
         let whole = record(4000, signal, |t| signal(t) + 1.0);
-        let decimate = with(|p| p.rate = NewRate::Decimated(factor));
+        let decimate = preparation_with(|p| p.rate = NewRate::Decimated(factor));
         let (found, steps) = decimate.apply(whole.clone()).unwrap();
         let (expected, done) = whole.decimated(factor).unwrap();
         assert_eq!((found, steps), (expected, vec![Step::from(done)]));
     }
-    let (_, steps) = with(|p| p.rate = NewRate::Decimated(2))
+    let (_, steps) = preparation_with(|p| p.rate = NewRate::Decimated(2))
         .apply(record(400, signal, signal))
         .unwrap();
     assert!(
@@ -197,12 +197,12 @@ fn resampling_to_lower_and_higher_rates_is_accurate() {
     for hz in [60.0, 128.0, 250.0, 36.7] {
         let edge = 0.8 * 0.5 * f64::min(hz, 100.0);
         let low = |t: f64| (2.0 * PI * 0.99 * edge * t).cos() + (2.0 * PI * 0.5 * t).sin();
-        let (found, _) = with(|p| p.rate = NewRate::Hz(hz))
+        let (found, _) = preparation_with(|p| p.rate = NewRate::Hz(hz))
             .apply(record(3000, low, low))
             .unwrap();
         let (start_s, ts) = (found.time_s(0) - 3.0, found.sample_time().s());
         assert!((ts * hz - 1.0).abs() < 1e-12);
-        let error = largest(found.input(), |k| low(start_s + k as f64 * ts));
+        let error = max_deviation(found.input(), |k| low(start_s + k as f64 * ts));
         assert!(error < 2e-4, "{hz}: {error:e}");
         // The new samples are on the grid that starts at the first sample.
         let steps = (found.time_s(0) - 3.0) / ts;
@@ -210,7 +210,7 @@ fn resampling_to_lower_and_higher_rates_is_accurate() {
     }
     // The requested rate is the rate of the record.
     assert!(
-        with(|p| p.rate = NewRate::Hz(100.0))
+        preparation_with(|p| p.rate = NewRate::Hz(100.0))
             .apply(record(3, signal, signal))
             .unwrap()
             .1
@@ -220,7 +220,7 @@ fn resampling_to_lower_and_higher_rates_is_accurate() {
 
 #[test]
 fn run_in_is_counted_in_file_time_and_trend_removed_last() {
-    let preparation = with(|p| {
+    let preparation = preparation_with(|p| {
         p.run_in_s = 5.0;
         p.rate = NewRate::Decimated(4);
         p.detrend = Detrend::Mean;
@@ -242,7 +242,7 @@ fn run_in_is_counted_in_file_time_and_trend_removed_last() {
 
 #[test]
 fn invalid_preparations_are_errors() {
-    let rate = |rate| with(|p| p.rate = rate);
+    let rate = |rate| preparation_with(|p| p.rate = rate);
     for (preparation, n, words) in [
         (rate(NewRate::Decimated(0)), 10, "found a factor of 0"),
         (rate(NewRate::Decimated(4)), 1, "found 1 samples for a filter"),
@@ -252,18 +252,26 @@ fn invalid_preparations_are_errors() {
         (rate(NewRate::Hz(-1.0)), 200, "new-fs: -1 Hz, expected a positive"),
         (rate(NewRate::Hz(1e9)), 200, "at most 100"),
         (rate(NewRate::Hz(1e-9)), 200, "a longer record"),
-        (with(|p| p.run_in_s = -1.0), 10, "run-in: -1 s"),
-        (with(|p| p.run_in_s = f64::NAN), 10, "run-in: NaN s"),
-        (with(|p| p.run_in_s = 0.1), 10, "0.1 s in a record of 0.1 s"),
+        (preparation_with(|p| p.run_in_s = -1.0), 10, "run-in: -1 s"),
+        (preparation_with(|p| p.run_in_s = f64::NAN), 10, "run-in: NaN s"),
+        (preparation_with(|p| p.run_in_s = 0.1), 10, "0.1 s in a record of 0.1 s"),
         (
-            moved("u", Offset::Samples(10.0)),
+            offset_preparation("u", Offset::Samples(10.0)),
             10,
             "stick=10 samples in a record of 10",
         ),
-        (moved("u", Offset::Seconds(-1e300)), 10, "offset"),
-        (moved("u", Offset::Samples(f64::NAN)), 10, "a finite number"),
-        (moved("u", Offset::Samples(0.5)), 20, "to each side for interpolation"),
-        (moved("x", Offset::Samples(1.0)), 20, "no channel \"x\""),
+        (offset_preparation("u", Offset::Seconds(-1e300)), 10, "offset"),
+        (
+            offset_preparation("u", Offset::Samples(f64::NAN)),
+            10,
+            "a finite number",
+        ),
+        (
+            offset_preparation("u", Offset::Samples(0.5)),
+            20,
+            "to each side for interpolation",
+        ),
+        (offset_preparation("x", Offset::Samples(1.0)), 20, "no channel \"x\""),
     ] {
         let message = message(&preparation, n);
         assert!(message.contains(words), "{words}: {message}");
@@ -273,7 +281,7 @@ fn invalid_preparations_are_errors() {
     }
     assert_eq!(" 0.02s".parse::<Offset>().unwrap(), Offset::Seconds(0.02));
     // A factor that makes values overflow is reported as an error of the record.
-    let large = scaled("u", Scaling::by(1e300, None).unwrap());
+    let large = scaling_preparation("u", Scaling::by(1e300, None).unwrap());
     assert!(
         large
             .apply(record(5, signal, |_| 1e300))
@@ -284,9 +292,9 @@ fn invalid_preparations_are_errors() {
 }
 
 /// Pseudo-random numbers, the same in every run.
-struct Arbitrary(u64);
+struct RandomNumbers(u64);
 
-impl Arbitrary {
+impl RandomNumbers {
     fn next(&mut self) -> u64 {
         self.0 = self
             .0
@@ -296,7 +304,7 @@ impl Arbitrary {
     }
 
     fn number(&mut self) -> f64 {
-        const ODD: [f64; 12] = [
+        const EDGE_VALUES: [f64; 12] = [
             0.0,
             1.0,
             -1.0,
@@ -311,19 +319,19 @@ impl Arbitrary {
             2.0,
         ];
         match self.next() % 4 {
-            0 => ODD[self.next() as usize % ODD.len()],
+            0 => EDGE_VALUES[self.next() as usize % EDGE_VALUES.len()],
             _ => (self.next() as f64 / 2.0_f64.powi(30) - 1.0) * 10_f64.powi((self.next() % 7) as i32 - 3),
         }
     }
 }
 
 #[test]
-fn arbitrary_preparations_never_panic() {
-    let mut any = Arbitrary(7);
+fn arbitrary_preparations_do_not_cause_a_panic() {
+    let mut any = RandomNumbers(7);
     let mut done = 0;
     for _ in 0..4000 {
         let n = 1 + any.next() as usize % 300;
-        let preparation = with(|p| {
+        let preparation = preparation_with(|p| {
             let names = ["e", "u", "r-y", "stick", "q"];
             for _ in 0..any.next() % 3 {
                 let name = names[any.next() as usize % names.len()].to_owned();

@@ -12,13 +12,13 @@ use hoid_model::Record;
 
 use super::from_table::{ReadRecord, record_of};
 use super::read_options::ReadOptions;
-use super::sparse::without_gaps;
+use super::sparse::close_gaps;
 use crate::IoError;
 use crate::formats::table_of_file;
 use crate::preparation::{NewRate, Offset, Preparation, Step};
 
 /// Number of additional rows that are read beyond each end of the span for interpolation at a fractional offset.
-const FOR_INTERPOLATION: f64 = 64.0;
+const INTERPOLATION_MARGIN_ROWS: f64 = 64.0;
 
 /// Reads and prepares a record whose output is additionally shifted earlier by `late_samples`.
 ///
@@ -48,7 +48,7 @@ pub fn read_aligned(
             ..options.clone()
         };
         if let Ok(wide) = read_as_recorded(path, &wider, drop_repeated)
-            && let Some((record, steps)) = shifted_within(wide.record, &read.record, preparation, &late)
+            && let Some((record, steps)) = shift_and_cut(wide.record, &read.record, preparation, &late)
         {
             let steps = [read.steps, steps].concat();
             return Ok(ReadRecord { record, steps, ..read });
@@ -66,7 +66,7 @@ pub fn read_aligned(
 pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
     let mut bytes = Vec::new();
-    let (table, steps) = without_gaps(table_of_file(path, &file, &mut bytes, options)?, options)?;
+    let (table, steps) = close_gaps(table_of_file(path, &file, &mut bytes, options)?, options)?;
     let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
     let read = record_of(table, options, drop_repeated)?;
     Ok(ReadRecord {
@@ -85,12 +85,12 @@ fn max_shift(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     let offsets: Vec<f64> = preparation.offset.values().map(samples).chain([late_samples]).collect();
     let most = offsets.iter().map(|d| d.abs()).fold(0.0, f64::max) + late_samples.abs();
     let between = offsets.iter().any(|d| (d - d.round()).abs() > 1e-6);
-    most.ceil() + if between { 2.0 * FOR_INTERPOLATION } else { 0.0 }
+    most.ceil() + if between { 2.0 * INTERPOLATION_MARGIN_ROWS } else { 0.0 }
 }
 
 /// Shifts the channels of the longer record `wide`, cuts out the span, and applies the remaining steps; `None` if this
 /// fails: processing the shorter record then gives the error.
-fn shifted_within(
+fn shift_and_cut(
     wide: Record,
     narrow: &Record,
     preparation: &Preparation,

@@ -4,7 +4,7 @@ use hoid_model::{Channel, Record};
 
 /// Returns the channels in the order in which people read them: target, input and output of the operator, other
 /// channels.
-pub(crate) fn channels(record: &Record) -> Vec<&Channel> {
+pub(crate) fn ordered_channels(record: &Record) -> Vec<&Channel> {
     let (target, others): (Vec<&Channel>, Vec<&Channel>) = record.channels().partition(|c| c.name == "f_t");
     target.into_iter().chain(others).collect()
 }

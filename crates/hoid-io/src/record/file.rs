@@ -10,7 +10,7 @@ use std::path::Path;
 use hoid_model::Record;
 
 use super::alignment::read_aligned;
-use super::channels::{channels, comments};
+use super::channels::{comments, ordered_channels};
 use super::from_table::ReadRecord;
 use super::read_options::ReadOptions;
 use crate::IoError;
@@ -63,7 +63,7 @@ pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
 
 /// Writes a record as a table of its channels, with the same comments as in CSV.
 fn write_columns(path: &Path, record: &Record) -> Result<(), IoError> {
-    let channels = channels(record);
+    let channels = ordered_channels(record);
     let t = record.times_s();
     let names = std::iter::once("t").chain(channels.iter().map(|c| c.name.as_str()));
     let values = std::iter::once(Values::Real(&t)).chain(channels.iter().map(|c| Values::Real(&c.values)));

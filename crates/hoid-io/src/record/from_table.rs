@@ -10,7 +10,7 @@ use crate::IoError;
 use crate::data_quality::{QualityIssue, issues_of_signals};
 use crate::preparation::{Preparation, Step};
 use crate::table::{Column, ColumnExpression, Signal, Table};
-use crate::wording::{list, named};
+use crate::wording::{format_name, list_names};
 
 /// A record read from a file, the steps applied to it, and notes about the reading.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,7 +42,7 @@ pub(super) fn record_of(
     }
     let time = names.iter().position(|name| *name == "t");
     if time.is_none() && options.sampling_hz.is_none() {
-        let available = list(&names);
+        let available = list_names(&names);
         return Err(IoError::NoSampling { file, available });
     }
     let quality_issues = issues_of_signals(&table, time, input.into_iter().chain([output]), options);
@@ -118,7 +118,7 @@ impl TableReader<'_> {
                 Err(error) => {
                     self.table
                         .notes
-                        .push(format!("column {} is left out: {error}", named(&channel.name)));
+                        .push(format!("column {} is left out: {error}", format_name(&channel.name)));
                     columns.push(None);
                 }
             }
@@ -129,17 +129,21 @@ impl TableReader<'_> {
             .collect();
         for ((signal, _), made) in signals().zip(&mut made) {
             if let Signal::Column(column) = signal {
-                *made = (columns.get_mut(column).and_then(Option::take)).unwrap_or_else(nothing);
+                *made = (columns.get_mut(column).and_then(Option::take)).unwrap_or_else(empty_channel);
             }
         }
-        let output = made.pop().unwrap_or_else(nothing);
+        let output = made.pop().unwrap_or_else(empty_channel);
         let record = match made.pop() {
             Some(input) => Record::new(grid.sample_time, input, output),
-            None => Record::of_output(grid.sample_time, output),
+            None => Record::from_output(grid.sample_time, output),
         };
-        let mut record = record.map_err(|source| self.model(source))?.starting_at(grid.start_s);
+        let mut record = record
+            .map_err(|source| self.model_error(source))?
+            .starting_at(grid.start_s);
         for channel in columns.into_iter().flatten() {
-            record = record.with_channel(channel).map_err(|source| self.model(source))?;
+            record = record
+                .with_channel(channel)
+                .map_err(|source| self.model_error(source))?;
         }
         Ok(ReadRecord {
             record,
@@ -151,14 +155,14 @@ impl TableReader<'_> {
 }
 
 /// Returns a channel without samples, which no record accepts.
-fn nothing() -> Channel {
+fn empty_channel() -> Channel {
     Channel::new("", "", Vec::new())
 }
 
 /// Evaluates an expression of columns; an expression that is a single column gives an empty channel here. The channel
 /// is named after the expression; a difference has a unit if both terms have the same unit.
 fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
-    let nothing = nothing();
+    let nothing = empty_channel();
     let column = |index: usize| columns.get(index).and_then(Option::as_ref).unwrap_or(&nothing);
     match signal {
         Signal::Column(_) => nothing,

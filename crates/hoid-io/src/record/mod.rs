@@ -32,8 +32,8 @@ pub(crate) mod topics;
 pub(crate) mod trials;
 
 pub use alignment::read_aligned;
-pub(crate) use channels::{channels, comments};
+pub(crate) use channels::{comments, ordered_channels};
 pub use file::{read, read_prepared, read_record, write_record, write_record_csv};
 pub use from_table::ReadRecord;
-pub use read_options::{ReadOptions, Repair, Sparse, TrialChoice};
+pub use read_options::{ReadOptions, Repair, SparseTreatment, TrialChoice};
 pub use segments::read_segments;

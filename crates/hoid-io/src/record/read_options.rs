@@ -20,7 +20,7 @@ pub struct Repair {
 
 /// Treatment of a column that has no value in some rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sparse {
+pub enum SparseTreatment {
     /// The last value is held until the next value.
     Hold,
     /// Values are interpolated linearly.
@@ -29,7 +29,7 @@ pub enum Sparse {
     Drop,
 }
 
-hoid_model::named_choice!(Sparse, "handling of a sparse column", 3, {
+hoid_model::named_choice!(SparseTreatment, "handling of a sparse column", 3, {
     Hold => "hold",
     Linear => "linear",
     Drop => "drop",
@@ -55,7 +55,7 @@ pub struct ReadOptions {
     pub span_s: (Option<f64>, Option<f64>),
     /// Columns that were logged at their own times and therefore have no value in some rows; `e` and `u` denote input
     /// and output unless a column has that name. By default there are none.
-    pub sparse: BTreeMap<String, Sparse>,
+    pub sparse: BTreeMap<String, SparseTreatment>,
     /// Names of columns to keep in addition to input, output and time; by default all columns are kept. Other columns
     /// of a CSV file are not kept in memory.
     pub columns: Option<Vec<String>>,
@@ -81,7 +81,7 @@ impl Default for ReadOptions {
 
 impl ReadOptions {
     /// True if a column must be read; the time is treated separately.
-    pub(crate) fn wants(&self, name: &str) -> bool {
+    pub(crate) fn needs_column(&self, name: &str) -> bool {
         let is_term = |signal: &ColumnExpression| signal.terms().contains(&name);
         self.columns.as_ref().is_none_or(|kept| {
             kept.iter().any(|column| column == name)
@@ -108,7 +108,7 @@ pub struct TrialChoice {
 
 impl TrialChoice {
     /// Selects a single trial.
-    pub(super) fn one(column: &str, value: &str) -> Self {
+    pub(super) fn single(column: &str, value: &str) -> Self {
         Self {
             column: column.to_owned(),
             value: Some(value.to_owned()),

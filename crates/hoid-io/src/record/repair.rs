@@ -7,12 +7,12 @@
 use std::ops::Range;
 
 use crate::preparation::Step;
-use crate::table::{Table, kept};
+use crate::table::{Table, keep_rows};
 use crate::time::sampling::pairs;
 
 /// Fraction of a step by which rounding may shift a time: a held signal changes to the value of a row this fraction of
 /// a step before the row.
-const ROUNDING: f64 = 1e-6;
+const ROUNDING_FRACTION: f64 = 1e-6;
 
 /// End of the column at which values are missing, where they cannot be interpolated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,7 +23,7 @@ pub(super) enum OpenEnd {
 
 /// Counts of interpolated values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Bridged {
+pub(super) struct FillCounts {
     /// Number of interpolated values.
     pub(super) values: usize,
     /// Length of the longest run of interpolated values.
@@ -32,18 +32,18 @@ pub(super) struct Bridged {
 
 /// Replaces each run of NaN by a straight line between its neighbours, as a function of `t` if it is known, otherwise
 /// of the row number.
-pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, OpenEnd> {
-    let mut bridged = Bridged::default();
+pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<FillCounts, OpenEnd> {
+    let mut bridged = FillCounts::default();
     let mut at = 0;
     let x = |row: usize| t.map_or(Some(row as f64), |t| t.get(row).copied()).unwrap_or(f64::NAN);
-    while let Some(run) = next_run(values, at) {
+    while let Some(run) = next_missing_run(values, at) {
         let last_before = run.start.checked_sub(1).ok_or(OpenEnd::Start)?;
         let (Some(&before), Some(&after)) = (values.get(last_before), values.get(run.end)) else {
             return Err(OpenEnd::End);
         };
         let (from, to) = (x(last_before), x(run.end));
         for (row, value) in values.iter_mut().enumerate().take(run.end).skip(run.start) {
-            *value = line(before, after, (x(row) - from) / (to - from));
+            *value = interpolate(before, after, (x(row) - from) / (to - from));
         }
         bridged.values = bridged.values.saturating_add(run.len());
         bridged.longest = bridged.longest.max(run.len());
@@ -77,10 +77,10 @@ pub(super) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
     let rows: Vec<usize> = (0..table.rows)
         .filter(|row| repeated.binary_search(row).is_err())
         .collect();
-    (kept(table, rows), Some(step))
+    (keep_rows(table, rows), Some(step))
 }
 
-fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {
+fn next_missing_run(values: &[f64], from: usize) -> Option<Range<usize>> {
     let mut rest = values.iter().enumerate().skip(from);
     let (start, _) = rest.find(|(_, v)| v.is_nan())?;
     let end = rest.find(|(_, v)| !v.is_nan());
@@ -88,10 +88,10 @@ fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {
 }
 
 /// Interpolates the points `(t, value)`, where t increases, at the times `start + k step`, k = 0 .. n - 1: linearly, or
-/// with the value of the last point if the signal is held. A held signal changes [`ROUNDING`] of a step before each
+/// with the value of the last point if the signal is held. A held signal changes [`ROUNDING_FRACTION`] of a step before each
 /// point, to allow for rounding.
 pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: usize, is_held: bool) -> Vec<f64> {
-    let early = if is_held { ROUNDING * step } else { 0.0 };
+    let early = if is_held { ROUNDING_FRACTION * step } else { 0.0 };
     let mut lines = pairs(t).zip(pairs(values));
     let Some(mut this) = lines.next() else {
         return Vec::new();
@@ -106,12 +106,12 @@ pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: 
         let ((from, to), (before, after)) = this;
         let share = ((time - from) / (to - from)).clamp(0.0, 1.0);
         let share = if is_held { share.floor() } else { share };
-        line(before, after, share)
+        interpolate(before, after, share)
     };
     (0..n).map(value).collect()
 }
 
-fn line(a: f64, b: f64, share: f64) -> f64 {
+fn interpolate(a: f64, b: f64, share: f64) -> f64 {
     // This form gives exactly a and b at the ends and does not overflow between them.
     a * (1.0 - share) + b * share
 }
@@ -131,7 +131,7 @@ mod tests {
         assert_eq!(fill(&mut [MISSING, 1.0], None), Err(OpenEnd::Start));
         assert_eq!(fill(&mut [1.0, MISSING], None), Err(OpenEnd::End));
         assert_eq!(fill(&mut [MISSING], None), Err(OpenEnd::Start));
-        assert_eq!(fill(&mut [], None), Ok(Bridged::default()));
+        assert_eq!(fill(&mut [], None), Ok(FillCounts::default()));
     }
 
     #[test]

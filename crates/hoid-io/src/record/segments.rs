@@ -13,12 +13,12 @@ use super::alignment::read_as_recorded;
 use super::file::read_prepared;
 use super::from_table::ReadRecord;
 use super::read_options::{ReadOptions, TrialChoice};
-use super::sparse::without_gaps;
+use super::sparse::close_gaps;
 use crate::IoError;
 use crate::data_quality::{QualityIssue, QualityIssueKind, issues_of_record};
 use crate::formats::table_of_file;
 use crate::preparation::{Preparation, Step};
-use crate::wording::{decimal, list};
+use crate::wording::{format_decimal, list_names};
 
 /// Reads the segments of a file that lie between faults of the given kinds and last at least `shortest_s`, in their
 /// order; if no kind is given, reads the whole record. The first segment carries the problems with the file as a whole.
@@ -47,7 +47,7 @@ pub fn read_segments(
     let mut all = Vec::new();
     for trial in &trials {
         let one = ReadOptions {
-            trial: Some(TrialChoice::one(&by, trial)),
+            trial: Some(TrialChoice::single(&by, trial)),
             ..options.clone()
         };
         for mut read in read_trial(path, &one, preparation, mask, shortest_s)? {
@@ -57,7 +57,7 @@ pub fn read_segments(
                 let count = trials.len();
                 read.notes.push(format!(
                     "{count} trials by {by} ({}): each is a separate record",
-                    list_of(&trials)
+                    list_of_trials(&trials)
                 ));
             } else {
                 // Notes about the file are reported with its first trial only.
@@ -69,8 +69,8 @@ pub fn read_segments(
     Ok(all)
 }
 
-fn list_of(trials: &[String]) -> String {
-    list(&trials.iter().map(String::as_str).collect::<Vec<_>>())
+fn list_of_trials(trials: &[String]) -> String {
+    list_names(&trials.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
 /// Reads the segments of a single trial.
@@ -91,8 +91,11 @@ fn read_trial(
         found,
         expected: expected.to_owned(),
     };
-    if let Some(kind) = mask.iter().find(|kind| !QualityIssueKind::MASKABLE.contains(kind)) {
-        let names = QualityIssueKind::MASKABLE.map(QualityIssueKind::name).join(", ");
+    if let Some(kind) = mask
+        .iter()
+        .find(|kind| !QualityIssueKind::MASKABLE_KINDS.contains(kind))
+    {
+        let names = QualityIssueKind::MASKABLE_KINDS.map(QualityIssueKind::name).join(", ");
         return Err(refuse(kind.name().to_owned(), &format!("one or more of {names}")));
     }
     if preparation.run_in_s != 0.0 {
@@ -108,7 +111,7 @@ fn read_trial(
         ));
     }
     let mut bytes = Vec::new();
-    let (table, _) = without_gaps(table_of_file(path, &file, &mut bytes, options)?, options)?;
+    let (table, _) = close_gaps(table_of_file(path, &file, &mut bytes, options)?, options)?;
     let (quality_issues, rows) = issues_of_record(&table, options)?;
     let time = table.names().iter().position(|name| *name == "t");
     let at = |row: usize| match (time, options.sampling_hz) {
@@ -121,7 +124,7 @@ fn read_trial(
         (None, None) => f64::NAN,
     };
     let mut segments = Vec::new();
-    for segment in between(&quality_issues, mask, rows.clone()) {
+    for segment in ranges_between_faults(&quality_issues, mask, rows.clone()) {
         let (from, last) = (at(segment.start), at(segment.end.saturating_sub(1)));
         // The comparison is false if a time is NaN, so such a segment is skipped.
         let is_long = last - from >= shortest_s;
@@ -146,7 +149,12 @@ fn read_trial(
             to_s,
         }];
         steps.extend(read.steps);
-        let label = format!("{} ({} to {} s)", read.record.label(), decimal(from), decimal(to_s));
+        let label = format!(
+            "{} ({} to {} s)",
+            read.record.label(),
+            format_decimal(from),
+            format_decimal(to_s)
+        );
         segments.push(ReadRecord {
             record: read.record.labelled(label),
             steps,
@@ -168,7 +176,7 @@ fn read_trial(
 }
 
 /// Returns the row ranges between faults of the given kinds.
-fn between(issues: &[QualityIssue], mask: &[QualityIssueKind], rows: Range<usize>) -> Vec<Range<usize>> {
+fn ranges_between_faults(issues: &[QualityIssue], mask: &[QualityIssueKind], rows: Range<usize>) -> Vec<Range<usize>> {
     // `out` marks excluded rows; `cut` marks rows at which the record is cut.
     let mut out = vec![false; rows.len()];
     let mut cut = out.clone();

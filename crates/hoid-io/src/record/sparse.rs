@@ -4,9 +4,9 @@
 //!
 //! | treatment | value in that row |
 //! |---|---|
-//! | [`Sparse::Hold`] | `x_i`, as for a display or an actuator that is updated at `t_i` |
-//! | [`Sparse::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between samples |
-//! | [`Sparse::Drop`] | none: the row is omitted |
+//! | [`SparseTreatment::Hold`] | `x_i`, as for a display or an actuator that is updated at `t_i` |
+//! | [`SparseTreatment::Linear`] | `x_i + (x_{i+1} - x_i) (t - t_i)/(t_{i+1} - t_i)`, for a signal that is smooth between samples |
+//! | [`SparseTreatment::Drop`] | none: the row is omitted |
 //!
 //! On average, a held value is late by half the time between logged values. Rows before the first logged value and
 //! after the last one are cut. All values are computed before the rows and the span are cut, so a row at the start of a
@@ -15,15 +15,15 @@
 
 use std::ops::Range;
 
-use super::read_options::{ReadOptions, Sparse};
+use super::read_options::{ReadOptions, SparseTreatment};
 use crate::IoError;
 use crate::preparation::Step;
-use crate::table::{Column, ColumnExpression, Signal, Table, kept};
-use hoid_model::numbers::counted;
+use crate::table::{Column, ColumnExpression, Signal, Table, keep_rows};
+use hoid_model::numbers::count_with_noun;
 
-use crate::wording::{list, named};
+use crate::wording::{format_name, list_names};
 
-const STEP: &str = "sparse";
+const STEP_NAME: &str = "sparse";
 
 /// In the columns named as sparse, fills in the rows without a value or drops these rows; returns the table and the
 /// applied steps.
@@ -31,7 +31,7 @@ const STEP: &str = "sparse";
 /// # Errors
 /// [`IoError::Preparation`] if a column does not exist, is the time, is named twice or is completely empty, or if no
 /// row remains; [`IoError::NoSuchColumn`].
-pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> Result<(Table<'a>, Vec<Step>), IoError> {
+pub(super) fn close_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> Result<(Table<'a>, Vec<Step>), IoError> {
     if options.sparse.is_empty() {
         return Ok((table, Vec::new()));
     }
@@ -39,16 +39,20 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
     let mut steps = Vec::new();
     let mut bounds = 0..table.rows;
     let mut dropped: Vec<usize> = Vec::new();
-    let columns = columns(&table, options)?;
+    let columns = sparse_columns(&table, options)?;
     for &(column, how) in &columns {
         let Some(sparse) = table.columns.get_mut(column) else {
             continue;
         };
         let gaps = Gaps::of(sparse);
-        let name = named(&sparse.name);
+        let name = format_name(&sparse.name);
         let Some(own) = gaps.own.clone() else {
             let found = format!("column {name} has no value in {} rows", table.rows);
-            return Err(refused(&table, found, "a column with some values; check the recording"));
+            return Err(sparse_error(
+                &table,
+                found,
+                "a column with some values; check the recording",
+            ));
         };
         if gaps.missing.is_empty() {
             let note = format!("column {name} has a value in every row: --sparse has no effect on it");
@@ -58,8 +62,8 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
         bounds = bounds.start.max(own.start)..bounds.end.min(own.end);
         steps.push(gaps.step(&sparse.name, how, &x));
         match how {
-            Sparse::Drop => dropped.extend(gaps.missing),
-            Sparse::Hold | Sparse::Linear => gaps.close(sparse, how, &x),
+            SparseTreatment::Drop => dropped.extend(gaps.missing),
+            SparseTreatment::Hold | SparseTreatment::Linear => gaps.fill(sparse, how, &x),
         }
     }
     dropped.sort_unstable();
@@ -72,13 +76,13 @@ pub(super) fn without_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> R
         let names: Vec<&str> = named.map(|column| column.name.as_str()).collect();
         let found = format!(
             "the columns {} have no rows in common between their first and last values",
-            list(&names)
+            list_names(&names)
         );
-        return Err(refused(&table, found, "columns that were logged at the same time"));
+        return Err(sparse_error(&table, found, "columns that were logged at the same time"));
     }
     if rows.len() < table.rows {
         note_cut(&mut table, &bounds);
-        table = kept(table, rows);
+        table = keep_rows(table, rows);
     }
     Ok((table, steps))
 }
@@ -88,15 +92,15 @@ fn note_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
     if (before, after) != (0, 0) {
         table.notes.push(format!(
             "{} at the start and {after} at the end cut: a sparse column has no values there",
-            counted(before, "row")
+            count_with_noun(before, "row")
         ));
     }
 }
 
-fn refused(table: &Table<'_>, found: String, expected: &str) -> IoError {
+fn sparse_error(table: &Table<'_>, found: String, expected: &str) -> IoError {
     IoError::Preparation {
         record: table.source.file().to_owned(),
-        step: STEP,
+        step: STEP_NAME,
         found,
         expected: expected.to_owned(),
     }
@@ -104,19 +108,19 @@ fn refused(table: &Table<'_>, found: String, expected: &str) -> IoError {
 
 /// Returns the named columns with their treatment. `e` and `u` denote the input and the output unless a column has that
 /// name.
-fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Sparse)>, IoError> {
+fn sparse_columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, SparseTreatment)>, IoError> {
     let names = table.names();
     let file = table.source.file();
     let of = |expression: Option<&ColumnExpression>| -> Result<Vec<usize>, IoError> {
         let signal = expression.map(|one| one.resolve(&names, file)).transpose()?;
         Ok(signal.into_iter().flat_map(Signal::columns).collect())
     };
-    let mut all: Vec<(usize, Sparse)> = Vec::new();
+    let mut all: Vec<(usize, SparseTreatment)> = Vec::new();
     for (name, how) in &options.sparse {
         let found = match (names.iter().position(|known| known == name), name.as_str()) {
             (Some(_), "t") => {
                 let expected = "a column other than t, because every row needs a time";
-                return Err(refused(table, "t is the time".to_owned(), expected));
+                return Err(sparse_error(table, "t is the time".to_owned(), expected));
             }
             (Some(at), _) => vec![at],
             (None, "e") => of(options.input.as_ref())?,
@@ -124,17 +128,17 @@ fn columns(table: &Table<'_>, options: &ReadOptions) -> Result<Vec<(usize, Spars
             (None, _) => Vec::new(),
         };
         if found.is_empty() {
-            let found = format!("there is no column \"{}\"", named(name));
-            let expected = format!("one of {}, or e for the input and u for the output", list(&names));
-            return Err(refused(table, found, &expected));
+            let found = format!("there is no column \"{}\"", format_name(name));
+            let expected = format!("one of {}, or e for the input and u for the output", list_names(&names));
+            return Err(sparse_error(table, found, &expected));
         }
         for column in found {
             if all.iter().any(|(known, _)| *known == column) {
                 let found = format!(
                     "column {} is named twice",
-                    names.get(column).map_or_else(String::new, |name| named(name))
+                    names.get(column).map_or_else(String::new, |name| format_name(name))
                 );
-                return Err(refused(table, found, "each column once"));
+                return Err(sparse_error(table, found, "each column once"));
             }
             all.push((column, *how));
         }
@@ -191,7 +195,7 @@ impl Gaps {
         runs
     }
 
-    fn step(&self, name: &str, how: Sparse, x: &[f64]) -> Step {
+    fn step(&self, name: &str, how: SparseTreatment, x: &[f64]) -> Step {
         let runs = self.runs();
         let inside: usize = runs.iter().map(|(_, run)| run.len()).sum();
         let own = self.own.as_ref().map_or(0, Range::len);
@@ -205,12 +209,12 @@ impl Gaps {
             own: own.saturating_sub(inside),
             rows: inside,
             longest_s: runs.iter().map(span).fold(0.0, f64::max),
-            mean_age_s: (how == Sparse::Hold && mean_age_s.is_finite()).then_some(mean_age_s),
+            mean_age_s: (how == SparseTreatment::Hold && mean_age_s.is_finite()).then_some(mean_age_s),
         }
     }
 
     /// Fills in a value in each missing row that has values on both sides.
-    fn close(&self, column: &mut Column, how: Sparse, x: &[f64]) {
+    fn fill(&self, column: &mut Column, how: SparseTreatment, x: &[f64]) {
         let values = &mut column.values;
         for (before, run) in self.runs() {
             let (a, b) = (at(values, before), at(values, run.end));
@@ -219,13 +223,13 @@ impl Gaps {
                 let share = (x - from) / (to - from);
                 *value = match how {
                     // Linear interpolation between two equal times is undefined.
-                    Sparse::Linear if share.is_finite() => a * (1.0 - share) + b * share,
+                    SparseTreatment::Linear if share.is_finite() => a * (1.0 - share) + b * share,
                     _ => a,
                 };
             }
         }
         column.filled_rows.clone_from(&self.missing);
-        column.is_held = how == Sparse::Hold;
+        column.is_held = how == SparseTreatment::Hold;
     }
 }
 
@@ -247,19 +251,22 @@ mod tests {
     fn sparse_values_are_held_or_interpolated_in_time() {
         let x = [0.0, 0.1, 0.4, 0.5, 1.0, 1.1];
         for (how, expected) in [
-            (Sparse::Hold, [1.0, 1.0, 1.0, 6.0, 6.0]),
-            (Sparse::Linear, [1.0, 2.0, 5.0, 6.0, 11.0]),
+            (SparseTreatment::Hold, [1.0, 1.0, 1.0, 6.0, 6.0]),
+            (SparseTreatment::Linear, [1.0, 2.0, 5.0, 6.0, 11.0]),
         ] {
             let mut e = column(&[1.0, MISSING, MISSING, 6.0, MISSING, 12.0]);
-            Gaps::of(&e).close(&mut e, how, &x);
+            Gaps::of(&e).fill(&mut e, how, &x);
             for (found, expected) in e.values.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-14, "{how}: {:?}", e.values);
             }
-            assert_eq!((e.filled_rows, e.is_held), (vec![1, 2, 4], how == Sparse::Hold));
+            assert_eq!(
+                (e.filled_rows, e.is_held),
+                (vec![1, 2, 4], how == SparseTreatment::Hold)
+            );
         }
         // The times are constant.
         let mut e = column(&[1.0, MISSING, 2.0]);
-        Gaps::of(&e).close(&mut e, Sparse::Linear, &[0.0; 3]);
+        Gaps::of(&e).fill(&mut e, SparseTreatment::Linear, &[0.0; 3]);
         assert_eq!(e.values, [1.0, 1.0, 2.0]);
     }
 }

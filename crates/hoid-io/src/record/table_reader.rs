@@ -2,14 +2,14 @@
 
 use std::ops::Range;
 
-use hoid_model::{ModelError, numbers::counted};
+use hoid_model::{ModelError, numbers::count_with_noun};
 
 use super::read_options::ReadOptions;
 use super::repair::{self, OpenEnd};
 use crate::IoError;
 use crate::preparation::Step;
 use crate::table::{Column, Table};
-use crate::wording::{named, sparse_option};
+use crate::wording::{format_name, sparse_option};
 
 /// The table to be converted, and the steps applied to it.
 pub(super) struct TableReader<'a> {
@@ -22,7 +22,7 @@ pub(super) struct TableReader<'a> {
 }
 
 impl TableReader<'_> {
-    pub(super) fn model(&self, source: ModelError) -> IoError {
+    pub(super) fn model_error(&self, source: ModelError) -> IoError {
         IoError::Model {
             file: self.file.clone(),
             source,
@@ -31,7 +31,7 @@ impl TableReader<'_> {
 
     /// Returns the rows to use. If missing values are interpolated, these are the rows in which all signals have values
     /// on both sides, because two topics in one table do not start and end in the same row; otherwise all `rows`.
-    pub(super) fn between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
+    pub(super) fn rows_between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
         if !self.options.repair.fill {
             return rows;
         }
@@ -48,10 +48,10 @@ impl TableReader<'_> {
         let (before, after) = (kept.start.saturating_sub(rows.start), rows.end.saturating_sub(kept.end));
         if (before, after) != (0, 0) {
             let columns = self.signals.iter().filter_map(|column| self.table.columns.get(*column));
-            let names: Vec<String> = columns.map(|column| named(&column.name)).collect();
+            let names: Vec<String> = columns.map(|column| format_name(&column.name)).collect();
             self.table.notes.push(format!(
                 "{} at the start and {after} at the end left out: --fill has no value to bridge to there (columns: {})",
-                counted(before, "row"),
+                count_with_noun(before, "row"),
                 names.join(", ")
             ));
         }
@@ -59,7 +59,7 @@ impl TableReader<'_> {
         // interpolated here.
         for at in [first, last] {
             for &column in &self.signals {
-                let value = self.between(column, at, &rows, time);
+                let value = self.interpolated_value(column, at, &rows, time);
                 let place = self.table.columns.get_mut(column);
                 if let (Some(value), Some(place)) = (value, place.and_then(|column| column.values.get_mut(at))) {
                     *place = value;
@@ -71,7 +71,7 @@ impl TableReader<'_> {
 
     /// Returns the value interpolated in row `at` between its neighbours; `None` if the value is not missing, or if
     /// there is no value on one side.
-    fn between(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
+    fn interpolated_value(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
         let source = self.table.columns.get(column)?;
         if !source.values.get(at)?.is_nan() || source.texts.binary_search(&at).is_ok() {
             return None;
@@ -90,14 +90,14 @@ impl TableReader<'_> {
 
     /// Returns the times at which the signal with the most samples has values, as two topics that share a table have
     /// separate clocks; `None` unless there are fewer of these times than rows.
-    pub(super) fn own_times(&self, rows: &Range<usize>, time: usize, t: &[f64]) -> Option<Vec<f64>> {
+    pub(super) fn recorded_times(&self, rows: &Range<usize>, time: usize, t: &[f64]) -> Option<Vec<f64>> {
         // If the time itself is a signal, it has a value in each row; its values have already been moved out of the
         // table.
         if self.signals.contains(&time) {
             return None;
         }
         let of = |column: &Column| -> Vec<f64> {
-            let values = column.own_values(rows.clone());
+            let values = column.recorded_values(rows.clone());
             // The first and the last row are excluded because they may have been filled in.
             let inside = values.iter().zip(t).skip(1).take(values.len().saturating_sub(2));
             let own = inside.filter(|(value, _)| value.is_finite());
@@ -119,7 +119,7 @@ impl TableReader<'_> {
         let finite = |row: &usize| source.values.get(*row).is_some_and(|value| value.is_finite());
         let bad = |row: &usize| !(finite(row) || may_fill && source.is_missing(*row));
         if let Some(row) = rows.clone().find(bad) {
-            return Err(self.table.bad_value(column, row, rows));
+            return Err(self.table.bad_value_error(column, row, rows));
         }
         // The values are moved out of the table, since a column is read only once; long columns are thus not copied.
         let mut values = std::mem::take(&mut source.values);
@@ -133,7 +133,7 @@ impl TableReader<'_> {
             IoError::NothingToBridgeTo {
                 file: self.file.clone(),
                 place: self.table.source.place(row),
-                column: named(&source.name),
+                column: format_name(&source.name),
                 end,
             }
         })?;
@@ -141,7 +141,7 @@ impl TableReader<'_> {
             self.table.notes.push(format!(
                 "column {} has many missing values, as if logged at its own times: --fill interpolates linearly; {} \
                  holds the last value",
-                named(&source.name),
+                format_name(&source.name),
                 sparse_option(&source.name)
             ));
         }

@@ -8,11 +8,11 @@ use super::table_reader::TableReader;
 use crate::IoError;
 use crate::preparation::Step;
 use crate::table::Precision;
-use crate::time::sampling::{self, Uneven};
-use crate::wording::list;
+use crate::time::sampling::{self, SamplingFault};
+use crate::wording::list_names;
 
 /// Maximum ratio of the number of resampled samples to that of recorded samples.
-const LARGEST_FACTOR: usize = 100;
+const MAX_RESAMPLING_RATIO: usize = 100;
 
 /// Rows and times from which the samples of a record are taken.
 pub(super) struct TimeGrid {
@@ -36,12 +36,12 @@ impl TableReader<'_> {
             },
         };
         match (time, given) {
-            (Some(time), None) => self.grid_of_t(time, None),
-            (Some(time), Some(ts)) if self.options.repair.resample => self.grid_of_t(time, Some(ts)),
+            (Some(time), None) => self.grid_from_time(time, None),
+            (Some(time), Some(ts)) if self.options.repair.resample => self.grid_from_time(time, Some(ts)),
             (time, Some(ts)) => self.counted_grid(time, ts),
             (None, None) => Err(IoError::NoSampling {
                 file: self.file.clone(),
-                available: list(&self.table.names()),
+                available: list_names(&self.table.names()),
             }),
         }
     }
@@ -82,8 +82,8 @@ impl TableReader<'_> {
         }
         let time_s = |row: usize| start + row as f64 * ts;
         let times: Vec<f64> = (0..self.table.rows).map(time_s).collect();
-        let rows = self.rows(&times)?;
-        let rows = self.between_values(rows, None);
+        let rows = self.rows_in_span(&times)?;
+        let rows = self.rows_between_values(rows, None);
         Ok(TimeGrid {
             start_s: time_s(rows.start),
             rows,
@@ -94,16 +94,16 @@ impl TableReader<'_> {
     }
 
     /// Determines the grid from the column t, or the grid to which the record is resampled.
-    fn grid_of_t(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
-        let too_few = |this: &Self| this.uneven(Uneven::TooFew, &(0..0), &[]);
+    fn grid_from_time(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
+        let too_few = |this: &Self| this.sampling_error(SamplingFault::TooFew, &(0..0), &[]);
         let column = self.table.columns.get(time).ok_or_else(|| too_few(self))?;
         let precision = column.precision;
-        let rows = self.rows(&column.values)?;
-        let rows = self.between_values(rows, Some(time));
+        let rows = self.rows_in_span(&column.values)?;
+        let rows = self.rows_between_values(rows, Some(time));
         let t = self.values(time, rows.clone(), None)?;
         let start_s = *t.first().ok_or_else(|| too_few(self))?;
         let stated = self.table.sample_time_s;
-        let sampled = match (sampling::even(&t, precision, stated), given) {
+        let sampled = match (sampling::even_sampling(&t, precision, stated), given) {
             (Ok(even), Some(given)) if !given.matches(self.sample_time(even.sample_time_s)?) => Ok(given),
             (Ok(even), _) => {
                 self.table.notes.extend(even.note);
@@ -115,17 +115,17 @@ impl TableReader<'_> {
                     t: Some(t),
                 });
             }
-            (Err(Uneven::Gap { .. } | Uneven::Jitter { .. }), Some(given)) => Ok(given),
-            (Err(Uneven::Gap { .. } | Uneven::Jitter { .. }), None) if self.options.repair.resample => {
-                let own = self.own_times(&rows, time, &t);
-                match sampling::typical(own.as_deref().unwrap_or(&t), precision) {
+            (Err(SamplingFault::Gap { .. } | SamplingFault::Jitter { .. }), Some(given)) => Ok(given),
+            (Err(SamplingFault::Gap { .. } | SamplingFault::Jitter { .. }), None) if self.options.repair.resample => {
+                let own = self.recorded_times(&rows, time, &t);
+                match sampling::typical_sample_time(own.as_deref().unwrap_or(&t), precision) {
                     Ok(ts) => Ok(self.sample_time(ts)?),
                     Err(uneven) => Err(uneven),
                 }
             }
             (Err(uneven), _) => Err(uneven),
         };
-        let sample_time = sampled.map_err(|uneven| self.uneven(uneven, &rows, &t))?;
+        let sample_time = sampled.map_err(|uneven| self.sampling_error(uneven, &rows, &t))?;
         self.resampled_grid(rows, t, sample_time, precision)
     }
 
@@ -138,20 +138,20 @@ impl TableReader<'_> {
     ) -> Result<TimeGrid, IoError> {
         // Interpolation needs at least two samples.
         let &[start_s, .., end_s] = t.as_slice() else {
-            return Err(self.uneven(Uneven::TooFew, &rows, &t));
+            return Err(self.sampling_error(SamplingFault::TooFew, &rows, &t));
         };
         let ts = sample_time.s();
         // The rounding of the last t must not remove the last sample.
         let slack = 1e-6 + (precision.unit(end_s) / ts).min(0.5);
         let samples = ((end_s - start_s) / ts + slack).floor() + 1.0;
-        if samples > LARGEST_FACTOR.saturating_mul(t.len()) as f64 || !samples.is_finite() {
+        if samples > MAX_RESAMPLING_RATIO.saturating_mul(t.len()) as f64 || !samples.is_finite() {
             return Err(IoError::ResampledTooLong {
                 file: self.file.clone(),
                 start_s,
                 end_s,
                 samples,
                 rows: t.len(),
-                factor: LARGEST_FACTOR,
+                factor: MAX_RESAMPLING_RATIO,
             });
         }
         let longest = sampling::steps(&t).fold(0.0, f64::max);
@@ -177,19 +177,19 @@ impl TableReader<'_> {
         })
     }
 
-    fn uneven(&self, uneven: Uneven, rows: &Range<usize>, t: &[f64]) -> IoError {
+    fn sampling_error(&self, uneven: SamplingFault, rows: &Range<usize>, t: &[f64]) -> IoError {
         let file = self.file.clone();
         let place = |row: usize| self.table.source.place(rows.start.saturating_add(row));
         let at = |row: usize| t.get(row).copied().unwrap_or(f64::NAN);
         match uneven {
-            Uneven::TooFew => IoError::TooFewSamples { file, found: t.len() },
-            Uneven::NotIncreasing { row } => IoError::NotIncreasing {
+            SamplingFault::TooFew => IoError::TooFewSamples { file, found: t.len() },
+            SamplingFault::NotIncreasing { row } => IoError::NotIncreasing {
                 file,
                 place: place(row),
                 found: at(row),
                 previous: at(row.saturating_sub(1)),
             },
-            Uneven::Gap {
+            SamplingFault::Gap {
                 row,
                 missing,
                 gaps,
@@ -203,7 +203,7 @@ impl TableReader<'_> {
                 gaps,
                 sample_time_s,
             },
-            Uneven::Jitter {
+            SamplingFault::Jitter {
                 row,
                 deviation_s,
                 tolerance_s,
@@ -220,11 +220,11 @@ impl TableReader<'_> {
     }
 
     fn sample_time(&self, ts_s: f64) -> Result<SampleTime, IoError> {
-        SampleTime::new(ts_s).map_err(|source| self.model(source))
+        SampleTime::new(ts_s).map_err(|source| self.model_error(source))
     }
 
     /// Returns the range of rows whose time is inside the span.
-    fn rows(&self, times: &[f64]) -> Result<Range<usize>, IoError> {
+    fn rows_in_span(&self, times: &[f64]) -> Result<Range<usize>, IoError> {
         let (from, to) = self.options.span_s;
         let mut finite = times.iter().copied().filter(|t| t.is_finite());
         let (start_s, end_s) = (

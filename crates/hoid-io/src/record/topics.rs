@@ -6,12 +6,12 @@
 //! missing.
 
 use super::read_options::ReadOptions;
-use crate::table::{Signal, Table, kept};
+use crate::table::{Signal, Table, keep_rows};
 use crate::time::sampling::pairs;
 
 /// Returns the table with its topics joined if t decreases and no row has values of both input and output, although
 /// each of these has values in other rows; otherwise returns the table unchanged.
-pub(crate) fn joined<'a>(table: Table<'a>, options: &ReadOptions) -> Table<'a> {
+pub(crate) fn join_topics<'a>(table: Table<'a>, options: &ReadOptions) -> Table<'a> {
     let names = table.names();
     let Some(time) = names.iter().position(|name| *name == "t") else {
         return table;
@@ -32,7 +32,7 @@ pub(crate) fn joined<'a>(table: Table<'a>, options: &ReadOptions) -> Table<'a> {
     }
     let mut order: Vec<usize> = (0..table.rows).collect();
     order.sort_by(|a, b| table.value(time, *a).total_cmp(&table.value(time, *b)));
-    with_joined_rows(kept(table, order), time)
+    with_joined_rows(keep_rows(table, order), time)
 }
 
 /// Joins consecutive rows of the same t: each missing value is taken from the next of these rows that has one.
@@ -53,7 +53,7 @@ fn with_joined_rows(mut table: Table<'_>, time: usize) -> Table<'_> {
             }
         }
     }
-    let mut table = kept(table, rows);
+    let mut table = keep_rows(table, rows);
     table.notes.push(String::from(
         "t starts again, and no row has values of both input and output: the rows are joined by t as topics",
     ));

@@ -13,22 +13,22 @@ use std::ops::Range;
 use super::read_options::TrialChoice;
 use crate::IoError;
 use crate::formats::arrays::Contents;
-use crate::table::{Column, ColumnOption, Table, kept};
+use crate::table::{Column, ColumnOption, Table, keep_rows};
 use crate::time::sampling::pairs;
-use crate::wording::{did_you_mean, list, shown};
+use crate::wording::{abbreviate, did_you_mean, list_names};
 
 /// Minimum number of rows of a trial that is recognised automatically.
 const MIN_TRIAL_ROWS: usize = 8;
 
 /// Names and rows of the trials found.
-type Parts = Vec<(String, Range<usize>)>;
+type NamedRanges = Vec<(String, Range<usize>)>;
 
 /// Returns the requested trial of a table, or the table itself if it contains a single trial.
 pub(crate) fn select_trial<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Result<Table<'a>, IoError> {
     let file = || table.source.file().to_owned();
     let (by, parts) = match choice {
-        Some(choice) => (choice.column.clone(), parts_by(&table, choice)?),
-        None => match restarts(&table) {
+        Some(choice) => (choice.column.clone(), split_by(&table, choice)?),
+        None => match split_at_restarts(&table) {
             Some(found) => found,
             None => return Ok(table),
         },
@@ -41,20 +41,20 @@ pub(crate) fn select_trial<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -
                 return Err(IoError::NoSuchTrial {
                     file: file(),
                     asked: format!("{by}={value}"),
-                    available: list(&names),
+                    available: list_names(&names),
                 });
             }
         },
         None => match parts.as_slice() {
             [(_, rows)] => rows.clone(),
             [] => return Err(IoError::NoRows { file: file() }),
-            _ => return Err(several(file(), &by, names)),
+            _ => return Err(several_trials_error(file(), &by, names)),
         },
     };
-    Ok(kept(table, rows.collect()))
+    Ok(keep_rows(table, rows.collect()))
 }
 
-fn several(file: String, by: &str, names: Vec<&str>) -> IoError {
+fn several_trials_error(file: String, by: &str, names: Vec<&str>) -> IoError {
     IoError::SeveralTrials {
         file,
         by: by.to_owned(),
@@ -73,7 +73,7 @@ fn rows_with_decreasing_time(table: &Table<'_>) -> Vec<usize> {
 }
 
 /// Returns the row range of each trial; `begins` are the first rows of all trials except the first.
-fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
+fn trial_ranges(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     let from = std::iter::once(0).chain(begins.iter().copied());
     let to = begins.iter().copied().chain([rows]);
     from.zip(to).map(|(from, to)| from..to).collect()
@@ -90,10 +90,10 @@ fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
 }
 
 /// Divides a table into trials by a column and by t, or only by t.
-fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
+fn split_by(table: &Table<'_>, choice: &TrialChoice) -> Result<NamedRanges, IoError> {
     let mut begins = rows_with_decreasing_time(table);
     if choice.column == "t" {
-        return Ok(numbered(between(&begins, table.rows)));
+        return Ok(number_trials(trial_ranges(&begins, table.rows)));
     }
     let names = table.names();
     let Some(at) = names.iter().position(|name| *name == choice.column) else {
@@ -102,7 +102,7 @@ fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
             missing: format!("\"{}\"", choice.column),
             meant: did_you_mean(&[&choice.column], &names).into_boxed_str(),
             asked: choice.to_string(),
-            available: list(&names),
+            available: list_names(&names),
             option: ColumnOption::Trial,
         });
     };
@@ -111,20 +111,20 @@ fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
     begins.extend(pairs.filter(|(_, (before, label))| before != label).map(|(row, _)| row));
     begins.sort_unstable();
     begins.dedup();
-    Ok(named(between(&begins, table.rows), |row| {
+    Ok(name_trials(trial_ranges(&begins, table.rows), |row| {
         labels.get(row).cloned().flatten()
     }))
 }
 
 /// Numbers the trials; their numbers are their names.
-fn numbered(parts: Vec<Range<usize>>) -> Parts {
+fn number_trials(parts: Vec<Range<usize>>) -> NamedRanges {
     let counted = (1_usize..).zip(parts);
     counted.map(|(number, rows)| (number.to_string(), rows)).collect()
 }
 
 /// Names each trial by the value of the column in its first row and omits trials without a value; a number is appended
 /// to repeated values.
-fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> Parts {
+fn name_trials(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> NamedRanges {
     let mut found: Vec<(String, usize, Range<usize>)> = Vec::new();
     for rows in parts {
         let Some(value) = label(rows.start) else { continue };
@@ -140,11 +140,11 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
 
 /// Returns the name of the column that names the trials, or `t` if no column does, and the trials between restarts of
 /// t; `None` if t does not restart.
-fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
+fn split_at_restarts(table: &Table<'_>) -> Option<(String, NamedRanges)> {
     let begins = rows_with_decreasing_time(table);
     let time = table.columns.iter().position(|column| column.name == "t")?;
     let t = |row: usize| table.value(time, row);
-    let parts = between(&begins, table.rows);
+    let parts = trial_ranges(&begins, table.rows);
     let starts_again = parts.iter().zip(parts.iter().skip(1)).all(|(part, next)| {
         let (first, last) = (t(part.start), t(part.end.saturating_sub(1)));
         last - t(next.start) >= 0.5 * (last - first)
@@ -164,14 +164,14 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     let is_named = |column: &Column| !column.name.is_empty() && column.name != "t";
     let mut columns = table.columns.iter().enumerate();
     Some(match columns.find(|(at, column)| is_named(column) && counts(*at)) {
-        Some((at, column)) => (column.name.clone(), named(parts, |row| cell(table, at, row))),
-        None => (String::from("t"), numbered(parts)),
+        Some((at, column)) => (column.name.clone(), name_trials(parts, |row| cell(table, at, row))),
+        None => (String::from("t"), number_trials(parts)),
     })
 }
 
 /// Selects a trial from an array of structures, such as `trial(3).e`; the second value is true if a trial was selected
 /// or the array was requested; the rows then need not be divided into trials.
-pub(crate) fn of_contents(
+pub(crate) fn select_trial_in_contents(
     mut contents: Contents,
     choice: Option<&TrialChoice>,
     file: &str,
@@ -209,13 +209,13 @@ pub(crate) fn of_contents(
         Some(value) => {
             return Err(IoError::NoSuchTrial {
                 file: file.to_owned(),
-                asked: shown(&format!("{array}={value}")),
-                available: list(&numbers),
+                asked: abbreviate(&format!("{array}={value}")),
+                available: list_names(&numbers),
             });
         }
         // An array with a single element needs no choice.
         None if numbers.len() < 2 => return Ok((contents, asked.is_some())),
-        None => return Err(several(file.to_owned(), &array, numbers)),
+        None => return Err(several_trials_error(file.to_owned(), &array, numbers)),
     };
     let mut at = elements.iter();
     contents.entries.retain(|_| match at.next() {

@@ -40,7 +40,7 @@ impl FitFile {
     /// # Errors
     /// [`IoError::NoFit`] for a fit of another structure, without covariance, or without determined parameters.
     pub fn operator(self) -> Result<FittedOperator, IoError> {
-        self.operator.map_err(|reason| not_a_fit(&self.source, reason))
+        self.operator.map_err(|reason| no_fit_error(&self.source, reason))
     }
 }
 
@@ -64,7 +64,7 @@ pub fn read_fit(path: &Path) -> Result<FitFile, IoError> {
 /// # Errors
 /// [`IoError::NoFit`] for a text that is not such a fit.
 pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
-    let found: FitObject = serde_json::from_str(text).map_err(|error| not_a_fit(source, error.to_string()))?;
+    let found: FitObject = serde_json::from_str(text).map_err(|error| no_fit_error(source, error.to_string()))?;
     let of = |p: &ParameterObject| {
         Some(FitParameter {
             name: p.name.clone(),
@@ -83,7 +83,7 @@ pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
     })
 }
 
-fn not_a_fit(source: &str, reason: String) -> IoError {
+fn no_fit_error(source: &str, reason: String) -> IoError {
     IoError::NoFit {
         file: source.to_owned(),
         reason,
@@ -163,7 +163,7 @@ impl FitObject {
     fn feedforward(&self) -> Option<Feedforward> {
         let mut seen = self.channels.iter().filter(|channel| channel.role == "feedforward");
         let channel = seen.next().filter(|_| seen.next().is_none())?;
-        let form = Form::of_name(channel.form.as_deref()?).ok()?;
+        let form = Form::from_name(channel.form.as_deref()?).ok()?;
         let own = channel.parameters.as_ref()?;
         let value = |name: &str| {
             let named = |all: &[ParameterObject]| all.iter().find(|p| p.name == name).and_then(|p| p.value);
@@ -184,7 +184,7 @@ impl FitObject {
                 Some((name.to_owned(), found?))
             })
             .collect();
-        let operator = FamilyOperator::of_names(form, &pairs?).ok()?;
+        let operator = FamilyOperator::from_names(form, &pairs?).ok()?;
         Some(Feedforward::new(operator, preview_s))
     }
 
@@ -201,7 +201,7 @@ impl FitObject {
                 self.verdict.reasons.join("; ")
             ));
         }
-        let form = Form::of_name(&form).map_err(|error| error.to_string())?;
+        let form = Form::from_name(&form).map_err(|error| error.to_string())?;
         let covariance = self.covariance.ok_or("it has no covariance")?;
         let neuromuscular = self.neuromuscular.ok_or("it has no key `neuromuscular`")?;
         let names: Vec<&str> = form.coordinates(neuromuscular).iter().map(|c| c.name()).collect();
@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn feedforward_delay_includes_the_preview() {
         let of = |channels: &str| {
-            let text = FIT.trim_end().strip_suffix('}').unwrap();
+            let text = FIT_JSON.trim_end().strip_suffix('}').unwrap();
             parse_fit(&format!("{text}, \"channels\": [{channels}]}}"), "fit.json")
                 .unwrap()
                 .feedforward
@@ -263,7 +263,7 @@ mod tests {
             assert!((seen.operator.tau_e_s() - delay).abs() < 1e-12, "{form}");
             assert_eq!(seen.preview_s, ahead, "{form}");
             assert_eq!(
-                seen.operator.neuromuscular().map(|(omega, _)| omega.round()),
+                seen.operator.neuromuscular_parameters().map(|(omega, _)| omega.round()),
                 Some(10.0)
             );
         }
@@ -274,7 +274,7 @@ mod tests {
         assert_eq!(of(&format!("{one}, {one}")), None);
     }
 
-    const FIT: &str = r#"{"hoid": "0.1.0", "structure": "grey-box", "form": "gain", "neuromuscular": true,
+    const FIT_JSON: &str = r#"{"hoid": "0.1.0", "structure": "grey-box", "form": "gain", "neuromuscular": true,
         "verdict": {"level": "doubtful", "reasons": ["few seconds"]},
         "records": [{"file": "a.csv", "sample_time": 0.01, "units": {"input": "deg", "output": "mm"}}],
         "parameters": [{"name": "K", "value": 2.0, "standard_error": 0.1, "determined": true},
@@ -283,26 +283,26 @@ mod tests {
         "covariance": {"coordinates": ["gain", "ln omega_nm", "ln zeta_nm", "tau_e"], "values": [2.0, 2.4, -1.2, 0.2],
                        "matrix": [[0.01, 0, 0, 0], [0, 0.01, 0, 0], [0, 0, 0.01, 0], [0, 0, 0, 0.0001]]}}"#;
 
-    fn why(text: &str) -> String {
+    fn refusal(text: &str) -> String {
         let found = parse_fit(text, "fit.json").and_then(FitFile::operator);
         found.unwrap_err().to_string()
     }
 
     #[test]
     fn a_fit_is_read_with_its_covariance_and_units() {
-        let found = parse_fit(FIT, "fit.json").unwrap();
+        let found = parse_fit(FIT_JSON, "fit.json").unwrap();
         assert_eq!(found.parameters.len(), 1);
         assert!(found.parameters[0].determined);
         let fit = found.operator().unwrap();
         assert_eq!(fit.operator.form(), Form::Gain);
         assert_eq!((fit.covariance.len(), fit.covariance[15]), (16, 0.0001));
-        assert_eq!((fit.noise.1[0], fit.sample_time), (-0.9, SampleTime::HUNDREDTH));
+        assert_eq!((fit.noise.1[0], fit.sample_time), (-0.9, SampleTime::AT_100_HZ));
         assert_eq!(fit.units, ["deg", "mm"]);
     }
 
     #[test]
-    fn unusable_fits_give_the_reason() {
-        assert!(why("{}").contains("parameters") && why("[1").contains("hoid identify --json"));
+    fn errors_give_the_reason_for_unusable_fits() {
+        assert!(refusal("{}").contains("parameters") && refusal("[1").contains("hoid identify --json"));
         for (from, to, expected) in [
             (r#""form": "gain", "#, "", "structure grey-box"),
             ("doubtful", "not determined", "few seconds"),
@@ -315,7 +315,7 @@ mod tests {
             ("[0.01, 0, 0, 0]", "[0.01, 0, 0]", "expected 16"),
             ("\"gain\", \"neuro", "\"curve\", \"neuro", "curve"),
         ] {
-            let reason = why(&FIT.replace(from, to));
+            let reason = refusal(&FIT_JSON.replace(from, to));
             assert!(reason.contains(expected), "{expected}: {reason}");
         }
     }

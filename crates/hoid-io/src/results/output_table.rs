@@ -94,7 +94,7 @@ impl OutputTable {
     }
 
     /// Returns the number of rows; an error if the columns differ in length.
-    pub(super) fn rows(&self, file: &str) -> Result<usize, IoError> {
+    pub(super) fn row_count(&self, file: &str) -> Result<usize, IoError> {
         let expected = self.columns.first().map_or(0, |column| column.values.len());
         match self.columns.iter().find(|column| column.values.len() != expected) {
             None => Ok(expected),
@@ -108,7 +108,7 @@ impl OutputTable {
     }
 
     pub(super) fn values(&self) -> Vec<Values<'_>> {
-        self.columns.iter().map(|column| column.values.all()).collect()
+        self.columns.iter().map(|column| column.values.as_values()).collect()
     }
 }
 
@@ -116,7 +116,7 @@ impl ColumnValues {
     /// Returns the number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.all().len()
+        self.as_values().len()
     }
 
     /// True if the table has no rows.
@@ -135,7 +135,7 @@ impl ColumnValues {
         }
     }
 
-    pub(super) fn all(&self) -> Values<'_> {
+    pub(super) fn as_values(&self) -> Values<'_> {
         match self {
             Self::Real(values) => Values::Real(values),
             Self::Whole(values) => Values::Whole(values),
@@ -201,7 +201,7 @@ impl Values<'_> {
         }
     }
 
-    pub(crate) fn part(&self, rows: Range<usize>) -> Self {
+    pub(crate) fn slice(&self, rows: Range<usize>) -> Self {
         match self {
             Self::Real(values) => Self::Real(values.get(rows).unwrap_or_default()),
             Self::Whole(values) => Self::Whole(values.get(rows).unwrap_or_default()),

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::output_table::OutputTable;
 use super::table_writer::write_values;
 use crate::IoError;
-use crate::formats::{bytes_of, format_to_write};
+use crate::formats::{format_to_write, read_with_format};
 
 /// Checks that a table can be written to a file with this name, before long computations.
 ///
@@ -40,7 +40,7 @@ pub fn check_table_path(path: &Path) -> Result<(), IoError> {
 /// # Ok::<(), hoid_io::IoError>(())
 /// ```
 pub fn write_table(path: &Path, table: &OutputTable) -> Result<(), IoError> {
-    table.rows(&path.display().to_string())?;
+    table.row_count(&path.display().to_string())?;
     write_values(path, table.schema(), &table.values())
 }
 
@@ -52,6 +52,6 @@ pub fn write_table(path: &Path, table: &OutputTable) -> Result<(), IoError> {
 /// [`IoError`] with the place in the file.
 pub fn read_table(path: &Path) -> Result<OutputTable, IoError> {
     let file = path.display().to_string();
-    let (format, bytes) = bytes_of(path)?;
+    let (format, bytes) = read_with_format(path)?;
     format.results(bytes, &file)
 }

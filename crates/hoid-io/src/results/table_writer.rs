@@ -5,12 +5,12 @@ use std::path::Path;
 
 use super::output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema, Values};
 use crate::IoError;
-use crate::formats::{ColumnsWriter, Format, RowWriter, Writing, format_to_write};
+use crate::formats::{ColumnsWriter, Format, FormatWriter, RowWriter, format_to_write};
 use crate::output::{WholeFile, write_atomically};
 
 /// Number of rows written at a time; the contents of the file therefore do not depend on the groups in which rows were
 /// appended.
-const GROUP: usize = 1 << 16;
+const ROWS_PER_GROUP: usize = 1 << 16;
 
 /// State of a file between two groups of rows.
 enum Sink {
@@ -28,19 +28,19 @@ struct BufferedColumns {
 impl Sink {
     fn start(format: &Format, file: &mut dyn Write, schema: TableSchema) -> io::Result<Self> {
         match format.writing {
-            Writing::Rows(start) => start(file, &schema).map(Self::Rows),
-            Writing::Columns(write) => Ok(Self::Columns(BufferedColumns {
+            FormatWriter::Rows(start) => start(file, &schema).map(Self::Rows),
+            FormatWriter::Columns(write) => Ok(Self::Columns(BufferedColumns {
                 write,
                 columns: schema.columns.iter().map(|column| empty_values(column.kind)).collect(),
                 schema,
             })),
-            Writing::ReadOnly(what) => Err(io::Error::other(what)),
+            FormatWriter::ReadOnly(what) => Err(io::Error::other(what)),
         }
     }
 
-    fn group(&mut self, file: &mut dyn Write, values: &[Values<'_>]) -> io::Result<()> {
+    fn write_group(&mut self, file: &mut dyn Write, values: &[Values<'_>]) -> io::Result<()> {
         match self {
-            Self::Rows(rows) => rows.rows(file, values),
+            Self::Rows(rows) => rows.write_rows(file, values),
             Self::Columns(waiting) => {
                 for (column, values) in waiting.columns.iter_mut().zip(values) {
                     extend(column, *values);
@@ -54,7 +54,7 @@ impl Sink {
         match self {
             Self::Rows(rows) => rows.finish(file),
             Self::Columns(BufferedColumns { write, schema, columns }) => {
-                let values: Vec<Values<'_>> = columns.iter().map(ColumnValues::all).collect();
+                let values: Vec<Values<'_>> = columns.iter().map(ColumnValues::as_values).collect();
                 write(file, &schema, &values)
             }
         }
@@ -66,15 +66,15 @@ pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_
     let format = format_to_write(path)?;
     let schema = schema.checked(&path.display().to_string())?;
     let rows = values.first().map_or(0, Values::len);
-    if let Writing::Columns(write) = format.writing {
+    if let FormatWriter::Columns(write) = format.writing {
         return write_atomically(path, |file| write(file, &schema, values));
     }
     write_atomically(path, |file| {
         let mut sink = Sink::start(format, file, schema)?;
-        for start in (0..rows).step_by(GROUP) {
-            let end = rows.min(start.saturating_add(GROUP));
-            let group: Vec<Values<'_>> = values.iter().map(|values| values.part(start..end)).collect();
-            sink.group(file, &group)?;
+        for start in (0..rows).step_by(ROWS_PER_GROUP) {
+            let end = rows.min(start.saturating_add(ROWS_PER_GROUP));
+            let group: Vec<Values<'_>> = values.iter().map(|values| values.slice(start..end)).collect();
+            sink.write_group(file, &group)?;
         }
         sink.finish(file)
     })
@@ -134,21 +134,21 @@ impl TableWriter {
         if schema.columns != self.columns {
             return Err(IoError::ColumnsDiffer {
                 file: self.name.clone(),
-                found: listed(&schema.columns),
-                expected: listed(&self.columns),
+                found: list_of_columns(&schema.columns),
+                expected: list_of_columns(&self.columns),
             });
         }
-        let rows = table.rows(&self.name)?;
+        let rows = table.row_count(&self.name)?;
         let values = table.values();
         let mut start = 0;
         while start < rows {
-            let room = GROUP.saturating_sub(self.waiting.first().map_or(0, ColumnValues::len));
+            let room = ROWS_PER_GROUP.saturating_sub(self.waiting.first().map_or(0, ColumnValues::len));
             let end = rows.min(start.saturating_add(room));
             for (waiting, values) in self.waiting.iter_mut().zip(&values) {
-                extend(waiting, values.part(start..end));
+                extend(waiting, values.slice(start..end));
             }
             if end.saturating_sub(start) == room {
-                self.group()?;
+                self.write_group()?;
             }
             start = end;
         }
@@ -161,17 +161,17 @@ impl TableWriter {
     /// [`IoError::Unwritable`] for errors reported by the operating system.
     pub fn finish(mut self) -> Result<(), IoError> {
         if self.waiting.iter().any(|waiting| !waiting.is_empty()) {
-            self.group()?;
+            self.write_group()?;
         }
         let sink = self.sink.take().ok_or_else(|| unfinished_error(&self.name))?;
         self.file.write(|file| sink.finish(file))?;
         self.file.finish()
     }
 
-    fn group(&mut self) -> Result<(), IoError> {
+    fn write_group(&mut self) -> Result<(), IoError> {
         let mut sink = self.sink.take().ok_or_else(|| unfinished_error(&self.name))?;
-        let values: Vec<Values<'_>> = self.waiting.iter().map(ColumnValues::all).collect();
-        self.file.write(|file| sink.group(file, &values))?;
+        let values: Vec<Values<'_>> = self.waiting.iter().map(ColumnValues::as_values).collect();
+        self.file.write(|file| sink.write_group(file, &values))?;
         self.sink = Some(sink);
         for (waiting, column) in self.waiting.iter_mut().zip(&self.columns) {
             *waiting = empty_values(column.kind);
@@ -205,7 +205,7 @@ fn extend(column: &mut ColumnValues, values: Values<'_>) {
     }
 }
 
-fn listed(columns: &[ColumnSchema]) -> String {
+fn list_of_columns(columns: &[ColumnSchema]) -> String {
     let column = |column: &ColumnSchema| {
         let kind = match column.kind {
             ColumnKind::Real => "real",

@@ -25,7 +25,7 @@ pub struct ScenarioChanges {
     pub sample_time: Option<f64>,
     /// Position of the leading gain of the controlled element.
     pub realisation: Option<Realisation>,
-    /// Response to the displayed target as text ([`Feedforward::of_text`]), or `none`.
+    /// Response to the displayed target as text ([`Feedforward::from_text`]), or `none`.
     pub feedforward: Option<String>,
     /// Root mean square of the disturbance at the input of the controlled element, deg; zero for none.
     pub disturbance: Option<f64>,
@@ -48,12 +48,12 @@ impl ScenarioChanges {
     /// [`ScenarioChangeError`] with the name of the option.
     pub fn apply(&self, scenario: AnyScenario) -> Result<AnyScenario, ScenarioChangeError> {
         Ok(match scenario {
-            AnyScenario::Reference(scenario) => AnyScenario::Reference(Box::new(self.of_reference(*scenario)?)),
-            AnyScenario::Family(scenario) => AnyScenario::Family(Box::new(self.of_family(*scenario)?)),
+            AnyScenario::Reference(scenario) => AnyScenario::Reference(Box::new(self.apply_to_reference(*scenario)?)),
+            AnyScenario::Family(scenario) => AnyScenario::Family(Box::new(self.apply_to_family(*scenario)?)),
         })
     }
 
-    fn of_reference(&self, mut scenario: Scenario) -> Result<Scenario, ScenarioChangeError> {
+    fn apply_to_reference(&self, mut scenario: Scenario) -> Result<Scenario, ScenarioChangeError> {
         if let Some(order) = self.remnant_order {
             scenario.remnant.order = order;
         }
@@ -68,7 +68,7 @@ impl ScenarioChanges {
         }
         let strength = scenario.remnant.strength;
         scenario.remnant.strength =
-            (strength.changed(self.noise_level, self.noise_definition)).ok_or_else(|| ScenarioChangeError {
+            (strength.with_level(self.noise_level, self.noise_definition)).ok_or_else(|| ScenarioChangeError {
                 option: "noise_definition",
                 reason: "needs a noise level, but the scenario gives the gain K_n instead".to_owned(),
             })?;
@@ -77,17 +77,18 @@ impl ScenarioChanges {
             scenario.feedforward = feedforward(text, Some((of.omega_nm_rad_s, of.zeta_nm)))?;
         }
         if let Some(rms) = self.disturbance {
-            scenario.disturbance = disturbance(&scenario.disturbance, rms).map_err(|error| ScenarioChangeError {
-                option: "disturbance",
-                reason: format!("is wrong: {error}"),
-            })?;
+            scenario.disturbance =
+                rescaled_disturbance(&scenario.disturbance, rms).map_err(|error| ScenarioChangeError {
+                    option: "disturbance",
+                    reason: format!("is wrong: {error}"),
+                })?;
         }
         Ok(scenario)
     }
 
     /// Refuses the options of remnant and disturbance, because the scenario file of an operator of the family defines
     /// both.
-    fn of_family(&self, mut scenario: FamilyScenario) -> Result<FamilyScenario, ScenarioChangeError> {
+    fn apply_to_family(&self, mut scenario: FamilyScenario) -> Result<FamilyScenario, ScenarioChangeError> {
         let remnant = "applies only to the remnant of the thesis; in a scenario with a form, specify the remnant in \
                        [[remnant]] tables";
         let disturbance = "applies only to the conditions of the thesis; in a scenario with a form, specify the \
@@ -113,7 +114,7 @@ impl ScenarioChanges {
             scenario.realisation = realisation;
         }
         if let Some(text) = &self.feedforward {
-            scenario.feedforward = feedforward(text, scenario.initial.operator.neuromuscular())?;
+            scenario.feedforward = feedforward(text, scenario.initial.operator.neuromuscular_parameters())?;
             if scenario.feedforward.is_some() && scenario.target.function.sinusoids().is_empty() {
                 return Err(ScenarioChangeError {
                     option: "feedforward",
@@ -136,7 +137,7 @@ fn feedforward(text: &str, neuromuscular: Option<(f64, f64)>) -> Result<Option<F
     if text.trim() == "none" {
         return Ok(None);
     }
-    let found = Feedforward::of_text(text, neuromuscular).map_err(|error| ScenarioChangeError {
+    let found = Feedforward::from_text(text, neuromuscular).map_err(|error| ScenarioChangeError {
         option: "feedforward",
         reason: format!("is wrong: {error}"),
     })?;
@@ -145,7 +146,7 @@ fn feedforward(text: &str, neuromuscular: Option<(f64, f64)>) -> Result<Option<F
 
 /// Returns a disturbance with the lines of `known` and another root mean square. If `known` has no lines, the lines are
 /// between the lines of the target of the thesis.
-pub(super) fn disturbance(known: &ForcingFunction, rms_deg: f64) -> Result<ForcingFunction, ModelError> {
+pub(super) fn rescaled_disturbance(known: &ForcingFunction, rms_deg: f64) -> Result<ForcingFunction, ModelError> {
     let reference = ForcingFunction::reference_disturbance(rms_deg)?;
     let own = known.rms_deg();
     if own == 0.0 || rms_deg == 0.0 {
@@ -216,7 +217,7 @@ mod tests {
             (plain.feedforward.clone(), plain.disturbance.clone()),
             (None, ForcingFunction::default())
         );
-        let louder = disturbance(&scenario.disturbance, 0.4).unwrap();
+        let louder = rescaled_disturbance(&scenario.disturbance, 0.4).unwrap();
         assert!((louder.rms_deg() - 0.4).abs() < 1e-15);
         let of_person = ScenarioChanges {
             feedforward: Some("gain:0.5,tau_f=0.2".to_owned()),
@@ -227,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn invalid_changes_name_their_option() {
+    fn errors_for_invalid_changes_name_the_option() {
         let with = |change: &dyn Fn(&mut ScenarioChanges)| {
             let mut changes = ScenarioChanges::default();
             change(&mut changes);

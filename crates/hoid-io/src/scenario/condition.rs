@@ -10,7 +10,7 @@ use hoid_model::{
     schedule::Schedule,
 };
 
-use super::changes::disturbance;
+use super::changes::rescaled_disturbance;
 use super::error::ScenarioFileError;
 use super::keys::{DefinitionKey, File, RealisationKey, RemnantTable, ScheduleTable, SinusoidTable, StateTable};
 use super::values::{Limits, Source};
@@ -23,7 +23,7 @@ impl Source<'_> {
         let condition = match &file.condition {
             None => None,
             Some(given) => Some(given.get_ref().parse::<Condition>().map_err(|_| {
-                self.value(
+                self.value_error(
                     "condition",
                     given.span().start,
                     given.get_ref(),
@@ -36,34 +36,35 @@ impl Source<'_> {
         }
         let mut scenario = Scenario::condition(condition.unwrap_or(Condition::C1));
         scenario.name = file.name.unwrap_or_else(|| name.to_owned());
-        if let Some(ts) = self.limited("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)? {
-            scenario.sample_time = SampleTime::new(ts).map_err(|error| self.model(error))?;
+        if let Some(ts) = self.optional_number("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)? {
+            scenario.sample_time = SampleTime::new(ts).map_err(|error| self.model_error(error))?;
         }
         let ts = scenario.sample_time;
-        let tau_e_s = self.whole("tau_e_s", file.tau_e_s, scenario.initial.operator.tau_e_s, ts, 0.0)?;
+        let tau_e_s = self.whole_samples("tau_e_s", file.tau_e_s, scenario.initial.operator.tau_e_s, ts, 0.0)?;
         for state in [&mut scenario.initial, &mut scenario.last] {
             state.operator.tau_e_s = tau_e_s;
         }
-        scenario.measurement_s = self.whole("measurement_s", file.measurement_s, scenario.measurement_s, ts, 1.0)?;
-        scenario.run_in_s = self.whole("run_in_s", file.run_in_s, scenario.run_in_s, ts, 0.0)?;
+        scenario.measurement_s =
+            self.whole_samples("measurement_s", file.measurement_s, scenario.measurement_s, ts, 1.0)?;
+        scenario.run_in_s = self.whole_samples("run_in_s", file.run_in_s, scenario.run_in_s, ts, 0.0)?;
         match file.realisation {
             Some(RealisationKey::Input) => scenario.realisation = Realisation::Input,
             Some(RealisationKey::Output) => scenario.realisation = Realisation::Output,
             None => {}
         }
 
-        self.change(&mut scenario.initial, "initial", file.initial, ts)?;
+        self.set_state(&mut scenario.initial, "initial", file.initial, ts)?;
         if scenario.schedule == Schedule::Constant {
             scenario.last = scenario.initial;
         }
         let changes_last = file.last.is_some();
         if let Some(table) = file.last {
-            self.change(&mut scenario.last, "last", table, ts)?;
+            self.set_state(&mut scenario.last, "last", table, ts)?;
         }
         scenario.schedule = self.schedule(file.schedule, scenario.schedule)?;
         if scenario.schedule == Schedule::Constant && changes_last {
             return Err(
-                self.keys("[last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s")
+                self.keys_error("[last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s")
             );
         }
         if let Some(table) = &file.feedforward {
@@ -72,24 +73,25 @@ impl Source<'_> {
         }
         let response_changes = scenario.feedforward.as_ref().is_some_and(|seen| seen.last.is_some());
         if response_changes && scenario.schedule == Schedule::Constant {
-            return Err(self.keys(
+            return Err(self.keys_error(
                 "[feedforward.last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s",
             ));
         }
         if scenario.schedule != Schedule::Constant && scenario.initial == scenario.last && !response_changes {
-            return Err(
-                self.keys("[schedule] is given, but both states are the same: add [last] with the values that change")
-            );
+            return Err(self.keys_error(
+                "[schedule] is given, but both states are the same: add [last] with the values that change",
+            ));
         }
-        self.remnant(&mut scenario, file.remnant)?;
+        self.set_remnant(&mut scenario, file.remnant)?;
         if let Some(tables) = file.forcing {
             scenario.forcing = self.forcing("forcing", tables, scenario.measurement_s)?;
         }
         if let Some(tables) = file.disturbance {
             scenario.disturbance = self.forcing("disturbance", tables, scenario.measurement_s)?;
         }
-        if let Some(rms) = self.limited("disturbance_rms_deg", file.disturbance_rms_deg, Limits::NOISE_GAIN)? {
-            scenario.disturbance = disturbance(&scenario.disturbance, rms).map_err(|error| self.model(error))?;
+        if let Some(rms) = self.optional_number("disturbance_rms_deg", file.disturbance_rms_deg, Limits::NOISE_GAIN)? {
+            scenario.disturbance =
+                rescaled_disturbance(&scenario.disturbance, rms).map_err(|error| self.model_error(error))?;
         }
         Ok(scenario)
     }
@@ -111,13 +113,13 @@ impl Source<'_> {
         if missing.is_empty() {
             return Ok(());
         }
-        Err(self.keys(&format!(
+        Err(self.keys_error(&format!(
             "missing {}: give them, or start from a condition, such as condition = \"C1\"",
             missing.join(", ")
         )))
     }
 
-    fn change(
+    fn set_state(
         &self,
         state: &mut OperatingState,
         table: &str,
@@ -129,7 +131,7 @@ impl Source<'_> {
             operator,
             controlled_element,
         } = state;
-        operator.tau_e_s = self.whole(&key("tau_e_s"), given.tau_e_s, operator.tau_e_s, sample_time, 0.0)?;
+        operator.tau_e_s = self.whole_samples(&key("tau_e_s"), given.tau_e_s, operator.tau_e_s, sample_time, 0.0)?;
         let any = [
             ("K_e", given.k_e, &mut operator.k_e, Limits::GAIN),
             ("T_L_s", given.t_l_s, &mut operator.t_l_s, Limits::LEAD_S),
@@ -149,7 +151,7 @@ impl Source<'_> {
             ("zeta_nm", given.zeta_nm, &mut operator.zeta_nm, Limits::DAMPING),
         ];
         for (name, value, target, limits) in any {
-            if let Some(value) = self.limited(&key(name), value, limits)? {
+            if let Some(value) = self.optional_number(&key(name), value, limits)? {
                 *target = value;
             }
         }
@@ -158,14 +160,14 @@ impl Source<'_> {
 
     pub(super) fn schedule(&self, given: Option<ScheduleTable>, base: Schedule) -> Result<Schedule, ScenarioFileError> {
         let Some(given) = given else { return Ok(base) };
-        let rate = self.limited("schedule.rate_per_s", given.rate_per_s, Limits::CHANGE_PER_S)?;
-        let midpoint = self.limited("schedule.midpoint_s", given.midpoint_s, Limits::INSTANT_S)?;
+        let rate = self.optional_number("schedule.rate_per_s", given.rate_per_s, Limits::CHANGE_PER_S)?;
+        let midpoint = self.optional_number("schedule.midpoint_s", given.midpoint_s, Limits::INSTANT_S)?;
         let (of_base, at_base) = (base.rate_per_s(), base.change_s());
-        let missing = |key: &str| self.keys(&format!("[schedule] lacks {key}, which has no default: add it"));
+        let missing = |key: &str| self.keys_error(&format!("[schedule] lacks {key}, which has no default: add it"));
         let rate_per_s = rate.or(of_base).ok_or_else(|| missing("rate_per_s"))?;
         let midpoint_s = midpoint.or(at_base).ok_or_else(|| missing("midpoint_s"))?;
         Ok(
-            match self.limited("schedule.interval_s", given.interval_s, Limits::INTERVAL_S)? {
+            match self.optional_number("schedule.interval_s", given.interval_s, Limits::INTERVAL_S)? {
                 Some(interval_s) => Schedule::Alternating {
                     rate_per_s,
                     midpoint_s,
@@ -176,24 +178,26 @@ impl Source<'_> {
         )
     }
 
-    fn remnant(&self, scenario: &mut Scenario, given: RemnantTable) -> Result<(), ScenarioFileError> {
+    fn set_remnant(&self, scenario: &mut Scenario, given: RemnantTable) -> Result<(), ScenarioFileError> {
         if let Some(order) = given.order {
             scenario.remnant.order = match usize::try_from(*order.get_ref()) {
                 Ok(m @ 1..=4) => m,
-                _ => return Err(self.value("remnant.order", order.span().start, order.get_ref(), "1, 2, 3 or 4")),
+                _ => {
+                    return Err(self.value_error("remnant.order", order.span().start, order.get_ref(), "1, 2, 3 or 4"));
+                }
             };
         }
-        if let Some(t_n_s) = self.limited("remnant.T_n_s", given.t_n_s, Limits::TIME_CONSTANT_S)? {
+        if let Some(t_n_s) = self.optional_number("remnant.T_n_s", given.t_n_s, Limits::TIME_CONSTANT_S)? {
             scenario.remnant.time_constant_s = t_n_s;
         }
-        let level = self.limited("remnant.noise_level", given.noise_level, Limits::NOISE_LEVEL)?;
+        let level = self.optional_number("remnant.noise_level", given.noise_level, Limits::NOISE_LEVEL)?;
         let definition = given.noise_definition.map(|key| match key {
             DefinitionKey::Response => NoiseDefinition::Response,
             DefinitionKey::Remnant => NoiseDefinition::Remnant,
         });
         let gains = [
-            self.limited("remnant.K_n_initial_deg", given.k_n_initial_deg, Limits::NOISE_GAIN)?,
-            self.limited("remnant.K_n_last_deg", given.k_n_last_deg, Limits::NOISE_GAIN)?,
+            self.optional_number("remnant.K_n_initial_deg", given.k_n_initial_deg, Limits::NOISE_GAIN)?,
+            self.optional_number("remnant.K_n_last_deg", given.k_n_last_deg, Limits::NOISE_GAIN)?,
         ];
         match (gains, &mut scenario.remnant.strength) {
             (
@@ -208,11 +212,11 @@ impl Source<'_> {
             }
             ([None, None], RemnantStrength::Gain { .. }) => {}
             _ if level.is_some() || definition.is_some() => {
-                return Err(self.keys("[remnant] has a noise level and a gain K_n: give only one of the two"));
+                return Err(self.keys_error("[remnant] has a noise level and a gain K_n: give only one of the two"));
             }
             ([Some(initial), last], strength) => {
                 if last.is_none() && scenario.schedule != Schedule::Constant {
-                    return Err(self.keys(
+                    return Err(self.keys_error(
                         "[remnant] has K_n_initial_deg but no K_n_last_deg for the state after the change: add it",
                     ));
                 }
@@ -222,7 +226,7 @@ impl Source<'_> {
                 };
             }
             ([None, Some(_)], _) => {
-                return Err(self.keys("[remnant] has K_n_last_deg but no K_n_initial_deg: give both"));
+                return Err(self.keys_error("[remnant] has K_n_last_deg but no K_n_initial_deg: give both"));
             }
         }
         Ok(())
@@ -236,24 +240,24 @@ impl Source<'_> {
         measurement_s: f64,
     ) -> Result<ForcingFunction, ScenarioFileError> {
         if tables.len() > MAX_LINES {
-            return Err(self.keys(&format!(
+            return Err(self.keys_error(&format!(
                 "there are {} [[{name}]] tables, expected at most {MAX_LINES}",
                 tables.len()
             )));
         }
         let mut sinusoids = Vec::with_capacity(tables.len());
         for (k, table) in (1..).zip(tables) {
-            let omega = self.limited(
+            let omega = self.optional_number(
                 &format!("{name}.omega_rad_s"),
                 table.omega_rad_s,
                 Limits::FREQUENCY_RAD_S,
             )?;
-            let cycles = self.limited(&format!("{name}.cycles"), table.cycles, Limits::CYCLES)?;
+            let cycles = self.optional_number(&format!("{name}.cycles"), table.cycles, Limits::CYCLES)?;
             let omega_rad_s = match (omega, cycles) {
                 (Some(omega), None) => omega,
                 (None, Some(cycles)) => cycles * TAU / measurement_s,
                 _ => {
-                    return Err(self.keys(&format!(
+                    return Err(self.keys_error(&format!(
                         "[[{name}]] number {k}: give either omega_rad_s or cycles (periods within measurement_s)"
                     )));
                 }
@@ -264,6 +268,6 @@ impl Source<'_> {
                 phase_rad: self.number(&format!("{name}.phase_rad"), &table.phase_rad, Limits::PHASE_RAD)?,
             });
         }
-        ForcingFunction::new(sinusoids).map_err(|error| self.model(error))
+        ForcingFunction::new(sinusoids).map_err(|error| self.model_error(error))
     }
 }

@@ -21,32 +21,32 @@ use super::values::{Limits, Source};
 
 impl Source<'_> {
     pub(super) fn family_scenario(&self, file: FamilyFile, name: &str) -> Result<FamilyScenario, ScenarioFileError> {
-        let form = self.form("form", &file.form)?;
-        let rate = self.limited("sampling_rate_hz", file.sampling_rate_hz, Limits::RATE_HZ)?;
+        let form = self.parse_form("form", &file.form)?;
+        let rate = self.optional_number("sampling_rate_hz", file.sampling_rate_hz, Limits::RATE_HZ)?;
         let sample_time = match (
-            self.limited("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)?,
+            self.optional_number("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)?,
             rate,
         ) {
-            (None, None) => SampleTime::SIXTIETH,
-            (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
-            (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
+            (None, None) => SampleTime::AT_60_HZ,
+            (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model_error(error))?,
+            (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model_error(error))?,
             (Some(_), Some(_)) => {
-                return Err(
-                    self.keys("sample_time_s and sampling_rate_hz specify the same quantity: give only one of the two")
-                );
+                return Err(self.keys_error(
+                    "sample_time_s and sampling_rate_hz specify the same quantity: give only one of the two",
+                ));
             }
         };
         let initial = self.family_state(form, file.neuromuscular, "initial", &file.initial)?;
         let mut scenario = FamilyScenario::new(initial, sample_time);
         scenario.name = file.name.unwrap_or_else(|| name.to_owned());
-        scenario.measurement_s = self.whole(
+        scenario.measurement_s = self.whole_samples(
             "measurement_s",
             file.measurement_s,
             scenario.measurement_s,
             sample_time,
             1.0,
         )?;
-        scenario.run_in_s = self.whole("run_in_s", file.run_in_s, scenario.run_in_s, sample_time, 0.0)?;
+        scenario.run_in_s = self.whole_samples("run_in_s", file.run_in_s, scenario.run_in_s, sample_time, 0.0)?;
         if let Some(RealisationKey::Output) = file.realisation {
             scenario.realisation = Realisation::Output;
         }
@@ -54,12 +54,14 @@ impl Source<'_> {
         match (&file.last, scenario.schedule) {
             (None, Schedule::Constant) => {}
             (Some(_), Schedule::Constant) => {
-                return Err(
-                    self.keys("[last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s")
-                );
+                return Err(self.keys_error(
+                    "[last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s",
+                ));
             }
             (None, _) => {
-                return Err(self.keys("[schedule] is given, but no [last]: add [last] with the values that change"));
+                return Err(
+                    self.keys_error("[schedule] is given, but no [last]: add [last] with the values that change")
+                );
             }
             (Some(last), _) => {
                 let last = last.with_defaults_from(&file.initial);
@@ -71,23 +73,23 @@ impl Source<'_> {
         }
         if let Some(table) = file.feedforward {
             if scenario.target.function.sinusoids().is_empty() {
-                return Err(self.keys("[feedforward] is given, but there is no displayed target: add [target]"));
+                return Err(self.keys_error("[feedforward] is given, but there is no displayed target: add [target]"));
             }
-            let muscles = scenario.initial.operator.neuromuscular();
+            let muscles = scenario.initial.operator.neuromuscular_parameters();
             scenario.feedforward = Some(self.feedforward(&table, muscles, sample_time)?);
         }
         if let Some(table) = file.motion {
             if table.preview_s.is_some() || table.last.is_some() {
-                return Err(self.keys("[motion] has a preview or values after the change; expected neither"));
+                return Err(self.keys_error("[motion] has a preview or values after the change; expected neither"));
             }
-            let muscles = scenario.initial.operator.neuromuscular();
+            let muscles = scenario.initial.operator.neuromuscular_parameters();
             scenario.motion = Some(self.further_input("motion", &table, muscles, sample_time)?.operator);
         }
         if let Some(table) = file.disturbance {
             scenario.disturbance = self.excitation("disturbance", table)?;
         }
         for (k, table) in (1..).zip(file.remnant) {
-            scenario.remnant.push(self.part(k, table)?);
+            scenario.remnant.push(self.remnant_part(k, table)?);
         }
         scenario.stick = Stick {
             bias: file.stick.bias,
@@ -107,13 +109,13 @@ impl Source<'_> {
     ) -> Result<FamilyState, ScenarioFileError> {
         let operator = self.operator(form, neuromuscular, table, given)?;
         let Some(element) = &given.controlled_element else {
-            return Err(self.keys(&format!(
+            return Err(self.keys_error(&format!(
                 "[{table}] lacks controlled_element, such as controlled_element = \"1/s\" or \"90/(s(s+6))\""
             )));
         };
         Ok(FamilyState {
             operator,
-            controlled_element: self.element(&format!("{table}.controlled_element"), element)?,
+            controlled_element: self.parse_element(&format!("{table}.controlled_element"), element)?,
         })
     }
 
@@ -127,18 +129,18 @@ impl Source<'_> {
         for (key, value) in given.numbers() {
             // A lag with an infinite time constant is an integrator.
             if let Some(value) = value.filter(|value| !(key == "T_I_s" && value.is_infinite())) {
-                self.checked(&format!("{table}.{key}"), value, limits_of(key))?;
+                self.check(&format!("{table}.{key}"), value, limits_of(key))?;
             }
         }
         let need = |key: &str, value: Option<f64>| {
-            value.ok_or_else(|| self.keys(&format!("[{table}] lacks {key} for the form {form}")))
+            value.ok_or_else(|| self.keys_error(&format!("[{table}] lacks {key} for the form {form}")))
         };
         let positive = |key: &str, value: Option<f64>| {
             let value = need(key, value)?;
             if value > 0.0 {
                 Ok(value)
             } else {
-                Err(self.keys(&format!("{table}.{key} is {value}, expected a positive number")))
+                Err(self.keys_error(&format!("{table}.{key} is {value}, expected a positive number")))
             }
         };
         let mut used = vec!["tau_e_s"];
@@ -150,14 +152,14 @@ impl Source<'_> {
                     None => {
                         let t_i = positive("T_I_s", given.t_i_s)?;
                         if t_i.is_infinite() {
-                            return Err(self.keys(&format!(
+                            return Err(self.keys_error(&format!(
                                 "[{table}] has an infinite T_I_s: give K_over_T_I in place of K"
                             )));
                         }
                         (&["K"], need("K or K_over_T_I", given.k)? / t_i)
                     }
                 },
-                Coordinate::Gain => match form.gain().0 {
+                Coordinate::Gain => match form.gain_name_and_unit().0 {
                     "K_I" => (&["K_I"], need("K_I", given.k_i)?),
                     "K_d" => (&["K_d_s"], need("K_d_s", given.k_d_s)?),
                     "K_m" => (&["K_m_s2"], need("K_m_s2", given.k_m_s2)?),
@@ -184,19 +186,19 @@ impl Source<'_> {
             .iter()
             .find(|(key, value)| value.is_some() && !used.contains(key))
         {
-            return Err(self.keys(&format!(
+            return Err(self.keys_error(&format!(
                 "[{table}] has {}, which the form {form} does not use, or which repeats another key; the form takes {}",
                 key.0,
                 used.join(", ")
             )));
         }
-        FamilyOperator::new(form, neuromuscular, &coordinates).map_err(|error| self.model(error))
+        FamilyOperator::new(form, neuromuscular, &coordinates).map_err(|error| self.model_error(error))
     }
 
-    fn form(&self, key: &str, given: &Spanned<String>) -> Result<Form, ScenarioFileError> {
+    fn parse_form(&self, key: &str, given: &Spanned<String>) -> Result<Form, ScenarioFileError> {
         let form = given.get_ref().parse();
         form.map_err(|error: hoid_model::UnknownName| {
-            self.value(key, given.span().start, given.get_ref(), &error.to_string())
+            self.value_error(key, given.span().start, given.get_ref(), &error.to_string())
         })
     }
 
@@ -219,18 +221,18 @@ impl Source<'_> {
         neuromuscular: Option<(f64, f64)>,
         sample_time: SampleTime,
     ) -> Result<Feedforward, ScenarioFileError> {
-        let form = self.form(&format!("{name}.form"), &given.form)?;
+        let form = self.parse_form(&format!("{name}.form"), &given.form)?;
         let preview_s = given.preview_s.clone();
-        let preview_s = self.whole(&format!("{name}.preview_s"), preview_s, 0.0, sample_time, 0.0)?;
+        let preview_s = self.whole_samples(&format!("{name}.preview_s"), preview_s, 0.0, sample_time, 0.0)?;
         let early = if name == "motion" {
             "to motion before it happens"
         } else {
             "to a target before it is displayed"
         };
         let of = |table: &str, tau_f_s: f64, gains: FamilyStateTable| {
-            self.checked(&format!("{table}.tau_f_s"), tau_f_s, Limits::LEAD_S)?;
+            self.check(&format!("{table}.tau_f_s"), tau_f_s, Limits::LEAD_S)?;
             let delay_s = Feedforward::delay_s(tau_f_s, preview_s).map_err(|_| {
-                self.keys(&format!(
+                self.keys_error(&format!(
                     "{table}.tau_f_s is {tau_f_s}, expected at least {}: a person cannot respond {early}",
                     -preview_s
                 ))
@@ -275,15 +277,19 @@ impl Source<'_> {
     }
 
     /// Parses a transfer function such as `90/(s(s+6))`, or `90/1,6,0` with coefficients in descending powers of s.
-    fn element(&self, key: &str, given: &Spanned<String>) -> Result<ContinuousTransferFunction, ScenarioFileError> {
+    fn parse_element(
+        &self,
+        key: &str,
+        given: &Spanned<String>,
+    ) -> Result<ContinuousTransferFunction, ScenarioFileError> {
         let at = given.span().start;
         let element: ContinuousTransferFunction = given.get_ref().parse().map_err(|error| match error {
-            ModelError::TransferFunction { expected, .. } => self.value(key, at, given.get_ref(), &expected),
-            other => self.model(other),
+            ModelError::TransferFunction { expected, .. } => self.value_error(key, at, given.get_ref(), &expected),
+            other => self.model_error(other),
         })?;
         let mut coefficients = element.num().iter().chain(element.den());
-        if let Some(value) = coefficients.find(|value| !Limits::ANY.hold(**value)) {
-            return Err(self.value(key, at, value, &format!("{} in each coefficient", Limits::ANY)));
+        if let Some(value) = coefficients.find(|value| !Limits::ANY.contains(**value)) {
+            return Err(self.value_error(key, at, value, &format!("{} in each coefficient", Limits::ANY)));
         }
         Ok(element)
     }
@@ -295,7 +301,7 @@ impl Source<'_> {
                 ("rms", given.rms, Limits::NOISE_GAIN),
             ] {
                 if let Some(value) = value {
-                    self.checked(&format!("{name}.{key}"), value, limits)?;
+                    self.check(&format!("{name}.{key}"), value, limits)?;
                 }
             }
             let default = MultiSine::default();
@@ -307,34 +313,34 @@ impl Source<'_> {
                     None => default.interleaved,
                     Some(word) => word.get_ref().parse().map_err(|error: hoid_model::UnknownName| {
                         let key = format!("{name}.interleaved");
-                        self.value(&key, word.span().start, word.get_ref(), &error.to_string())
+                        self.value_error(&key, word.span().start, word.get_ref(), &error.to_string())
                     })?,
                 },
             };
-            let mut excitation = sum.excitation().map_err(|error| self.model(error))?;
+            let mut excitation = sum.excitation().map_err(|error| self.model_error(error))?;
             excitation.random_phases = given.random_phases.unwrap_or(true);
             return Ok(excitation);
         };
         let of_primes = given.interleaved.is_some() || given.largest_multiple.is_some();
         if given.period_s.is_some() || of_primes || given.rms.is_some() {
-            return Err(self.keys(&format!(
+            return Err(self.keys_error(&format!(
                 "[{name}] has both lines and the keys of a multi-sine: give only one of the two"
             )));
         }
         if lines.len() > MAX_LINES {
-            return Err(self.keys(&format!(
+            return Err(self.keys_error(&format!(
                 "[{name}] has {} lines, expected at most {MAX_LINES}",
                 lines.len()
             )));
         }
         for line in &lines {
-            self.checked(&format!("{name}.lines.amplitude"), line.amplitude, Limits::GAIN)?;
-            self.checked(
+            self.check(&format!("{name}.lines.amplitude"), line.amplitude, Limits::GAIN)?;
+            self.check(
                 &format!("{name}.lines.omega_rad_s"),
                 line.omega_rad_s,
                 Limits::FREQUENCY_RAD_S,
             )?;
-            self.checked(&format!("{name}.lines.phase_rad"), line.phase_rad, Limits::PHASE_RAD)?;
+            self.check(&format!("{name}.lines.phase_rad"), line.phase_rad, Limits::PHASE_RAD)?;
         }
         let line = |line: &super::family_keys::LineTable| Sinusoid {
             amplitude_deg: line.amplitude,
@@ -342,13 +348,14 @@ impl Source<'_> {
             phase_rad: line.phase_rad,
         };
         Ok(Excitation {
-            function: ForcingFunction::new(lines.iter().map(line).collect()).map_err(|error| self.model(error))?,
+            function: ForcingFunction::new(lines.iter().map(line).collect())
+                .map_err(|error| self.model_error(error))?,
             random_phases: given.random_phases.unwrap_or(false),
         })
     }
 
-    fn part(&self, k: usize, given: PartTable) -> Result<RemnantPart, ScenarioFileError> {
-        let refuse = |reason: String| Err(self.keys(&format!("[[remnant]] number {k}: {reason}")));
+    fn remnant_part(&self, k: usize, given: PartTable) -> Result<RemnantPart, ScenarioFileError> {
+        let refuse = |reason: String| Err(self.keys_error(&format!("[[remnant]] number {k}: {reason}")));
         let numbers = [
             given.share,
             given.gain,
@@ -368,7 +375,7 @@ impl Source<'_> {
             .into_iter()
             .flatten()
             .chain(coefficients)
-            .find(|v| !Limits::GAIN.hold(*v))
+            .find(|v| !Limits::GAIN.contains(*v))
         {
             return refuse(format!("one of its values is {value}, expected {}", Limits::GAIN));
         }
@@ -424,7 +431,7 @@ impl Source<'_> {
         };
         let requires = |owner: &str, is_there: bool, others: bool| {
             if others && !is_there {
-                return Err(self.keys(&format!("[[remnant]] number {k} lacks {owner}")));
+                return Err(self.keys_error(&format!("[[remnant]] number {k} lacks {owner}")));
             }
             Ok(())
         };

@@ -13,7 +13,7 @@ pub(super) struct FamilyFile {
     #[schemars(with = "String")]
     pub(super) form: Spanned<String>,
     /// Whether the operator has neuromuscular dynamics. Default: true.
-    #[serde(default = "yes")]
+    #[serde(default = "default_true")]
     pub(super) neuromuscular: bool,
     pub(super) name: Option<String>,
     #[schemars(with = "Option<f64>")]
@@ -40,7 +40,7 @@ pub(super) struct FamilyFile {
     pub(super) stick: StickTable,
 }
 
-fn yes() -> bool {
+fn default_true() -> bool {
     true
 }
 

@@ -20,7 +20,7 @@ fn parse(text: &str) -> Result<FamilyScenario, ScenarioFileError> {
 fn a_file_with_every_table_is_read() {
     let scenario = parse(EXAMPLE).unwrap();
     assert_eq!(scenario.name, "a person");
-    assert_eq!(scenario.sample_time, SampleTime::SIXTIETH);
+    assert_eq!(scenario.sample_time, SampleTime::AT_60_HZ);
     assert_eq!((scenario.measurement_s, scenario.run_in_s), (60.0, 5.0));
     assert_eq!(scenario.realisation, Realisation::Output);
     let (initial, last) = (&scenario.initial, &scenario.last);
@@ -58,22 +58,27 @@ fn a_file_with_every_table_is_read() {
     assert_eq!(scenario.stick.offset_u, -0.1);
 }
 
-const SHORT: &str = "form = \"lead-lag\"\n[initial]\nK_over_T_I = 4\nT_L_s = 0.6\nT_I_s = inf\nomega_nm_rad_s = 11\nzeta_nm = 0.3\ntau_e_s = 0.15\ncontrolled_element = \"1/1,0\"\n";
+const SHORT_EXAMPLE: &str = "form = \"lead-lag\"\n[initial]\nK_over_T_I = 4\nT_L_s = 0.6\nT_I_s = inf\nomega_nm_rad_s = 11\nzeta_nm = 0.3\ntau_e_s = 0.15\ncontrolled_element = \"1/1,0\"\n";
 
 #[test]
 fn pure_integration_has_an_infinite_lag() {
-    let scenario = parse(SHORT).unwrap();
+    let scenario = parse(SHORT_EXAMPLE).unwrap();
     assert_eq!(scenario.initial.operator.coordinates()[2], 0.0);
     assert_eq!(
         (scenario.measurement_s, scenario.sample_time),
-        (40.0, SampleTime::SIXTIETH)
+        (40.0, SampleTime::AT_60_HZ)
     );
     assert_eq!(scenario.initial, scenario.last);
 }
 
 #[test]
 fn controlled_element_is_read_as_a_transfer_function() {
-    let element = |text: &str| parse(&SHORT.replace("1/1,0", text)).unwrap().initial.controlled_element;
+    let element = |text: &str| {
+        parse(&SHORT_EXAMPLE.replace("1/1,0", text))
+            .unwrap()
+            .initial
+            .controlled_element
+    };
     let expected = element("90/1,6,0");
     assert_eq!((expected.num(), expected.den()), (&[90.0][..], &[1.0, 6.0, 0.0][..]));
     for text in ["90/(s(s+6))", " 90 / 1, 6, 0 ", "180/(2s^2 + 12s)"] {
@@ -84,8 +89,8 @@ fn controlled_element_is_read_as_a_transfer_function() {
 
 #[test]
 fn invalid_files_are_refused_with_a_remedy() {
-    let with = |from: &str, to: &str| SHORT.replace(from, to);
-    let more = |tail: &str| format!("{SHORT}{tail}\n");
+    let with = |from: &str, to: &str| SHORT_EXAMPLE.replace(from, to);
+    let more = |tail: &str| format!("{SHORT_EXAMPLE}{tail}\n");
     for (text, part) in [
         (with("lead-lag", "lead-leg"), "line 1: form is lead-leg"),
         (with("T_L_s = 0.6\n", ""), "lacks T_L_s"),
@@ -129,7 +134,7 @@ fn invalid_files_are_refused_with_a_remedy() {
         );
     }
     // Studies accept only the operator of the thesis.
-    let message = parse_scenario(SHORT, "x.toml", "x").unwrap_err().to_string();
+    let message = parse_scenario(SHORT_EXAMPLE, "x.toml", "x").unwrap_err().to_string();
     assert!(message.contains("`form` key"), "{message}");
     assert!(matches!(
         parse_any_scenario("condition = \"C1\"", "x.toml", "x"),
@@ -138,11 +143,11 @@ fn invalid_files_are_refused_with_a_remedy() {
     assert!(family_scenario_schema().contains("K_over_T_I"));
 }
 
-const PURSUIT: &str = include_str!("../../../../fixtures/scenario/pursuit.toml");
+const PURSUIT_EXAMPLE: &str = include_str!("../../../../fixtures/scenario/pursuit.toml");
 
 #[test]
 fn displayed_target_is_read() {
-    let scenario = parse(PURSUIT).unwrap();
+    let scenario = parse(PURSUIT_EXAMPLE).unwrap();
     let seen = scenario.feedforward.as_ref().unwrap();
     let muscles = [11.0_f64.ln(), 0.3_f64.ln()];
     assert_eq!((seen.operator.form(), seen.preview_s), (Form::Derivative, 0.25));
@@ -159,7 +164,7 @@ fn displayed_target_is_read() {
         ("interleaved = \"even\"", "interleaved = \"some\"", "even"),
         ("[target]\ninterleaved = \"even\"", "", "no displayed target"),
     ] {
-        let error = parse(&PURSUIT.replace(from, to)).unwrap_err().to_string();
+        let error = parse(&PURSUIT_EXAMPLE.replace(from, to)).unwrap_err().to_string();
         assert!(error.contains(expected), "{to}: {error}");
     }
 }

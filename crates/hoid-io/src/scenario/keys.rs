@@ -39,7 +39,7 @@ pub(super) struct File {
 }
 
 /// Keys whose value is a list; for these, a list in a study plan is a single value and not several alternatives.
-pub const WHOLE_KEYS: [&str; 2] = ["forcing", "disturbance"];
+pub const LIST_VALUED_KEYS: [&str; 2] = ["forcing", "disturbance"];
 
 /// Response to a target or to motion; it includes the neuromuscular system of the operator.
 #[derive(Deserialize, JsonSchema)]

@@ -60,7 +60,7 @@ mod values;
 
 pub use changes::{ScenarioChangeError, ScenarioChanges};
 pub use error::ScenarioFileError;
-pub use keys::WHOLE_KEYS;
+pub use keys::LIST_VALUED_KEYS;
 pub use reading::{
     AnyScenario, family_scenario_schema, parse_any_scenario, parse_scenario, read_any_scenario, read_scenario,
     scenario_schema,

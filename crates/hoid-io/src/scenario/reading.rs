@@ -8,7 +8,7 @@ use super::error::ScenarioFileError;
 use super::family_keys::FamilyFile;
 use super::keys::File;
 use super::values::{Source, line_of};
-use crate::wording::printable;
+use crate::wording::escape_control_characters;
 
 /// A scenario of the thesis task or of the operator family.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,10 +37,10 @@ pub fn parse_any_scenario(text: &str, path: &str, name: &str) -> Result<AnyScena
     if !has_form(text) {
         return Ok(AnyScenario::Reference(Box::new(parse_scenario(text, path, name)?)));
     }
-    let file: FamilyFile = toml::from_str(text).map_err(|error| syntax(text, path, &error))?;
+    let file: FamilyFile = toml::from_str(text).map_err(|error| syntax_error(text, path, &error))?;
     let source = Source { text, path };
     let scenario = source.family_scenario(file, name)?;
-    scenario.resolve().map_err(|error| source.model(error))?;
+    scenario.resolve().map_err(|error| source.model_error(error))?;
     Ok(AnyScenario::Family(Box::new(scenario)))
 }
 
@@ -77,23 +77,23 @@ fn text_of(path: &Path) -> Result<(String, String, String), ScenarioFileError> {
 /// As [`read_scenario`].
 pub fn parse_scenario(text: &str, path: &str, name: &str) -> Result<Scenario, ScenarioFileError> {
     if has_form(text) {
-        return Err(Source { text, path }.keys(
+        return Err(Source { text, path }.keys_error(
             "the `form` key describes an operator of the family, which `hoid simulate --scenario` can simulate but a \
              study cannot use; remove `form` to use the operator K_e (T_L s + 1)",
         ));
     }
-    let file: File = toml::from_str(text).map_err(|error| syntax(text, path, &error))?;
+    let file: File = toml::from_str(text).map_err(|error| syntax_error(text, path, &error))?;
     let source = Source { text, path };
     let scenario = source.scenario(file, name)?;
-    scenario.resolve().map_err(|error| source.model(error))?;
+    scenario.resolve().map_err(|error| source.model_error(error))?;
     Ok(scenario)
 }
 
-fn syntax(text: &str, path: &str, error: &toml::de::Error) -> ScenarioFileError {
+fn syntax_error(text: &str, path: &str, error: &toml::de::Error) -> ScenarioFileError {
     ScenarioFileError::Syntax {
         path: path.to_owned(),
         line: error.span().map_or(1, |span| line_of(text, span.start)),
-        reason: printable(error.message().trim_end()),
+        reason: escape_control_characters(error.message().trim_end()),
     }
 }
 

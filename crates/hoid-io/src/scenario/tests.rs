@@ -16,7 +16,7 @@ fn refusal(text: &str) -> String {
     parse(text).unwrap_err().to_string()
 }
 
-fn named(condition: Condition) -> Scenario {
+fn renamed_condition(condition: Condition) -> Scenario {
     Scenario {
         name: "x".to_owned(),
         ..Scenario::condition(condition)
@@ -32,7 +32,7 @@ fn documentation_example_is_read() {
         .take_while(|l| *l != "//! ```")
         .map(|l| format!("{}\n", l.trim_start_matches("//!").trim_start()))
         .collect();
-    let mut expected = named(Condition::C4);
+    let mut expected = renamed_condition(Condition::C4);
     expected.realisation = Realisation::Output;
     for state in [&mut expected.initial, &mut expected.last] {
         state.operator.tau_e_s = 0.3;
@@ -67,7 +67,7 @@ fn each_state_may_have_its_own_delay() {
 
 #[test]
 fn interval_gives_an_alternating_schedule() {
-    let mut expected = named(Condition::C4);
+    let mut expected = renamed_condition(Condition::C4);
     expected.schedule = Schedule::Alternating {
         rate_per_s: 100.0,
         midpoint_s: 40.96,
@@ -80,7 +80,10 @@ fn interval_gives_an_alternating_schedule() {
 #[test]
 fn condition_key_alone_gives_the_named_condition() {
     for condition in Condition::ALL {
-        assert_eq!(parse(&format!("condition = \"{condition}\"")), Ok(named(condition)));
+        assert_eq!(
+            parse(&format!("condition = \"{condition}\"")),
+            Ok(renamed_condition(condition))
+        );
     }
 }
 
@@ -112,7 +115,7 @@ fn constant_conditions_stay_constant() {
 }
 
 #[test]
-fn bad_values_name_line_key_and_remedy() {
+fn invalid_value_errors_name_line_key_and_remedy() {
     for (text, parts) in [
         ("\n\ncondition = \"C7\"", ["line 3", "condition is C7", "C1, C2"]),
         (
@@ -202,7 +205,7 @@ fn missing_and_unknown_keys_are_refused() {
 }
 
 #[test]
-fn errors_of_the_model_name_the_file() {
+fn model_errors_name_the_file() {
     let unreachable = "condition = \"C1\"\n[remnant]\nnoise_level = 3\nnoise_definition = \"remnant\"";
     assert!(refusal(unreachable).contains("largest reachable"));
     assert!(refusal("condition = \"C1\"\n[initial]\nK_e = 5").contains("x.toml"));
@@ -210,14 +213,14 @@ fn errors_of_the_model_name_the_file() {
     assert!(matches!(nowhere, ScenarioFileError::Unreadable { .. }));
 }
 
-const SEEN: &str = "condition = \"C4\"\ndisturbance_rms_deg = 0.1\n[feedforward]\nform = \"derivative\"\nK_d_s = 0.15\n\
+const DISPLAYED_TARGET: &str = "condition = \"C4\"\ndisturbance_rms_deg = 0.1\n[feedforward]\nform = \"derivative\"\nK_d_s = 0.15\n\
                     tau_f_s = 0.1\npreview_s = 0.25\n";
 
 #[test]
 fn displayed_target_and_disturbance_are_read() {
-    let scenario = parse(SEEN).unwrap();
+    let scenario = parse(DISPLAYED_TARGET).unwrap();
     let text = "derivative:0.15,tau_f=0.1,preview=0.25";
-    let expected = hoid_model::Feedforward::of_text(text, Some((11.25, 0.35))).unwrap();
+    let expected = hoid_model::Feedforward::from_text(text, Some((11.25, 0.35))).unwrap();
     assert_eq!(scenario.feedforward, Some(expected));
     assert_eq!(scenario.disturbance.sinusoids().len(), 10);
     assert!((scenario.disturbance.rms_deg() - 0.1).abs() < 1e-15);
@@ -225,7 +228,7 @@ fn displayed_target_and_disturbance_are_read() {
     let lines = "[[disturbance]]\namplitude_deg = 1\nphase_rad = 0\ncycles = 4\n\
                  [[disturbance]]\namplitude_deg = 1\nphase_rad = 1\nomega_rad_s = 2\n";
     let changing = parse(&format!(
-        "{SEEN}[feedforward.last]\nK_d_s = 0.3\ntau_f_s = 0.2\n{lines}"
+        "{DISPLAYED_TARGET}[feedforward.last]\nK_d_s = 0.3\ntau_f_s = 0.2\n{lines}"
     ))
     .unwrap();
     let last = changing.feedforward.unwrap().last.unwrap();
@@ -264,9 +267,9 @@ fn invalid_displays_are_refused() {
             "disturbance_rms_deg",
         ),
     ] {
-        let error = refusal(&SEEN.replace(from, to));
+        let error = refusal(&DISPLAYED_TARGET.replace(from, to));
         assert!(error.contains(words), "{to}: {error}");
     }
-    let constant = SEEN.replace("C4", "C1") + "[feedforward.last]\nK_d_s = 0.3\n";
+    let constant = DISPLAYED_TARGET.replace("C4", "C1") + "[feedforward.last]\nK_d_s = 0.3\n";
     assert!(refusal(&constant).contains("add [schedule]"));
 }

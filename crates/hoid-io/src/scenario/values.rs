@@ -4,7 +4,7 @@ use hoid_model::{ModelError, SampleTime};
 
 use super::error::ScenarioFileError;
 use super::keys::Number;
-use crate::wording::printable;
+use crate::wording::escape_control_characters;
 
 /// Maximum number of samples of a run, so that a wrong unit does not exhaust the memory.
 const MAX_SAMPLES: f64 = 1e7;
@@ -40,7 +40,7 @@ impl Limits {
     /// Coefficients of a transfer function, and all other numbers.
     pub(super) const ANY: Self = Self(-1e12, 1e12);
 
-    pub(super) fn hold(self, value: f64) -> bool {
+    pub(super) fn contains(self, value: f64) -> bool {
         (self.0..=self.1).contains(&value)
     }
 }
@@ -86,7 +86,7 @@ pub(super) struct Source<'a> {
 impl Source<'_> {
     /// Returns a time in s, given or default, after checking that it is a whole number of samples, from `least` to ten
     /// million. A default time may also fail this check if the file gives the sample time.
-    pub(super) fn whole(
+    pub(super) fn whole_samples(
         &self,
         key: &str,
         given: Option<Number>,
@@ -104,13 +104,13 @@ impl Source<'_> {
             sample_time.s()
         );
         Err(match given {
-            Some(given) => self.value(key, given.span().start, &short_number(time_s), &expected),
-            None => self.keys(&format!("{key} is {time_s} by default, expected {expected}")),
+            Some(given) => self.value_error(key, given.span().start, &short_number(time_s), &expected),
+            None => self.keys_error(&format!("{key} is {time_s} by default, expected {expected}")),
         })
     }
 
     /// Returns an optional number after checking that it is within its limits.
-    pub(super) fn limited(
+    pub(super) fn optional_number(
         &self,
         key: &str,
         given: Option<Number>,
@@ -121,21 +121,21 @@ impl Source<'_> {
 
     pub(super) fn number(&self, key: &str, given: &Number, limits: Limits) -> Result<f64, ScenarioFileError> {
         let value = *given.get_ref();
-        if limits.hold(value) {
+        if limits.contains(value) {
             return Ok(value);
         }
-        Err(self.value(key, given.span().start, &short_number(value), &limits.to_string()))
+        Err(self.value_error(key, given.span().start, &short_number(value), &limits.to_string()))
     }
 
     /// Checks that a number, whose line in the file is unknown, is within its limits.
-    pub(super) fn checked(&self, key: &str, value: f64, limits: Limits) -> Result<(), ScenarioFileError> {
-        if limits.hold(value) {
+    pub(super) fn check(&self, key: &str, value: f64, limits: Limits) -> Result<(), ScenarioFileError> {
+        if limits.contains(value) {
             return Ok(());
         }
-        Err(self.keys(&format!("{key} is {}, expected {limits}", short_number(value))))
+        Err(self.keys_error(&format!("{key} is {}, expected {limits}", short_number(value))))
     }
 
-    pub(super) fn value(
+    pub(super) fn value_error(
         &self,
         key: &str,
         offset: usize,
@@ -146,19 +146,19 @@ impl Source<'_> {
             path: self.path.to_owned(),
             line: line_of(self.text, offset),
             key: key.to_owned(),
-            found: printable(&found.to_string()),
+            found: escape_control_characters(&found.to_string()),
             expected: expected.to_owned(),
         }
     }
 
-    pub(super) fn keys(&self, reason: &str) -> ScenarioFileError {
+    pub(super) fn keys_error(&self, reason: &str) -> ScenarioFileError {
         ScenarioFileError::Keys {
             path: self.path.to_owned(),
             reason: reason.to_owned(),
         }
     }
 
-    pub(super) fn model(&self, source: ModelError) -> ScenarioFileError {
+    pub(super) fn model_error(&self, source: ModelError) -> ScenarioFileError {
         ScenarioFileError::Model {
             path: self.path.to_owned(),
             source,

@@ -5,13 +5,13 @@
 
 use std::path::Path;
 
-use super::read::{RawColumn, of_arrays, of_table};
-use super::sampling::{SamplingSurvey, sampling};
-use super::values::{ValueSurvey, values};
+use super::read::{RawColumn, columns_of_arrays, columns_of_table};
+use super::sampling::{SamplingSurvey, survey_sampling};
+use super::values::{ValueSurvey, survey_values};
 use crate::IoError;
-use crate::data_quality::{QualityIssue, QualityIssueKind, Signal, Signals, is_clock_name, issues_of};
-use crate::formats::arrays::TIMES;
-use crate::formats::{Format, Reading, bytes_of, long_text};
+use crate::data_quality::{QualityIssue, QualityIssueKind, Signal, Signals, find_issues, is_clock_name};
+use crate::formats::arrays::TIME_NAMES;
+use crate::formats::{Format, FormatReader, read_long_text, read_with_format};
 use crate::record::ReadOptions;
 use crate::time::with_time;
 
@@ -52,15 +52,15 @@ pub struct ColumnSurvey {
 pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
     let (format, columns, notes) = columns_of(path, &file)?;
-    let is_time = |column: &&RawColumn| TIMES.contains(&column.name.as_str()) && column.rows > 1;
+    let is_time = |column: &&RawColumn| TIME_NAMES.contains(&column.name.as_str()) && column.rows > 1;
     let samplings = columns
         .iter()
         .filter(is_time)
-        .filter_map(|time| sampling(time, &columns))
+        .filter_map(|time| survey_sampling(time, &columns))
         .collect();
     let quality_issues = quality_issues(&columns);
     let survey = |column: RawColumn| ColumnSurvey {
-        values: column.values.as_deref().and_then(values),
+        values: column.values.as_deref().and_then(survey_values),
         path: column.path,
         unit: column.unit,
         kind: column.kind,
@@ -77,14 +77,14 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
 
 /// Returns the format, the columns and the notes of a file.
 fn columns_of(path: &Path, file: &str) -> Result<(&'static Format, Vec<RawColumn>, Vec<String>), IoError> {
-    if let Some((format, table)) = long_text(path, file, &ReadOptions::default())? {
-        let (columns, notes) = of_table(with_time(table, None)?);
+    if let Some((format, table)) = read_long_text(path, file, &ReadOptions::default())? {
+        let (columns, notes) = columns_of_table(with_time(table, None)?);
         return Ok((format, columns, notes));
     }
-    let (format, mut bytes) = bytes_of(path)?;
+    let (format, mut bytes) = read_with_format(path)?;
     let (columns, notes) = match format.reading {
-        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, file)?, None)?),
-        Reading::Arrays(read) => of_arrays(&read(bytes, file)?),
+        FormatReader::Table { record, .. } => columns_of_table(with_time(record(&mut bytes, file)?, None)?),
+        FormatReader::Arrays(read) => columns_of_arrays(&read(bytes, file)?),
     };
     Ok((format, columns, notes))
 }
@@ -107,13 +107,13 @@ fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
         }
         seen.push(key);
         let neighbours = || columns.iter().filter(|c| (c.parent.as_str(), c.rows) == key);
-        let time = TIMES
+        let time = TIME_NAMES
             .iter()
             .find_map(|name| neighbours().find(|c| c.name == *name && c.values.is_some()));
         let is_time = |c: &RawColumn| time.is_some_and(|time| time.path == c.path);
         let numbers = || neighbours().filter(|c| c.values.is_some() && !is_time(c));
-        let is_clock = |c: &&RawColumn| is_clock_name(&c.name) || TIMES.contains(&c.name.as_str());
-        found.extend(issues_of(&Signals {
+        let is_clock = |c: &&RawColumn| is_clock_name(&c.name) || TIME_NAMES.contains(&c.name.as_str());
+        found.extend(find_issues(&Signals {
             columns: numbers().filter(|c| !is_clock(c)).map(signal).collect(),
             time: time.map(signal),
             precision: time.map(|c| c.precision).unwrap_or_default(),

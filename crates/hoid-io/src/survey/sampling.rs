@@ -31,7 +31,7 @@ pub struct SamplingSurvey {
 
 /// Returns the sampling that a time column determines; `None` if fewer than two times are finite or the time does not
 /// advance.
-pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
+pub(super) fn survey_sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
     let t: Vec<f64> = time
         .values
         .as_ref()?
@@ -99,7 +99,7 @@ mod tests {
         let mut x: Vec<f64> = (0..100).map(f64::from).collect();
         x[31] = x[30];
         let columns = [read("t", t), read("x", x), read("c", vec![1.0; 100])];
-        let found = sampling(&columns[0], &columns).unwrap();
+        let found = survey_sampling(&columns[0], &columns).unwrap();
         assert!((found.sample_time_s - 0.01).abs() < 1e-5 && (found.jitter_s - 0.002).abs() < 2e-4);
         // The row after a row with constant time is two steps later.
         assert_eq!(
@@ -107,6 +107,6 @@ mod tests {
             (2, 4, 1, 1)
         );
         assert!((found.first_gap_s.unwrap() - 0.49).abs() < 1e-12);
-        assert!(sampling(&read("t", vec![1.0, 1.0]), &columns).is_none());
+        assert!(survey_sampling(&read("t", vec![1.0, 1.0]), &columns).is_none());
     }
 }

@@ -3,7 +3,7 @@
 use crate::data_quality::{Levels, saturation_limits};
 
 /// Number of characters of a sketch.
-const SKETCH: usize = 32;
+const SKETCH_CHARS: usize = 32;
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
 /// Statistics of a column, in the unit of the column.
@@ -32,7 +32,7 @@ pub struct ValueSurvey {
 }
 
 /// Returns the statistics of a column; `None` if no value is finite.
-pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
+pub(super) fn survey_values(all: &[f64]) -> Option<ValueSurvey> {
     let finite: Vec<f64> = all.iter().copied().filter(|value| value.is_finite()).collect();
     let (min, max) = finite.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), v| {
         (min.min(*v), max.max(*v))
@@ -53,7 +53,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     let found = saturation_limits(all, &levels);
     let at_rail = |upper: bool| {
         let rail = found.iter().find(|rail| rail.is_upper == upper);
-        rail.map_or(0, |rail| rail.rows())
+        rail.map_or(0, |rail| rail.row_count())
     };
     let (low, high) = (at_rail(false), at_rail(true));
     Some(ValueSurvey {
@@ -77,7 +77,7 @@ pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
     reason = "the number of a part is at most 32, and its ends are at most the number of values"
 )]
 fn sketch(all: &[f64], min: f64, max: f64) -> String {
-    let parts = SKETCH.min(all.len());
+    let parts = SKETCH_CHARS.min(all.len());
     let bar = |part: usize| {
         let values = &all[part * all.len() / parts..(part + 1) * all.len() / parts];
         let (sum, count) = values
@@ -108,27 +108,27 @@ mod tests {
     #[test]
     fn value_column_faults_are_reported() {
         let sine: Vec<f64> = (0..400).map(|k| (0.05 * f64::from(k)).sin()).collect();
-        let found = values(&sine).unwrap();
+        let found = survey_values(&sine).unwrap();
         assert_eq!(
             (found.constant, found.quantum, found.saturated_low, found.saturated_high),
             (false, None, 0, 0)
         );
-        assert_eq!(found.sketch.chars().count(), SKETCH);
+        assert_eq!(found.sketch.chars().count(), SKETCH_CHARS);
         assert!(found.sketch.contains('█') && found.sketch.contains('▁'));
         let coarse: Vec<f64> = sine.iter().map(|v| (20.0 * v).round() / 20.0).collect();
-        assert!((values(&coarse).unwrap().quantum.unwrap() - 0.05).abs() < 1e-12);
+        assert!((survey_values(&coarse).unwrap().quantum.unwrap() - 0.05).abs() < 1e-12);
         let clipped: Vec<f64> = sine.iter().map(|v| v.min(0.8)).collect();
-        let found = values(&clipped).unwrap();
+        let found = survey_values(&clipped).unwrap();
         assert_eq!(found.saturated_low, 0);
         assert_eq!(found.saturated_high, clipped.iter().filter(|v| **v == 0.8).count());
-        let constant = values(&[2.0; 10]).unwrap();
+        let constant = survey_values(&[2.0; 10]).unwrap();
         assert!(constant.constant && constant.deviation == 0.0);
-        let missing = values(&[1.0, f64::NAN, 3.0, f64::INFINITY]).unwrap();
+        let missing = survey_values(&[1.0, f64::NAN, 3.0, f64::INFINITY]).unwrap();
         assert_eq!(
             (missing.missing, missing.mean, missing.sketch.as_str()),
             (2, 2.0, "▁ █ ")
         );
-        assert_eq!(values(&[f64::NAN]), None);
-        assert!(values(&[f64::MAX, f64::MIN]).is_some_and(|found| found.mean == 0.0));
+        assert_eq!(survey_values(&[f64::NAN]), None);
+        assert!(survey_values(&[f64::MAX, f64::MIN]).is_some_and(|found| found.mean == 0.0));
     }
 }

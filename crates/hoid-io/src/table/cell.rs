@@ -14,7 +14,7 @@ pub(crate) enum Cell {
 }
 
 /// Words for missing values in R, pandas, databases, spreadsheets, statistics packages and the C library of Windows.
-const MISSING: [&str; 30] = [
+const MISSING_WORDS: [&str; 30] = [
     "",
     "na",
     "n/a",
@@ -51,13 +51,13 @@ const MISSING: [&str; 30] = [
 const MINUS: char = '\u{2212}';
 
 impl Cell {
-    /// Interprets the text of a cell; an empty cell, NaN and the words in [`MISSING`] denote missing values.
+    /// Interprets the text of a cell; an empty cell, NaN and the words in [`MISSING_WORDS`] denote missing values.
     pub(crate) fn parse(text: &str) -> Self {
         let text = text.trim();
         match text.parse::<f64>() {
             Ok(value) if value.is_nan() => Self::Missing,
             Ok(value) => Self::Number(value),
-            Err(_) if MISSING.iter().any(|word| text.eq_ignore_ascii_case(word)) => Self::Missing,
+            Err(_) if MISSING_WORDS.iter().any(|word| text.eq_ignore_ascii_case(word)) => Self::Missing,
             // Spreadsheets in some languages write the typographic minus sign, and Fortran the exponent D.
             Err(_) if text.contains(MINUS) || is_fortran(text) => {
                 match text.replace(MINUS, "-").replace(['d', 'D'], "e").parse::<f64>() {
@@ -71,7 +71,7 @@ impl Cell {
 }
 
 /// Remedy for cells for which [`has_decimal_comma`] is true.
-pub(crate) const DECIMAL_COMMA: &str =
+pub(crate) const DECIMAL_COMMA_REMEDY: &str =
     "write the numbers with a decimal point instead of a comma, and without thousands separators";
 
 /// True if a text cell would be a number with a decimal point instead of its comma.
@@ -90,7 +90,7 @@ pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
 }
 
 /// Signs that separate thousands and never decimals: apostrophes, and blanks of several widths.
-const THOUSANDS: [char; 6] = ['\'', '\u{2019}', ' ', '\u{a0}', '\u{2009}', '\u{202f}'];
+const THOUSANDS_SEPARATORS: [char; 6] = ['\'', '\u{2019}', ' ', '\u{a0}', '\u{2009}', '\u{202f}'];
 
 /// Returns a number such as `-1.234,50`, `1,234.50`, `1'234.5` or `1 234,5` with a decimal point and without the signs
 /// between its thousands; `None` for any other cell. In `1,234` the comma may be a decimal sign.
@@ -112,7 +112,7 @@ fn without_thousands(cell: &str) -> Option<String> {
     let is_mark = match mark {
         '.' | ',' => decimal_sign.is_some_and(|sign| sign != mark),
         ' ' => decimal_sign.is_some(),
-        mark => THOUSANDS.contains(&mark),
+        mark => THOUSANDS_SEPARATORS.contains(&mark),
     };
     let mut groups = whole.split(mark);
     let first = groups.next()?;
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn decimal_commas_and_moments_are_recognised() {
+    fn decimal_commas_and_clock_times_are_recognised() {
         assert_eq!(with_decimal_point("-1,5e-3", true), "-1.5e-3");
         assert_eq!(
             Cell::parse(&with_decimal_point("\u{2212}1,5", true)),

@@ -9,7 +9,7 @@ use std::str::FromStr;
 
 use super::column_option::ColumnOption;
 use crate::IoError;
-use crate::wording::{did_you_mean, list};
+use crate::wording::{did_you_mean, list_names};
 
 /// A column, its negative, or the difference of two columns. The expression is kept as text until the columns of a file
 /// are known.
@@ -124,7 +124,7 @@ impl ColumnExpression {
                     missing: missing.join(" and no "),
                     meant: did_you_mean(&unknown, names).into_boxed_str(),
                     asked: self.text.clone(),
-                    available: list(names),
+                    available: list_names(names),
                     option: ColumnOption::Signals,
                 })
             }
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn hyphenated_names_win_over_differences() {
+    fn hyphenated_names_take_precedence_over_differences() {
         assert_eq!(resolve("stick-x").unwrap(), Signal::Column(3));
         assert_eq!(resolve("-stick-x").unwrap(), Signal::Negative(3));
         assert_eq!(resolve("stick-x-y").unwrap(), Signal::Difference(3, 2));
@@ -226,7 +226,7 @@ mod tests {
     fn long_lists_are_truncated() {
         let names: Vec<String> = (0..45).map(|k| format!("x{k}")).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        assert!(list(&names).ends_with("x39 and 5 more"));
-        assert_eq!(list(&["", ""]), "no named columns");
+        assert!(list_names(&names).ends_with("x39 and 5 more"));
+        assert_eq!(list_names(&["", ""]), "no named columns");
     }
 }

@@ -8,14 +8,14 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::cell::{DECIMAL_COMMA, has_decimal_comma, is_moment};
+use super::cell::{DECIMAL_COMMA_REMEDY, has_decimal_comma, is_moment};
 use super::precision::Precision;
 use crate::IoError;
-use crate::wording::{named, shown};
+use crate::wording::{abbreviate, format_name};
 
 /// Minimum number of separate gaps in a sparse column, and minimum fraction of its rows without a value. A dropout is a
 /// single gap.
-const SPARSE: (usize, f64) = (5, 0.05);
+const SPARSE_LIMITS: (usize, f64) = (5, 0.05);
 
 /// A column of a table.
 #[derive(Debug, Default)]
@@ -56,11 +56,11 @@ impl Column {
         };
         let places = rows.clone().filter(|row| missing(row) && !follows(row));
         let count = rows.clone().filter(missing).count();
-        places.count() >= SPARSE.0 && count as f64 >= SPARSE.1 * rows.len() as f64
+        places.count() >= SPARSE_LIMITS.0 && count as f64 >= SPARSE_LIMITS.1 * rows.len() as f64
     }
 
     /// Returns the values of the column in some rows, with NaN for values that were not recorded.
-    pub(crate) fn own_values(&self, rows: Range<usize>) -> Cow<'_, [f64]> {
+    pub(crate) fn recorded_values(&self, rows: Range<usize>) -> Cow<'_, [f64]> {
         let values = self.values.get(rows.clone()).unwrap_or_default();
         if self.filled_rows.is_empty() {
             return Cow::Borrowed(values);
@@ -115,26 +115,26 @@ impl Table<'_> {
 
     /// Returns the error that explains why the non-finite value of column `at` in a row cannot be used. `rows` are the
     /// rows in use.
-    pub(crate) fn bad_value(&self, at: usize, row: usize, rows: Range<usize>) -> IoError {
+    pub(crate) fn bad_value_error(&self, at: usize, row: usize, rows: Range<usize>) -> IoError {
         let unknown = Column::default();
         let column = self.columns.get(at).unwrap_or(&unknown);
         let file = self.source.file().to_owned();
         let place = self.source.place(row);
         let found = self.source.cell(row, at);
         let is_last_cell = self.columns.len().checked_sub(1) == Some(at);
-        let name = named(&column.name);
+        let name = format_name(&column.name);
         // A sign or a point at the end of a truncated file is the start of a number.
         let is_unfinished_number = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
         if is_unfinished_number || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
-                DECIMAL_COMMA
+                DECIMAL_COMMA_REMEDY
             } else if is_moment(&found) && column.texts.len() == self.rows {
                 "the column holds dates or clock times: choose it with --time, or choose another column"
             } else if is_moment(&found) {
                 "the column mixes numbers with dates or clock times: write it in one format, or give --fs HZ if the \
                  samples are evenly spaced"
             } else if row == 0 && self.rows > 1 && self.row_has_no_numbers(row) {
-                UNITS_ROW
+                UNITS_ROW_REMEDY
             } else if is_last_cell && self.source.is_open(row) {
                 "the file ends in the middle of this line: copy or record the file again, or remove this line"
             } else {
@@ -181,12 +181,12 @@ impl Table<'_> {
 }
 
 /// Remedy for a first row of the data without numbers.
-pub(crate) const UNITS_ROW: &str =
+pub(crate) const UNITS_ROW_REMEDY: &str =
     "no column has a number in this row: if it contains the units, remove it and give --unit e=deg,u=deg";
 
 /// Checks that the names are unique, and adds a note on columns without a name.
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {
-    check_number(names.len(), file)?;
+    check_column_count(names.len(), file)?;
     let mut known: HashMap<&str, usize> = HashMap::new();
     for (second, name) in (1..).zip(names) {
         if name.is_empty() {
@@ -194,7 +194,7 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
         } else if let Some(first) = known.insert(name, second) {
             return Err(IoError::DuplicateColumn {
                 file: file.to_owned(),
-                name: shown(name),
+                name: abbreviate(name),
                 first,
                 second,
             });
@@ -207,7 +207,7 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
 const MAX_COLUMNS: usize = 10_000;
 
 /// Checks the number of columns before memory is allocated for them.
-pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
+pub(crate) fn check_column_count(columns: usize, file: &str) -> Result<(), IoError> {
     if columns <= MAX_COLUMNS {
         return Ok(());
     }
@@ -275,7 +275,7 @@ impl Source for RowSelection<'_> {
 }
 
 /// Returns a table with only the given rows.
-pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
+pub(crate) fn keep_rows(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
     let Table {
         mut columns, source, ..
     } = table;

@@ -5,7 +5,7 @@
 //! counts only as the first word.
 
 /// Common names of the error, the most specific first.
-const ERRORS: [&str; 10] = [
+const ERROR_NAMES: [&str; 10] = [
     "e",
     "error",
     "err",
@@ -18,7 +18,7 @@ const ERRORS: [&str; 10] = [
     "erreur",
 ];
 /// Common names of the control.
-const CONTROLS: [&str; 13] = [
+const CONTROL_NAMES: [&str; 13] = [
     "u",
     "control",
     "stick",
@@ -36,17 +36,17 @@ const CONTROLS: [&str; 13] = [
 
 /// Returns the column whose name denotes the tracking error; `None` if there is none.
 #[must_use]
-pub fn error_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
-    among(columns, &ERRORS)
+pub fn find_error_column<'a>(columns: &[&'a str]) -> Option<&'a str> {
+    find_column(columns, &ERROR_NAMES)
 }
 
 /// Returns the column whose name denotes the control; `None` if there is none.
 #[must_use]
-pub fn control_among<'a>(columns: &[&'a str]) -> Option<&'a str> {
-    among(columns, &CONTROLS)
+pub fn find_control_column<'a>(columns: &[&'a str]) -> Option<&'a str> {
+    find_column(columns, &CONTROL_NAMES)
 }
 
-fn among<'a>(columns: &[&'a str], names: &[&str]) -> Option<&'a str> {
+fn find_column<'a>(columns: &[&'a str], names: &[&str]) -> Option<&'a str> {
     let whole = |name: &&str| columns.iter().copied().find(|column| column.eq_ignore_ascii_case(name));
     names.iter().find_map(whole).or_else(|| {
         let mut by_word = columns.iter().copied().filter(|column| has_word_of(column, names));
@@ -69,23 +69,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn whole_names_win_over_single_words() {
-        assert_eq!(error_among(&["t", "Error", "e"]), Some("e"));
+    fn whole_names_take_precedence_over_single_words() {
+        assert_eq!(find_error_column(&["t", "Error", "e"]), Some("e"));
         assert_eq!(
-            error_among(&["Time (s)", "Tracking error", "Stick"]),
+            find_error_column(&["Time (s)", "Tracking error", "Stick"]),
             Some("Tracking error")
         );
         assert_eq!(
-            control_among(&["Time (s)", "Tracking error", "Stick [V]"]),
+            find_control_column(&["Time (s)", "Tracking error", "Stick [V]"]),
             Some("Stick [V]")
         );
-        assert_eq!(error_among(&["e (deg)", "u (deg)"]), Some("e (deg)"));
+        assert_eq!(find_error_column(&["e (deg)", "u (deg)"]), Some("e (deg)"));
         let german = ["Zeit [s]", "Fehler [deg]", "Knüppel [V]"];
         assert_eq!(
-            (error_among(&german), control_among(&german)),
+            (find_error_column(&german), find_control_column(&german)),
             (Some(german[1]), Some(german[2]))
         );
-        assert_eq!(control_among(&["stick force", "stick position"]), None);
-        assert_eq!(error_among(&["phase e", "terror", ""]), None);
+        assert_eq!(find_control_column(&["stick force", "stick position"]), None);
+        assert_eq!(find_error_column(&["phase e", "terror", ""]), None);
     }
 }

@@ -18,11 +18,13 @@ mod common_names;
 mod precision;
 mod selection;
 
-pub(crate) use cell::{Cell, DECIMAL_COMMA, has_decimal_comma, with_decimal_point};
+pub(crate) use cell::{Cell, DECIMAL_COMMA_REMEDY, has_decimal_comma, with_decimal_point};
 pub use column_expression::ColumnExpression;
 pub(crate) use column_expression::Signal;
 pub use column_option::ColumnOption;
-pub(crate) use columns::{Column, Source, Table, UNITS_ROW, check_names, check_number, kept, read_comments};
-pub use common_names::{control_among, error_among};
+pub(crate) use columns::{
+    Column, Source, Table, UNITS_ROW_REMEDY, check_column_count, check_names, keep_rows, read_comments,
+};
+pub use common_names::{find_control_column, find_error_column};
 pub(crate) use precision::Precision;
-pub(crate) use selection::{check_selected, selected};
+pub(crate) use selection::{check_selected, select_columns};

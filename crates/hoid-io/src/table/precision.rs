@@ -25,7 +25,7 @@ impl Precision {
     /// tenths of a ms, all times are multiples of one unit of the last decimal, which reveals the rounding. A rounded
     /// number deviates from such a multiple by less than two units of its last binary digit; for the numbers of
     /// decimals tried here, numbers that were not rounded are not so close to a multiple by chance.
-    pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
+    pub(crate) fn from_times(values: &[f64], single: bool) -> Self {
         if single {
             return Self::single();
         }
@@ -61,9 +61,9 @@ impl Precision {
             .iter()
             .filter(|byte| byte.is_ascii_digit())
             .skip_while(|byte| **byte == b'0');
-        let decimals = count(fraction_digits).saturating_sub(exponent);
+        let decimals = digit_count(fraction_digits).saturating_sub(exponent);
         self.decimals = Some(self.decimals.unwrap_or(i32::MIN).max(decimals));
-        self.significant = self.significant.max(count(significant));
+        self.significant = self.significant.max(digit_count(significant));
     }
 
     /// Updates the precision with that of another part of the column.
@@ -124,7 +124,7 @@ fn last_digit(decimals: i32) -> f64 {
     10_f64.powi(decimals.saturating_neg())
 }
 
-fn count(digits: impl Iterator) -> i32 {
+fn digit_count(digits: impl Iterator) -> i32 {
     i32::try_from(digits.count()).unwrap_or(i32::MAX)
 }
 
@@ -172,13 +172,13 @@ mod tests {
     fn rounded_times_are_detected() {
         let times = |rate_hz: f64| (0..5000).map(move |k| f64::from(k) / rate_hz);
         let rounded: Vec<f64> = times(60.0).map(|t| (t * 1e4).round() / 1e4).collect();
-        assert!((Precision::of_times(&rounded, false).unit(45.0) - 1e-4).abs() < 1e-18);
+        assert!((Precision::from_times(&rounded, false).unit(45.0) - 1e-4).abs() < 1e-18);
         let hundredths: Vec<f64> = (0..5000).map(|k| f64::from(k) * 0.01).collect();
-        assert!((Precision::of_times(&hundredths, false).unit(45.0) - 1e-2).abs() < 1e-16);
+        assert!((Precision::from_times(&hundredths, false).unit(45.0) - 1e-2).abs() < 1e-16);
         let exact: Vec<f64> = times(60.0).collect();
-        assert_eq!(Precision::of_times(&exact, false).unit(45.0), 0.0);
-        assert_eq!(Precision::of_times(&exact, true), Precision::single());
+        assert_eq!(Precision::from_times(&exact, false).unit(45.0), 0.0);
+        assert_eq!(Precision::from_times(&exact, true), Precision::single());
         // Times with NaN are reported elsewhere; here NaN is ignored.
-        assert_eq!(Precision::of_times(&[f64::NAN, 0.5], false).unit(1.0), 0.1);
+        assert_eq!(Precision::from_times(&[f64::NAN, 0.5], false).unit(1.0), 0.1);
     }
 }

@@ -4,7 +4,7 @@ use super::column_option::ColumnOption;
 use super::columns::{Source, Table};
 use crate::IoError;
 use crate::record::ReadOptions;
-use crate::wording::{did_you_mean, list};
+use crate::wording::{did_you_mean, list_names};
 
 /// Source of a table from which columns were removed; messages still refer to the columns of the file.
 struct ColumnSelection<'a> {
@@ -32,7 +32,7 @@ impl Source for ColumnSelection<'_> {
 }
 
 /// Returns the table with only the columns for which `keep` is true.
-pub(crate) fn selected<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool) -> Table<'a> {
+pub(crate) fn select_columns<'a>(table: Table<'a>, keep: impl Fn(usize, &str) -> bool) -> Table<'a> {
     let names = table.names();
     let columns = names.iter().enumerate().filter(|(at, name)| keep(*at, name));
     let columns: Vec<usize> = columns.map(|(at, _)| at).collect();
@@ -71,7 +71,7 @@ pub(crate) fn check_selected(names: &[&str], options: &ReadOptions, file: &str) 
             missing: format!("\"{missing}\""),
             meant: did_you_mean(&[missing], names).into_boxed_str(),
             asked: kept.join(","),
-            available: list(names),
+            available: list_names(names),
             option: ColumnOption::Kept,
         }),
     }

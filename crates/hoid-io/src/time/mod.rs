@@ -12,7 +12,7 @@ pub(crate) mod sampling;
 mod time_choice;
 mod time_column;
 
-pub(crate) use moment::{Moments, is_clock_time, seconds};
+pub(crate) use moment::{ClockTimes, is_clock_time, seconds_between};
 pub use sampling::even_times;
 pub use time_choice::TimeChoice;
 pub(crate) use time_column::{is_time, is_time_unit, may_be_time, with_time};

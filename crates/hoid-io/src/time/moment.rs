@@ -12,12 +12,12 @@ use crate::table::{Column, Precision};
 const NS_PER_S: i64 = 1_000_000_000;
 
 /// Period in ns after which a clock without a date, or a clock without hours, returns to zero.
-const DAY: i64 = 86_400 * NS_PER_S;
-const HOUR: i64 = 3600 * NS_PER_S;
+const DAY_NS: i64 = 86_400 * NS_PER_S;
+const HOUR_NS: i64 = 3600 * NS_PER_S;
 
 /// A clock time, and the precision of its seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Moment {
+struct ClockTime {
     ns: i64,
     precision: Precision,
     /// Time after which the clock starts again at zero, ns; `None` if there is a date.
@@ -25,12 +25,12 @@ struct Moment {
 }
 
 /// Parses a cell as a clock time; `None` if the cell is not a clock time. A date without a time means midnight.
-fn parse(cell: &str) -> Option<Moment> {
+fn parse(cell: &str) -> Option<ClockTime> {
     let cell = cell.trim();
     if !cell.starts_with(|c: char| c.is_ascii_digit()) || cell.len() > 40 {
         return None;
     }
-    if let Some(moment) = duration(cell) {
+    if let Some(moment) = parse_duration(cell) {
         return Some(moment);
     }
     let (date, time) = match cell.split_once(['T', ' ', '_']) {
@@ -44,11 +44,11 @@ fn parse(cell: &str) -> Option<Moment> {
         other => other,
     };
     let days = date.map_or(Some(0), days_of)?;
-    let (ns, decimals, cycle) = time.map_or(Some((0, 0, DAY)), time_of_day)?;
-    let day = days.checked_mul(DAY)?;
-    Some(Moment {
+    let (ns, decimals, cycle) = time.map_or(Some((0, 0, DAY_NS)), parse_time_of_day)?;
+    let day = days.checked_mul(DAY_NS)?;
+    Some(ClockTime {
         ns: day.checked_add(ns)?,
-        precision: of_decimals(decimals),
+        precision: precision_of_decimals(decimals),
         cycle: date.is_none().then_some(cycle),
     })
 }
@@ -57,7 +57,7 @@ fn is_half(text: &str) -> bool {
     ["am", "pm"].iter().any(|half| text.eq_ignore_ascii_case(half))
 }
 
-fn of_decimals(decimals: usize) -> Precision {
+fn precision_of_decimals(decimals: usize) -> Precision {
     // The number of decimals does not depend on the size of the value.
     let mut precision = Precision::default();
     precision.add_decimals(decimals);
@@ -65,19 +65,19 @@ fn of_decimals(decimals: usize) -> Precision {
 }
 
 /// Parses a duration of MATLAB such as `0.01 sec`, or of pandas such as `0 days 00:00:00.01`.
-fn duration(cell: &str) -> Option<Moment> {
+fn parse_duration(cell: &str) -> Option<ClockTime> {
     let (number, rest) = cell.split_once(' ')?;
     let rest = rest.trim();
     if let Some(clock) = rest.strip_prefix("day") {
         let days = number.parse::<u16>().ok().map(i64::from)?;
         let clock = clock.trim_start_matches(['s', ',', ' ']);
         let (ns, decimals, _) = match clock {
-            "" => (0, 0, DAY),
-            clock => time_of_day(clock).filter(|(_, _, cycle)| *cycle == DAY)?,
+            "" => (0, 0, DAY_NS),
+            clock => parse_time_of_day(clock).filter(|(_, _, cycle)| *cycle == DAY_NS)?,
         };
-        return Some(Moment {
-            ns: days.checked_mul(DAY)?.checked_add(ns)?,
-            precision: of_decimals(decimals),
+        return Some(ClockTime {
+            ns: days.checked_mul(DAY_NS)?.checked_add(ns)?,
+            precision: precision_of_decimals(decimals),
             cycle: None,
         });
     }
@@ -87,7 +87,7 @@ fn duration(cell: &str) -> Option<Moment> {
     let mut precision = Precision::default();
     precision.add(number);
     // Larger numbers of ns are not exact, and may exceed 64 bits.
-    (ns.abs() < 9e15).then(|| Moment {
+    (ns.abs() < 9e15).then(|| ClockTime {
         ns: ns as i64,
         precision: precision.shifted(power),
         cycle: None,
@@ -101,7 +101,7 @@ pub(crate) fn is_clock_time(cell: &str) -> bool {
 
 /// Interpretation of the texts of a column, row by row: they are clock times unless some cell has other contents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Moments {
+pub(crate) enum ClockTimes {
     /// All values so far are missing.
     #[default]
     Unknown,
@@ -112,12 +112,12 @@ pub(crate) enum Moments {
     No,
 }
 
-impl Moments {
+impl ClockTimes {
     /// Interprets a text cell and appends its value to the column.
     pub(crate) fn push(&mut self, column: &mut Column, cell: &str) {
         let moment = parse(cell).filter(|_| *self != Self::No);
         let row = column.values.len();
-        let Some(Moment { ns, precision, cycle }) = moment else {
+        let Some(ClockTime { ns, precision, cycle }) = moment else {
             self.refuse(column);
             column.texts.push(row);
             column.values.push(f64::NAN);
@@ -143,7 +143,7 @@ impl Moments {
         };
         column.moments = true;
         column.precision.join(precision);
-        column.values.push(seconds(now, first));
+        column.values.push(seconds_between(now, first));
     }
 
     /// Called if a number was found in the column: its apparent clock times are then treated as text.
@@ -162,7 +162,7 @@ impl Moments {
 }
 
 /// Returns the time between two clock times in s.
-pub(crate) fn seconds(ns: i64, from: i64) -> f64 {
+pub(crate) fn seconds_between(ns: i64, from: i64) -> f64 {
     // The number of ns is exact below 2^53, which is about a hundred days.
     i128::from(ns).saturating_sub(i128::from(from)) as f64 / NS_PER_S as f64
 }
@@ -222,7 +222,7 @@ fn month_of(text: &str) -> Option<i64> {
     clippy::arithmetic_side_effects,
     reason = "numbers of at most three digits and a fraction of 1e9 ns, in 64 bits"
 )]
-fn time_of_day(text: &str) -> Option<(i64, usize, i64)> {
+fn parse_time_of_day(text: &str) -> Option<(i64, usize, i64)> {
     let (text, half_day) = match text.rsplit_once(' ') {
         Some((text, half)) if half.eq_ignore_ascii_case("pm") => (text, Some(12)),
         Some((text, half)) if half.eq_ignore_ascii_case("am") => (text, Some(0)),
@@ -230,7 +230,7 @@ fn time_of_day(text: &str) -> Option<(i64, usize, i64)> {
     };
     let (clock, zone_min) = match text.find(['Z', 'z', '+', '-']) {
         None => (text, 0),
-        Some(at) => (text[..at].trim_end(), zone(&text[at..])?),
+        Some(at) => (text[..at].trim_end(), parse_zone(&text[at..])?),
     };
     let parts: Vec<&str> = clock.split(':').collect();
     let has_fraction = |seconds: &str| seconds.contains(['.', ',']);
@@ -243,8 +243,8 @@ fn time_of_day(text: &str) -> Option<(i64, usize, i64)> {
         _ => return None,
     };
     let cycle = match parts.as_slice() {
-        [_, seconds] if has_fraction(seconds) => HOUR,
-        _ => DAY,
+        [_, seconds] if has_fraction(seconds) => HOUR_NS,
+        _ => DAY_NS,
     };
     let whole = |text: &str, below: i64| text.parse::<u8>().ok().map(i64::from).filter(|n| *n < below);
     let hour = match half_day {
@@ -266,7 +266,7 @@ fn time_of_day(text: &str) -> Option<(i64, usize, i64)> {
     clippy::arithmetic_side_effects,
     reason = "numbers of at most three digits, in 64 bits"
 )]
-fn zone(text: &str) -> Option<i64> {
+fn parse_zone(text: &str) -> Option<i64> {
     if text.eq_ignore_ascii_case("z") {
         return Some(0);
     }
@@ -286,7 +286,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn moments_match_unix_time() {
+    fn clock_times_match_unix_time() {
         // Result of `date -u -d '2024-03-05 10:11:12' +%s`.
         let s = 1_709_633_472 * NS_PER_S;
         for (cell, ns) in [
@@ -310,9 +310,9 @@ mod tests {
             ("0.01 sec", 10_000_000),
             ("1.5 min", 90 * NS_PER_S),
             ("20 ms", 20_000_000),
-            ("1 days 00:00:00.010000", DAY + 10_000_000),
-            ("2 days", 2 * DAY),
-            ("1 day, 0:00:01", DAY + NS_PER_S),
+            ("1 days 00:00:00.010000", DAY_NS + 10_000_000),
+            ("2 days", 2 * DAY_NS),
+            ("1 day, 0:00:01", DAY_NS + NS_PER_S),
         ] {
             assert_eq!(parse(cell).map(|moment| moment.ns), Some(ns), "{cell}");
         }
@@ -324,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn other_text_is_no_moment() {
+    fn other_text_is_not_a_clock_time() {
         for cell in [
             "",
             "abc",
@@ -358,7 +358,7 @@ mod tests {
     /// Pushes cells to a column and returns its values.
     fn column(cells: &[&str]) -> Vec<f64> {
         let mut column = Column::default();
-        let mut moments = Moments::default();
+        let mut moments = ClockTimes::default();
         cells.iter().for_each(|cell| moments.push(&mut column, cell));
         column.values
     }

@@ -9,13 +9,13 @@
 use crate::table::Precision;
 
 /// Largest permitted deviation from the evenly spaced grid, in sample times.
-const JITTER: f64 = 1e-3;
+const MAX_JITTER: f64 = 1e-3;
 /// Largest relative deviation at which a frequency is rounded to a whole number of Hz.
-const WHOLE_HZ: f64 = 1e-4;
+const WHOLE_HZ_TOLERANCE: f64 = 1e-4;
 
 /// Reason why the samples are not evenly spaced. Rows are counted from the first row in use.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Uneven {
+pub(crate) enum SamplingFault {
     TooFew,
     NotIncreasing {
         row: usize,
@@ -47,32 +47,32 @@ pub(crate) struct Sampling {
 /// # Errors
 /// The index of the row, counted from 0, at which the spacing is uneven.
 pub fn even_times(t: &[f64]) -> Result<f64, usize> {
-    match even(t, Precision::of_times(t, false), None) {
+    match even_sampling(t, Precision::from_times(t, false), None) {
         Ok(sampling) => Ok(sampling.sample_time_s),
-        Err(Uneven::TooFew) => Err(0),
-        Err(Uneven::Gap { row, .. }) => Err(row.saturating_add(1)),
-        Err(Uneven::NotIncreasing { row } | Uneven::Jitter { row, .. }) => Err(row),
+        Err(SamplingFault::TooFew) => Err(0),
+        Err(SamplingFault::Gap { row, .. }) => Err(row.saturating_add(1)),
+        Err(SamplingFault::NotIncreasing { row } | SamplingFault::Jitter { row, .. }) => Err(row),
     }
 }
 
 /// Returns the sampling of an evenly spaced t. A sample time stated in the file is used if t agrees with it.
-pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Result<Sampling, Uneven> {
+pub(crate) fn even_sampling(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Result<Sampling, SamplingFault> {
     let (&[first, .., last], steps) = (t, t.len().saturating_sub(1) as f64) else {
         return match stated_s {
             Some(sample_time_s) if t.len() == 1 => Ok(Sampling {
                 sample_time_s,
                 note: None,
             }),
-            _ => Err(Uneven::TooFew),
+            _ => Err(SamplingFault::TooFew),
         };
     };
-    increasing(t)?;
+    check_increasing(t)?;
     let rounding = Rounding::of(t, precision);
     let typical_s = typical_step(t, rounding);
-    gap(t, rounding, typical_s)?;
+    check_gaps(t, rounding, typical_s)?;
     let mean_s = (last - first) / steps;
     let first_unit = rounding.unit(first);
-    let tolerance = |t: f64| (JITTER * mean_s).max(rounding.unit(t).max(first_unit) * (1.0 + 1e-6));
+    let tolerance = |t: f64| (MAX_JITTER * mean_s).max(rounding.unit(t).max(first_unit) * (1.0 + 1e-6));
     // The largest excess of the deviation over the tolerance is decisive; NaN, which results from an overflow, counts
     // as an excess.
     let deviation = |k: usize, t: f64| (t - (first + k as f64 * mean_s)).abs();
@@ -84,7 +84,7 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .unwrap_or((f64::NAN, 0, first));
     if !(excess <= 0.0 && mean_s.is_finite() && mean_s > 0.0) {
-        return Err(Uneven::Jitter {
+        return Err(SamplingFault::Jitter {
             row,
             deviation_s: deviation(row, worst),
             tolerance_s: tolerance(worst),
@@ -106,7 +106,7 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
             note: Some(note),
         });
     }
-    let sample_time_s = whole_hz(mean_s, rounding.unit(first.abs().max(last.abs())) / steps);
+    let sample_time_s = round_to_whole_hz(mean_s, rounding.unit(first.abs().max(last.abs())) / steps);
     let note = moves_end(sample_time_s).then(|| {
         format!(
             "t gives a sampling frequency of {:.6} Hz, taken as {:.0} Hz",
@@ -118,23 +118,23 @@ pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Re
 }
 
 /// Returns the sample time for resampling an unevenly spaced t, which is its typical step.
-pub(crate) fn typical(t: &[f64], precision: Precision) -> Result<f64, Uneven> {
+pub(crate) fn typical_sample_time(t: &[f64], precision: Precision) -> Result<f64, SamplingFault> {
     let &[first, .., last] = t else {
-        return Err(Uneven::TooFew);
+        return Err(SamplingFault::TooFew);
     };
-    increasing(t)?;
+    check_increasing(t)?;
     let rounding = Rounding::of(t, precision);
     let slack_s = rounding.unit(first.abs().max(last.abs())) / t.len().saturating_sub(1) as f64;
-    Ok(whole_hz(typical_step(t, rounding), slack_s))
+    Ok(round_to_whole_hz(typical_step(t, rounding), slack_s))
 }
 
-fn increasing(t: &[f64]) -> Result<(), Uneven> {
+fn check_increasing(t: &[f64]) -> Result<(), SamplingFault> {
     // The condition is formulated so that NaN also counts as not increasing.
     let standing =
         |(_, (before, next)): &(usize, (f64, f64))| next.partial_cmp(before) != Some(std::cmp::Ordering::Greater);
     match (1..).zip(pairs(t)).find(standing) {
         None => Ok(()),
-        Some((row, _)) => Err(Uneven::NotIncreasing { row }),
+        Some((row, _)) => Err(SamplingFault::NotIncreasing { row }),
     }
 }
 
@@ -150,7 +150,7 @@ pub(crate) fn steps(values: &[f64]) -> impl Iterator<Item = f64> {
 }
 
 /// Returns the stride at which at most about two million steps of a long time are used for its median.
-pub(crate) fn every(times: usize) -> usize {
+pub(crate) fn median_stride(times: usize) -> usize {
     (times >> 20).max(1)
 }
 
@@ -165,7 +165,7 @@ struct Rounding {
 
 impl Rounding {
     fn of(t: &[f64], precision: Precision) -> Self {
-        let mut steps: Vec<f64> = steps(t).step_by(every(t.len())).collect();
+        let mut steps: Vec<f64> = steps(t).step_by(median_stride(t.len())).collect();
         let middle = steps.len() / 2;
         Self {
             precision,
@@ -196,7 +196,7 @@ fn typical_step(t: &[f64], rounding: Rounding) -> f64 {
 
 /// Detects missing samples. Rounding may make a step longer than the sample time by up to one unit, as in 0.00, 0.02,
 /// 0.03 at 60 Hz, but not by a full unit if the sample time is a multiple of the unit.
-fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
+fn check_gaps(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), SamplingFault> {
     let is_gap = |(_, (before, next)): &(usize, (f64, f64))| {
         let step = next - before;
         step >= 1.5 * typical_s && step - typical_s > 0.95 * rounding.unit(*next)
@@ -205,7 +205,7 @@ fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
     let Some((row, (before, next))) = gaps.next() else {
         return Ok(());
     };
-    Err(Uneven::Gap {
+    Err(SamplingFault::Gap {
         row,
         missing: (((next - before) / typical_s).round() - 1.0).max(1.0) as u64,
         gaps: gaps.count().saturating_add(1),
@@ -215,9 +215,10 @@ fn gap(t: &[f64], rounding: Rounding, typical_s: f64) -> Result<(), Uneven> {
 
 /// Returns the sample time of the nearest whole number of Hz if `ts` is close enough, otherwise `ts`; `slack_s` is the
 /// uncertainty of `ts` due to the rounding of t.
-fn whole_hz(ts: f64, slack_s: f64) -> f64 {
+fn round_to_whole_hz(ts: f64, slack_s: f64) -> f64 {
     let frequency = (1.0 / ts).round();
-    let near = (1.0 / ts - frequency).abs() <= WHOLE_HZ * frequency || (1.0 / frequency - ts).abs() <= slack_s;
+    let near =
+        (1.0 / ts - frequency).abs() <= WHOLE_HZ_TOLERANCE * frequency || (1.0 / frequency - ts).abs() <= slack_s;
     if frequency >= 1.0 && frequency.is_finite() && near {
         1.0 / frequency
     } else {
@@ -243,7 +244,7 @@ mod tests {
     }
 
     /// Returns times as a file with a given number of decimals prints them.
-    fn printed(times: impl Iterator<Item = f64>, decimals: usize) -> (Vec<f64>, Precision) {
+    fn printed_times(times: impl Iterator<Item = f64>, decimals: usize) -> (Vec<f64>, Precision) {
         let mut precision = Precision::default();
         let t = times
             .map(|t| {
@@ -264,8 +265,8 @@ mod tests {
         for hz in [30.0, 50.0, 60.0, 75.0, 100.0, 128.0, 1000.0] {
             for decimals in [3, 4, 6, 17] {
                 for (n, start) in [(12, 0.0), (2702, 0.0), (9000, -10.24)] {
-                    let (t, precision) = printed(grid(n, start, 1.0 / hz), decimals);
-                    let sampling = even(&t, precision, None).unwrap();
+                    let (t, precision) = printed_times(grid(n, start, 1.0 / hz), decimals);
+                    let sampling = even_sampling(&t, precision, None).unwrap();
                     assert_eq!(
                         sampling.sample_time_s,
                         1.0 / hz,
@@ -276,45 +277,51 @@ mod tests {
             }
         }
         // The printed steps alternate between 0.01 and 0.02.
-        let (t, precision) = printed(grid(2000, 0.0, 1.0 / 60.0), 2);
-        assert_eq!(even(&t, precision, None).unwrap().sample_time_s, 1.0 / 60.0);
+        let (t, precision) = printed_times(grid(2000, 0.0, 1.0 / 60.0), 2);
+        assert_eq!(even_sampling(&t, precision, None).unwrap().sample_time_s, 1.0 / 60.0);
     }
 
     #[test]
     fn other_rates_are_not_rounded() {
-        let (t, precision) = printed(grid(5000, 0.0, 0.0125 / 0.79), 12);
-        let ts = even(&t, precision, None).unwrap().sample_time_s;
+        let (t, precision) = printed_times(grid(5000, 0.0, 0.0125 / 0.79), 12);
+        let ts = even_sampling(&t, precision, None).unwrap().sample_time_s;
         assert!((ts - 0.0125 / 0.79).abs() < 1e-12);
-        let (t, precision) = printed(grid(100, 0.0, 2.0), 0);
-        assert_eq!(even(&t, precision, None).unwrap().sample_time_s, 2.0);
+        let (t, precision) = printed_times(grid(100, 0.0, 2.0), 0);
+        assert_eq!(even_sampling(&t, precision, None).unwrap().sample_time_s, 2.0);
         // 99.995 Hz is rounded to 100 Hz, with a note.
-        let (t, precision) = printed(grid(8000, 0.0, 1.0 / 99.995), 9);
-        let sampling = even(&t, precision, None).unwrap();
+        let (t, precision) = printed_times(grid(8000, 0.0, 1.0 / 99.995), 9);
+        let sampling = even_sampling(&t, precision, None).unwrap();
         assert_eq!(sampling.sample_time_s, 0.01);
         assert!(sampling.note.unwrap().contains("99.995000 Hz, taken as 100 Hz"));
     }
 
     #[test]
     fn stated_sample_time_is_used_if_t_agrees() {
-        let (t, precision) = printed(grid(500, 0.0, 0.015), 17);
+        let (t, precision) = printed_times(grid(500, 0.0, 0.015), 17);
         let stated = f64::from_bits(0.015_f64.to_bits() + 1);
-        assert_eq!(even(&t, precision, Some(stated)).unwrap().sample_time_s, stated);
-        let other = even(&t, precision, Some(0.016)).unwrap();
+        assert_eq!(
+            even_sampling(&t, precision, Some(stated)).unwrap().sample_time_s,
+            stated
+        );
+        let other = even_sampling(&t, precision, Some(0.016)).unwrap();
         assert!((other.sample_time_s - 0.015).abs() < 1e-12);
         assert!(other.note.unwrap().contains("contradicts t"));
-        assert_eq!(even(&[3.0], precision, Some(0.015)).unwrap().sample_time_s, 0.015);
-        assert_eq!(even(&[3.0], precision, None), Err(Uneven::TooFew));
-        assert_eq!(even(&[], precision, Some(0.015)), Err(Uneven::TooFew));
+        assert_eq!(
+            even_sampling(&[3.0], precision, Some(0.015)).unwrap().sample_time_s,
+            0.015
+        );
+        assert_eq!(even_sampling(&[3.0], precision, None), Err(SamplingFault::TooFew));
+        assert_eq!(even_sampling(&[], precision, Some(0.015)), Err(SamplingFault::TooFew));
     }
 
     #[test]
     fn gaps_are_counted() {
         for decimals in [2, 3, 6] {
-            let (mut t, precision) = printed(grid(1000, 0.0, 0.01), decimals);
+            let (mut t, precision) = printed_times(grid(1000, 0.0, 0.01), decimals);
             t.drain(900..903);
             t.remove(400);
-            let found = even(&t, precision, None);
-            let Err(Uneven::Gap {
+            let found = even_sampling(&t, precision, None);
+            let Err(SamplingFault::Gap {
                 row,
                 missing,
                 gaps,
@@ -327,11 +334,11 @@ mod tests {
             assert!((sample_time_s - 0.01).abs() < 1e-4);
         }
         // The times are counts of samples instead of s.
-        let (mut t, precision) = printed(grid(50, 0.0, 1.0), 0);
+        let (mut t, precision) = printed_times(grid(50, 0.0, 1.0), 0);
         t.remove(20);
         assert!(matches!(
-            even(&t, precision, None),
-            Err(Uneven::Gap {
+            even_sampling(&t, precision, None),
+            Err(SamplingFault::Gap {
                 row: 19,
                 missing: 1,
                 ..
@@ -341,14 +348,14 @@ mod tests {
 
     #[test]
     fn jitter_is_measured() {
-        let (mut t, precision) = printed(grid(1000, 0.0, 0.01), 6);
+        let (mut t, precision) = printed_times(grid(1000, 0.0, 0.01), 6);
         t[321] += 0.002;
-        let Err(Uneven::Jitter {
+        let Err(SamplingFault::Jitter {
             row,
             deviation_s,
             tolerance_s,
             ..
-        }) = even(&t, precision, None)
+        }) = even_sampling(&t, precision, None)
         else {
             panic!("not found");
         };
@@ -356,26 +363,32 @@ mod tests {
         // One deviating sample of 1000 shifts neither end of the grid.
         assert!((deviation_s - 0.002).abs() < 1e-9 && (tolerance_s - 1e-5).abs() < 1e-9);
         t[321] -= 0.001_995;
-        assert!(even(&t, precision, None).is_ok());
+        assert!(even_sampling(&t, precision, None).is_ok());
     }
 
     #[test]
     fn non_increasing_or_overflowing_time_is_an_error() {
         let p = Precision::default();
         assert_eq!(
-            even(&[0.0, 0.1, 0.1, 0.2], p, None),
-            Err(Uneven::NotIncreasing { row: 2 })
+            even_sampling(&[0.0, 0.1, 0.1, 0.2], p, None),
+            Err(SamplingFault::NotIncreasing { row: 2 })
         );
-        assert_eq!(even(&[0.0, 0.1, 0.05], p, None), Err(Uneven::NotIncreasing { row: 2 }));
-        assert_eq!(typical(&[0.0, f64::NAN], p), Err(Uneven::NotIncreasing { row: 1 }));
-        assert!(even(&[-1e308, 0.0, 1e308], p, None).is_err());
-        assert!(even(&[0.0, 5e-324], p, None).is_ok_and(|s| s.sample_time_s > 0.0));
+        assert_eq!(
+            even_sampling(&[0.0, 0.1, 0.05], p, None),
+            Err(SamplingFault::NotIncreasing { row: 2 })
+        );
+        assert_eq!(
+            typical_sample_time(&[0.0, f64::NAN], p),
+            Err(SamplingFault::NotIncreasing { row: 1 })
+        );
+        assert!(even_sampling(&[-1e308, 0.0, 1e308], p, None).is_err());
+        assert!(even_sampling(&[0.0, 5e-324], p, None).is_ok_and(|s| s.sample_time_s > 0.0));
     }
 
     #[test]
     fn typical_step_ignores_gaps_and_rounding() {
-        let (mut t, precision) = printed(grid(1000, 5.0, 1.0 / 60.0), 4);
+        let (mut t, precision) = printed_times(grid(1000, 5.0, 1.0 / 60.0), 4);
         t.iter_mut().skip(300).for_each(|t| *t += 7.0);
-        assert_eq!(typical(&t, precision).unwrap(), 1.0 / 60.0);
+        assert_eq!(typical_sample_time(&t, precision).unwrap(), 1.0 / 60.0);
     }
 }

@@ -23,10 +23,10 @@ use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
 use crate::IoError;
 use crate::table::{Column, ColumnOption, Precision, Table};
-use crate::wording::{did_you_mean, list, named, shown};
+use crate::wording::{abbreviate, did_you_mean, format_name, list_names};
 
 /// Size above which the numbers in a time stamp column are assumed to be counted from 1970: 1e8 s is in 1973.
-const STAMP: f64 = 1e8;
+const MIN_STAMP: f64 = 1e8;
 /// Median step above which integer times are assumed not to be in s.
 const MIN_NON_SECOND_STEP: f64 = 5.0;
 /// Largest sampling frequency that is assumed when the unit is inferred from the steps, Hz.
@@ -38,7 +38,7 @@ const SERIAL_DAYS: [Range<f64>; 2] = [20_000.0..80_000.0, 700_000.0..800_000.0];
 const SERIAL_STEPS_S: Range<f64> = 1.0 / MAX_HZ..10.0;
 
 /// Column names that denote a time.
-const WORDS: [&str; 11] = [
+const TIME_NAMES: [&str; 11] = [
     "t",
     "time",
     "zeit",
@@ -52,7 +52,7 @@ const WORDS: [&str; 11] = [
     "x value",
 ];
 /// Column names that denote a time stamp; a column with such a name may also hold the time of day or a count.
-const STAMPS: [&str; 14] = [
+const STAMP_NAMES: [&str; 14] = [
     "timestamp",
     "timestamps",
     "time stamp",
@@ -89,12 +89,12 @@ fn column_role(name: &str) -> ColumnRole {
         ([base @ .., _], Some(_)) => base.join(" "),
         (all, _) => all.join(" "),
     };
-    if WORDS.contains(&base.as_str()) {
+    if TIME_NAMES.contains(&base.as_str()) {
         return ColumnRole::Time(unit);
     }
     match (words.last(), unit) {
-        _ if STAMPS.contains(&base.as_str()) && unit.is_some() => ColumnRole::Time(unit),
-        (Some(last), None) if STAMPS.contains(last) || STAMPS.contains(&base.as_str()) => ColumnRole::Stamp,
+        _ if STAMP_NAMES.contains(&base.as_str()) && unit.is_some() => ColumnRole::Time(unit),
+        (Some(last), None) if STAMP_NAMES.contains(last) || STAMP_NAMES.contains(&base.as_str()) => ColumnRole::Stamp,
         _ => ColumnRole::Other,
     }
 }
@@ -131,10 +131,10 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
             .iter()
             .position(|column| column.name == "t")
             .map(|at| (at, None)),
-        None => found(&table),
+        None => find_time_column(&table),
     };
     if let Some((at, unit)) = found {
-        make_time(&mut table, at, unit);
+        convert_to_time(&mut table, at, unit);
     }
     // Clock times in other columns do not count as numbers.
     for column in table.columns.iter_mut().filter(|column| column.moments) {
@@ -171,52 +171,52 @@ fn selected_time_column(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize
         missing: format!("\"{}\"", choice.column),
         meant: did_you_mean(&[&choice.column], &names).into_boxed_str(),
         asked: choice.to_string(),
-        available: list(&names),
+        available: list_names(&names),
         option: ColumnOption::Time,
     })
 }
 
 /// Returns the only column that satisfies the condition; `None` if there are none or several.
-fn only(table: &Table<'_>, is_meant: impl Fn(usize, &Column) -> bool) -> Option<usize> {
+fn only_match(table: &Table<'_>, is_meant: impl Fn(usize, &Column) -> bool) -> Option<usize> {
     let all = table.columns.iter().enumerate();
     let mut meant = all.filter(|(at, column)| is_meant(*at, column)).map(|(at, _)| at);
     meant.next().filter(|_| meant.next().is_none())
 }
 
 /// Finds the time column by its name, type or position; also returns its unit, if known.
-fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
+fn find_time_column(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
     let is_constant = |values: &[f64]| values.iter().all(|value| values.first() == Some(value));
     let unit = |at: usize| match table.columns.get(at).map(|column| column_role(&column.name)) {
         Some(ColumnRole::Time(unit)) => unit,
         _ => None,
     };
     let by_name = || {
-        only(table, |_, column| {
+        only_match(table, |_, column| {
             matches!(column_role(&column.name), ColumnRole::Time(_)) && column.texts.is_empty()
         })
     };
-    let by_type = || only(table, |_, column| column.moments && !is_constant(&column.values));
+    let by_type = || only_match(table, |_, column| column.moments && !is_constant(&column.values));
     let by_stamp = || {
-        only(table, |_, column| {
+        only_match(table, |_, column| {
             let values = &column.values;
-            let is_stamp = || values.iter().all(|value| *value >= STAMP || value.is_nan());
+            let is_stamp = || values.iter().all(|value| *value >= MIN_STAMP || value.is_nan());
             column_role(&column.name) == ColumnRole::Stamp
                 && (is_stamp() || is_serial_days(values) || runs_in_seconds(values))
         })
     };
     let by_unit = || {
-        only(table, |_, column| {
+        only_match(table, |_, column| {
             is_time_unit(&column.unit) && is_increasing(&column.values)
         })
     };
-    let pair = || only(table, |at, _| nanoseconds_of(table, at).is_some());
+    let pair = || only_match(table, |at, _| nanoseconds_of(table, at).is_some());
     by_name()
         .or_else(by_type)
         .or_else(by_stamp)
         .map(|at| (at, unit(at)))
         .or_else(|| pair().map(|at| (at, Some(Unit::SecondsAndNanoseconds))))
         .or_else(|| by_unit().map(|at| (at, None)))
-        .or_else(|| first_line(table).map(|at| (at, None)))
+        .or_else(|| first_time_line(table).map(|at| (at, None)))
 }
 
 /// Finds the column of nanoseconds that belongs to a column of whole seconds.
@@ -232,7 +232,7 @@ fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
     if unit != Some(Unit::Power(0)) || !is_whole(column) {
         return None;
     }
-    only(table, |_, column| {
+    only_match(table, |_, column| {
         split(&column.name) == Some((prefix.clone(), Some(Unit::Power(-9))))
             && column.values.iter().all(|ns| (0.0..1e9).contains(ns))
     })
@@ -240,12 +240,12 @@ fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
 
 /// Returns the first column if it has no name, or the first row or column of a matrix, if its values increase like a
 /// time.
-fn first_line(table: &Table<'_>) -> Option<usize> {
+fn first_time_line(table: &Table<'_>) -> Option<usize> {
     let is_first = |at: usize, column: &Column| {
         let line = ["(1,:)", "(:,1)", "[0,:]", "[:,0]", "[0]"];
         (at == 0 && column.name.is_empty()) || line.iter().any(|line| column.name.ends_with(line))
     };
-    let first = only(table, is_first)?;
+    let first = only_match(table, is_first)?;
     let values = &table.columns.get(first)?.values;
     let counts = steps(values).all(|step| step == 1.0);
     (is_increasing(values) && !counts).then_some(first)
@@ -281,7 +281,7 @@ fn runs_in_seconds(values: &[f64]) -> bool {
 }
 
 /// Infers the unit of times whose unit is not stated.
-fn unit_of(values: &[f64]) -> Unit {
+fn infer_unit(values: &[f64]) -> Unit {
     let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
     match first {
         stamp if stamp >= 1e17 => return Unit::Power(-9),
@@ -305,7 +305,7 @@ fn unit_of(values: &[f64]) -> Unit {
 }
 
 /// Converts a column to the time t.
-fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
+fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     let nanosecond_column = nanoseconds_of(table, at).filter(|_| unit == Some(Unit::SecondsAndNanoseconds));
     let nanosecond_column = nanosecond_column.and_then(|nanosecond_column| table.columns.get(nanosecond_column));
     let nanoseconds = nanosecond_column.map(|column| (column.name.clone(), column.values.clone()));
@@ -320,20 +320,20 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     let unit = match unit {
         _ if time.moments => Unit::Iso,
         Some(unit) => unit,
-        None => Unit::of(&time.unit).unwrap_or_else(|| unit_of(&time.values)),
+        None => Unit::of(&time.unit).unwrap_or_else(|| infer_unit(&time.values)),
     };
     if was_t && unit == Unit::Power(0) {
         return;
     }
     // If the name of the column does not denote a time, its printed digits were not counted.
     if time.precision == Precision::default() && !time.moments {
-        time.precision = Precision::of_times(&time.values, false);
+        time.precision = Precision::from_times(&time.values, false);
     }
     let name = std::mem::replace(&mut time.name, String::from("t"));
     let name = if name.is_empty() {
         String::from("the first column, which has no name,")
     } else {
-        shown(&name)
+        abbreviate(&name)
     };
     let first = time
         .values
@@ -366,7 +366,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             time.precision = Precision::default();
             format!(
                 "{name} and {} are taken as t, in s from their first time stamp",
-                named(&other)
+                format_name(&other)
             )
         }
         Unit::Minutes | Unit::Hours | Unit::Days => {
@@ -390,7 +390,7 @@ fn make_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
         Unit::Power(0) => format!("{name} is taken as t, in s"),
         Unit::Power(power) => {
             let parts = 10_f64.powi(power.saturating_neg());
-            let from_first = first / parts >= STAMP;
+            let from_first = first / parts >= MIN_STAMP;
             scale(time, parts, if from_first { first } else { 0.0 }, true);
             time.precision = time.precision.shifted(power);
             let origin = if from_first { " from its first time stamp" } else { "" };
@@ -447,7 +447,7 @@ mod tests {
 
     #[test]
     fn time_units_are_inferred_from_values() {
-        let unit = |first: f64, step: f64| unit_of(&(0..9).map(|k| first + step * f64::from(k)).collect::<Vec<_>>());
+        let unit = |first: f64, step: f64| infer_unit(&(0..9).map(|k| first + step * f64::from(k)).collect::<Vec<_>>());
         for (first, step, power) in [
             (1.7e9, 1.0, 0),
             (1.7e12, 20.0, -3),
@@ -478,8 +478,8 @@ mod tests {
         }
         assert!(!is_serial_days(&[]) && !is_serial_days(&[f64::NAN]) && !is_serial_days(&[45_321.5]));
         assert!(!is_serial_days(&[45_321.5, 45_321.500_000_1, 12.0]));
-        assert_eq!(unit_of(&[f64::NAN]), Unit::Power(0));
-        assert_eq!(unit_of(&[]), Unit::Power(0));
+        assert_eq!(infer_unit(&[f64::NAN]), Unit::Power(0));
+        assert_eq!(infer_unit(&[]), Unit::Power(0));
     }
 
     #[test]

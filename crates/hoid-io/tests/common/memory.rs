@@ -3,7 +3,7 @@
 use std::fs;
 
 /// Resets the peak memory before a measurement, on systems that support this.
-pub fn forget_peak() {
+pub fn reset_peak() {
     let _ = fs::write("/proc/self/clear_refs", "5");
 }
 

@@ -7,11 +7,11 @@ use std::{fs, path::PathBuf};
 use hoid_io::{IoError, ReadOptions, ReadRecord, read_record};
 
 /// A temporary folder, removed after the test.
-pub struct Desk {
+pub struct TestFolder {
     pub dir: tempfile::TempDir,
 }
 
-impl Desk {
+impl TestFolder {
     pub fn new() -> Self {
         Self {
             dir: tempfile::tempdir().unwrap(),
@@ -46,6 +46,6 @@ pub fn options(input: &str, output: &str) -> ReadOptions {
     }
 }
 
-pub fn defaults() -> ReadOptions {
+pub fn default_options() -> ReadOptions {
     ReadOptions::default()
 }

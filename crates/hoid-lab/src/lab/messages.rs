@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Mode, Outgoing, Page, Shared};
+use super::{Mode, OutgoingMessage, Page, SharedState};
 use crate::{
     calibrate::Calibration,
     config::LiveFor,
@@ -12,7 +12,7 @@ use crate::{
     wire::{Role, State, ToPage},
 };
 
-impl Shared {
+impl SharedState {
     /// Sends a message to the pages selected by `wants`.
     pub(super) fn send_to_pages(&self, message: &ToPage<'_>, wants: impl Fn(u64, &Page) -> bool) {
         // Every message can be serialised as JSON.
@@ -22,7 +22,7 @@ impl Shared {
         for (id, page) in &*self.pages() {
             if wants(*id, page) {
                 // A page that has been closed is removed by its socket thread.
-                let _ = page.sender.send(Outgoing::Text(text.clone()));
+                let _ = page.sender.send(OutgoingMessage::Text(text.clone()));
             }
         }
     }
@@ -46,7 +46,7 @@ impl Shared {
         folders
             .iter()
             .filter(|folder| unfinished(folder))
-            .map(|folder| name_of(folder))
+            .map(|folder| session_name(folder))
             .collect()
     }
 
@@ -54,8 +54,8 @@ impl Shared {
         let state = self.state();
         let session = state.session.as_ref();
         let facts = session.map(|session| &session.facts);
-        let next = session.and_then(Session::next);
-        let run = |place: usize| facts.and_then(|facts| facts.run(place));
+        let next = session.and_then(Session::next_run);
+        let run = |place: usize| facts.and_then(|facts| facts.planned_run(place));
         let done = match (&self.mode, session) {
             (Mode::Replay(_), Some(session)) => reverified_runs(session),
             (_, Some(session)) => session.done.clone(),
@@ -65,14 +65,14 @@ impl Shared {
             phase: match (&self.mode, session) {
                 (Mode::Replay(_), _) => "replay",
                 (_, None) => "consent",
-                (_, Some(session)) if session.next().is_some() => "runs",
+                (_, Some(session)) if session.next_run().is_some() => "runs",
                 _ => "finished",
             },
             name: self.config.name.clone(),
             consent: self.config.consent.clone(),
             live: self.config.live,
             calibrate: self.mode == Mode::Calibrate,
-            session: session.map(|session| name_of(&session.folder)),
+            session: session.map(|session| session_name(&session.folder)),
             open: if session.is_none() {
                 self.open_sessions()
             } else {
@@ -100,7 +100,7 @@ fn reverified_runs(session: &Session) -> Vec<FinishedRun> {
     let again = |done: &FinishedRun| {
         let checked = check(&session.stem(&done.condition, done.number));
         let (verdict, reasons) = match &checked {
-            Ok(checked) => (checked.word(), checked.reasons()),
+            Ok(checked) => (checked.label(), checked.reasons()),
             Err(error) => ("unverified", error.to_string()),
         };
         FinishedRun {
@@ -113,7 +113,7 @@ fn reverified_runs(session: &Session) -> Vec<FinishedRun> {
 }
 
 /// Returns the name of a session, such as `sub-P01/ses-01`.
-fn name_of(folder: &Path) -> String {
+fn session_name(folder: &Path) -> String {
     let last = |path: &Path| {
         path.file_name()
             .map(|name| name.to_string_lossy().into_owned())

@@ -4,33 +4,33 @@ use std::{collections::BTreeMap, sync::Arc, thread};
 
 use hoid_track::Sample;
 
-use super::{Current, Mode, Outgoing, Ready, Running, Shared};
+use super::{ActiveRun, LabState, Mode, OutgoingMessage, PreparedRun, SharedState};
 use crate::{
     LabError, calibrate, experiment,
     live::{LiveRun, Samples, start},
     record::record,
     reports,
-    session::{Batch, Logged, RunEnd, RunLog, RunStart, Session},
+    session::{Batch, LoggedRun, RunEnd, RunLog, RunStart, Session},
     task::{TICKS_PER_SAMPLE, Task},
     utc,
     verify::Measures,
     wire::{FromPage, ToPage},
 };
 
-impl Shared {
-    pub(super) fn send_run(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
+impl SharedState {
+    pub(super) fn send_run(&self, state: &mut LabState, id: u64) -> Result<(), LabError> {
         if state.run.is_some() {
             return Err(LabError::Order("a run is already in progress".to_owned()));
         }
-        let session = session_of(state)?;
+        let session = current_session(state)?;
         let next = session
-            .next()
-            .and_then(|place| Some((place, session.facts.run(place)?)));
+            .next_run()
+            .and_then(|place| Some((place, session.facts.planned_run(place)?)));
         let Some((planned, (plan, condition))) = next else {
             return Err(LabError::Order("all runs of the session are done".to_owned()));
         };
         let condition = condition.clone();
-        let number = session.new_number()?;
+        let number = session.next_run_number()?;
         let training = plan.training;
         let task = Task::new(&condition, plan.condition as u64, number as u64)?;
         let simulated = (self.mode == Mode::Calibrate)
@@ -51,13 +51,13 @@ impl Shared {
         let numbers = task.target.iter().chain(&task.disturbance).chain(noise);
         let bytes: Vec<u8> = numbers.flat_map(|v| v.to_le_bytes()).collect();
         if let Some(page) = self.pages().get(&id) {
-            let _ = page.sender.send(Outgoing::Binary(bytes));
+            let _ = page.sender.send(OutgoingMessage::Binary(bytes));
         }
-        state.ready = Some(Ready { planned, number, task });
+        state.ready = Some(PreparedRun { planned, number, task });
         Ok(())
     }
 
-    pub(super) fn begin(self: &Arc<Self>, state: &mut Current, message: FromPage) -> Result<(), LabError> {
+    pub(super) fn start_run(self: &Arc<Self>, state: &mut LabState, message: FromPage) -> Result<(), LabError> {
         let FromPage::Begin {
             number,
             input,
@@ -83,13 +83,13 @@ impl Shared {
             .ready
             .take()
             .filter(|ready| ready.number == number && state.run.is_none());
-        let Some(Ready { planned, task, .. }) = ready else {
+        let Some(PreparedRun { planned, task, .. }) = ready else {
             return Err(LabError::Order(format!("run {number} was not requested")));
         };
         // Until the log exists, batches of this run are ignored.
         state.last_ended_run = Some(number);
-        let session = session_of(state)?;
-        let Some((plan, condition)) = session.facts.run(planned) else {
+        let session = current_session(state)?;
+        let Some((plan, condition)) = session.facts.planned_run(planned) else {
             return Err(LabError::Order(format!("the session has no run {planned}")));
         };
         let condition = condition.clone();
@@ -115,14 +115,14 @@ impl Shared {
         };
         run_start.write(&stem, &task).map_err(unverified_run_error)?;
         let log = RunLog::create(&stem, task.ticks).map_err(unverified_run_error)?;
-        let live = LiveRun::new(&session.facts.config.method, run_start.condition.course()?)?;
+        let live = LiveRun::new(&session.facts.config.method, run_start.condition.task_definition()?)?;
         let teller = Arc::downgrade(self);
         let live = start(live, &stem, move |line| {
             if let Some(shared) = teller.upgrade() {
                 shared.send_live(number, line);
             }
         });
-        state.run = Some(Running {
+        state.run = Some(ActiveRun {
             log,
             run_start,
             stem,
@@ -132,13 +132,13 @@ impl Shared {
         Ok(())
     }
 
-    pub(super) fn take(&self, state: &mut Current, number: usize, batch: &Batch) -> Result<(), LabError> {
+    pub(super) fn append_batch(&self, state: &mut LabState, number: usize, batch: &Batch) -> Result<(), LabError> {
         if state.run.is_none() && state.last_ended_run == Some(number) {
             return Ok(());
         }
-        state.running(number)?;
+        state.active_run(number)?;
         let Some(run) = &mut state.run else { return Ok(()) };
-        run.log.continued_by(batch)?;
+        run.log.check_batch(batch)?;
         // The samples are passed to the estimate before the data are written, since the estimate is displayed live and
         // writing may take time.
         let samples = (batch.first..)
@@ -164,15 +164,15 @@ impl Shared {
     }
 
     /// Ends a run of which all ticks have been received.
-    pub(super) fn finish(
+    pub(super) fn finish_run(
         self: &Arc<Self>,
-        state: &mut Current,
+        state: &mut LabState,
         number: usize,
         counted: BTreeMap<String, f64>,
     ) -> Result<(), LabError> {
-        let run = state.running(number)?;
-        if run.log.ticks() != run.run_start.ticks {
-            let (ticks, all) = (run.log.ticks(), run.run_start.ticks);
+        let run = state.active_run(number)?;
+        if run.log.tick_count() != run.run_start.ticks {
+            let (ticks, all) = (run.log.tick_count(), run.run_start.ticks);
             return Err(LabError::Order(format!(
                 "the run has only {ticks} of {all} ticks and cannot be finished"
             )));
@@ -183,8 +183,12 @@ impl Shared {
             ));
         }
         self.end_run(state, RunEnd::Finished, counted)?;
-        if state.session.as_ref().is_some_and(|session| session.next().is_none()) {
-            self.report(state);
+        if state
+            .session
+            .as_ref()
+            .is_some_and(|session| session.next_run().is_none())
+        {
+            self.create_reports(state);
         }
         Ok(())
     }
@@ -192,28 +196,28 @@ impl Shared {
     /// Ends the current run, if there is one.
     pub(super) fn end_run(
         &self,
-        state: &mut Current,
+        state: &mut LabState,
         how: RunEnd,
         counted: BTreeMap<String, f64>,
     ) -> Result<(), LabError> {
         let Some(run) = state.run.take() else { return Ok(()) };
         state.last_ended_run = Some(run.run_start.number);
-        let measures = self.close(state, run, how, counted).map_err(unverified_run_error)?;
+        let measures = self.close_run(state, run, how, counted).map_err(unverified_run_error)?;
         let done = state.session.as_ref().and_then(|session| session.done.last());
         if let (Some(done), Some(measures)) = (done, &measures) {
             self.send_to_pages(&ToPage::Verdict { done, measures }, |_, page| page.role.is_some());
         }
         if self.mode == Mode::Sessions {
-            experiment::manifest(&self.out)?;
+            experiment::write_manifest(&self.out)?;
         }
         Ok(())
     }
 
     /// Closes a run. Its record is written before its verdict, so that every run reported as verified has a record.
-    fn close(
+    fn close_run(
         &self,
-        state: &mut Current,
-        mut run: Running,
+        state: &mut LabState,
+        mut run: ActiveRun,
         how: RunEnd,
         counted: BTreeMap<String, f64>,
     ) -> Result<Option<Measures>, LabError> {
@@ -223,22 +227,22 @@ impl Shared {
         let Some(session) = &mut state.session else {
             return Ok(None);
         };
-        let logged = Logged::read(&run.stem)?;
+        let logged = LoggedRun::read(&run.stem)?;
         let record = (logged.signals.e.len() > 2 * TICKS_PER_SAMPLE)
             .then(|| record(&run.run_start, &run.task, &logged))
             .transpose()?;
         if let Some(record) = &record {
             hoid_io::write_record(&run.stem.file("beh.parquet"), record)?;
         }
-        let checked = session.end(&run.stem, how, counted)?;
+        let checked = session.end_run(&run.stem, how, counted)?;
         if let (Mode::Calibrate, RunEnd::Finished, Some(record)) = (&self.mode, how, &record) {
-            state.calibration = Some(calibrate::judge(&self.out, record, &logged)?);
+            state.calibration = Some(calibrate::evaluate(&self.out, record, &logged)?);
         }
         Ok(Some(checked.measures))
     }
 
     /// Creates the pages about the session on a separate thread.
-    pub(super) fn report(self: &Arc<Self>, state: &mut Current) {
+    pub(super) fn create_reports(self: &Arc<Self>, state: &mut LabState) {
         let (Some(program), Some(session)) = (&self.program, &state.session) else {
             return;
         };
@@ -249,7 +253,7 @@ impl Shared {
         let (program, out, folder) = (program.clone(), self.out.clone(), session.folder.clone());
         let shared = Arc::clone(self);
         thread::spawn(move || {
-            let pages = reports::make(&program, &out, &folder, &|pages| {
+            let pages = reports::make_pages(&program, &out, &folder, &|pages| {
                 shared.state().pages = pages.clone();
                 shared.send_state();
             });
@@ -275,7 +279,7 @@ fn unverified_run_error(error: LabError) -> LabError {
     ))
 }
 
-fn session_of(state: &Current) -> Result<&Session, LabError> {
+fn current_session(state: &LabState) -> Result<&Session, LabError> {
     state
         .session
         .as_ref()

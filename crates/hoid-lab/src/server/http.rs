@@ -28,13 +28,13 @@ impl Request {
     pub fn of(head: &[u8]) -> Option<Result<Self, Reply>> {
         if !head.windows(4).any(|four| four == b"\r\n\r\n") {
             let long = head.len() > MAX_HEAD_BYTES;
-            return long.then(|| Err(Reply::refused(431, "the header of the request is too long")));
+            return long.then(|| Err(Reply::refusal(431, "the header of the request is too long")));
         }
-        Some(Self::parse(head).ok_or_else(|| Reply::refused(400, "not an HTTP request")))
+        Some(Self::parse(head).ok_or_else(|| Reply::refusal(400, "not an HTTP request")))
     }
 
     /// Returns the token, and the path after it.
-    pub fn token(&self) -> (&str, &str) {
+    pub fn token_and_path(&self) -> (&str, &str) {
         let path = self.path.trim_start_matches('/');
         path.split_once('/').unwrap_or((&self.path, ""))
     }
@@ -101,7 +101,7 @@ impl Reply {
     }
 
     /// Creates a refusal as text.
-    pub fn refused(status: u16, words: &str) -> Self {
+    pub fn refusal(status: u16, words: &str) -> Self {
         Self {
             status,
             kind: "text/plain; charset=utf-8",
@@ -112,10 +112,10 @@ impl Reply {
     }
 
     /// Creates a redirection to another address.
-    pub fn moved(address: &str) -> Self {
+    pub fn redirect(address: &str) -> Self {
         Self {
             location: Some(address.to_owned()),
-            ..Self::refused(303, "see there")
+            ..Self::refusal(303, "see there")
         }
     }
 

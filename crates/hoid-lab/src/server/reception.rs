@@ -2,7 +2,7 @@
 //!
 //! While no client is connected, the thread waits for the next connection. Otherwise it accepts connections, examines
 //! each client once (complete head, head too long or too late, connection closed by the client), and pauses for
-//! [`PAUSE`] if nothing has happened. New connections are examined before any connection is closed. The page, whose
+//! [`IDLE_PAUSE`] if nothing has happened. New connections are examined before any connection is closed. The page, whose
 //! head arrives at once, is therefore served regardless of the number of other clients. If there are more than
 //! [`MAX_PENDING`] incomplete connections, the oldest ones are closed.
 
@@ -22,8 +22,8 @@ const MAX_ACCEPTED_PER_ROUND: usize = 64;
 /// Time within which a complete head must arrive.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
 /// Pause if nothing has happened, and pause if the operating system provides no connection.
-const PAUSE: Duration = Duration::from_millis(1);
-const BACK_OFF: Duration = Duration::from_millis(50);
+const IDLE_PAUSE: Duration = Duration::from_millis(1);
+const RETRY_PAUSE: Duration = Duration::from_millis(50);
 
 /// A connection with an incomplete head.
 struct PendingConnection {
@@ -55,7 +55,7 @@ impl PendingConnection {
             }
         }
         if self.accepted_at.elapsed() > HEAD_TIMEOUT {
-            return ReadState::Complete(Err(Reply::refused(408, "the request did not arrive in time")));
+            return ReadState::Complete(Err(Reply::refusal(408, "the request did not arrive in time")));
         }
         ReadState::Incomplete
     }
@@ -63,15 +63,18 @@ impl PendingConnection {
 
 /// Accepts connections while the program runs. `admitted` takes over a request with its connection, or returns the
 /// refusal.
-pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStream) -> Result<(), (Reply, TcpStream)>) {
+pub fn accept_requests(
+    listener: &TcpListener,
+    mut admitted: impl FnMut(Request, TcpStream) -> Result<(), (Reply, TcpStream)>,
+) {
     let mut all: VecDeque<PendingConnection> = VecDeque::new();
     loop {
-        let mut idle = match take(listener, &mut all) {
+        let mut idle = match accept_pending(listener, &mut all) {
             Ok(accepted) => accepted == 0,
             // If no file descriptor is left, the oldest incomplete connection is closed.
             Err(_) => {
                 drop(all.pop_front());
-                thread::sleep(BACK_OFF);
+                thread::sleep(RETRY_PAUSE);
                 false
             }
         };
@@ -101,13 +104,13 @@ pub fn receive(listener: &TcpListener, mut admitted: impl FnMut(Request, TcpStre
             drop(all.pop_front());
         }
         if idle {
-            thread::sleep(PAUSE);
+            thread::sleep(IDLE_PAUSE);
         }
     }
 }
 
 /// Accepts pending connections; waits for one if no client is connected.
-fn take(listener: &TcpListener, all: &mut VecDeque<PendingConnection>) -> io::Result<usize> {
+fn accept_pending(listener: &TcpListener, all: &mut VecDeque<PendingConnection>) -> io::Result<usize> {
     let first = all.is_empty();
     listener.set_nonblocking(!first)?;
     for accepted in 0..MAX_ACCEPTED_PER_ROUND {

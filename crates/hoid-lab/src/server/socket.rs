@@ -16,11 +16,11 @@ use tungstenite::{
 
 use crate::{
     LabError,
-    lab::{Lab, Outgoing},
+    lab::{Lab, OutgoingMessage},
     wire::{FromPage, MAX_MESSAGE_BYTES, ToPage},
 };
 
-const WAIT: Duration = Duration::from_millis(10);
+const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
 pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
     let accept = derive_accept_key(key.as_bytes());
@@ -29,7 +29,7 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
     );
     if stream
         .write_all(head.as_bytes())
-        .and(stream.set_read_timeout(Some(WAIT)))
+        .and(stream.set_read_timeout(Some(POLL_INTERVAL)))
         .is_err()
     {
         return;
@@ -44,8 +44,8 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
         let mut sent = Ok(());
         while let (Ok(outgoing), true) = (receiver.try_recv(), sent.is_ok()) {
             sent = socket.send(match outgoing {
-                Outgoing::Text(text) => Message::text(text),
-                Outgoing::Binary(bytes) => Message::binary(bytes),
+                OutgoingMessage::Text(text) => Message::text(text),
+                OutgoingMessage::Binary(bytes) => Message::binary(bytes),
             });
         }
         if sent.is_err() {
@@ -78,7 +78,7 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
 }
 
 fn process_message(lab: &Lab, id: u64, text: &str) -> Result<(), LabError> {
-    let message: FromPage =
-        serde_json::from_str(text).map_err(|error| LabError::Message(hoid_io::printable(&error.to_string())))?;
+    let message: FromPage = serde_json::from_str(text)
+        .map_err(|error| LabError::Message(hoid_io::escape_control_characters(&error.to_string())))?;
     lab.receive(id, message)
 }

@@ -20,7 +20,7 @@ pub(super) fn check_subject(subject: &str) -> Result<(), LabError> {
     }
     Err(LabError::Order(format!(
         "the pseudonym is {:?}, expected 1 to 20 letters and digits, such as P01",
-        hoid_io::printable(subject)
+        hoid_io::escape_control_characters(subject)
     )))
 }
 
@@ -51,7 +51,7 @@ impl Stem {
     }
 
     /// Returns the folder of the pages of the run.
-    pub fn reports(&self) -> PathBuf {
+    pub fn report_folder(&self) -> PathBuf {
         self.folder.join("reports").join(&self.stem)
     }
 
@@ -59,7 +59,7 @@ impl Stem {
     ///
     /// # Errors
     /// [`LabError::Io`].
-    pub fn all(folder: &Path) -> Result<Vec<(usize, Self)>, LabError> {
+    pub fn find_all(folder: &Path) -> Result<Vec<(usize, Self)>, LabError> {
         let mut found: Vec<(usize, Self)> = hoid_io::file_names(folder)?
             .iter()
             .filter_map(|name| {

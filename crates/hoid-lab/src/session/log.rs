@@ -136,7 +136,7 @@ impl RunLog {
     ///
     /// # Errors
     /// [`LabError::Message`] for a batch that does not continue the previous one or extends beyond the end of the run.
-    pub fn continued_by(&self, batch: &Batch) -> Result<usize, LabError> {
+    pub fn check_batch(&self, batch: &Batch) -> Result<usize, LabError> {
         let end = batch.first.saturating_add(batch.u.len());
         if batch.first != self.logged || batch.u.len() != batch.e.len() || end > self.planned {
             return Err(LabError::Message(format!(
@@ -153,10 +153,10 @@ impl RunLog {
     /// Appends a batch completely or not at all.
     ///
     /// # Errors
-    /// The errors of [`RunLog::continued_by`]; [`LabError::File`], after which the files contain only the previous
+    /// The errors of [`RunLog::check_batch`]; [`LabError::File`], after which the files contain only the previous
     /// batches.
     pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
-        let end = self.continued_by(batch)?;
+        let end = self.check_batch(batch)?;
         let mut texts = [String::new(), String::new(), String::new()];
         for (tick, (u, e)) in (batch.first..).zip(batch.u.iter().zip(&batch.e)) {
             texts[0].push_str(&format!("{tick},{u:?},{e:?}\n"));
@@ -193,7 +193,7 @@ impl RunLog {
     }
 
     /// Returns the number of logged ticks.
-    pub fn ticks(&self) -> usize {
+    pub fn tick_count(&self) -> usize {
         self.logged
     }
 
@@ -216,7 +216,7 @@ fn append(path: &Path, file: &mut File, text: &str) -> Result<(), LabError> {
 }
 
 /// Returns the bytes up to the end of the last complete line.
-pub(super) fn whole_lines(bytes: &[u8]) -> &[u8] {
+pub(super) fn complete_lines(bytes: &[u8]) -> &[u8] {
     let end = bytes.iter().rposition(|byte| *byte == b'\n');
     end.and_then(|end| bytes.get(..=end)).unwrap_or_default()
 }
@@ -246,12 +246,12 @@ mod tests {
             OpenOptions::new().write(true).open("/dev/full").unwrap(),
         );
         assert!(log.append(&batch(10)).unwrap_err().to_string().contains("frames.csv"));
-        assert_eq!(log.ticks(), 10);
+        assert_eq!(log.tick_count(), 10);
         assert_eq!(std::fs::read(stem.file("ticks.csv")).unwrap(), before);
         // Once there is space, the log continues at the same position.
         log.files[2].1 = frames;
         log.append(&batch(10)).unwrap();
-        assert_eq!(log.ticks(), 20);
+        assert_eq!(log.tick_count(), 20);
         let text = std::fs::read_to_string(stem.file("ticks.csv")).unwrap();
         assert_eq!(text.lines().count(), 21);
     }

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use super::{
     folder::Stem,
-    log::{Event, Frame, whole_lines},
+    log::{Event, Frame, complete_lines},
 };
 use crate::{LabError, task::Signals};
 
 /// The log of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Logged {
+pub struct LoggedRun {
     /// Number of each tick as logged.
     pub numbers: Vec<f64>,
     /// u and e of each tick.
@@ -23,7 +23,7 @@ pub struct Logged {
     pub faults: Vec<String>,
 }
 
-impl Logged {
+impl LoggedRun {
     /// Reads each file of the log up to its last complete line, or up to its first invalid line. A missing file counts
     /// as empty and is reported in `faults`.
     ///
@@ -32,15 +32,18 @@ impl Logged {
     pub fn read(stem: &Stem) -> Result<Self, LabError> {
         let mut logged = Self::default();
         let mut faults = Vec::new();
-        faults.extend(rows(&stem.file("ticks.csv"), |[tick, u, e]| {
+        faults.extend(for_each_row(&stem.file("ticks.csv"), |[tick, u, e]| {
             logged.numbers.push(tick);
             logged.signals.u.push(u);
             logged.signals.e.push(e);
         })?);
-        faults.extend(rows(&stem.file("events.csv"), |[tick, stamp, handled, raw]| {
-            logged.events.push(Event::from((tick, stamp, handled, raw)));
-        })?);
-        faults.extend(rows(&stem.file("frames.csv"), |[frame, drawn, tick, e]| {
+        faults.extend(for_each_row(
+            &stem.file("events.csv"),
+            |[tick, stamp, handled, raw]| {
+                logged.events.push(Event::from((tick, stamp, handled, raw)));
+            },
+        )?);
+        faults.extend(for_each_row(&stem.file("frames.csv"), |[frame, drawn, tick, e]| {
             logged.frames.push(Frame::from((frame, drawn, tick, e)));
         })?);
         logged.faults = faults;
@@ -50,7 +53,7 @@ impl Logged {
 
 /// Calls `each` with the numbers in every complete line after the header, up to the first invalid line; returns a
 /// description of the problem if there is one.
-fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
+fn for_each_row<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
     let name = || {
         path.file_name()
             .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
@@ -59,7 +62,7 @@ fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<O
         return Ok(Some(format!("{} is missing", name())));
     }
     let bytes = hoid_io::read_bytes(path)?;
-    let whole = whole_lines(&bytes);
+    let whole = complete_lines(&bytes);
     let text = String::from_utf8_lossy(whole);
     for (number, line) in (1_usize..).zip(text.lines()).skip(1) {
         let mut values = [0.0; N];
@@ -72,7 +75,7 @@ fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<O
             _ => false,
         });
         if !read || cells.next().is_some() {
-            let found = hoid_io::printable(line);
+            let found = hoid_io::escape_control_characters(line);
             let words = format!("line {number} of {} is {found:?}, expected {N} numbers", name());
             return Ok(Some(words));
         }

@@ -24,7 +24,7 @@
 //! | `folder` | the names of files and folders |
 //! | `run_start` | [`RunStart`]: data known before a run; [`Ended`]: data known after it |
 //! | `log` | [`RunLog`]: the appended data |
-//! | `logged` | [`Logged`]: the appended data, read back |
+//! | `logged` | [`LoggedRun`]: the appended data, read back |
 //! | `state` | [`Session`]: the session as a whole |
 
 mod folder;
@@ -35,6 +35,6 @@ mod state;
 
 pub use folder::{Stem, session_folder};
 pub use log::{Batch, Event, Frame, RunLog};
-pub use logged::Logged;
+pub use logged::LoggedRun;
 pub use run_start::{Ended, RunEnd, RunStart, digest};
 pub use state::{FinishedRun, Session, SessionPlan};

@@ -124,20 +124,23 @@ impl RunStart {
         let table = hoid_io::read_table(&path)?;
         let column = |name: &str| match table.column(name) {
             Some(ColumnValues::Real(values)) => Ok(values.clone()),
-            _ => Err(LabError::damaged(&path, format!("there is no numeric column {name}"))),
+            _ => Err(LabError::damaged_file(
+                &path,
+                format!("there is no numeric column {name}"),
+            )),
         };
         let (target, mut disturbance) = (column("target")?, column("disturbance")?);
         disturbance.truncate(self.ticks);
         if target.len() < self.ticks || disturbance.len() < self.ticks {
             let reason = format!("{} rows, expected {} ticks", target.len(), self.ticks);
-            return Err(LabError::damaged(&path, reason));
+            return Err(LabError::damaged_file(&path, reason));
         }
         let order = self.phases.first().map(|phase| phase.plant.order());
         let fits = |phase: &Phase| phase.plant.is_valid() && Some(phase.plant.order()) == order;
         if order.is_none() || !self.phases.iter().all(fits) {
             let reason = "the matrices of its controlled element have inconsistent sizes; the file was changed after \
                           hoid lab wrote it";
-            return Err(LabError::damaged(&stem.file("run.json"), reason));
+            return Err(LabError::damaged_file(&stem.file("run.json"), reason));
         }
         Ok(Task {
             run_in: self.run_in,
@@ -191,12 +194,12 @@ pub fn digest(bytes: &[u8]) -> String {
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), LabError> {
-    let text = serde_json::to_string_pretty(value).map_err(|error| LabError::damaged(path, error.to_string()))?;
+    let text = serde_json::to_string_pretty(value).map_err(|error| LabError::damaged_file(path, error.to_string()))?;
     hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?;
     Ok(())
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, LabError> {
     serde_json::from_str(&hoid_io::read_settings(path)?)
-        .map_err(|error| LabError::damaged(path, format!("{error}; the file was changed after hoid lab wrote it")))
+        .map_err(|error| LabError::damaged_file(path, format!("{error}; the file was changed after hoid lab wrote it")))
 }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     folder::{Stem, check_subject, session_folder},
-    log::{RunLog, whole_lines},
+    log::{RunLog, complete_lines},
     run_start::{APPENDED_FILES, Ended, RunEnd, RunStart},
 };
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
     config::{Condition, Config},
     order::{Planned, plan},
     utc,
-    verify::{Checked, check},
+    verify::{Verification, check},
 };
 
 /// Name of the file with the plan, and name of its backup copy.
@@ -67,7 +67,7 @@ impl SessionPlan {
     fn read(path: &Path) -> Result<Self, LabError> {
         let text = hoid_io::read_settings(path)?;
         let facts: Self = toml::from_str(&text).map_err(|error| {
-            LabError::damaged(path, format!("{}; expected the lab.toml of a session", error.message()))
+            LabError::damaged_file(path, format!("{}; expected the lab.toml of a session", error.message()))
         })?;
         let conditions = facts.config.condition.len();
         if let Some(wrong) = facts.plan.iter().find(|run| run.condition >= conditions) {
@@ -76,13 +76,13 @@ impl SessionPlan {
                  wrote it",
                 wrong.condition
             );
-            return Err(LabError::damaged(path, reason));
+            return Err(LabError::damaged_file(path, reason));
         }
         Ok(facts)
     }
 
     /// Returns a planned run, by its index in the plan, with its condition.
-    pub fn run(&self, place: usize) -> Option<(&Planned, &Condition)> {
+    pub fn planned_run(&self, place: usize) -> Option<(&Planned, &Condition)> {
         let planned = self.plan.get(place)?;
         Some((planned, self.config.condition.get(planned.condition)?))
     }
@@ -131,10 +131,10 @@ impl Session {
     ///
     /// # Errors
     /// [`LabError::Order`] for an invalid pseudonym; errors of reading or writing files.
-    pub fn begin(out: &Path, config: &Config, subject: &str, cc0: bool) -> Result<Self, LabError> {
+    pub fn create(out: &Path, config: &Config, subject: &str, cc0: bool) -> Result<Self, LabError> {
         check_subject(subject)?;
         hoid_io::make_directory(out)?;
-        let row = row_of(out, subject)?;
+        let row = latin_square_row(out, subject)?;
         let free = (1..).find(|session| !session_folder(out, subject, *session).exists());
         let session = free.unwrap_or(1);
         let folder = session_folder(out, subject, session);
@@ -168,16 +168,16 @@ impl Session {
     /// [`LabError::Damaged`] for a folder without a session; errors of writing files.
     pub fn open(folder: &Path) -> Result<Self, LabError> {
         let mut session = Self::read(folder)?;
-        for (number, stem) in Stem::all(folder)? {
+        for (number, stem) in Stem::find_all(folder)? {
             if session.done.iter().any(|done| done.number == number) {
                 continue;
             }
             if RunStart::read(&stem).is_err() {
                 session.mark_run_as_lost(number, &stem)?;
             } else if Ended::read(&stem).is_ok_and(|ended| ended.is_some()) {
-                session.note(&stem, &check(&stem)?)?;
+                session.record_run(&stem, &check(&stem)?)?;
             } else {
-                session.end(&stem, RunEnd::Interrupted, BTreeMap::new())?;
+                session.end_run(&stem, RunEnd::Interrupted, BTreeMap::new())?;
             }
         }
         Ok(session)
@@ -207,14 +207,15 @@ impl Session {
     pub fn save(&self) -> Result<(), LabError> {
         for name in [PLAN_FILE, PLAN_COPY_FILE] {
             let path = self.folder.join(name);
-            let text = toml::to_string(&self.facts).map_err(|error| LabError::damaged(&path, error.to_string()))?;
+            let text =
+                toml::to_string(&self.facts).map_err(|error| LabError::damaged_file(&path, error.to_string()))?;
             hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
         }
         Ok(())
     }
 
     /// Returns the index of the next run in the plan; `None` if all runs are done.
-    pub fn next(&self) -> Option<usize> {
+    pub fn next_run(&self) -> Option<usize> {
         let finished = |place: &usize| {
             self.done
                 .iter()
@@ -227,8 +228,8 @@ impl Session {
     ///
     /// # Errors
     /// [`LabError::Io`].
-    pub fn new_number(&self) -> Result<usize, LabError> {
-        let last = Stem::all(&self.folder)?.last().map_or(0, |(number, _)| *number);
+    pub fn next_run_number(&self) -> Result<usize, LabError> {
+        let last = Stem::find_all(&self.folder)?.last().map_or(0, |(number, _)| *number);
         Ok(last.saturating_add(1))
     }
 
@@ -241,7 +242,12 @@ impl Session {
     ///
     /// # Errors
     /// Errors of reading or writing files.
-    pub fn end(&mut self, stem: &Stem, how: RunEnd, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
+    pub fn end_run(
+        &mut self,
+        stem: &Stem,
+        how: RunEnd,
+        counted: BTreeMap<String, f64>,
+    ) -> Result<Verification, LabError> {
         if !APPENDED_FILES.iter().any(|end| stem.file(end).exists()) {
             // The run ended before its first tick: empty files are created.
             drop(RunLog::create(stem, 0)?);
@@ -254,8 +260,8 @@ impl Session {
         }
         .write(stem)?;
         let checked = check(stem)?;
-        self.note(stem, &checked)?;
-        if self.next().is_none() {
+        self.record_run(stem, &checked)?;
+        if self.next_run().is_none() {
             self.facts.finished = true;
             self.save()?;
         }
@@ -263,7 +269,7 @@ impl Session {
     }
 
     /// Appends a run that has ended to `runs.csv`.
-    fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
+    fn record_run(&mut self, stem: &Stem, checked: &Verification) -> Result<(), LabError> {
         let run_start = RunStart::read(stem)?;
         let done = FinishedRun {
             number: run_start.number,
@@ -272,7 +278,7 @@ impl Session {
             training: run_start.training,
             how: Ended::read(stem)?.map_or(RunEnd::Interrupted, |ended| ended.how),
             utc: utc::now(),
-            verdict: checked.word().to_owned(),
+            verdict: checked.label().to_owned(),
             reasons: checked.reasons(),
             notes: checked.verdict.notes().collect::<Vec<_>>().join("; "),
             rms_e: checked.measures.rms_e,
@@ -307,14 +313,14 @@ impl Session {
     fn append_to_log(&mut self, done: FinishedRun) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
-            whole_lines(&hoid_io::read_bytes(&path)?).len()
+            complete_lines(&hoid_io::read_bytes(&path)?).len()
         } else {
             0
         };
         let mut writer = csv::WriterBuilder::new()
             .has_headers(whole == 0)
             .from_writer(Vec::new());
-        let unwritable = |error: String| LabError::damaged(&path, error);
+        let unwritable = |error: String| LabError::damaged_file(&path, error);
         writer.serialize(&done).map_err(|error| unwritable(error.to_string()))?;
         let line = writer.into_inner().map_err(|error| unwritable(error.to_string()))?;
         let opened = OpenOptions::new().append(true).create(true).open(&path);
@@ -337,9 +343,9 @@ impl Session {
     /// [`LabError::Io`].
     pub fn folders(out: &Path) -> Result<Vec<PathBuf>, LabError> {
         let mut found = Vec::new();
-        for person in directories(out, "sub-")? {
+        for person in subdirectories(out, "sub-")? {
             found.extend(
-                directories(&person, "ses-")?
+                subdirectories(&person, "ses-")?
                     .into_iter()
                     .filter(|folder| is_session(folder)),
             );
@@ -349,7 +355,7 @@ impl Session {
 }
 
 /// Returns the subdirectories whose names start with `prefix`, sorted.
-fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
+fn subdirectories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
     if !of.exists() {
         return Ok(Vec::new());
     }
@@ -365,13 +371,13 @@ fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
 
 /// Returns the row of the Latin square for a person: the row in their first session, or else the number of people
 /// before them.
-fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
+fn latin_square_row(out: &Path, subject: &str) -> Result<usize, LabError> {
     let mut others = 0_usize;
-    for person in directories(out, "sub-")? {
+    for person in subdirectories(out, "sub-")? {
         let own = person
             .file_name()
             .is_some_and(|name| name.to_string_lossy() == format!("sub-{subject}"));
-        let first = directories(&person, "ses-")?
+        let first = subdirectories(&person, "ses-")?
             .into_iter()
             .find(|folder| is_session(folder));
         match first {
@@ -389,6 +395,6 @@ fn read_runs(path: &Path) -> Result<Vec<FinishedRun>, LabError> {
     }
     // A truncated or invalid line is skipped; its run is evaluated again when the session is opened.
     let bytes = hoid_io::read_bytes(path)?;
-    let mut reader = csv::Reader::from_reader(whole_lines(&bytes));
+    let mut reader = csv::Reader::from_reader(complete_lines(&bytes));
     Ok(reader.deserialize().flatten().collect())
 }

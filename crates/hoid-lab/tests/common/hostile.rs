@@ -33,11 +33,11 @@ use crate::{
 };
 
 /// Number of ticks of a run.
-const TICKS: usize = 500;
+const TICKS_PER_RUN: usize = 500;
 /// Number of messages to one lab.
 const MESSAGES_PER_LAB: usize = 200;
 /// Number of samples for a restored tracker.
-const SAMPLES: usize = 25;
+const RESTORED_SAMPLES: usize = 25;
 
 /// Numbers at which indices, lengths and sums fail.
 const EXTREME_NUMBERS: [f64; 16] = [
@@ -60,23 +60,23 @@ const EXTREME_NUMBERS: [f64; 16] = [
 ];
 
 /// Returns one of these numbers, or a JSON value that is not a number.
-fn extreme(draw: &mut Draw) -> Value {
-    match draw.below(12) {
+fn extreme_value(draw: &mut Draw) -> Value {
+    match draw.integer_below(12) {
         0 => Value::Null,
-        1 => json!("x".repeat(1 << draw.below(12))),
+        1 => json!("x".repeat(1 << draw.integer_below(12))),
         2 => json!([]),
         3 => json!({}),
         4 => json!(u64::MAX),
         5 => json!(i64::MIN),
-        6 => json!(draw.below(TICKS)),
+        6 => json!(draw.integer_below(TICKS_PER_RUN)),
         7 => json!([1.0, 1.0, 1e300, 1.0]),
         8 => json!(true),
-        _ => json!(EXTREME_NUMBERS[draw.below(EXTREME_NUMBERS.len())]),
+        _ => json!(EXTREME_NUMBERS[draw.integer_below(EXTREME_NUMBERS.len())]),
     }
 }
 
 /// State of the tests.
-pub struct Hostile {
+pub struct HostileTest {
     directory: tempfile::TempDir,
     session: PathBuf,
     files: Vec<String>,
@@ -101,31 +101,31 @@ fn config() -> Config {
     }
 }
 
-impl Hostile {
+impl HostileTest {
     pub fn new() -> Self {
         let directory = tempfile::tempdir().unwrap();
         let out = directory.path().join("good");
-        let mut good = Person::begin(&out, config());
-        good.next(1).unwrap();
-        good.track(1, 0..TICKS).unwrap();
+        let mut good = Person::start_session(&out, config());
+        good.start_next_run(1).unwrap();
+        good.track(1, 0..TICKS_PER_RUN).unwrap();
         good.finish(1).unwrap();
-        good.next(2).unwrap();
+        good.start_next_run(2).unwrap();
         good.track(2, 0..100).unwrap();
         drop(good);
         let session = out.join("sub-P01/ses-01");
         let record = Simulator::new(&Scenario::condition(OfText::C4)).unwrap();
         let record = record.run(RunSeed::default(), false).unwrap();
-        let (trackers, warm_up) = saved(&record);
-        let texts = texts::all(&record);
+        let (trackers, warm_up) = saved_trackers(&record);
+        let texts = texts::valid_texts(&record);
         assert!(
             texts
                 .iter()
-                .all(|text| text.is_good(&directory.path().join("good.toml")))
+                .all(|text| text.is_accepted(&directory.path().join("good.toml")))
         );
         Self {
             files: file_names(&session).unwrap(),
             session,
-            person: Person::begin(&directory.path().join("lab-0"), config()),
+            person: Person::start_session(&directory.path().join("lab-0"), config()),
             directory,
             message_count: 0,
             texts,
@@ -137,49 +137,49 @@ impl Hostile {
 
     /// Runs a case. Of four cases, one tests a tracker, one tests messages, one tests session files, and one tests
     /// settings or a result.
-    pub fn case(&mut self, seed: u64, number: u64) {
+    pub fn run_case(&mut self, seed: u64, number: u64) {
         let mut draw = Draw(seed ^ number.wrapping_mul(0xd134_2543_de82_ef95));
         match number % 4 {
-            0 => self.messages(&mut draw),
-            1 => self.damaged(&mut draw),
-            2 => self.restored(&mut draw),
+            0 => self.send_messages(&mut draw),
+            1 => self.open_damaged_session(&mut draw),
+            2 => self.restore_tracker(&mut draw),
             _ => {
-                let text = &self.texts[draw.below(self.texts.len())];
-                text.damaged(&mut draw, &self.directory.path().join("changed.toml"));
+                let text = &self.texts[draw.integer_below(self.texts.len())];
+                text.read_modified(&mut draw, &self.directory.path().join("changed.toml"));
             }
         }
     }
 
     /// Sends some messages to a lab in the state left by earlier messages.
-    fn messages(&mut self, draw: &mut Draw) {
+    fn send_messages(&mut self, draw: &mut Draw) {
         if self.message_count % MESSAGES_PER_LAB == MESSAGES_PER_LAB - 1 {
             let out = self.directory.path().join(format!("lab-{}", self.message_count));
-            self.person = Person::begin(&out, config());
+            self.person = Person::start_session(&out, config());
         }
         self.message_count += 1;
-        let number = 1 + draw.below(3);
-        for _ in 0..1 + draw.below(6) {
-            let (first, length) = (draw.below(TICKS), draw.below(60));
-            let mut message = match draw.below(10) {
+        let number = 1 + draw.integer_below(3);
+        for _ in 0..1 + draw.integer_below(6) {
+            let (first, length) = (draw.integer_below(TICKS_PER_RUN), draw.integer_below(60));
+            let mut message = match draw.integer_below(10) {
                 0 => json!({"type": "hello", "role": "person", "browser": {"screen": "1 x 1"}}),
                 1 => json!({"type": "consent", "subject": "P02", "agreed": true, "cc0": true}),
                 2 => json!({"type": "resume", "session": "sub-P01/ses-01"}),
                 3 | 4 => json!({"type": "next"}),
-                5 | 6 => person::begin(number),
-                7 => person::batch(number, [0, first][draw.below(2)], &vec![0.5; length]),
+                5 | 6 => person::begin_message(number),
+                7 => person::batch_message(number, [0, first][draw.integer_below(2)], &vec![0.5; length]),
                 8 => json!({"type": "finish", "number": number, "counted": {"synthetic_events": 0.0}}),
                 _ => json!({"type": "abort", "number": number}),
             };
-            if message["type"] == "batch" && draw.below(2) == 0 {
+            if message["type"] == "batch" && draw.integer_below(2) == 0 {
                 message["batch"]["events"] = json!([[3, 2.5, 2.75, 512.0], [4, 3.5, 3.75, 400.0]]);
                 message["batch"]["frames"] = json!([[1.0, 2.0, 2, 0.5]]);
             }
-            if draw.below(2) == 0 {
-                change(&mut message, draw);
+            if draw.integer_below(2) == 0 {
+                mutate_json(&mut message, draw);
             }
             let mut text = message.to_string().into_bytes();
-            if draw.below(8) == 0 {
-                bytes(&mut text, draw);
+            if draw.integer_below(8) == 0 {
+                mutate_bytes(&mut text, draw);
             }
             // Invalid messages are refused at once.
             if let Ok(message) = serde_json::from_slice::<FromPage>(&text) {
@@ -189,15 +189,15 @@ impl Hostile {
     }
 
     /// Opens, evaluates and shows a session with one modified file.
-    fn damaged(&mut self, draw: &mut Draw) {
+    fn open_damaged_session(&mut self, draw: &mut Draw) {
         let at = self.directory.path().join("damaged/sub-P01/ses-01");
         let _ = fs::remove_dir_all(&at);
         fs::create_dir_all(&at).unwrap();
         for name in &self.files {
             fs::copy(self.session.join(name), at.join(name)).unwrap();
         }
-        for _ in 0..1 + draw.below(2) {
-            damage(&at.join(&self.files[draw.below(self.files.len())]), draw);
+        for _ in 0..1 + draw.integer_below(2) {
+            damage(&at.join(&self.files[draw.integer_below(self.files.len())]), draw);
         }
         let shown = |folder: &Path| {
             let out = folder.ancestors().nth(2).unwrap();
@@ -214,63 +214,63 @@ impl Hostile {
         };
         shown(&at);
         if let Ok(session) = Session::open(&at) {
-            let _ = (session.next(), session.new_number());
-            for (_, stem) in Stem::all(&at).unwrap() {
+            let _ = (session.next_run(), session.next_run_number());
+            for (_, stem) in Stem::find_all(&at).unwrap() {
                 let _ = check(&stem);
             }
         }
     }
 
     /// Restores a tracker or a warm-up from modified numbers with a valid checksum.
-    fn restored(&mut self, draw: &mut Draw) {
-        let which = draw.below(self.trackers.len() + 1);
+    fn restore_tracker(&mut self, draw: &mut Draw) {
+        let which = draw.integer_below(self.trackers.len() + 1);
         let saved = self.trackers.get(which).map_or(&self.warm_up, |(_, numbers)| numbers);
         let mut numbers = saved[..saved.len() - 1].to_vec();
-        for _ in 0..1 + draw.below(4) {
-            let at = draw.below(numbers.len());
-            match draw.below(8) {
-                0 => numbers[at] = f64::from_bits(numbers[at].to_bits() ^ (1 << draw.below(64))),
+        for _ in 0..1 + draw.integer_below(4) {
+            let at = draw.integer_below(numbers.len());
+            match draw.integer_below(8) {
+                0 => numbers[at] = f64::from_bits(numbers[at].to_bits() ^ (1 << draw.integer_below(64))),
                 1 => numbers[at] = f64::from_bits(draw.bits()),
-                2 => numbers.swap(at, draw.below(saved.len() - 1)),
+                2 => numbers.swap(at, draw.integer_below(saved.len() - 1)),
                 3 => numbers[at] += 1.0,
-                _ => numbers[at] = EXTREME_NUMBERS[draw.below(EXTREME_NUMBERS.len())],
+                _ => numbers[at] = EXTREME_NUMBERS[draw.integer_below(EXTREME_NUMBERS.len())],
             }
         }
         let sample_time = self.record.sample_time();
         let numbers = sealed(numbers);
-        let from = 2700 + draw.below(1000);
+        let from = 2700 + draw.integer_below(1000);
         let sample = |k: usize| Sample {
             e: self.record.input()[k],
             u: if k % 20 == 3 { f64::NAN } else { self.record.output()[k] },
             reference: None,
         };
         let Some((options, _)) = self.trackers.get(which) else {
-            if let Some(warm_up) = WarmUp::restored(sample_time, &numbers) {
+            if let Some(warm_up) = WarmUp::restore(sample_time, &numbers) {
                 let mut live = Stage::Collecting(warm_up);
                 let default = TrackOptions::default_for(Method::adaptive(), 29);
-                for k in from..from + SAMPLES {
+                for k in from..from + RESTORED_SAMPLES {
                     live.update(sample(k), true, &|_| Ok((default.clone(), None)));
                 }
-                live.saved();
+                live.save();
             }
             return;
         };
-        if let Ok(mut tracker) = Tracker::restored(options, sample_time, &numbers) {
-            for k in from..from + SAMPLES {
+        if let Ok(mut tracker) = Tracker::restore(options, sample_time, &numbers) {
+            for k in from..from + RESTORED_SAMPLES {
                 tracker.update(sample(k), true);
             }
             let _ = (
                 tracker.operator(),
                 tracker.covariance(),
                 tracker.response(3.0),
-                tracker.saved(),
+                tracker.save(),
             );
         }
     }
 }
 
 /// Returns saved trackers after a run, and a warm-up.
-fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
+fn saved_trackers(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
     let span = record.span(0.0, 20.0).unwrap();
     let bj = Structure::BoxJenkins;
     let of = |method| TrackOptions::new(method, bj, bj.operator_orders(29));
@@ -300,7 +300,7 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
         (2000..2700).for_each(|k| {
             tracker.update(sample(k), true);
         });
-        let numbers = tracker.saved();
+        let numbers = tracker.save();
         (options, numbers)
     };
     let default = of(hoid_survey::physical());
@@ -308,42 +308,42 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
     for k in 0..100 {
         live.update(sample(k), true, &|_| Ok((default.clone(), None)));
     }
-    (all.into_iter().map(run).collect(), live.saved().1)
+    (all.into_iter().map(run).collect(), live.save().1)
 }
 
 /// Modifies, removes or adds one value of a message.
-pub fn change(value: &mut Value, draw: &mut Draw) {
-    let deeper = draw.below(4) > 0;
+pub fn mutate_json(value: &mut Value, draw: &mut Draw) {
+    let deeper = draw.integer_below(4) > 0;
     match value {
         Value::Object(map) if deeper && !map.is_empty() => {
-            let key = map.keys().nth(draw.below(map.len())).cloned().unwrap();
-            match draw.below(8) {
+            let key = map.keys().nth(draw.integer_below(map.len())).cloned().unwrap();
+            match draw.integer_below(8) {
                 0 => drop(map.remove(&key)),
                 1 => drop(map.insert(format!("{key}x"), json!(1))),
-                _ => change(&mut map[&key], draw),
+                _ => mutate_json(&mut map[&key], draw),
             }
         }
         Value::Array(all) if deeper && !all.is_empty() => {
-            let at = draw.below(all.len());
-            match draw.below(4) {
+            let at = draw.integer_below(all.len());
+            match draw.integer_below(4) {
                 0 => drop(all.remove(at)),
                 1 => all.insert(at, all[at].clone()),
-                _ => change(&mut all[at], draw),
+                _ => mutate_json(&mut all[at], draw),
             }
         }
-        other => *other = extreme(draw),
+        other => *other = extreme_value(draw),
     }
 }
 
 /// Modifies a byte, the end, a part of a text, or a number in it.
-pub fn bytes(text: &mut Vec<u8>, draw: &mut Draw) {
+pub fn mutate_bytes(text: &mut Vec<u8>, draw: &mut Draw) {
     if text.is_empty() {
         return;
     }
-    let at = draw.below(text.len());
-    let end = (at + 1 + draw.below(40)).min(text.len());
-    match draw.below(6) {
-        0 => text[at] ^= 1 << draw.below(8),
+    let at = draw.integer_below(text.len());
+    let end = (at + 1 + draw.integer_below(40)).min(text.len());
+    match draw.integer_below(6) {
+        0 => text[at] ^= 1 << draw.integer_below(8),
         1 => text.truncate(at),
         2 => drop(text.drain(at..end)),
         3 => {
@@ -356,7 +356,7 @@ pub fn bytes(text: &mut Vec<u8>, draw: &mut Draw) {
                 return;
             };
             let length = text[start..].iter().take_while(|byte| is_number(byte)).count();
-            text.splice(start..start + length, extreme(draw).to_string().into_bytes());
+            text.splice(start..start + length, extreme_value(draw).to_string().into_bytes());
         }
     }
 }
@@ -366,12 +366,12 @@ fn damage(path: &Path, draw: &mut Draw) {
     let Ok(mut whole) = fs::read(path) else { return };
     let json = serde_json::from_slice::<Value>(&whole);
     match json {
-        _ if draw.below(12) == 0 => return drop(fs::remove_file(path)),
-        Ok(mut value) if draw.below(4) > 0 => {
-            (0..1 + draw.below(2)).for_each(|_| change(&mut value, draw));
+        _ if draw.integer_below(12) == 0 => return drop(fs::remove_file(path)),
+        Ok(mut value) if draw.integer_below(4) > 0 => {
+            (0..1 + draw.integer_below(2)).for_each(|_| mutate_json(&mut value, draw));
             whole = value.to_string().into_bytes();
         }
-        _ => (0..1 + draw.below(3)).for_each(|_| bytes(&mut whole, draw)),
+        _ => (0..1 + draw.integer_below(3)).for_each(|_| mutate_bytes(&mut whole, draw)),
     }
     fs::write(path, whole).unwrap();
 }

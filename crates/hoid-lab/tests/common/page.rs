@@ -39,7 +39,7 @@ impl Engine {
     }
 
     /// Returns the answer of the engine.
-    pub fn ask(&mut self, question: &Value) -> Value {
+    pub fn request(&mut self, question: &Value) -> Value {
         writeln!(self.input, "{question}").unwrap();
         let mut line = String::new();
         self.output.read_line(&mut line).unwrap();
@@ -65,7 +65,7 @@ impl Generator {
 }
 
 /// Runs a random plant with tables and events in the page; true if every bit equals that of Rust.
-pub fn same_bits(engine: &mut Engine, seed: u32) -> bool {
+pub fn is_bit_identical(engine: &mut Engine, seed: u32) -> bool {
     let mut own = Generator(seed ^ 0x5bd1_e995);
     let mut any = |low: f64, high: f64| low + (high - low) * (own.next() + 0.5);
     let poles = any(0.0, 5.0) as usize;
@@ -92,7 +92,7 @@ pub fn same_bits(engine: &mut Engine, seed: u32) -> bool {
         target: Some(Signal::default()),
         ..Condition::default()
     };
-    let condition = match condition.course() {
+    let condition = match condition.task_definition() {
         Ok(_) => condition,
         // The element after the change is invalid, so the condition is used without the change.
         Err(_) => Condition {
@@ -110,7 +110,7 @@ pub fn same_bits(engine: &mut Engine, seed: u32) -> bool {
     let mut tables = Generator(seed);
     let mut table = |size: f64| (0..task.ticks).map(|_| size * tables.next()).collect::<Vec<f64>>();
     (task.target, task.disturbance) = (table(8.0), table(1.0));
-    let answer = engine.ask(&json!({"phases": task.phases, "ticks": task.ticks, "map": map, "seed": seed}));
+    let answer = engine.request(&json!({"phases": task.phases, "ticks": task.ticks, "map": map, "seed": seed}));
     let events: Vec<(usize, f64)> = (answer["events"].as_array().unwrap().iter())
         .map(|event| (event[0].as_u64().unwrap() as usize, map.u(event[1].as_f64().unwrap())))
         .collect();

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::{
     draw::Draw,
-    hostile::{bytes, change},
+    hostile::{mutate_bytes, mutate_json},
 };
 
 const SCENARIOS: [&str; 3] = [
@@ -35,7 +35,7 @@ pub struct Text {
 }
 
 /// Returns the valid texts, including a fit of this record.
-pub fn all(record: &Record) -> Vec<Text> {
+pub fn valid_texts(record: &Record) -> Vec<Text> {
     let toml = |text: &str, reader: Reader| Text {
         text: text.to_owned(),
         is_json: false,
@@ -45,7 +45,7 @@ pub fn all(record: &Record) -> Vec<Text> {
         orders: [("nk".to_owned(), 29..=29)].into(),
         ..Polynomials::new(Structure::Arx)
     });
-    let found = found.run(Recordings::of_records([record.clone()])).unwrap();
+    let found = found.run(Recordings::from_records([record.clone()])).unwrap();
     let fit = Text {
         text: found.to_json().unwrap(),
         is_json: true,
@@ -54,7 +54,7 @@ pub fn all(record: &Record) -> Vec<Text> {
             parse_fit(text, "fit.json").is_ok()
         },
     };
-    let mut all: Vec<Text> = SCENARIOS.map(|text| toml(text, scenario)).into();
+    let mut all: Vec<Text> = SCENARIOS.map(|text| toml(text, accepts_scenario)).into();
     all.push(toml(PLANS[0].text, |text, _| Plan::parse(text, "plan.toml").is_ok()));
     all.push(toml(MANIFEST, |text, _| Manifest::parse(text, "group.toml").is_ok()));
     all.push(toml(&Config::default().text().unwrap(), |text, path| {
@@ -65,7 +65,7 @@ pub fn all(record: &Record) -> Vec<Text> {
     all
 }
 
-fn scenario(text: &str, _: &Path) -> bool {
+fn accepts_scenario(text: &str, _: &Path) -> bool {
     match parse_any_scenario(text, "scenario.toml", "scenario") {
         Ok(AnyScenario::Reference(scenario)) => scenario.resolve().is_ok(),
         Ok(AnyScenario::Family(scenario)) => scenario.resolve().is_ok(),
@@ -75,19 +75,19 @@ fn scenario(text: &str, _: &Path) -> bool {
 
 impl Text {
     /// True if the text is accepted as it is.
-    pub fn is_good(&self, path: &Path) -> bool {
+    pub fn is_accepted(&self, path: &Path) -> bool {
         (self.reader)(&self.text, path)
     }
 
     /// Reads the text after some changes.
-    pub fn damaged(&self, draw: &mut Draw, path: &Path) {
+    pub fn read_modified(&self, draw: &mut Draw, path: &Path) {
         let mut text = self.text.clone();
-        if draw.below(3) > 0 {
+        if draw.integer_below(3) > 0 {
             text = self.with_other_values(draw).unwrap_or(text);
         }
-        if draw.below(2) == 0 {
+        if draw.integer_below(2) == 0 {
             let mut raw = text.into_bytes();
-            (0..1 + draw.below(3)).for_each(|_| bytes(&mut raw, draw));
+            (0..1 + draw.integer_below(3)).for_each(|_| mutate_bytes(&mut raw, draw));
             text = String::from_utf8_lossy(&raw).into_owned();
         }
         (self.reader)(&text, path);
@@ -100,7 +100,7 @@ impl Text {
         } else {
             toml::from_str(&self.text).ok()?
         };
-        (0..1 + draw.below(3)).for_each(|_| change(&mut value, draw));
+        (0..1 + draw.integer_below(3)).for_each(|_| mutate_json(&mut value, draw));
         if self.is_json {
             Some(value.to_string())
         } else {

@@ -6,27 +6,27 @@ use crate::{ContinuousTransferFunction, polynomial};
 
 /// Maps poles and zeros by `z = e^{s Ts}` and returns numerator and denominator in descending powers of z. `None` if
 /// the roots cannot be found.
-pub(super) fn matched(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+pub(super) fn matched_pole_zero(h: &ContinuousTransferFunction, ts: f64) -> Option<(Vec<f64>, Vec<f64>)> {
     let poles = polynomial::roots(h.den())?;
     let leading = h.num()[0];
     if leading == 0.0 {
-        return Some((vec![0.0], image(&poles, ts)));
+        return Some((vec![0.0], mapped_polynomial(&poles, ts)));
     }
     let zeros = polynomial::roots(h.num())?;
     let at_infinity = poles.len() - zeros.len();
     let gain = leading * static_ratio(&zeros, ts) / static_ratio(&poles, ts);
-    let mut num = image(&zeros, ts);
+    let mut num = mapped_polynomial(&zeros, ts);
     if at_infinity > 0 {
         for _ in 1..at_infinity {
             num = polynomial::product(&num, &[0.5, 0.5]);
         }
         num.insert(0, 0.0);
     }
-    Some((num.iter().map(|c| gain * c).collect(), image(&poles, ts)))
+    Some((num.iter().map(|c| gain * c).collect(), mapped_polynomial(&poles, ts)))
 }
 
 /// Returns `prod (z - e^{p Ts})` over the roots p, in descending powers of z.
-fn image(roots: &[Complex64], ts: f64) -> Vec<f64> {
+fn mapped_polynomial(roots: &[Complex64], ts: f64) -> Vec<f64> {
     polynomial::from_roots(&roots.iter().map(|p| (p * ts).exp()).collect::<Vec<_>>())
 }
 

@@ -1,7 +1,7 @@
 //! The methods of discretisation in Table 5.2; some of them are substitutions `s = c (z - 1) / q(z)`.
 
-use super::hold::hold;
-use super::matched::matched;
+use super::hold::hold_equivalent;
+use super::matched::matched_pole_zero;
 use crate::{ContinuousTransferFunction, DiscreteTransferFunction, ModelError, SampleTime, polynomial};
 
 /// Method of discretisation of a continuous transfer function.
@@ -77,18 +77,19 @@ pub fn discretise(
             substitute(h, omega_rad_s / (omega_rad_s * ts / 2.0).tan(), [1.0, 1.0])?
         }
         Method::ZeroOrderHold | Method::FirstOrderHold => {
-            hold(h, ts, fraction, method == Method::FirstOrderHold).ok_or_else(|| no_finite_result(h))?
+            hold_equivalent(h, ts, fraction, method == Method::FirstOrderHold)
+                .ok_or_else(|| non_finite_result_error(h))?
         }
-        Method::Matched => matched(h, ts).ok_or_else(|| no_finite_result(h))?,
+        Method::Matched => matched_pole_zero(h, ts).ok_or_else(|| non_finite_result_error(h))?,
     };
     if num.iter().chain(&den).any(|c| !c.is_finite()) {
-        return Err(no_finite_result(h));
+        return Err(non_finite_result_error(h));
     }
     let delayed: Vec<f64> = std::iter::repeat_n(0.0, whole).chain(num).collect();
     DiscreteTransferFunction::new(&delayed, &den, sample_time)
 }
 
-fn no_finite_result(h: &ContinuousTransferFunction) -> ModelError {
+fn non_finite_result_error(h: &ContinuousTransferFunction) -> ModelError {
     ModelError::TransferFunction {
         found: format!("{:?} / {:?}", h.num(), h.den()),
         expected: "expected poles with a finite e^{s Ts}; use a shorter sample time or slower unstable poles"

@@ -52,7 +52,7 @@ fn cases() -> Vec<Case> {
         .collect()
 }
 
-fn largest(p: &[f64]) -> f64 {
+fn max_magnitude(p: &[f64]) -> f64 {
     p.iter().fold(0.0, |m, c| m.max(c.abs()))
 }
 
@@ -60,15 +60,15 @@ fn assert_close(name: &str, found: &[f64], expected: &[f64], tolerance: f64) {
     assert_eq!(found.len(), expected.len(), "{name}: {found:?} and {expected:?}");
     for (a, b) in found.iter().zip(expected) {
         assert!(
-            (a - b).abs() <= tolerance * largest(expected),
+            (a - b).abs() <= tolerance * max_magnitude(expected),
             "{name}: {found:?} and {expected:?}, off by {:e}",
-            (a - b).abs() / largest(expected)
+            (a - b).abs() / max_magnitude(expected)
         );
     }
 }
 
 #[test]
-fn agrees_with_exact_values() {
+fn discretisation_agrees_with_exact_values() {
     let cases = cases();
     assert!(cases.len() >= 40);
     for case in &cases {
@@ -81,12 +81,12 @@ fn agrees_with_exact_values() {
 }
 
 #[test]
-fn agrees_with_scipy() {
+fn discretisation_agrees_with_scipy() {
     for case in cases() {
         let d = discretise(&case.h, case.sample_time, case.method).unwrap();
         // ss2tf computes a numerator as the difference of two characteristic polynomials, so its absolute errors are
         // 1e-15 times binomial coefficients.
-        let size = largest(&case.scipy_den) + largest(&case.scipy_num);
+        let size = max_magnitude(&case.scipy_den) + max_magnitude(&case.scipy_num);
         for (ours, theirs) in [(d.num(), &case.scipy_num), (d.den(), &case.scipy_den)] {
             assert_eq!(ours.len(), theirs.len());
             for (a, b) in ours.iter().zip(theirs) {
@@ -231,7 +231,7 @@ fn matched_method_maps_poles_and_zeros() {
 }
 
 #[test]
-fn static_gains_and_degenerate_systems() {
+fn degenerate_systems_keep_their_static_gain() {
     for method in [
         Method::ForwardEuler,
         Method::Tustin,

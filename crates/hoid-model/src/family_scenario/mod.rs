@@ -29,5 +29,5 @@ pub use remnant::{Followed, Intermittence, PartStrength, Pulses, RemnantPart, Re
 pub use scenario::{FamilyScenario, ResolvedFamilyScenario};
 pub use state::FamilyState;
 pub use typical_feedforward::{
-    FOLLOWED_FRACTION, LONGEST_LEAD_S, NEAR_CROSSOVER_RAD_S, PREVIEW_S, slope, time_constant, typical_feedforward,
+    FOLLOWED_FRACTION, LONGEST_LEAD_S, PREVIEW_S, SLOPE_FREQUENCY_RAD_S, slope, time_constant, typical_feedforward,
 };

@@ -8,7 +8,7 @@ use super::{
 use crate::{
     FamilyOperator, Feedforward, ModelError, SampleTime,
     delayed_operator::whole_samples,
-    feedforward::{OperatorAt, delay_at, delays},
+    feedforward::{OperatorWithDelay, delay_at, delays},
     scenario::Realisation,
     schedule::Schedule,
 };
@@ -104,7 +104,7 @@ impl FamilyScenario {
             let expected = "one to 1e8 samples including the run-in";
             return Err(wrong("measurement time T_m in s", self.measurement_s, expected));
         }
-        if !self.initial.is_like(&self.last) {
+        if !self.initial.has_same_form(&self.last) {
             return Err(ModelError::Operator {
                 reason: format!(
                     "the form of the operator and the number of poles of the controlled element change from {} and {} \
@@ -203,7 +203,7 @@ impl ResolvedFamilyScenario {
         let FamilyScenario { initial, last, .. } = &self.scenario;
         let changes = self.scenario.schedule.change_s().is_some();
         let seen = self.scenario.feedforward.as_ref();
-        let muscles = initial.operator.neuromuscular() != last.operator.neuromuscular();
+        let muscles = initial.operator.neuromuscular_parameters() != last.operator.neuromuscular_parameters();
         changes && seen.is_some_and(|seen| seen.last.is_some() || muscles)
     }
 
@@ -212,13 +212,13 @@ impl ResolvedFamilyScenario {
     ///
     /// # Errors
     /// As [`FamilyOperator::new`].
-    pub fn motion_in(&self, state: &FamilyState) -> Result<Option<OperatorAt>, ModelError> {
+    pub fn motion_in(&self, state: &FamilyState) -> Result<Option<OperatorWithDelay>, ModelError> {
         let FamilyScenario { initial, last, .. } = &self.scenario;
         let Some(felt) = &self.scenario.motion else {
             return Ok(None);
         };
-        let changes = initial.operator.neuromuscular() != last.operator.neuromuscular();
-        let felt = match state.operator.neuromuscular().filter(|_| changes) {
+        let changes = initial.operator.neuromuscular_parameters() != last.operator.neuromuscular_parameters();
+        let felt = match state.operator.neuromuscular_parameters().filter(|_| changes) {
             Some((omega, zeta)) => felt.with_neuromuscular(omega, zeta)?,
             None => felt.clone(),
         };
@@ -237,8 +237,8 @@ impl ResolvedFamilyScenario {
         };
         let FamilyScenario { initial, last, .. } = &self.scenario;
         let mut after = seen.last.as_ref().unwrap_or(&seen.operator).clone();
-        let muscles = last.operator.neuromuscular();
-        if let Some((omega, zeta)) = muscles.filter(|_| muscles != initial.operator.neuromuscular()) {
+        let muscles = last.operator.neuromuscular_parameters();
+        if let Some((omega, zeta)) = muscles.filter(|_| muscles != initial.operator.neuromuscular_parameters()) {
             after = after.with_neuromuscular(omega, zeta)?;
         }
         Ok([Some(seen.operator.clone()), Some(after)])
@@ -249,7 +249,7 @@ impl ResolvedFamilyScenario {
     ///
     /// # Errors
     /// As [`ResolvedFamilyScenario::state_at`].
-    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<OperatorAt>, ModelError> {
+    pub fn feedforward_at(&self, t_s: f64) -> Result<Option<OperatorWithDelay>, ModelError> {
         let FamilyScenario {
             initial,
             last,
@@ -259,7 +259,10 @@ impl ResolvedFamilyScenario {
             ..
         } = &self.scenario;
         let Some(seen) = feedforward else { return Ok(None) };
-        let (before, after) = (initial.operator.neuromuscular(), last.operator.neuromuscular());
+        let (before, after) = (
+            initial.operator.neuromuscular_parameters(),
+            last.operator.neuromuscular_parameters(),
+        );
         let between = |a: f64, b: f64| schedule.value(a, b, t_s);
         let muscles = before.zip(after).filter(|(before, after)| before != after);
         let muscles = muscles.map(|(a, b)| (between(a.0, b.0), between(a.1, b.1)));

@@ -46,9 +46,9 @@ impl FamilyState {
     }
 
     /// True if both states have the same form, which is required for a transition between them.
-    pub(super) fn is_like(&self, other: &Self) -> bool {
+    pub(super) fn has_same_form(&self, other: &Self) -> bool {
         let (c, d) = (&self.controlled_element, &other.controlled_element);
-        self.operator.is_like(&other.operator) && (c.num().len(), c.den().len()) == (d.num().len(), d.den().len())
+        self.operator.has_same_form(&other.operator) && (c.num().len(), c.den().len()) == (d.num().len(), d.den().len())
     }
 
     /// Returns a state between this state and another one. `between` computes each parameter of the operator
@@ -69,7 +69,7 @@ impl FamilyState {
             .map(|c| c * gain)
             .collect();
         Ok(Self {
-            operator: self.operator.between(&other.operator, &between)?,
+            operator: self.operator.with_interpolated_parameters(&other.operator, &between)?,
             controlled_element: ContinuousTransferFunction::new(&num, &pairs(c.den(), d.den()))?,
         })
     }

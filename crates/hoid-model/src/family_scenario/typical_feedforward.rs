@@ -15,9 +15,9 @@ use super::{display::Display, state::FamilyState};
 use crate::{ContinuousTransferFunction, FamilyOperator, Feedforward, Form, ModelError, operator_family::Coordinate};
 
 /// Frequency at which slopes are evaluated, rad/s.
-pub const NEAR_CROSSOVER_RAD_S: f64 = 3.0;
+pub const SLOPE_FREQUENCY_RAD_S: f64 = 3.0;
 /// Shortest time constant of people, s.
-const SHORTEST_S: f64 = 0.1;
+const MIN_TIME_CONSTANT_S: f64 = 0.1;
 /// Longest lead time constant of people, s.
 pub const LONGEST_LEAD_S: f64 = 2.0;
 /// Fraction of the target that the machine follows.
@@ -25,20 +25,23 @@ pub const FOLLOWED_FRACTION: f64 = 0.7;
 /// Preview in s, the default of a condition of `hoid lab`.
 pub const PREVIEW_S: f64 = 1.0;
 /// Largest absolute slope for which the form is a gain.
-const GAIN_SLOPE_LIMIT: f64 = 0.5;
+const MAX_GAIN_FORM_SLOPE: f64 = 0.5;
 
 /// Returns the slope `d ln|P|/d ln omega` near the crossover.
 pub fn slope(element: &ContinuousTransferFunction) -> f64 {
     let gain = |omega: f64| element.response(omega).norm().ln();
     let step = 0.01_f64;
-    let (up, down) = (NEAR_CROSSOVER_RAD_S * step.exp(), NEAR_CROSSOVER_RAD_S * (-step).exp());
+    let (up, down) = (
+        SLOPE_FREQUENCY_RAD_S * step.exp(),
+        SLOPE_FREQUENCY_RAD_S * (-step).exp(),
+    );
     (gain(up) - gain(down)) / (2.0 * step)
 }
 
 /// Returns the time constant of a lead that adds this slope at 3 rad/s, at least .1 s and at most `longest_s`.
 pub fn time_constant(slope: f64, longest_s: f64) -> f64 {
     let x = (slope.max(0.0) / (1.0 - slope).max(1e-9)).sqrt();
-    (x / NEAR_CROSSOVER_RAD_S).clamp(SHORTEST_S, longest_s)
+    (x / SLOPE_FREQUENCY_RAD_S).clamp(MIN_TIME_CONSTANT_S, longest_s)
 }
 
 /// Returns the typical response to the target for a person with this response to the error. `followed` is the fraction
@@ -57,15 +60,15 @@ pub fn typical_feedforward(
     let (operator, element) = (&state.operator, &state.controlled_element);
     let rise = -slope(element);
     let (form, lead_s) = match rise {
-        r if r.abs() <= GAIN_SLOPE_LIMIT => (Form::Gain, None),
-        r if r > GAIN_SLOPE_LIMIT && r <= 1.0 => (Form::Derivative, None),
+        r if r.abs() <= MAX_GAIN_FORM_SLOPE => (Form::Gain, None),
+        r if r > MAX_GAIN_FORM_SLOPE && r <= 1.0 => (Form::Derivative, None),
         r if r > 1.0 && operator.has_neuromuscular() => {
             (Form::DerivativeLead, Some(time_constant(r - 1.0, LONGEST_LEAD_S)))
         }
         _ => return Ok(None),
     };
     let preview_s = if display == Display::Preview { shown_s } else { 0.0 };
-    let muscles = operator.neuromuscular();
+    let muscles = operator.neuromuscular_parameters();
     let delay_s = match (display, muscles) {
         (Display::Preview, Some((omega, zeta))) => (preview_s - 2.0 * zeta / omega).max(0.0),
         (Display::Preview, None) => preview_s,
@@ -85,7 +88,7 @@ pub fn typical_feedforward(
         return Ok(None);
     };
     // The gain refers to the intended motion of the hand, before the neuromuscular system.
-    let omega = NEAR_CROSSOVER_RAD_S;
+    let omega = SLOPE_FREQUENCY_RAD_S;
     let ([a, b, c, _], _) = form.shape(&lead_s.into_iter().collect::<Vec<_>>());
     let shape = (a - c * omega * omega).hypot(b * omega);
     coordinates[0] = followed / (shape * element.response(omega).norm());
@@ -126,7 +129,7 @@ mod tests {
                 // Apart from the dynamics of the arm, the machine follows the fraction g of the target; with a preview
                 // it follows in phase.
                 let omega = 3.0_f64;
-                let (nm, zeta) = state.operator.neuromuscular().unwrap();
+                let (nm, zeta) = state.operator.neuromuscular_parameters().unwrap();
                 let z = omega / nm;
                 let arm = num_complex::Complex64::new(1.0 - z * z, 2.0 * zeta * z).inv();
                 let moved = seen.operator.response(omega) * state.controlled_element.response(omega);

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::crossings::{LARGEST_TURN_RAD, total_turn};
+use super::crossings::{MAX_TURN_RAD, total_phase_change};
 use crate::{ContinuousTransferFunction, polynomial};
 
 /// Maximum number of subdivisions of frequency intervals in the stability test; if more are needed, the loop is not
@@ -39,7 +39,7 @@ pub fn unstable_poles(
     highest_rad_s: f64,
 ) -> Option<usize> {
     let order = element.den().len() - 1;
-    let scale = match root_size(element.den()) {
+    let scale = match max_root_magnitude(element.den()) {
         0.0 => 1.0,
         size => size,
     };
@@ -55,13 +55,13 @@ pub fn unstable_poles(
     if !(highest_rad_s > low && (operator(highest_rad_s) * element.response(highest_rad_s)).norm() < 1.0) {
         return None;
     }
-    let (turned, first, last) = total_turn(characteristic, (low, highest_rad_s))?;
+    let (turned, first, last) = total_phase_change(characteristic, (low, highest_rad_s))?;
     let element_alone = |omega: f64| {
         let s = Complex64::new(0.0, omega);
         horner(element.den(), s) / Complex64::new(scale, omega).powu(order as u32)
     };
     let far = 1e3 * highest_rad_s.max(scale);
-    let (beyond, from, to) = total_turn(element_alone, (highest_rad_s, far))?;
+    let (beyond, from, to) = total_phase_change(element_alone, (highest_rad_s, far))?;
     // F(0) and the limit of F/(s + a)^n at infinite frequency are real; the argument of 1 + L is between -90 and 90 deg
     // from the last frequency on.
     let at_zero = if first.re >= 0.0 { first } else { -first }.arg();
@@ -72,7 +72,7 @@ pub fn unstable_poles(
 }
 
 /// Returns the magnitude of the largest root of a polynomial, estimated from its coefficients.
-fn root_size(p: &[f64]) -> f64 {
+fn max_root_magnitude(p: &[f64]) -> f64 {
     let relative = (1..p.len()).map(|k| (p[k] / p[0]).abs().powf(1.0 / k as f64));
     relative.fold(0.0, f64::max)
 }
@@ -98,7 +98,7 @@ impl<'a> Characteristic<'a> {
         if biproper && (tau > 0.0 && at_infinity >= 1.0 || num[0] == -1.0) {
             return None;
         }
-        let scale = match root_size(den) {
+        let scale = match max_root_magnitude(den) {
             0.0 => 1.0,
             size => size,
         };
@@ -171,7 +171,7 @@ impl<'a> Characteristic<'a> {
                 let turn = (next.0 * f.conj()).arg();
                 let delay_turn = tau * (omega - here.0);
                 let loop_matters = gain.max(next.2) > 0.5;
-                if turn.abs() > LARGEST_TURN_RAD || (delay_turn > LARGEST_TURN_RAD && loop_matters) {
+                if turn.abs() > MAX_TURN_RAD || (delay_turn > MAX_TURN_RAD && loop_matters) {
                     evaluations += 1;
                     if depth > 60 || evaluations > MAX_EVALUATIONS {
                         return None;

@@ -61,7 +61,7 @@ impl Crossings {
 
 const POINTS_PER_DECADE: f64 = 100.0;
 /// Largest accepted phase change between neighbouring points of the scan, rad.
-pub(super) const LARGEST_TURN_RAD: f64 = 0.5;
+pub(super) const MAX_TURN_RAD: f64 = 0.5;
 /// Phase change between neighbouring points above which the direction of the change is uncertain, rad.
 const MAX_CERTAIN_TURN_RAD: f64 = 2.0;
 /// Maximum number of successive halvings of a step of the grid: the resulting 4096 points per step are enough to follow
@@ -114,7 +114,7 @@ pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) 
 
 /// Returns the total phase change of a response from the lower to the upper end of a range, in rad, and the response at
 /// both ends. `None` if the response is not finite, or if its phase turns too fast to be followed.
-pub(super) fn total_turn(
+pub(super) fn total_phase_change(
     of: impl Fn(f64) -> Complex64,
     range_rad_s: (f64, f64),
 ) -> Option<(f64, Complex64, Complex64)> {
@@ -174,7 +174,7 @@ fn scan(open_loop: &impl Fn(f64) -> Complex64, (low, high): (f64, f64)) -> Vec<P
 fn halve(open_loop: &impl Fn(f64) -> Complex64, low: Point, high: Point, depth: u32, points: &mut Vec<Point>) {
     let turn = (high.l * low.l.conj()).arg().abs();
     let by_slope = low.slope_s.abs().max(high.slope_s.abs()) * (high.omega - low.omega);
-    if depth > 0 && turn.max(by_slope) > LARGEST_TURN_RAD {
+    if depth > 0 && turn.max(by_slope) > MAX_TURN_RAD {
         let between = Point::new(open_loop, (low.omega * high.omega).sqrt());
         halve(open_loop, low, between, depth - 1, points);
         halve(open_loop, between, high, depth - 1, points);

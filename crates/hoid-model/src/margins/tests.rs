@@ -10,7 +10,7 @@ fn tf(num: &[f64], den: &[f64]) -> ContinuousTransferFunction {
     ContinuousTransferFunction::new(num, den).unwrap()
 }
 
-fn delayed(num: &[f64], den: &[f64], delay_s: f64) -> ContinuousTransferFunction {
+fn delayed_transfer_function(num: &[f64], den: &[f64], delay_s: f64) -> ContinuousTransferFunction {
     tf(num, den).with_delay(delay_s).unwrap()
 }
 
@@ -31,7 +31,7 @@ fn s2() -> ContinuousTransferFunction {
     open_loop(OperatingState::s2())
 }
 
-fn continuous(h: &ContinuousTransferFunction) -> Margins {
+fn continuous_margins(h: &ContinuousTransferFunction) -> Margins {
     margins(|w| h.response(w), MANUAL_CONTROL_RANGE_RAD_S)
 }
 
@@ -66,18 +66,18 @@ fn reference_states_match_scipy() {
         4.0542340213785195,
         3.1031729189944683,
     ];
-    assert_margins(continuous(&s1()), expected(first));
-    assert_margins(continuous(&s2()), expected(second));
+    assert_margins(continuous_margins(&s1()), expected(first));
+    assert_margins(continuous_margins(&s2()), expected(second));
 }
 
 #[test]
-fn crossover_model_in_closed_form() {
+fn crossover_model_margins_match_closed_form() {
     // K e^{-s tau}/s has omega_c = K, the phase margin 90 deg - K tau and the phase crossover pi/(2 tau).
     for (k, tau) in [(1.0, 0.3), (3.0, 0.2), (0.05, 12.0), (2.0, 0.785)] {
-        let h = delayed(&[k], &[1.0, 0.0], tau);
+        let h = delayed_transfer_function(&[k], &[1.0, 0.0], tau);
         let phase_crossover = PI / (2.0 * tau);
         assert_margins(
-            continuous(&h),
+            continuous_margins(&h),
             [
                 (k, 1e-12 * k),
                 (90.0 - (k * tau).to_degrees(), 1e-9),
@@ -94,9 +94,9 @@ fn margins_nearest_to_zero_are_selected() {
     // margins of 83.94, 22.75 and -120.7 deg, and the negative real axis at 8.786 and 47.2 rad/s with -5.392 and 61.95
     // dB. These values were computed with numpy at two million frequencies; `stability_margins` of python-control
     // 0.10.2 selects the same two margins.
-    let h = delayed(&[1.0], &[1.0, 0.0], 0.1).series(&tf(&[81.0], &[1.0, 0.36, 81.0]));
+    let h = delayed_transfer_function(&[1.0], &[1.0, 0.0], 0.1).series(&tf(&[81.0], &[1.0, 0.36, 81.0]));
     assert_margins(
-        continuous(&h),
+        continuous_margins(&h),
         [(8.48246, 3e-5), (22.749, 1e-3), (8.78549, 3e-5), (-5.3923, 1e-3)],
     );
     assert!(!closed_loop_is_stable(&h));
@@ -108,8 +108,8 @@ fn fast_phase_rotation_is_tracked() {
     // the last step of the grid, from 977.2 to 1000 rad/s, the delay turns the phase by exactly four revolutions, which
     // the phases at the ends of the step do not show.
     let tau = 4.0 * 2.0 * PI / (1000.0 * -(-0.01 * 10f64.ln()).exp_m1());
-    let h = delayed(&[0.9, 0.0], &[1.0, 500.0], tau);
-    let found = continuous(&h);
+    let h = delayed_transfer_function(&[0.9, 0.0], &[1.0, 500.0], tau);
+    let found = continuous_margins(&h);
     let omega = found.phase_crossover_rad_s.unwrap();
     assert!(omega > 1000.0 - 2.0 * PI / tau, "{omega}");
     assert!(h.response(omega).im.abs() < 1e-12 && h.response(omega).re < 0.0);
@@ -148,7 +148,7 @@ fn invalid_range_has_no_margins() {
     assert_eq!(margins(|_| Complex64::new(f64::NAN, 0.0), (0.1, 10.0)), none);
     // The response of a double integrator lies on the negative real axis: it has no phase crossover, and its phase
     // margin is zero.
-    let double = continuous(&tf(&[4.0], &[1.0, 0.0, 0.0]));
+    let double = continuous_margins(&tf(&[4.0], &[1.0, 0.0, 0.0]));
     assert_eq!(double.phase_crossover_rad_s, None);
     assert!((double.crossover_rad_s.unwrap() - 2.0).abs() < 1e-12 && double.phase_margin_deg.unwrap().abs() < 1e-9);
 }
@@ -156,7 +156,7 @@ fn invalid_range_has_no_margins() {
 #[test]
 fn stability_changes_at_the_gain_margin() {
     for h in [s1(), s2()] {
-        let gain = 10f64.powf(continuous(&h).gain_margin_db.unwrap() / 20.0);
+        let gain = 10f64.powf(continuous_margins(&h).gain_margin_db.unwrap() / 20.0);
         assert!(closed_loop_is_stable(&h));
         for (factor, stable) in [
             (1e-6, true),
@@ -172,12 +172,12 @@ fn stability_changes_at_the_gain_margin() {
 }
 
 #[test]
-fn stability_with_delay_in_closed_form() {
+fn stability_with_delay_matches_closed_form() {
     // K e^{-s tau}/s is stable for K tau < pi/2.
     for tau in [1e-3, 0.28, 40.0] {
         for (product, stable) in [(1e-4, true), (1.57, true), (1.5709, false), (4.0, false), (60.0, false)] {
             assert_eq!(
-                closed_loop_is_stable(&delayed(&[product / tau], &[1.0, 0.0], tau)),
+                closed_loop_is_stable(&delayed_transfer_function(&[product / tau], &[1.0, 0.0], tau)),
                 stable
             );
         }
@@ -185,7 +185,7 @@ fn stability_with_delay_in_closed_form() {
     // A pair of zeros enters the right half plane at each K tau = pi/2 + 2 pi k. For K tau = 5000 the phase makes many
     // revolutions within each step of the grid.
     for product in [1.5, 1.6, 60.0, 5000.0] {
-        let h = delayed(&[product / 0.28], &[1.0, 0.0], 0.28);
+        let h = delayed_transfer_function(&[product / 0.28], &[1.0, 0.0], 0.28);
         let pairs = ((product - PI / 2.0) / (2.0 * PI)).ceil().max(0.0) as usize;
         let found = Characteristic::new(&h).unwrap().zeros_in_right_half_plane();
         assert_eq!(found, Some(2 * pairs), "{product}");
@@ -194,15 +194,31 @@ fn stability_with_delay_in_closed_form() {
     // 2.331122370414423).
     let limit = (1.0 + 2.331122370414423f64.powi(2)).sqrt();
     for (k, stable) in [(0.9, false), (1.001, true), (limit - 1e-3, true), (limit + 1e-3, false)] {
-        assert_eq!(closed_loop_is_stable(&delayed(&[k], &[1.0, -1.0], 0.5)), stable, "{k}");
+        assert_eq!(
+            closed_loop_is_stable(&delayed_transfer_function(&[k], &[1.0, -1.0], 0.5)),
+            stable,
+            "{k}"
+        );
     }
     // With a delay in the wrong unit, the test of stability still terminates.
-    assert!(!closed_loop_is_stable(&delayed(&[5.0], &[1.0, 0.0], 1e9)));
+    assert!(!closed_loop_is_stable(&delayed_transfer_function(
+        &[5.0],
+        &[1.0, 0.0],
+        1e9
+    )));
     // With any delay, the gain at infinite frequency must be less than one.
-    assert!(closed_loop_is_stable(&delayed(&[0.5], &[1.0], 1.0)));
-    assert!(!closed_loop_is_stable(&delayed(&[1.5], &[1.0], 1.0)));
-    assert!(closed_loop_is_stable(&delayed(&[0.6, 0.2], &[1.0, 2.0], 0.7)));
-    assert!(!closed_loop_is_stable(&delayed(&[-0.6, -2.1], &[1.0, 2.0], 0.7)));
+    assert!(closed_loop_is_stable(&delayed_transfer_function(&[0.5], &[1.0], 1.0)));
+    assert!(!closed_loop_is_stable(&delayed_transfer_function(&[1.5], &[1.0], 1.0)));
+    assert!(closed_loop_is_stable(&delayed_transfer_function(
+        &[0.6, 0.2],
+        &[1.0, 2.0],
+        0.7
+    )));
+    assert!(!closed_loop_is_stable(&delayed_transfer_function(
+        &[-0.6, -2.1],
+        &[1.0, 2.0],
+        0.7
+    )));
 }
 
 #[test]
@@ -265,7 +281,7 @@ fn marginal_and_hidden_modes_are_not_stable() {
 /// and the margin nearest to zero is not at the lowest of them.
 #[test]
 fn all_crossings_are_found() {
-    let resonance = delayed(&[81.0], &[1.0, 1.0, 81.0], 0.15);
+    let resonance = delayed_transfer_function(&[81.0], &[1.0, 1.0, 81.0], 0.15);
     let l = resonance.series(&tf(&[2.5], &[1.0, 0.0]));
     let found = crossings(|w| l.response(w), MANUAL_CONTROL_RANGE_RAD_S);
     assert_eq!(found.gain.len(), 3, "{found:?}");
@@ -286,9 +302,9 @@ fn all_crossings_are_found() {
 #[test]
 fn unstable_pole_counts_match_the_transfer_function() {
     let operators = [
-        delayed(&[1.0], &[1.0], 0.2),
-        delayed(&[81.0], &[1.0, 1.0, 81.0], 0.15),
-        delayed(&[60.0, 81.0], &[1.0, 6.0, 81.0], 0.3),
+        delayed_transfer_function(&[1.0], &[1.0], 0.2),
+        delayed_transfer_function(&[81.0], &[1.0, 1.0, 81.0], 0.15),
+        delayed_transfer_function(&[60.0, 81.0], &[1.0, 6.0, 81.0], 0.3),
     ];
     let elements = [
         tf(&[1.0], &[1.0, 0.0]),

@@ -5,7 +5,7 @@ use crate::ModelError;
 
 impl FamilyOperator {
     /// True if both operators have the same form, which is required for a transition between them.
-    pub fn is_like(&self, other: &Self) -> bool {
+    pub fn has_same_form(&self, other: &Self) -> bool {
         self.form() == other.form() && self.has_neuromuscular() == other.has_neuromuscular()
     }
 
@@ -14,7 +14,11 @@ impl FamilyOperator {
     ///
     /// # Errors
     /// As [`FamilyOperator::new`].
-    pub fn between(&self, other: &Self, between: impl Fn(f64, f64) -> f64) -> Result<Self, ModelError> {
+    pub fn with_interpolated_parameters(
+        &self,
+        other: &Self,
+        between: impl Fn(f64, f64) -> f64,
+    ) -> Result<Self, ModelError> {
         let on_its_way = |(kind, (x, y)): (Coordinate, (&f64, &f64))| match kind {
             Coordinate::Delay => *x,
             // If both values are equal, this value is kept exactly.
@@ -23,7 +27,7 @@ impl FamilyOperator {
             _ => between(*x, *y),
         };
         let both = self.coordinates().iter().zip(other.coordinates());
-        let coordinates: Vec<f64> = self.kinds().into_iter().zip(both).map(on_its_way).collect();
+        let coordinates: Vec<f64> = self.coordinate_kinds().into_iter().zip(both).map(on_its_way).collect();
         Self::new(self.form(), self.has_neuromuscular(), &coordinates)
     }
 
@@ -33,7 +37,7 @@ impl FamilyOperator {
     /// # Errors
     /// As [`FamilyOperator::new`].
     pub fn with_neuromuscular(&self, omega_nm_rad_s: f64, zeta_nm: f64) -> Result<Self, ModelError> {
-        self.with(|kind, x| match kind {
+        self.with_coordinates(|kind, x| match kind {
             Coordinate::LogOmega => omega_nm_rad_s.ln(),
             Coordinate::LogZeta => zeta_nm.ln(),
             _ => x,
@@ -45,16 +49,16 @@ impl FamilyOperator {
     /// # Errors
     /// As [`FamilyOperator::new`].
     pub fn with_delay(&self, tau_e_s: f64) -> Result<Self, ModelError> {
-        self.with(|kind, x| if kind == Coordinate::Delay { tau_e_s } else { x })
+        self.with_coordinates(|kind, x| if kind == Coordinate::Delay { tau_e_s } else { x })
     }
 
-    fn with(&self, value: impl Fn(Coordinate, f64) -> f64) -> Result<Self, ModelError> {
-        let all = self.kinds().into_iter().zip(self.coordinates());
+    fn with_coordinates(&self, value: impl Fn(Coordinate, f64) -> f64) -> Result<Self, ModelError> {
+        let all = self.coordinate_kinds().into_iter().zip(self.coordinates());
         let coordinates: Vec<f64> = all.map(|(kind, x)| value(kind, *x)).collect();
         Self::new(self.form(), self.has_neuromuscular(), &coordinates)
     }
 
-    fn kinds(&self) -> Vec<Coordinate> {
+    fn coordinate_kinds(&self) -> Vec<Coordinate> {
         self.form().coordinates(self.has_neuromuscular())
     }
 }
@@ -64,11 +68,11 @@ mod tests {
     use super::super::{Form, examples::operator};
 
     #[test]
-    fn between_interpolates_only_changed_parameters() {
+    fn only_changed_parameters_are_interpolated() {
         let (a, b) = (operator(Form::LeadLag, true, 0.1), operator(Form::LeadLag, true, 0.3));
         let b = b.with_neuromuscular(9.0, 0.45).unwrap();
-        let half = a.between(&b, |x, y| 0.5 * (x + y)).unwrap();
-        let (omega, zeta) = half.neuromuscular().unwrap();
+        let half = a.with_interpolated_parameters(&b, |x, y| 0.5 * (x + y)).unwrap();
+        let (omega, zeta) = half.neuromuscular_parameters().unwrap();
         assert!((omega - 10.0).abs() < 1e-12 && (zeta - 0.35).abs() < 1e-12);
         // Coordinates that are equal in both operators, and the delay, are bit-identical to the values of the first
         // operator.
@@ -77,7 +81,7 @@ mod tests {
         assert_eq!(a.with_delay(0.3).unwrap().tau_e_s(), 0.3);
         let bare = operator(Form::Gain, false, 0.1);
         assert_eq!(bare.with_neuromuscular(9.0, 0.4).unwrap(), bare);
-        assert!(!a.is_like(&bare));
+        assert!(!a.has_same_form(&bare));
         assert!(a.with_delay(-0.1).is_err() && a.with_neuromuscular(-1.0, 0.4).is_err());
     }
 }

@@ -6,7 +6,7 @@
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Number of partial derivatives: the largest number of parameters of a form.
-pub const PARTIALS: usize = 6;
+pub const PARTIAL_COUNT: usize = 6;
 
 /// A value and its partial derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,7 +14,7 @@ pub struct Dual {
     /// Value of the number.
     pub value: f64,
     /// Partial derivatives of the value.
-    pub partials: [f64; PARTIALS],
+    pub partials: [f64; PARTIAL_COUNT],
 }
 
 impl Dual {
@@ -22,13 +22,13 @@ impl Dual {
     pub const fn constant(value: f64) -> Self {
         Self {
             value,
-            partials: [0.0; PARTIALS],
+            partials: [0.0; PARTIAL_COUNT],
         }
     }
 
     /// Returns the variable with this index, whose derivative with respect to itself is one.
     pub fn variable(value: f64, index: usize) -> Self {
-        let mut partials = [0.0; PARTIALS];
+        let mut partials = [0.0; PARTIAL_COUNT];
         partials[index] = 1.0;
         Self { value, partials }
     }
@@ -120,6 +120,6 @@ mod tests {
         let exact = f(Dual::variable(x, 0), Dual::variable(y, 1)).partials;
         assert!((exact[0] - (at(x + h, y) - at(x - h, y)) / (2.0 * h)).abs() < 1e-8);
         assert!((exact[1] - (at(x, y + h) - at(x, y - h)) / (2.0 * h)).abs() < 1e-8);
-        assert_eq!(exact[2..], [0.0; PARTIALS - 2]);
+        assert_eq!(exact[2..], [0.0; PARTIAL_COUNT - 2]);
     }
 }

@@ -92,13 +92,13 @@ mod tests {
     use super::*;
     use crate::Form;
 
-    fn fitted() -> FittedOperator {
+    fn fitted_operator() -> FittedOperator {
         FittedOperator {
             operator: FamilyOperator::new(Form::Gain, true, &[2.0, 2.4, -1.2, 0.2]).unwrap(),
             covariance: (0..16).map(|i| if i % 5 == 0 { 0.01 } else { 0.0 }).collect(),
             noise: (Vec::new(), vec![-0.9]),
             innovation_variance: 0.1,
-            sample_time: SampleTime::HUNDREDTH,
+            sample_time: SampleTime::AT_100_HZ,
             units: ["deg".to_owned(), String::new()],
             source: "fit.json".to_owned(),
         }
@@ -106,8 +106,8 @@ mod tests {
 
     #[test]
     fn fit_with_other_rate_or_units_is_refused_with_a_remedy() {
-        let fit = fitted().checked().unwrap();
-        let ts = SampleTime::HUNDREDTH;
+        let fit = fitted_operator().checked().unwrap();
+        let ts = SampleTime::AT_100_HZ;
         for units in [["deg", "mm"], ["", ""]] {
             assert!(fit.check_samples(ts, units).is_ok());
         }
@@ -124,20 +124,20 @@ mod tests {
     fn invalid_numbers_are_refused() {
         let short = FittedOperator {
             covariance: vec![1.0; 4],
-            ..fitted()
+            ..fitted_operator()
         };
         assert!(short.checked().unwrap_err().to_string().contains("expected 16"));
         let negative = FittedOperator {
             covariance: (0..16).map(|i| if i == 0 { -1.0 } else { 0.0 }).collect(),
-            ..fitted()
+            ..fitted_operator()
         };
         let endless = FittedOperator {
             noise: (vec![f64::NAN], Vec::new()),
-            ..fitted()
+            ..fitted_operator()
         };
         let silent = FittedOperator {
             innovation_variance: 0.0,
-            ..fitted()
+            ..fitted_operator()
         };
         for wrong in [negative, endless, silent] {
             assert!(wrong.checked().is_err());

@@ -1,6 +1,6 @@
 //! The forms of the family, and the coordinates of an operator.
 
-use super::dual::{Dual, PARTIALS};
+use super::dual::{Dual, PARTIAL_COUNT};
 
 /// A form of the operator, without its delay and neuromuscular part; p is the power of the lead, q the power of the
 /// lag.
@@ -53,14 +53,14 @@ crate::named_choice!(Form, "form of the operator", 12, {
 });
 
 /// Leak rate of an integration, 1/s. It is too low to be visible in a record, but keeps the discrete model stable.
-const LEAK: f64 = 1e-4;
+const LEAK_RATE_PER_S: f64 = 1e-4;
 
 /// Time constants of the semicircular canals, s: of the lead and of the lag, which turns the response to the angular
 /// acceleration into one to the angular rate between 0.17 and 9 rad/s.
-const CANALS_S: (f64, f64) = (0.11, 5.9);
+const CANAL_TIME_CONSTANTS_S: (f64, f64) = (0.11, 5.9);
 
 /// Number of coefficients of the numerator, for powers of s from 0 to 3.
-pub const POWERS: usize = 4;
+pub const POWER_COUNT: usize = 4;
 
 /// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in coordinates whose estimates
 /// are nearly normal even if the data carry little information.
@@ -119,7 +119,7 @@ impl Coordinate {
 
     /// Returns the coordinate that belongs to a parameter name; `None` for K_e_dot, which is a product of two
     /// coordinates, and for unknown names.
-    pub fn of_parameter(name: &str) -> Option<Self> {
+    pub fn from_parameter(name: &str) -> Option<Self> {
         match name {
             "K_over_T_I" | "K_I" | "K_e" | "K_d" | "K_m" | "K_m_rate" => Some(Self::Gain),
             _ => Self::ALL.into_iter().find(|coordinate| coordinate.parameter() == name),
@@ -144,13 +144,13 @@ impl Coordinate {
 
 /// Numerator `n_0 + n_1 s + n_2 s^2 + n_3 s^3` of an operator, and its pole `-a`, if it has one.
 pub(super) struct Rational {
-    pub numerator: [Dual; POWERS],
+    pub numerator: [Dual; POWER_COUNT],
     pub pole: Option<Dual>,
 }
 
 impl Form {
     /// Forms of the response to the error. Derivative forms are excluded, because people respond to a constant error.
-    pub const OF_ERROR: [Self; 8] = [
+    pub const ERROR_FORMS: [Self; 8] = [
         Self::Gain,
         Self::Lead,
         Self::Lead2,
@@ -162,7 +162,7 @@ impl Form {
     ];
 
     /// Forms of the response to a displayed target: to its value, rate and acceleration.
-    pub const OF_TARGET: [Self; 5] = [
+    pub const TARGET_FORMS: [Self; 5] = [
         Self::Gain,
         Self::Lead,
         Self::Lag,
@@ -173,7 +173,7 @@ impl Form {
     /// Forms of the response to motion, for an input that is an angle: to the angle, to its rate, and by the
     /// semicircular canals (R. A. Hess, J. Guidance, Control, and Dynamics 13 (1990) 131-140, for the rate; D. M. Pool,
     /// *Objective Evaluation of Flight Simulator Motion Cueing Fidelity*, 2012, for the canals).
-    pub const OF_MOTION: [Self; 4] = [Self::Gain, Self::Lag, Self::Derivative, Self::Canals];
+    pub const MOTION_FORMS: [Self; 4] = [Self::Gain, Self::Lag, Self::Derivative, Self::Canals];
 
     /// True if the steady response of the form to a constant input is zero.
     pub fn is_derivative(self) -> bool {
@@ -184,7 +184,7 @@ impl Form {
     }
 
     /// Returns name and unit of the parameter by which a gain of this form is given: `K`, `K_I`, `K_d` or `K_m`.
-    pub fn gain(self) -> (&'static str, &'static str) {
+    pub fn gain_name_and_unit(self) -> (&'static str, &'static str) {
         match self {
             Self::QuadraticIntegral => ("K_I", "1/s"),
             Self::Derivative | Self::DerivativeLead => ("K_d", "s"),
@@ -226,7 +226,7 @@ impl Form {
 
     /// Returns the number of coordinates of the form without the neuromuscular part; a form with fewer coordinates is
     /// simpler.
-    pub fn simplicity(self) -> usize {
+    pub fn coordinate_count(self) -> usize {
         self.coordinates(false).len()
     }
 
@@ -250,7 +250,7 @@ impl Form {
 
     /// Number of coordinates of the numerator other than the gain: T_L, or c_1 and c_2, or T_L and alpha. These
     /// coordinates follow the gain in [`Form::coordinates`] and precede the coordinates of the poles.
-    pub fn varying_beside_gain(self) -> usize {
+    pub fn shape_coordinate_count(self) -> usize {
         match self {
             Self::Gain | Self::Lag | Self::Derivative | Self::Canals | Self::CanalsRate => 0,
             Self::Lead | Self::Lead2 | Self::LeadLag | Self::Lead2Lag | Self::DerivativeLead => 1,
@@ -260,9 +260,9 @@ impl Form {
 
     /// Returns the numerator divided by its gain, `m_0 + m_1 s + m_2 s^2 + m_3 s^3`, and the derivatives of these
     /// coefficients with respect to x. Here x contains the coordinates of the numerator that follow the gain.
-    pub fn shape(self, x: &[f64]) -> ([f64; POWERS], [[f64; POWERS]; 2]) {
-        let none = [0.0; POWERS];
-        let (lead, lag) = CANALS_S;
+    pub fn shape(self, x: &[f64]) -> ([f64; POWER_COUNT], [[f64; POWER_COUNT]; 2]) {
+        let none = [0.0; POWER_COUNT];
+        let (lead, lag) = CANAL_TIME_CONSTANTS_S;
         match self {
             Self::Gain | Self::Lag => ([1.0, 0.0, 0.0, 0.0], [none; 2]),
             Self::Lead | Self::LeadLag => ([1.0, x[0], 0.0, 0.0], [[0.0, 1.0, 0.0, 0.0], none]),
@@ -290,7 +290,7 @@ impl Form {
     pub(super) fn rational(self, x: &[Dual]) -> Rational {
         let zero = Dual::constant(0.0);
         let k = x[0];
-        let (lead, lag) = CANALS_S;
+        let (lead, lag) = CANAL_TIME_CONSTANTS_S;
         let canals = Some(Dual::constant(1.0 / lag));
         let (numerator, pole) = match self {
             Self::Gain => ([k, zero, zero, zero], None),
@@ -299,10 +299,10 @@ impl Form {
             Self::Lag => ([k, zero, zero, zero], Some(x[1])),
             Self::LeadLag => ([k, k * x[1], zero, zero], Some(x[2])),
             Self::Lead2Lag => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1], zero], Some(x[2])),
-            Self::QuadraticIntegral => ([k, k * x[1], k * x[2], zero], Some(Dual::constant(LEAK))),
+            Self::QuadraticIntegral => ([k, k * x[1], k * x[2], zero], Some(Dual::constant(LEAK_RATE_PER_S))),
             Self::LeadDroop => (
                 [k * x[2], k + k * x[1] * x[2], k * x[1], zero],
-                Some(Dual::constant(LEAK)),
+                Some(Dual::constant(LEAK_RATE_PER_S)),
             ),
             Self::Derivative => ([zero, k, zero, zero], None),
             Self::DerivativeLead => ([zero, k, k * x[1], zero], None),
@@ -313,7 +313,7 @@ impl Form {
     }
 }
 
-const _: () = assert!(PARTIALS >= 6);
+const _: () = assert!(PARTIAL_COUNT >= 6);
 
 #[cfg(test)]
 mod tests {
@@ -329,7 +329,7 @@ mod tests {
             for (i, n) in numerator.iter().enumerate() {
                 assert!((n.value - 3.0 * shape[i]).abs() < 1e-14, "{form} {i}");
                 assert!((n.partials[0] - shape[i]).abs() < 1e-14, "{form} {i}");
-                for j in 0..form.varying_beside_gain() {
+                for j in 0..form.shape_coordinate_count() {
                     assert!((n.partials[1 + j] - 3.0 * slopes[j][i]).abs() < 1e-14, "{form} {i} {j}");
                 }
             }

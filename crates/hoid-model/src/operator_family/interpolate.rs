@@ -20,7 +20,9 @@
 
 use super::{
     dual::Dual,
-    matrices::{SIZE, Vector, characteristic, companion, exponential, product, times},
+    matrices::{
+        MATRIX_SIZE, Vector, characteristic_polynomial, companion, exponential, matrix_vector_product, product,
+    },
     operator::FamilyOperator,
     zoh::HeldFamily,
 };
@@ -38,27 +40,31 @@ impl FamilyOperator {
     /// [`ModelError::OutOfRange`] if an exponential overflows or the delay is too long in samples.
     pub fn interpolate(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
         let late = self.tau_e_s() + 0.5 * sample_time.s();
-        self.interpolate_within(whole_samples(late, sample_time)?, sample_time)
+        self.interpolate_with_delay_samples(whole_samples(late, sample_time)?, sample_time)
     }
 
     /// As [`FamilyOperator::interpolate`], with a given number l of whole samples in `tau + Ts/2`.
     ///
     /// # Errors
     /// As [`FamilyOperator::interpolate`].
-    pub fn interpolate_within(&self, sample: usize, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
+    pub fn interpolate_with_delay_samples(
+        &self,
+        sample: usize,
+        sample_time: SampleTime,
+    ) -> Result<HeldFamily, ModelError> {
         let variables = self.variables();
         let ts = sample_time.s();
         let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
         let delay = variables[variables.len() - 1];
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64 - 0.5);
         let rest = one - delta;
-        let (numerator, denominator) = self.by_samples(&variables, ts);
+        let (numerator, denominator) = self.scaled_polynomials(&variables, ts);
         let order = self.order();
         let direct = if self.has_direct_part() { numerator[order] } else { zero };
         let output: Vec<Dual> = (0..order).map(|i| numerator[i] - direct * denominator[i]).collect();
 
-        let mut phi = [[zero; SIZE]; SIZE];
-        let (mut oldest, mut middle, mut newest) = ([zero; SIZE], [zero; SIZE], [zero; SIZE]);
+        let mut phi = [[zero; MATRIX_SIZE]; MATRIX_SIZE];
+        let (mut oldest, mut middle, mut newest) = ([zero; MATRIX_SIZE], [zero; MATRIX_SIZE], [zero; MATRIX_SIZE]);
         if order > 0 {
             let system = companion(&denominator, order);
             let (first, second) = (exponential(&system, delta), exponential(&system, rest));
@@ -66,13 +72,13 @@ impl FamilyOperator {
             let column = |m: &super::matrices::Matrix, j: usize| -> Vector { std::array::from_fn(|i| m[i][j]) };
             let (step, ramp) = (column(&first, order), column(&first, order + 1));
             let (last_step, last_ramp) = (column(&second, order), column(&second, order + 1));
-            let combined = |f: &dyn Fn(usize) -> Dual| times(&second, &std::array::from_fn(f), order);
+            let combined = |f: &dyn Fn(usize) -> Dual| matrix_vector_product(&second, &std::array::from_fn(f), order);
             oldest = combined(&|i| delta * step[i] - ramp[i]);
             let held = combined(&|i| rest * step[i] + ramp[i]);
             middle = std::array::from_fn(|i| held[i] + last_step[i] - last_ramp[i]);
             newest = last_ramp;
         }
-        let f = characteristic(&phi, order);
+        let f = characteristic_polynomial(&phi, order);
 
         let (nb, _) = self.interpolated_orders();
         let mut impulse = vec![zero; nb];
@@ -80,12 +86,12 @@ impl FamilyOperator {
             let mut state = start;
             for value in impulse.iter_mut().skip(late) {
                 *value = (0..order).fold(*value, |sum, i| sum + output[i] * state[i]);
-                state = times(&phi, &state, order);
+                state = matrix_vector_product(&phi, &state, order);
             }
         }
         impulse[0] = impulse[0] + direct * rest;
         impulse[1] = impulse[1] + direct * delta;
-        HeldFamily::of_impulse_response(sample, &impulse, &f)
+        HeldFamily::from_impulse_response(sample, &impulse, &f)
     }
 }
 
@@ -144,7 +150,7 @@ mod tests {
                     let mut x = operator.coordinates().to_vec();
                     x[i] = (x[i] + by).max(if i + 1 == x.len() { 0.0 } else { f64::MIN });
                     let moved = FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &x).unwrap();
-                    let model = moved.interpolate_within(sample, ts).unwrap();
+                    let model = moved.interpolate_with_delay_samples(sample, ts).unwrap();
                     ([model.b, model.f].concat(), x[i])
                 };
                 let ((up, above), (down, below)) = (at(h), at(-h));

@@ -31,8 +31,8 @@ mod matrices;
 mod operator;
 mod zoh;
 
-pub use dual::PARTIALS;
+pub use dual::PARTIAL_COUNT;
 pub use fitted::FittedOperator;
-pub use form::{Coordinate, Form, POWERS};
+pub use form::{Coordinate, Form, POWER_COUNT};
 pub use operator::{FamilyOperator, FamilyResponse, NamedParameter, PARAMETERS};
 pub use zoh::HeldFamily;

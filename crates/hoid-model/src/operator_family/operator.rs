@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 use super::{
-    dual::{Dual, PARTIALS},
+    dual::{Dual, PARTIAL_COUNT},
     form::{Coordinate, Form, Rational},
 };
 use crate::{
@@ -11,7 +11,7 @@ use crate::{
     uncertainty::{Estimate, variance_along},
 };
 
-/// Names and units of the parameters of all forms; the names are those of [`FamilyOperator::named`].
+/// Names and units of the parameters of all forms; the names are those of [`FamilyOperator::named_parameters`].
 pub const PARAMETERS: [(&str, &str); 16] = [
     ("K", ""),
     ("K_over_T_I", "1/s"),
@@ -95,14 +95,14 @@ pub struct NamedParameter {
 }
 
 impl Form {
-    /// Returns the names of the parameters of an operator with this form, in the order of [`FamilyOperator::named`].
+    /// Returns the names of the parameters of an operator with this form, in the order of [`FamilyOperator::named_parameters`].
     pub fn parameters(self, neuromuscular: bool) -> Vec<&'static str> {
         let any = FamilyOperator {
             form: self,
             neuromuscular,
             coordinates: vec![1.0; self.coordinates(neuromuscular).len()],
         };
-        any.named().iter().map(|p| p.name).collect()
+        any.named_parameters().iter().map(|p| p.name).collect()
     }
 }
 
@@ -157,7 +157,7 @@ impl FamilyOperator {
     /// # Errors
     /// [`ModelError::Operator`] for a name that is unknown or missing, for a gain given under two names, and for
     /// invalid values; otherwise as [`FamilyOperator::new`].
-    pub fn of_names(form: Form, pairs: &[(String, f64)]) -> Result<Self, ModelError> {
+    pub fn from_names(form: Form, pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         let wrong = |reason: String| ModelError::Operator { reason };
         let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);
         let need = |name: &str| find(name).ok_or_else(|| wrong(format!("{name} is missing for the form {form}")));
@@ -178,7 +178,7 @@ impl FamilyOperator {
                     Some(ratio) => (&["K_over_T_I"], ratio),
                     None => (&["K"], need("K")? / positive("T_I")?),
                 },
-                Coordinate::Gain => match form.gain() {
+                Coordinate::Gain => match form.gain_name_and_unit() {
                     ("K", _) if find("K").is_none() => (&["K_e"], need("K_e")?),
                     ("K_I", _) => (&["K_I"], need("K_I")?),
                     ("K_d", _) => (&["K_d"], need("K_d")?),
@@ -234,7 +234,7 @@ impl FamilyOperator {
     }
 
     /// Neuromuscular frequency in rad/s and damping ratio; `None` without a neuromuscular part.
-    pub fn neuromuscular(&self) -> Option<(f64, f64)> {
+    pub fn neuromuscular_parameters(&self) -> Option<(f64, f64)> {
         let (log_omega, log_zeta) = (
             self.coordinate(Coordinate::LogOmega)?,
             self.coordinate(Coordinate::LogZeta)?,
@@ -244,7 +244,7 @@ impl FamilyOperator {
 
     /// Returns the parameters by name: `K`, `K_over_T_I`, `T_L`, `T_I`, `omega_nm`, `zeta_nm`, `tau_e`; `K_e`, `T_L`,
     /// `K_e_dot` for the lead; `c_1`, `c_2`, `alpha` for the alternative forms.
-    pub fn named(&self) -> Vec<NamedParameter> {
+    pub fn named_parameters(&self) -> Vec<NamedParameter> {
         let gain = self.coordinates[0];
         let mut all = Vec::new();
         let mut put = |name, unit, value, coordinate| {
@@ -265,7 +265,7 @@ impl FamilyOperator {
                 }
                 Coordinate::Gain if self.form == Form::Lead => put("K_e", "", gain, own),
                 Coordinate::Gain => {
-                    let (name, unit) = self.form.gain();
+                    let (name, unit) = self.form.gain_name_and_unit();
                     put(name, unit, gain, own);
                 }
                 Coordinate::Lead => {
@@ -286,7 +286,7 @@ impl FamilyOperator {
         all
     }
 
-    /// Returns the parameters of [`FamilyOperator::named`], each with its derivatives with respect to the coordinates.
+    /// Returns the parameters of [`FamilyOperator::named_parameters`], each with its derivatives with respect to the coordinates.
     pub fn named_gradients(&self) -> Vec<(NamedParameter, Vec<f64>)> {
         let x = &self.coordinates;
         let all = self.form.coordinates(self.neuromuscular);
@@ -309,10 +309,10 @@ impl FamilyOperator {
             }
             (parameter, gradient)
         };
-        self.named().into_iter().map(with).collect()
+        self.named_parameters().into_iter().map(with).collect()
     }
 
-    /// Returns the parameters of [`FamilyOperator::named`] with their standard errors to first order, from the
+    /// Returns the parameters of [`FamilyOperator::named_parameters`] with their standard errors to first order, from the
     /// covariance of the coordinates by rows. A standard error is missing if there is no covariance or the parameter is
     /// infinite.
     pub fn named_estimates(&self, covariance: Option<&[f64]>) -> Vec<(NamedParameter, Estimate)> {
@@ -335,7 +335,7 @@ impl FamilyOperator {
     }
 
     /// Returns omega and zeta as functions of the coordinates; `None` without a neuromuscular part.
-    pub(super) fn neuromuscular_of(&self, variables: &[Dual]) -> Option<(Dual, Dual)> {
+    pub(super) fn neuromuscular_variables(&self, variables: &[Dual]) -> Option<(Dual, Dual)> {
         let n = variables.len();
         self.neuromuscular
             .then(|| (variables[n - 3].exp(), variables[n - 2].exp()))
@@ -350,7 +350,7 @@ impl FamilyOperator {
         // Value and derivatives of a polynomial in s whose coefficients are functions of the coordinates.
         let of = |coefficients: &[Dual]| {
             let mut value = zero;
-            let mut partials = [zero; PARTIALS];
+            let mut partials = [zero; PARTIAL_COUNT];
             for c in coefficients.iter().rev() {
                 value = value * s + c.value;
                 for (p, d) in partials.iter_mut().zip(c.partials) {
@@ -362,7 +362,7 @@ impl FamilyOperator {
         let (n, n_slopes) = of(&numerator);
         let mut value = n;
         let mut gradient = n_slopes;
-        let mut divide = |(d, slopes): (Complex64, [Complex64; PARTIALS])| {
+        let mut divide = |(d, slopes): (Complex64, [Complex64; PARTIAL_COUNT])| {
             value /= d;
             for (g, slope) in gradient.iter_mut().zip(slopes) {
                 *g = (*g - value * slope) / d;
@@ -372,7 +372,7 @@ impl FamilyOperator {
         if let Some(a) = pole {
             divide(of(&[a, one]));
         }
-        if let Some((omega, zeta)) = self.neuromuscular_of(&variables) {
+        if let Some((omega, zeta)) = self.neuromuscular_variables(&variables) {
             divide(of(&[one, (zeta / omega).scaled(2.0), one / (omega * omega)]));
         }
         let delay = self.coordinates.len() - 1;
@@ -401,7 +401,7 @@ impl FamilyOperator {
         if let Some(a) = pole {
             den = vec![1.0, a.value];
         }
-        if let Some((omega, zeta)) = self.neuromuscular() {
+        if let Some((omega, zeta)) = self.neuromuscular_parameters() {
             let square = omega * omega;
             num.iter_mut().for_each(|c| *c *= square);
             den = polynomial::product(&den, &[1.0, 2.0 * zeta * omega, square]);
@@ -420,7 +420,7 @@ mod tests {
 
     /// A change of gain affects only the real part of `dY/Y`, a change of delay only the imaginary part.
     #[test]
-    fn relative_covariance_of_a_gain_and_a_delay() {
+    fn gain_affects_real_part_and_delay_imaginary_part_of_relative_covariance() {
         let operator = FamilyOperator::new(Form::Gain, false, &[2.0, 0.3]).unwrap();
         let response = operator.response_and_gradient(5.0);
         let [[gain, both], [again, phase]] = response.relative_covariance(&[0.04, 0.003, 0.003, 0.01]);
@@ -435,21 +435,21 @@ mod tests {
     fn parameter_names_cover_all_forms() {
         let mut seen = Vec::new();
         for form in Form::ALL {
-            for named in typical(form).named() {
+            for named in typical(form).named_parameters() {
                 assert!(PARAMETERS.contains(&(named.name, named.unit)), "{form} {}", named.name);
                 seen.push(named.name);
                 // K of a form with a lag has no coordinate, because it is a quotient of two coordinates.
                 if let Some(coordinate) = named.coordinate {
-                    assert_eq!(Coordinate::of_parameter(named.name), Some(coordinate), "{form}");
+                    assert_eq!(Coordinate::from_parameter(named.name), Some(coordinate), "{form}");
                 }
             }
         }
         assert!(PARAMETERS.iter().all(|(name, _)| seen.contains(name)));
         for coordinate in Coordinate::ALL {
-            assert_eq!(Coordinate::of_parameter(coordinate.parameter()), Some(coordinate));
+            assert_eq!(Coordinate::from_parameter(coordinate.parameter()), Some(coordinate));
         }
-        assert_eq!(Coordinate::of_parameter("K_e_dot"), None);
-        assert_eq!(Coordinate::of_parameter("gain"), None);
+        assert_eq!(Coordinate::from_parameter("K_e_dot"), None);
+        assert_eq!(Coordinate::from_parameter("gain"), None);
     }
 
     #[test]
@@ -490,19 +490,19 @@ mod tests {
         for form in Form::ALL {
             let operator = typical(form);
             let pairs: Vec<(String, f64)> = operator
-                .named()
+                .named_parameters()
                 .iter()
                 .filter(|p| !["K_e_dot"].contains(&p.name))
                 .filter(|p| !(form.has_lag() && p.name == "K"))
                 .map(|p| (p.name.to_owned(), p.value))
                 .collect();
-            let back = FamilyOperator::of_names(form, &pairs).unwrap();
+            let back = FamilyOperator::from_names(form, &pairs).unwrap();
             for (a, b) in back.coordinates.iter().zip(&operator.coordinates) {
                 assert!((a - b).abs() < 1e-14 * (1.0 + b.abs()), "{form}");
             }
         }
         let k = |name: &str, value: f64| (name.to_owned(), value);
-        let lag = FamilyOperator::of_names(Form::Lag, &[k("K", 10.0), k("T_I", 5.0)]).unwrap();
+        let lag = FamilyOperator::from_names(Form::Lag, &[k("K", 10.0), k("T_I", 5.0)]).unwrap();
         assert_eq!(
             (lag.coordinates(), lag.has_neuromuscular()),
             (&[2.0, 0.2, 0.0][..], false)
@@ -518,7 +518,7 @@ mod tests {
                     let at = |by: f64| {
                         let mut x = operator.coordinates.clone();
                         x[i] += by;
-                        FamilyOperator::new(form, true, &x).unwrap().named()[k].value
+                        FamilyOperator::new(form, true, &x).unwrap().named_parameters()[k].value
                     };
                     let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
                     let error = (gradient[i] - difference).abs();
@@ -539,7 +539,7 @@ mod tests {
         assert!(FamilyOperator::new(Form::Gain, false, &[1.0, -0.1]).is_err());
         assert!(FamilyOperator::new(Form::Gain, false, &[f64::NAN, 0.1]).is_err());
         let pair = |name: &str, value: f64| (name.to_owned(), value);
-        let lag = |pairs: &[(String, f64)]| FamilyOperator::of_names(Form::Lag, pairs);
+        let lag = |pairs: &[(String, f64)]| FamilyOperator::from_names(Form::Lag, pairs);
         assert!(
             lag(&[pair("K", 1.0)])
                 .unwrap_err()

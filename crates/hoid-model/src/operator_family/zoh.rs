@@ -19,9 +19,11 @@
 //! around `t - tau - Ts/2`. The additional delay Ts/2 is the delay that the hold gives to all other parts.
 
 use super::{
-    dual::{Dual, PARTIALS},
-    form::{POWERS, Rational},
-    matrices::{Matrix, SIZE, Vector, characteristic, companion, exponential, product, times},
+    dual::{Dual, PARTIAL_COUNT},
+    form::{POWER_COUNT, Rational},
+    matrices::{
+        MATRIX_SIZE, Matrix, Vector, characteristic_polynomial, companion, exponential, matrix_vector_product, product,
+    },
     operator::FamilyOperator,
 };
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
@@ -37,7 +39,7 @@ pub struct HeldFamily {
     pub f: Vec<f64>,
     /// Derivatives of the coefficients of B, then of F: one row for each coefficient, with one column for each
     /// coordinate.
-    pub jacobian: Vec<[f64; PARTIALS]>,
+    pub jacobian: Vec<[f64; PARTIAL_COUNT]>,
 }
 
 /// Dynamics of the poles and the delay over one sample, independent of the numerator.
@@ -55,7 +57,7 @@ struct HeldPoles {
 
 impl HeldFamily {
     /// Returns the model with the denominator F whose impulse response, from lag nk on, is `impulse`: `B = F h`.
-    pub(super) fn of_impulse_response(nk: usize, impulse: &[Dual], f: &[Dual]) -> Result<Self, ModelError> {
+    pub(super) fn from_impulse_response(nk: usize, impulse: &[Dual], f: &[Dual]) -> Result<Self, ModelError> {
         let order = f.len();
         let b: Vec<Dual> = (0..impulse.len())
             .map(|k| (1..=order.min(k)).fold(impulse[k], |sum, i| sum + f[i - 1] * impulse[k - i]))
@@ -102,7 +104,7 @@ impl FamilyOperator {
     /// # Errors
     /// [`ModelError::OutOfRange`] if an exponential overflows or the delay is too long in samples.
     pub fn zoh(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
-        self.zoh_within(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
+        self.zoh_with_delay_samples(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
     }
 
     /// As [`FamilyOperator::zoh`], with a given number of whole samples in the delay. `delta = tau - sample Ts` may be
@@ -110,11 +112,11 @@ impl FamilyOperator {
     ///
     /// # Errors
     /// As [`FamilyOperator::zoh`].
-    pub fn zoh_within(&self, sample: usize, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
+    pub fn zoh_with_delay_samples(&self, sample: usize, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
         let variables = self.variables();
         let Rational { numerator, .. } = self.form().rational(&variables);
         let poles = self.held_poles(&variables, sample, sample_time.s());
-        self.held(&poles, numerator, sample, sample_time.s())
+        self.held_model(&poles, numerator, sample, sample_time.s())
     }
 
     /// Returns exact discrete models with the numerators `s^i`, i from 0 to the degree of the numerator, and with the
@@ -124,11 +126,15 @@ impl FamilyOperator {
     ///
     /// # Errors
     /// As [`FamilyOperator::zoh`].
-    pub fn zoh_powers_within(&self, sample: usize, sample_time: SampleTime) -> Result<Vec<HeldFamily>, ModelError> {
+    pub fn zoh_powers_with_delay_samples(
+        &self,
+        sample: usize,
+        sample_time: SampleTime,
+    ) -> Result<Vec<HeldFamily>, ModelError> {
         let poles = self.held_poles(&self.variables(), sample, sample_time.s());
         let power = |i: usize| std::array::from_fn(|j| Dual::constant(f64::from(u8::from(i == j))));
         (0..=self.form().degree())
-            .map(|i| self.held(&poles, power(i), sample, sample_time.s()))
+            .map(|i| self.held_model(&poles, power(i), sample, sample_time.s()))
             .collect()
     }
 
@@ -137,11 +143,15 @@ impl FamilyOperator {
         let delay = variables[variables.len() - 1];
         // Time is in samples, which keeps the entries of all matrices at moderate size.
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
-        let denominator = self.denominator_by_samples(variables, ts);
+        let denominator = self.scaled_denominator(variables, ts);
         let order = self.order();
         let zero = Dual::constant(0.0);
         let rest = Dual::constant(1.0) - delta;
-        let (mut phi, mut gamma_old, mut gamma_new) = ([[zero; SIZE]; SIZE], [zero; SIZE], [zero; SIZE]);
+        let (mut phi, mut gamma_old, mut gamma_new) = (
+            [[zero; MATRIX_SIZE]; MATRIX_SIZE],
+            [zero; MATRIX_SIZE],
+            [zero; MATRIX_SIZE],
+        );
         if order > 0 {
             let first = exponential(&companion(&denominator, order), delta);
             let second = exponential(&companion(&denominator, order), rest);
@@ -153,7 +163,7 @@ impl FamilyOperator {
         }
         HeldPoles {
             gain: self.numerator_gain(variables),
-            f: characteristic(&phi, order),
+            f: characteristic_polynomial(&phi, order),
             denominator,
             delta,
             phi,
@@ -163,16 +173,16 @@ impl FamilyOperator {
     }
 
     /// Returns the model with the given numerator and poles.
-    fn held(
+    fn held_model(
         &self,
         poles: &HeldPoles,
-        numerator: [Dual; POWERS],
+        numerator: [Dual; POWER_COUNT],
         sample: usize,
         ts: f64,
     ) -> Result<HeldFamily, ModelError> {
         let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
         let order = self.order();
-        let numerator = self.numerator_by_samples(numerator, poles.gain, ts);
+        let numerator = self.scaled_numerator(numerator, poles.gain, ts);
         let direct = if self.has_direct_part() { numerator[order] } else { zero };
         // Output row of the strictly proper part, c_i = n_i - D d_i.
         let output: Vec<Dual> = (0..order)
@@ -191,8 +201,8 @@ impl FamilyOperator {
             if j + 1 < nb {
                 impulse[j + 1] = impulse[j + 1] + value(&late);
             }
-            state = times(&poles.phi, &state, order);
-            late = times(&poles.phi, &late, order);
+            state = matrix_vector_product(&poles.phi, &state, order);
+            late = matrix_vector_product(&poles.phi, &late, order);
         }
         if self.has_direct_part() {
             // The delay of the direct part is tau + Ts/2 = (sample + whole + part) Ts.
@@ -202,42 +212,42 @@ impl FamilyOperator {
             impulse[whole] = impulse[whole] + direct * (one - part);
             impulse[whole + 1] = impulse[whole + 1] + direct * part;
         }
-        HeldFamily::of_impulse_response(sample + shift, &impulse, &poles.f)
+        HeldFamily::from_impulse_response(sample + shift, &impulse, &poles.f)
     }
 
     /// Returns numerator and monic denominator of the operator in ascending powers of `s Ts`.
-    pub(super) fn by_samples(&self, variables: &[Dual], ts: f64) -> (Vector, Vector) {
+    pub(super) fn scaled_polynomials(&self, variables: &[Dual], ts: f64) -> (Vector, Vector) {
         let Rational { numerator, .. } = self.form().rational(variables);
         (
-            self.numerator_by_samples(numerator, self.numerator_gain(variables), ts),
-            self.denominator_by_samples(variables, ts),
+            self.scaled_numerator(numerator, self.numerator_gain(variables), ts),
+            self.scaled_denominator(variables, ts),
         )
     }
 
     /// Returns omega^2, the factor of the neuromuscular part in the numerator; `None` without a neuromuscular part.
     fn numerator_gain(&self, variables: &[Dual]) -> Option<Dual> {
-        self.neuromuscular_of(variables).map(|(omega, _)| omega * omega)
+        self.neuromuscular_variables(variables).map(|(omega, _)| omega * omega)
     }
 
-    fn numerator_by_samples(&self, numerator: [Dual; POWERS], gain: Option<Dual>, ts: f64) -> Vector {
-        let mut num = [Dual::constant(0.0); SIZE];
-        num[..POWERS].copy_from_slice(&numerator);
+    fn scaled_numerator(&self, numerator: [Dual; POWER_COUNT], gain: Option<Dual>, ts: f64) -> Vector {
+        let mut num = [Dual::constant(0.0); MATRIX_SIZE];
+        num[..POWER_COUNT].copy_from_slice(&numerator);
         if let Some(square) = gain {
             num = num.map(|c| c * square);
         }
-        std::array::from_fn(|i| num[i].scaled(self.scale(i, ts)))
+        std::array::from_fn(|i| num[i].scaled(self.scale_factor(i, ts)))
     }
 
-    fn denominator_by_samples(&self, variables: &[Dual], ts: f64) -> Vector {
+    fn scaled_denominator(&self, variables: &[Dual], ts: f64) -> Vector {
         let zero = Dual::constant(0.0);
         let one = Dual::constant(1.0);
         let Rational { pole, .. } = self.form().rational(variables);
-        let mut den = [zero; SIZE];
+        let mut den = [zero; MATRIX_SIZE];
         den[0] = one;
         if let Some(a) = pole {
             (den[0], den[1]) = (a, one);
         }
-        if let Some((omega, zeta)) = self.neuromuscular_of(variables) {
+        if let Some((omega, zeta)) = self.neuromuscular_variables(variables) {
             let square = omega * omega;
             let middle = (zeta * omega).scaled(2.0);
             let before = den;
@@ -246,12 +256,12 @@ impl FamilyOperator {
                 square * shifted(0) + middle * shifted(1) + shifted(2)
             });
         }
-        std::array::from_fn(|i| den[i].scaled(self.scale(i, ts)))
+        std::array::from_fn(|i| den[i].scaled(self.scale_factor(i, ts)))
     }
 
     /// Factor that converts a coefficient of s^i to the coefficient of `(s Ts)^i`, for a denominator that remains
     /// monic.
-    fn scale(&self, i: usize, ts: f64) -> f64 {
+    fn scale_factor(&self, i: usize, ts: f64) -> f64 {
         ts.powi(self.order() as i32 - i as i32)
     }
 }
@@ -301,7 +311,7 @@ mod tests {
                     let mut x = operator.coordinates().to_vec();
                     x[i] += by;
                     let moved = FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &x).unwrap();
-                    let held = moved.zoh_within(sample, ts()).unwrap();
+                    let held = moved.zoh_with_delay_samples(sample, ts()).unwrap();
                     [held.b, held.f].concat()
                 };
                 let scale = exact.jacobian.iter().map(|row| row[i].abs()).fold(1e-3, f64::max);
@@ -348,7 +358,7 @@ mod tests {
         for operator in all() {
             let sample = whole_samples(operator.tau_e_s(), ts()).unwrap();
             let whole = operator.zoh(ts()).unwrap();
-            let powers = operator.zoh_powers_within(sample, ts()).unwrap();
+            let powers = operator.zoh_powers_with_delay_samples(sample, ts()).unwrap();
             let x = operator.coordinates();
             let (shape, _) = operator.form().shape(&x[1..]);
             assert_eq!(powers.len(), operator.form().degree() + 1);
@@ -358,7 +368,7 @@ mod tests {
                 assert!((sum - b).abs() <= 1e-12 * size, "{operator:?} {k}: {sum} {b}");
             }
             // These models do not depend on the coordinates of the numerator.
-            let of_numerator = 1 + operator.form().varying_beside_gain();
+            let of_numerator = 1 + operator.form().shape_coordinate_count();
             for power in &powers {
                 assert_eq!((power.nk, &power.f), (whole.nk, &whole.f));
                 assert!(
@@ -372,7 +382,7 @@ mod tests {
     }
 
     #[test]
-    fn static_gain_and_continuity_in_the_delay() {
+    fn model_has_static_gain_and_is_continuous_in_the_delay() {
         for form in [Form::Gain, Form::Lead, Form::LeadLag, Form::Lead2Lag] {
             let held = operator(form, true, 0.13).zoh(ts()).unwrap();
             let sum: f64 = held.b.iter().sum::<f64>() / (1.0 + held.f.iter().sum::<f64>());

@@ -1,9 +1,9 @@
 //! The two discretisations of the remnant filter, each with its pole and gain.
 
-use super::held_numerator::Factored;
+use super::held_numerator::FactoredNumerator;
 
 /// Lower limit of Ts/T_n for which the filter is computed; the upper limit is the reciprocal of this value.
-pub(super) const SMALLEST_RATIO: f64 = 1e-9;
+pub(super) const MIN_TIME_CONSTANT_RATIO: f64 = 1e-9;
 
 /// Discretisation of the remnant filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -45,7 +45,7 @@ impl RemnantDiscretisation {
     pub(super) fn innovation_sd(self, order: usize, a: f64) -> (f64, f64) {
         match self {
             Self::ZeroOrderHold => {
-                let held = Factored::new(order, a);
+                let held = FactoredNumerator::new(order, a);
                 (held.innovation_sd, held.log_derivative)
             }
             Self::BackwardEuler => (backward_gain(order, a), order as f64 / (a * (1.0 + a))),

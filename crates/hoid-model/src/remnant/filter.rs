@@ -1,7 +1,7 @@
 //! The remnant filter, its discrete transfer function and its monic noise model.
 
-use super::discretisation::{RemnantDiscretisation, SMALLEST_RATIO, backward_gain, denominator};
-use super::held_numerator::{Factored, HIGHEST_ORDER, held_numerator};
+use super::discretisation::{MIN_TIME_CONSTANT_RATIO, RemnantDiscretisation, backward_gain, denominator};
+use super::held_numerator::{FactoredNumerator, HIGHEST_ORDER, held_numerator};
 use crate::{DiscreteTransferFunction, ModelError, SampleTime};
 
 /// `K_n / (T_n s + 1)^m`, driven by white noise of unit variance.
@@ -64,10 +64,10 @@ impl RemnantFilter {
     }
 
     /// Checks the filter and returns `a = Ts/T_n`.
-    pub(crate) fn ratio(&self, sample_time: SampleTime) -> Result<f64, ModelError> {
+    pub(crate) fn time_constant_ratio(&self, sample_time: SampleTime) -> Result<f64, ModelError> {
         self.check()?;
         let a = sample_time.s() / self.time_constant_s;
-        if !(SMALLEST_RATIO..=1.0 / SMALLEST_RATIO).contains(&a) {
+        if !(MIN_TIME_CONSTANT_RATIO..=1.0 / MIN_TIME_CONSTANT_RATIO).contains(&a) {
             return Err(ModelError::OutOfRange {
                 quantity: "remnant time constant T_n in s",
                 found: self.time_constant_s,
@@ -82,12 +82,12 @@ impl RemnantFilter {
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and if T_n is not between 1e-9 and 1e9 samples.
-    pub fn discrete(
+    pub fn discretise(
         &self,
         sample_time: SampleTime,
         how: RemnantDiscretisation,
     ) -> Result<DiscreteTransferFunction, ModelError> {
-        let a = self.ratio(sample_time)?;
+        let a = self.time_constant_ratio(sample_time)?;
         let num: Vec<f64> = match how {
             RemnantDiscretisation::ZeroOrderHold => {
                 let numerator = held_numerator(self.order, a);
@@ -105,10 +105,10 @@ impl RemnantFilter {
     /// # Errors
     /// [`ModelError::OutOfRange`] as for [`RemnantFilter::new`], and if T_n is not between 1e-9 and 1e9 samples.
     pub fn noise_model(&self, sample_time: SampleTime, how: RemnantDiscretisation) -> Result<NoiseModel, ModelError> {
-        let a = self.ratio(sample_time)?;
+        let a = self.time_constant_ratio(sample_time)?;
         let (c, unit) = match how {
             RemnantDiscretisation::ZeroOrderHold => {
-                let held = Factored::new(self.order, a);
+                let held = FactoredNumerator::new(self.order, a);
                 (held.c, held.innovation_sd)
             }
             RemnantDiscretisation::BackwardEuler => (vec![1.0], backward_gain(self.order, a)),

@@ -70,7 +70,7 @@ fn held_numerator_derivative(order: usize, a: f64) -> Vec<f64> {
 }
 
 /// The numerator of the zero-order hold with its zeros inside the unit circle, for K_n = 1.
-pub(crate) struct Factored {
+pub(crate) struct FactoredNumerator {
     pub c: Vec<f64>,
     /// Derivatives of the coefficients c with respect to `a = Ts/T_n`.
     pub c_derivative: Vec<f64>,
@@ -79,7 +79,7 @@ pub(crate) struct Factored {
     pub log_derivative: f64,
 }
 
-impl Factored {
+impl FactoredNumerator {
     pub fn new(order: usize, a: f64) -> Self {
         let numerator = held_numerator(order, a);
         let derivative = held_numerator_derivative(order, a);

@@ -32,7 +32,7 @@ mod retrieval;
 pub use discretisation::RemnantDiscretisation;
 pub(crate) use discretisation::denominator;
 pub use filter::{NoiseModel, RemnantFilter};
-pub(crate) use held_numerator::Factored;
+pub(crate) use held_numerator::FactoredNumerator;
 pub use held_numerator::HIGHEST_ORDER;
 pub use retrieval::{RetrievedRemnant, retrieval_jacobian, retrieve};
 

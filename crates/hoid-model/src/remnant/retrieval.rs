@@ -1,6 +1,6 @@
 //! Time constant and gain from an estimated noise model, and their derivatives.
 
-use super::discretisation::{RemnantDiscretisation, SMALLEST_RATIO, binomial};
+use super::discretisation::{MIN_TIME_CONSTANT_RATIO, RemnantDiscretisation, binomial};
 use super::held_numerator::HIGHEST_ORDER;
 use crate::{NotConvertible, SampleTime};
 
@@ -109,7 +109,7 @@ fn mean_time_constant(
 ) -> Result<f64, NotConvertible> {
     let sum: f64 = poles.iter().map(|&alpha| how.time_constant(alpha).0).sum();
     let samples = sum / poles.len() as f64;
-    if samples < SMALLEST_RATIO {
+    if samples < MIN_TIME_CONSTANT_RATIO {
         return Err(NotConvertible::NotARemnantFilter {
             order: poles.len(),
             reason: format!("T_n would be {samples:e} samples: the noise is white"),

@@ -6,7 +6,7 @@ use crate::{
     polynomial,
 };
 
-const BOTH: [RemnantDiscretisation; 2] = [
+const DISCRETISATIONS: [RemnantDiscretisation; 2] = [
     RemnantDiscretisation::ZeroOrderHold,
     RemnantDiscretisation::BackwardEuler,
 ];
@@ -37,7 +37,7 @@ fn variance(h: &DiscreteTransferFunction, samples: usize) -> f64 {
 #[test]
 fn hold_agrees_with_the_general_discretisation() {
     for filter in filters() {
-        let h = filter.discrete(ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
+        let h = filter.discretise(ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
         let pole = [filter.time_constant_s, 1.0];
         let den = (1..filter.order).fold(pole.to_vec(), |p, _| polynomial::product(&p, &pole));
         let continuous = ContinuousTransferFunction::new(&[filter.gain], &den).unwrap();
@@ -56,7 +56,7 @@ fn hold_agrees_with_the_general_discretisation() {
 #[test]
 fn backward_euler_agrees_with_the_general_discretisation() {
     for filter in filters() {
-        let h = filter.discrete(ts(), RemnantDiscretisation::BackwardEuler).unwrap();
+        let h = filter.discretise(ts(), RemnantDiscretisation::BackwardEuler).unwrap();
         let pole = [filter.time_constant_s, 1.0];
         let den = (1..filter.order).fold(pole.to_vec(), |p, _| polynomial::product(&p, &pole));
         let continuous = ContinuousTransferFunction::new(&[filter.gain], &den).unwrap();
@@ -67,7 +67,7 @@ fn backward_euler_agrees_with_the_general_discretisation() {
 }
 
 #[test]
-fn first_order_is_an_autoregression() {
+fn first_order_filter_is_an_autoregression() {
     // Values of corrections.md: d1 = -0.8465 (exact) and -0.8571 (backward Euler).
     let filter = RemnantFilter::new(1.0, 0.06, 1).unwrap();
     let exact = filter.noise_model(ts(), RemnantDiscretisation::default()).unwrap();
@@ -77,15 +77,15 @@ fn first_order_is_an_autoregression() {
     assert!((euler.d[1] + 0.8571).abs() < 5e-5);
     // In closed form, a first-order process has the variance (1 - alpha)^2/(1 - alpha^2).
     let alpha: f64 = (-1.0f64 / 6.0).exp();
-    let h = filter.discrete(ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
+    let h = filter.discretise(ts(), RemnantDiscretisation::ZeroOrderHold).unwrap();
     assert!((variance(&h, 400) - (1.0 - alpha) / (1.0 + alpha)).abs() < 1e-14);
 }
 
 #[test]
 fn noise_model_has_the_spectrum_of_the_filter() {
     for filter in filters() {
-        for how in BOTH {
-            let h = filter.discrete(ts(), how).unwrap();
+        for how in DISCRETISATIONS {
+            let h = filter.discretise(ts(), how).unwrap();
             let model = filter.noise_model(ts(), how).unwrap();
             let monic = DiscreteTransferFunction::new(&model.c, &model.d, ts()).unwrap();
             assert_eq!((model.c[0], model.d[0]), (1.0, 1.0));
@@ -141,7 +141,7 @@ fn numerator_sums_to_the_static_gain_for_any_sampling() {
 #[test]
 fn retrieve_inverts_noise_model() {
     for filter in filters() {
-        for how in BOTH {
+        for how in DISCRETISATIONS {
             let model = filter.noise_model(ts(), how).unwrap();
             let found = retrieve(&model.d[1..], model.innovation_sd, ts(), how).unwrap();
             // With T_n of 2000 samples, 1 - alpha has 12 correct digits, and K_n depends on its power m.
@@ -169,7 +169,7 @@ fn perturbed_coefficients_give_the_mean_time_constant() {
 
 #[test]
 fn jacobian_agrees_with_finite_differences() {
-    for how in BOTH {
+    for how in DISCRETISATIONS {
         for m in 1..=4 {
             for t in [0.004, 0.06, 0.3] {
                 let model = RemnantFilter::new(0.3, t, m).unwrap().noise_model(ts(), how).unwrap();
@@ -259,12 +259,12 @@ fn bad_filters_are_refused() {
             time_constant_s: time,
             order,
         };
-        assert!(literal.discrete(ts(), RemnantDiscretisation::ZeroOrderHold).is_err());
+        assert!(literal.discretise(ts(), RemnantDiscretisation::ZeroOrderHold).is_err());
         assert!(literal.noise_model(ts(), RemnantDiscretisation::BackwardEuler).is_err());
     }
     for time in [1e-100, 1e100] {
         let absurd = RemnantFilter::new(0.1, time, 4).unwrap();
-        assert!(absurd.discrete(ts(), RemnantDiscretisation::ZeroOrderHold).is_err());
+        assert!(absurd.discretise(ts(), RemnantDiscretisation::ZeroOrderHold).is_err());
         assert!(absurd.noise_model(ts(), RemnantDiscretisation::ZeroOrderHold).is_err());
     }
 }

@@ -3,15 +3,15 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::kernel::{Kernel, PASS, STOP_DB};
+use super::kernel::{Kernel, PASS_BAND_EDGE, STOP_BAND_ATTENUATION_DB};
 use crate::{ModelError, SampleTime};
 
 /// Rate above which records are decimated automatically, Hz.
-const HIGHEST_HZ: f64 = 200.0;
+const MAX_RATE_HZ: f64 = 200.0;
 /// Target rate of the automatic decimation, Hz.
-const TARGET_HZ: f64 = 100.0;
+const TARGET_RATE_HZ: f64 = 100.0;
 /// Relative difference between two rates above which it is not attributed to rounding.
-const ROUNDING: f64 = 1e-6;
+const RATE_TOLERANCE: f64 = 1e-6;
 
 /// Choice of the decimation factor for a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -28,7 +28,7 @@ pub enum Decimation {
 impl Decimation {
     /// Returns the choice for estimators of polynomials, whose orders and delays are in samples: these estimators use
     /// the original samples unless a factor is given.
-    pub fn when_named(self) -> Self {
+    pub fn explicit_only(self) -> Self {
         match self {
             Self::Auto => Self::Off,
             other => other,
@@ -40,9 +40,9 @@ impl Decimation {
         let hz = 1.0 / sample_time.s();
         match self {
             Self::By(factor) => factor,
-            Self::Auto if hz > HIGHEST_HZ * (1.0 + ROUNDING) => {
-                let below = (hz / TARGET_HZ).floor();
-                let distance = |factor: f64| (hz / factor - TARGET_HZ).abs();
+            Self::Auto if hz > MAX_RATE_HZ * (1.0 + RATE_TOLERANCE) => {
+                let below = (hz / TARGET_RATE_HZ).floor();
+                let distance = |factor: f64| (hz / factor - TARGET_RATE_HZ).abs();
                 let nearest = if distance(below + 1.0) < distance(below) {
                     below + 1.0
                 } else {
@@ -115,19 +115,19 @@ impl Decimated {
     /// Returns the description of a decimation by a factor, with its filter and the new sample time; `None` if the
     /// filter would be longer than `longest` samples on each side.
     pub(super) fn by(factor: usize, old: SampleTime, longest: usize) -> Option<(Self, Kernel, SampleTime)> {
-        let kernel = Kernel::folding(1.0 / factor as f64, longest)?;
+        let kernel = Kernel::for_decimation(1.0 / factor as f64, longest)?;
         let new = SampleTime::new(factor as f64 * old.s()).ok()?;
         let to_hz = 1.0 / new.s();
         let done = Self {
             factor,
             from_hz: 1.0 / old.s(),
             to_hz,
-            pass_hz: PASS * 0.5 * to_hz,
-            stop_hz: (2.0 - PASS) * 0.5 * to_hz,
-            stop_db: STOP_DB,
-            taps: 2 * kernel.half() + 1,
+            pass_hz: PASS_BAND_EDGE * 0.5 * to_hz,
+            stop_hz: (2.0 - PASS_BAND_EDGE) * 0.5 * to_hz,
+            stop_db: STOP_BAND_ATTENUATION_DB,
+            taps: 2 * kernel.samples_per_side() + 1,
             lead_s: 0.5 * (new.s() - old.s()),
-            lag_s: (kernel.half() + factor / 2) as f64 * old.s(),
+            lag_s: (kernel.samples_per_side() + factor / 2) as f64 * old.s(),
         };
         Some((done, kernel, new))
     }
@@ -171,8 +171,8 @@ mod tests {
         ] {
             let ts = SampleTime::new(1.0 / hz).unwrap();
             assert_eq!(Decimation::Auto.factor(ts), factor, "{hz}");
-            assert_eq!(Decimation::Auto.when_named().factor(ts), 1);
-            assert_eq!(Decimation::By(7).when_named().factor(ts), 7);
+            assert_eq!(Decimation::Auto.explicit_only().factor(ts), 1);
+            assert_eq!(Decimation::By(7).explicit_only().factor(ts), 7);
         }
     }
 

@@ -94,7 +94,7 @@ impl<const C: usize> Decimator<C> {
     }
 
     /// Returns the description of the decimation.
-    pub fn done(&self) -> Decimated {
+    pub fn applied_decimation(&self) -> Decimated {
         self.done
     }
 
@@ -110,13 +110,13 @@ impl<const C: usize> Decimator<C> {
     }
 
     /// Returns the state as numbers, for [`Decimator::restore`].
-    pub fn saved(&mut self) -> Vec<f64> {
+    pub fn saved_state(&mut self) -> Vec<f64> {
         let mut numbers = Vec::new();
         self.visit(&mut |number| numbers.push(*number));
         numbers
     }
 
-    /// Restores the state saved by [`Decimator::saved`]; returns false if the numbers belong to another decimator.
+    /// Restores the state saved by [`Decimator::saved_state`]; returns false if the numbers belong to another decimator.
     #[must_use]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let (mut left, mut lacking) = (numbers.iter(), false);
@@ -128,11 +128,15 @@ impl<const C: usize> Decimator<C> {
     }
 
     /// Takes one sample of each channel; returns a new sample of each channel if one is available, otherwise `None`.
-    pub fn take(&mut self, values: [f64; C]) -> Option<[f64; C]> {
-        let (number, factor, half) = (self.input_count, self.done.factor as u64, self.kernel.half());
+    pub fn push(&mut self, values: [f64; C]) -> Option<[f64; C]> {
+        let (number, factor, half) = (
+            self.input_count,
+            self.done.factor as u64,
+            self.kernel.samples_per_side(),
+        );
         self.input_count += 1;
         for (lane, value) in self.lanes.iter_mut().zip(values) {
-            lane.take(value, number);
+            lane.push(value, number);
         }
         // The last sample that the next output needs has not yet arrived.
         if self.input_count <= self.output_count * factor + factor / 2 + half as u64 {
@@ -153,7 +157,7 @@ impl<const C: usize> Decimator<C> {
 }
 
 impl DecimatedChannel {
-    fn take(&mut self, value: f64, number: u64) {
+    fn push(&mut self, value: f64, number: u64) {
         if value.is_finite() {
             self.last = value;
             if !self.has_valid_sample {
@@ -207,7 +211,7 @@ impl DecimatedChannel {
 impl<const C: usize> State for Decimator<C> {
     /// The restored numbers may come from any source: counts and indices are limited to values that a stream can reach.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        let (half, factor) = (self.kernel.half(), self.done.factor);
+        let (half, factor) = (self.kernel.samples_per_side(), self.done.factor);
         let most = 2 * half + 4 * factor + 4;
         self.input_count.visit(each);
         self.output_count.visit(each);

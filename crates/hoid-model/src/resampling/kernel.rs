@@ -11,19 +11,19 @@
 //! around c.
 //!
 //! At integer t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, with the same
-//! frequency response. The weights for each t are divided by their sum, so a constant is unchanged. A is [`DESIGN_DB`],
-//! which exceeds the documented attenuation [`STOP_DB`] by a margin.
+//! frequency response. The weights for each t are divided by their sum, so a constant is unchanged. A is [`DESIGN_ATTENUATION_DB`],
+//! which exceeds the documented attenuation [`STOP_BAND_ATTENUATION_DB`] by a margin.
 
 use std::f64::consts::PI;
 
 /// Attenuation for which the filter is designed, dB.
-const DESIGN_DB: f64 = 90.0;
+const DESIGN_ATTENUATION_DB: f64 = 90.0;
 /// Documented attenuation of aliases and of the interpolation error, dB.
-pub const STOP_DB: f64 = 80.0;
+pub const STOP_BAND_ATTENUATION_DB: f64 = 80.0;
 /// Half the width of the transition, relative to its upper edge.
-const HALF_TRANSITION: f64 = 0.1;
+const HALF_TRANSITION_WIDTH: f64 = 0.1;
 /// End of the pass band relative to the lower of the two Nyquist frequencies.
-pub const PASS: f64 = 0.8;
+pub const PASS_BAND_EDGE: f64 = 0.8;
 
 /// Distance from an integer, in samples, up to which the difference counts as rounding.
 const INTEGER_TOLERANCE: f64 = 1e-9;
@@ -39,20 +39,20 @@ pub struct Kernel {
 impl Kernel {
     /// Returns a kernel with a pass band up to 0.8 and a stop band from 1.2 of the Nyquist frequency of the record: it
     /// shifts a band-limited signal by fractions of a sample.
-    pub fn interpolating() -> Self {
+    pub fn for_interpolation() -> Self {
         Self {
             cutoff: 1.0,
-            half: half_length(2.0 * (1.0 - PASS)) as usize,
+            half: half_length(2.0 * (1.0 - PASS_BAND_EDGE)) as usize,
         }
     }
 
     /// Returns a kernel with a pass band up to 0.8 `ratio` and a stop band from `ratio`, the new Nyquist frequency
     /// relative to the old one; `None` if the filter would be longer than `longest` on each side.
-    pub fn limiting(ratio: f64, longest: usize) -> Option<Self> {
-        let half = half_length(2.0 * HALF_TRANSITION * ratio);
+    pub fn for_resampling(ratio: f64, longest: usize) -> Option<Self> {
+        let half = half_length(2.0 * HALF_TRANSITION_WIDTH * ratio);
         // The condition is written so that NaN gives `None`.
         (half <= longest as f64).then_some(Self {
-            cutoff: (1.0 - HALF_TRANSITION) * ratio,
+            cutoff: (1.0 - HALF_TRANSITION_WIDTH) * ratio,
             half: half as usize,
         })
     }
@@ -61,8 +61,8 @@ impl Kernel {
     /// Nyquist frequency relative to the old one; the attenuation is 6 dB at `ratio`. Aliases fall between 0.8 and 1 of
     /// the new Nyquist frequency, where they replace the part of the spectrum that the filter has removed, so the
     /// spectrum of noise has no gap. `None` if the filter would be longer than `longest` on each side.
-    pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
-        let half = half_length(2.0 * (1.0 - PASS) * ratio);
+    pub fn for_decimation(ratio: f64, longest: usize) -> Option<Self> {
+        let half = half_length(2.0 * (1.0 - PASS_BAND_EDGE) * ratio);
         // The condition is written so that NaN gives `None`.
         (half <= longest as f64).then_some(Self {
             cutoff: ratio,
@@ -71,7 +71,7 @@ impl Kernel {
     }
 
     /// Returns the number of samples that the filter uses on each side of the requested instant.
-    pub fn half(self) -> usize {
+    pub fn samples_per_side(self) -> usize {
         self.half
     }
 
@@ -89,12 +89,12 @@ impl Kernel {
     fn response(self, s: f64) -> f64 {
         let r = s / self.half as f64;
         let root = (1.0 - r * r).max(0.0).sqrt();
-        let beta = 0.1102 * (DESIGN_DB - 8.7);
+        let beta = 0.1102 * (DESIGN_ATTENUATION_DB - 8.7);
         self.cutoff * sinc(self.cutoff * s) * bessel_i0(beta * root) / bessel_i0(beta)
     }
 
     /// Returns the values at `t_k = first + k step` for k = 0 to n - 1, in samples; every t_k must be at least
-    /// [`Kernel::half`] samples from both ends.
+    /// [`Kernel::samples_per_side`] samples from both ends.
     pub fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
         // For an integer step all fractions are equal, and the weights are computed once.
         let (mut known, mut offset, mut weights) = (f64::NAN, 0, Vec::new());
@@ -120,7 +120,7 @@ impl Kernel {
 
 /// Returns half the length of the filter for a transition of the given width, relative to the Nyquist frequency.
 fn half_length(width: f64) -> f64 {
-    ((DESIGN_DB - 7.95) / (2.0 * 2.285 * PI * width)).ceil()
+    ((DESIGN_ATTENUATION_DB - 7.95) / (2.0 * 2.285 * PI * width)).ceil()
 }
 
 fn sinc(x: f64) -> f64 {
@@ -175,15 +175,15 @@ mod tests {
 
     #[test]
     fn pass_band_and_stop_band_meet_their_specification() {
-        let stop = 10_f64.powf(-STOP_DB / 20.0);
+        let stop = 10_f64.powf(-STOP_BAND_ATTENUATION_DB / 20.0);
         for factor in [2.0, 3.0, 4.0, 10.0, 1.7] {
-            let kernel = Kernel::limiting(1.0 / factor, 100_000).unwrap();
+            let kernel = Kernel::for_resampling(1.0 / factor, 100_000).unwrap();
             let nyquist = 0.5 / factor;
             for fraction in [0.0, 0.25, 0.5, 0.9] {
                 let weights = kernel.weights(fraction);
                 for i in 1..=400 {
                     let share = f64::from(i) / 400.0;
-                    let (gain, delay) = response(&weights, share * PASS * nyquist, fraction);
+                    let (gain, delay) = response(&weights, share * PASS_BAND_EDGE * nyquist, fraction);
                     let (leak, _) = response(&weights, nyquist + share * (0.5 - nyquist), fraction);
                     // The filter is designed for 90 dB (3.2e-5), which leaves a margin to the documented 80 dB.
                     assert!((gain - 1.0).abs() < 0.5 * stop, "{factor}, {share}: {gain}");
@@ -200,13 +200,13 @@ mod tests {
     #[test]
     fn decimation_filter_aliases_only_into_the_last_fifth() {
         for factor in [2.0, 3.0, 10.0, 20.0] {
-            let kernel = Kernel::folding(1.0 / factor, 100_000).unwrap();
+            let kernel = Kernel::for_decimation(1.0 / factor, 100_000).unwrap();
             let nyquist = 0.5 / factor;
             for fraction in [0.0, 0.5] {
                 let weights = kernel.weights(fraction);
                 for i in 1..=400 {
                     let share = f64::from(i) / 400.0;
-                    let (gain, delay) = response(&weights, share * PASS * nyquist, fraction);
+                    let (gain, delay) = response(&weights, share * PASS_BAND_EDGE * nyquist, fraction);
                     let (leak, _) = response(&weights, 1.2 * nyquist + share * (0.5 - 1.2 * nyquist), fraction);
                     assert!(
                         (gain - 1.0).abs() < 5e-5 && leak < 5e-5,
@@ -222,11 +222,11 @@ mod tests {
     }
 
     #[test]
-    fn too_long_filter_is_none() {
-        assert!(Kernel::limiting(1e-3, 1000).is_none());
+    fn too_long_filter_is_refused() {
+        assert!(Kernel::for_resampling(1e-3, 1000).is_none());
         for bad in [0.0, f64::NAN, -1.0] {
             assert!(
-                Kernel::limiting(bad, 1000).is_none_or(|kernel| kernel.half() <= 1000),
+                Kernel::for_resampling(bad, 1000).is_none_or(|kernel| kernel.samples_per_side() <= 1000),
                 "{bad}"
             );
         }

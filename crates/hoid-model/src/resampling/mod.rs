@@ -44,7 +44,7 @@ mod of_record;
 
 pub use decimation::{Decimated, Decimation};
 pub use decimator::Decimator;
-pub use kernel::{Kernel, PASS, STOP_DB};
+pub use kernel::{Kernel, PASS_BAND_EDGE, STOP_BAND_ATTENUATION_DB};
 
 #[cfg(test)]
 mod tests;

@@ -36,7 +36,8 @@ impl Record {
         let n = self.len();
         // The reflected part must be shorter than the record.
         let Some((done, kernel, new)) = Decimated::by(factor, self.sample_time(), n - 1) else {
-            let half = Decimated::by(factor, self.sample_time(), usize::MAX).map(|(_, kernel, _)| kernel.half());
+            let half =
+                Decimated::by(factor, self.sample_time(), usize::MAX).map(|(_, kernel, _)| kernel.samples_per_side());
             return Err(refuse(
                 format!(
                     "{n} samples for a filter that extends {} samples to each side",
@@ -50,13 +51,13 @@ impl Record {
         let (label, start_s) = (self.label().to_owned(), self.time_s(0));
         let (input, output, others) = self.into_channels();
         let at = |first: f64, channel: Channel| Channel {
-            values: filtered(kernel, &channel.values, first, factor, new_samples),
+            values: filtered_values(kernel, &channel.values, first, factor, new_samples),
             ..channel
         };
         let output = at(0.0, output);
         let record = match input {
             Some(input) => Self::new(new, at(0.5 * (factor as f64 - 1.0), input), output),
-            None => Self::of_output(new, output),
+            None => Self::from_output(new, output),
         }?;
         let mut record = record.labelled(label).starting_at(start_s);
         for channel in others {
@@ -68,8 +69,8 @@ impl Record {
 
 /// Returns filtered values at `first + k factor` for k = 0 to n - 1; beyond its ends the signal is reflected in the end
 /// points.
-fn filtered(kernel: Kernel, values: &[f64], first: f64, factor: usize, n: usize) -> Vec<f64> {
-    let half = kernel.half();
+fn filtered_values(kernel: Kernel, values: &[f64], first: f64, factor: usize, n: usize) -> Vec<f64> {
+    let half = kernel.samples_per_side();
     let last = values.len() - 1;
     let mut long = Vec::with_capacity(values.len() + 2 * half);
     long.extend((1..=half).rev().map(|k| 2.0 * values[0] - values[k]));

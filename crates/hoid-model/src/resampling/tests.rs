@@ -6,10 +6,13 @@ use super::*;
 use crate::{Channel, ModelError, Record, SampleTime};
 
 /// Sinusoids below 40 Hz, in the pass band at 100 Hz: frequency in Hz, amplitude, phase.
-const WAVES: [(f64, f64, f64); 4] = [(0.13, 1.0, 0.3), (1.7, 0.8, 1.1), (6.3, 0.5, -2.0), (31.0, 0.3, 2.0)];
+const SINUSOIDS: [(f64, f64, f64); 4] = [(0.13, 1.0, 0.3), (1.7, 0.8, 1.1), (6.3, 0.5, -2.0), (31.0, 0.3, 2.0)];
 
-fn waves(t: f64) -> f64 {
-    WAVES.iter().map(|(hz, a, p)| a * (2.0 * PI * hz * t + p).cos()).sum()
+fn sum_of_sinusoids(t: f64) -> f64 {
+    SINUSOIDS
+        .iter()
+        .map(|(hz, a, p)| a * (2.0 * PI * hz * t + p).cos())
+        .sum()
 }
 
 fn record(hz: f64, n: usize, e: impl Fn(f64) -> f64, u: impl Fn(f64) -> f64) -> Record {
@@ -36,7 +39,7 @@ fn max_deviation(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> 
 #[test]
 fn sum_of_sines_is_preserved_at_the_new_rate() {
     for hz in [250.0, 1000.0 / 3.0, 500.0, 1000.0, 1024.0, 2000.0] {
-        let (n, slow) = ((8.0 * hz) as usize, |t: f64| 3.0 + waves(t));
+        let (n, slow) = ((8.0 * hz) as usize, |t: f64| 3.0 + sum_of_sinusoids(t));
         let (found, done) = Decimation::Auto.of(record(hz, n, slow, |t| 2.0 * slow(t))).unwrap();
         let (done, ts) = (done.unwrap(), found.sample_time().s());
         assert!((1.0 / ts - hz / done.factor as f64).abs() < 1e-9);
@@ -130,12 +133,12 @@ fn records_that_cannot_be_decimated_are_refused() {
     assert_eq!(Decimation::Auto.of(slow.clone()).unwrap(), (slow, None));
     for factor in [0, 1, usize::MAX] {
         assert!(
-            Decimator::new(factor, SampleTime::HUNDREDTH, [true]).is_err(),
+            Decimator::new(factor, SampleTime::AT_100_HZ, [true]).is_err(),
             "{factor}"
         );
     }
     // A record without an input has no held channel.
-    let alone = Record::of_output(SampleTime::new(0.001).unwrap(), Channel::new("u", "", vec![1.0; 2000])).unwrap();
+    let alone = Record::from_output(SampleTime::new(0.001).unwrap(), Channel::new("u", "", vec![1.0; 2000])).unwrap();
     let (found, _) = alone.decimated(10).unwrap();
     assert!(found.input().is_empty() && found.output().iter().all(|u| (u - 1.0).abs() < 1e-12));
 }
@@ -143,13 +146,13 @@ fn records_that_cannot_be_decimated_are_refused() {
 /// Returns the output of a stream for these samples.
 fn streamed(hz: f64, factor: usize, samples: impl Iterator<Item = (f64, f64)>) -> Vec<[f64; 2]> {
     let mut decimator = Decimator::new(factor, SampleTime::new(1.0 / hz).unwrap(), [true, false]).unwrap();
-    samples.filter_map(|(e, u)| decimator.take([e, u])).collect()
+    samples.filter_map(|(e, u)| decimator.push([e, u])).collect()
 }
 
 #[test]
 fn streamed_decimation_is_bit_identical_to_batch() {
     for (hz, factor) in [(1000.0, 10), (250.0, 3), (2000.0, 20), (500.0, 5), (400.0, 2)] {
-        let whole = record(hz, (4.0 * hz) as usize, waves, |t| waves(t - 0.2));
+        let whole = record(hz, (4.0 * hz) as usize, sum_of_sinusoids, |t| sum_of_sinusoids(t - 0.2));
         let samples = whole.input().iter().copied().zip(whole.output().iter().copied());
         let found = streamed(hz, factor, samples);
         let (batch, done) = whole.clone().decimated(factor).unwrap();
@@ -166,7 +169,7 @@ fn streamed_decimation_is_bit_identical_to_batch() {
 
 #[test]
 fn missing_values_stay_missing_and_are_not_used() {
-    let value = |k: usize| waves(k as f64 * 1e-3);
+    let value = |k: usize| sum_of_sinusoids(k as f64 * 1e-3);
     let samples = |k: usize| match k {
         // A gap in e and u, a single invalid value of u, and missing samples at the start.
         0..7 | 1500..1523 => (f64::NAN, f64::NAN),
@@ -188,19 +191,25 @@ fn missing_values_stay_missing_and_are_not_used() {
 fn restored_decimator_is_bit_identical() {
     let fresh = || Decimator::new(10, SampleTime::new(1e-3).unwrap(), [true, false]).unwrap();
     for at in [0, 100, 290, 777, 1503] {
-        let value = |k: usize| if k % 97 == 3 { f64::NAN } else { waves(k as f64 * 1e-3) };
+        let value = |k: usize| {
+            if k % 97 == 3 {
+                f64::NAN
+            } else {
+                sum_of_sinusoids(k as f64 * 1e-3)
+            }
+        };
         let mut first = fresh();
         for k in 0..at {
-            let _ = first.take([value(k), value(k + 1)]);
+            let _ = first.push([value(k), value(k + 1)]);
         }
-        let numbers = first.saved();
+        let numbers = first.saved_state();
         let mut second = fresh();
         assert!(second.restore(&numbers));
         assert!(!fresh().restore(&numbers[1..]) && !fresh().restore(&[]));
         for k in at..at + 900 {
             let bits = |found: Option<[f64; 2]>| found.map(|values| values.map(f64::to_bits));
             let sample = [value(k), value(k + 1)];
-            assert_eq!(bits(first.take(sample)), bits(second.take(sample)), "{at}, {k}");
+            assert_eq!(bits(first.push(sample)), bits(second.push(sample)), "{at}, {k}");
         }
     }
 }

@@ -54,7 +54,7 @@ impl FromStr for ContinuousTransferFunction {
         let read = if text.contains(',') {
             coefficients(text)
         } else {
-            Reader::new(text).whole()
+            Reader::new(text).expression()
         };
         let refuse = |expected: String| ModelError::TransferFunction {
             found: format!("{text:?}"),

@@ -6,14 +6,14 @@ use kuva::prelude::{Layout, TickFormat};
 
 use super::style;
 
-/// Smallest distance between the ticks of an ordinate, in units of the figure; `HIGH_DECADE` is the smallest height of
+/// Smallest distance between the ticks of an ordinate, in units of the figure; `MIN_LABELLED_DECADE_HEIGHT` is the smallest height of
 /// a decade with labels at 2 and 5.
-const TICK_HEIGHT: f64 = 16.0;
-const HIGH_DECADE: f64 = 48.0;
+const MIN_TICK_SPACING: f64 = 16.0;
+const MIN_LABELLED_DECADE_HEIGHT: f64 = 48.0;
 /// Spacings of phase ticks, deg.
 const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 /// Smallest width of a decade with labels at 2 and 5 on a logarithmic abscissa.
-const WIDE_DECADE: f64 = 95.0;
+const MIN_LABELLED_DECADE_WIDTH: f64 = 95.0;
 /// Width of a tick label with the space to its neighbour.
 const TICK_WIDTH: f64 = 34.0;
 /// Smallest number that the library draws on a logarithmic axis.
@@ -57,7 +57,7 @@ pub fn with_ordinate(
 ) -> Layout {
     if logarithmic {
         let decades = (high / low).log10();
-        let all = decades < 1.02 || height / decades > HIGH_DECADE;
+        let all = decades < 1.02 || height / decades > MIN_LABELLED_DECADE_HEIGHT;
         let format = move |v: f64| match labelled && (all || is_power_of_ten(v)) {
             true => log_tick(v, (low, high)),
             false => String::new(),
@@ -66,7 +66,7 @@ pub fn with_ordinate(
             .with_log_y()
             .with_y_tick_format(TickFormat::Custom(Arc::new(format)));
     }
-    let most = height / TICK_HEIGHT;
+    let most = height / MIN_TICK_SPACING;
     let of_circle = PHASE_STEPS.into_iter().find(|s| (high - low) / s <= most);
     let step = match of_circle {
         Some(step) if unit == "deg" && high - low > PHASE_STEPS[0] => step,
@@ -106,7 +106,7 @@ impl SymmetricLogAxis {
 
     /// Returns the layout with ticks at the integer decades of a range, on axes that are `height` units high.
     pub fn with_ordinate(self, layout: Layout, (low, high): (f64, f64), height: f64) -> Layout {
-        let step = ((high - low) * TICK_HEIGHT / height).ceil().max(1.0);
+        let step = ((high - low) * MIN_TICK_SPACING / height).ceil().max(1.0);
         let range = (self.linear_within, self.value(low.abs().max(high.abs())));
         let format = move |h: f64| match self.value(h.round()) {
             0.0 => "0".to_owned(),
@@ -123,7 +123,7 @@ impl SymmetricLogAxis {
 pub fn with_abscissa(layout: Layout, (low, high): (f64, f64), logarithmic: bool, width: f64) -> Layout {
     if logarithmic {
         let decades = (high / low).log10();
-        let all = decades < 1.02 || width / decades > WIDE_DECADE;
+        let all = decades < 1.02 || width / decades > MIN_LABELLED_DECADE_WIDTH;
         let format = move |v: f64| match all || is_power_of_ten(v) {
             true => log_tick(v, (low, high)),
             false => String::new(),
@@ -150,7 +150,7 @@ pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     if low > high {
         return (0.1, 1.0);
     }
-    let (from, to) = (one_two_five(low, false), one_two_five(high, true));
+    let (from, to) = (round_to_one_two_five(low, false), round_to_one_two_five(high, true));
     if to > from * 1.5 {
         (from, to)
     } else {
@@ -162,7 +162,7 @@ pub fn log_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
 /// powers of ten.
 pub fn log_tick(value: f64, (low, high): (f64, f64)) -> String {
     if low > 0.999e-3 && high < 1e6 {
-        return crate::numbers::plain(value);
+        return crate::numbers::format_plain(value);
     }
     format!("{value:.0e}")
 }
@@ -173,7 +173,7 @@ pub fn is_power_of_ten(value: f64) -> bool {
 }
 
 /// The nearest 1, 2 or 5 times a power of ten that is at least (`up`) or at most this value.
-pub fn one_two_five(value: f64, up: bool) -> f64 {
+pub fn round_to_one_two_five(value: f64, up: bool) -> f64 {
     const ONE_TWO_FIVE: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
     let power = 10f64.powf(value.log10().floor());
     let rest = value / power;
@@ -196,8 +196,8 @@ mod tests {
         assert_eq!(tick(1e-17, 0.1), "0");
         assert_eq!(tick(1.25e-5, 5e-7), "1.25e-5");
         assert_eq!(tick(3e7, 1e7), "3e7");
-        assert_eq!(one_two_five(0.003, false), 0.002);
-        assert!((one_two_five(0.0051, true) - 0.01).abs() < 1e-12);
+        assert_eq!(round_to_one_two_five(0.003, false), 0.002);
+        assert!((round_to_one_two_five(0.0051, true) - 0.01).abs() < 1e-12);
         assert_eq!(log_tick(0.02, (0.01, 1e4)), "0.02");
         assert_eq!(log_tick(0.02, (1e-5, 1.0)), "2e-2");
         assert_eq!(log_tick(1e-5, (1e-5, 1.0)), "1e-5");

@@ -20,22 +20,22 @@ use super::{
 };
 use crate::numbers::Z_95;
 
-const UPPER: f64 = 175.0;
-const LOWER: f64 = 205.0;
+const MAGNITUDE_HEIGHT: f64 = 175.0;
+const PHASE_HEIGHT: f64 = 205.0;
 
 const MAGNITUDE_STEPS: [f64; 5] = [1.0, 2.0, 5.0, 10.0, 20.0];
-const MAX_STEPS: f64 = 6.5;
+const MAX_STEP_COUNT: f64 = 6.5;
 const PHASE_STEPS: [f64; 6] = [15.0, 30.0, 45.0, 90.0, 180.0, 360.0];
 
 /// Number of frequencies of a curve.
-const POINTS: usize = 240;
+const POINT_COUNT: usize = 240;
 /// Lowest frequency of manual control, rad/s, followed by the highest; on an axis from 0.1 to 50 rad/s there are ticks
 /// at 1, 2 and 5 in each decade.
-const LOWEST_RAD_S: f64 = 0.1;
-const HIGHEST_RAD_S: f64 = 50.0;
+const MIN_OMEGA_RAD_S: f64 = 0.1;
+const MAX_OMEGA_RAD_S: f64 = 50.0;
 /// Displayed range of the phase, deg. Below this range the phase of a dead time decreases without bound and is not
 /// relevant to the closed loop.
-const PHASE_SHOWN_DEG: (f64, f64) = (-540.0, 270.0);
+const PHASE_RANGE_DEG: (f64, f64) = (-540.0, 270.0);
 
 /// A model that is drawn in a Bode diagram.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +71,7 @@ pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> Stri
 /// bars of 1.96 standard errors. The axes extend below the frequencies of the curves if there are points at lower
 /// frequencies. The first set of points is black; further sets have colours that no model has.
 pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse], points: &[BodePoints]) -> String {
-    let points: Vec<BodePoints> = points.iter().map(BodePoints::drawable).collect();
+    let points: Vec<BodePoints> = points.iter().map(BodePoints::drawable_points).collect();
     let omega = frequencies(models, &points);
     let mut curves: Vec<(Curve, &str)> = Vec::new();
     for (i, model) in models.iter().enumerate() {
@@ -89,7 +89,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
         .map(|c| c.phase_deg.iter().map(|p| p.0).collect());
     let points: Vec<BodePoints> = points
         .into_iter()
-        .map(|p| p.on_branch_of(first.as_deref().map(|phase| (&omega[..], phase))))
+        .map(|p| p.shift_to_branch_of(first.as_deref().map(|phase| (&omega[..], phase))))
         .collect();
 
     let limits = (omega[0], omega[omega.len() - 1]);
@@ -98,14 +98,14 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
     for is_phase in [false, true] {
         let series = |c: &Curve| {
             if is_phase {
-                c.phase_deg.iter().map(|p| (shown(p.0), p.1)).collect()
+                c.phase_deg.iter().map(|p| (phase_or_gap(p.0), p.1)).collect()
             } else {
                 c.magnitude_db.clone()
             }
         };
         let all = curves.iter().map(|(c, _)| c).chain(&truths);
         let of_points = |p: &BodePoints| -> Vec<f64> {
-            BodePoints::reach(if is_phase { &p.phase_deg } else { &p.magnitude_db }).collect()
+            BodePoints::values_and_bar_ends(if is_phase { &p.phase_deg } else { &p.magnitude_db }).collect()
         };
         let values = all.flat_map(|c| series(c).into_iter().map(|p| p.0));
         let (low, high) = style::padded_range(values.chain(points.iter().flat_map(of_points)));
@@ -130,7 +130,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
             let points = omega.iter().copied().zip(series(truth).into_iter().map(|p| p.0));
             plots.push(style::line(points, BLACK, 1.4).with_dashed().into());
         }
-        let height = if is_phase { LOWER } else { UPPER };
+        let height = if is_phase { PHASE_HEIGHT } else { MAGNITUDE_HEIGHT };
         let layout = style::layout(limits, range, height).with_log_x().with_y_tick_step(step);
         let layout = if is_phase {
             layout
@@ -139,23 +139,23 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
         } else {
             layout
                 .with_y_label("magnitude (dB)")
-                .with_force_margins_y(style::TOP, style::BOTTOM_WITHOUT_LABEL)
+                .with_force_margins_y(style::TOP_MARGIN, style::BOTTOM_MARGIN_WITHOUT_LABEL)
         };
         // A figure that contains only points still needs axes.
         if plots.is_empty() {
             plots.push(style::line([], BLACK, 1.0).into());
         }
         let (top, below) = if is_phase {
-            (UPPER, style::BOTTOM)
+            (MAGNITUDE_HEIGHT, style::BOTTOM_MARGIN)
         } else {
-            (0.0, style::BOTTOM_WITHOUT_LABEL)
+            (0.0, style::BOTTOM_MARGIN_WITHOUT_LABEL)
         };
         scales.push(Scale {
             area: Area {
-                left: style::LEFT,
-                top: top + style::TOP,
-                width: style::WIDTH - style::LEFT - style::RIGHT,
-                height: height - style::TOP - below,
+                left: style::LEFT_MARGIN,
+                top: top + style::TOP_MARGIN,
+                width: style::WIDTH - style::LEFT_MARGIN - style::RIGHT_MARGIN,
+                height: height - style::TOP_MARGIN - below,
             },
             x: limits,
             y: range,
@@ -172,7 +172,7 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
     if !truths.is_empty() {
         entries.push(Entry::new("true operator", BLACK, Sample::Dashed));
     }
-    let mut scene = style::stacked(panels);
+    let mut scene = style::stack_panels(panels);
     for (i, set) in points.iter().enumerate() {
         let colour = match i {
             0 => BLACK,
@@ -187,8 +187,8 @@ pub fn bode_with_points(id: &str, models: &[BodeModel<'_>], truths: &[TrueRespon
 }
 
 /// Returns a phase within the displayed range; NaN, which becomes a gap, for any other phase.
-fn shown(phase_deg: f64) -> f64 {
-    let (low, high) = PHASE_SHOWN_DEG;
+fn phase_or_gap(phase_deg: f64) -> f64 {
+    let (low, high) = PHASE_RANGE_DEG;
     if (low..=high).contains(&phase_deg) {
         phase_deg
     } else {
@@ -201,18 +201,18 @@ fn frequencies(models: &[BodeModel<'_>], points: &[BodePoints]) -> Vec<f64> {
         .iter()
         .map(|m| m.fit.model().sample_time().nyquist_rad_s())
         .fold(f64::INFINITY, f64::min);
-    let high = nyquist.min(HIGHEST_RAD_S);
+    let high = nyquist.min(MAX_OMEGA_RAD_S);
     let longest_s = models
         .iter()
         .flat_map(|m| m.records)
         .map(|r| r.len() as f64 * r.sample_time().s())
         .fold(0.0, f64::max);
-    let low = (TAU / longest_s).max(LOWEST_RAD_S).min(high / 10.0);
+    let low = (TAU / longest_s).max(MIN_OMEGA_RAD_S).min(high / 10.0);
     // A point at the edge of the axes would be cut in half.
     let below = points.iter().flat_map(|p| &p.omega_rad_s).map(|w| w / 1.1);
     let low = below.filter(|w| *w > 1e-6 * high).fold(low, f64::min);
-    let ratio = (high / low).ln() / (POINTS - 1) as f64;
-    (0..POINTS).map(|i| low * (ratio * i as f64).exp()).collect()
+    let ratio = (high / low).ln() / (POINT_COUNT - 1) as f64;
+    (0..POINT_COUNT).map(|i| low * (ratio * i as f64).exp()).collect()
 }
 
 /// Values and standard errors of magnitude and phase over frequency.
@@ -269,12 +269,12 @@ impl Curve {
 /// last element.
 fn tick_step(span: f64, steps: &[f64]) -> f64 {
     let largest = steps.last().copied().unwrap_or(1.0);
-    let enough = |step: &&f64| span / **step <= MAX_STEPS;
+    let enough = |step: &&f64| span / **step <= MAX_STEP_COUNT;
     steps
         .iter()
         .find(enough)
         .copied()
-        .unwrap_or_else(|| largest * (span / (MAX_STEPS * largest)).ceil())
+        .unwrap_or_else(|| largest * (span / (MAX_STEP_COUNT * largest)).ceil())
 }
 
 /// The 95 % band, limited to the range of the figure; `None` without standard errors.
@@ -313,7 +313,7 @@ mod tests {
                 tau_e_s,
                 ..OperatingState::s1().operator
             },
-            sample_time: SampleTime::HUNDREDTH,
+            sample_time: SampleTime::AT_100_HZ,
         };
         // A delay of 0.5 s gives four turns of phase at 50 rad/s.
         let figure = bode("b", &[], &[truth(0.5)]);
@@ -326,7 +326,7 @@ mod tests {
     fn held_true_operator_matches_continuous_at_low_frequency() {
         let truth = TrueResponse {
             operator: OperatingState::s1().operator,
-            sample_time: SampleTime::HUNDREDTH,
+            sample_time: SampleTime::AT_100_HZ,
         };
         let curve = Curve::of_truth(&truth, &[0.01, 5.0]);
         // The magnitude is K_e in dB; at 5 rad/s the half-sample delay of the hold adds 1.4 deg of phase lag.

@@ -11,7 +11,7 @@ use kuva::render::render::Scene;
 use super::{draw, scale::Scale};
 use crate::numbers::Z_95;
 
-const RADIUS: f64 = 2.4;
+const MARKER_RADIUS: f64 = 2.4;
 /// Half of the width of an error bar's cap.
 const CAP_HALF_WIDTH: f64 = 2.5;
 
@@ -43,7 +43,7 @@ impl BodePoints {
     }
 
     /// The points with finite magnitude and phase and a finite, positive frequency.
-    pub(super) fn drawable(&self) -> Self {
+    pub(super) fn drawable_points(&self) -> Self {
         let n = self
             .omega_rad_s
             .len()
@@ -64,7 +64,7 @@ impl BodePoints {
     }
 
     /// Shifts the phases by full turns to the branch nearest to a curve, given as frequencies and phases in deg.
-    pub(super) fn on_branch_of(mut self, curve: Option<(&[f64], &[f64])>) -> Self {
+    pub(super) fn shift_to_branch_of(mut self, curve: Option<(&[f64], &[f64])>) -> Self {
         let pairs: Vec<(f64, f64)> = self
             .omega_rad_s
             .iter()
@@ -73,7 +73,7 @@ impl BodePoints {
             .collect();
         let unwrapped = unwrapped_deg(&pairs, self.delay_s);
         for ((phase, &omega), alone) in self.phase_deg.iter_mut().zip(&self.omega_rad_s).zip(unwrapped) {
-            phase.value = match curve.and_then(|(w, y)| interpolated(w, y, omega)) {
+            phase.value = match curve.and_then(|(w, y)| interpolate(w, y, omega)) {
                 Some(near) => phase.value + 360.0 * ((near - phase.value) / 360.0).round(),
                 None => alone,
             };
@@ -82,9 +82,9 @@ impl BodePoints {
     }
 
     /// Returns the values together with both ends of their error bars.
-    pub(super) fn reach(values: &[Estimate]) -> impl Iterator<Item = f64> + '_ {
+    pub(super) fn values_and_bar_ends(values: &[Estimate]) -> impl Iterator<Item = f64> + '_ {
         values.iter().flat_map(|v| {
-            let half = half_bar(v);
+            let half = bar_half_length(v);
             [v.value - half, v.value, v.value + half]
         })
     }
@@ -93,7 +93,7 @@ impl BodePoints {
     pub(super) fn draw(&self, scene: &mut Scene, scale: &Scale, values: &[Estimate], colour: &str) {
         let mut at = Vec::new();
         for (&omega, value) in self.omega_rad_s.iter().zip(values).filter(|(w, _)| scale.has_x(**w)) {
-            let (x, half) = (scale.place_x(omega), half_bar(value));
+            let (x, half) = (scale.place_x(omega), bar_half_length(value));
             let (low, high) = (value.value - half, value.value + half);
             if high < scale.y.0 || low > scale.y.1 {
                 continue;
@@ -115,17 +115,17 @@ impl BodePoints {
                 at.push((x, scale.place_y(value.value)));
             }
         }
-        draw::points(scene, &at, RADIUS, colour, None);
+        draw::points(scene, &at, MARKER_RADIUS, colour, None);
     }
 }
 
-fn half_bar(value: &Estimate) -> f64 {
+fn bar_half_length(value: &Estimate) -> f64 {
     value.standard_error.map_or(0.0, |s| Z_95 * s).clamp(0.0, 1e6)
 }
 
 /// Interpolates linearly between the points of a curve and returns the value of the nearest end outside it; `None` if
 /// the value is not finite.
-fn interpolated(omega: &[f64], y: &[f64], at: f64) -> Option<f64> {
+fn interpolate(omega: &[f64], y: &[f64], at: f64) -> Option<f64> {
     let n = omega.len().min(y.len());
     let above = omega[..n].partition_point(|w| *w <= at);
     let value = match (above.checked_sub(1), above < n) {
@@ -156,10 +156,10 @@ mod tests {
 
     #[test]
     fn phases_are_moved_to_the_branch_of_the_curve() {
-        let joined = points(&[100.0, 60.0, -170.0]).on_branch_of(Some((&[0.5, 3.5], &[-200.0, -600.0])));
+        let joined = points(&[100.0, 60.0, -170.0]).shift_to_branch_of(Some((&[0.5, 3.5], &[-200.0, -600.0])));
         let phases: Vec<f64> = joined.phase_deg.iter().map(|p| p.value).collect();
         assert_eq!(phases, [-260.0, -300.0, -530.0]);
-        let alone = points(&[-100.0, 170.0, 100.0]).on_branch_of(None);
+        let alone = points(&[-100.0, 170.0, 100.0]).shift_to_branch_of(None);
         let phases: Vec<f64> = alone.phase_deg.iter().map(|p| p.value).collect();
         assert_eq!(phases, [-100.0, -190.0, -260.0]);
     }
@@ -169,9 +169,9 @@ mod tests {
         let mut broken = points(&[1.0, f64::NAN, 3.0, 4.0]);
         broken.omega_rad_s[0] = 0.0;
         broken.magnitude_db.truncate(3);
-        assert_eq!(broken.drawable().omega_rad_s, [3.0]);
+        assert_eq!(broken.drawable_points().omega_rad_s, [3.0]);
         assert_eq!(
-            BodePoints::reach(&[Estimate {
+            BodePoints::values_and_bar_ends(&[Estimate {
                 value: 1.0,
                 standard_error: Some(f64::INFINITY)
             }])

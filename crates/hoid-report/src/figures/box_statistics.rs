@@ -4,7 +4,7 @@
 //! values within 1.5 interquartile ranges of the box; values beyond are drawn as points (Tukey, *Exploratory Data
 //! Analysis*, 1977).
 
-use hoid_numerics::statistics::{finite_sorted, quantile};
+use hoid_numerics::statistics::{quantile, sorted_finite_values};
 
 use super::style;
 
@@ -33,7 +33,7 @@ pub struct BoxStatistics {
 impl BoxStatistics {
     /// Computes the statistics of the finite values; quartiles are interpolated linearly between ranks.
     pub fn of(values: &[f64]) -> Self {
-        let values = finite_sorted(values.iter().copied());
+        let values = sorted_finite_values(values.iter().copied());
         let quartile = |q| quantile(&values, q).unwrap_or_default();
         let (lower, upper) = (quartile(0.25), quartile(0.75));
         let reach = WHISKER_LENGTH * (upper - lower);

@@ -9,26 +9,26 @@ use kuva::{
 use super::{
     BoxStatistics,
     axes::{SymmetricLogAxis, with_ordinate},
-    draw::{self, INK},
+    draw::{self, OUTLINE_COLOUR},
     frame::{self, Area, Frame, Ordinates},
-    labels::{marked, panel_label},
-    legend::{Entry, Sample, add_legend_by},
+    labels::{label_markup, panel_label},
+    legend::{Entry, Sample, add_legend_in_multiples_of},
     palette::{Shade, is_dark},
-    style::{self, BLACK, TEXT},
+    style::{self, BLACK, TEXT_SIZE},
     svg,
 };
 
 /// Height of the axes of a panel; `SINGLE_PANEL_HEIGHT` is the height if the figure has a single panel.
-const HEIGHT: f64 = 112.0;
+const PANEL_HEIGHT: f64 = 112.0;
 const SINGLE_PANEL_HEIGHT: f64 = 150.0;
 /// Space above a panel for its note and for the counts of outliers beyond its range.
-const COUNTS: f64 = 13.0;
+const NOTE_SPACE: f64 = 13.0;
 /// Distance of the group names below the axis; `ROW_DISTANCE` is the distance of a second row of names below the first.
-const NAMES_BELOW: f64 = 17.0;
+const NAME_DISTANCE: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
 /// Fraction of the width of a group that its boxes occupy; `BOX_WIDTH_SHARE` is the width of a box as a fraction of its
 /// place, and `MAX_BOX_WIDTH` the largest width.
-const GROUP: f64 = 0.86;
+const GROUP_WIDTH_SHARE: f64 = 0.86;
 const BOX_WIDTH_SHARE: f64 = 0.8;
 const MAX_BOX_WIDTH: f64 = 26.0;
 
@@ -100,18 +100,18 @@ pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
     if n == 0 || grid.groups.is_empty() {
-        return frame::empty(id, title);
+        return frame::empty_figure(id, title);
     }
     let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
     let ordinates = Ordinates::of(labels, columns, grid.shared_ordinates);
-    let ranges = frame::of_rows(
+    let ranges = frame::row_ranges(
         grid.panels.iter().map(|p| grid.range_of(p)).collect(),
         columns,
         grid.shared_ordinates,
     );
-    let height = if n == 1 { SINGLE_PANEL_HEIGHT } else { HEIGHT };
+    let height = if n == 1 { SINGLE_PANEL_HEIGHT } else { PANEL_HEIGHT };
     let with_text = grid.range == BoxRange::Whiskers || grid.panels.iter().any(|p| !p.note.is_empty());
-    let above = if with_text { COUNTS } else { 0.0 };
+    let above = if with_text { NOTE_SPACE } else { 0.0 };
     let frame = Frame::with_space(n, columns, height, ordinates, grid.titles.len(), (above, 0.0));
     let groups = (0.5, grid.groups.len() as f64 + 0.5);
     let cell = |(i, panel): (usize, &BoxPanel)| {
@@ -121,13 +121,13 @@ pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
             None => with_ordinate(layout, ranges[i], &panel.unit, false, height, frame.has_ticks(i)),
         };
         let layout = frame
-            .fitted(i, layout)
+            .fit_layout(i, layout)
             .with_x_categories(vec![String::new(); grid.groups.len()]);
         (vec![Plot::from(style::line([], BLACK, 1.0))], layout)
     };
     let cells = grid.panels.iter().enumerate().map(cell).collect();
     let label = |i: usize| panel_label(&grid.panels[i].name, &grid.panels[i].unit);
-    let mut scene = frame.drawn(cells, &grid.abscissa, label, &grid.titles, 0.0);
+    let mut scene = frame.draw_panels(cells, &grid.abscissa, label, &grid.titles, 0.0);
     let mut missing = false;
     for (i, panel) in grid.panels.iter().enumerate() {
         missing |= grid.draw(&mut scene, panel, frame.area(i), ranges[i]);
@@ -172,19 +172,19 @@ impl BoxGrid {
 
     /// Draws the names of the groups, in two rows if they are long.
     fn add_names(&self, scene: &mut Scene, area: Area) {
-        let names: Vec<String> = self.groups.iter().map(|g| marked(g)).collect();
+        let names: Vec<String> = self.groups.iter().map(|g| label_markup(g)).collect();
         let pitch = area.width / names.len() as f64;
-        let widest = names.iter().map(|n| draw::text_space(n, TEXT)).fold(0.0, f64::max);
+        let widest = names.iter().map(|n| draw::text_space(n, TEXT_SIZE)).fold(0.0, f64::max);
         let staggered = widest > pitch;
         for (k, name) in names.iter().enumerate() {
             let x = area.left + pitch * (k as f64 + 0.5);
             let y = area.bottom()
                 + if staggered && k % 2 == 1 {
-                    NAMES_BELOW + ROW_DISTANCE
+                    NAME_DISTANCE + ROW_DISTANCE
                 } else {
-                    NAMES_BELOW
+                    NAME_DISTANCE
                 };
-            scene.add(draw::centred(x, y, name.clone(), None));
+            scene.add(draw::centred_text(x, y, name.clone(), None));
         }
     }
 
@@ -207,17 +207,17 @@ impl BoxGrid {
                 Some("2 2"),
             ));
         }
-        let pitch = GROUP * of_group / self.series.len().max(1) as f64;
+        let pitch = GROUP_WIDTH_SHARE * of_group / self.series.len().max(1) as f64;
         let half = 0.5 * (BOX_WIDTH_SHARE * pitch).min(MAX_BOX_WIDTH);
         let (mut above, mut below, mut missing) = (0, 0, false);
         for group in 0..self.groups.len() {
-            let start = area.left + of_group * (group as f64 + 0.5 * (1.0 - GROUP));
+            let start = area.left + of_group * (group as f64 + 0.5 * (1.0 - GROUP_WIDTH_SHARE));
             for (place, series) in self.series.iter().enumerate() {
                 let x = start + pitch * (place as f64 + 0.5);
                 let statistics = panel.boxes.get(group).and_then(|b| b.get(place));
                 let Some(statistics) = statistics.filter(|b| b.is_drawable()) else {
                     missing = true;
-                    draw::cross(scene, (x, area.bottom() - 6.0), half.min(3.0), INK, 1.0);
+                    draw::cross(scene, (x, area.bottom() - 6.0), half.min(3.0), OUTLINE_COLOUR, 1.0);
                     continue;
                 };
                 let colour = series.shade.colour();
@@ -256,7 +256,7 @@ impl BoxGrid {
                 area.right(),
                 y,
                 marks.join(", "),
-                TEXT,
+                TEXT_SIZE,
                 TextAnchor::End,
                 None,
             ));
@@ -270,11 +270,11 @@ impl BoxGrid {
             .map(|s| Entry::new(&s.name, &s.shade.colour(), Sample::Box))
             .collect();
         if missing {
-            entries.push(Entry::new("no value", INK, Sample::Cross));
+            entries.push(Entry::new("no value", OUTLINE_COLOUR, Sample::Cross));
         }
         // In the legend, the levels of one method stay in one row.
         let levels = self.series.first().map_or(1, |s| s.shade.levels);
-        add_legend_by(scene, &entries, levels);
+        add_legend_in_multiples_of(scene, &entries, levels);
     }
 }
 
@@ -288,11 +288,22 @@ fn draw_box(
 ) {
     let [lowest, lower, median, upper, highest] = statistics.marks().map(y_of);
     for (end, side) in [(lowest, lower), (highest, upper)] {
-        scene.add(draw::line((x, side), (x, end), INK, 0.8, None));
-        scene.add(draw::line((x - 0.6 * half, end), (x + 0.6 * half, end), INK, 0.8, None));
+        scene.add(draw::line((x, side), (x, end), OUTLINE_COLOUR, 0.8, None));
+        scene.add(draw::line(
+            (x - 0.6 * half, end),
+            (x + 0.6 * half, end),
+            OUTLINE_COLOUR,
+            0.8,
+            None,
+        ));
     }
     let size = (2.0 * half, lower - upper);
-    scene.add(draw::rectangle((x - half, upper), size, colour, Some((INK, 0.6))));
+    scene.add(draw::rectangle(
+        (x - half, upper),
+        size,
+        colour,
+        Some((OUTLINE_COLOUR, 0.6)),
+    ));
     // Only the median line of a very flat box is visible.
     let on_box = if size.1 < 2.0 || !is_dark(colour) {
         BLACK
@@ -304,7 +315,7 @@ fn draw_box(
 
 #[cfg(test)]
 mod tests {
-    use super::{super::draw::tests::has, *};
+    use super::{super::draw::tests::contains_element, *};
 
     fn grid(boxes: Vec<Vec<BoxStatistics>>) -> BoxGrid {
         let (groups, series) = (boxes.len(), boxes.first().map_or(0, Vec::len));
@@ -344,13 +355,13 @@ mod tests {
         };
         let svg = box_plots("b", "t", &grid(vec![vec![one]]));
         let y = |v: f64| 8.0 + SINGLE_PANEL_HEIGHT * (10.5 - v) / 11.0;
-        let middle = style::LEFT + 0.5 * (style::WIDTH - style::LEFT - style::RIGHT);
+        let middle = style::LEFT_MARGIN + 0.5 * (style::WIDTH - style::LEFT_MARGIN - style::RIGHT_MARGIN);
         let side = middle - 0.5 * MAX_BOX_WIDTH;
         let height = SINGLE_PANEL_HEIGHT * 6.0 / 11.0;
         let rect = [("x", side), ("y", y(8.0)), ("width", MAX_BOX_WIDTH), ("height", height)];
-        assert!(has(&svg, "rect", &rect), "{svg}");
+        assert!(contains_element(&svg, "rect", &rect), "{svg}");
         let line = |from: (f64, f64), to: (f64, f64)| {
-            has(
+            contains_element(
                 &svg,
                 "line",
                 &[("x1", from.0), ("y1", from.1), ("x2", to.0), ("y2", to.1)],
@@ -359,9 +370,15 @@ mod tests {
         assert!(line((middle, y(2.0)), (middle, y(0.0))), "lower whisker");
         assert!(line((middle, y(8.0)), (middle, y(9.0))), "upper whisker");
         assert!(line((side, y(5.0)), (side + MAX_BOX_WIDTH, y(5.0))), "median");
-        assert!(has(&svg, "circle", &[("cx", middle), ("cy", y(10.0))]), "outlier");
+        assert!(
+            contains_element(&svg, "circle", &[("cx", middle), ("cy", y(10.0))]),
+            "outlier"
+        );
         // The ordinate of the library agrees: its tick at 2 is at the height of the lower quartile.
-        assert!(line((style::LEFT - 5.0, y(2.0)), (style::LEFT, y(2.0))), "tick");
+        assert!(
+            line((style::LEFT_MARGIN - 5.0, y(2.0)), (style::LEFT_MARGIN, y(2.0))),
+            "tick"
+        );
         assert!(svg.contains(">10</text>") && svg.contains(">0</text>"));
     }
 

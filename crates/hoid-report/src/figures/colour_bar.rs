@@ -11,17 +11,17 @@ use kuva::{
 use super::{
     axes::{tick, tick_step},
     draw,
-    labels::marked,
-    style::{BLACK, TEXT},
+    labels::label_markup,
+    style::{BLACK, TEXT_SIZE},
 };
 
-/// Space for the colour bar at the right of the panels; `BAR` is the width of the bar and `STEPS` the number of its
+/// Space for the colour bar at the right of the panels; `BAR_WIDTH` is the width of the bar and `STEP_COUNT` the number of its
 /// colour steps.
-pub const SPACE_FOR_BAR: f64 = 72.0;
-const BAR: f64 = 12.0;
-const STEPS: usize = 64;
+pub const BAR_SPACE: f64 = 72.0;
+const BAR_WIDTH: f64 = 12.0;
+const STEP_COUNT: usize = 64;
 /// Smallest distance between the ticks of the colour bar.
-const TICK_HEIGHT: f64 = 30.0;
+const MIN_TICK_SPACING: f64 = 30.0;
 
 /// Colour map of the cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -56,7 +56,7 @@ impl ColourScale {
     /// Ticks of a colour bar of this height, at least three if possible: the first tick in units of the spacing, the
     /// number of ticks, and the spacing.
     fn ticks(&self, height: f64) -> (f64, usize, f64) {
-        let mut most = (height / TICK_HEIGHT).max(2.0);
+        let mut most = (height / MIN_TICK_SPACING).max(2.0);
         loop {
             let step = tick_step(self.high - self.low, most);
             let first = (self.low / step - 1e-9).ceil();
@@ -71,35 +71,56 @@ impl ColourScale {
 
     /// Draws a colour bar with ticks and the name of the quantity at the right edge of the figure.
     pub fn add_bar(&self, scene: &mut Scene, top: f64, bottom: f64, name: &str) {
-        let left = scene.width - SPACE_FOR_BAR + 2.0;
+        let left = scene.width - BAR_SPACE + 2.0;
         let height = bottom - top;
-        let step = height / STEPS as f64;
-        for k in 0..STEPS {
-            let share = (k as f64 + 0.5) / STEPS as f64;
+        let step = height / STEP_COUNT as f64;
+        for k in 0..STEP_COUNT {
+            let share = (k as f64 + 0.5) / STEP_COUNT as f64;
             let value = self.low + share * (self.high - self.low);
             let colour = self.colour(value);
             let corner = (left, bottom - step * (k + 1) as f64);
-            scene.add(draw::rectangle(corner, (BAR, step), &colour, Some((&colour, 0.4))));
+            scene.add(draw::rectangle(
+                corner,
+                (BAR_WIDTH, step),
+                &colour,
+                Some((&colour, 0.4)),
+            ));
         }
-        scene.add(draw::rectangle((left, top), (BAR, height), "none", Some((BLACK, 0.8))));
+        scene.add(draw::rectangle(
+            (left, top),
+            (BAR_WIDTH, height),
+            "none",
+            Some((BLACK, 0.8)),
+        ));
         let (first, many, ticks) = self.ticks(height);
         for k in 0..many {
             let value = (first + k as f64) * ticks;
             let y = bottom - height * (value - self.low) / (self.high - self.low);
-            scene.add(draw::line((left + BAR, y), (left + BAR + 4.0, y), BLACK, 1.0, None));
-            let at = left + BAR + 7.0;
+            scene.add(draw::line(
+                (left + BAR_WIDTH, y),
+                (left + BAR_WIDTH + 4.0, y),
+                BLACK,
+                1.0,
+                None,
+            ));
+            let at = left + BAR_WIDTH + 7.0;
             scene.add(draw::text(
                 at,
                 y + 4.5,
                 tick(value, ticks),
-                TEXT,
+                TEXT_SIZE,
                 TextAnchor::Start,
                 None,
             ));
         }
         // The name is vertical, so a subscript extends further to the right.
         let x = scene.width - 9.0;
-        scene.add(draw::centred(x, top + 0.5 * height, marked(name), Some(-90.0)));
+        scene.add(draw::centred_text(
+            x,
+            top + 0.5 * height,
+            label_markup(name),
+            Some(-90.0),
+        ));
     }
 }
 
@@ -124,7 +145,7 @@ mod tests {
                     let last = (first + (many - 1) as f64) * step;
                     assert!((3..12).contains(&many), "{low} {high} {height}: {many}");
                     assert!(first * step >= low - 1e-9 * step && last <= high + 1e-9 * step);
-                    assert!(height / (high - low) * step > TEXT.into(), "numbers apart");
+                    assert!(height / (high - low) * step > TEXT_SIZE.into(), "numbers apart");
                 }
             }
         }

@@ -66,7 +66,7 @@ fn stems(id: &str, title: &str, ordinate: &str, correlation: &Correlation, sampl
     let layout = style::layout((first - room, last + room), range, HEIGHT)
         .with_x_label(labels::axis_label(
             "lag",
-            &format!("samples of {} s", crate::numbers::plain(sample_time.s())),
+            &format!("samples of {} s", crate::numbers::format_plain(sample_time.s())),
         ))
         .with_y_label(ordinate)
         .with_shaded_region(
@@ -82,5 +82,9 @@ fn stems(id: &str, title: &str, ordinate: &str, correlation: &Correlation, sampl
                 .with_stroke_width(0.8)
                 .with_dasharray("none"),
         );
-    svg::finish(id, title, style::stacked(vec![(vec![stems.into()], layout, HEIGHT)]))
+    svg::finish(
+        id,
+        title,
+        style::stack_panels(vec![(vec![stems.into()], layout, HEIGHT)]),
+    )
 }

@@ -10,21 +10,21 @@ use super::{
     draw::{self, BAND_OPACITY},
     frame::{self, Frame, Ordinates},
     labels::panel_label,
-    legend::{Entry, Sample, add_legend_by},
+    legend::{Entry, Sample, add_legend_in_multiples_of},
     palette::Shade,
     scale::Scale,
-    series::{runs, thinned_run},
+    series::{runs, thinned_run_indices},
     style::{self, BLACK},
     svg,
 };
 
 /// Height of the axes of a panel; `SINGLE_PANEL_HEIGHT` is the height if the figure has a single panel.
-const HEIGHT: f64 = 112.0;
+const PANEL_HEIGHT: f64 = 112.0;
 const SINGLE_PANEL_HEIGHT: f64 = 150.0;
-const LINE: f64 = 1.4;
-const RADIUS: f64 = 2.2;
+const LINE_WIDTH: f64 = 1.4;
+const MARKER_RADIUS: f64 = 2.2;
 /// Half of the width of an error bar's cap.
-const CAP: f64 = 2.5;
+const CAP_HALF_WIDTH: f64 = 2.5;
 /// Margin outside the first and the last stem or marker, as a fraction of the abscissa.
 const ABSCISSA_MARGIN: f64 = 0.03;
 
@@ -105,13 +105,13 @@ pub fn curves(id: &str, title: &str, grid: &CurveGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
     if n == 0 {
-        return frame::empty(id, title);
+        return frame::empty_figure(id, title);
     }
     let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
     let ordinates = Ordinates::of(labels, columns, grid.shared_ordinates);
-    let height = if n == 1 { SINGLE_PANEL_HEIGHT } else { HEIGHT };
+    let height = if n == 1 { SINGLE_PANEL_HEIGHT } else { PANEL_HEIGHT };
     let x_range = grid.abscissa_range();
-    let ranges = frame::of_rows(
+    let ranges = frame::row_ranges(
         grid.panels.iter().map(CurvePanel::range).collect(),
         columns,
         grid.shared_ordinates,
@@ -135,17 +135,17 @@ pub fn curves(id: &str, title: &str, grid: &CurveGrid) -> String {
             height,
             frame.has_ticks(i),
         );
-        (panel.plots(&scale(i)), frame.fitted(i, layout))
+        (panel.plots(&scale(i)), frame.fit_layout(i, layout))
     };
     let cells = grid.panels.iter().enumerate().map(cell).collect();
     let label = |i: usize| panel_label(&grid.panels[i].name, &grid.panels[i].unit);
-    let mut scene = frame.drawn(cells, &grid.abscissa, label, &grid.titles, 0.0);
+    let mut scene = frame.draw_panels(cells, &grid.abscissa, label, &grid.titles, 0.0);
     for (i, panel) in grid.panels.iter().enumerate() {
         for curve in &panel.curves {
             curve.draw_marks(&mut scene, &scale(i));
         }
     }
-    add_legend_by(&mut scene, &grid.entries(), grid.levels());
+    add_legend_in_multiples_of(&mut scene, &grid.entries(), grid.level_count());
     svg::finish(id, title, scene)
 }
 
@@ -196,7 +196,7 @@ impl CurveGrid {
     }
 
     /// Number of levels of the method with the most levels.
-    fn levels(&self) -> usize {
+    fn level_count(&self) -> usize {
         let curves = self.panels.iter().flat_map(|p| &p.curves);
         curves.map(|c| c.shade.levels).max().unwrap_or(1)
     }
@@ -274,9 +274,9 @@ impl Curve {
         let known = |k: usize| scale.has_x(self.x[k]) && scale.has_y(self.y[k]);
         let values = &self.y[..n];
         let line = |run: std::ops::Range<usize>| -> Plot {
-            let kept = thinned_run(values, run, scale.area.parts()).into_iter();
-            let points = kept.map(|k| (self.x[k], scale.bounded(values[k])));
-            let line = style::line(points, &self.colour(), LINE);
+            let kept = thinned_run_indices(values, run, scale.area.column_count()).into_iter();
+            let points = kept.map(|k| (self.x[k], scale.limit_to_axes(values[k])));
+            let line = style::line(points, &self.colour(), LINE_WIDTH);
             match self.kind {
                 LineKind::Truth | LineKind::Dashed => line.with_dashed().into(),
                 LineKind::Dotted => line.with_dotted().into(),
@@ -305,7 +305,13 @@ impl Curve {
             for (end, y) in [(low, from), (high, to)] {
                 // An end of a bar that lies beyond the axes has no cap.
                 if scale.clamp_to_axis(end) == end {
-                    scene.add(draw::line((x - CAP, y), (x + CAP, y), &colour, 1.0, None));
+                    scene.add(draw::line(
+                        (x - CAP_HALF_WIDTH, y),
+                        (x + CAP_HALF_WIDTH, y),
+                        &colour,
+                        1.0,
+                        None,
+                    ));
                 }
             }
         }
@@ -326,15 +332,15 @@ impl Curve {
         match self.kind {
             LineKind::Marked => at
                 .iter()
-                .for_each(|at| draw::mark(scene, *at, RADIUS, self.shade.mark(), &colour)),
-            _ => draw::points(scene, &at, RADIUS, &colour, None),
+                .for_each(|at| draw::mark(scene, *at, MARKER_RADIUS, self.shade.mark(), &colour)),
+            _ => draw::points(scene, &at, MARKER_RADIUS, &colour, None),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{super::draw::tests::has, *};
+    use super::{super::draw::tests::contains_element, *};
 
     fn curve(kind: LineKind, x: &[f64], y: &[f64]) -> Curve {
         Curve {
@@ -367,13 +373,13 @@ mod tests {
         let mut stems = curve(LineKind::Stems, &[1.0, 10.0, 100.0], &[1.0, 10.0, 100.0]);
         stems.bars = vec![(0.5, 2.0), (f64::NAN, 1.0), (-1.0, 1000.0)];
         let svg = curves("c", "t", &grid(vec![stems], true));
-        let left = style::LEFT;
-        let width = style::WIDTH - style::LEFT - style::RIGHT;
+        let left = style::LEFT_MARGIN;
+        let width = style::WIDTH - style::LEFT_MARGIN - style::RIGHT_MARGIN;
         // The abscissa extends by 3 % of two decades beyond both ends; the ordinate ranges from 0.5 to 1000.
         let x = |v: f64| left + width * (v.log10() + 0.06) / 2.12;
         let y = |v: f64| 8.0 + SINGLE_PANEL_HEIGHT * (1000.0 / v).log10() / 2000.0_f64.log10();
         let upright = |at: f64, from: f64, to: f64| {
-            has(
+            contains_element(
                 &svg,
                 "line",
                 &[("x1", x(at)), ("y1", y(from)), ("x2", x(at)), ("y2", y(to))],
@@ -381,7 +387,10 @@ mod tests {
         };
         for v in [1.0, 10.0, 100.0] {
             assert!(upright(v, 0.5, v), "stem at {v}: {svg}");
-            assert!(has(&svg, "circle", &[("cx", x(v)), ("cy", y(v))]), "point at {v}");
+            assert!(
+                contains_element(&svg, "circle", &[("cx", x(v)), ("cy", y(v))]),
+                "point at {v}"
+            );
         }
         assert!(upright(1.0, 0.5, 2.0), "bar");
         assert!(!svg.contains("NaN") && !svg.contains("inf"));

@@ -17,13 +17,13 @@ use super::{
 use crate::numbers::Z_95;
 
 /// Name in the legend.
-const NAME: &str = "describing function, bars 95 %";
+const LEGEND_NAME: &str = "describing function, bars 95 %";
 /// Name in the legend if an error bar is truncated.
-const NAME_OF_CUT: &str = "describing function, bars 95 %, cut at 180 deg";
+const TRUNCATED_NAME: &str = "describing function, bars 95 %, cut at 180 deg";
 /// Name of the abscissa.
-pub(super) const FREQUENCY: &str = "frequency \u{3c9} (rad/s)";
+pub(super) const FREQUENCY_LABEL: &str = "frequency \u{3c9} (rad/s)";
 /// Number of frequencies of a model curve.
-const POINTS: usize = 240;
+const POINT_COUNT: usize = 240;
 
 /// A frequency response drawn with the points.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,7 +43,7 @@ pub struct ModelCurve {
 impl ModelCurve {
     /// Creates the curve of a response over the frequency range of a description; the range is widened by a small
     /// margin and extends at least up to `reach_rad_s`.
-    pub fn over(
+    pub fn over_frequencies(
         found: &Description,
         reach_rad_s: f64,
         name: &str,
@@ -60,7 +60,7 @@ impl ModelCurve {
         }
     }
 
-    /// Creates the curve of a response with its standard errors over the frequencies of [`Self::over`].
+    /// Creates the curve of a response with its standard errors over the frequencies of [`Self::over_frequencies`].
     pub fn with_band(
         found: &Description,
         reach_rad_s: f64,
@@ -95,7 +95,11 @@ impl ModelCurve {
         let ends = |(value, errors): (&f64, &[f64; 2])| {
             let whole = Z_95 * errors[part];
             // `f64::min` would ignore NaN.
-            let half = if whole > LONGEST_BAR { LONGEST_BAR } else { whole };
+            let half = if whole > MAX_BAR_HALF_LENGTH {
+                MAX_BAR_HALF_LENGTH
+            } else {
+                whole
+            };
             (value - half, value + half)
         };
         around.iter().zip(&self.standard_errors).map(ends).collect()
@@ -146,7 +150,7 @@ fn frequencies(found: &Description, reach_rad_s: f64) -> Vec<f64> {
     let ends = lines.first().zip(lines.last());
     let (low, high) = ends.map_or((0.1, 10.0), |(a, b)| (0.9 * a.omega_rad_s, 1.1 * b.omega_rad_s));
     let high = f64::max(high, reach_rad_s);
-    log_spaced((low, high), POINTS)
+    log_spaced((low, high), POINT_COUNT)
 }
 
 /// Returns `n` frequencies from `low` to `high` at equal ratios.
@@ -172,8 +176,11 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     let omega: Vec<f64> = lines.iter().map(|line| line.omega_rad_s).collect();
     let magnitudes: Vec<Estimate> = lines.iter().map(|line| line.magnitude_db()).collect();
     let phases = found.phases_deg();
-    let is_cut = magnitudes.iter().chain(&phases).any(|v| half_bar(v) > LONGEST_BAR);
-    let name = if is_cut { NAME_OF_CUT } else { NAME };
+    let is_cut = magnitudes
+        .iter()
+        .chain(&phases)
+        .any(|v| bar_half_length(v) > MAX_BAR_HALF_LENGTH);
+    let name = if is_cut { TRUNCATED_NAME } else { LEGEND_NAME };
     let points = |values: &[Estimate], name: &str| Curve {
         name: name.to_owned(),
         kind: LineKind::Points,
@@ -181,10 +188,10 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         x: omega.clone(),
         y: values.iter().map(|v| v.value).collect(),
         band: Vec::new(),
-        bars: values.iter().map(bar).collect(),
+        bars: values.iter().map(bar_ends).collect(),
     };
     let line = |(k, model): (usize, &ModelCurve), part: usize, y: Vec<f64>| {
-        model.curve((kind_of(k), Shade::of_method(k + 1)), part, y)
+        model.curve((line_kind(k), Shade::of_method(k + 1)), part, y)
     };
     let known: Vec<(f64, f64)> = omega.iter().copied().zip(phases.iter().map(|p| p.value)).collect();
     // The models precede the points, which are drawn over them.
@@ -225,7 +232,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         panels,
         columns: 1,
         titles: Vec::new(),
-        abscissa: FREQUENCY.to_owned(),
+        abscissa: FREQUENCY_LABEL.to_owned(),
         logarithmic_abscissa: true,
         shared_ordinates: false,
     };
@@ -234,7 +241,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
 
 /// The first model has a solid line; further models have dashed and dotted lines, so that coinciding curves stay
 /// visible.
-fn kind_of(model: usize) -> LineKind {
+fn line_kind(model: usize) -> LineKind {
     match model {
         0 => LineKind::Line,
         1 => LineKind::Dashed,
@@ -244,17 +251,21 @@ fn kind_of(model: usize) -> LineKind {
 
 /// Largest half length of an error bar, dB or deg. A phase with an error of half a turn is unknown, and a longer bar
 /// would compress the scale for all other points.
-const LONGEST_BAR: f64 = 180.0;
+const MAX_BAR_HALF_LENGTH: f64 = 180.0;
 
 /// Half length of an error bar; NaN if the standard error is unknown.
-fn half_bar(v: &Estimate) -> f64 {
+fn bar_half_length(v: &Estimate) -> f64 {
     v.standard_error.map_or(f64::NAN, |s| Z_95 * s)
 }
 
 /// Ends of an error bar, truncated to the largest length.
-fn bar(v: &Estimate) -> (f64, f64) {
-    let whole = half_bar(v);
-    let half = if whole > LONGEST_BAR { LONGEST_BAR } else { whole };
+fn bar_ends(v: &Estimate) -> (f64, f64) {
+    let whole = bar_half_length(v);
+    let half = if whole > MAX_BAR_HALF_LENGTH {
+        MAX_BAR_HALF_LENGTH
+    } else {
+        whole
+    };
     (v.value - half, v.value + half)
 }
 
@@ -268,7 +279,7 @@ mod tests {
     use super::*;
 
     /// `u(t) = 2 e(t - 0.3)` at lines from 1 to 23 times TAU/20 rad/s, with a different disturbance in each run.
-    fn described(runs: u32) -> Description {
+    fn simulated_description(runs: u32) -> Description {
         let ts = SampleTime::new(0.1).unwrap();
         let wave = |t: f64| {
             [1.0, 4.0, 9.0, 23.0]
@@ -291,8 +302,10 @@ mod tests {
 
     #[test]
     fn model_phase_is_unwrapped_to_the_points() {
-        let found = described(4);
-        let model = |turn: f64| ModelCurve::over(&found, 0.0, "m", 0.3, |w| Complex64::from_polar(2.0, turn - 0.3 * w));
+        let found = simulated_description(4);
+        let model = |turn: f64| {
+            ModelCurve::over_frequencies(&found, 0.0, "m", 0.3, |w| Complex64::from_polar(2.0, turn - 0.3 * w))
+        };
         let points: Vec<(f64, f64)> = found
             .function
             .lines
@@ -317,7 +330,7 @@ mod tests {
 
     #[test]
     fn model_band_is_drawn() {
-        let found = described(4);
+        let found = simulated_description(4);
         let of = |error: Option<f64>| {
             ModelCurve::with_band(&found, 0.0, "m", 0.3, |omega| {
                 let point = |&omega_rad_s: &f64| ResponsePoint {
@@ -342,7 +355,7 @@ mod tests {
                 .iter()
                 .all(|b| *b == (6.0 - Z_95, 6.0 + Z_95))
         );
-        assert_eq!(known.band(1, &[0.0])[0], (-LONGEST_BAR, LONGEST_BAR));
+        assert_eq!(known.band(1, &[0.0])[0], (-MAX_BAR_HALF_LENGTH, MAX_BAR_HALF_LENGTH));
         assert!(of(None).band(0, &[6.0])[0].0.is_nan());
         let drawn = |model: ModelCurve| describing("d", "t", &found, &[model]);
         assert_ne!(drawn(known), drawn(of(None)));
@@ -351,8 +364,8 @@ mod tests {
 
     #[test]
     fn figure_has_points_models_and_coherence() {
-        let found = described(4);
-        let model = ModelCurve::over(&found, 0.0, "gain and delay", 0.3, |w| {
+        let found = simulated_description(4);
+        let model = ModelCurve::over_frequencies(&found, 0.0, "gain and delay", 0.3, |w| {
             Complex64::from_polar(2.0, -0.3 * w)
         });
         let svg = describing("d", "t", &found, std::slice::from_ref(&model));
@@ -368,16 +381,16 @@ mod tests {
         }
         assert_eq!(svg, describing("d", "t", &found, &[model]));
         // A single run has neither errors nor coherence.
-        let alone = describing("d", "t", &described(1), &[]);
+        let alone = describing("d", "t", &simulated_description(1), &[]);
         assert!(!alone.contains("coherence") && !alone.contains("NaN"));
     }
 
     #[test]
     fn curves_extend_beyond_the_last_line() {
-        let found = described(4);
+        let found = simulated_description(4);
         let last = found.function.lines.last().unwrap().omega_rad_s;
         for (asked, reached) in [(0.0, 1.1 * last), (last, 1.1 * last), (3.0 * last, 3.0 * last)] {
-            let curve = ModelCurve::over(&found, asked, "m", 0.3, |_| Complex64::new(1.0, 0.0));
+            let curve = ModelCurve::over_frequencies(&found, asked, "m", 0.3, |_| Complex64::new(1.0, 0.0));
             assert!(
                 (curve.omega_rad_s.last().unwrap() / reached - 1.0).abs() < 1e-12,
                 "{asked}"
@@ -387,8 +400,9 @@ mod tests {
 
     #[test]
     fn identical_models_are_all_visible() {
-        let found = described(4);
-        let model = |name: &str| ModelCurve::over(&found, 0.0, name, 0.3, |w| Complex64::from_polar(2.0, -0.3 * w));
+        let found = simulated_description(4);
+        let model =
+            |name: &str| ModelCurve::over_frequencies(&found, 0.0, name, 0.3, |w| Complex64::from_polar(2.0, -0.3 * w));
         let broken = |models: &[ModelCurve]| describing("d", "t", &found, models).matches("stroke-dasharray").count();
         let (none, one) = (broken(&[]), broken(&[model("a")]));
         let (two, three) = (broken(&[model("a"), model("b")]), broken(&["a", "b", "c"].map(model)));
@@ -398,7 +412,7 @@ mod tests {
 
     #[test]
     fn truncated_error_bars_are_noted() {
-        let mut found = described(4);
+        let mut found = simulated_description(4);
         assert!(!describing("d", "t", &found, &[]).contains("cut at 180"));
         let line = &mut found.function.lines[0];
         line.standard_error = Some(10.0 * line.response.norm());

@@ -8,18 +8,18 @@ use kuva::render::{
 use super::{
     labels::{Level, parts},
     palette::Mark,
-    style::{GREY, TEXT},
+    style::{GREY, TEXT_SIZE},
 };
 
 /// Colour of outlines, whiskers and marks of missing values.
-pub const INK: &str = "#333333";
+pub const OUTLINE_COLOUR: &str = "#333333";
 /// Font size of labels that would otherwise be too long.
 const SMALL_FONT_SIZE: u32 = 10;
 /// Opacity of bands around lines.
 pub const BAND_OPACITY: f64 = 0.2;
 
 /// Distance between the lines of the hatching.
-const HATCH: f64 = 5.0;
+const HATCH_SPACING: f64 = 5.0;
 
 pub fn line(from: (f64, f64), to: (f64, f64), colour: &str, width: f64, dashes: Option<&str>) -> Primitive {
     Primitive::Line {
@@ -102,14 +102,14 @@ pub fn triangle(scene: &mut Scene, (x, y): (f64, f64), half: f64, up: bool, colo
 }
 
 /// Draws a pale rectangle with diagonal lines, for missing values.
-pub fn hatched(scene: &mut Scene, (x, y): (f64, f64), (width, height): (f64, f64)) {
+pub fn hatched_rectangle(scene: &mut Scene, (x, y): (f64, f64), (width, height): (f64, f64)) {
     scene.add(rectangle((x, y), (width, height), "#f2f2f2", None));
-    let mut offset = HATCH;
+    let mut offset = HATCH_SPACING;
     while offset < width + height {
         let from = (x + (offset - height).max(0.0), y + offset.min(height));
         let to = (x + offset.min(width), y + (offset - width).max(0.0));
         scene.add(line(from, to, GREY, 0.6, None));
-        offset += HATCH;
+        offset += HATCH_SPACING;
     }
 }
 
@@ -127,15 +127,15 @@ pub fn text(x: f64, y: f64, content: String, size: u32, anchor: TextAnchor, rota
 }
 
 /// Text centred at a position, with the font size of labels.
-pub fn centred(x: f64, y: f64, content: String, rotate: Option<f64>) -> Primitive {
-    text(x, y, content, TEXT, TextAnchor::Middle, rotate)
+pub fn centred_text(x: f64, y: f64, content: String, rotate: Option<f64>) -> Primitive {
+    text(x, y, content, TEXT_SIZE, TextAnchor::Middle, rotate)
 }
 
 /// Text centred at a position, with a smaller font if it is longer than the available space.
-pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -> Primitive {
-    let size = match text_width(&content, TEXT) > room {
+pub fn fitted_text(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -> Primitive {
+    let size = match text_width(&content, TEXT_SIZE) > room {
         true => SMALL_FONT_SIZE,
-        false => TEXT,
+        false => TEXT_SIZE,
     };
     text(x, y, content, size, TextAnchor::Middle, rotate)
 }
@@ -164,7 +164,7 @@ pub mod tests {
     use super::*;
 
     /// True if the figure has an element with these numbers, to the written precision of a hundredth.
-    pub fn has(svg: &str, element: &str, numbers: &[(&str, f64)]) -> bool {
+    pub fn contains_element(svg: &str, element: &str, numbers: &[(&str, f64)]) -> bool {
         let number = |tag: &str, name: &str| -> Option<f64> {
             let (_, rest) = tag.split_once(&format!(" {name}=\""))?;
             rest.split_once('"')?.0.parse().ok()

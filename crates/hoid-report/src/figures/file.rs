@@ -89,25 +89,25 @@ mod converted {
     use crate::ReportError;
 
     /// Pixels per inch of an SVG without units (CSS).
-    const PIXELS_AN_INCH: f64 = 96.0;
+    const PIXELS_PER_INCH: f64 = 96.0;
     /// Font families of the figures, with their replacements on Linux.
     const SANS_SERIF: [&str; 5] = ["Helvetica", "Arial", "Liberation Sans", "DejaVu Sans", "Noto Sans"];
 
     pub fn pdf(svg: &str) -> Result<Vec<u8>, ReportError> {
         let page = PageOptions {
-            dpi: PIXELS_AN_INCH as f32,
+            dpi: PIXELS_PER_INCH as f32,
         };
-        svg2pdf::to_pdf(&tree(svg)?, ConversionOptions::default(), page).map_err(|e| failed(&e))
+        svg2pdf::to_pdf(&tree(svg)?, ConversionOptions::default(), page).map_err(|e| figure_error(&e))
     }
 
     pub fn png(svg: &str) -> Result<Vec<u8>, ReportError> {
         let tree = tree(svg)?;
-        let scale = (DPI / PIXELS_AN_INCH) as f32;
-        let size = (tree.size().to_int_size().scale_by(scale)).ok_or_else(|| failed(&"it has no size"))?;
-        let mut dots =
-            Pixmap::new(size.width(), size.height()).ok_or_else(|| failed(&"it has more pixels than fit in memory"))?;
+        let scale = (DPI / PIXELS_PER_INCH) as f32;
+        let size = (tree.size().to_int_size().scale_by(scale)).ok_or_else(|| figure_error(&"it has no size"))?;
+        let mut dots = Pixmap::new(size.width(), size.height())
+            .ok_or_else(|| figure_error(&"it has more pixels than fit in memory"))?;
         resvg::render(&tree, Transform::from_scale(scale, scale), &mut dots.as_mut());
-        dots.encode_png().map_err(|e| failed(&e))
+        dots.encode_png().map_err(|e| figure_error(&e))
     }
 
     fn tree(svg: &str) -> Result<Tree, ReportError> {
@@ -115,11 +115,13 @@ mod converted {
         let fonts = options.fontdb_mut();
         fonts.load_system_fonts();
         let family = sans_serif(fonts).ok_or_else(|| {
-            failed(&"the system has no font; install one, such as DejaVu (fonts-dejavu), or write the figure as .svg")
+            figure_error(
+                &"the system has no font; install one, such as DejaVu (fonts-dejavu), or write the figure as .svg",
+            )
         })?;
         fonts.set_sans_serif_family(family.clone());
         options.font_family = family;
-        Tree::from_str(svg, &options).map_err(|e| failed(&e))
+        Tree::from_str(svg, &options).map_err(|e| figure_error(&e))
     }
 
     /// A font family of the system: the first family of [`SANS_SERIF`] that exists, otherwise any family.
@@ -133,7 +135,7 @@ mod converted {
         known.or_else(|| fonts.faces().next()?.families.first().map(|(family, _)| family.clone()))
     }
 
-    fn failed(reason: &dyn std::fmt::Display) -> ReportError {
+    fn figure_error(reason: &dyn std::fmt::Display) -> ReportError {
         ReportError::Figure {
             reason: reason.to_string(),
         }

@@ -14,25 +14,25 @@ use kuva::{
 
 use super::{
     draw,
-    labels::marked,
-    style::{self, LEFT, RIGHT, WIDTH},
+    labels::label_markup,
+    style::{self, LEFT_MARGIN, RIGHT_MARGIN, WIDTH},
     svg,
 };
 
 /// Space above the axes of a panel, and below the axes if there is no abscissa.
-const SPACE: f64 = 8.0;
+const VERTICAL_MARGIN: f64 = 8.0;
 /// Space to the left of a panel that shares the ordinate of its neighbour.
-const GAP: f64 = 16.0;
+const PANEL_GAP: f64 = 16.0;
 /// Space to the left of a panel that has its own ticks but no label.
-const TICKS: f64 = 50.0;
+const TICK_SPACE: f64 = 50.0;
 /// Space to the right of a panel whose neighbour has ticks but no label. This space is less than half of a tick label,
 /// which therefore extends into the space of the neighbour.
-const NARROW: f64 = 5.0;
-const TITLE: f64 = 18.0;
+const NARROW_RIGHT_MARGIN: f64 = 5.0;
+const TITLE_HEIGHT: f64 = 18.0;
 /// Position of the centre of the ordinate label.
-const LABEL_AT: f64 = 13.0;
+const LABEL_POSITION: f64 = 13.0;
 /// Distance of the name of the abscissa below the axis, with room for two rows of category names.
-const NAME_BELOW: f64 = 44.0;
+const NAME_DISTANCE: f64 = 44.0;
 
 /// Selection of the panels of a row that have ticks and the label of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,7 +70,7 @@ pub struct Area {
 
 impl Area {
     /// Number of columns of points to which a line between these axes is reduced: one for each unit of width.
-    pub fn parts(&self) -> usize {
+    pub fn column_count(&self) -> usize {
         self.width.max(1.0) as usize
     }
 
@@ -135,31 +135,31 @@ impl Frame {
 
     fn left(&self, column: usize) -> f64 {
         match self.ordinates {
-            _ if column == 0 => LEFT,
-            Ordinates::Each => LEFT,
-            Ordinates::Ticks => TICKS,
-            Ordinates::Shared => GAP,
+            _ if column == 0 => LEFT_MARGIN,
+            Ordinates::Each => LEFT_MARGIN,
+            Ordinates::Ticks => TICK_SPACE,
+            Ordinates::Shared => PANEL_GAP,
         }
     }
 
     fn right(&self, column: usize) -> f64 {
         match self.ordinates {
-            Ordinates::Ticks if column + 1 < self.columns => NARROW,
-            _ => RIGHT,
+            Ordinates::Ticks if column + 1 < self.columns => NARROW_RIGHT_MARGIN,
+            _ => RIGHT_MARGIN,
         }
     }
 
     fn top(&self, row: usize) -> f64 {
         let titled = row * self.columns < self.titles;
-        SPACE + self.above + if titled { TITLE } else { 0.0 }
+        VERTICAL_MARGIN + self.above + if titled { TITLE_HEIGHT } else { 0.0 }
     }
 
     fn bottom(&self, row: usize) -> f64 {
         let last = self.n.min((row + 1) * self.columns);
         if last + self.columns > self.n {
-            style::BOTTOM
+            style::BOTTOM_MARGIN
         } else {
-            SPACE
+            VERTICAL_MARGIN
         }
     }
 
@@ -192,7 +192,7 @@ impl Frame {
 
     /// Returns the layout with the size and margins of a panel. Only the lowest panel of a column has tick labels on
     /// the abscissa.
-    pub fn fitted(&self, i: usize, layout: Layout) -> Layout {
+    pub fn fit_layout(&self, i: usize, layout: Layout) -> Layout {
         let (row, column) = (i / self.columns, i % self.columns);
         let layout = layout
             .with_width(self.widths[column])
@@ -206,7 +206,7 @@ impl Frame {
     }
 
     /// Draws the panels with the name of the abscissa, the labels of the ordinates and the titles.
-    pub fn drawn(
+    pub fn draw_panels(
         &self,
         cells: Vec<(Vec<Plot>, Layout)>,
         abscissa: &str,
@@ -214,21 +214,36 @@ impl Frame {
         titles: &[String],
         right_space: f64,
     ) -> Scene {
-        let mut scene = style::in_grid(cells, &self.widths, &self.heights);
+        let mut scene = style::arrange_in_grid(cells, &self.widths, &self.heights);
         for i in (0..self.n).filter(|i| self.has_label(*i)) {
             let area = self.area(i);
-            let (x, y) = (area.left - LEFT + LABEL_AT + 4.5, area.top + 0.5 * area.height);
-            let room = area.height + 2.0 * SPACE;
-            scene.add(draw::fitted(x, y, label(i), room, Some(-90.0)));
+            let (x, y) = (
+                area.left - LEFT_MARGIN + LABEL_POSITION + 4.5,
+                area.top + 0.5 * area.height,
+            );
+            let room = area.height + 2.0 * VERTICAL_MARGIN;
+            scene.add(draw::fitted_text(x, y, label(i), room, Some(-90.0)));
         }
         for area in (0..self.n).filter(|i| self.is_lowest(*i)).map(|i| self.area(i)) {
-            let (x, y) = (area.left + 0.5 * area.width, area.bottom() + NAME_BELOW);
-            scene.add(draw::fitted(x, y, marked(abscissa), area.width + 2.0 * SPACE, None));
+            let (x, y) = (area.left + 0.5 * area.width, area.bottom() + NAME_DISTANCE);
+            scene.add(draw::fitted_text(
+                x,
+                y,
+                label_markup(abscissa),
+                area.width + 2.0 * VERTICAL_MARGIN,
+                None,
+            ));
         }
         for (i, title) in titles.iter().take(self.n.min(self.titles)).enumerate() {
             let area = self.area(i);
-            let (middle, y) = (area.left + 0.5 * area.width, area.top - SPACE - self.above);
-            scene.add(draw::fitted(middle, y, marked(title), area.width + SPACE, None));
+            let (middle, y) = (area.left + 0.5 * area.width, area.top - VERTICAL_MARGIN - self.above);
+            scene.add(draw::fitted_text(
+                middle,
+                y,
+                label_markup(title),
+                area.width + VERTICAL_MARGIN,
+                None,
+            ));
         }
         // The widths of the cells add up to the width of the figure, up to rounding errors.
         scene.width = (scene.width + right_space).round();
@@ -237,12 +252,12 @@ impl Frame {
 }
 
 /// A figure without panels.
-pub fn empty(id: &str, title: &str) -> String {
+pub fn empty_figure(id: &str, title: &str) -> String {
     svg::finish(id, title, Scene::new(WIDTH, 1.0))
 }
 
 /// The range of each panel; if `shared`, the smallest range that covers all panels of its row.
-pub fn of_rows(own: Vec<(f64, f64)>, columns: usize, shared: bool) -> Vec<(f64, f64)> {
+pub fn row_ranges(own: Vec<(f64, f64)>, columns: usize, shared: bool) -> Vec<(f64, f64)> {
     if !shared {
         return own;
     }
@@ -266,7 +281,7 @@ mod tests {
                 let areas: Vec<Area> = (0..2 * columns).map(|i| frame.area(i)).collect();
                 assert!(areas.iter().all(|a| (a.width - areas[0].width).abs() < 1e-9));
                 let whole = if columns == 1 { WIDTH } else { 2.0 * WIDTH };
-                assert!((areas[columns - 1].right() - (whole - 30.0 - RIGHT)).abs() < 1e-9);
+                assert!((areas[columns - 1].right() - (whole - 30.0 - RIGHT_MARGIN)).abs() < 1e-9);
                 assert!(
                     areas
                         .windows(2)
@@ -283,8 +298,15 @@ mod tests {
             [0, 2, 4].map(|i| frame.area(i).top)
         };
         let none = tops(0);
-        assert_eq!(tops(2), none.map(|top| top + TITLE));
-        assert_eq!(tops(5), [none[0] + TITLE, none[1] + 2.0 * TITLE, none[2] + 3.0 * TITLE]);
+        assert_eq!(tops(2), none.map(|top| top + TITLE_HEIGHT));
+        assert_eq!(
+            tops(5),
+            [
+                none[0] + TITLE_HEIGHT,
+                none[1] + 2.0 * TITLE_HEIGHT,
+                none[2] + 3.0 * TITLE_HEIGHT
+            ]
+        );
     }
 
     #[test]
@@ -305,7 +327,7 @@ mod tests {
     #[test]
     fn rows_share_the_widest_range() {
         let own = vec![(0.0, 1.0), (-1.0, 0.5), (3.0, 4.0)];
-        assert_eq!(of_rows(own.clone(), 2, true), [(-1.0, 1.0), (-1.0, 1.0), (3.0, 4.0)]);
-        assert_eq!(of_rows(own.clone(), 2, false), own);
+        assert_eq!(row_ranges(own.clone(), 2, true), [(-1.0, 1.0), (-1.0, 1.0), (3.0, 4.0)]);
+        assert_eq!(row_ranges(own.clone(), 2, false), own);
     }
 }

@@ -1,7 +1,7 @@
 //! Text of labels: symbols of parameters, subscripts and superscripts.
 //!
 //! The drawing library has no subscripts. Subscripts and superscripts are marked by characters of the private use area
-//! of Unicode, which become tags in the finished SVG ([`tagged`]). SVG readers differ: some add the shifts of nested
+//! of Unicode, which become tags in the finished SVG ([`insert_tags`]). SVG readers differ: some add the shifts of nested
 //! tags, others replace them. Some drop tags without text, trim spaces at the edges of a tag, or position each tag of a
 //! centred text separately. The tags are therefore not nested; each contains text and the full shift from the previous
 //! tag, and leading spaces are non-breaking. `svg` sets the start position of a text with tags.
@@ -11,7 +11,7 @@ const SUB: char = '\u{e000}';
 const END_SUB: char = '\u{e001}';
 const SUPER: char = '\u{e003}';
 const END_SUPER: char = '\u{e004}';
-const SIGNS: [char; 4] = [SUB, END_SUB, SUPER, END_SUPER];
+const MARKER_CHARS: [char; 4] = [SUB, END_SUB, SUPER, END_SUPER];
 const NO_BREAK_SPACE: char = '\u{a0}';
 
 /// Vertical position of a part of a label.
@@ -24,7 +24,7 @@ pub enum Level {
 
 impl Level {
     /// Distance of the part below the baseline, in units of the figure; negative for a superscript.
-    fn below(self) -> i32 {
+    fn baseline_offset(self) -> i32 {
         match self {
             Self::Line => 0,
             Self::Subscript => 3,
@@ -34,23 +34,23 @@ impl Level {
 
     /// Font size of the part relative to that of the line.
     pub fn size(self) -> f64 {
-        if self == Self::Line { 1.0 } else { SMALLER }
+        if self == Self::Line { 1.0 } else { SUBSCRIPT_SIZE_RATIO }
     }
 }
 
-/// Font size of subscripts in units of the figure; `SMALLER` is the size relative to the line.
-const SUBSCRIPT: &str = "12.2";
-const SMALLER: f64 = 12.2 / 13.0;
+/// Font size of subscripts in units of the figure; `SUBSCRIPT_SIZE_RATIO` is the size relative to the line.
+const SUBSCRIPT_SIZE: &str = "12.2";
+const SUBSCRIPT_SIZE_RATIO: f64 = 12.2 / 13.0;
 
 /// Escapes dollar signs in a text, because a dollar sign would start a formula.
-fn literal(text: &str) -> String {
+fn escape_dollars(text: &str) -> String {
     text.replace('$', "\\$")
 }
 
 /// Label of an axis: name and unit.
 pub fn axis_label(name: &str, unit: &str) -> String {
     let unit = if unit.is_empty() { "-" } else { unit };
-    literal(&plain(&format!("{name} ({unit})")))
+    escape_dollars(&strip_markers(&format!("{name} ({unit})")))
 }
 
 /// Label of a panel: name and unit; several names are separated by commas.
@@ -58,19 +58,19 @@ pub fn panel_label(name: &str, unit: &str) -> String {
     let names: Vec<String> = name.split(", ").map(symbol).collect();
     let unit = match unit {
         "" => String::new(),
-        unit => format!(" ({})", marks(unit)),
+        unit => format!(" ({})", mark_scripts(unit)),
     };
-    literal(&format!("{}{unit}", names.join(", ")))
+    escape_dollars(&format!("{}{unit}", names.join(", ")))
 }
 
 /// Marks the subscripts and superscripts of a label, such as `n_k^*` or `B_r(b_0^{d,0})`. `_` and `^` mark one
 /// character, or several in braces; words such as `my_model` and `run_2` are unchanged.
-pub fn marked(text: &str) -> String {
-    literal(&marks(text))
+pub fn label_markup(text: &str) -> String {
+    escape_dollars(&mark_scripts(text))
 }
 
-fn marks(text: &str) -> String {
-    let signs: Vec<char> = plain(text).chars().collect();
+fn mark_scripts(text: &str) -> String {
+    let signs: Vec<char> = strip_markers(text).chars().collect();
     let mut result = String::new();
     let mut at = 0;
     while at < signs.len() {
@@ -118,10 +118,10 @@ pub fn parts(text: &str) -> Vec<(Level, String)> {
 }
 
 /// Returns the figure with tags in place of the markers of subscripts and superscripts.
-pub fn tagged(svg: &str) -> String {
+pub fn insert_tags(svg: &str) -> String {
     let mut result = String::with_capacity(svg.len());
     let mut rest = svg;
-    while let Some(sign) = rest.find(SIGNS) {
+    while let Some(sign) = rest.find(MARKER_CHARS) {
         let start = rest[..sign].rfind('>').map_or(0, |at| at + 1);
         let end = rest[sign..].find('<').map_or(rest.len(), |at| sign + at);
         result.push_str(&rest[..start]);
@@ -140,10 +140,10 @@ fn with_tags(text: &str) -> String {
             result.push_str(&part);
             continue;
         }
-        let step = level.below() - above.below();
+        let step = level.baseline_offset() - above.baseline_offset();
         let size = match level {
             Level::Line => String::new(),
-            _ => format!(" font-size=\"{SUBSCRIPT}\""),
+            _ => format!(" font-size=\"{SUBSCRIPT_SIZE}\""),
         };
         let part = match part.strip_prefix(' ') {
             Some(after) => format!("{NO_BREAK_SPACE}{after}"),
@@ -157,12 +157,12 @@ fn with_tags(text: &str) -> String {
 
 /// True if the text has subscripts or superscripts.
 pub fn has_tags(text: &str) -> bool {
-    text.contains(SIGNS)
+    text.contains(MARKER_CHARS)
 }
 
 /// Removes the private characters that mark subscripts and superscripts.
-pub fn plain(text: &str) -> String {
-    text.replace(SIGNS, "")
+pub fn strip_markers(text: &str) -> String {
+    text.replace(MARKER_CHARS, "")
 }
 
 /// Symbol of a parameter with its subscript; other text is unchanged.
@@ -176,7 +176,7 @@ fn symbol(name: &str) -> String {
         "tau_e" => ("\u{3c4}", "e"),
         other => match other.char_indices().nth(1).map(|(at, _)| other.split_at(at)) {
             Some((letter, digits)) if digits.bytes().all(|b| b.is_ascii_digit()) => (letter, digits),
-            _ => return marks(other),
+            _ => return mark_scripts(other),
         },
     };
     format!("{letter}{SUB}{sub}{END_SUB}")
@@ -187,8 +187,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn subscripts_and_superscripts_are_found() {
-        let shown = |text: &str| tagged(&marked(text));
+    fn subscripts_and_superscripts_are_marked() {
+        let shown = |text: &str| insert_tags(&label_markup(text));
         assert_eq!(
             shown("n_k^*"),
             "n<tspan dy=\"3\" font-size=\"12.2\">k</tspan><tspan dy=\"-7\" font-size=\"12.2\">*</tspan>"
@@ -201,15 +201,18 @@ mod tests {
         for plain in ["my_model", "run_2", "_", "a_", "^2", "a_{b", "x_ y", ""] {
             assert_eq!(shown(plain), plain);
         }
-        let of_line: String = parts(&marked("P_n = 0.1")).into_iter().map(|part| part.1).collect();
+        let of_line: String = parts(&label_markup("P_n = 0.1"))
+            .into_iter()
+            .map(|part| part.1)
+            .collect();
         assert_eq!(of_line, "Pn = 0.1");
     }
 
     #[test]
     fn only_text_elements_are_tagged() {
-        let figure = format!("<text x=\"1\">{}</text><line/><text>b</text>", marked("K_e (s)"));
+        let figure = format!("<text x=\"1\">{}</text><line/><text>b</text>", label_markup("K_e (s)"));
         assert_eq!(
-            tagged(&figure),
+            insert_tags(&figure),
             "<text x=\"1\">K<tspan dy=\"3\" font-size=\"12.2\">e</tspan><tspan dy=\"-3\">\u{a0}(s)</tspan></text><line/><text>b</text>"
         );
     }

@@ -4,14 +4,14 @@ use kuva::render::render::{Scene, TextAnchor};
 
 use super::{
     draw,
-    labels::marked,
+    labels::label_markup,
     palette::Mark,
-    style::{LEFT, TEXT},
+    style::{LEFT_MARGIN, TEXT_SIZE},
 };
 
-const ROW: f64 = 18.0;
-const SAMPLE: f64 = 22.0;
-const GAP: f64 = 6.0;
+const ROW_HEIGHT: f64 = 18.0;
+const SAMPLE_WIDTH: f64 = 22.0;
+const NAME_GAP: f64 = 6.0;
 const ENTRY_GAP: f64 = 14.0;
 const MAX_NAME_CHARS: usize = 48;
 
@@ -39,7 +39,7 @@ pub enum Sample {
 /// One entry of a legend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Entry {
-    /// Text of the entry; see [`marked`] for subscripts.
+    /// Text of the entry; see [`label_markup`] for subscripts.
     pub name: String,
     /// Colour `#rrggbb`.
     pub colour: String,
@@ -60,54 +60,58 @@ impl Entry {
 /// Adds a legend below the figure and increases the height of the figure accordingly. The entries form one row if the
 /// width suffices, otherwise columns or, if names are long, rows with as many entries as fit.
 pub fn add_legend(scene: &mut Scene, entries: &[Entry]) {
-    add_legend_by(scene, entries, 1);
+    add_legend_in_multiples_of(scene, entries, 1);
 }
 
 /// Adds a legend as [`add_legend`] does. If it needs several rows, the number of columns is a multiple of `multiple`
 /// where possible, so that related entries stay together.
-pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
+pub fn add_legend_in_multiples_of(scene: &mut Scene, entries: &[Entry], multiple: usize) {
     if entries.is_empty() {
         return;
     }
     let names: Vec<String> = entries
         .iter()
-        .map(|e| marked(&shortened(&e.name, MAX_NAME_CHARS)))
+        .map(|e| label_markup(&shorten(&e.name, MAX_NAME_CHARS)))
         .collect();
     let widths: Vec<f64> = names
         .iter()
-        .map(|n| SAMPLE + GAP + draw::text_space(n, TEXT) + ENTRY_GAP)
+        .map(|n| SAMPLE_WIDTH + NAME_GAP + draw::text_space(n, TEXT_SIZE) + ENTRY_GAP)
         .collect();
     let last = scene.width - 4.0 + ENTRY_GAP;
     let whole: f64 = widths.iter().sum();
     let pitch = widths.iter().copied().fold(0.0, f64::max);
-    let columns = ((last - LEFT) / pitch) as usize;
+    let columns = ((last - LEFT_MARGIN) / pitch) as usize;
     let columns = if columns > multiple {
         columns - columns % multiple.max(1)
     } else {
         columns
     };
     let in_one_row = whole <= last - 8.0;
-    let left = if in_one_row { LEFT.min(last - whole) } else { LEFT };
+    let left = if in_one_row {
+        LEFT_MARGIN.min(last - whole)
+    } else {
+        LEFT_MARGIN
+    };
     let (mut x, mut y) = (left, scene.height + 15.0);
     for (i, entry) in entries.iter().enumerate() {
         let (start, advance) = match columns {
             _ if in_one_row => (x, widths[i]),
             2.. => {
                 if i > 0 && i.is_multiple_of(columns) {
-                    (x, y) = (left, y + ROW);
+                    (x, y) = (left, y + ROW_HEIGHT);
                 }
                 (x, pitch)
             }
             _ => {
                 if x > left && x + widths[i] > last {
-                    (x, y) = (left, y + ROW);
+                    (x, y) = (left, y + ROW_HEIGHT);
                 }
                 (x.min(last - widths[i]).max(4.0), widths[i])
             }
         };
         add_sample(scene, entry, start, y - 4.5);
-        let at = start + SAMPLE + GAP;
-        scene.add(draw::text(at, y, names[i].clone(), TEXT, TextAnchor::Start, None));
+        let at = start + SAMPLE_WIDTH + NAME_GAP;
+        scene.add(draw::text(at, y, names[i].clone(), TEXT_SIZE, TextAnchor::Start, None));
         x = start + advance;
     }
     scene.height = y + 7.0;
@@ -115,17 +119,17 @@ pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
 
 fn add_sample(scene: &mut Scene, entry: &Entry, x: f64, y: f64) {
     let colour = entry.colour.as_str();
-    let middle = x + 0.5 * SAMPLE;
-    let line = |dashes: Option<&str>| draw::line((x, y), (x + SAMPLE, y), colour, 2.0, dashes);
+    let middle = x + 0.5 * SAMPLE_WIDTH;
+    let line = |dashes: Option<&str>| draw::line((x, y), (x + SAMPLE_WIDTH, y), colour, 2.0, dashes);
     match entry.sample {
         Sample::Line => scene.add(line(None)),
         Sample::Dashed => scene.add(line(Some("6 3"))),
         Sample::Dotted => scene.add(line(Some("2 4"))),
         Sample::Box => scene.add(draw::rectangle(
             (x + 3.0, y - 5.0),
-            (SAMPLE - 6.0, 10.0),
+            (SAMPLE_WIDTH - 6.0, 10.0),
             colour,
-            Some((draw::INK, 0.7)),
+            Some((draw::OUTLINE_COLOUR, 0.7)),
         )),
         Sample::Point => draw::points(scene, &[(middle, y)], 2.6, colour, None),
         Sample::LineMark(mark) => {
@@ -133,11 +137,11 @@ fn add_sample(scene: &mut Scene, entry: &Entry, x: f64, y: f64) {
             draw::mark(scene, (middle, y), 2.6, mark, colour);
         }
         Sample::Cross => draw::cross(scene, (middle, y), 3.5, colour, 1.3),
-        Sample::Hatched => draw::hatched(scene, (x + 3.0, y - 5.0), (SAMPLE - 6.0, 10.0)),
+        Sample::Hatched => draw::hatched_rectangle(scene, (x + 3.0, y - 5.0), (SAMPLE_WIDTH - 6.0, 10.0)),
     }
 }
 
-fn shortened(text: &str, longest: usize) -> String {
+fn shorten(text: &str, longest: usize) -> String {
     if text.chars().count() <= longest {
         return text.to_owned();
     }
@@ -154,8 +158,8 @@ mod tests {
 
     #[test]
     fn long_names_are_shortened() {
-        assert_eq!(shortened("abc", 3), "abc");
-        assert_eq!(shortened("\u{3c9}\u{3c9}\u{3c9}\u{3c9}", 3), "\u{3c9}\u{3c9}\u{2026}");
+        assert_eq!(shorten("abc", 3), "abc");
+        assert_eq!(shorten("\u{3c9}\u{3c9}\u{3c9}\u{3c9}", 3), "\u{3c9}\u{3c9}\u{2026}");
     }
 
     #[test]
@@ -173,6 +177,6 @@ mod tests {
                 before = (*y, *x);
             }
         }
-        assert!(scene.height > 100.0 + 3.0 * ROW);
+        assert!(scene.height > 100.0 + 3.0 * ROW_HEIGHT);
     }
 }

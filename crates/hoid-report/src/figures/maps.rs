@@ -7,21 +7,21 @@ use kuva::{
 
 use super::{
     MapColours,
-    colour_bar::{ColourScale, SPACE_FOR_BAR},
+    colour_bar::{BAR_SPACE, ColourScale},
     draw,
     frame::{self, Area, Frame, Ordinates},
-    labels::marked,
+    labels::label_markup,
     legend::{Entry, Sample, add_legend},
     palette::is_dark,
-    style::{self, BLACK, TEXT},
+    style::{self, BLACK, TEXT_SIZE},
     svg,
 };
 
 /// Height of a cell; `MIN_PANEL_HEIGHT` is the smallest height of a panel.
-const CELL: f64 = 26.0;
+const CELL_HEIGHT: f64 = 26.0;
 const MIN_PANEL_HEIGHT: f64 = 78.0;
 /// Distance between the axis and the name of the ordinate.
-const NAME_AT: f64 = 26.0;
+const NAME_DISTANCE: f64 = 26.0;
 /// Smallest space between category names.
 const LABEL_SPACING: f64 = 5.0;
 
@@ -74,16 +74,16 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
     let n = grid.panels.len();
     let (nx, ny) = (grid.x_categories.len(), grid.y_categories.len());
     if n == 0 || nx == 0 || ny == 0 {
-        return frame::empty(id, title);
+        return frame::empty_figure(id, title);
     }
-    let height = (CELL * ny as f64).max(MIN_PANEL_HEIGHT);
+    let height = (CELL_HEIGHT * ny as f64).max(MIN_PANEL_HEIGHT);
     let frame = Frame::with_space(
         n,
         columns,
         height,
         Ordinates::Shared,
         grid.titles.len(),
-        (0.0, SPACE_FOR_BAR),
+        (0.0, BAR_SPACE),
     );
     let (x_range, y_range) = ((0.5, nx as f64 + 0.5), (0.5, ny as f64 + 0.5));
     let x_names = grid.x_names(frame.area(0).width);
@@ -95,12 +95,12 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
         let layout = style::layout(x_range, y_range, height)
             .with_show_grid(false)
             .with_y_tick_step(10.0 * (ny as f64 + 1.0));
-        let layout = frame.fitted(i, layout).with_x_categories(shown);
+        let layout = frame.fit_layout(i, layout).with_x_categories(shown);
         (vec![Plot::from(style::line([], BLACK, 1.0))], layout)
     };
     let cells = (0..n).map(cell).collect();
-    let label = |i: usize| marked(&grid.panels[i].name);
-    let mut scene = frame.drawn(cells, &grid.abscissa, label, &grid.titles, SPACE_FOR_BAR);
+    let label = |i: usize| label_markup(&grid.panels[i].name);
+    let mut scene = frame.draw_panels(cells, &grid.abscissa, label, &grid.titles, BAR_SPACE);
 
     let whole = grid.scale(&grid.panels);
     let mut missing = false;
@@ -159,8 +159,8 @@ impl MapGrid {
 
     /// Category names of an abscissa of this width; only every second, third or further name is shown if not all fit.
     fn x_names(&self, width: f64) -> Vec<String> {
-        let names: Vec<String> = self.x_categories.iter().map(|p| marked(p)).collect();
-        let widest = names.iter().map(|n| draw::text_space(n, TEXT)).fold(0.0, f64::max);
+        let names: Vec<String> = self.x_categories.iter().map(|p| label_markup(p)).collect();
+        let widest = names.iter().map(|n| draw::text_space(n, TEXT_SIZE)).fold(0.0, f64::max);
         let every = ((widest + LABEL_SPACING) * names.len() as f64 / width).ceil().max(1.0) as usize;
         let shown = |(i, name): (usize, String)| if i.is_multiple_of(every) { name } else { String::new() };
         names.into_iter().enumerate().map(shown).collect()
@@ -175,15 +175,15 @@ impl MapGrid {
             scene.add(draw::text(
                 area.left - 8.0,
                 y + 4.5,
-                marked(place),
-                TEXT,
+                label_markup(place),
+                TEXT_SIZE,
                 TextAnchor::End,
                 None,
             ));
         }
         let middle = area.top + 0.5 * area.height;
-        let x = area.left - NAME_AT;
-        scene.add(draw::centred(x, middle, marked(&self.ordinate), Some(-90.0)));
+        let x = area.left - NAME_DISTANCE;
+        scene.add(draw::centred_text(x, middle, label_markup(&self.ordinate), Some(-90.0)));
     }
 
     /// Draws the cells of a panel. Returns true if a value is missing.
@@ -199,7 +199,7 @@ impl MapGrid {
                 let is_marked = panel.marked == Some((x, y));
                 let Some(value) = value.filter(|v| style::is_drawable(*v)) else {
                     missing = true;
-                    draw::hatched(scene, corner, (width, height));
+                    draw::hatched_rectangle(scene, corner, (width, height));
                     if is_marked {
                         let at = (corner.0 + 0.5 * width, corner.1 + 0.5 * height);
                         draw::cross(scene, at, 5.0, BLACK, 1.6);
@@ -213,8 +213,8 @@ impl MapGrid {
                     let mut text = draw::text(
                         corner.0 + 0.5 * width,
                         corner.1 + 0.5 * height + 4.5,
-                        printed(value, decimals),
-                        TEXT,
+                        format_without_negative_zero(value, decimals),
+                        TEXT_SIZE,
                         TextAnchor::Middle,
                         None,
                     );
@@ -255,7 +255,7 @@ impl MapGrid {
             _ => 3,
         };
         let fits = |decimals: &usize| {
-            let widths = finite().map(|v| draw::text_space(&printed(v, *decimals), TEXT));
+            let widths = finite().map(|v| draw::text_space(&format_without_negative_zero(v, *decimals), TEXT_SIZE));
             widths.fold(0.0, f64::max) <= width - 1.5
         };
         let least = usize::from(largest < 10.0);
@@ -263,7 +263,7 @@ impl MapGrid {
     }
 }
 
-fn printed(value: f64, decimals: usize) -> String {
+fn format_without_negative_zero(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     match text.strip_prefix('-') {
         Some(rest) if rest.bytes().all(|b| matches!(b, b'0' | b'.')) => rest.to_owned(),
@@ -273,7 +273,7 @@ fn printed(value: f64, decimals: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{super::draw::tests::has, *};
+    use super::{super::draw::tests::contains_element, *};
 
     fn grid(values: Vec<Vec<f64>>) -> MapGrid {
         MapGrid {
@@ -295,17 +295,17 @@ mod tests {
     #[test]
     fn cells_have_their_position_and_colour() {
         let svg = maps("m", "t", &grid(vec![vec![1.0, 2.0], vec![3.0, f64::NAN]])).to_lowercase();
-        let width = 0.5 * (style::WIDTH - SPACE_FOR_BAR - style::LEFT - style::RIGHT);
+        let width = 0.5 * (style::WIDTH - BAR_SPACE - style::LEFT_MARGIN - style::RIGHT_MARGIN);
         let top = 8.0;
         let cell = |x: f64, y: f64, colour: &str| {
             let place = [
-                ("x", style::LEFT + width * x),
+                ("x", style::LEFT_MARGIN + width * x),
                 ("y", top + 39.0 * y),
                 ("width", width),
                 ("height", 39.0),
             ];
             let of_colour = svg.replace(&format!("\" fill=\"{colour}\""), "\" wanted=\"1\"");
-            has(&of_colour, "rect", &[&place[..], &[("wanted", 1.0)]].concat())
+            contains_element(&of_colour, "rect", &[&place[..], &[("wanted", 1.0)]].concat())
         };
         // The ends of viridis: the lowest value is at the lower left, the highest value above it.
         assert!(cell(0.0, 1.0, "#440154"), "{svg}");
@@ -328,8 +328,8 @@ mod tests {
 
     #[test]
     fn numbers_have_no_negative_zero() {
-        assert_eq!(printed(-0.001, 2), "0.00");
-        assert_eq!(printed(-0.01, 2), "-0.01");
+        assert_eq!(format_without_negative_zero(-0.001, 2), "0.00");
+        assert_eq!(format_without_negative_zero(-0.01, 2), "-0.01");
     }
 
     #[test]

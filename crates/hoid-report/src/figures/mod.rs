@@ -61,7 +61,7 @@ pub use describing::{ModelCurve, describing, log_spaced};
 pub use file::{DPI, FigureFormat, with_width_mm};
 pub use maps::{MapGrid, MapPanel, maps};
 pub use palette::{Shade, shade};
-pub use panel::{Beyond, CurveKind, Ordinate, TraceCurve, TracePanel};
+pub use panel::{CurveKind, Ordinate, RowsBeyondAxes, TraceCurve, TracePanel};
 pub use people::{CategoryEstimate, PeopleGrid, PeoplePanel, people_by_condition};
 pub use responses::responses;
 pub(crate) use time_response::has_close_up;

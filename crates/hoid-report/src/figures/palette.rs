@@ -7,9 +7,9 @@
 
 use super::style::MODEL_COLOURS;
 
-/// Lightness of the lowest of several levels; `DARKEST` is the lightness of the highest level.
-const LIGHTEST: f64 = 76.0;
-const DARKEST: f64 = 22.0;
+/// Lightness of the lowest of several levels; `MIN_LIGHTNESS` is the lightness of the highest level.
+const MAX_LIGHTNESS: f64 = 76.0;
+const MIN_LIGHTNESS: f64 = 22.0;
 
 /// Shape of the markers of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,7 +61,7 @@ pub fn shade(method: usize, level: usize, levels: usize) -> String {
         return hue.to_owned();
     }
     let share = level.min(levels - 1) as f64 / (levels - 1) as f64;
-    let wanted = LIGHTEST + share * (DARKEST - LIGHTEST);
+    let wanted = MAX_LIGHTNESS + share * (MIN_LIGHTNESS - MAX_LIGHTNESS);
     let hue = channels(hue);
     let end = if wanted > lightness(hue) { 255.0 } else { 0.0 };
     let mixed = |part: f64| hue.map(|c| c + part * (end - c));
@@ -122,7 +122,7 @@ mod tests {
         for method in 0..MODEL_COLOURS.len() {
             for levels in [2, 3, 4, 7] {
                 let of = |level| lightness(channels(&shade(method, level, levels)));
-                let step = (DARKEST - LIGHTEST) / (levels - 1) as f64;
+                let step = (MIN_LIGHTNESS - MAX_LIGHTNESS) / (levels - 1) as f64;
                 for level in 1..levels {
                     // Rounding of the channels to integers changes L* by up to 0.4.
                     assert!(

@@ -6,15 +6,15 @@
 //! side, to include the 1 and 99 % quantiles and the middle part of the bands. If a true value is known and at least
 //! one method is near it, methods far from it do not determine the scale either: the ordinate ends at most two spans
 //! from the true values, where a span is the range of the true values or a quarter of their magnitude, and methods and
-//! batch fits beyond are ignored. Values outside the ordinate are cut off at the axes, and [`TracePanel::beyond`]
+//! batch fits beyond are ignored. Values outside the ordinate are cut off at the axes, and [`TracePanel::rows_beyond_axes`]
 //! counts them.
 
-use hoid_numerics::statistics::{finite_sorted, quantile, quantile_of};
+use hoid_numerics::statistics::{finite_quantile, quantile, sorted_finite_values};
 
-use super::{axes::one_two_five, style};
+use super::{axes::round_to_one_two_five, style};
 
 /// Largest extension of an ordinate beyond its middle part, as a multiple of the range of that part.
-const LARGEST_EXTENSION: f64 = 1.5;
+const MAX_EXTENSION: f64 = 1.5;
 
 /// Style of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,7 +61,7 @@ pub enum Ordinate {
 
 /// Number of rows of a method that lie beyond the axes of a panel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Beyond {
+pub struct RowsBeyondAxes {
     /// Index of the method.
     pub method: usize,
     /// Number of rows with an estimate beyond the axes.
@@ -85,7 +85,7 @@ pub struct TracePanel {
 }
 
 impl TracePanel {
-    fn pooled(&self, pick: impl Fn(&TraceCurve) -> Vec<f64>) -> Vec<f64> {
+    fn pooled_values(&self, pick: impl Fn(&TraceCurve) -> Vec<f64>) -> Vec<f64> {
         self.curves.iter().flat_map(pick).collect()
     }
 
@@ -95,9 +95,14 @@ impl TracePanel {
             Ordinate::Robust => self.robust_range(),
             Ordinate::Within(low, high) => style::padded_range([low, high]),
             Ordinate::Logarithmic => {
-                let positive = finite_sorted(self.pooled(|c| c.values.iter().copied().filter(|v| *v > 0.0).collect()));
+                let positive = sorted_finite_values(
+                    self.pooled_values(|c| c.values.iter().copied().filter(|v| *v > 0.0).collect()),
+                );
                 match (quantile(&positive, 0.01), quantile(&positive, 0.99)) {
-                    (Some(low), Some(high)) => (one_two_five(low, false), one_two_five(high * 1.05, true)),
+                    (Some(low), Some(high)) => (
+                        round_to_one_two_five(low, false),
+                        round_to_one_two_five(high * 1.05, true),
+                    ),
                     _ => (0.1, 1.0),
                 }
             }
@@ -105,12 +110,12 @@ impl TracePanel {
     }
 
     fn robust_range(&self) -> (f64, f64) {
-        let limit = self.limit();
+        let limit = self.limits();
         let within = |v: f64| limit.map_or(v, |(low, high)| v.clamp(low, high));
         let near = |v: f64| within(v) == v;
         let (mut core, mut wanted) = (Vec::new(), Vec::new());
         for curve in &self.curves {
-            let values = finite_sorted(curve.values.iter().copied());
+            let values = sorted_finite_values(curve.values.iter().copied());
             if curve.kind != CurveKind::Estimate {
                 core.extend(values.into_iter().filter(|v| near(*v)));
                 continue;
@@ -120,11 +125,11 @@ impl TracePanel {
             }
             core.extend([0.1, 0.9].iter().filter_map(|q| quantile(&values, *q)));
             wanted.extend([0.01, 0.99].iter().filter_map(|q| quantile(&values, *q)));
-            wanted.extend(quantile(&finite_sorted(curve.band.iter().map(|b| b.0)), 0.25));
-            wanted.extend(quantile(&finite_sorted(curve.band.iter().map(|b| b.1)), 0.75));
+            wanted.extend(quantile(&sorted_finite_values(curve.band.iter().map(|b| b.0)), 0.25));
+            wanted.extend(quantile(&sorted_finite_values(curve.band.iter().map(|b| b.1)), 0.75));
         }
         let (low, high) = style::padded_range(core.into_iter().map(within));
-        let more = LARGEST_EXTENSION * (high - low);
+        let more = MAX_EXTENSION * (high - low);
         let reach = wanted.into_iter().map(|v| within(v).clamp(low - more, high + more));
         let (low, high) = reach.fold((low, high), |(l, h), v| (l.min(v), h.max(v)));
         style::padded_range([low, high])
@@ -132,24 +137,24 @@ impl TracePanel {
 
     /// Limits of the ordinate, two spans to either side of the true values; `None` if the median of no estimate lies
     /// between them.
-    fn limit(&self) -> Option<(f64, f64)> {
+    fn limits(&self) -> Option<(f64, f64)> {
         let of = |kind| self.curves.iter().filter(move |c| c.kind == kind);
-        let truth = finite_sorted(of(CurveKind::Truth).flat_map(|c| c.values.iter().copied()));
+        let truth = sorted_finite_values(of(CurveKind::Truth).flat_map(|c| c.values.iter().copied()));
         let (least, most) = (*truth.first()?, *truth.last()?);
         let span = (most - least).max(0.25 * least.abs().max(most.abs()));
         let (low, high) = (least - 2.0 * span, most + 2.0 * span);
-        let near = |c: &TraceCurve| quantile_of(&c.values, 0.5).is_some_and(|m| (low..=high).contains(&m));
+        let near = |c: &TraceCurve| finite_quantile(&c.values, 0.5).is_some_and(|m| (low..=high).contains(&m));
         of(CurveKind::Estimate).any(near).then_some((low, high))
     }
 
     /// Returns the methods with rows beyond the range of this panel, which is the drawn range unless the panel shares
     /// its ordinate with others.
-    pub fn beyond(&self) -> Vec<Beyond> {
+    pub fn rows_beyond_axes(&self) -> Vec<RowsBeyondAxes> {
         let (low, high) = self.range();
         let estimates = self.curves.iter().filter(|c| c.kind == CurveKind::Estimate);
         let count = |c: &TraceCurve| {
             let finite = || c.values.iter().filter(|v| v.is_finite());
-            Beyond {
+            RowsBeyondAxes {
                 method: c.method,
                 outside: finite().filter(|v| !(low..=high).contains(*v)).count(),
                 rows: finite().count(),
@@ -194,12 +199,12 @@ pub(super) mod tests {
         let (low, high) = with.range();
         // The ordinate extends below the middle part by at most one and a half times its range, plus a margin of 5 %.
         assert!(low > 0.3 && high < quiet.1 + 0.1, "{low} {high}");
-        let expected = Beyond {
+        let expected = RowsBeyondAxes {
             method: 0,
             outside: 30,
             rows: 1000,
         };
-        assert_eq!(with.beyond(), [expected]);
+        assert_eq!(with.rows_beyond_axes(), [expected]);
         // The range always includes all true values.
         let truth = vec![1.0, 1.0, -0.5, 1.0];
         let (low, _) = panel(vec![curve(CurveKind::Estimate, values), curve(CurveKind::Truth, truth)]).range();

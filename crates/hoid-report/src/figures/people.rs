@@ -6,23 +6,23 @@ use kuva::{prelude::Plot, render::render::Scene};
 use super::{
     Shade,
     axes::with_ordinate,
-    draw::{self, INK},
+    draw::{self, OUTLINE_COLOUR},
     frame::{self, Area, Frame, Ordinates},
-    labels::{marked, panel_label},
+    labels::{label_markup, panel_label},
     legend::{Entry, Sample, add_legend},
     palette::Mark,
-    style::{self, BLACK, GREY, TEXT},
+    style::{self, BLACK, GREY, TEXT_SIZE},
     svg,
 };
 
-const HEIGHT: f64 = 150.0;
+const PANEL_HEIGHT: f64 = 150.0;
 /// Distance of the category names below the axis; `ROW_DISTANCE` is the distance of a second row of names below the
 /// first.
-const NAMES_BELOW: f64 = 17.0;
+const NAME_DISTANCE: f64 = 17.0;
 const ROW_DISTANCE: f64 = 12.0;
 /// Horizontal positions of the first and the last person within a category, as fractions of its width; `MEAN_POSITION`
 /// is the position of the mean.
-const PEOPLE: (f64, f64) = (0.18, 0.6);
+const PEOPLE_POSITIONS: (f64, f64) = (0.18, 0.6);
 const MEAN_POSITION: f64 = 0.78;
 /// Maximum number of people with individual colours; larger groups are drawn in grey, with one legend entry for all
 /// people.
@@ -62,25 +62,25 @@ pub struct PeopleGrid {
 pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
     let n = grid.panels.len();
     if n == 0 || grid.categories.is_empty() {
-        return frame::empty(id, title);
+        return frame::empty_figure(id, title);
     }
     let columns = if n == 1 { 1 } else { 2 };
     let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
     let ordinates = Ordinates::of(labels, columns, false);
     let ranges: Vec<(f64, f64)> = grid.panels.iter().map(PeoplePanel::range).collect();
-    let frame = Frame::new(n, columns, HEIGHT, ordinates, 0);
+    let frame = Frame::new(n, columns, PANEL_HEIGHT, ordinates, 0);
     let places = (0.5, grid.categories.len() as f64 + 0.5);
     let cell = |(i, panel): (usize, &PeoplePanel)| {
-        let layout = style::layout(places, ranges[i], HEIGHT);
-        let layout = with_ordinate(layout, ranges[i], &panel.unit, false, HEIGHT, frame.has_ticks(i));
+        let layout = style::layout(places, ranges[i], PANEL_HEIGHT);
+        let layout = with_ordinate(layout, ranges[i], &panel.unit, false, PANEL_HEIGHT, frame.has_ticks(i));
         let layout = frame
-            .fitted(i, layout)
+            .fit_layout(i, layout)
             .with_x_categories(vec![String::new(); grid.categories.len()]);
         (vec![Plot::from(style::line([], BLACK, 1.0))], layout)
     };
     let cells = grid.panels.iter().enumerate().map(cell).collect();
     let label = |i: usize| panel_label(&grid.panels[i].name, &grid.panels[i].unit);
-    let mut scene = frame.drawn(cells, &grid.abscissa, label, &[], 0.0);
+    let mut scene = frame.draw_panels(cells, &grid.abscissa, label, &[], 0.0);
     for (i, panel) in grid.panels.iter().enumerate() {
         grid.draw(&mut scene, panel, frame.area(i), ranges[i]);
         if frame.is_lowest(i) {
@@ -124,13 +124,13 @@ impl PeoplePanel {
 
 impl PeopleGrid {
     fn add_names(&self, scene: &mut Scene, area: Area) {
-        let names: Vec<String> = self.categories.iter().map(|name| marked(name)).collect();
+        let names: Vec<String> = self.categories.iter().map(|name| label_markup(name)).collect();
         let pitch = area.width / names.len() as f64;
-        let staggered = names.iter().any(|name| draw::text_space(name, TEXT) > pitch);
+        let staggered = names.iter().any(|name| draw::text_space(name, TEXT_SIZE) > pitch);
         for (k, name) in names.into_iter().enumerate() {
             let below = if staggered && k % 2 == 1 { ROW_DISTANCE } else { 0.0 };
             let x = area.left + pitch * (k as f64 + 0.5);
-            scene.add(draw::centred(x, area.bottom() + NAMES_BELOW + below, name, None));
+            scene.add(draw::centred_text(x, area.bottom() + NAME_DISTANCE + below, name, None));
         }
     }
 
@@ -141,7 +141,7 @@ impl PeopleGrid {
         let n = self.people.len();
         for (i, places) in panel.people.iter().enumerate() {
             let share = if n > 1 { i as f64 / (n - 1) as f64 } else { 0.5 };
-            let part = PEOPLE.0 + share * (PEOPLE.1 - PEOPLE.0);
+            let part = PEOPLE_POSITIONS.0 + share * (PEOPLE_POSITIONS.1 - PEOPLE_POSITIONS.0);
             let colour = colour(i, n);
             let drawable = |at: &CategoryEstimate| at.filter(|(v, _)| style::is_drawable(*v));
             let mut last: Option<(f64, f64)> = None;
@@ -171,14 +171,14 @@ impl PeopleGrid {
             for end in [from, to] {
                 scene.add(draw::line((x - 4.0, y_of(end)), (x + 4.0, y_of(end)), BLACK, 1.4, None));
             }
-            draw::mark(scene, (x, y_of(value)), 3.4, Mark::Diamond, INK);
+            draw::mark(scene, (x, y_of(value)), 3.4, Mark::Diamond, OUTLINE_COLOUR);
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{super::draw::tests::has, *};
+    use super::{super::draw::tests::contains_element, *};
 
     fn grid() -> PeopleGrid {
         PeopleGrid {
@@ -201,18 +201,18 @@ mod tests {
     fn marks_are_drawn_at_their_coordinates() {
         let svg = people_by_condition("p", "t", &grid());
         // The ordinate from 0 to 11 has a margin of 5 %.
-        let y = |v: f64| 8.0 + HEIGHT * (11.55 - v) / 12.1;
-        let width = style::WIDTH - style::LEFT - style::RIGHT;
-        let x = |place: f64, part: f64| style::LEFT + 0.5 * width * (place + part);
+        let y = |v: f64| 8.0 + PANEL_HEIGHT * (11.55 - v) / 12.1;
+        let width = style::WIDTH - style::LEFT_MARGIN - style::RIGHT_MARGIN;
+        let x = |place: f64, part: f64| style::LEFT_MARGIN + 0.5 * width * (place + part);
         for (at, v) in [
-            (x(0.0, PEOPLE.0), 0.0),
-            (x(1.0, PEOPLE.0), 10.0),
-            (x(0.0, PEOPLE.1), 4.0),
+            (x(0.0, PEOPLE_POSITIONS.0), 0.0),
+            (x(1.0, PEOPLE_POSITIONS.0), 10.0),
+            (x(0.0, PEOPLE_POSITIONS.1), 4.0),
         ] {
-            assert!(has(&svg, "circle", &[("cx", at), ("cy", y(v))]), "{svg}");
+            assert!(contains_element(&svg, "circle", &[("cx", at), ("cy", y(v))]), "{svg}");
         }
         let m = x(0.0, MEAN_POSITION);
-        assert!(has(
+        assert!(contains_element(
             &svg,
             "line",
             &[("x1", m), ("y1", y(0.0)), ("x2", m), ("y2", y(4.0))]

@@ -2,7 +2,7 @@
 
 use super::{
     curves::{Curve, CurveGrid, CurvePanel, LineKind, curves},
-    describing::{FREQUENCY, ModelCurve, panel},
+    describing::{FREQUENCY_LABEL, ModelCurve, panel},
     palette::Shade,
 };
 
@@ -23,7 +23,7 @@ pub fn responses(id: &str, title: &str, inputs: &[ModelCurve]) -> String {
         panels,
         columns: inputs.len(),
         titles: inputs.iter().map(|input| input.name.clone()).collect(),
-        abscissa: FREQUENCY.to_owned(),
+        abscissa: FREQUENCY_LABEL.to_owned(),
         logarithmic_abscissa: true,
         shared_ordinates: false,
     };

@@ -28,7 +28,7 @@ impl Scale {
 
     /// Limits a value far beyond the axes. The path is clipped at the axes, but without the limit values such as 1e300
     /// would be written to the file.
-    pub fn bounded(&self, y: f64) -> f64 {
+    pub fn limit_to_axes(&self, y: f64) -> f64 {
         let (low, high) = self.y;
         let span = high - low;
         match self.log_y {
@@ -38,15 +38,15 @@ impl Scale {
     }
 
     pub fn place_x(&self, x: f64) -> f64 {
-        self.area.left + self.area.width * share(x, self.x, self.log_x)
+        self.area.left + self.area.width * relative_position(x, self.x, self.log_x)
     }
 
     pub fn place_y(&self, y: f64) -> f64 {
-        self.area.bottom() - self.area.height * share(y, self.y, self.log_y)
+        self.area.bottom() - self.area.height * relative_position(y, self.y, self.log_y)
     }
 }
 
-fn share(value: f64, (low, high): (f64, f64), logarithmic: bool) -> f64 {
+fn relative_position(value: f64, (low, high): (f64, f64), logarithmic: bool) -> f64 {
     match logarithmic {
         true => (value / low).ln() / (high / low).ln(),
         false => (value - low) / (high - low),
@@ -75,7 +75,11 @@ mod tests {
         assert_eq!(scale.place_x(1.0), 35.0);
         assert!((scale.place_y(10.0) - 45.0).abs() < 1e-12);
         assert_eq!(
-            (scale.clamp_to_axis(1e3), scale.bounded(1e9), scale.bounded(0.5)),
+            (
+                scale.clamp_to_axis(1e3),
+                scale.limit_to_axes(1e9),
+                scale.limit_to_axes(0.5)
+            ),
             (100.0, 1e3, 0.5)
         );
         assert!(scale.has_x(4.0) && !scale.has_x(f64::NAN) && !scale.has_x(-1.0));

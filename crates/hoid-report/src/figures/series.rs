@@ -4,25 +4,25 @@ use std::ops::Range;
 
 /// Number of columns of points to which a line is reduced in a single-column figure: one for each unit between its
 /// axes.
-pub const COLUMNS: usize = 340;
+pub const COLUMN_COUNT: usize = 340;
 
 /// Maximum number of runs of consecutive known values; if there are more, runs that are separated by gaps narrower than
 /// a column are joined.
 const MAX_RUNS: usize = 200;
 
 /// Indices of the smallest and the largest value in each column, in ascending order; all indices of a short series.
-pub fn thinned(values: &[f64]) -> Vec<usize> {
-    thinned_run(values, 0..values.len(), COLUMNS)
+pub fn thinned_indices(values: &[f64]) -> Vec<usize> {
+    thinned_run_indices(values, 0..values.len(), COLUMN_COUNT)
 }
 
-/// As [`thinned`], for a run of indices of a series that is divided into `parts` columns. Non-finite values are
+/// As [`thinned_indices`], for a run of indices of a series that is divided into `parts` columns. Non-finite values are
 /// omitted.
-pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize> {
+pub fn thinned_run_indices(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize> {
     let finite = |k: &usize| values[*k].is_finite();
     if values.len() <= 2 * parts {
         return run.filter(finite).collect();
     }
-    let mut kept = Vec::with_capacity(2 * COLUMNS + 2);
+    let mut kept = Vec::with_capacity(2 * COLUMN_COUNT + 2);
     kept.extend(run.clone().find(finite));
     for column in columns(values.len(), &run, parts) {
         let by_value = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
@@ -39,7 +39,7 @@ pub fn thinned_run(values: &[f64], run: Range<usize>, parts: usize) -> Vec<usize
 
 /// Points of a band in a run of indices: the first index, the middle index of each column with the smallest lower and
 /// the largest upper edge in that column, and the last index.
-pub fn thinned_band(lower: &[f64], upper: &[f64], run: Range<usize>, parts: usize) -> Vec<(usize, f64, f64)> {
+pub fn thinned_band_points(lower: &[f64], upper: &[f64], run: Range<usize>, parts: usize) -> Vec<(usize, f64, f64)> {
     let point = |k: usize| (k, lower[k], upper[k]);
     if lower.len() <= 2 * parts {
         return run.map(point).collect();
@@ -69,7 +69,7 @@ fn columns(n: usize, run: &Range<usize>, parts: usize) -> impl Iterator<Item = R
 
 /// Returns both ends and the indices whose value differs from the value of a neighbour, since a constant level needs no
 /// other points.
-pub fn without_level<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -> Vec<usize> {
+pub fn remove_constant_stretches<T: PartialEq>(kept: &[usize], value: impl Fn(usize) -> T) -> Vec<usize> {
     let level = |i: usize| {
         let same = |a: usize| value(kept[a]) == value(kept[i]);
         i > 0 && i + 1 < kept.len() && same(i - 1) && same(i + 1)
@@ -94,7 +94,7 @@ pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut joined: Vec<Range<usize>> = Vec::new();
     for run in found {
         match joined.last_mut() {
-            Some(before) if (run.start - before.end) * COLUMNS < n => before.end = run.end,
+            Some(before) if (run.start - before.end) * COLUMN_COUNT < n => before.end = run.end,
             _ => joined.push(run),
         }
     }
@@ -109,19 +109,19 @@ mod tests {
     fn thinning_keeps_order_ends_and_peaks() {
         let mut values: Vec<f64> = (0..50_000).map(|k| (k as f64 * 0.01).sin()).collect();
         values[12_345] = 9.0;
-        let kept = thinned(&values);
-        assert!(kept.len() <= 2 * COLUMNS + 2);
+        let kept = thinned_indices(&values);
+        assert!(kept.len() <= 2 * COLUMN_COUNT + 2);
         assert!(kept.windows(2).all(|w| w[0] < w[1]));
         assert_eq!((kept[0], kept[kept.len() - 1]), (0, 49_999));
         assert!(kept.contains(&12_345));
-        assert_eq!(thinned(&[1.0, 2.0]), [0, 1]);
+        assert_eq!(thinned_indices(&[1.0, 2.0]), [0, 1]);
     }
 
     #[test]
     fn thinned_run_keeps_its_ends() {
         let values: Vec<f64> = (0..10_000).map(|k| (k as f64 * 0.05).cos()).collect();
         for run in [0..1, 17..19, 4_000..9_999, 9_999..10_000, 0..10_000] {
-            let kept = thinned_run(&values, run.clone(), COLUMNS);
+            let kept = thinned_run_indices(&values, run.clone(), COLUMN_COUNT);
             assert_eq!((kept[0], kept[kept.len() - 1]), (run.start, run.end - 1));
             assert!(kept.windows(2).all(|w| w[0] < w[1]), "{run:?}");
         }
@@ -133,11 +133,11 @@ mod tests {
         let mut upper = vec![1.0; n];
         upper[777] = 5.0;
         let lower: Vec<f64> = upper.iter().map(|u| -u).collect();
-        let kept = thinned_band(&lower, &upper, 100..15_000, COLUMNS);
+        let kept = thinned_band_points(&lower, &upper, 100..15_000, COLUMN_COUNT);
         assert!(kept.windows(2).all(|w| w[0].0 < w[1].0));
         assert_eq!((kept[0].0, kept[kept.len() - 1].0), (100, 14_999));
         assert!(kept.iter().any(|k| (k.1, k.2) == (-5.0, 5.0)));
-        assert!(kept.len() <= COLUMNS + 2);
+        assert!(kept.len() <= COLUMN_COUNT + 2);
     }
 
     #[test]

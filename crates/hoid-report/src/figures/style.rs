@@ -10,15 +10,15 @@ use kuva::{
 /// Width of a figure with a single column, in units of the SVG.
 pub const WIDTH: f64 = 420.0;
 /// Space for the tick labels and the label of the ordinate, equal in all figures so that panels are aligned.
-pub const LEFT: f64 = 76.0;
-pub const RIGHT: f64 = 14.0;
+pub const LEFT_MARGIN: f64 = 76.0;
+pub const RIGHT_MARGIN: f64 = 14.0;
 /// Space above the axes.
-pub const TOP: f64 = 10.0;
+pub const TOP_MARGIN: f64 = 10.0;
 /// Space below the axes for ticks and the label of the abscissa.
-pub const BOTTOM: f64 = 48.0;
+pub const BOTTOM_MARGIN: f64 = 48.0;
 /// Space below the axes for ticks only.
-pub const BOTTOM_WITHOUT_LABEL: f64 = 26.0;
-pub const TEXT: u32 = 13;
+pub const BOTTOM_MARGIN_WITHOUT_LABEL: f64 = 26.0;
+pub const TEXT_SIZE: u32 = 13;
 
 pub const BLACK: &str = "#000000";
 pub const GREY: &str = "#999999";
@@ -37,22 +37,22 @@ pub fn layout((x_low, x_high): (f64, f64), (y_low, y_high): (f64, f64), height: 
         .with_y_axis_max(y_high)
         .with_width(WIDTH)
         .with_height(height)
-        .with_force_margins(LEFT, RIGHT)
-        .with_force_margins_y(TOP, BOTTOM)
+        .with_force_margins(LEFT_MARGIN, RIGHT_MARGIN)
+        .with_force_margins_y(TOP_MARGIN, BOTTOM_MARGIN)
         .with_theme(Theme {
             grid_color: "#e4e4e4".to_owned(),
             ..Theme::light()
         })
         .with_font_family("Helvetica, Arial, 'Liberation Sans', sans-serif")
-        .with_label_size(TEXT)
-        .with_tick_size(TEXT)
-        .with_body_size(TEXT)
+        .with_label_size(TEXT_SIZE)
+        .with_tick_size(TEXT_SIZE)
+        .with_body_size(TEXT_SIZE)
         .with_axis_line_width(1.0)
-        .with_tick_format(TickFormat::Custom(Arc::new(tick)))
+        .with_tick_format(TickFormat::Custom(Arc::new(tick_label)))
 }
 
 /// Label of a tick as the shortest decimal number, without rounding errors such as that of `0.1 + 0.2`.
-fn tick(value: f64) -> String {
+fn tick_label(value: f64) -> String {
     let text = format!("{value:.6}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
     match text {
@@ -94,7 +94,7 @@ pub fn padded_range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
 }
 
 /// Stacks panels vertically, each with its own height.
-pub fn stacked(panels: Vec<(Vec<Plot>, Layout, f64)>) -> Scene {
+pub fn stack_panels(panels: Vec<(Vec<Plot>, Layout, f64)>) -> Scene {
     let mut figure = Figure::new(panels.len(), 1)
         .with_cell_size(WIDTH, WIDTH)
         .with_spacing(0.0)
@@ -110,7 +110,7 @@ pub fn stacked(panels: Vec<(Vec<Plot>, Layout, f64)>) -> Scene {
 
 /// Arranges panels, given row by row, in columns and rows of these widths and heights; the last row may have fewer
 /// panels.
-pub fn in_grid(panels: Vec<(Vec<Plot>, Layout)>, widths: &[f64], heights: &[f64]) -> Scene {
+pub fn arrange_in_grid(panels: Vec<(Vec<Plot>, Layout)>, widths: &[f64], heights: &[f64]) -> Scene {
     let mut figure = Figure::new(heights.len(), widths.len())
         .with_cell_size(WIDTH, WIDTH)
         .with_spacing(0.0)
@@ -131,10 +131,10 @@ mod tests {
 
     #[test]
     fn tick_labels_are_short() {
-        assert_eq!(tick(0.1 + 0.2), "0.3");
-        assert_eq!(tick(-0.0), "0");
-        assert_eq!(tick(-1e-12), "0");
-        assert_eq!(tick(20.0), "20");
+        assert_eq!(tick_label(0.1 + 0.2), "0.3");
+        assert_eq!(tick_label(-0.0), "0");
+        assert_eq!(tick_label(-1e-12), "0");
+        assert_eq!(tick_label(20.0), "20");
     }
 
     #[test]

@@ -7,17 +7,17 @@ use kuva::prelude::Plot;
 use super::{
     labels,
     legend::{Entry, Sample, add_legend},
-    series::thinned,
+    series::thinned_indices,
     style::{self, BLUE, GREY, VERMILLION},
     svg,
 };
 
-/// Length of a record divided by the length of its close-up; a close-up has at least `SMALLEST_CLOSE_UP` samples.
-const CLOSE_UP: usize = 8;
-const SMALLEST_CLOSE_UP: usize = 50;
+/// Length of a record divided by the length of its close-up; a close-up has at least `MIN_CLOSE_UP_SAMPLES` samples.
+const CLOSE_UP_RATIO: usize = 8;
+const MIN_CLOSE_UP_SAMPLES: usize = 50;
 
-const UPPER: f64 = 150.0;
-const LOWER: f64 = 190.0;
+const RECORD_HEIGHT: f64 = 150.0;
+const CLOSE_UP_HEIGHT: f64 = 190.0;
 
 /// Draws the measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record above, and
 /// below it the middle eighth, where the prediction can be distinguished from the measurement.
@@ -40,7 +40,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
             let part =
                 &values[from.saturating_sub(first).min(values.len())..to.saturating_sub(first).min(values.len())];
             let start = from.max(first);
-            let points = thinned(part)
+            let points = thinned_indices(part)
                 .into_iter()
                 .map(|k| (record.time_s(start + k), bounded(part[k])));
             style::line(points, colour, width).into()
@@ -61,16 +61,21 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
     let mut panels = Vec::new();
     let (from, to) = if has_close_up(record) {
         let (plots, span) = panel(0, n);
-        let upper = layout(span, UPPER).with_force_margins_y(style::TOP, style::BOTTOM_WITHOUT_LABEL);
-        panels.push((plots, upper, UPPER));
-        let part = n / CLOSE_UP;
+        let upper =
+            layout(span, RECORD_HEIGHT).with_force_margins_y(style::TOP_MARGIN, style::BOTTOM_MARGIN_WITHOUT_LABEL);
+        panels.push((plots, upper, RECORD_HEIGHT));
+        let part = n / CLOSE_UP_RATIO;
         ((n - part) / 2, (n + part) / 2)
     } else {
         (0, n)
     };
     let (plots, span) = panel(from, to);
-    panels.push((plots, layout(span, LOWER).with_x_label("time (s)"), LOWER));
-    let mut scene = style::stacked(panels);
+    panels.push((
+        plots,
+        layout(span, CLOSE_UP_HEIGHT).with_x_label("time (s)"),
+        CLOSE_UP_HEIGHT,
+    ));
+    let mut scene = style::stack_panels(panels);
     let entries = [
         Entry::new("measured", GREY, Sample::Line),
         Entry::new("predicted", VERMILLION, Sample::Line),
@@ -82,5 +87,5 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
 
 /// True if the record is long enough for a close-up of its middle.
 pub fn has_close_up(record: &Record) -> bool {
-    record.len() / CLOSE_UP >= SMALLEST_CLOSE_UP
+    record.len() / CLOSE_UP_RATIO >= MIN_CLOSE_UP_SAMPLES
 }

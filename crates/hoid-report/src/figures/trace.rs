@@ -13,20 +13,20 @@ use super::{
     draw::BAND_OPACITY,
     frame::{self, Frame, Ordinates},
     labels::panel_label,
-    legend::{Entry, Sample, add_legend_by},
+    legend::{Entry, Sample, add_legend_in_multiples_of},
     palette::shade,
     panel::{CurveKind, Ordinate, TraceCurve, TracePanel},
-    series::{runs, thinned_band, thinned_run, without_level},
+    series::{remove_constant_stretches, runs, thinned_band_points, thinned_run_indices},
     style::{self, BLACK, GREY},
     svg,
 };
 
 /// Height of the axes of a panel.
-const HEIGHT: f64 = 84.0;
+const PANEL_HEIGHT: f64 = 84.0;
 
-const DOTS: &str = "#444444";
+const DOT_COLOUR: &str = "#444444";
 /// Maximum number of changes named in the legend.
-const CHANGES_NAMED: usize = 6;
+const MAX_NAMED_CHANGES: usize = 6;
 
 /// Panels with a common time axis.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -58,31 +58,38 @@ pub fn trace_panels(id: &str, title: &str, grid: &TraceGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();
     if n == 0 {
-        return frame::empty(id, title);
+        return frame::empty_figure(id, title);
     }
     let time = grid.time_range();
-    let ranges = frame::of_rows(
+    let ranges = frame::row_ranges(
         grid.panels.iter().map(TracePanel::range).collect(),
         columns,
         grid.shared_ordinates,
     );
     let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
     let ordinates = Ordinates::of(labels, columns, grid.shared_ordinates);
-    let frame = Frame::new(n, columns, HEIGHT, ordinates, grid.titles.len());
+    let frame = Frame::new(n, columns, PANEL_HEIGHT, ordinates, grid.titles.len());
     let cell = |(i, panel): (usize, &TracePanel)| {
-        let layout = style::layout(time, ranges[i], HEIGHT);
+        let layout = style::layout(time, ranges[i], PANEL_HEIGHT);
         let layout = with_abscissa(layout, time, false, frame.area(i).width);
         let logarithmic = panel.ordinate == Ordinate::Logarithmic;
-        let layout = with_ordinate(layout, ranges[i], &panel.unit, logarithmic, HEIGHT, frame.has_ticks(i));
-        let layout = frame.fitted(i, layout);
+        let layout = with_ordinate(
+            layout,
+            ranges[i],
+            &panel.unit,
+            logarithmic,
+            PANEL_HEIGHT,
+            frame.has_ticks(i),
+        );
+        let layout = frame.fit_layout(i, layout);
         (
-            panel.plots(ranges[i], grid.levels.len(), frame.area(i).parts()),
-            grid.marked(layout, time, i == 0),
+            panel.plots(ranges[i], grid.levels.len(), frame.area(i).column_count()),
+            grid.with_marks(layout, time, i == 0),
         )
     };
     let cells = grid.panels.iter().enumerate().map(cell).collect();
     let label = |i: usize| panel_label(&grid.panels[i].name, &grid.panels[i].unit);
-    let mut scene = frame.drawn(cells, "time (s)", label, &grid.titles, 0.0);
+    let mut scene = frame.draw_panels(cells, "time (s)", label, &grid.titles, 0.0);
     grid.add_legend(&mut scene);
     svg::finish(id, title, scene)
 }
@@ -99,7 +106,7 @@ impl TraceGrid {
         }
     }
 
-    fn marked(
+    fn with_marks(
         &self,
         mut layout: kuva::prelude::Layout,
         (from, to): (f64, f64),
@@ -121,7 +128,7 @@ impl TraceGrid {
         let inside = |(at, _): &&(f64, String)| (from..=to).contains(at);
         for (number, (at, _)) in self.changes.iter().filter(inside).enumerate() {
             let mut line = ReferenceLine::vertical(*at)
-                .with_color(DOTS)
+                .with_color(DOT_COLOUR)
                 .with_stroke_width(1.2)
                 .with_dasharray("6 3");
             if numbered {
@@ -151,20 +158,29 @@ impl TraceGrid {
         }
         let has = |kind| curves().any(|c| c.kind == kind);
         if has(CurveKind::Batch) {
-            entries.push(Entry::new("batch fit", DOTS, Sample::Dotted));
+            entries.push(Entry::new("batch fit", DOT_COLOUR, Sample::Dotted));
         }
         if has(CurveKind::Truth) {
             entries.push(Entry::new("truth", BLACK, Sample::Dashed));
         }
-        for (number, (at, what)) in self.changes.iter().enumerate().take(CHANGES_NAMED) {
+        for (number, (at, what)) in self.changes.iter().enumerate().take(MAX_NAMED_CHANGES) {
             let name = format!("change {}, {at:.1} s: {what}", number + 1);
-            entries.push(Entry::new(&name, DOTS, Sample::Dashed));
+            entries.push(Entry::new(&name, DOT_COLOUR, Sample::Dashed));
         }
-        if let Some(more) = self.changes.len().checked_sub(CHANGES_NAMED).filter(|more| *more > 0) {
+        if let Some(more) = self
+            .changes
+            .len()
+            .checked_sub(MAX_NAMED_CHANGES)
+            .filter(|more| *more > 0)
+        {
             let changes = if more == 1 { "change" } else { "changes" };
-            entries.push(Entry::new(&format!("{more} more {changes}"), DOTS, Sample::Dashed));
+            entries.push(Entry::new(
+                &format!("{more} more {changes}"),
+                DOT_COLOUR,
+                Sample::Dashed,
+            ));
         }
-        add_legend_by(scene, &entries, self.levels.len());
+        add_legend_in_multiples_of(scene, &entries, self.levels.len());
     }
 }
 
@@ -224,8 +240,8 @@ impl TraceCurve {
             return vec![(t - half, y), (t + half, y)];
         }
         let whole: Vec<usize> = run.clone().collect();
-        let turns = without_level(&whole, |k| self.values[k]);
-        let thin = thinned_run(&self.values, run, parts);
+        let turns = remove_constant_stretches(&whole, |k| self.values[k]);
+        let thin = thinned_run_indices(&self.values, run, parts);
         let kept = if turns.len() <= thin.len() { turns } else { thin };
         kept.into_iter().map(at).collect()
     }
@@ -236,9 +252,9 @@ impl TraceCurve {
         let lower: Vec<f64> = self.band[..n].iter().map(|b| cut(b.0)).collect();
         let upper: Vec<f64> = self.band[..n].iter().map(|b| cut(b.1)).collect();
         let band = |run: Range<usize>| -> Plot {
-            let kept = thinned_band(&lower, &upper, run, parts);
+            let kept = thinned_band_points(&lower, &upper, run, parts);
             let places: Vec<usize> = (0..kept.len()).collect();
-            let needed: Vec<_> = without_level(&places, |i| (kept[i].1, kept[i].2))
+            let needed: Vec<_> = remove_constant_stretches(&places, |i| (kept[i].1, kept[i].2))
                 .into_iter()
                 .map(|i| kept[i])
                 .collect();
@@ -264,7 +280,7 @@ mod tests {
     use super::{
         super::{
             panel::tests::{curve, panel},
-            series::COLUMNS,
+            series::COLUMN_COUNT,
         },
         *,
     };
@@ -298,7 +314,7 @@ mod tests {
     fn constant_levels_need_few_points_and_jumps_stay_sharp() {
         let values: Vec<f64> = (0..100_000).map(|k| if k < 50_000 { 1.0 } else { 2.0 }).collect();
         let truth = curve(CurveKind::Truth, values);
-        let points = truth.points(0..100_000, COLUMNS, |v| v);
+        let points = truth.points(0..100_000, COLUMN_COUNT, |v| v);
         assert_eq!(points.len(), 4);
         assert!(points[2].0 - points[1].0 < 0.011);
     }

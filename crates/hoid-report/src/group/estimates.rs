@@ -55,11 +55,11 @@ impl GroupReport<'_> {
                 ));
                 rows.len() - 1
             });
-            rows[place].3[at] = numbers::significant(median[i], 4);
+            rows[place].3[at] = numbers::format_significant(median[i], 4);
             rows[place].4 = rows[place].4.max(runs[i]);
         }
         rows.into_iter()
-            .map(|(subject, condition, estimator, cells, runs)| context! { subject, condition, estimator, cells, runs => numbers::plain(runs) })
+            .map(|(subject, condition, estimator, cells, runs)| context! { subject, condition, estimator, cells, runs => numbers::format_plain(runs) })
             .collect()
     }
 
@@ -70,7 +70,7 @@ impl GroupReport<'_> {
         (0..subject.len())
             .filter(|i| self.shows(&subject[*i]))
             .map(|i| {
-                let cells = columns.map(|column| numbers::plain(column.get(i).copied().unwrap_or(f64::NAN)));
+                let cells = columns.map(|column| numbers::format_plain(column.get(i).copied().unwrap_or(f64::NAN)));
                 context! { subject => &subject[i], condition => &condition[i], cells => cells.to_vec() }
             })
             .collect()

@@ -40,7 +40,7 @@ impl GroupReport<'_> {
                 .filter(|v| v.is_finite());
             match (value, error) {
                 (None, _) => "\u{2013}".to_owned(),
-                (Some(value), None) => numbers::fixed(value, 3),
+                (Some(value), None) => numbers::format_fixed(value, 3),
                 (Some(value), error) => {
                     let (value, error) = numbers::with_uncertainty(value, error);
                     format!("{value} \u{b1} {error}")
@@ -77,7 +77,7 @@ impl GroupReport<'_> {
         let Some(lines) = self.tables.frequencies.map(|f| f.lines) else {
             return Vec::new();
         };
-        let (subjects, conditions) = self.names();
+        let (subjects, conditions) = self.subjects_and_conditions();
         let column = |condition: &str, subject: &str| {
             let rows = rows_of(lines, subject, condition);
             let pick = |name: &str| rows.iter().map(|i| reals(lines, name)[*i]).collect::<Vec<f64>>();
@@ -195,7 +195,7 @@ impl GroupReport<'_> {
         (0..subject.len())
             .filter(|i| self.shows(&subject[*i]))
             .map(|i| {
-                let cells = columns.map(|(column, digits)| numbers::fixed(column.get(i).copied().unwrap_or(f64::NAN), digits)).to_vec();
+                let cells = columns.map(|(column, digits)| numbers::format_fixed(column.get(i).copied().unwrap_or(f64::NAN), digits)).to_vec();
                 context! { subject => &subject[i], condition => &condition[i], estimator => &estimator[i], agrees => &agrees[i], cells }
             })
             .collect()

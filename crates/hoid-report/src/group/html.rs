@@ -33,8 +33,8 @@ impl GroupReport<'_> {
                 agreement => self.agreement(),
                 describing_functions => self.describing_functions(),
                 recursions => over_time::methods(),
-                settling => self.settling(),
-                figures => self.over_time(),
+                settling => self.settling_rows(),
+                figures => self.figures_over_time(),
             },
         )
     }

@@ -34,7 +34,7 @@ const DISCRETE: [Row; 4] = [
 
 /// Statistics that a figure shows over time.
 #[derive(Clone, Copy, PartialEq)]
-enum Shown {
+enum ShownStatistic {
     /// Medians and quartiles over the runs, for all recursions.
     Estimates,
     /// Variances of the RPEM estimates.
@@ -76,14 +76,14 @@ fn with_unit(name: &str, unit: &str) -> String {
 }
 
 /// Formats a number with three significant digits.
-fn short(value: f64) -> String {
-    numbers::significant(value, 3)
+fn format_short(value: f64) -> String {
+    numbers::format_significant(value, 3)
 }
 
 impl GroupReport<'_> {
     /// Returns the figures of the recursive estimates over time, for each condition.
-    pub(super) fn over_time(&self) -> Vec<Value> {
-        let (_, conditions) = self.names();
+    pub(super) fn figures_over_time(&self) -> Vec<Value> {
+        let (_, conditions) = self.subjects_and_conditions();
         let rows = |rows: &[Row]| rows.iter().map(|row| PanelRow::of(*row)).collect::<Vec<_>>();
         conditions
             .iter()
@@ -93,11 +93,11 @@ impl GroupReport<'_> {
                 let responses = self.response_rows();
                 context! {
                     condition => if condition.is_empty() { "all runs" } else { condition },
-                    operator => figure(&rows(&OPERATOR), "operator", Shown::Estimates),
-                    discrete => figure(&rows(&DISCRETE), "discrete", Shown::Estimates),
-                    response => (!responses.is_empty()).then(|| figure(&responses, "response", Shown::Estimates)),
-                    variances => figure(&rows(&DISCRETE), "variance", Shown::Variances),
-                    correlations => figure(&self.correlation_rows(), "correlation", Shown::Correlations),
+                    operator => figure(&rows(&OPERATOR), "operator", ShownStatistic::Estimates),
+                    discrete => figure(&rows(&DISCRETE), "discrete", ShownStatistic::Estimates),
+                    response => (!responses.is_empty()).then(|| figure(&responses, "response", ShownStatistic::Estimates)),
+                    variances => figure(&rows(&DISCRETE), "variance", ShownStatistic::Variances),
+                    correlations => figure(&self.correlation_rows(), "correlation", ShownStatistic::Correlations),
                 }
             })
             .collect()
@@ -140,7 +140,7 @@ impl GroupReport<'_> {
 
     /// Settling times and noise of the recursions after a change: one row for each subject, condition and parameter,
     /// with three cells for each recursion.
-    pub(super) fn settling(&self) -> Vec<Value> {
+    pub(super) fn settling_rows(&self) -> Vec<Value> {
         let table = self.tables.settling;
         let [subject, condition, estimator, parameter] =
             ["subject", "condition", "estimator", "parameter"].map(|name| texts(table, name));
@@ -154,7 +154,7 @@ impl GroupReport<'_> {
                 .into_iter()
                 .map(|row| (with_unit(&row.name, row.unit), row.of_rls)),
         );
-        let (subjects, conditions) = self.names();
+        let (subjects, conditions) = self.subjects_and_conditions();
         let mut rows = Vec::new();
         for (condition_of, subject_of) in conditions.iter().flat_map(|c| subjects.iter().map(move |s| (c, s))) {
             for (shown, name) in &names {
@@ -174,11 +174,11 @@ impl GroupReport<'_> {
                     .into_iter()
                     .flat_map(|row| match row {
                         Some(i) => [
-                            format!("{} \u{2192} {}", short(before[i]), short(after[i])),
-                            short(settled[i]),
-                            short(noise[i]),
+                            format!("{} \u{2192} {}", format_short(before[i]), format_short(after[i])),
+                            format_short(settled[i]),
+                            format_short(noise[i]),
                         ],
-                        None => std::array::from_fn(|_| short(f64::NAN)),
+                        None => std::array::from_fn(|_| format_short(f64::NAN)),
                     })
                     .collect();
                 rows.push(context! { subject => *subject_of, condition => *condition_of, parameter => shown, cells });
@@ -200,9 +200,9 @@ impl GroupReport<'_> {
     }
 
     /// Draws one figure with a column of panels for each subject.
-    fn figure(&self, id: &str, condition: &str, rows: &[PanelRow], shown: Shown) -> String {
-        let (subjects, _) = self.names();
-        let methods = if shown == Shown::Estimates {
+    fn figure(&self, id: &str, condition: &str, rows: &[PanelRow], shown: ShownStatistic) -> String {
+        let (subjects, _) = self.subjects_and_conditions();
+        let methods = if shown == ShownStatistic::Estimates {
             &METHODS[..]
         } else {
             &METHODS[1..2]
@@ -216,7 +216,7 @@ impl GroupReport<'_> {
                     .filter(|(_, method)| methods.contains(method));
                 panels.push(TracePanel {
                     name: match shown {
-                        Shown::Variances => format!("variance of {}", row.name),
+                        ShownStatistic::Variances => format!("variance of {}", row.name),
                         _ => row.name.clone(),
                     },
                     unit: row.unit.to_owned(),
@@ -227,7 +227,7 @@ impl GroupReport<'_> {
                         })
                         .collect(),
                     ordinate: match shown {
-                        Shown::Variances => Ordinate::Logarithmic,
+                        ShownStatistic::Variances => Ordinate::Logarithmic,
                         _ => Ordinate::Robust,
                     },
                 });
@@ -253,7 +253,7 @@ impl GroupReport<'_> {
         (subject, condition, method): (&str, &str, &str),
         number: usize,
         parameter: &str,
-        shown: Shown,
+        shown: ShownStatistic,
     ) -> Option<TraceCurve> {
         let table = self.tables.traces;
         let estimators = texts(table, "estimator");
@@ -267,7 +267,7 @@ impl GroupReport<'_> {
                 .map(|i| column.get(*i).copied().unwrap_or(f64::NAN))
                 .collect::<Vec<f64>>()
         };
-        let variances = shown == Shown::Variances;
+        let variances = shown == ShownStatistic::Variances;
         let values = figure(if variances { "variance" } else { "median" });
         values.iter().any(|v| v.is_finite()).then(|| TraceCurve {
             kind: CurveKind::Estimate,

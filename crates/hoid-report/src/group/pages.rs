@@ -51,7 +51,7 @@ impl Tables {
         })
     }
 
-    fn all(&self) -> GroupTables<'_> {
+    fn as_group_tables(&self) -> GroupTables<'_> {
         GroupTables {
             estimates: &self.estimates,
             averages: &self.averages,
@@ -72,7 +72,7 @@ impl Tables {
 }
 
 /// Smallest width of a figure with several columns, mm; the text then has 6 pt, as journals require.
-const PAGE_MM: f64 = 137.0;
+const PAGE_WIDTH_MM: f64 = 137.0;
 
 /// Draws the describing functions of a finished group with the fitted operators, one figure for each condition, and
 /// returns pairs of name and SVG text; empty if no condition has a periodic excitation. If `width_mm` is too narrow for
@@ -89,11 +89,11 @@ pub fn group_figures(
     let report = GroupReport {
         manifest,
         summary: &GroupSummary::read(manifest, out)?,
-        tables: tables.all(),
+        tables: tables.as_group_tables(),
         settings: Vec::new(),
         subject: None,
     };
-    Ok(report.describing_figures(width_mm.is_some_and(|width| width < PAGE_MM)))
+    Ok(report.describing_figures(width_mm.is_some_and(|width| width < PAGE_WIDTH_MM)))
 }
 
 /// Writes the page of the group and one page for each subject to the directory of the tables; `path` is the path of the
@@ -104,7 +104,7 @@ pub fn group_figures(
 /// [`ReportError::Template`] if a template cannot be rendered, which is a defect of this crate.
 pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let read = Tables::read(out)?;
-    let tables = read.all();
+    let tables = read.as_group_tables();
     let summary = GroupSummary::read(manifest, out)?;
     let counting: Vec<_> = manifest.runs.iter().filter(|run| run.counts).collect();
     let mut subjects: Vec<&str> = Vec::new();
@@ -135,7 +135,7 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
         ),
     ];
     let table = |name: &str| read_table(&out.join(format!("{name}.parquet")));
-    settings.extend(account(&table("preparation")?, &table("trouble")?));
+    settings.extend(preparation_rows(&table("preparation")?, &table("trouble")?));
     let names = page_names(&subjects);
     let mut pages = Vec::new();
     let of_subjects = subjects.iter().zip(names).map(|(subject, name)| (Some(*subject), name));
@@ -154,14 +154,14 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
 
 /// Maximum number of characters of a subject in the file name of a page; with a number appended, the name is valid on
 /// every file system.
-const LONGEST_NAME: usize = 80;
+const MAX_NAME_LENGTH: usize = 80;
 
 /// The file name of the page of each subject. Characters other than ASCII letters and digits become `-`. A number is
 /// appended if the name of another subject is the same or differs only in case, which some file systems ignore.
 fn page_names(subjects: &[&str]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let name_of = |subject: &&str| {
-        let cut: String = subject.chars().take(LONGEST_NAME).collect();
+        let cut: String = subject.chars().take(MAX_NAME_LENGTH).collect();
         let plain = cut.replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let numbered = (1_u64..).map(|n| match n {
             1 => format!("subject-{plain}.html"),
@@ -176,7 +176,7 @@ fn page_names(subjects: &[&str]) -> Vec<String> {
 }
 
 /// Preparation of the runs and problems of their sampling; all files with the same text are combined in one row.
-fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
+fn preparation_rows(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
     for (table, what) in [(preparation, "preparation"), (trouble, "sampling problems")] {
         let mut files: Vec<(&str, String)> = Vec::new();

@@ -70,12 +70,14 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
                 (p.crossover_rad_s, p.crossover_interval),
                 (p.phase_margin_deg, p.phase_margin_interval),
             ];
-            cells.extend(measures.map(|(e, interval)| e.map_or_else(dash, |e| estimate_within(&e, interval))));
+            cells.extend(
+                measures.map(|(e, interval)| e.map_or_else(dash, |e| format_estimate_with_interval(&e, interval))),
+            );
         }
         cells.extend(
             columns
                 .iter()
-                .map(|(name, _)| p.parameter(name).map_or_else(dash, parameter)),
+                .map(|(name, _)| p.parameter(name).map_or_else(dash, format_parameter)),
         );
         cells.extend(further.iter().map(|(input, name, _)| response_cell(p, input, name)));
         cells.push(p.verdict.map_or("", VerdictLevel::name).to_owned());
@@ -89,9 +91,9 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
 }
 
 /// Name of the column with the form of the response to a further input.
-const FORM: &str = "form";
+const FORM_COLUMN: &str = "form";
 /// Names and headings of the parameters that occur only in the response to a further input, not in the operator.
-const OF_FURTHER: [(&str, &str); 2] = [("K_d", "K_d (s)"), ("tau_f", "tau_f (s)")];
+const FURTHER_INPUT_PARAMETERS: [(&str, &str); 2] = [("K_d", "K_d (s)"), ("tau_f", "tau_f (s)")];
 
 /// Input, name and heading of each column of the responses to further inputs.
 fn further_columns<'a>(people: &[&'a Person]) -> Vec<(&'a str, &'static str, String)> {
@@ -101,12 +103,15 @@ fn further_columns<'a>(people: &[&'a Person]) -> Vec<(&'a str, &'static str, Str
         if all.iter().any(|(known, ..)| *known == input) {
             continue;
         }
-        all.push((input, FORM, format!("response to {input}")));
+        all.push((input, FORM_COLUMN, format!("response to {input}")));
         let has = |name: &str| {
             let mut own = people.iter().flat_map(|p| &p.channels).filter(|c| c.name == input);
             own.any(|c| c.parameter(name).is_some())
         };
-        let used = COLUMNS.into_iter().chain(OF_FURTHER).filter(|(name, _)| has(name));
+        let used = COLUMNS
+            .into_iter()
+            .chain(FURTHER_INPUT_PARAMETERS)
+            .filter(|(name, _)| has(name));
         all.extend(used.map(|(name, heading)| (input, name, format!("{input}: {heading}"))));
     }
     all
@@ -118,8 +123,8 @@ fn response_cell(p: &Person, input: &str, name: &str) -> String {
         return dash();
     };
     match (name, channel.form) {
-        (FORM, form) => form.map_or("none found", Form::name).to_owned(),
-        _ => channel.parameter(name).map_or_else(dash, parameter),
+        (FORM_COLUMN, form) => form.map_or("none found", Form::name).to_owned(),
+        _ => channel.parameter(name).map_or_else(dash, format_parameter),
     }
 }
 
@@ -127,9 +132,9 @@ fn dash() -> String {
     numbers::DASH.to_owned()
 }
 
-fn estimate(e: &Estimate) -> String {
+fn format_estimate(e: &Estimate) -> String {
     match e.standard_error.filter(|s| s.is_finite() && *s > 0.0) {
-        None => numbers::significant(e.value, 3),
+        None => numbers::format_significant(e.value, 3),
         Some(error) => {
             let (value, error) = numbers::with_uncertainty(e.value, Some(error));
             format!("{value} \u{b1} {error}")
@@ -138,33 +143,35 @@ fn estimate(e: &Estimate) -> String {
 }
 
 /// Value and standard error, followed by the interval in brackets.
-fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> String {
+fn format_estimate_with_interval(e: &Estimate, interval: Option<(f64, f64)>) -> String {
     let ends = interval.map(|(low, high)| {
         format!(
             " [{} to {}]",
-            numbers::significant(low, 3),
-            numbers::significant(high, 3)
+            numbers::format_significant(low, 3),
+            numbers::format_significant(high, 3)
         )
     });
-    format!("{}{}", estimate(e), ends.unwrap_or_default())
+    format!("{}{}", format_estimate(e), ends.unwrap_or_default())
 }
 
-fn parameter(p: &Parameter) -> String {
+fn format_parameter(p: &Parameter) -> String {
     let known = Estimate {
         value: p.value,
         standard_error: p.standard_error,
     };
     match p.interval {
-        _ if p.determined => estimate(&known),
-        Some((low, high)) if high.is_infinite() && low.is_finite() => format!("> {}", numbers::significant(low, 2)),
+        _ if p.determined => format_estimate(&known),
+        Some((low, high)) if high.is_infinite() && low.is_finite() => {
+            format!("> {}", numbers::format_significant(low, 2))
+        }
         _ if !p.value.is_finite() => dash(),
-        _ => format!("({})", numbers::significant(p.value, 2)),
+        _ => format!("({})", numbers::format_significant(p.value, 2)),
     }
 }
 
 impl GroupReport<'_> {
     /// The people shown on the page.
-    fn shown(&self) -> impl Iterator<Item = &Person> {
+    fn shown_people(&self) -> impl Iterator<Item = &Person> {
         let GroupSummary { people, .. } = self.summary;
         people.iter().filter(|p| self.shows(&p.subject))
     }
@@ -191,12 +198,12 @@ impl GroupReport<'_> {
     }
 
     pub(super) fn people_headings(&self) -> Vec<String> {
-        people_table(self.shown()).headings
+        people_table(self.shown_people()).headings
     }
 
     pub(super) fn people(&self) -> Vec<Value> {
-        let rows = people_table(self.shown()).rows;
-        let people = self.shown().filter(|p| p.verdict.is_some());
+        let rows = people_table(self.shown_people()).rows;
+        let people = self.shown_people().filter(|p| p.verdict.is_some());
         rows.into_iter()
             .zip(people)
             .map(|(cells, p)| context! { cells, reasons => &p.reasons, notes => &p.notes, name => p.name() })
@@ -211,7 +218,7 @@ mod tests {
     #[test]
     fn undetermined_values_have_no_standard_error() {
         let of = |value, standard_error, interval, determined| {
-            parameter(&Parameter {
+            format_parameter(&Parameter {
                 name: "T_I".to_owned(),
                 unit: "s",
                 value,
@@ -235,8 +242,8 @@ mod tests {
             value: 3.05,
             standard_error: Some(0.12),
         };
-        let with = estimate_within(&crossover, Some((2.7778, 3.3222)));
+        let with = format_estimate_with_interval(&crossover, Some((2.7778, 3.3222)));
         assert_eq!(with, "3.05 \u{b1} 0.12 [2.78 to 3.32]");
-        assert_eq!(estimate_within(&crossover, None), "3.05 \u{b1} 0.12");
+        assert_eq!(format_estimate_with_interval(&crossover, None), "3.05 \u{b1} 0.12");
     }
 }

@@ -26,7 +26,7 @@ impl GroupReport<'_> {
     }
 
     /// The subjects and the conditions, in the order of the manifest.
-    pub(super) fn names(&self) -> (Vec<&str>, Vec<&str>) {
+    pub(super) fn subjects_and_conditions(&self) -> (Vec<&str>, Vec<&str>) {
         let (mut subjects, mut conditions): (Vec<&str>, Vec<&str>) = (Vec::new(), Vec::new());
         for run in self
             .manifest

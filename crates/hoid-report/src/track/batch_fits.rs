@@ -3,7 +3,7 @@
 use hoid_ident::{Estimator, Fit, IdentError};
 use hoid_model::{Orders, Record};
 use hoid_numerics::statistics::upper_median;
-use hoid_track::{StartAt, Trace};
+use hoid_track::{StartSource, Trace};
 
 /// The span of a batch fit, s, and the fit.
 pub type BatchFit = ((f64, f64), Fit);
@@ -49,12 +49,12 @@ pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Resu
 /// last third of the record. The second element is the error of the fit to the last third, if that fit fails.
 pub fn default_batch_fits(trace: &Trace, record: &Record) -> (Vec<BatchFit>, Option<IdentError>) {
     let mut all = Vec::new();
-    if let (Some(start), StartAt::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
+    if let (Some(start), StartSource::Span(Some((from, to)))) = (trace.start(), &trace.options().start)
         && let Ok(span) = record.span(*from, *to)
     {
         all.push(((span.time_s(0), span.time_s(span.len())), start.clone()));
     }
-    if trace.options().method.starts_itself() {
+    if trace.options().method.is_self_starting() {
         // The orders of a method without a start fit are unsuitable for a batch fit, because the noise model is long
         // and the method tracks its own delay.
         return (all, None);

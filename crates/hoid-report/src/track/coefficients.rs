@@ -23,7 +23,7 @@ impl Coefficient {
     }
 
     /// The coefficient in whose panel this coefficient is drawn: if `joined` is true, f1 is drawn in the panel of a1.
-    pub fn home(self, joined: bool) -> Self {
+    pub fn panel_coefficient(self, joined: bool) -> Self {
         match self.letter {
             'f' if joined => Self { letter: 'a', ..self },
             _ => self,
@@ -41,7 +41,7 @@ impl Coefficient {
 }
 
 /// The coefficients of a trace, in the order of theta.
-pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
+pub fn trace_coefficients(trace: &Trace) -> Vec<Coefficient> {
     trace
         .parameter_names()
         .iter()
@@ -50,7 +50,7 @@ pub fn of_trace(trace: &Trace) -> Vec<Coefficient> {
 }
 
 /// The coefficients of a fit, in the order of theta; empty for a grey-box model, whose parameters are not coefficients.
-pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
+pub fn fit_coefficients(fit: &Fit) -> Vec<Coefficient> {
     if fit.is_grey_box() {
         return Vec::new();
     }
@@ -61,7 +61,7 @@ pub fn of_fit(fit: &Fit) -> Vec<Coefficient> {
 }
 
 /// True if some traces have their poles in A and others in F; a1 and f1 are then the same quantity.
-pub fn joined(traces: &[&Trace]) -> bool {
+pub fn must_join_poles(traces: &[&Trace]) -> bool {
     let orders = |t: &&&Trace| t.options().orders;
     traces.iter().any(|t| orders(&t).na > 0 && orders(&t).nf == 0)
         && traces.iter().any(|t| orders(&t).nf > 0 && orders(&t).na == 0)

@@ -9,12 +9,12 @@ use hoid_track::OPERATOR_COLUMNS;
 use super::section::TraceSection;
 
 /// A trace with the operator in each row.
-pub struct Evaluated<'a> {
+pub struct EvaluatedTrace<'a> {
     pub section: &'a TraceSection<'a>,
     pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
 }
 
-impl<'a> Evaluated<'a> {
+impl<'a> EvaluatedTrace<'a> {
     pub fn new(section: &'a TraceSection<'a>) -> Self {
         let rows = 0..section.trace.len();
         Self {
@@ -25,12 +25,12 @@ impl<'a> Evaluated<'a> {
 }
 
 /// Returns the estimate of the operator parameter with this name; `None` for an unknown name.
-pub fn of_name(operator: &OperatorEstimate, name: &str) -> Option<Estimate> {
+pub fn operator_estimate(operator: &OperatorEstimate, name: &str) -> Option<Estimate> {
     operator.rows().into_iter().find(|r| r.0 == name).map(|r| r.2)
 }
 
 /// Names of the displayed parameters; tau_e is included only if a method tracks it.
-pub fn operator_names(traces: &[Evaluated<'_>]) -> Vec<&'static str> {
+pub fn operator_names(traces: &[EvaluatedTrace<'_>]) -> Vec<&'static str> {
     let mut names = OPERATOR_COLUMNS.to_vec();
     if traces
         .iter()

@@ -6,12 +6,12 @@ use hoid_model::{
     GainUnit, Record,
     uncertainty::{Estimate, OperatorEstimate},
 };
-use hoid_numerics::statistics::quantile_of;
-use hoid_track::{StartAt, Trace};
+use hoid_numerics::statistics::finite_quantile;
+use hoid_track::{StartSource, Trace};
 
 use super::{
-    coefficients::{Coefficient, joined, of_fit, of_trace},
-    evaluated::{Evaluated, of_name, operator_names, unit},
+    coefficients::{Coefficient, fit_coefficients, must_join_poles, trace_coefficients},
+    evaluated::{EvaluatedTrace, operator_estimate, operator_names, unit},
     truth,
 };
 use crate::{
@@ -21,13 +21,13 @@ use crate::{
 
 /// Number that is drawn for each estimate: its value or its standard error.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Shown {
+enum PlottedPart {
     Value,
     Error,
 }
 
 /// Curve of estimates with their band, or of their standard errors.
-fn curve(method: usize, times_s: &[f64], estimates: &[Option<Estimate>], shown: Shown) -> TraceCurve {
+fn curve(method: usize, times_s: &[f64], estimates: &[Option<Estimate>], shown: PlottedPart) -> TraceCurve {
     let error = |e: &Option<Estimate>| e.and_then(|e| e.standard_error).unwrap_or(f64::NAN);
     let value = |e: &Option<Estimate>| e.map_or(f64::NAN, |e| e.value);
     let edges = |e: &Option<Estimate>| (value(e) - Z_95 * error(e), value(e) + Z_95 * error(e));
@@ -38,9 +38,15 @@ fn curve(method: usize, times_s: &[f64], estimates: &[Option<Estimate>], shown: 
         times_s: times_s.to_vec(),
         values: estimates
             .iter()
-            .map(|e| if shown == Shown::Value { value(e) } else { error(e) })
+            .map(|e| {
+                if shown == PlottedPart::Value {
+                    value(e)
+                } else {
+                    error(e)
+                }
+            })
             .collect(),
-        band: if shown == Shown::Value {
+        band: if shown == PlottedPart::Value {
             estimates.iter().map(edges).collect()
         } else {
             Vec::new()
@@ -48,10 +54,15 @@ fn curve(method: usize, times_s: &[f64], estimates: &[Option<Estimate>], shown: 
     }
 }
 
-fn batch_curve(method: usize, (from_s, to_s): (f64, f64), estimate: Estimate, shown: Shown) -> Option<TraceCurve> {
+fn batch_curve(
+    method: usize,
+    (from_s, to_s): (f64, f64),
+    estimate: Estimate,
+    shown: PlottedPart,
+) -> Option<TraceCurve> {
     let level = match shown {
-        Shown::Value => estimate.value,
-        Shown::Error => estimate.standard_error?,
+        PlottedPart::Value => estimate.value,
+        PlottedPart::Error => estimate.standard_error?,
     };
     Some(TraceCurve {
         kind: CurveKind::Batch,
@@ -75,7 +86,7 @@ fn truth_curve(record: &Record, values: Vec<f64>) -> TraceCurve {
 }
 
 /// Symbol, for the legend, of a quantity that changed, with its subscript.
-fn in_legend(name: &str) -> &str {
+fn legend_symbol(name: &str) -> &str {
     match name {
         "K_e_dot" => "K_\u{117}",
         "omega_nm" => "\u{3c9}_{nm}",
@@ -87,11 +98,11 @@ fn in_legend(name: &str) -> &str {
 
 /// Combines the panels with the legend, the shaded spans of the start fits and the times from which the estimates are
 /// updated.
-fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> TraceGrid {
+fn grid(traces: &[EvaluatedTrace<'_>], record: &Record, panels: Vec<TracePanel>) -> TraceGrid {
     let mut shaded_s: Vec<(f64, f64)> = Vec::new();
     let mut marks_s: Vec<f64> = Vec::new();
     for trace in traces.iter().map(|t| t.section.trace) {
-        if let (StartAt::Span(span), true) = (&trace.options().start, trace.start().is_some()) {
+        if let (StartSource::Span(span), true) = (&trace.options().start, trace.start().is_some()) {
             let start_s = record.time_s(0);
             let third = start_s + record.len() as f64 * record.sample_time().s() / 3.0;
             let span = span.unwrap_or((start_s, third));
@@ -106,8 +117,8 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
     }
     let mut changes: Vec<(f64, String)> = Vec::new();
     for (t, change) in traces.iter().flat_map(|t| t.section.trace.changes()) {
-        let what = change.changed();
-        let what: Vec<&str> = what.into_iter().map(in_legend).collect();
+        let what = change.changed_quantities();
+        let what: Vec<&str> = what.into_iter().map(legend_symbol).collect();
         let what = if what.is_empty() { vec!["the response"] } else { what };
         changes.push((*t, what.join(", ")));
     }
@@ -126,14 +137,14 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
 /// Panels of the response and the loop: gain and phase at the frequencies of the traces, crossover and phase margin
 /// with the controlled element, and the level of the remnant. `None` if neither frequencies nor a controlled element
 /// were given.
-pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
+pub fn response_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> Option<TraceGrid> {
     let mut panels = Vec::new();
     let mut add = |name: String, unit: &str, of: &dyn Fn(&Trace, usize) -> Option<Estimate>| {
         let curves: Vec<TraceCurve> = (traces.iter().enumerate())
             .map(|(method, t)| {
                 let trace = t.section.trace;
                 let estimates: Vec<Option<Estimate>> = (0..trace.len()).map(|row| of(trace, row)).collect();
-                curve(method, trace.times_s(), &estimates, Shown::Value)
+                curve(method, trace.times_s(), &estimates, PlottedPart::Value)
             })
             .collect();
         panels.push(TracePanel {
@@ -180,8 +191,8 @@ pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceG
 }
 
 /// Panel of the tracked standard deviation of the innovations.
-fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
-    let level = |(method, t): (usize, &Evaluated<'_>)| TraceCurve {
+fn remnant_panel(traces: &[EvaluatedTrace<'_>], record: &Record) -> TracePanel {
+    let level = |(method, t): (usize, &EvaluatedTrace<'_>)| TraceCurve {
         kind: CurveKind::Estimate,
         method,
         level: 0,
@@ -198,32 +209,32 @@ fn remnant_panel(traces: &[Evaluated<'_>], record: &Record) -> TracePanel {
 }
 
 /// Standard deviation of the innovation in each row.
-fn innovation_standard_deviations(t: &Evaluated<'_>) -> Vec<f64> {
+fn innovation_standard_deviations(t: &EvaluatedTrace<'_>) -> Vec<f64> {
     let variances = t.section.trace.innovation_variance().iter();
     variances.map(|v| if *v >= 0.0 { v.sqrt() } else { f64::NAN }).collect()
 }
 
 /// The parameters of the operator over time, one panel for each.
-pub fn operator_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
-    grid(traces, record, operator_panels(traces, record, Shown::Value))
+pub fn operator_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> TraceGrid {
+    grid(traces, record, operator_panels(traces, record, PlottedPart::Value))
 }
 
-fn operator_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -> Vec<TracePanel> {
+fn operator_panels(traces: &[EvaluatedTrace<'_>], record: &Record, shown: PlottedPart) -> Vec<TracePanel> {
     let gain = GainUnit::of(record);
     let panel = |name: &'static str| {
         let mut curves = Vec::new();
         for (method, t) in traces.iter().enumerate() {
-            let estimate = |o: &Result<OperatorEstimate, _>| o.as_ref().ok().and_then(|o| of_name(o, name));
+            let estimate = |o: &Result<OperatorEstimate, _>| o.as_ref().ok().and_then(|o| operator_estimate(o, name));
             let estimates: Vec<Option<Estimate>> = t.operators.iter().map(estimate).collect();
             curves.push(curve(method, t.section.trace.times_s(), &estimates, shown));
         }
         for (method, t) in traces.iter().enumerate() {
             for line in &t.section.batch {
-                let estimate = line.fit.operator().ok().and_then(|o| of_name(&o, name));
+                let estimate = line.fit.operator().ok().and_then(|o| operator_estimate(&o, name));
                 curves.extend(estimate.and_then(|e| batch_curve(method, (line.from_s, line.to_s), e, shown)));
             }
         }
-        if let (Shown::Value, Some(values)) = (shown, record.channel(name)) {
+        if let (PlottedPart::Value, Some(values)) = (shown, record.channel(name)) {
             curves.push(truth_curve(record, values.to_vec()));
         }
         TracePanel {
@@ -236,58 +247,58 @@ fn operator_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -> V
     operator_names(traces).into_iter().map(panel).collect()
 }
 
-fn ordinate(shown: Shown) -> Ordinate {
+fn ordinate(shown: PlottedPart) -> Ordinate {
     match shown {
-        Shown::Value => Ordinate::Robust,
-        Shown::Error => Ordinate::Logarithmic,
+        PlottedPart::Value => Ordinate::Robust,
+        PlottedPart::Error => Ordinate::Logarithmic,
     }
 }
 
 /// The coefficients over time, one panel for each. If some methods have the poles in A and others in F, the
 /// coefficients of the poles share panels.
-pub fn coefficient_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
-    grid(traces, record, coefficient_panels(traces, record, Shown::Value))
+pub fn coefficient_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> TraceGrid {
+    grid(traces, record, coefficient_panels(traces, record, PlottedPart::Value))
 }
 
 /// Standard errors over time: of the parameters of the operator if all methods estimate these, otherwise of the
 /// coefficients.
-pub fn error_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
-    let panels = if of_operator(traces) {
-        operator_panels(traces, record, Shown::Error)
+pub fn error_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> TraceGrid {
+    let panels = if all_are_physical(traces) {
+        operator_panels(traces, record, PlottedPart::Error)
     } else {
-        coefficient_panels(traces, record, Shown::Error)
+        coefficient_panels(traces, record, PlottedPart::Error)
     };
     grid(traces, record, panels)
 }
 
 /// True if all methods estimate the parameters of the operator.
-pub fn of_operator(traces: &[Evaluated<'_>]) -> bool {
+pub fn all_are_physical(traces: &[EvaluatedTrace<'_>]) -> bool {
     traces.iter().all(|t| t.section.trace.options().method.is_physical())
 }
 
-fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -> Vec<TracePanel> {
+fn coefficient_panels(traces: &[EvaluatedTrace<'_>], record: &Record, shown: PlottedPart) -> Vec<TracePanel> {
     let all: Vec<_> = traces.iter().map(|t| t.section.trace).collect();
-    let joined = joined(&all);
+    let joined = must_join_poles(&all);
     let mut curves: BTreeMap<Coefficient, [Vec<TraceCurve>; 3]> = BTreeMap::new();
     for (method, t) in traces.iter().enumerate() {
         let trace = t.section.trace;
         let rows: Vec<Vec<Estimate>> = (0..trace.len()).map(|row| trace.parameters(row)).collect();
-        for (i, coefficient) in of_trace(trace).into_iter().enumerate() {
+        for (i, coefficient) in trace_coefficients(trace).into_iter().enumerate() {
             let estimates: Vec<Option<Estimate>> = rows.iter().map(|r| r.get(i).copied()).collect();
-            let [estimated, ..] = curves.entry(coefficient.home(joined)).or_default();
+            let [estimated, ..] = curves.entry(coefficient.panel_coefficient(joined)).or_default();
             estimated.push(curve(method, trace.times_s(), &estimates, shown));
         }
         for line in &t.section.batch {
-            for (coefficient, (_, estimate)) in of_fit(line.fit).into_iter().zip(line.fit.parameters()) {
+            for (coefficient, (_, estimate)) in fit_coefficients(line.fit).into_iter().zip(line.fit.parameters()) {
                 // A coefficient that occurs in no trace has no panel.
-                if let Some([_, batch, _]) = curves.get_mut(&coefficient.home(joined)) {
+                if let Some([_, batch, _]) = curves.get_mut(&coefficient.panel_coefficient(joined)) {
                     batch.extend(batch_curve(method, (line.from_s, line.to_s), estimate, shown));
                 }
             }
         }
-        if shown == Shown::Value {
+        if shown == PlottedPart::Value {
             for (coefficient, values) in truth::coefficients(record, trace) {
-                let [.., known] = curves.entry(coefficient.home(joined)).or_default();
+                let [.., known] = curves.entry(coefficient.panel_coefficient(joined)).or_default();
                 let curve = truth_curve(record, values);
                 if known.is_empty() {
                     known.push(curve);
@@ -305,13 +316,13 @@ fn coefficient_panels(traces: &[Evaluated<'_>], record: &Record, shown: Shown) -
 }
 
 /// Innovations over time, with bounds of two standard deviations on either side; one panel for each method.
-pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
-    let panel = |(method, t): (usize, &Evaluated<'_>)| {
+pub fn innovation_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> TraceGrid {
+    let panel = |(method, t): (usize, &EvaluatedTrace<'_>)| {
         let trace = t.section.trace;
         let sigma = innovation_standard_deviations(t);
-        let typical = quantile_of(&sigma, 0.9).unwrap_or(0.0);
+        let typical = finite_quantile(&sigma, 0.9).unwrap_or(0.0);
         let sizes: Vec<f64> = trace.innovation().iter().map(|e| e.abs()).collect();
-        let reach = (4.0 * typical).max(quantile_of(&sizes, 0.99).unwrap_or(0.0));
+        let reach = (4.0 * typical).max(finite_quantile(&sizes, 0.99).unwrap_or(0.0));
         let line = |kind, values: Vec<f64>| TraceCurve {
             kind,
             method,
@@ -336,12 +347,12 @@ pub fn innovation_grid(traces: &[Evaluated<'_>], record: &Record) -> TraceGrid {
 }
 
 /// Number of shortened steps over time; `None` if no step was shortened.
-pub fn shortened_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
+pub fn shortened_step_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> Option<TraceGrid> {
     let most = traces.iter().map(|t| t.section.trace.counts().shortened).max()?;
     if most == 0 {
         return None;
     }
-    let curve = |(method, t): (usize, &Evaluated<'_>)| TraceCurve {
+    let curve = |(method, t): (usize, &EvaluatedTrace<'_>)| TraceCurve {
         kind: CurveKind::Steps,
         method,
         level: 0,

@@ -1,12 +1,12 @@
 //! The page about recursive estimates, composed of its sections.
 
-use hoid_analysis::Tracked;
+use hoid_analysis::TrackingResult;
 use hoid_model::{GainUnit, Record, Verdict};
 use minijinja::{Value, context};
 
 use super::{
     batch_fits::BatchFit,
-    evaluated::Evaluated,
+    evaluated::EvaluatedTrace,
     panels,
     section::{BatchLine, TraceSection},
     tables,
@@ -40,7 +40,7 @@ pub struct TrackReport<'a> {
 
 impl<'a> TrackReport<'a> {
     /// Creates the page about a tracked recording, with batch fits for comparison.
-    pub fn of_tracked(tracked: &'a Tracked, batch: &'a [BatchFit]) -> Self {
+    pub fn from_tracked(tracked: &'a TrackingResult, batch: &'a [BatchFit]) -> Self {
         let options = tracked.trace.options();
         let line = |((from_s, to_s), fit): &'a BatchFit| BatchLine {
             from_s: *from_s,
@@ -69,15 +69,15 @@ impl TrackReport<'_> {
     /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`];
     /// [`ReportError::Template`] if a template cannot be rendered, which is a defect of this crate.
     pub fn to_html(&self) -> Result<String, ReportError> {
-        self.check()?;
-        let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
+        self.check_trace_count()?;
+        let traces: Vec<EvaluatedTrace<'_>> = self.traces.iter().map(EvaluatedTrace::new).collect();
         let sections: Vec<Value> = traces.iter().enumerate().map(|(i, t)| self.section(i, t)).collect();
         let operator = panels::operator_grid(&traces, self.record);
         let response = panels::response_grid(&traces, self.record);
         let coefficients = panels::coefficient_grid(&traces, self.record);
         let innovation = panels::innovation_grid(&traces, self.record);
         let errors = panels::error_grid(&traces, self.record);
-        let shortened = panels::shortened_grid(&traces, self.record);
+        let shortened = panels::shortened_step_grid(&traces, self.record);
         let draw =
             |id: &str, title: &str, grid: &TraceGrid| Value::from_safe_string(figures::trace_panels(id, title, grid));
         let values = context! {
@@ -92,7 +92,7 @@ impl TrackReport<'_> {
             has_marks => !operator.marks_s.is_empty(),
             has_truth => self.record.channel("K_e").is_some(),
             methods => tables::methods(&traces, self.record),
-            counts => tables::counts(&traces),
+            counts => tables::sample_count_rows(&traces),
             errors => tables::errors(&traces, self.record),
             response => response.as_ref().map(|grid| draw("response", "Response over time", grid)),
             response_beyond => response.as_ref().map(rows_beyond_axes),
@@ -102,7 +102,7 @@ impl TrackReport<'_> {
             coefficients_beyond => rows_beyond_axes(&coefficients),
             innovation => draw("innovation", "Innovations over time", &innovation),
             spread => draw("errors", "Standard errors over time", &errors),
-            spread_of_operator => panels::of_operator(&traces),
+            spread_of_operator => panels::all_are_physical(&traces),
             shortened => shortened.map(|s| draw("shortened", "Shortened steps over time", &s)),
             traces => sections,
         };
@@ -114,8 +114,8 @@ impl TrackReport<'_> {
     /// # Errors
     /// [`ReportError::NoTraces`], [`ReportError::TooManyTraces`], [`ReportError::EmptyTrace`].
     pub fn operator_grid(&self) -> Result<TraceGrid, ReportError> {
-        self.check()?;
-        let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
+        self.check_trace_count()?;
+        let traces: Vec<EvaluatedTrace<'_>> = self.traces.iter().map(EvaluatedTrace::new).collect();
         Ok(panels::operator_grid(&traces, self.record))
     }
 
@@ -125,8 +125,8 @@ impl TrackReport<'_> {
     /// # Errors
     /// The errors of [`TrackReport::operator_grid`].
     pub fn response_grid(&self) -> Result<Option<TraceGrid>, ReportError> {
-        self.check()?;
-        let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
+        self.check_trace_count()?;
+        let traces: Vec<EvaluatedTrace<'_>> = self.traces.iter().map(EvaluatedTrace::new).collect();
         Ok(panels::response_grid(&traces, self.record))
     }
 
@@ -135,12 +135,12 @@ impl TrackReport<'_> {
     /// # Errors
     /// The errors of [`TrackReport::operator_grid`].
     pub fn coefficient_grid(&self) -> Result<TraceGrid, ReportError> {
-        self.check()?;
-        let traces: Vec<Evaluated<'_>> = self.traces.iter().map(Evaluated::new).collect();
+        self.check_trace_count()?;
+        let traces: Vec<EvaluatedTrace<'_>> = self.traces.iter().map(EvaluatedTrace::new).collect();
         Ok(panels::coefficient_grid(&traces, self.record))
     }
 
-    fn check(&self) -> Result<(), ReportError> {
+    fn check_trace_count(&self) -> Result<(), ReportError> {
         let maximum = MAX_TRACES;
         match self.traces.len() {
             0 => return Err(ReportError::NoTraces { maximum }),
@@ -155,7 +155,7 @@ impl TrackReport<'_> {
         }
     }
 
-    fn section(&self, index: usize, trace: &Evaluated<'_>) -> Value {
+    fn section(&self, index: usize, trace: &EvaluatedTrace<'_>) -> Value {
         let start = trace.section.trace.start();
         context! {
             name => trace.section.name.clone(),
@@ -169,9 +169,9 @@ impl TrackReport<'_> {
             watched => !trace.section.trace.change_odds().is_empty(),
             changes => tables::changes(trace),
             begins => Some(trace.section.trace.options())
-                .filter(|options| options.method.starts_itself())
+                .filter(|options| options.method.is_self_starting())
                 .map(hoid_track::TrackOptions::start_as_text),
-            batch => tables::batch(trace, self.record),
+            batch => tables::batch_rows(trace, self.record),
         }
     }
 }
@@ -180,7 +180,7 @@ impl TrackReport<'_> {
 fn rows_beyond_axes(grid: &TraceGrid) -> Vec<Value> {
     let of = |panel: &figures::TracePanel| -> Vec<Value> {
         let label = tables::symbol_of(&panel.name);
-        let rows = panel.beyond().into_iter();
+        let rows = panel.rows_beyond_axes().into_iter();
         rows.map(|b| {
             context! {
                 label => label.clone(), name => grid.methods.get(b.method).cloned(),

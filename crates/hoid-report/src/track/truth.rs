@@ -3,7 +3,7 @@
 use hoid_model::{OperatorParameters, Record};
 use hoid_track::Trace;
 
-use super::coefficients::{Coefficient, of_trace};
+use super::coefficients::{Coefficient, trace_coefficients};
 
 /// The true parameters of the operator at sample `k`; `None` unless the record contains all of them.
 fn operator(record: &Record, k: usize) -> Option<OperatorParameters> {
@@ -18,7 +18,7 @@ fn operator(record: &Record, k: usize) -> Option<OperatorParameters> {
 }
 
 /// Index of the sample at a time; `None` outside the record.
-pub fn sample(record: &Record, time_s: f64) -> Option<usize> {
+pub fn sample_index(record: &Record, time_s: f64) -> Option<usize> {
     let k = ((time_s - record.time_s(0)) / record.sample_time().s()).round();
     (k >= 0.0 && k < record.len() as f64).then_some(k as usize)
 }
@@ -26,7 +26,7 @@ pub fn sample(record: &Record, time_s: f64) -> Option<usize> {
 /// The true value of an operator parameter at a time.
 pub fn parameter(record: &Record, name: &str, time_s: f64) -> Option<f64> {
     let values = record.channel(name)?;
-    sample(record, time_s).map(|k| values[k])
+    sample_index(record, time_s).map(|k| values[k])
 }
 
 /// The true coefficients of B and of the poles at every sample, computed by the exact hold with the parameters of that
@@ -58,7 +58,7 @@ pub fn coefficients(record: &Record, trace: &Trace) -> Vec<(Coefficient, Vec<f64
         .collect();
     let pole = if orders.na == 2 { 'a' } else { 'f' };
     let wanted = [('b', 0), ('b', 1), (pole, 1), (pole, 2)];
-    of_trace(trace)
+    trace_coefficients(trace)
         .into_iter()
         .filter_map(|c| {
             let at = wanted.iter().position(|w| *w == (c.letter, c.index))?;

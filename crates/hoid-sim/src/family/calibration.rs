@@ -19,7 +19,7 @@ use hoid_model::{
 
 use super::{
     held_loop::{HeldLoop, Inputs, LoopState, Outputs},
-    noise::{Shaped, Shaping},
+    noise::{Shaping, ShapingState},
 };
 
 /// Initial horizon in samples.
@@ -28,7 +28,7 @@ const INITIAL_HORIZON: usize = 512;
 const MAX_HORIZON: usize = 1 << 20;
 /// Fraction of the energy that may remain in the second half of the horizon for a response to count as decayed. The
 /// fraction beyond the horizon is then about the square of this value.
-const DECAYED_ENERGY: f64 = 1e-7;
+const MAX_TAIL_ENERGY: f64 = 1e-7;
 
 /// Mean squares of u, of its steps from sample to sample, and of e.
 type MeanSquares = [f64; 3];
@@ -51,12 +51,12 @@ impl Calibration {
         seen: Option<&FamilyOperator>,
     ) -> Result<Self, ModelError> {
         // This call checks the stability of the loop even if there is no remnant.
-        energy(held, &Shaping::White)?;
-        let mut sum = line_power(held, scenario, seen)?;
+        response_energies(held, &Shaping::White)?;
+        let mut sum = line_powers(held, scenario, seen)?;
         let mut energies = Vec::with_capacity(shapings.len());
         let mut shares = 0.0;
         for (shaping, part) in shapings.iter().zip(&scenario.remnant) {
-            let own = energy(held, shaping)?;
+            let own = response_energies(held, shaping)?;
             match part.strength {
                 PartStrength::Share(share) => shares += share,
                 PartStrength::Gain { initial, last } => {
@@ -105,9 +105,9 @@ fn scaled(a: MeanSquares, by: f64) -> MeanSquares {
 }
 
 /// Returns the sums of the squared responses of u, of its steps and of e to one unit of w.
-fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError> {
+fn response_energies(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError> {
     let mut state = LoopState::at_rest(held, held.longest_delay());
-    let mut shaped = Shaped::at_rest(shaping);
+    let mut shaped = ShapingState::at_rest(shaping);
     let (mut total, mut before, mut w) = ([0.0; 3], 0.0, 1.0);
     let mut horizon = INITIAL_HORIZON;
     let mut done = 0;
@@ -132,7 +132,7 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
         if !total[0].is_finite() {
             return Err(unstable("the response of u to a unit of remnant grows without bound"));
         }
-        if horizon > INITIAL_HORIZON && block[0] <= DECAYED_ENERGY * total[0] {
+        if horizon > INITIAL_HORIZON && block[0] <= MAX_TAIL_ENERGY * total[0] {
             return Ok(total);
         }
         if horizon >= MAX_HORIZON {
@@ -149,7 +149,7 @@ fn held_response(held: &HeldFamily, backward: Complex64) -> Complex64 {
 }
 
 /// Returns the mean squares due to target and disturbance.
-fn line_power(
+fn line_powers(
     held: &HeldLoop,
     scenario: &FamilyScenario,
     seen: Option<&FamilyOperator>,

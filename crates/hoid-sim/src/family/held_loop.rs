@@ -11,8 +11,8 @@
 //! together.
 
 use hoid_model::{
-    Complex64, ModelError, SampleTime, family_scenario::FamilyState, feedforward::OperatorAt, held_system::HeldSystem,
-    scenario::Realisation,
+    Complex64, ModelError, SampleTime, family_scenario::FamilyState, feedforward::OperatorWithDelay,
+    held_system::HeldSystem, scenario::Realisation,
 };
 
 use crate::held_operator::{HeldOperator, OperatorOutput, OperatorState};
@@ -60,7 +60,7 @@ impl HeldLoop {
     pub fn new(
         state: &FamilyState,
         delay: (usize, f64),
-        motion: Option<&OperatorAt>,
+        motion: Option<&OperatorWithDelay>,
         realisation: Realisation,
         sample_time: SampleTime,
     ) -> Result<Self, ModelError> {
@@ -93,28 +93,28 @@ impl HeldLoop {
         Ok(held)
     }
 
-    fn element_direct(&self) -> f64 {
-        self.element_input * self.element_output * self.element.direct()
+    fn element_feedthrough(&self) -> f64 {
+        self.element_input * self.element_output * self.element.direct_feedthrough()
     }
 
     /// Returns `1 + D (Y - M)`, where D, Y and M are the direct responses of the element, to the error and to motion
     /// within a sample.
     fn return_difference(&self) -> f64 {
-        let felt = self.motion.as_ref().map_or(0.0, HeldOperator::tap);
-        1.0 + self.element_direct() * (self.operator.tap() - felt)
+        let felt = self.motion.as_ref().map_or(0.0, HeldOperator::feedthrough);
+        1.0 + self.element_feedthrough() * (self.operator.feedthrough() - felt)
     }
 
     /// Returns the longer of the delays of both responses, in whole samples.
     pub fn longest_delay(&self) -> usize {
         self.motion
             .as_ref()
-            .map_or(0, HeldOperator::delay)
-            .max(self.operator.delay())
+            .map_or(0, HeldOperator::delay_samples)
+            .max(self.operator.delay_samples())
     }
 
     /// True if u depends on the error of the same sample.
     pub fn has_direct_response(&self) -> bool {
-        self.operator.tap() != 0.0
+        self.operator.feedthrough() != 0.0
     }
 
     /// Advances the loop by one sample and returns its signals at this sample.
@@ -122,7 +122,7 @@ impl HeldLoop {
     pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
         let output = self.operator.output(&state.operator);
         let OperatorOutput { known, tap, .. } = output;
-        let direct = self.element_direct();
+        let direct = self.element_feedthrough();
         let of_state = self.element_output * self.element.output(&state.element);
         let (e, u) = match (&self.motion, &mut state.motion) {
             (Some(motion), Some(felt)) => {
@@ -164,7 +164,7 @@ impl HeldLoop {
     /// Returns the frequency responses of operator and element in the sampled loop; `None` if a response does not exist
     /// at this frequency.
     pub fn responses(&self, omega_rad_s: f64) -> Option<[Complex64; 2]> {
-        let element = self.element.response(omega_rad_s)? + self.element.direct();
+        let element = self.element.response(omega_rad_s)? + self.element.direct_feedthrough();
         Some([
             self.operator.response(omega_rad_s)?,
             element * self.element_input * self.element_output,

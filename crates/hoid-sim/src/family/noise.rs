@@ -40,12 +40,12 @@ impl Shaping {
 
 /// State of a shaping filter.
 #[derive(Debug, Clone)]
-pub(super) struct Shaped {
+pub(super) struct ShapingState {
     state: Vec<f64>,
     next: Vec<f64>,
 }
 
-impl Shaped {
+impl ShapingState {
     pub fn at_rest(shaping: &Shaping) -> Self {
         let order = match shaping {
             Shaping::White => 0,
@@ -89,25 +89,25 @@ impl Shaped {
 }
 
 /// Returns the white sequence w of a part, with its pulses and intermittence but without its dependence on u.
-pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, samples: usize) -> Vec<f64> {
+pub(super) fn driving_noise(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, samples: usize) -> Vec<f64> {
     let mut w = if index == 0 {
         // The first part uses the same deviates as `Simulator`, so a remnant of one part is the same as in `Simulator`.
         run.white_noise(samples)
     } else {
-        run.white_noise_of(STREAMS + 4 * index, samples)
+        run.white_noise_with_tag(PART_STREAM_TAG + 4 * index, samples)
     };
     if let Some(pulses) = part.pulses {
         // There is at most one pulse per sample.
         let chance = (pulses.rate_per_s * ts_s).min(1.0);
-        let heights = run.white_noise_of(STREAMS + 4 * index + 1, samples);
-        let places = run.uniform_of(STREAMS + 4 * index + 2, samples);
+        let heights = run.white_noise_with_tag(PART_STREAM_TAG + 4 * index + 1, samples);
+        let places = run.uniform_with_tag(PART_STREAM_TAG + 4 * index + 2, samples);
         let (steady, size) = ((1.0 - pulses.part).sqrt(), (pulses.part / chance).sqrt());
         for ((w, height), place) in w.iter_mut().zip(heights).zip(places) {
             *w = steady * *w + if place < chance { size * height } else { 0.0 };
         }
     }
     if let Some(times) = part.intermittence.filter(|times| times.off_s > 0.0) {
-        let draws = run.uniform_of(STREAMS + 4 * index + 3, samples);
+        let draws = run.uniform_with_tag(PART_STREAM_TAG + 4 * index + 3, samples);
         let duty = times.on_s / (times.on_s + times.off_s);
         // The switching is a two-state Markov chain with the mean times `on_s` and `off_s`, observed at the samples.
         let settled = 1.0 - (-ts_s * (1.0 / times.on_s + 1.0 / times.off_s)).exp();
@@ -125,4 +125,4 @@ pub(super) fn driving(part: &RemnantPart, run: RunSeed, index: u64, ts_s: f64, s
 
 /// Tag of the random streams of part 0; the tags of the other parts follow. The deviates of part 0 come from
 /// [`RunSeed::white_noise`].
-pub(super) const STREAMS: u64 = u64::from_le_bytes(*b"\0people\0");
+pub(super) const PART_STREAM_TAG: u64 = u64::from_le_bytes(*b"\0people\0");

@@ -30,7 +30,7 @@ impl FamilyOperatorRun {
     pub fn new(simulator: FamilySimulator, run: RunSeed, start_s: f64) -> Result<Self, SimError> {
         let scenario = simulator.scenario.scenario();
         let ts_s = scenario.sample_time.s();
-        if (0..simulator.samples()).any(|k| simulator.held(k).has_direct_response()) {
+        if (0..simulator.sample_count()).any(|k| simulator.loop_at(k).has_direct_response()) {
             return Err(SimError::DirectResponse {
                 scenario: scenario.name.clone(),
                 tau_e_s: scenario
@@ -45,7 +45,7 @@ impl FamilyOperatorRun {
         let k = simulator.scenario.run_in_samples().saturating_add_signed(after_run_in);
         let mut remnant = RemnantRun::new(&simulator.scenario, &simulator.remnants, run);
         Ok(Self {
-            operator: OperatorState::at_rest(&simulator.held(0).operator, simulator.longest_delay()),
+            operator: OperatorState::at_rest(&simulator.loop_at(0).operator, simulator.longest_delay()),
             n: remnant.next(&simulator.scenario, &simulator.remnants, k),
             remnant,
             k,
@@ -53,13 +53,13 @@ impl FamilyOperatorRun {
         })
     }
 
-    fn held(&self) -> &HeldLoop {
-        self.simulator.held(self.k)
+    fn held_loop(&self) -> &HeldLoop {
+        self.simulator.loop_at(self.k)
     }
 
     /// Returns the control u of the next sample in deg.
     pub fn control(&self) -> f64 {
-        self.held().operator.output(&self.operator).known + self.n
+        self.held_loop().operator.output(&self.operator).known + self.n
     }
 
     /// Returns the remnant n of the next sample in deg, including the bias and the random walk of the stick.
@@ -68,18 +68,19 @@ impl FamilyOperatorRun {
     }
 
     /// Takes the error e of the sample in deg and advances by one sample.
-    pub fn take(&mut self, e: f64) {
-        let held = &self.simulator.held(self.k).operator;
+    pub fn push(&mut self, e: f64) {
+        let held = &self.simulator.loop_at(self.k).operator;
         let answer = held.output(&self.operator);
         held.advance(&mut self.operator, answer, e);
         let (scenario, remnants) = (&self.simulator.scenario, &self.simulator.remnants);
-        self.remnant.follow(scenario, remnants, self.k, answer.known + self.n);
+        self.remnant
+            .update_control(scenario, remnants, self.k, answer.known + self.n);
         self.k += 1;
         self.n = self.remnant.next(scenario, remnants, self.k);
     }
 
     /// Returns the state as numbers.
-    pub fn saved(&mut self) -> Vec<f64> {
+    pub fn saved_state(&mut self) -> Vec<f64> {
         let own_state = [self.k as f64, self.n];
         own_state
             .into_iter()
@@ -87,7 +88,7 @@ impl FamilyOperatorRun {
             .collect()
     }
 
-    /// Restores the state that [`FamilyOperatorRun::saved`] returned for an operator with the same scenario and run, so
+    /// Restores the state that [`FamilyOperatorRun::saved_state`] returned for an operator with the same scenario and run, so
     /// it continues with bit-identical results. Returns false, without any change, if the numbers belong to another
     /// operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
@@ -143,7 +144,7 @@ mod tests {
     }
 
     /// Returns a scenario in which delay and element change, with every kind of remnant and a random walk of the stick.
-    fn busy() -> FamilyScenario {
+    fn scenario_with_all_remnants() -> FamilyScenario {
         let person = |k: f64, tau_e_s: f64| [k, 0.5, 3.0, 11.0_f64.ln(), 0.25_f64.ln(), tau_e_s];
         let of = |k, tau_e_s| state(Form::LeadLag, true, &person(k, tau_e_s), [&[1.0], &[1.0, 0.0]]);
         let mut scenario = task(of(4.0, 0.18));
@@ -202,7 +203,7 @@ mod tests {
     }
 
     /// Returns a scenario with a gain and a delay of a fraction of a sample only.
-    fn quick(samples: f64) -> FamilyScenario {
+    fn gain_scenario(samples: f64) -> FamilyScenario {
         let mut scenario = task(state(Form::Gain, false, &[1.5, 0.01 * samples], [&[1.0], &[1.0, 0.0]]));
         scenario.remnant = vec![RemnantPart::new(RemnantShape::White, 0.1)];
         scenario
@@ -213,7 +214,13 @@ mod tests {
     #[test]
     fn operator_run_reproduces_the_control_of_the_simulator() {
         let integrating = state(Form::Lag, false, &[1.5, 0.0, 0.1437], [&[1.0], &[1.0]]);
-        for scenario in [busy(), quick(0.7), quick(1.0), quick(5.3), task(integrating)] {
+        for scenario in [
+            scenario_with_all_remnants(),
+            gain_scenario(0.7),
+            gain_scenario(1.0),
+            gain_scenario(5.3),
+            task(integrating),
+        ] {
             let simulator = FamilySimulator::new(&scenario).unwrap();
             let record = simulator.run(SEED, true).unwrap();
             let mut operator = FamilyOperatorRun::new(simulator, SEED, record.time_s(0)).unwrap();
@@ -221,7 +228,7 @@ mod tests {
             for (k, e) in record.input().iter().enumerate() {
                 assert_eq!(operator.control().to_bits(), record.output()[k].to_bits(), "{k}");
                 assert_eq!(operator.remnant().to_bits(), remnant[k].to_bits(), "{k}");
-                operator.take(*e);
+                operator.push(*e);
             }
         }
     }
@@ -229,19 +236,20 @@ mod tests {
     /// A saved operator continues in another operator, also after the end of its scenario.
     #[test]
     fn restored_operator_continues_bit_identically() {
-        let new = || FamilyOperatorRun::new(FamilySimulator::new(&busy()).unwrap(), SEED, 0.0).unwrap();
+        let new =
+            || FamilyOperatorRun::new(FamilySimulator::new(&scenario_with_all_remnants()).unwrap(), SEED, 0.0).unwrap();
         let mut first = new();
         let e = |k: usize| (0.1 * k as f64).sin();
-        (0..1300).for_each(|k| first.take(e(k)));
-        let saved = first.saved();
+        (0..1300).for_each(|k| first.push(e(k)));
+        let saved = first.saved_state();
         let mut second = new();
         assert!(second.restore(&saved));
         for k in 1300..1500 {
             assert_eq!(first.control().to_bits(), second.control().to_bits(), "{k}");
-            first.take(e(k));
-            second.take(e(k));
+            first.push(e(k));
+            second.push(e(k));
         }
-        let before = second.saved();
+        let before = second.saved_state();
         let mut other = saved.clone();
         for k in [-1.0, 0.5, f64::NAN, 1e300] {
             other[0] = k;
@@ -250,26 +258,27 @@ mod tests {
         for length in [0, 1, 2, saved.len() - 1] {
             assert!(!second.restore(&saved[..length]));
         }
-        assert_eq!(second.saved(), before);
+        assert_eq!(second.saved_state(), before);
     }
 
     #[test]
     fn scenario_continues_after_its_end() {
-        let mut scenario = quick(5.3);
+        let mut scenario = gain_scenario(5.3);
         let long = FamilySimulator::new(&scenario).unwrap();
         scenario.measurement_s = 1.0;
         let short = FamilySimulator::new(&scenario).unwrap();
-        let samples = short.samples() + 500;
+        let samples = short.sample_count() + 500;
         let mut of = [long, short].map(|simulator| FamilyOperatorRun::new(simulator, SEED, -2.0).unwrap());
         for k in 0..samples {
             assert_eq!(of[0].control().to_bits(), of[1].control().to_bits(), "{k}");
-            of.iter_mut().for_each(|operator| operator.take((0.1 * k as f64).sin()));
+            of.iter_mut().for_each(|operator| operator.push((0.1 * k as f64).sin()));
         }
     }
 
     #[test]
     fn operator_with_delay_below_the_minimum_is_refused() {
-        let of = |samples: f64| FamilyOperatorRun::new(FamilySimulator::new(&quick(samples)).unwrap(), SEED, 0.0);
+        let of =
+            |samples: f64| FamilyOperatorRun::new(FamilySimulator::new(&gain_scenario(samples)).unwrap(), SEED, 0.0);
         let refused = of(0.3).unwrap_err();
         assert!(matches!(refused, SimError::DirectResponse { .. }), "{refused}");
         assert!(refused.to_string().contains("0.003 s") && refused.to_string().contains("0.005 s"));

@@ -9,11 +9,11 @@ use hoid_model::family_scenario::{Followed, ResolvedFamilyScenario};
 
 use super::{
     calibration::Calibration,
-    noise::{Shaped, Shaping, driving},
+    noise::{Shaping, ShapingState, driving_noise},
 };
 use crate::RunSeed;
 
-const STICK_STREAM: u64 = u64::from_le_bytes(*b"stick\0\0\0");
+const STICK_STREAM_TAG: u64 = u64::from_le_bytes(*b"stick\0\0\0");
 
 /// Prepared remnant of a scenario: the filter of each part, and its strength before and after the change.
 #[derive(Debug, Clone)]
@@ -28,17 +28,17 @@ impl Remnants {
     /// Returns a value of the calibration at sample `k`, between its values in the initial and the final state. After
     /// the end of the scenario it is the value at the last sample.
     #[inline]
-    fn calibrated(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
+    fn calibrated_value(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
         let [initial, last] = &self.calibrations;
         if !self.changes {
             return of(initial);
         }
-        let t_s = scenario.time_s(k.min(samples_of(scenario) - 1));
+        let t_s = scenario.time_s(k.min(sample_count_of(scenario) - 1));
         scenario.scenario().schedule.value(of(initial), of(last), t_s)
     }
 }
 
-fn samples_of(scenario: &ResolvedFamilyScenario) -> usize {
+fn sample_count_of(scenario: &ResolvedFamilyScenario) -> usize {
     scenario.run_in_samples() + scenario.measurement_samples()
 }
 
@@ -50,7 +50,7 @@ pub(super) struct RemnantRun {
     driven: Vec<Vec<f64>>,
     /// Steps of the random walk of the stick, for the same samples.
     steps: Vec<f64>,
-    shaped: Vec<Shaped>,
+    shaped: Vec<ShapingState>,
     /// Running mean square of the signal on which each part depends, relative to the mean square of this signal over
     /// the run.
     followed: Vec<f64>,
@@ -72,13 +72,13 @@ impl RemnantRun {
             run,
             driven: Vec::new(),
             steps: Vec::new(),
-            shaped: of.shapings.iter().map(Shaped::at_rest).collect(),
+            shaped: of.shapings.iter().map(ShapingState::at_rest).collect(),
             followed: vec![1.0; of.shapings.len()],
             forgets: forgets.collect(),
             walk: scenario.stick.bias,
             before: 0.0,
         };
-        new.draw(resolved, samples_of(resolved));
+        new.draw(resolved, sample_count_of(resolved));
         new
     }
 
@@ -92,12 +92,12 @@ impl RemnantRun {
         let ts_s = scenario.sample_time.s();
         self.driven = (0..)
             .zip(&scenario.remnant)
-            .map(|(i, part)| driving(part, self.run, i, ts_s, samples))
+            .map(|(i, part)| driving_noise(part, self.run, i, ts_s, samples))
             .collect();
         self.steps = if scenario.stick.walk_per_root_s == 0.0 {
             vec![0.0; samples]
         } else {
-            self.run.white_noise_of(STICK_STREAM, samples)
+            self.run.white_noise_with_tag(STICK_STREAM_TAG, samples)
         };
     }
 
@@ -114,23 +114,23 @@ impl RemnantRun {
             if let Some(own) = part.signal_dependence {
                 w *= (1.0 - own.part + own.part * self.followed[i]).sqrt();
             }
-            n += of.calibrated(scenario, k, |c| c.gains[i]) * self.shaped[i].step(&of.shapings[i], w);
+            n += of.calibrated_value(scenario, k, |c| c.gains[i]) * self.shaped[i].step(&of.shapings[i], w);
         }
         n
     }
 
     /// Takes the control at sample `k`, for which [`RemnantRun::next`] has already been called.
     #[inline]
-    pub fn follow(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
+    pub fn update_control(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
         // A restored run may not have drawn any numbers yet.
         self.draw(scenario, k + 1);
         for (i, part) in scenario.scenario().remnant.iter().enumerate() {
             if let Some(own) = part.signal_dependence {
                 let (square, mean) = match own.follows {
-                    Followed::Control => (u * u, of.calibrated(scenario, k, |c| c.mean_squares[0])),
+                    Followed::Control => (u * u, of.calibrated_value(scenario, k, |c| c.mean_squares[0])),
                     Followed::Rate => (
                         (u - self.before).powi(2),
-                        of.calibrated(scenario, k, |c| c.mean_squares[1]),
+                        of.calibrated_value(scenario, k, |c| c.mean_squares[1]),
                     ),
                 };
                 self.followed[i] += self.forgets[i] * (square / mean - self.followed[i]);
@@ -143,7 +143,7 @@ impl RemnantRun {
 
     /// Returns the state as numbers.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
-        let shaped = self.shaped.iter_mut().flat_map(Shaped::numbers);
+        let shaped = self.shaped.iter_mut().flat_map(ShapingState::numbers);
         [&mut self.walk, &mut self.before]
             .into_iter()
             .chain(&mut self.followed)

@@ -22,7 +22,7 @@ use super::{
 };
 use crate::{
     RunSeed, SimError,
-    target_response::{TargetResponse, truth_of},
+    target_response::{TargetResponse, true_parameter_channels},
 };
 
 /// Prepared scenario: held models for all samples, and gains of the remnant.
@@ -55,8 +55,8 @@ pub struct FamilySignals {
     pub d: Vec<f64>,
 }
 
-const TARGET_PHASES: u64 = u64::from_le_bytes(*b"target\0\0");
-const DISTURBANCE_PHASES: u64 = u64::from_le_bytes(*b"disturb\0");
+const TARGET_PHASE_TAG: u64 = u64::from_le_bytes(*b"target\0\0");
+const DISTURBANCE_PHASE_TAG: u64 = u64::from_le_bytes(*b"disturb\0");
 
 impl FamilySimulator {
     /// Prepares a scenario. All runs share the result.
@@ -144,13 +144,13 @@ impl FamilySimulator {
     }
 
     /// Returns the number of samples of a run, including the run-in.
-    pub fn samples(&self) -> usize {
+    pub fn sample_count(&self) -> usize {
         self.scenario.run_in_samples() + self.scenario.measurement_samples()
     }
 
     /// Returns the loop at sample `k`. After the end of the scenario it is the loop at the last sample.
     #[inline]
-    pub(super) fn held(&self, k: usize) -> &HeldLoop {
+    pub(super) fn loop_at(&self, k: usize) -> &HeldLoop {
         let place = self.places.get(k).or(self.places.last()).copied().unwrap_or(0);
         &self.loops[place].1
     }
@@ -186,16 +186,16 @@ impl FamilySimulator {
     /// [`SimError::Diverged`] if a signal is not finite.
     pub fn signals(&self, run: RunSeed) -> Result<FamilySignals, SimError> {
         let scenario = self.scenario.scenario();
-        let (ts, samples) = (scenario.sample_time, self.samples());
+        let (ts, samples) = (scenario.sample_time, self.sample_count());
         let start_s = self.scenario.time_s(0);
         let mut signals = FamilySignals {
-            f: phased(&scenario.target, run, TARGET_PHASES)?.samples(start_s, ts, samples),
-            d: phased(&scenario.disturbance, run, DISTURBANCE_PHASES)?.samples(start_s, ts, samples),
+            f: forcing_with_phases(&scenario.target, run, TARGET_PHASE_TAG)?.samples(start_s, ts, samples),
+            d: forcing_with_phases(&scenario.disturbance, run, DISTURBANCE_PHASE_TAG)?.samples(start_s, ts, samples),
             ..FamilySignals::default()
         };
         let seen = self.response_to_target(run)?;
         let mut remnant = RemnantRun::new(&self.scenario, &self.remnants, run);
-        let mut state = LoopState::at_rest(self.held(0), self.longest_delay());
+        let mut state = LoopState::at_rest(self.loop_at(0), self.longest_delay());
         for k in 0..samples {
             let n = remnant.next(&self.scenario, &self.remnants, k);
             let inputs = Inputs {
@@ -204,8 +204,8 @@ impl FamilySimulator {
                 // The response of the person to the target does not depend on the signals of the loop.
                 remnant: n + seen.get(k).copied().unwrap_or(0.0),
             };
-            let now = self.held(k).step(&mut state, inputs);
-            remnant.follow(&self.scenario, &self.remnants, k, now.u);
+            let now = self.loop_at(k).step(&mut state, inputs);
+            remnant.update_control(&self.scenario, &self.remnants, k, now.u);
             signals.e.push(now.e + scenario.stick.offset_e);
             signals.u.push(now.u + scenario.stick.offset_u);
             signals.y.push(now.y);
@@ -230,8 +230,8 @@ impl FamilySimulator {
             return Ok(Vec::new());
         };
         let shown_s = self.scenario.time_s(0) + seen.preview_s();
-        let target = phased(&scenario.target, run, TARGET_PHASES)?;
-        Ok(seen.of(&target.samples(shown_s, scenario.sample_time, self.samples()))?)
+        let target = forcing_with_phases(&scenario.target, run, TARGET_PHASE_TAG)?;
+        Ok(seen.of(&target.samples(shown_s, scenario.sample_time, self.sample_count()))?)
     }
 
     /// Returns one run as a record, from the start of the measurement or, with `keep_run_in`, of the run-in: e, u, d,
@@ -272,19 +272,26 @@ impl FamilySimulator {
     /// Same as [`FamilySimulator::run`].
     pub fn run_with_truth(&self, run: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
         let mut record = self.run(run, keep_run_in)?;
-        let first = self.samples() - record.len();
-        let named: Vec<_> = self.loops.iter().map(|(state, _)| state.operator.named()).collect();
+        let first = self.sample_count() - record.len();
+        let named: Vec<_> = self
+            .loops
+            .iter()
+            .map(|(state, _)| state.operator.named_parameters())
+            .collect();
         for (i, parameter) in named[0].iter().enumerate() {
             let value = |k: usize| named[self.places.get(k).copied().unwrap_or(0)][i].value;
-            let values: Vec<f64> = (first..self.samples()).map(value).collect();
+            let values: Vec<f64> = (first..self.sample_count()).map(value).collect();
             if values.iter().all(|v| v.is_finite()) {
                 record = record.with_channel(Channel::new(parameter.name, parameter.unit, values))?;
             }
         }
         let felt = self.scenario.scenario().motion.as_ref();
         let felt = felt.map(|felt| response_parameters(felt, 0.0));
-        let felt = felt.map(|named| truth_of("y", (first, self.samples()), |_| &named));
-        let seen = self.seen.iter().flat_map(|seen| seen.truth(first, self.samples()));
+        let felt = felt.map(|named| true_parameter_channels("y", (first, self.sample_count()), |_| &named));
+        let seen = self
+            .seen
+            .iter()
+            .flat_map(|seen| seen.true_parameters(first, self.sample_count()));
         for channel in seen.chain(felt.into_iter().flatten()) {
             record = record.with_channel(channel)?;
         }
@@ -293,12 +300,12 @@ impl FamilySimulator {
 }
 
 /// Returns the forcing function with the phases of a run, which are random or fixed.
-fn phased(excitation: &Excitation, run: RunSeed, tag: u64) -> Result<ForcingFunction, SimError> {
+fn forcing_with_phases(excitation: &Excitation, run: RunSeed, tag: u64) -> Result<ForcingFunction, SimError> {
     if !excitation.random_phases {
         return Ok(excitation.function.clone());
     }
     let lines = excitation.function.sinusoids();
-    let phases = run.uniform_of(tag, lines.len());
+    let phases = run.uniform_with_tag(tag, lines.len());
     let with = |(line, phase): (&Sinusoid, f64)| Sinusoid {
         phase_rad: TAU * phase,
         ..*line

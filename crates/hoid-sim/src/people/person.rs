@@ -39,7 +39,7 @@ pub struct Task {
 impl Default for Task {
     fn default() -> Self {
         Self {
-            sample_time: SampleTime::SIXTIETH,
+            sample_time: SampleTime::AT_60_HZ,
             measurement_s: 40.0,
             run_in_s: 5.0,
             between_runs: 0.0,
@@ -91,11 +91,11 @@ const MAX_DRAWS: usize = 2000;
 /// Maximum number of draws for a run.
 const MAX_RUN_DRAWS: usize = 50;
 /// Number of random values per draw.
-const NUMBERS: usize = 16;
-const PERSON: u64 = u64::from_le_bytes(*b"person\0\0");
-const DISPLAY: u64 = u64::from_le_bytes(*b"display\0");
-const TARGET_SPREAD: u64 = u64::from_le_bytes(*b"tspread\0");
-const SPREAD: u64 = u64::from_le_bytes(*b"spread\0\0");
+const VALUES_PER_DRAW: usize = 16;
+const PERSON_TAG: u64 = u64::from_le_bytes(*b"person\0\0");
+const DISPLAY_TAG: u64 = u64::from_le_bytes(*b"display\0");
+const TARGET_SPREAD_TAG: u64 = u64::from_le_bytes(*b"tspread\0");
+const SPREAD_TAG: u64 = u64::from_le_bytes(*b"spread\0\0");
 
 impl Person {
     /// Draws the person identified by a seed and a number. If `form` is `None`, one of the forms that people use with
@@ -126,8 +126,8 @@ impl Person {
             cell: person,
             replication: 0,
         };
-        let numbers = streams.uniform_of(PERSON, NUMBERS * MAX_DRAWS);
-        for draw in numbers.chunks_exact(NUMBERS) {
+        let numbers = streams.uniform_with_tag(PERSON_TAG, VALUES_PER_DRAW * MAX_DRAWS);
+        for draw in numbers.chunks_exact(VALUES_PER_DRAW) {
             let form = form.unwrap_or_else(|| {
                 let forms = plant.forms();
                 forms[(draw[0] * forms.len() as f64) as usize % forms.len()]
@@ -141,14 +141,17 @@ impl Person {
                 phase_margin_deg,
             } = taken;
             let remnant_share = population.remnant_share.at(draw[9]);
-            let omega = state.operator.neuromuscular().map_or(11.0, |(omega, _)| omega);
-            let remnant = kind.parts(remnant_share, omega, [draw[10], draw[11], draw[12]]);
+            let omega = state
+                .operator
+                .neuromuscular_parameters()
+                .map_or(11.0, |(omega, _)| omega);
+            let remnant = kind.remnant_parts(remnant_share, omega, [draw[10], draw[11], draw[12]]);
             let mut scenario = FamilyScenario::new(state.clone(), task.sample_time);
             scenario.name = format!("person {person}");
             scenario.disturbance = plant.disturbance().excitation()?;
             if task.display != Display::Compensatory {
-                let followed = population.followed.at(streams.uniform_of(DISPLAY, 1)[0]);
-                let [target, disturbance] = plant.interleaved();
+                let followed = population.followed.at(streams.uniform_with_tag(DISPLAY_TAG, 1)[0]);
+                let [target, disturbance] = plant.interleaved_excitations();
                 scenario.target = target.excitation()?;
                 scenario.disturbance = disturbance.excitation()?;
                 scenario.feedforward = typical_feedforward(&state, task.display, followed, task.preview_s)?;
@@ -218,10 +221,10 @@ impl Person {
             });
         }
         let number = |operator: &FamilyOperator| operator.coordinates().len();
-        let deviates = seed.white_noise_of(SPREAD, number(&self.state.operator) * MAX_RUN_DRAWS);
+        let deviates = seed.white_noise_with_tag(SPREAD_TAG, number(&self.state.operator) * MAX_RUN_DRAWS);
         let of_target = self.feedforward.as_ref().map_or(0, |seen| number(&seen.operator));
         // Without a displayed target, there are no deviates for its response in any draw.
-        let of_target = seed.white_noise_of(TARGET_SPREAD, of_target * MAX_RUN_DRAWS);
+        let of_target = seed.white_noise_with_tag(TARGET_SPREAD_TAG, of_target * MAX_RUN_DRAWS);
         for (draw, z) in deviates.chunks_exact(number(&self.state.operator)).enumerate() {
             let state = FamilyState {
                 operator: self.task.spread(&self.state.operator, z)?,
@@ -281,7 +284,7 @@ impl Task {
     ) -> Result<Feedforward, ModelError> {
         let number = seen.operator.coordinates().len();
         let own = self.spread(&seen.operator, &deviates[draw * number..(draw + 1) * number])?;
-        let shared = match of_run.neuromuscular() {
+        let shared = match of_run.neuromuscular_parameters() {
             Some((omega, zeta)) => own.with_neuromuscular(omega, zeta)?,
             None => own,
         };
@@ -301,20 +304,20 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
     let kinds = form.coordinates(true);
     let value = |kind: &Coordinate| match kind {
         Coordinate::Gain => 1.0,
-        Coordinate::Lead | Coordinate::Linear => population.lead_s.at_log(draw[0]),
+        Coordinate::Lead | Coordinate::Linear => population.lead_s.log_interpolated(draw[0]),
         Coordinate::LagRate if draw[1] < population.integrates => 0.0,
-        Coordinate::LagRate => 1.0 / population.lag_s.at_log(draw[2]),
+        Coordinate::LagRate => 1.0 / population.lag_s.log_interpolated(draw[2]),
         // If the numerator is a double lead with real roots, c_2 is at most (c_1/2)^2.
-        Coordinate::Quadratic => (population.lead_s.at_log(draw[0]) / 2.0).powi(2) * draw[3],
+        Coordinate::Quadratic => (population.lead_s.log_interpolated(draw[0]) / 2.0).powi(2) * draw[3],
         // A lag causes a phase droop with alpha of the order of 1/T_I.
-        Coordinate::Droop => 1.0 / population.lag_s.at_log(draw[2]),
+        Coordinate::Droop => 1.0 / population.lag_s.log_interpolated(draw[2]),
         Coordinate::LogOmega => population.omega_nm_rad_s.at(draw[4]).ln(),
-        Coordinate::LogZeta => population.zeta_nm.at_log(draw[5]).ln(),
+        Coordinate::LogZeta => population.zeta_nm.log_interpolated(draw[5]).ln(),
         Coordinate::Delay => population.tau_e_s.at(draw[6]),
     };
     let mut coordinates: Vec<f64> = kinds.iter().map(value).collect();
     let element = plant.transfer_function()?;
-    let crossover = population.crossover_rad_s.at_log(draw[7]);
+    let crossover = population.crossover_rad_s.log_interpolated(draw[7]);
     let unit = FamilyOperator::new(form, true, &coordinates)?;
     let at = unit.response(crossover) * element.response(crossover);
     let margin = (-at).arg().to_degrees();

@@ -40,7 +40,7 @@ impl Range {
     }
 
     /// Returns the value at a fraction (0 to 1) of the range on a logarithmic scale.
-    pub(super) fn at_log(&self, part: f64) -> f64 {
+    pub(super) fn log_interpolated(&self, part: f64) -> f64 {
         self.low * (self.high / self.low).powf(part)
     }
 
@@ -209,7 +209,7 @@ impl Plant {
 
     /// Returns target and disturbance of a task with a displayed target: the multi-sine of [`Plant::disturbance`], whose
     /// primes are used alternately by target and disturbance.
-    pub fn interleaved(self) -> [MultiSine; 2] {
+    pub fn interleaved_excitations(self) -> [MultiSine; 2] {
         [Interleaved::Even, Interleaved::Odd].map(|interleaved| MultiSine {
             interleaved,
             ..self.disturbance()

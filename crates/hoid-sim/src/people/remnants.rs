@@ -32,18 +32,18 @@ hoid_model::named_choice!(RemnantKind, "kind of remnant", 5, {
     Intermittent => "intermittent",
 });
 
-const BAND_S: Range = Range::new(0.05, 0.3);
-const DRIFT_S: Range = Range::new(3.0, 10.0);
-const DAMPING: Range = Range::new(0.15, 0.4);
+const BAND_RANGE_S: Range = Range::new(0.05, 0.3);
+const DRIFT_RANGE_S: Range = Range::new(3.0, 10.0);
+const DAMPING_RANGE: Range = Range::new(0.15, 0.4);
 
 impl RemnantKind {
     /// Returns the parts of the remnant of a person, from three numbers in `[0, 1)`.
-    pub(super) fn parts(self, share: f64, omega_nm_rad_s: f64, numbers: [f64; 3]) -> Vec<RemnantPart> {
+    pub(super) fn remnant_parts(self, share: f64, omega_nm_rad_s: f64, numbers: [f64; 3]) -> Vec<RemnantPart> {
         let lag = |time_constant_s| RemnantShape::Lag {
             time_constant_s,
             order: 1,
         };
-        let shape = lag(BAND_S.at_log(numbers[0]));
+        let shape = lag(BAND_RANGE_S.log_interpolated(numbers[0]));
         if self == Self::Lag {
             return vec![RemnantPart::new(shape, share)];
         }
@@ -72,9 +72,9 @@ impl RemnantKind {
         };
         let peak = RemnantShape::Resonance {
             omega_rad_s: omega_nm_rad_s,
-            zeta: DAMPING.at_log(numbers[1]),
+            zeta: DAMPING_RANGE.log_interpolated(numbers[1]),
         };
-        let drift = lag(DRIFT_S.at_log(numbers[2]));
+        let drift = lag(DRIFT_RANGE_S.log_interpolated(numbers[2]));
         vec![
             band,
             RemnantPart::new(peak, 0.2 * share),

@@ -1,7 +1,7 @@
 //! Analysis of the runs of a person in a condition, jointly and one by one.
 //!
 //! First, all runs of a person in a condition are analysed together. If the task does not change within them, the
-//! family of operators is fitted jointly to all of them ([`hoid_ident::family`]), which gives the operator of the
+//! family of operators is fitted jointly to all of them ([`hoid_ident::family_estimator`]), which gives the operator of the
 //! person. The orders and delay of the polynomial models (nk, and for Box-Jenkins nd and T_n) are also chosen once for
 //! all of these runs (`run_orders`). In addition, a Box-Jenkins model is fitted to all runs, with separate initial
 //! states for each run, the best-fitting delay, and the highest order of the noise model that the manifest allows. In a
@@ -25,9 +25,9 @@ use super::{
     block::Cell,
     family_fits,
     manifest::{Manifest, RunEntry},
-    person::{ALL, Person, PersonStatus, people_of, people_table},
+    person::{ALL_RUNS, Person, PersonStatus, people_table, read_people},
     person_channel::PersonChannel,
-    reading::{Pairing, Recorded, Run, account, read_files, read_run, run_of},
+    reading::{Pairing, Run, UnrepairedRun, account_tables, join_files, read_files, read_run},
     run_orders::{self, label_of},
     run_rows::{RunRows, RunTables},
     traces,
@@ -36,11 +36,11 @@ use super::{
 use crate::statistics::median;
 
 /// Label of a run that could not be read.
-pub(super) const READ: &str = "read";
+pub(super) const READ_LABEL: &str = "read";
 /// Label of the grey box.
-const GREY_BOX: &str = "grey box";
+const GREY_BOX_LABEL: &str = "grey box";
 /// Label of quantities that describe the recording itself.
-pub(super) const RECORD: &str = "record";
+pub(super) const RECORD_LABEL: &str = "record";
 /// Name of the table of people.
 pub(super) const PEOPLE_TABLE: &str = "people";
 
@@ -57,14 +57,14 @@ pub(super) struct CellResults {
 impl CellResults {
     /// Reads the results from two tables of the cell: its estimates and its people.
     pub fn of(estimates: &OutputTable, people: &OutputTable) -> Self {
-        let people = people_of(people);
+        let people = read_people(people);
         let person = people.first();
         let channels = person.map_or(&[][..], |person| &person.channels);
         Self {
-            arx: run_orders::chosen(estimates, Structure::Arx),
-            box_jenkins: run_orders::chosen(estimates, Structure::BoxJenkins),
+            arx: run_orders::chosen_orders(estimates, Structure::Arx),
+            box_jenkins: run_orders::chosen_orders(estimates, Structure::BoxJenkins),
             form: person.and_then(|person| person.form.parse().ok()),
-            channels: channels.iter().filter_map(PersonChannel::in_use).collect(),
+            channels: channels.iter().filter_map(PersonChannel::single_run_channel).collect(),
         }
     }
 
@@ -90,17 +90,17 @@ impl CellResults {
 pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry, from_cell: &CellResults) -> RunTables {
     let mut analysis = RunAnalysis::new(manifest, entry);
     let files = read_files(manifest, base, entry, Pairing::Recorded);
-    let account = account(entry, &files);
-    match run_of(files) {
+    let account = account_tables(entry, &files);
+    match join_files(files) {
         Ok(run) => {
-            analysis.rows.at_the_rate_of(&run);
+            analysis.rows.convert_sample_counts(&run);
             analysis.analyse(&run, from_cell);
             if let Some(form) = from_cell.form.filter(|_| manifest.analysis.each_run) {
                 let paired = read_run(manifest, base, entry, Pairing::InTheLoop);
-                analysis.family_of_run(paired.map(|run| run.record), form, &from_cell.channels);
+                analysis.fit_family_to_run(paired.map(|run| run.record), form, &from_cell.channels);
             }
         }
-        Err(reason) => analysis.rows.failed(None, READ, &reason),
+        Err(reason) => analysis.rows.write_failure(None, READ_LABEL, &reason),
     }
     RunTables {
         account: account.into(),
@@ -109,9 +109,9 @@ pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry, from_c
 }
 
 /// Analyses all runs of a person in a condition jointly.
-pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>) -> RunTables {
+pub(super) fn analyse_jointly(manifest: &Manifest, base: &Path, cell: &Cell<'_>) -> RunTables {
     let all = RunEntry {
-        run: ALL.to_owned(),
+        run: ALL_RUNS.to_owned(),
         ..cell.runs[0].clone()
     };
     let mut analysis = RunAnalysis::new(manifest, &all);
@@ -122,13 +122,13 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     };
     let (entries, runs) = read(Pairing::Recorded);
     if let Some(run) = runs.first() {
-        analysis.rows.at_the_rate_of(run);
+        analysis.rows.convert_sample_counts(run);
     }
     let late_samples = analysis.rows.condition.offset_samples;
     let people = match (&cell.changes, runs.is_empty()) {
-        (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
+        (Some(reason), _) => vec![Person::without_operator(cell.key(), PersonStatus::Changes, reason)],
         // A file that cannot be read is reported by the analysis of its run.
-        (None, true) => vec![Person::without(
+        (None, true) => vec![Person::without_operator(
             cell.key(),
             PersonStatus::Failed,
             "no run could be read",
@@ -136,9 +136,9 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
         // The two pairings differ only if u is recorded late.
         (None, false) if late_samples != 0.0 => {
             let (entries, paired) = read(Pairing::InTheLoop);
-            analysis.family_together(manifest, cell.key(), &entries, &paired)
+            analysis.fit_family_jointly(manifest, cell.key(), &entries, &paired)
         }
-        (None, false) => analysis.family_together(manifest, cell.key(), &entries, &runs),
+        (None, false) => analysis.fit_family_jointly(manifest, cell.key(), &entries, &runs),
     };
     let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
     let one_input = people[0].channels.iter().all(|channel| channel.form.is_none());
@@ -148,12 +148,12 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
         // The names of the structures were checked with the manifest.
         for structure in analysis.settings.structures().unwrap_or_default() {
             if let Err(reason) = run_orders::choose(analysis.settings, &records, structure, nk, &mut analysis.rows) {
-                analysis.rows.failed(None, label_of(structure), &reason);
+                analysis.rows.write_failure(None, label_of(structure), &reason);
             }
         }
         let fitted = analysis.settings.polynomials().unwrap_or_default();
         if cell.changes.is_none() && records.len() > 1 && fitted.contains(&Structure::BoxJenkins) {
-            analysis.box_jenkins_together(&records);
+            analysis.fit_box_jenkins_jointly(&records);
         }
     }
     let mut tables = analysis.rows.into_tables();
@@ -184,10 +184,11 @@ impl<'a> RunAnalysis<'a> {
             ("rms_u", root_mean_square(record.output())),
         ];
         for (name, value) in of_record.into_iter().chain(change) {
-            self.rows.row(Some(windows[2]), RECORD, name, Estimate::fixed(value));
+            self.rows
+                .write_row(Some(windows[2]), RECORD_LABEL, name, Estimate::fixed(value));
         }
         if let Some(reason) = from_cell.reason_against_one_input() {
-            return self.one_input(&reason);
+            return self.report_one_input_exclusion(&reason);
         }
         // The names of structures and recursions were checked with the manifest.
         for structure in self.settings.polynomials().unwrap_or_default() {
@@ -195,7 +196,7 @@ impl<'a> RunAnalysis<'a> {
             let orders = match from_cell.orders(structure) {
                 Ok(orders) => *orders,
                 Err(reason) => {
-                    self.rows.failed(None, label, reason);
+                    self.rows.write_failure(None, label, reason);
                     continue;
                 }
             };
@@ -208,8 +209,8 @@ impl<'a> RunAnalysis<'a> {
                             .fit(&[part])
                             .map_err(|e| e.to_string())
                     }) {
-                    Ok(fit) => self.rows.fit_rows(window, label, &fit, record),
-                    Err(reason) => self.rows.failed(Some(window), label, &reason),
+                    Ok(fit) => self.rows.write_fit_rows(window, label, &fit, record),
+                    Err(reason) => self.rows.write_failure(Some(window), label, &reason),
                 }
             }
         }
@@ -217,20 +218,20 @@ impl<'a> RunAnalysis<'a> {
             self.track(run, &windows, &method, from_cell);
         }
         if self.settings.grey_box {
-            self.grey_box(record, &windows);
+            self.fit_grey_box(record, &windows);
         }
     }
 
     /// Reports why the models and recursions with one input are not fitted.
-    fn one_input(&mut self, reason: &str) {
+    fn report_one_input_exclusion(&mut self, reason: &str) {
         for structure in self.settings.polynomials().unwrap_or_default() {
-            self.rows.omitted(label_of(structure), reason);
+            self.rows.write_omission(label_of(structure), reason);
         }
         for method in self.settings.recursions().unwrap_or_default() {
-            self.rows.omitted(&traces::label_of(&method), reason);
+            self.rows.write_omission(&traces::label_of(&method), reason);
         }
         if self.settings.grey_box {
-            self.rows.omitted(GREY_BOX, reason);
+            self.rows.write_omission(GREY_BOX_LABEL, reason);
         }
     }
 
@@ -241,40 +242,41 @@ impl<'a> RunAnalysis<'a> {
         let mut tracking = Tracking {
             // The run has already been repaired and reduced to its final rate.
             rate: Decimation::Off,
-            every: run.samples(self.settings.trace_every as f64).round().max(1.0) as usize,
+            every: run.run_samples(self.settings.trace_every as f64).round().max(1.0) as usize,
             ..Tracking::of(TrackRequest::of(method.clone()))
         };
-        if !method.starts_itself() {
+        if !method.is_self_starting() {
             let structure = method.default_structure();
             match from_cell.orders(structure) {
                 Ok(orders) => {
                     let has = |name: &str| name == "nk" || structure.polynomials().contains(&name[1..]);
-                    let named = orders.named().into_iter().filter(|(name, _)| has(name));
+                    let named = orders.named_orders().into_iter().filter(|(name, _)| has(name));
                     tracking.recursion.orders = named.map(|(name, n)| (name.to_owned(), n..=n)).collect();
                     tracking.start_span_s = Some((windows[0].from_s, windows[0].to_s));
                 }
-                Err(reason) => return self.rows.failed(None, &label, reason),
+                Err(reason) => return self.rows.write_failure(None, &label, reason),
             }
         }
-        let tracked = match tracking.run(Recordings::of_records([run.record.clone()]), None, &|| ()) {
+        let tracked = match tracking.run(Recordings::from_records([run.record.clone()]), None, &|| ()) {
             Ok(tracked) => tracked,
-            Err(error) => return self.rows.failed(None, &label, &error.to_string()),
+            Err(error) => return self.rows.write_failure(None, &label, &error.to_string()),
         };
         let trace = tracked.trace;
-        self.rows.judged(&label, &tracked.verdict);
-        self.rows.trace_rows(&trace);
+        self.rows.write_verdict(&label, &tracked.verdict);
+        self.rows.write_trace_rows(&trace);
         for window in &windows[..2] {
             for (name, values) in traces::values_within(&trace, window.from_s, window.to_s) {
                 let middle = median(&values);
                 if middle.is_finite() {
-                    self.rows.row(Some(*window), &label, &name, Estimate::fixed(middle));
+                    self.rows
+                        .write_row(Some(*window), &label, &name, Estimate::fixed(middle));
                 }
             }
         }
     }
 
     /// Fits one Box-Jenkins model to all runs.
-    fn box_jenkins_together(&mut self, records: &[Record]) {
+    fn fit_box_jenkins_jointly(&mut self, records: &[Record]) {
         const LABEL: &str = "BJ, all runs";
         let structure = Structure::BoxJenkins;
         let mut ranges = run_orders::ranges(self.settings, &records[0], structure);
@@ -283,13 +285,13 @@ impl<'a> RunAnalysis<'a> {
         let template = Estimator::new(structure, structure.operator_orders(1));
         let window = windows(self.settings, &records[0])[2];
         match choose_orders(&template, &ranges, Criterion::Bic, records) {
-            Ok(choice) => self.rows.fit_rows(window, LABEL, &choice.fit, &records[0]),
-            Err(error) => self.rows.failed(Some(window), LABEL, &error.to_string()),
+            Ok(choice) => self.rows.write_fit_rows(window, LABEL, &choice.fit, &records[0]),
+            Err(error) => self.rows.write_failure(Some(window), LABEL, &error.to_string()),
         }
     }
 
     /// Fits the family jointly to all runs and returns the people of the fit.
-    fn family_together(
+    fn fit_family_jointly(
         &mut self,
         manifest: &Manifest,
         key: (&str, &str),
@@ -298,7 +300,7 @@ impl<'a> RunAnalysis<'a> {
     ) -> Vec<Person> {
         let mut recordings = Recordings::default();
         for (entry, run) in entries.iter().zip(runs) {
-            if let Some(Recorded { record, account }) = run.recorded.clone() {
+            if let Some(UnrepairedRun { record, account }) = run.recorded.clone() {
                 recordings.push(entry.file.display().to_string(), record, account);
             }
         }
@@ -308,18 +310,18 @@ impl<'a> RunAnalysis<'a> {
             Ok(found) => {
                 let record = &runs[0].record;
                 let window = windows(self.settings, record)[2];
-                family_fits::rows_of_fit(&mut self.rows, window, family_fits::JOINT_LABEL, &found.fit, record);
+                family_fits::write_fit(&mut self.rows, window, family_fits::JOINT_LABEL, &found.fit, record);
                 family_fits::people_of_fit(key, entries, &found, self.rows.element())
             }
             Err(reason) => {
-                self.rows.failed(None, family_fits::JOINT_LABEL, &reason);
-                vec![Person::without(key, PersonStatus::Failed, &reason)]
+                self.rows.write_failure(None, family_fits::JOINT_LABEL, &reason);
+                vec![Person::without_operator(key, PersonStatus::Failed, &reason)]
             }
         }
     }
 
     /// Fits the family to one run, in the forms chosen for the person.
-    fn family_of_run(&mut self, record: Result<Record, String>, form: Form, channels: &[SeenChannel]) {
+    fn fit_family_to_run(&mut self, record: Result<Record, String>, form: Form, channels: &[SeenChannel]) {
         let fit = record.and_then(|record| {
             let estimator = family_fits::estimator_of_run(self.settings, &self.rows.condition, form, channels)?;
             let fit = estimator.fit(std::slice::from_ref(&record));
@@ -328,13 +330,13 @@ impl<'a> RunAnalysis<'a> {
         match fit {
             Ok((fit, record)) => {
                 let window = windows(self.settings, &record)[2];
-                family_fits::rows_of_fit(&mut self.rows, window, family_fits::SINGLE_RUN_LABEL, &fit, &record);
+                family_fits::write_fit(&mut self.rows, window, family_fits::SINGLE_RUN_LABEL, &fit, &record);
             }
-            Err(reason) => self.rows.failed(None, family_fits::SINGLE_RUN_LABEL, &reason),
+            Err(reason) => self.rows.write_failure(None, family_fits::SINGLE_RUN_LABEL, &reason),
         }
     }
 
-    fn grey_box(&mut self, record: &Record, windows: &[Window; 3]) {
+    fn fit_grey_box(&mut self, record: &Record, windows: &[Window; 3]) {
         for window in windows {
             let found = record
                 .span(window.from_s, window.to_s)
@@ -348,11 +350,15 @@ impl<'a> RunAnalysis<'a> {
                 });
             match found {
                 Ok(fit) => {
-                    self.rows
-                        .response_rows(*window, GREY_BOX, fit.polynomial_fit(0), record.sample_time().s());
-                    self.rows.operator_rows(*window, GREY_BOX, fit.operator(0));
+                    self.rows.write_response_rows(
+                        *window,
+                        GREY_BOX_LABEL,
+                        fit.polynomial_fit(0),
+                        record.sample_time().s(),
+                    );
+                    self.rows.write_operator_rows(*window, GREY_BOX_LABEL, fit.operator(0));
                 }
-                Err(reason) => self.rows.failed(Some(*window), GREY_BOX, &reason),
+                Err(reason) => self.rows.write_failure(Some(*window), GREY_BOX_LABEL, &reason),
             }
         }
     }

@@ -22,7 +22,7 @@ pub struct AnalysisSettings {
     #[schemars(extend("items" = serde_json::json!({ "enum": method_names() })))]
     pub methods: Vec<String>,
     /// Polynomial models that are fitted in addition to the operator, for tables and figures: arx, bj, both or neither.
-    #[schemars(extend("items" = serde_json::json!({ "enum": POLYNOMIALS.map(Structure::name) })))]
+    #[schemars(extend("items" = serde_json::json!({ "enum": POLYNOMIAL_STRUCTURES.map(Structure::name) })))]
     pub polynomials: Vec<String>,
     /// Number of samples from one stored point of a trace to the next.
     pub trace_every: usize,
@@ -46,14 +46,14 @@ pub struct AnalysisSettings {
 }
 
 /// Polynomial structures that a group can fit.
-const POLYNOMIALS: [Structure; 2] = [Structure::Arx, Structure::BoxJenkins];
+const POLYNOMIAL_STRUCTURES: [Structure; 2] = [Structure::Arx, Structure::BoxJenkins];
 
 /// Name for the form chosen by the fit.
-const AUTO: &str = "auto";
+const AUTO_FORM: &str = "auto";
 
 /// Returns the names of the forms, for the schema.
 fn form_names() -> Vec<&'static str> {
-    std::iter::once(AUTO)
+    std::iter::once(AUTO_FORM)
         .chain(Form::ALL.iter().map(|form| form.name()))
         .collect()
 }
@@ -70,10 +70,12 @@ impl Default for AnalysisSettings {
             nd: (1, 1),
             delay_s: (0.05, 0.6),
             methods: ["adaptive", "rls", "rpem"].map(str::to_owned).to_vec(),
-            polynomials: POLYNOMIALS.map(|structure| structure.name().to_owned()).to_vec(),
+            polynomials: POLYNOMIAL_STRUCTURES
+                .map(|structure| structure.name().to_owned())
+                .to_vec(),
             trace_every: 16,
             grey_box: false,
-            form: AUTO.to_owned(),
+            form: AUTO_FORM.to_owned(),
             prior: "population".to_owned(),
             individual: Vec::new(),
             each_run: true,
@@ -97,7 +99,7 @@ impl AnalysisSettings {
     /// # Errors
     /// A name that is neither `arx` nor `bj`.
     pub(super) fn polynomials(&self) -> Result<Vec<Structure>, String> {
-        let names = POLYNOMIALS.map(Structure::name);
+        let names = POLYNOMIAL_STRUCTURES.map(Structure::name);
         if let Some(name) = self.polynomials.iter().find(|name| !names.contains(&name.as_str())) {
             let expected = names.join(", ");
             return Err(format!(
@@ -105,7 +107,7 @@ impl AnalysisSettings {
             ));
         }
         let asked = |structure: &Structure| self.polynomials.iter().any(|name| name == structure.name());
-        Ok(POLYNOMIALS.into_iter().filter(asked).collect())
+        Ok(POLYNOMIAL_STRUCTURES.into_iter().filter(asked).collect())
     }
 
     /// Returns the structures whose orders are needed: the structures of the polynomial models to fit, and of
@@ -116,26 +118,26 @@ impl AnalysisSettings {
     pub(super) fn structures(&self) -> Result<Vec<Structure>, String> {
         let (fitted, recursions) = (self.polynomials()?, self.recursions()?);
         let started = |structure: Structure| {
-            let mut from_fits = recursions.iter().filter(|method| !method.starts_itself());
+            let mut from_fits = recursions.iter().filter(|method| !method.is_self_starting());
             from_fits.any(|method| method.default_structure() == structure)
         };
         let needed = |structure: &Structure| fitted.contains(structure) || started(*structure);
-        Ok(POLYNOMIALS.into_iter().filter(needed).collect())
+        Ok(POLYNOMIAL_STRUCTURES.into_iter().filter(needed).collect())
     }
 
     /// Returns the settings for fitting the family; the form is given, or selected from the data.
     ///
     /// # Errors
     /// An unknown form, prior or parameter.
-    pub(super) fn family(&self) -> Result<FamilyEstimator, String> {
+    pub(super) fn family_estimator(&self) -> Result<FamilyEstimator, String> {
         let mut estimator = FamilyEstimator::default();
-        if self.form != AUTO {
+        if self.form != AUTO_FORM {
             let form = self.form.parse::<Form>();
-            estimator.forms = vec![form.map_err(|error| format!("analysis.form: {error}, or {AUTO}"))?];
+            estimator.forms = vec![form.map_err(|error| format!("analysis.form: {error}, or {AUTO_FORM}"))?];
         }
         estimator.prior = self.prior.parse().map_err(|error| format!("analysis.prior: {error}"))?;
         for name in &self.individual {
-            let coordinate = Coordinate::of_parameter(name).ok_or_else(|| {
+            let coordinate = Coordinate::from_parameter(name).ok_or_else(|| {
                 let names = Coordinate::ALL.map(Coordinate::parameter).join(", ");
                 format!("analysis.individual has {name:?}, expected parameters from {names}")
             })?;
@@ -147,7 +149,7 @@ impl AnalysisSettings {
     /// Checks the settings; the error is the reason why they are invalid.
     pub(super) fn check(&self) -> Result<(), String> {
         self.structures()?;
-        self.family()?;
+        self.family_estimator()?;
         if self.nd.0 == 0 || self.nd.0 > self.nd.1 || self.nd.1 > 20 {
             return Err(format!(
                 "analysis.nd is {:?}, expected two orders from 1 to 20, the smaller first",

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use hoid_io::{OutputTable, TableSchema};
 
-use super::tables::{numbers, real, schema, text, texts};
+use super::tables::{numbers, real_columns, schema, text_columns, texts};
 use crate::{
     columns::Rows,
     statistics::{Statistics, median},
@@ -33,7 +33,7 @@ impl Averages {
     /// Returns the table of means, standard deviations and standard errors over the runs.
     pub fn table(&self) -> OutputTable {
         let mut rows = Rows::new(&schema(
-            text(&["subject", "condition", "window", "estimator", "parameter"]).chain(real(&[
+            text_columns(&["subject", "condition", "window", "estimator", "parameter"]).chain(real_columns(&[
                 "runs",
                 "mean",
                 "standard_error",
@@ -50,14 +50,14 @@ impl Averages {
                 .iter()
                 .zip(key)
             {
-                rows.text(name, text);
+                rows.set_text(name, text);
             }
             let figures = [s.count as f64, s.mean, s.mean_se, s.sd, s.median, s.min, s.max];
             for (name, value) in ["runs", "mean", "standard_error", "sd", "median", "least", "most"]
                 .iter()
                 .zip(figures)
             {
-                rows.real(name, value);
+                rows.set_real(name, value);
             }
         }
         rows.into_table(Vec::new())
@@ -95,13 +95,15 @@ impl Delays {
     /// Returns the table of the chosen values.
     pub fn table(&self) -> OutputTable {
         let columns = DELAY_COLUMNS.map(|(_, _, column)| column);
-        let mut rows = Rows::new(&schema(text(&["subject", "condition"]).chain(real(&columns))));
+        let mut rows = Rows::new(&schema(
+            text_columns(&["subject", "condition"]).chain(real_columns(&columns)),
+        ));
         for ((subject, condition), values) in &self.0 {
             rows.start_row();
-            rows.text("subject", subject);
-            rows.text("condition", condition);
+            rows.set_text("subject", subject);
+            rows.set_text("condition", condition);
             for column in columns {
-                rows.real(column, values.get(column).copied().unwrap_or(f64::NAN));
+                rows.set_real(column, values.get(column).copied().unwrap_or(f64::NAN));
             }
         }
         rows.into_table(Vec::new())
@@ -109,7 +111,7 @@ impl Delays {
 }
 
 /// Statistics of a parameter over the runs at each time.
-const FIGURES: [&str; 6] = ["runs", "mean", "sd", "lower_quartile", "median", "upper_quartile"];
+const STATISTIC_COLUMNS: [&str; 6] = ["runs", "mean", "sd", "lower_quartile", "median", "upper_quartile"];
 
 /// Traces of all runs, collected by time.
 #[derive(Debug, Clone, Default)]
@@ -134,10 +136,10 @@ impl TraceAverages {
         for name in names {
             match name.strip_suffix("_se") {
                 Some(of) => columns.push(format!("{of}_variance")),
-                None => columns.extend(FIGURES.map(|figure| format!("{name}_{figure}"))),
+                None => columns.extend(STATISTIC_COLUMNS.map(|figure| format!("{name}_{figure}"))),
             }
         }
-        schema(text(&["subject", "condition", "estimator"]).chain(real(&columns)))
+        schema(text_columns(&["subject", "condition", "estimator"]).chain(real_columns(&columns)))
     }
 
     /// Adds the traces of a run.
@@ -176,13 +178,13 @@ impl TraceAverages {
             for (bits, all) in times {
                 rows.start_row();
                 for (name, text) in ["subject", "condition", "estimator"].iter().zip(key) {
-                    rows.text(name, text);
+                    rows.set_text(name, text);
                 }
-                rows.real("t", f64::from_bits(*bits));
+                rows.set_real("t", f64::from_bits(*bits));
                 for (name, values) in self.names.iter().zip(all).filter(|(_, values)| !values.is_empty()) {
                     let s = Statistics::of(values);
                     match name.strip_suffix("_se") {
-                        Some(of) => rows.real(&format!("{of}_variance"), s.median * s.median),
+                        Some(of) => rows.set_real(&format!("{of}_variance"), s.median * s.median),
                         None => {
                             let figures = [
                                 s.count as f64,
@@ -192,8 +194,8 @@ impl TraceAverages {
                                 s.median,
                                 s.upper_quartile,
                             ];
-                            for (figure, value) in FIGURES.iter().zip(figures) {
-                                rows.real(&format!("{name}_{figure}"), value);
+                            for (figure, value) in STATISTIC_COLUMNS.iter().zip(figures) {
+                                rows.set_real(&format!("{name}_{figure}"), value);
                             }
                         }
                     }

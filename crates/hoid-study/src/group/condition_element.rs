@@ -114,7 +114,7 @@ mod tests {
         Manifest::parse(&format!("name = \"x\"\n{}", runs.join("")), "group.toml").unwrap()
     }
 
-    fn applied(texts: &[&str]) -> Result<Manifest, String> {
+    fn apply_elements(texts: &[&str]) -> Result<Manifest, String> {
         let elements: Vec<ConditionElement> = texts.iter().map(|text| text.parse()).collect::<Result<_, _>>()?;
         let mut manifest = manifest();
         ConditionElement::apply(&elements, &mut manifest)?;
@@ -123,18 +123,18 @@ mod tests {
 
     #[test]
     fn elements_and_changes_are_applied_to_conditions() {
-        let found = applied(&["C1-*=90/(s(s+6))", "C3-roll=90/(s(s+6)) > 30/(s(s+.2)) @ 50 : 0.5"]).unwrap();
+        let found = apply_elements(&["C1-*=90/(s(s+6))", "C3-roll=90/(s(s+6)) > 30/(s(s+.2)) @ 50 : 0.5"]).unwrap();
         let facts = |name: &str| found.conditions.get(name).unwrap();
         for name in ["C1-roll", "C1-pitch"] {
-            assert_eq!(facts(name).lasting_element(), Some("90/(s(s+6))"));
+            assert_eq!(facts(name).constant_element(), Some("90/(s(s+6))"));
         }
         let changing = facts("C3-roll");
-        assert_eq!(changing.lasting_element(), None);
+        assert_eq!(changing.constant_element(), None);
         assert_eq!((changing.change_s, changing.change_per_s), (Some(50.0), Some(0.5)));
         assert_eq!(changing.changes_to.as_deref(), Some("30/(s(s+.2))"));
         assert_eq!(Manifest::parse(&found.text(), "group.toml").unwrap(), found);
         assert_eq!(
-            applied(&["C3-roll=1/s>1/(s^2)@50"]).unwrap().conditions["C3-roll"].change_per_s,
+            apply_elements(&["C3-roll=1/s>1/(s^2)@50"]).unwrap().conditions["C3-roll"].change_per_s,
             None
         );
     }
@@ -153,7 +153,7 @@ mod tests {
             ("C3-roll=1/s>1/s@soon", "\"soon\""),
             ("C3-roll=1/s>1/s@50:-2", "change_per_s is -2"),
         ] {
-            let refused = applied(&[text]).unwrap_err();
+            let refused = apply_elements(&[text]).unwrap_err();
             assert!(refused.contains(named), "{text}: {refused}");
         }
     }

@@ -45,7 +45,7 @@ pub struct ConditionSettings {
 
 impl ConditionSettings {
     /// Returns the controlled element if it is known and the same during the whole run, otherwise `None`.
-    pub fn lasting_element(&self) -> Option<&str> {
+    pub fn constant_element(&self) -> Option<&str> {
         match self.changes_to {
             None => self.controlled_element.as_deref(),
             Some(_) => None,

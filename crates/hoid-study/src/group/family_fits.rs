@@ -1,7 +1,7 @@
 //! Fits of the family of operators, jointly to all runs of a person in a condition, and to each run in the form chosen
 //! by the joint fit.
 
-use hoid_analysis::{Excitation, Identification, Identified};
+use hoid_analysis::{Excitation, Identification, IdentifiedModel};
 use hoid_ident::family::{FamilyEstimator, FamilyFit, SeenChannel};
 use hoid_model::{ContinuousTransferFunction, Form, Record, uncertainty::Estimate};
 
@@ -9,7 +9,7 @@ use super::{
     analysis_settings::AnalysisSettings,
     condition_settings::ConditionSettings,
     manifest::{Manifest, RunEntry},
-    person::{ALL, Person},
+    person::{ALL_RUNS, Person},
     run_rows::RunRows,
     windows::Window,
 };
@@ -29,12 +29,12 @@ pub(super) fn identification(
     Ok(Identification {
         estimator: FamilyEstimator {
             channels: facts.channels()?,
-            ..manifest.analysis.family()?
+            ..manifest.analysis.family_estimator()?
         },
         excitation: (facts.excitation.clone()).map_or(Excitation::Nothing, Excitation::IfRecorded),
         period_s: facts.period_s,
         faults: manifest.read.faults.handling(),
-        rate: manifest.by_rate(condition)?,
+        rate: manifest.rate_decimation(condition)?,
         controlled_element: rows.element().cloned(),
         answers: Vec::new(),
     })
@@ -45,7 +45,7 @@ fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Resu
     Ok(FamilyEstimator {
         excitation: condition.excitation.clone(),
         period_s: condition.period_s,
-        ..settings.family()?
+        ..settings.family_estimator()?
     })
 }
 
@@ -68,22 +68,22 @@ pub(super) fn estimator_of_run(
 pub(super) fn people_of_fit(
     key: (&str, &str),
     runs: &[&RunEntry],
-    found: &Identified,
+    found: &IdentifiedModel,
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Person> {
     let fit = &found.fit;
-    let person = |run: &str, record| Person::of_fit(key, run, runs.len(), fit, record, element);
+    let person = |run: &str, record| Person::from_fit(key, run, runs.len(), fit, record, element);
     if fit.operators.len() == 1 {
-        return vec![person(ALL, 0)];
+        return vec![person(ALL_RUNS, 0)];
     }
     let names = found.data.names.iter().enumerate();
     names
-        .map(|(record, name)| person(&run_of(runs, name), record))
+        .map(|(record, name)| person(&run_name(runs, name), record))
         .collect()
 }
 
 /// Returns the name of the run of a recording, with its time span if the run was cut at a fault.
-fn run_of(runs: &[&RunEntry], recording: &str) -> String {
+fn run_name(runs: &[&RunEntry], recording: &str) -> String {
     let of = |entry: &&RunEntry| {
         let span = recording.strip_prefix(&entry.file.display().to_string())?;
         (span.is_empty() || span.starts_with(" (")).then(|| format!("{}{span}", entry.run))
@@ -93,16 +93,16 @@ fn run_of(runs: &[&RunEntry], recording: &str) -> String {
 
 /// Writes the rows of a fit to a whole aligned record: parameters, innovation variance, VAF, response, crossover and
 /// phase margin.
-pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, fit: &FamilyFit, record: &Record) {
+pub(super) fn write_fit(rows: &mut RunRows<'_>, window: Window, label: &str, fit: &FamilyFit, record: &Record) {
     let of = fit.operator(0);
     for parameter in of.parameters.iter().filter(|p| p.value.is_finite()) {
         let estimate = Estimate {
             value: parameter.value,
             standard_error: parameter.standard_error,
         };
-        rows.row(Some(window), label, &parameter.name, estimate);
+        rows.write_row(Some(window), label, &parameter.name, estimate);
     }
-    rows.row(
+    rows.write_row(
         Some(window),
         label,
         "innovation_variance",
@@ -116,16 +116,16 @@ pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, f
     let vaf_of = own.and_then(|record| Ok((of.polynomial_fit.simulate(&record)?, record)));
     if let Ok((simulated, record)) = vaf_of {
         let vaf = hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values);
-        rows.row(Some(window), label, "vaf", Estimate::fixed(vaf));
+        rows.write_row(Some(window), label, "vaf", Estimate::fixed(vaf));
     }
-    rows.responses_of(
+    rows.write_responses(
         label,
         of.polynomial_fit.model(),
         record.sample_time().s(),
         rows.input_lead_s,
     );
     if let Some(measures) = rows.element().and_then(|element| fit.loop_measures(0, element)) {
-        rows.row(Some(window), label, "crossover_rad_s", measures.crossover_rad_s);
-        rows.row(Some(window), label, "phase_margin_deg", measures.phase_margin_deg);
+        rows.write_row(Some(window), label, "crossover_rad_s", measures.crossover_rad_s);
+        rows.write_row(Some(window), label, "phase_margin_deg", measures.phase_margin_deg);
     }
 }

@@ -30,12 +30,12 @@ use super::{
     manifest::Manifest,
     reading::{Pairing, Run, read_run},
     responses::{MedianResponse, ResponseAverages},
-    tables::{joined, real, schema, text},
+    tables::{join_sentences, real_columns, schema, text_columns},
 };
 use crate::{columns::Rows, statistics::median};
 
 /// Tables of the describing functions: one row per line, one row per subject and condition, and one row per fit.
-pub(super) struct Frequencies {
+pub(super) struct FrequencyTables {
     pub lines: OutputTable,
     pub margins: OutputTable,
     pub agreement: OutputTable,
@@ -50,7 +50,7 @@ const LINE_COLUMNS: [&str; 7] = [
     "coherence",
     "spread",
 ];
-const MARGINS: [&str; 9] = [
+const MARGIN_COLUMNS: [&str; 9] = [
     "crossover_rad_s",
     "phase_margin_deg",
     "phase_crossover_rad_s",
@@ -62,7 +62,7 @@ const MARGINS: [&str; 9] = [
     "rms_u",
 ];
 
-const AGREEMENT: [&str; 6] = [
+const AGREEMENT_COLUMNS: [&str; 6] = [
     "crossover_rad_s",
     "phase_margin_deg",
     "crossover_difference_percent",
@@ -84,25 +84,25 @@ struct Tables {
 
 /// Computes the describing functions of all subjects and conditions with an excitation, and the distances of the fits
 /// from them; `None` if the manifest names no excitation.
-pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<Frequencies> {
+pub(super) fn frequency_tables(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<FrequencyTables> {
     manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
-    let with_errors: Vec<String> = MARGINS
+    let with_errors: Vec<String> = MARGIN_COLUMNS
         .iter()
         .flat_map(|name| [(*name).to_owned(), format!("{name}_se")])
         .collect();
     let numbers = [vec!["runs".to_owned()], with_errors].concat();
     let keys = ["subject", "condition"];
     let mut tables = Tables {
-        lines: Rows::new(&schema(text(&keys).chain(real(&LINE_COLUMNS)))),
+        lines: Rows::new(&schema(text_columns(&keys).chain(real_columns(&LINE_COLUMNS)))),
         margins: Rows::new(&schema(
-            text(&keys)
-                .chain(text(&["status", "reason", "verdict", "reasons"]))
-                .chain(real(&numbers)),
+            text_columns(&keys)
+                .chain(text_columns(&["status", "reason", "verdict", "reasons"]))
+                .chain(real_columns(&numbers)),
         )),
         agreement: Rows::new(&schema(
-            text(&keys)
-                .chain(text(&["estimator", "agrees"]))
-                .chain(real(&AGREEMENT)),
+            text_columns(&keys)
+                .chain(text_columns(&["estimator", "agrees"]))
+                .chain(real_columns(&AGREEMENT_COLUMNS)),
         )),
     };
     let mut known: Vec<(&str, &str)> = Vec::new();
@@ -129,30 +129,30 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
         // A ratio of Fourier coefficients does not include the hold, so the corresponding shift of the input is
         // reversed.
         let late_samples = runs.first().map_or(0.0, |run| {
-            run.samples(facts.offset_samples) + run.input_lead_s / run.record.sample_time().s()
+            run.run_samples(facts.offset_samples) + run.input_lead_s / run.record.sample_time().s()
         });
         let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
         let margins = &mut tables.margins;
         margins.start_row();
-        margins.text("subject", key.0);
-        margins.text("condition", key.1);
-        margins.real("runs", records.len() as f64);
-        match of_records(&records, (facts, late_samples), key, fits, &mut tables) {
-            Ok(()) => tables.margins.text("status", "ok"),
+        margins.set_text("subject", key.0);
+        margins.set_text("condition", key.1);
+        margins.set_real("runs", records.len() as f64);
+        match write_describing_function(&records, (facts, late_samples), key, fits, &mut tables) {
+            Ok(()) => tables.margins.set_text("status", "ok"),
             Err(reason) => {
-                tables.margins.text("status", "failed");
-                tables.margins.text("reason", &reason);
+                tables.margins.set_text("status", "failed");
+                tables.margins.set_text("reason", &reason);
             }
         }
     }
-    Some(Frequencies {
+    Some(FrequencyTables {
         lines: tables.lines.into_table(Vec::new()),
         margins: tables.margins.into_table(Vec::new()),
         agreement: tables.agreement.into_table(Vec::new()),
     })
 }
 
-fn of_records(
+fn write_describing_function(
     records: &[Record],
     (facts, offset_samples): (&ConditionSettings, f64),
     (subject, condition): (&str, &str),
@@ -167,7 +167,7 @@ fn of_records(
     if records.is_empty() {
         return Err("no run could be read".to_owned());
     }
-    let element = facts.lasting_element();
+    let element = facts.constant_element();
     let element: Option<ContinuousTransferFunction> = element
         .map(str::parse)
         .transpose()
@@ -185,8 +185,8 @@ fn of_records(
     let found = &description.function;
     for (line, phase) in found.lines.iter().zip(description.phases_deg()) {
         lines.start_row();
-        lines.text("subject", subject);
-        lines.text("condition", condition);
+        lines.set_text("subject", subject);
+        lines.set_text("condition", condition);
         let magnitude = line.magnitude_db();
         let values = [
             line.omega_rad_s,
@@ -200,13 +200,13 @@ fn of_records(
         LINE_COLUMNS
             .iter()
             .zip(values)
-            .for_each(|(name, value)| lines.real(name, value));
+            .for_each(|(name, value)| lines.set_real(name, value));
     }
-    margins.text("verdict", description.verdict.level.name());
-    margins.text("reasons", &joined(description.verdict.reasons()));
+    margins.set_text("verdict", description.verdict.level.name());
+    margins.set_text("reasons", &join_sentences(description.verdict.reasons()));
     let mut put = |name: &str, estimate: Estimate| {
-        margins.real(name, estimate.value);
-        margins.real(&format!("{name}_se"), estimate.standard_error.unwrap_or(f64::NAN));
+        margins.set_real(name, estimate.value);
+        margins.set_real(&format!("{name}_se"), estimate.standard_error.unwrap_or(f64::NAN));
     };
     let coherences: Vec<f64> = found.lines.iter().filter_map(|line| line.coherence).collect();
     put("coherence", Estimate::fixed(mean(&coherences)));
@@ -234,27 +234,27 @@ fn of_records(
     }
     for (estimator, response) in fits.medians(subject, condition) {
         agreement.start_row();
-        agreement.text("subject", subject);
-        agreement.text("condition", condition);
-        agreement.text("estimator", estimator);
+        agreement.set_text("subject", subject);
+        agreement.set_text("condition", condition);
+        agreement.set_text("estimator", estimator);
         let (distance, in_errors) = distance(found, &response);
-        agreement.real("distance_percent", distance);
-        agreement.real("distance_in_errors", in_errors);
+        agreement.set_real("distance_percent", distance);
+        agreement.set_real("distance_in_errors", in_errors);
         let mut agrees = distance <= AGREEMENT_LIMITS.2;
         if let Some((crossover, margin)) = margins_of_lines {
             agrees = false;
             if let Some(of_fit) = element.as_ref().and_then(|element| response.crossover(element)) {
                 let by = 100.0 * (of_fit.omega_rad_s / crossover - 1.0);
                 let turn = of_fit.phase_margin_deg - margin;
-                agreement.real("crossover_rad_s", of_fit.omega_rad_s);
-                agreement.real("phase_margin_deg", of_fit.phase_margin_deg);
-                agreement.real("crossover_difference_percent", by);
-                agreement.real("phase_margin_difference_deg", turn);
+                agreement.set_real("crossover_rad_s", of_fit.omega_rad_s);
+                agreement.set_real("phase_margin_deg", of_fit.phase_margin_deg);
+                agreement.set_real("crossover_difference_percent", by);
+                agreement.set_real("phase_margin_difference_deg", turn);
                 agrees = by.abs() <= AGREEMENT_LIMITS.0 && turn.abs() <= AGREEMENT_LIMITS.1;
             }
         }
         let verdict = if agrees { "yes" } else { "no" };
-        agreement.text("agrees", if facts.change_s.is_some() { "" } else { verdict });
+        agreement.set_text("agrees", if facts.change_s.is_some() { "" } else { verdict });
     }
     Ok(())
 }
@@ -262,7 +262,7 @@ fn of_records(
 /// Returns the distance between a describing function and a fit, in percent and in standard errors. A single run has no
 /// standard errors: its lines have equal weights, and the distance is in percent only.
 fn distance(found: &DescribingFunction, response: &MedianResponse) -> (f64, f64) {
-    const PRIOR: f64 = 4.0;
+    const PRIOR_DEGREES_OF_FREEDOM: f64 = 4.0;
     let relative = |line: &Line| line.standard_error.map(|s| s * s / line.response.norm_sqr());
     let known: Vec<f64> = found.lines.iter().filter_map(relative).collect();
     let (middle, nu) = (median(&known), 2.0 * (found.runs.len() as f64 - 1.0));
@@ -272,7 +272,8 @@ fn distance(found: &DescribingFunction, response: &MedianResponse) -> (f64, f64)
             continue;
         };
         let size = line.response.norm_sqr();
-        let moderated = relative(line).map(|r| (nu * r + PRIOR * middle) / (nu + PRIOR) * size);
+        let moderated = relative(line)
+            .map(|r| (nu * r + PRIOR_DEGREES_OF_FREEDOM * middle) / (nu + PRIOR_DEGREES_OF_FREEDOM) * size);
         let weight = moderated.map_or(1.0, |variance| 1.0 / variance);
         between += weight * (fit - line.response).norm_sqr();
         of_lines += weight * size;

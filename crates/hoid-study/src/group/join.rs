@@ -12,7 +12,7 @@ use super::{
     block::Block,
     frequency,
     manifest::Manifest,
-    person::{Person, people_of, people_table},
+    person::{Person, people_table, read_people},
     reading,
     responses::{self, ResponseAverages},
     run_rows::estimates_schema,
@@ -22,13 +22,13 @@ use super::{
 };
 use crate::{
     StudyError,
-    directory::{part, table_path},
+    directory::{part_path, table_path},
 };
 
 /// The writers of a table, one for each file format.
-struct Writers(Vec<TableWriter>);
+struct TableWriters(Vec<TableWriter>);
 
-impl Writers {
+impl TableWriters {
     fn append(&mut self, table: &OutputTable) -> Result<(), StudyError> {
         Ok(self.0.iter_mut().try_for_each(|writer| writer.append(table))?)
     }
@@ -54,11 +54,11 @@ pub(super) fn join(
     csv: bool,
 ) -> Result<(), StudyError> {
     let formats: &[bool] = if csv { &[false, true] } else { &[false] };
-    let writers = |table: &str, schema: &TableSchema| -> Result<Writers, StudyError> {
+    let writers = |table: &str, schema: &TableSchema| -> Result<TableWriters, StudyError> {
         let writer = |csv: &bool| TableWriter::create(&table_path(directory, table, *csv), schema);
-        Ok(Writers(formats.iter().map(writer).collect::<Result<_, _>>()?))
+        Ok(TableWriters(formats.iter().map(writer).collect::<Result<_, _>>()?))
     };
-    let read = |block: usize, table: &str| hoid_io::read_table(&part(directory, block as u64, table));
+    let read = |block: usize, table: &str| hoid_io::read_table(&part_path(directory, block as u64, table));
 
     let (mut averages, mut delays) = (Averages::default(), Delays::default());
     let mut of_responses = ResponseAverages::default();
@@ -77,7 +77,7 @@ pub(super) fn join(
             let cell = cells.entry((&run.subject, &run.condition)).or_default();
             cell.push(RunOfCell {
                 block,
-                change_s: change_s(&found),
+                change_s: change_time_s(&found),
             });
         }
         let found = read(block, "responses")?;
@@ -90,7 +90,7 @@ pub(super) fn join(
     for (table, schema) in reading::schemas() {
         // These tables are the first that users examine, so they are always written as CSV too.
         let writer = |csv: bool| TableWriter::create(&table_path(directory, table, csv), &schema);
-        let mut writers = Writers(vec![writer(false)?, writer(true)?]);
+        let mut writers = TableWriters(vec![writer(false)?, writer(true)?]);
         for (block, _) in blocks.iter().enumerate().filter(|(_, of)| matches!(of, Block::Run(_))) {
             writers.append(&read(block, table)?)?;
         }
@@ -99,7 +99,7 @@ pub(super) fn join(
 
     let columns = TraceColumns::of(&manifest.analysis);
     let names = columns.names();
-    let settle = columns.of_settling();
+    let settle = columns.settling_columns();
     let mut traces = writers("traces", &columns.schema())?;
     let mut trace_averages = writers("trace-averages", &TraceAverages::schema(&names))?;
     let mut settlings = writers("settling", &Settling::schema())?;
@@ -122,7 +122,7 @@ pub(super) fn join(
 
     let mut people: Vec<Person> = Vec::new();
     for (block, _) in blocks.iter().enumerate().filter(|(_, of)| matches!(of, Block::Cell(_))) {
-        people.extend(people_of(&read(block, PEOPLE_TABLE)?));
+        people.extend(read_people(&read(block, PEOPLE_TABLE)?));
     }
     let people = people_table(&people);
     for csv in [false, true] {
@@ -134,7 +134,7 @@ pub(super) fn join(
         ("delays", delays.table()),
         ("response-averages", of_responses.table()),
     ];
-    if let Some(found) = frequency::frequencies(manifest, base, &of_responses) {
+    if let Some(found) = frequency::frequency_tables(manifest, base, &of_responses) {
         whole.extend([
             ("describing-functions", found.lines),
             ("frequency-margins", found.margins),
@@ -150,7 +150,7 @@ pub(super) fn join(
 }
 
 /// Returns the time in s at which the task of a run changes, read from the estimates of the run.
-fn change_s(estimates: &OutputTable) -> Option<f64> {
+fn change_time_s(estimates: &OutputTable) -> Option<f64> {
     let names = texts(estimates, "parameter");
     let row = names.iter().position(|name| name == "change_s")?;
     numbers(estimates, "value").get(row).copied()

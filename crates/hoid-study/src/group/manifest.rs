@@ -49,7 +49,7 @@ use super::{
 };
 
 /// Name of the copy of the manifest next to the results.
-pub const MANIFEST: &str = "group.toml";
+pub const MANIFEST_FILE: &str = "group.toml";
 
 /// A group of recorded runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -111,7 +111,7 @@ impl Manifest {
     /// [`StudyError::NoManifest`] if there is no manifest.
     pub fn manifest_path(named: &Path) -> Result<PathBuf, StudyError> {
         let path = if named.is_dir() {
-            named.join(MANIFEST)
+            named.join(MANIFEST_FILE)
         } else {
             named.to_owned()
         };
@@ -140,7 +140,7 @@ impl Manifest {
         let bad = |line: Option<usize>, reason: String| StudyError::Plan {
             path: path.to_owned(),
             line,
-            reason: hoid_io::printable(&reason),
+            reason: hoid_io::escape_control_characters(&reason),
         };
         let manifest: Self = toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| crate::plan::line_at(text, span.start));
@@ -208,7 +208,7 @@ impl Manifest {
     ///
     /// # Errors
     /// [`StudyError::Io`] if the directory cannot be read, [`StudyError::NoRuns`] if no name matches.
-    pub fn of_directory(directory: &Path, pattern: &Pattern) -> Result<(Self, Vec<String>), StudyError> {
+    pub fn from_directory(directory: &Path, pattern: &Pattern) -> Result<(Self, Vec<String>), StudyError> {
         let mut names = hoid_io::file_names(directory)?;
         names.sort();
         let (mut runs, mut others) = (Vec::new(), Vec::new());
@@ -217,7 +217,7 @@ impl Manifest {
                 Some(found) => runs.push(RunEntry {
                     file: PathBuf::from(&name),
                     then: None,
-                    condition: found.condition_of_axis(),
+                    condition: found.condition_with_axis(),
                     subject: if found.subject.is_empty() {
                         "1".to_owned()
                     } else {
@@ -270,9 +270,9 @@ impl Manifest {
     ///
     /// # Errors
     /// As [`Manifest::preparation`].
-    pub fn by_rate(&self, condition: &str) -> Result<Decimation, String> {
+    pub fn rate_decimation(&self, condition: &str) -> Result<Decimation, String> {
         let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
-        self.prepare.by_rate(of_condition)
+        self.prepare.rate_decimation(of_condition)
     }
 
     /// Sets the further inputs of all conditions.

@@ -12,16 +12,16 @@ use crate::columns::Rows;
 /// Suffixes of the numeric columns of a parameter.
 const NUMERIC_SUFFIXES: [&str; 6] = ["", "_se", "_se_person", "_low", "_high", "_prior_share"];
 /// Suffix of the text column of a parameter.
-const DETERMINED: &str = "_determined";
+const DETERMINED_SUFFIX: &str = "_determined";
 
 /// Returns the names of the numeric columns of a parameter.
-pub(super) fn real_names(name: &str) -> impl Iterator<Item = String> {
+pub(super) fn numeric_column_names(name: &str) -> impl Iterator<Item = String> {
     NUMERIC_SUFFIXES.into_iter().map(move |end| format!("{name}{end}"))
 }
 
 /// Returns the name of the text column of a parameter.
-pub(super) fn text_name(name: &str) -> String {
-    format!("{name}{DETERMINED}")
+pub(super) fn text_column_name(name: &str) -> String {
+    format!("{name}{DETERMINED_SUFFIX}")
 }
 
 /// Writes a parameter to its columns in the current row; `name` is the name of the first column.
@@ -37,9 +37,9 @@ pub(super) fn write(rows: &mut Rows, name: &str, p: &Parameter) {
         p.prior_share,
     ];
     for (end, value) in NUMERIC_SUFFIXES.iter().zip(values) {
-        rows.real(&format!("{name}{end}"), value);
+        rows.set_real(&format!("{name}{end}"), value);
     }
-    rows.text(&text_name(name), if p.determined { "yes" } else { "no" });
+    rows.set_text(&text_column_name(name), if p.determined { "yes" } else { "no" });
 }
 
 /// Reads a parameter from the columns whose names start with `prefix` and its name; `None` if its value is empty.
@@ -62,7 +62,7 @@ pub(super) fn read(
         standard_error_person: any("_se_person"),
         interval: any("_low").zip(any("_high")),
         prior_share: any("_prior_share").unwrap_or(0.0),
-        determined: texts(table, &text_name(&column))
+        determined: texts(table, &text_column_name(&column))
             .get(row)
             .is_some_and(|text| text == "yes"),
         averaged_over: Vec::new(),

@@ -34,7 +34,7 @@ pub struct FileNameParts {
 
 impl FileNameParts {
     /// Returns the condition with its axis, such as `C3-roll`. Each axis has its own controlled element and operator.
-    pub fn condition_of_axis(&self) -> String {
+    pub fn condition_with_axis(&self) -> String {
         match (self.condition.as_str(), self.axis.as_str()) {
             (condition, "") => condition.to_owned(),
             ("", axis) => axis.to_owned(),
@@ -104,7 +104,7 @@ impl Pattern {
     /// Returns the values of the placeholders for a file name; `None` if the name does not match.
     pub fn matches(&self, name: &str) -> Option<FileNameParts> {
         let mut found = FileNameParts::default();
-        found_in(&self.0, name, &mut found).then_some(found)
+        match_parts(&self.0, name, &mut found).then_some(found)
     }
 }
 
@@ -117,22 +117,22 @@ pub(super) fn matches_any(pattern: &str, text: &str) -> bool {
         }
         parts.push(Part::Text(fixed.to_owned()));
     }
-    found_in(&parts, text, &mut FileNameParts::default())
+    match_parts(&parts, text, &mut FileNameParts::default())
 }
 
-fn found_in(parts: &[Part], text: &str, found: &mut FileNameParts) -> bool {
+fn match_parts(parts: &[Part], text: &str, found: &mut FileNameParts) -> bool {
     let Some((first, rest)) = parts.split_first() else {
         return text.is_empty();
     };
     if let Part::Text(expected) = first {
         return text
             .strip_prefix(expected.as_str())
-            .is_some_and(|after| found_in(rest, after, found));
+            .is_some_and(|after| match_parts(rest, after, found));
     }
     let least = usize::from(*first != Part::Any);
     let ends = text.char_indices().map(|(i, _)| i).chain([text.len()]).skip(least);
     for end in ends {
-        if found_in(rest, &text[end..], found) {
+        if match_parts(rest, &text[end..], found) {
             if let Part::Name(name) = first {
                 let value = text[..end].to_owned();
                 match name.as_str() {
@@ -172,7 +172,7 @@ mod tests {
     fn axis_is_appended_to_the_condition() {
         let of = |pattern: &str, name: &str| {
             let found = Pattern::new(pattern).unwrap().matches(name).unwrap();
-            (found.condition_of_axis(), found.run)
+            (found.condition_with_axis(), found.run)
         };
         let both = of("{subject}_{condition}_{axis}_{run}.csv", "A1_C3_roll_6.csv");
         assert_eq!(both, ("C3-roll".to_owned(), "6".to_owned()));

@@ -15,12 +15,12 @@ use hoid_model::{ContinuousTransferFunction, Form, VerdictLevel, operator_family
 use super::{
     parameter_columns,
     person_channel::{self, PersonChannel},
-    tables::{joined, numbers, real, schema, sentences, text, texts},
+    tables::{join_sentences, numbers, real_columns, schema, split_sentences, text_columns, texts},
 };
 use crate::columns::Rows;
 
 /// Name of the run for results that apply to all runs.
-pub(super) const ALL: &str = "all";
+pub(super) const ALL_RUNS: &str = "all";
 
 /// Outcome of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,11 +97,11 @@ pub struct Person {
 
 impl Person {
     /// Creates a person without an operator, with the reason.
-    pub(super) fn without((subject, condition): (&str, &str), status: PersonStatus, reason: &str) -> Self {
+    pub(super) fn without_operator((subject, condition): (&str, &str), status: PersonStatus, reason: &str) -> Self {
         Self {
             subject: subject.to_owned(),
             condition: condition.to_owned(),
-            run: ALL.to_owned(),
+            run: ALL_RUNS.to_owned(),
             runs: 0,
             status,
             reason: reason.to_owned(),
@@ -123,7 +123,7 @@ impl Person {
     }
 
     /// Creates a person from one of the operators of a fit.
-    pub(super) fn of_fit(
+    pub(super) fn from_fit(
         key: (&str, &str),
         run: &str,
         runs: usize,
@@ -151,13 +151,13 @@ impl Person {
             verdict: Some(fit.verdict.level),
             reasons: strings(&mut fit.verdict.reasons()),
             notes: strings(&mut fit.verdict.notes()),
-            ..Self::without(key, PersonStatus::Fitted, "")
+            ..Self::without_operator(key, PersonStatus::Fitted, "")
         }
     }
 
     /// True for a row that covers all runs. If some parameters are individual, each run has its own row instead.
-    pub fn is_of_all_runs(&self) -> bool {
-        self.run == ALL
+    pub fn covers_all_runs(&self) -> bool {
+        self.run == ALL_RUNS
     }
 
     /// Returns a parameter by its name.
@@ -167,7 +167,7 @@ impl Person {
 
     /// Returns a label with the person and the condition, such as `P03 in fo`.
     pub fn name(&self) -> String {
-        let of_run = if self.is_of_all_runs() {
+        let of_run = if self.covers_all_runs() {
             String::new()
         } else {
             format!(", run {}", self.run)
@@ -191,11 +191,11 @@ impl Person {
             ("form", &self.form),
             ("verdict", self.verdict.map_or("", VerdictLevel::name)),
         ] {
-            rows.text(name, value);
+            rows.set_text(name, value);
         }
-        rows.text("reasons", &joined(self.reasons.iter().map(String::as_str)));
-        rows.text("notes", &joined(self.notes.iter().map(String::as_str)));
-        rows.real("runs", self.runs as f64);
+        rows.set_text("reasons", &join_sentences(self.reasons.iter().map(String::as_str)));
+        rows.set_text("notes", &join_sentences(self.notes.iter().map(String::as_str)));
+        rows.set_real("runs", self.runs as f64);
         for p in &self.parameters {
             parameter_columns::write(rows, &p.name, p);
         }
@@ -205,22 +205,22 @@ impl Person {
             ("phase_margin_deg", self.phase_margin_deg, self.phase_margin_interval),
         ] {
             if let Some(estimate) = estimate {
-                rows.real(name, estimate.value);
-                rows.real(&format!("{name}_se"), estimate.standard_error.unwrap_or(f64::NAN));
+                rows.set_real(name, estimate.value);
+                rows.set_real(&format!("{name}_se"), estimate.standard_error.unwrap_or(f64::NAN));
                 let (low, high) = interval.unwrap_or((f64::NAN, f64::NAN));
-                rows.real(&format!("{name}_low"), low);
-                rows.real(&format!("{name}_high"), high);
+                rows.set_real(&format!("{name}_low"), low);
+                rows.set_real(&format!("{name}_high"), high);
             }
         }
         for of in &self.forms {
-            rows.real(&format!("criterion_{}", of.form.name()), of.criterion);
-            rows.real(&format!("weight_{}", of.form.name()), of.weight);
+            rows.set_real(&format!("criterion_{}", of.form.name()), of.criterion);
+            rows.set_real(&format!("weight_{}", of.form.name()), of.weight);
         }
         let (chi2, dof) = self.chi2.map_or((f64::NAN, f64::NAN), |(c, dof)| (c, dof as f64));
-        rows.real("chi2", chi2);
-        rows.real("dof", dof);
-        rows.real("kappa", self.kappa.unwrap_or(f64::NAN));
-        rows.real("noise_order", self.noise_order.map_or(f64::NAN, |nd| nd as f64));
+        rows.set_real("chi2", chi2);
+        rows.set_real("dof", dof);
+        rows.set_real("kappa", self.kappa.unwrap_or(f64::NAN));
+        rows.set_real("noise_order", self.noise_order.map_or(f64::NAN, |nd| nd as f64));
     }
 
     fn read(table: &OutputTable, row: usize) -> Option<Self> {
@@ -262,8 +262,8 @@ impl Person {
             kappa: any("kappa"),
             noise_order: any("noise_order").map(|nd| nd as usize),
             verdict: cell("verdict").parse().ok(),
-            reasons: sentences(&cell("reasons")),
-            notes: sentences(&cell("notes")),
+            reasons: split_sentences(&cell("reasons")),
+            notes: split_sentences(&cell("notes")),
         })
     }
 }
@@ -312,33 +312,33 @@ fn people_schema(parameters: &[&str], forms: &[&str], (texts, numbers): &(Vec<St
         .collect();
     let of_parameters: Vec<String> = parameters
         .iter()
-        .flat_map(|name| parameter_columns::real_names(name))
+        .flat_map(|name| parameter_columns::numeric_column_names(name))
         .collect();
     let determined: Vec<String> = parameters
         .iter()
-        .map(|name| parameter_columns::text_name(name))
+        .map(|name| parameter_columns::text_column_name(name))
         .collect();
     let of_forms: Vec<String> = forms
         .iter()
         .flat_map(|form| ["criterion", "weight"].map(|of| format!("{of}_{form}")))
         .collect();
     schema(
-        text(&["subject", "condition", "run"])
-            .chain(real(&["runs"]))
-            .chain(text(&["status", "reason", "form"]))
-            .chain(real(&of_parameters))
-            .chain(text(&determined))
-            .chain(real(&of_ends))
-            .chain(real(&of_forms))
-            .chain(text(texts))
-            .chain(real(numbers))
-            .chain(real(&["chi2", "dof", "kappa", "noise_order"]))
-            .chain(text(&["verdict", "reasons", "notes"])),
+        text_columns(&["subject", "condition", "run"])
+            .chain(real_columns(&["runs"]))
+            .chain(text_columns(&["status", "reason", "form"]))
+            .chain(real_columns(&of_parameters))
+            .chain(text_columns(&determined))
+            .chain(real_columns(&of_ends))
+            .chain(real_columns(&of_forms))
+            .chain(text_columns(texts))
+            .chain(real_columns(numbers))
+            .chain(real_columns(&["chi2", "dof", "kappa", "noise_order"]))
+            .chain(text_columns(&["verdict", "reasons", "notes"])),
     )
 }
 
 /// Reads the people from a table; rows with an unknown status are skipped.
-pub(super) fn people_of(table: &OutputTable) -> Vec<Person> {
+pub(super) fn read_people(table: &OutputTable) -> Vec<Person> {
     let rows = match table.column("subject") {
         Some(ColumnValues::Text(values)) => values.len(),
         _ => 0,
@@ -416,11 +416,11 @@ mod tests {
             noise_order: Some(7),
             verdict: Some(VerdictLevel::Doubtful),
             reasons: vec!["one".to_owned(), "two; three".to_owned()],
-            ..Person::without(("P", "c"), PersonStatus::Fitted, "")
+            ..Person::without_operator(("P", "c"), PersonStatus::Fitted, "")
         };
-        let failed = Person::without(("Q", ""), PersonStatus::Failed, "no file");
+        let failed = Person::without_operator(("Q", ""), PersonStatus::Failed, "no file");
         let table = people_table(&[person.clone(), failed.clone()]);
-        assert_eq!(people_of(&table), [person.clone(), failed.clone()]);
+        assert_eq!(read_people(&table), [person.clone(), failed.clone()]);
         assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
         // No person has a lead: no columns for it.
         assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());

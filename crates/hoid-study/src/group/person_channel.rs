@@ -17,11 +17,11 @@ use crate::columns::Rows;
 /// Suffix of the column by which a further input is recognised.
 const ROLE_SUFFIX: &str = "_role";
 /// The delay of a response to a further input.
-const DELAY: (&str, &str) = ("tau_f", "s");
+const DELAY_PARAMETER: (&str, &str) = ("tau_f", "s");
 
 /// Returns names and units of the parameters of a response to a further input.
 fn parameters() -> impl Iterator<Item = (&'static str, &'static str)> {
-    PARAMETERS.into_iter().chain([DELAY])
+    PARAMETERS.into_iter().chain([DELAY_PARAMETER])
 }
 
 /// The response of a person to a further input.
@@ -62,7 +62,7 @@ impl PersonChannel {
 
     /// Returns the input for the fit of a single run, in the form found for the person; `None` if no response was
     /// found.
-    pub(super) fn in_use(&self) -> Option<SeenChannel> {
+    pub(super) fn single_run_channel(&self) -> Option<SeenChannel> {
         Some(SeenChannel {
             preview_s: self.preview_s,
             forms: vec![self.form?],
@@ -72,10 +72,10 @@ impl PersonChannel {
 
     pub(super) fn write(&self, rows: &mut Rows) {
         let column = |end: &str| format!("{}_{end}", self.name);
-        rows.text(&format!("{}{ROLE_SUFFIX}", self.name), self.role.name());
-        rows.text(&column("form"), self.form.map_or("", Form::name));
-        rows.real(&column("preview_s"), self.preview_s);
-        rows.real(&column("p_value"), self.p_value);
+        rows.set_text(&format!("{}{ROLE_SUFFIX}", self.name), self.role.name());
+        rows.set_text(&column("form"), self.form.map_or("", Form::name));
+        rows.set_real(&column("preview_s"), self.preview_s);
+        rows.set_real(&column("p_value"), self.p_value);
         for p in &self.parameters {
             parameter_columns::write(rows, &column(&p.name), p);
         }
@@ -118,8 +118,8 @@ pub(super) fn columns<'a>(channels: impl Iterator<Item = &'a PersonChannel> + Cl
         for (parameter, _) in parameters() {
             if own.clone().any(|channel| channel.parameter(parameter).is_some()) {
                 let column = format!("{name}_{parameter}");
-                real.extend(parameter_columns::real_names(&column));
-                of_text.push(parameter_columns::text_name(&column));
+                real.extend(parameter_columns::numeric_column_names(&column));
+                of_text.push(parameter_columns::text_column_name(&column));
             }
         }
     }

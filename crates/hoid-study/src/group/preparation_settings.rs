@@ -76,7 +76,7 @@ impl PreparationSettings {
 
     /// Returns the settings of the rate, `decimate` and `rate_hz`. They are two keys for one quantity, so a condition
     /// that gives either of them replaces both settings of the group.
-    fn rate<'a>(&'a self, condition: Option<&'a Self>) -> (Option<&'a NumberOrText>, Option<f64>) {
+    fn rate_settings<'a>(&'a self, condition: Option<&'a Self>) -> (Option<&'a NumberOrText>, Option<f64>) {
         let of = condition.unwrap_or(self);
         let named = of.decimate.is_some() || of.rate_hz.is_some();
         let of = if named { of } else { self };
@@ -87,9 +87,9 @@ impl PreparationSettings {
     ///
     /// # Errors
     /// The invalid key, and the reason.
-    pub fn by_rate(&self, condition: Option<&Self>) -> Result<Decimation, String> {
-        let (decimate, rate_hz) = self.rate(condition);
-        Ok(match decimation(decimate)? {
+    pub fn rate_decimation(&self, condition: Option<&Self>) -> Result<Decimation, String> {
+        let (decimate, rate_hz) = self.rate_settings(condition);
+        Ok(match parse_decimation(decimate)? {
             Decimation::Auto if rate_hz.is_none() => Decimation::Auto,
             _ => Decimation::Off,
         })
@@ -102,8 +102,8 @@ impl PreparationSettings {
     /// The invalid key, and the reason.
     pub fn preparation(&self, condition: Option<&Self>) -> Result<Preparation, String> {
         let of = condition.unwrap_or(self);
-        let (decimate, rate_hz) = self.rate(condition);
-        let rate = match (decimation(decimate)?, rate_hz) {
+        let (decimate, rate_hz) = self.rate_settings(condition);
+        let rate = match (parse_decimation(decimate)?, rate_hz) {
             (_, Some(_)) if decimate.is_some() => {
                 return Err("decimate and rate_hz both set the rate: remove one".to_owned());
             }
@@ -117,8 +117,8 @@ impl PreparationSettings {
             return Err(format!("run_in_s is {run_in_s}, expected a time of 0 s or more"));
         }
         Ok(Preparation {
-            scale: parsed(&self.scale, &of.scale, |text| text.parse::<Scaling>())?,
-            offset: parsed(&self.offset, &of.offset, |text| text.parse::<Offset>())?,
+            scale: parse_by_channel(&self.scale, &of.scale, |text| text.parse::<Scaling>())?,
+            offset: parse_by_channel(&self.offset, &of.offset, |text| text.parse::<Offset>())?,
             rate,
             run_in_s,
             drop_repeated: of.drop_repeated.or(self.drop_repeated).unwrap_or(false),
@@ -128,7 +128,7 @@ impl PreparationSettings {
 }
 
 /// Parses a decimation factor, "auto" or "off"; `Auto` if nothing is specified.
-fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
+fn parse_decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
     let Some(typed) = typed else {
         return Ok(Decimation::Auto);
     };
@@ -138,7 +138,7 @@ fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
 }
 
 /// Parses the settings by channel; settings of the condition override settings of the group.
-fn parsed<T>(
+fn parse_by_channel<T>(
     group: &BTreeMap<String, NumberOrText>,
     condition: &BTreeMap<String, NumberOrText>,
     parse: impl Fn(&str) -> Result<T, IoError>,

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_io::Sparse;
+use hoid_io::SparseTreatment;
 use hoid_model::{FaultHandling, UnknownName};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -47,7 +47,7 @@ pub struct ReadSettings {
 
 impl ReadSettings {
     /// Returns the columns logged at their own times, with their treatment.
-    pub(super) fn sparse(&self) -> Result<BTreeMap<String, Sparse>, String> {
+    pub(super) fn sparse_columns(&self) -> Result<BTreeMap<String, SparseTreatment>, String> {
         let of = |(name, how): (&String, &String)| match how.parse() {
             Ok(how) => Ok((name.clone(), how)),
             Err(error @ UnknownName { .. }) => Err(format!("sparse of {name}: {error}")),

@@ -36,7 +36,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         time: reading.time.as_deref().map(str::parse).transpose().map_err(text)?,
         sampling_hz: reading.sampling_hz,
         span_s: (reading.from_s, reading.to_s),
-        sparse: reading.sparse()?,
+        sparse: reading.sparse_columns()?,
         columns: None,
         repair: Repair {
             resample: reading.resample,
@@ -59,8 +59,8 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
             .map_or(0.0, |facts| facts.offset_samples),
     };
     let read = read_aligned(path, &options, &preparation, late_samples)
-        .map_err(|error| AnalysisError::of_reading(error, path, &options).to_string())?;
-    let recorded = Recorded {
+        .map_err(|error| AnalysisError::from_reading(error, path, &options).to_string())?;
+    let recorded = UnrepairedRun {
         record: read.record.clone(),
         account: Account {
             steps: read.steps.clone(),
@@ -89,7 +89,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     };
     // The rate is reduced only now, since faults are detected in the recorded samples.
     let (record, done) = manifest
-        .by_rate(condition)?
+        .rate_decimation(condition)?
         .of(read.record)
         .map_err(|error| error.to_string())?;
     read.record = record;
@@ -108,7 +108,7 @@ pub(super) struct CheckedRecord {
     faults: Vec<Fault>,
     /// Factor by which the rate was reduced, after the steps that count recorded samples.
     factor: usize,
-    recorded: Recorded,
+    recorded: UnrepairedRun,
 }
 
 /// Returns the columns of two tables: preparation steps of the runs, one per row, and problems of their sampling, one
@@ -181,12 +181,12 @@ pub(super) struct Run {
     pub input_lead_s: f64,
     /// The recording before repair, for an identification; `None` for a run joined from two files, within which the
     /// task changes.
-    pub recorded: Option<Recorded>,
+    pub recorded: Option<UnrepairedRun>,
 }
 
 /// A recorded run after preparation, but with its faults and at its recorded rate.
 #[derive(Clone)]
-pub(super) struct Recorded {
+pub(super) struct UnrepairedRun {
     pub record: Record,
     /// Preparation steps and quality issues of the run.
     pub account: Account,
@@ -194,14 +194,14 @@ pub(super) struct Recorded {
 
 impl Run {
     /// Converts a number of recorded samples to a number of samples of the run.
-    pub fn samples(&self, recorded: f64) -> f64 {
+    pub fn run_samples(&self, recorded: f64) -> f64 {
         recorded / self.factor as f64
     }
 }
 
 /// Reads a run.
 pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairing: Pairing) -> Result<Run, String> {
-    run_of(read_files(manifest, base, entry, pairing))
+    join_files(read_files(manifest, base, entry, pairing))
 }
 
 /// A run as prepared for the analysis of its group, for use by other analyses.
@@ -231,7 +231,7 @@ impl RecordedRun {
 }
 
 /// Returns the run of one file, or of two files joined.
-pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
+pub(super) fn join_files(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
         let CheckedRecord {
@@ -264,7 +264,7 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
 
 /// Returns two tables: the steps applied to the files of a run, and the problems of the files. A file that cannot be
 /// read has no rows here; the table of estimates reports it.
-pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
+pub(super) fn account_tables(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));
     for (file, read) in files {
@@ -273,36 +273,36 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
         };
         for fault in faults {
             start_row(&mut trouble, entry, file);
-            trouble.text("kind", fault.kind.name());
-            trouble.text("channel", &fault.channel);
-            trouble.whole("rows", fault.samples as u64);
-            trouble.real("share", fault.samples as f64 / read.record.len() as f64);
-            trouble.whole("places", 1);
-            trouble.real("from_s", fault.from_s);
-            trouble.real("size", fault.size);
-            trouble.text("what", &fault.to_string());
-            trouble.text("remedy", fault.remedy());
+            trouble.set_text("kind", fault.kind.name());
+            trouble.set_text("channel", &fault.channel);
+            trouble.set_whole("rows", fault.samples as u64);
+            trouble.set_real("share", fault.samples as f64 / read.record.len() as f64);
+            trouble.set_whole("places", 1);
+            trouble.set_real("from_s", fault.from_s);
+            trouble.set_real("size", fault.size);
+            trouble.set_text("what", &fault.to_string());
+            trouble.set_text("remedy", fault.remedy());
         }
         for step in &read.steps {
             start_row(&mut steps, entry, file);
-            steps.text("step", step.name());
-            steps.text("what", &step.to_string());
+            steps.set_text("step", step.name());
+            steps.set_text("what", &step.to_string());
         }
         for one in &read.quality_issues {
             start_row(&mut trouble, entry, file);
-            trouble.text("kind", one.kind.name());
-            trouble.text("channel", &one.channel);
-            trouble.whole("rows", one.rows as u64);
-            trouble.real("share", one.share);
-            trouble.whole("places", one.places.len() as u64);
+            trouble.set_text("kind", one.kind.name());
+            trouble.set_text("channel", &one.channel);
+            trouble.set_whole("rows", one.rows as u64);
+            trouble.set_real("share", one.share);
+            trouble.set_whole("places", one.places.len() as u64);
             if let Some(place) = one.places.first() {
-                trouble.whole("first_row", place.row as u64);
-                trouble.real("from_s", place.from_s.unwrap_or(f64::NAN));
+                trouble.set_whole("first_row", place.row as u64);
+                trouble.set_real("from_s", place.from_s.unwrap_or(f64::NAN));
             }
-            trouble.real("size", one.size);
-            trouble.text("unit", &one.unit);
-            trouble.text("what", &one.text);
-            trouble.text("remedy", one.kind.remedy());
+            trouble.set_real("size", one.size);
+            trouble.set_text("unit", &one.unit);
+            trouble.set_text("what", &one.text);
+            trouble.set_text("remedy", one.kind.remedy());
         }
     }
     [
@@ -313,8 +313,8 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
 
 fn start_row(rows: &mut Rows, entry: &RunEntry, file: &Path) {
     rows.start_row();
-    rows.text("subject", &entry.subject);
-    rows.text("condition", &entry.condition);
-    rows.text("run", &entry.run);
-    rows.text("file", &file.display().to_string());
+    rows.set_text("subject", &entry.subject);
+    rows.set_text("condition", &entry.condition);
+    rows.set_text("run", &entry.run);
+    rows.set_text("file", &file.display().to_string());
 }

@@ -11,16 +11,16 @@ use hoid_ident::frequency::Crossover;
 use hoid_io::{OutputTable, TableSchema};
 use hoid_model::{Complex64, ContinuousTransferFunction};
 
-use super::tables::{numbers, real, schema, text, texts};
+use super::tables::{numbers, real_columns, schema, text_columns, texts};
 use crate::{columns::Rows, statistics::Statistics};
 
 /// Subject, condition, estimator.
 pub(super) type Key = [String; 3];
 
-const KEYS: [&str; 3] = ["subject", "condition", "estimator"];
+const KEY_COLUMNS: [&str; 3] = ["subject", "condition", "estimator"];
 
 /// Returns the grid frequencies below half the sampling frequency, rad/s.
-pub(super) fn grid(sample_time_s: f64) -> Vec<f64> {
+pub(super) fn grid_frequencies(sample_time_s: f64) -> Vec<f64> {
     (-32..=51)
         .map(|k| 10f64.powf(f64::from(k) / 32.0))
         .filter(|omega| omega * sample_time_s < std::f64::consts::PI)
@@ -29,15 +29,17 @@ pub(super) fn grid(sample_time_s: f64) -> Vec<f64> {
 
 /// Returns the columns of the table of responses of single runs.
 pub(super) fn responses_schema() -> TableSchema {
-    schema(text(&["subject", "condition", "run", "estimator"]).chain(real(&[
-        "omega_rad_s",
-        "magnitude_db",
-        "phase_deg",
-    ])))
+    schema(
+        text_columns(&["subject", "condition", "run", "estimator"]).chain(real_columns(&[
+            "omega_rad_s",
+            "magnitude_db",
+            "phase_deg",
+        ])),
+    )
 }
 
 /// Returns the phases in deg, each on the branch nearest to the phase at the previous frequency.
-pub(super) fn followed_phases_deg(response: &[Complex64]) -> Vec<f64> {
+pub(super) fn unwrapped_phases_deg(response: &[Complex64]) -> Vec<f64> {
     let mut turn = 0.0;
     let mut last: Option<Complex64> = None;
     response
@@ -95,7 +97,7 @@ impl MedianResponse {
 impl ResponseAverages {
     /// Adds the responses of a run.
     pub fn add(&mut self, responses: &OutputTable) {
-        let keys = KEYS.map(|name| texts(responses, name));
+        let keys = KEY_COLUMNS.map(|name| texts(responses, name));
         let [omega, magnitude, phase] =
             ["omega_rad_s", "magnitude_db", "phase_deg"].map(|name| numbers(responses, name));
         for row in 0..omega.len() {
@@ -129,28 +131,30 @@ impl ResponseAverages {
 
     /// Returns the table of the medians and quartiles over the runs at each frequency.
     pub fn table(&self) -> OutputTable {
-        const FIGURES: [&str; 3] = ["lower_quartile", "median", "upper_quartile"];
+        const STATISTIC_COLUMNS: [&str; 3] = ["lower_quartile", "median", "upper_quartile"];
         let columns: Vec<String> = ["magnitude_db", "phase_deg"]
             .iter()
-            .flat_map(|name| FIGURES.map(|figure| format!("{name}_{figure}")))
+            .flat_map(|name| STATISTIC_COLUMNS.map(|figure| format!("{name}_{figure}")))
             .collect();
         let mut rows = Rows::new(&schema(
-            text(&KEYS).chain(real(&["runs", "omega_rad_s"])).chain(real(&columns)),
+            text_columns(&KEY_COLUMNS)
+                .chain(real_columns(&["runs", "omega_rad_s"]))
+                .chain(real_columns(&columns)),
         ));
         for (key, at) in &self.0 {
             for (bits, both) in at {
                 rows.start_row();
-                for (name, text) in KEYS.iter().zip(key) {
-                    rows.text(name, text);
+                for (name, text) in KEY_COLUMNS.iter().zip(key) {
+                    rows.set_text(name, text);
                 }
-                rows.real("runs", both[0].len() as f64);
-                rows.real("omega_rad_s", f64::from_bits(*bits));
+                rows.set_real("runs", both[0].len() as f64);
+                rows.set_real("omega_rad_s", f64::from_bits(*bits));
                 let figures = both.each_ref().map(|values| {
                     let s = Statistics::of(values);
                     [s.lower_quartile, s.median, s.upper_quartile]
                 });
                 for (name, value) in columns.iter().zip(figures.iter().flatten()) {
-                    rows.real(name, *value);
+                    rows.set_real(name, *value);
                 }
             }
         }
@@ -165,10 +169,10 @@ mod tests {
     #[test]
     fn phases_are_unwrapped_and_medians_interpolated() {
         // A delay of half a second has a phase of 20 rad at 40 rad/s.
-        let omega = grid(0.01);
-        assert_eq!((omega.len(), grid(0.1).len()), (84, 80));
+        let omega = grid_frequencies(0.01);
+        assert_eq!((omega.len(), grid_frequencies(0.1).len()), (84, 80));
         let response: Vec<Complex64> = omega.iter().map(|w| Complex64::from_polar(2.0, -0.5 * w)).collect();
-        let phase = followed_phases_deg(&response);
+        let phase = unwrapped_phases_deg(&response);
         for (w, p) in omega.iter().zip(&phase) {
             assert!((p + (0.5 * w).to_degrees()).abs() < 1e-9, "{w}: {p}");
         }

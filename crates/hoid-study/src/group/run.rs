@@ -10,17 +10,17 @@ use hoid_io::DirectoryLock;
 use sha2::{Digest, Sha256};
 
 use super::{
-    analysis::{CellResults, PEOPLE_TABLE, analyse, analyse_together},
+    analysis::{CellResults, PEOPLE_TABLE, analyse, analyse_jointly},
     block::{Block, blocks},
     join::join,
-    manifest::{MANIFEST, Manifest},
+    manifest::{MANIFEST_FILE, Manifest},
 };
 use crate::{
     RunOptions, StudyError,
-    directory::{part, remove_parts, table_path, write_source},
-    run::{Outcome, Progress, on_threads, ready},
+    directory::{part_path, remove_parts, table_path, write_source},
+    run::{Outcome, Progress, prepare_continuation, run_on_threads},
     run_record::RunRecord,
-    seal::{OnDisk, notes_on, on_disk, write_block},
+    seal::{OnDisk, block_state, damage_notes, write_block},
 };
 
 /// Analyses the runs that the manifest marks with `counts`. File names are relative to `base`.
@@ -51,7 +51,7 @@ pub fn run_group(
     hoid_io::make_directory(directory)?;
     let _lock = DirectoryLock::take(directory)?;
     let found = prepare(manifest, directory, &record, options.resume)?;
-    let tables = || tables(directory);
+    let tables = || table_paths(directory);
     if found.complete {
         return Ok(Outcome {
             finished: true,
@@ -62,7 +62,7 @@ pub fn run_group(
     }
     let total = blocks.len() as u64;
     let mut damaged = Vec::new();
-    let open = (0..blocks.len()).filter(|i| match on_disk(directory, &record.plan_sha256, *i as u64) {
+    let open = (0..blocks.len()).filter(|i| match block_state(directory, &record.plan_sha256, *i as u64) {
         OnDisk::Whole => false,
         OnDisk::Missing => true,
         OnDisk::Damaged(why) => {
@@ -74,7 +74,11 @@ pub fn run_group(
     // its results.
     let is_cell = |i: &usize| matches!(blocks[*i], Block::Cell(_));
     let (cells, runs): (Vec<usize>, Vec<usize>) = open.partition(is_cell);
-    let notes: Vec<String> = found.note_on_seals().into_iter().chain(notes_on(&damaged)).collect();
+    let notes: Vec<String> = found
+        .note_on_seals()
+        .into_iter()
+        .chain(damage_notes(&damaged))
+        .collect();
     let known = total - (cells.len() + runs.len()) as u64;
     let done = AtomicU64::new(known);
     let one = |&i: &usize| -> Result<bool, StudyError> {
@@ -86,11 +90,11 @@ pub fn run_group(
                 let key = (run.subject.as_str(), run.condition.as_str());
                 let of_run = |block: &Block<'_>| matches!(block, Block::Cell(cell) if cell.key() == key);
                 let place = blocks.iter().position(of_run).unwrap_or(i) as u64;
-                let read = |table: &str| hoid_io::read_table(&part(directory, place, table));
+                let read = |table: &str| hoid_io::read_table(&part_path(directory, place, table));
                 let from_cell = CellResults::of(&read("estimates")?, &read(PEOPLE_TABLE)?);
                 analyse(manifest, base, run, &from_cell)
             }
-            Block::Cell(cell) => analyse_together(manifest, base, cell),
+            Block::Cell(cell) => analyse_jointly(manifest, base, cell),
         };
         let mut all = vec![
             ("estimates", &found.estimates),
@@ -103,7 +107,7 @@ pub fn run_group(
         progress(Progress { done, total, known });
         Ok(true)
     };
-    let finished = on_threads(options.jobs, &cells, one)? && on_threads(options.jobs, &runs, one)?;
+    let finished = run_on_threads(options.jobs, &cells, one)? && run_on_threads(options.jobs, &runs, one)?;
     let estimates = done.load(Ordering::Relaxed) - known;
     if !finished {
         return Ok(Outcome {
@@ -167,22 +171,22 @@ fn prepare(manifest: &Manifest, directory: &Path, record: &RunRecord, resume: bo
         if !resume {
             return Err(StudyError::Occupied { directory: shown() });
         }
-        if let Some(reason) = found.differs(record) {
+        if let Some(reason) = found.difference(record) {
             return Err(StudyError::OtherStudy {
                 directory: shown(),
                 reason: format!("{reason} (the checksum covers the manifest and its files)"),
             });
         }
-        ready(directory, &found, record)?;
+        prepare_continuation(directory, &found, record)?;
         return Ok(found);
     }
     hoid_io::make_directory(&directory.join("parts"))?;
-    write_source(&directory.join(MANIFEST), &manifest.text())?;
+    write_source(&directory.join(MANIFEST_FILE), &manifest.text())?;
     record.write(directory)?;
     Ok(record.clone())
 }
 
-const TABLES: [&str; 14] = [
+const TABLE_NAMES: [&str; 14] = [
     PEOPLE_TABLE,
     "preparation",
     "trouble",
@@ -199,8 +203,8 @@ const TABLES: [&str; 14] = [
     "trace-averages",
 ];
 
-fn tables(directory: &Path) -> Vec<PathBuf> {
-    TABLES
+fn table_paths(directory: &Path) -> Vec<PathBuf> {
+    TABLE_NAMES
         .iter()
         .flat_map(|table| [false, true].map(|csv| table_path(directory, table, csv)))
         .filter(|path| path.exists())

@@ -7,9 +7,9 @@ use hoid_io::{OutputTable, read_table};
 use hoid_model::uncertainty::Estimate;
 
 use super::{
-    analysis::RECORD,
+    analysis::RECORD_LABEL,
     family_fits::{JOINT_LABEL, SINGLE_RUN_LABEL},
-    person::ALL,
+    person::ALL_RUNS,
     responses::MedianResponse,
     tables::{numbers, texts},
 };
@@ -45,7 +45,7 @@ impl RunEstimates {
         let [estimator, parameter, status] = ["estimator", "parameter", "status"].map(|name| texts(estimates, name));
         let [value, error] = ["value", "standard_error"].map(|name| numbers(estimates, name));
         for row in 0..status.len() {
-            if status[row] != "ok" || !(estimator[row] == SINGLE_RUN_LABEL || estimator[row] == RECORD) {
+            if status[row] != "ok" || !(estimator[row] == SINGLE_RUN_LABEL || estimator[row] == RECORD_LABEL) {
                 continue;
             }
             let key = key(estimates, row);
@@ -90,7 +90,7 @@ impl RunEstimates {
     /// Returns gain in dB and phase in deg of the operator of a run, or of the joint fit (`run = None`); `None` outside
     /// 0.1 to 40 rad/s.
     pub fn response(&self, [subject, condition]: [&str; 2], run: Option<&str>, omega_rad_s: f64) -> Option<[f64; 2]> {
-        let key = [subject, condition, run.unwrap_or(ALL)].map(str::to_owned);
+        let key = [subject, condition, run.unwrap_or(ALL_RUNS)].map(str::to_owned);
         self.responses.get(&key)?.decibel_and_degrees(omega_rad_s)
     }
 }
@@ -121,11 +121,11 @@ mod tests {
                 ("run", run),
                 ("estimator", estimator),
             ] {
-                estimates.text(name, text);
+                estimates.set_text(name, text);
             }
-            estimates.text("parameter", parameter);
-            estimates.text("status", status);
-            estimates.real("value", value);
+            estimates.set_text("parameter", parameter);
+            estimates.set_text("status", status);
+            estimates.set_real("value", value);
         }
         let mut responses = Rows::new(&responses_schema());
         for (omega, gain, phase) in [(1.0, 0.0, 0.0), (4.0, -20.0, -90.0)] {
@@ -136,11 +136,11 @@ mod tests {
                 ("run", "all"),
                 ("estimator", "family, all runs"),
             ] {
-                responses.text(name, text);
+                responses.set_text(name, text);
             }
-            responses.real("omega_rad_s", omega);
-            responses.real("magnitude_db", gain);
-            responses.real("phase_deg", phase);
+            responses.set_real("omega_rad_s", omega);
+            responses.set_real("magnitude_db", gain);
+            responses.set_real("phase_deg", phase);
         }
         let all = RunEstimates::of(&estimates.into_table(Vec::new()), &responses.into_table(Vec::new()));
         assert_eq!(all.runs("P", "c"), ["2", "1"]);

@@ -58,7 +58,7 @@ pub(super) fn choose(
         let choice = choose_orders(&template, &ranges, Criterion::Bic, &parts).map_err(|e| e.to_string())?;
         let orders = choice.fit.orders();
         if known_nk.is_none() {
-            rows.row(
+            rows.write_row(
                 Some(windows(settings, first)[which]),
                 label_of(structure),
                 "nk_of_window",
@@ -72,12 +72,12 @@ pub(super) fn choose(
     }
     let nk = (wanted.iter().map(|o| o.nk).sum::<usize>() as f64 / wanted.len() as f64).round() as usize;
     let nd = wanted.iter().map(|o| o.nd).max().unwrap_or(0);
-    rows.row(None, label_of(structure), "nk", Estimate::fixed(nk as f64));
+    rows.write_row(None, label_of(structure), "nk", Estimate::fixed(nk as f64));
     if structure == Structure::BoxJenkins {
-        rows.row(None, label_of(structure), "nd", Estimate::fixed(nd as f64));
+        rows.write_row(None, label_of(structure), "nd", Estimate::fixed(nd as f64));
         let mean = mean(&t_n);
         if mean.is_finite() {
-            rows.row(None, label_of(structure), "T_n", Estimate::fixed(mean));
+            rows.write_row(None, label_of(structure), "T_n", Estimate::fixed(mean));
         }
     }
     Ok(())
@@ -94,7 +94,7 @@ pub(super) fn ranges(settings: &AnalysisSettings, record: &Record, structure: St
 
 /// Returns the chosen orders, read from the estimates of a person in a condition, or the reason why no orders were
 /// chosen.
-pub(super) fn chosen(estimates: &OutputTable, structure: Structure) -> Result<Orders, String> {
+pub(super) fn chosen_orders(estimates: &OutputTable, structure: Structure) -> Result<Orders, String> {
     let [window, estimator, parameter, reason] =
         ["window", "estimator", "parameter", "reason"].map(|name| texts(estimates, name));
     let values = numbers(estimates, "value");

@@ -12,10 +12,10 @@ use super::{
     condition_settings::ConditionSettings,
     manifest::{Manifest, RunEntry},
     reading::Run,
-    responses::{followed_phases_deg, grid, responses_schema},
-    tables::{real, schema, text},
+    responses::{grid_frequencies, responses_schema, unwrapped_phases_deg},
+    tables::{real_columns, schema, text_columns},
     traces::{self, TraceColumns},
-    windows::{WHOLE, Window},
+    windows::{WHOLE_RUN, Window},
 };
 use crate::columns::Rows;
 
@@ -32,11 +32,11 @@ pub(super) struct RunTables {
 /// Returns the columns of the table of estimates, in long form: one estimate per row.
 pub(super) fn estimates_schema() -> TableSchema {
     schema(
-        text(&["subject", "condition", "run", "window"])
-            .chain(real(&["from_s", "to_s"]))
-            .chain(text(&["estimator", "parameter"]))
-            .chain(real(&["value", "standard_error"]))
-            .chain(text(&["status", "reason"])),
+        text_columns(&["subject", "condition", "run", "window"])
+            .chain(real_columns(&["from_s", "to_s"]))
+            .chain(text_columns(&["estimator", "parameter"]))
+            .chain(real_columns(&["value", "standard_error"]))
+            .chain(text_columns(&["status", "reason"])),
     )
 }
 
@@ -61,7 +61,7 @@ impl<'a> RunRows<'a> {
         let columns = TraceColumns::of(&manifest.analysis);
         Self {
             entry,
-            element: condition.lasting_element().and_then(|e| e.parse().ok()),
+            element: condition.constant_element().and_then(|e| e.parse().ok()),
             condition,
             input_lead_s: 0.0,
             estimates: Rows::new(&estimates_schema()),
@@ -72,8 +72,8 @@ impl<'a> RunRows<'a> {
     }
 
     /// Converts settings that count recorded samples to samples of a run.
-    pub fn at_the_rate_of(&mut self, run: &Run) {
-        self.condition.offset_samples = run.samples(self.condition.offset_samples);
+    pub fn convert_sample_counts(&mut self, run: &Run) {
+        self.condition.offset_samples = run.run_samples(self.condition.offset_samples);
         self.input_lead_s = run.input_lead_s;
     }
 
@@ -87,11 +87,11 @@ impl<'a> RunRows<'a> {
     }
 
     /// Writes coefficients, innovation variance, VAF, response and operator of a fit.
-    pub fn fit_rows(&mut self, window: Window, label: &str, fit: &Fit, record: &Record) {
+    pub fn write_fit_rows(&mut self, window: Window, label: &str, fit: &Fit, record: &Record) {
         for (name, estimate) in fit.parameters() {
-            self.row(Some(window), label, &name, estimate);
+            self.write_row(Some(window), label, &name, estimate);
         }
-        self.row(
+        self.write_row(
             Some(window),
             label,
             "innovation_variance",
@@ -101,32 +101,37 @@ impl<'a> RunRows<'a> {
             && let Ok(simulated) = fit.simulate(&part)
         {
             let vaf = hoid_ident::validation::vaf(&part.output()[simulated.first..], &simulated.values);
-            self.row(Some(window), label, "vaf", Estimate::fixed(vaf));
+            self.write_row(Some(window), label, "vaf", Estimate::fixed(vaf));
         }
-        self.response_rows(window, label, fit, record.sample_time().s());
-        self.operator_rows(window, label, fit.operator());
+        self.write_response_rows(window, label, fit, record.sample_time().s());
+        self.write_operator_rows(window, label, fit.operator());
     }
 
     /// Writes the operator of a fit, or the reason why the fit has no operator.
-    pub fn operator_rows(&mut self, window: Window, label: &str, operator: Result<OperatorEstimate, NotConvertible>) {
+    pub fn write_operator_rows(
+        &mut self,
+        window: Window,
+        label: &str,
+        operator: Result<OperatorEstimate, NotConvertible>,
+    ) {
         match operator {
             Ok(operator) => {
                 for (name, _, estimate) in operator.rows() {
-                    self.row(Some(window), label, name, estimate);
+                    self.write_row(Some(window), label, name, estimate);
                 }
             }
-            Err(reason) => self.not_convertible(window, label, &reason.to_string()),
+            Err(reason) => self.write_not_convertible(window, label, &reason.to_string()),
         }
     }
 
     /// Writes the frequency response of a fit of the whole run and, if the controlled element is known, crossover and
     /// phase margin.
-    pub fn response_rows(&mut self, window: Window, label: &str, fit: &Fit, sample_time_s: f64) {
-        if window.name != WHOLE {
+    pub fn write_response_rows(&mut self, window: Window, label: &str, fit: &Fit, sample_time_s: f64) {
+        if window.name != WHOLE_RUN {
             return;
         }
         let advance_s = self.condition.offset_samples * sample_time_s + self.input_lead_s;
-        let (omega, response) = self.responses_of(label, fit.model(), sample_time_s, advance_s);
+        let (omega, response) = self.write_responses(label, fit.model(), sample_time_s, advance_s);
         let Some(element) = &self.element else { return };
         let open_loop: Vec<Complex64> = omega
             .iter()
@@ -134,13 +139,13 @@ impl<'a> RunRows<'a> {
             .map(|(w, h)| h * element.response(*w))
             .collect();
         if let Some(found) = Crossover::of(&omega, &open_loop, 0.0) {
-            self.row(
+            self.write_row(
                 Some(window),
                 label,
                 "crossover_rad_s",
                 Estimate::fixed(found.omega_rad_s),
             );
-            self.row(
+            self.write_row(
                 Some(window),
                 label,
                 "phase_margin_deg",
@@ -151,28 +156,28 @@ impl<'a> RunRows<'a> {
 
     /// Writes the response of a model on the frequency grid, advanced by the time `advance_s`; returns frequencies and
     /// response.
-    pub fn responses_of(
+    pub fn write_responses(
         &mut self,
         label: &str,
         model: &PolynomialModel,
         sample_time_s: f64,
         advance_s: f64,
     ) -> (Vec<f64>, Vec<Complex64>) {
-        let omega = grid(sample_time_s);
+        let omega = grid_frequencies(sample_time_s);
         let response: Vec<Complex64> = omega
             .iter()
             .map(|w| model.response(*w) * Complex64::from_polar(1.0, w * advance_s))
             .collect();
-        for ((w, h), phase_deg) in omega.iter().zip(&response).zip(followed_phases_deg(&response)) {
+        for ((w, h), phase_deg) in omega.iter().zip(&response).zip(unwrapped_phases_deg(&response)) {
             let rows = &mut self.responses;
             rows.start_row();
-            rows.text("subject", &self.entry.subject);
-            rows.text("condition", &self.entry.condition);
-            rows.text("run", &self.entry.run);
-            rows.text("estimator", label);
-            rows.real("omega_rad_s", *w);
-            rows.real("magnitude_db", 20.0 * h.norm().log10());
-            rows.real("phase_deg", phase_deg);
+            rows.set_text("subject", &self.entry.subject);
+            rows.set_text("condition", &self.entry.condition);
+            rows.set_text("run", &self.entry.run);
+            rows.set_text("estimator", label);
+            rows.set_real("omega_rad_s", *w);
+            rows.set_real("magnitude_db", 20.0 * h.norm().log10());
+            rows.set_real("phase_deg", phase_deg);
         }
         (omega, response)
     }
@@ -183,61 +188,61 @@ impl<'a> RunRows<'a> {
     }
 
     /// Writes the rows of a trace from its first update on.
-    pub fn trace_rows(&mut self, trace: &Trace) {
+    pub fn write_trace_rows(&mut self, trace: &Trace) {
         traces::write(&mut self.traces, &self.columns, self.entry, trace);
     }
 
     fn start_row(&mut self, window: Option<Window>, estimator: &str) {
         let rows = &mut self.estimates;
         rows.start_row();
-        rows.text("subject", &self.entry.subject);
-        rows.text("condition", &self.entry.condition);
-        rows.text("run", &self.entry.run);
-        rows.text("estimator", estimator);
+        rows.set_text("subject", &self.entry.subject);
+        rows.set_text("condition", &self.entry.condition);
+        rows.set_text("run", &self.entry.run);
+        rows.set_text("estimator", estimator);
         if let Some(window) = window {
-            rows.text("window", window.name);
-            rows.real("from_s", window.from_s);
-            rows.real("to_s", window.to_s);
+            rows.set_text("window", window.name);
+            rows.set_real("from_s", window.from_s);
+            rows.set_real("to_s", window.to_s);
         }
     }
 
     /// Writes a quantity estimated in a window, or without a window for the run as a whole.
-    pub fn row(&mut self, window: Option<Window>, estimator: &str, parameter: &str, estimate: Estimate) {
+    pub fn write_row(&mut self, window: Option<Window>, estimator: &str, parameter: &str, estimate: Estimate) {
         self.start_row(window, estimator);
-        self.estimates.text("parameter", parameter);
-        self.estimates.real("value", estimate.value);
+        self.estimates.set_text("parameter", parameter);
+        self.estimates.set_real("value", estimate.value);
         if let Some(se) = estimate.standard_error {
-            self.estimates.real("standard_error", se);
+            self.estimates.set_real("standard_error", se);
         }
-        self.estimates.text("status", "ok");
+        self.estimates.set_text("status", "ok");
     }
 
-    fn not_convertible(&mut self, window: Window, estimator: &str, reason: &str) {
-        self.push_without_value(Some(window), estimator, "not convertible", reason);
+    fn write_not_convertible(&mut self, window: Window, estimator: &str, reason: &str) {
+        self.write_row_without_value(Some(window), estimator, "not convertible", reason);
     }
 
     /// Writes the verdict on a recursion with its reasons, unless the recursion is trustworthy.
-    pub fn judged(&mut self, estimator: &str, verdict: &Verdict) {
+    pub fn write_verdict(&mut self, estimator: &str, verdict: &Verdict) {
         if verdict.level == VerdictLevel::Trustworthy {
             return;
         }
         let reasons: Vec<&str> = verdict.reasons().collect();
-        self.push_without_value(None, estimator, verdict.level.name(), &reasons.join("; "));
+        self.write_row_without_value(None, estimator, verdict.level.name(), &reasons.join("; "));
     }
 
     /// Writes that an estimator failed, and the reason.
-    pub fn failed(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
-        self.push_without_value(window, estimator, "failed", reason);
+    pub fn write_failure(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
+        self.write_row_without_value(window, estimator, "failed", reason);
     }
 
     /// Writes that an estimator does not apply, and the reason.
-    pub fn omitted(&mut self, estimator: &str, reason: &str) {
-        self.push_without_value(None, estimator, "omitted", reason);
+    pub fn write_omission(&mut self, estimator: &str, reason: &str) {
+        self.write_row_without_value(None, estimator, "omitted", reason);
     }
 
-    fn push_without_value(&mut self, window: Option<Window>, estimator: &str, status: &str, reason: &str) {
+    fn write_row_without_value(&mut self, window: Option<Window>, estimator: &str, status: &str, reason: &str) {
         self.start_row(window, estimator);
-        self.estimates.text("status", status);
-        self.estimates.text("reason", reason);
+        self.estimates.set_text("status", status);
+        self.estimates.set_text("reason", reason);
     }
 }

@@ -56,7 +56,12 @@ impl SamplingDefect {
 
 /// Returns t and the given columns of a run as recorded with these defects. `noise` contains one normal deviate per
 /// sample.
-pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefect], noise: &[f64]) -> OutputTable {
+pub(super) fn recorded_table(
+    record: &Record,
+    names: &[&str],
+    defects: &[SamplingDefect],
+    noise: &[f64],
+) -> OutputTable {
     let has = |defect: SamplingDefect| defects.contains(&defect);
     let n = record.len();
     let ts = record.sample_time().s();

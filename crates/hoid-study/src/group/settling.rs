@@ -14,15 +14,15 @@ use hoid_io::{OutputTable, TableSchema};
 
 use super::{
     averages::TraceAverages,
-    tables::{numbers, real, schema, text, texts},
+    tables::{numbers, real_columns, schema, text_columns, texts},
 };
 use crate::{columns::Rows, statistics::median};
 
 /// Ratio of the standard deviation to the median absolute deviation for a normal distribution.
-const MAD: f64 = 1.4826;
+const SD_PER_MAD: f64 = 1.4826;
 
-const KEYS: [&str; 4] = ["subject", "condition", "estimator", "parameter"];
-const FIGURES: [&str; 7] = [
+const KEY_COLUMNS: [&str; 4] = ["subject", "condition", "estimator", "parameter"];
+const STATISTIC_COLUMNS: [&str; 7] = [
     "runs",
     "change_s",
     "before",
@@ -44,7 +44,7 @@ struct RunResults {
 pub(super) struct Settling(BTreeMap<[String; 3], RunResults>);
 
 /// Returns the rows in the second half of a time interval.
-fn second_half(times: &[f64], from_s: f64, to_s: f64) -> Vec<usize> {
+fn rows_in_second_half(times: &[f64], from_s: f64, to_s: f64) -> Vec<usize> {
     let inside: Vec<usize> = (0..times.len())
         .filter(|i| times[*i] > from_s && times[*i] <= to_s)
         .collect();
@@ -62,7 +62,7 @@ impl Settling {
             let of_estimator: Vec<usize> = (0..times.len()).filter(|i| keys[2][*i] == *estimator).collect();
             let Some(first) = of_estimator.first() else { continue };
             let at: Vec<f64> = of_estimator.iter().map(|i| times[*i]).collect();
-            let after = second_half(&at, change_s, f64::INFINITY);
+            let after = rows_in_second_half(&at, change_s, f64::INFINITY);
             let of_runs = self.0.entry(keys.map(|column| column[*first].clone())).or_default();
             of_runs.change_s.push(change_s);
             for name in names {
@@ -70,7 +70,7 @@ impl Settling {
                 let values: Vec<f64> = after.iter().map(|i| column[of_estimator[*i]]).collect();
                 let level = median(&values);
                 let deviations: Vec<f64> = values.iter().map(|v| (v - level).abs()).collect();
-                let noise = MAD * median(&deviations);
+                let noise = SD_PER_MAD * median(&deviations);
                 if noise.is_finite() {
                     of_runs.noise.entry(name.clone()).or_default().push(noise);
                 }
@@ -80,7 +80,7 @@ impl Settling {
 
     /// Returns the columns of the table.
     pub fn schema() -> TableSchema {
-        schema(text(&KEYS).chain(real(&FIGURES)))
+        schema(text_columns(&KEY_COLUMNS).chain(real_columns(&STATISTIC_COLUMNS)))
     }
 
     /// Returns the table with a row for each estimator and parameter.
@@ -93,13 +93,13 @@ impl Settling {
                 let noise = median(noises);
                 let step = Step::of(&times, &medians, change_s);
                 rows.start_row();
-                for (column, value) in KEYS.iter().zip(key.iter().chain([name])) {
-                    rows.text(column, value);
+                for (column, value) in KEY_COLUMNS.iter().zip(key.iter().chain([name])) {
+                    rows.set_text(column, value);
                 }
                 let settled = |share: f64| {
                     let moves = (step.after - step.before).abs() > noise;
                     moves
-                        .then(|| step.settled_s(&times, &medians, change_s, share))
+                        .then(|| step.settling_time_s(&times, &medians, change_s, share))
                         .flatten()
                 };
                 let figures = [
@@ -111,8 +111,8 @@ impl Settling {
                     settled(0.9).unwrap_or(f64::NAN),
                     noise,
                 ];
-                for (column, value) in FIGURES.iter().zip(figures) {
-                    rows.real(column, value);
+                for (column, value) in STATISTIC_COLUMNS.iter().zip(figures) {
+                    rows.set_real(column, value);
                 }
             }
         }
@@ -129,7 +129,10 @@ struct Step {
 impl Step {
     fn of(times: &[f64], values: &[f64], change_s: f64) -> Self {
         let level = |from_s: f64, to_s: f64| {
-            let inside: Vec<f64> = second_half(times, from_s, to_s).iter().map(|i| values[*i]).collect();
+            let inside: Vec<f64> = rows_in_second_half(times, from_s, to_s)
+                .iter()
+                .map(|i| values[*i])
+                .collect();
             median(&inside)
         };
         Self {
@@ -140,7 +143,7 @@ impl Step {
 
     /// Returns the time from the change until the given share of the step is covered; `None` if it was covered before
     /// the change or is never covered.
-    fn settled_s(&self, times: &[f64], values: &[f64], change_s: f64, share: f64) -> Option<f64> {
+    fn settling_time_s(&self, times: &[f64], values: &[f64], change_s: f64, share: f64) -> Option<f64> {
         let covered = |v: f64| (v - self.before) / (self.after - self.before) >= share;
         let (before, after): (Vec<_>, Vec<_>) = times.iter().zip(values).partition(|(t, _)| **t <= change_s);
         if before.last().is_some_and(|(_, v)| covered(**v)) {
@@ -158,7 +161,7 @@ mod tests {
     /// Two runs of a first-order step from 1 to 3 at 10 s, with a ripple of known deviation.
     fn traces(run: usize) -> OutputTable {
         let mut rows = Rows::new(&schema(
-            text(&["subject", "condition", "run", "estimator"]).chain(real(&["t", "K_e", "flat"])),
+            text_columns(&["subject", "condition", "run", "estimator"]).chain(real_columns(&["t", "K_e", "flat"])),
         ));
         for k in 0..400 {
             let t = 0.1 * f64::from(k);
@@ -167,12 +170,12 @@ mod tests {
             let ripple = [0.0, 0.1, -0.1, 0.2][(k as usize + run) % 4];
             rows.start_row();
             for (name, value) in [("subject", "A"), ("condition", "C"), ("estimator", "RLS")] {
-                rows.text(name, value);
+                rows.set_text(name, value);
             }
-            rows.text("run", &run.to_string());
-            rows.real("t", t);
-            rows.real("K_e", 1.0 + 2.0 * covered + ripple);
-            rows.real("flat", 5.0 + ripple);
+            rows.set_text("run", &run.to_string());
+            rows.set_real("t", t);
+            rows.set_real("K_e", 1.0 + 2.0 * covered + ripple);
+            rows.set_real("flat", 5.0 + ripple);
         }
         rows.into_table(Vec::new())
     }
@@ -199,7 +202,7 @@ mod tests {
             );
         }
         assert!(
-            (of("noise")[1] - MAD * 0.1).abs() < 0.1 * MAD * 0.51,
+            (of("noise")[1] - SD_PER_MAD * 0.1).abs() < 0.1 * SD_PER_MAD * 0.51,
             "{:?}",
             of("noise")
         );

@@ -20,9 +20,9 @@ use hoid_io::{OutputTable, read_table};
 use hoid_model::{Finding, Verdict, VerdictLevel};
 
 use super::{
-    analysis::{PEOPLE_TABLE, READ},
+    analysis::{PEOPLE_TABLE, READ_LABEL},
     manifest::Manifest,
-    person::{Person, PersonStatus, cell_name, people_of},
+    person::{Person, PersonStatus, cell_name, read_people},
     tables::texts,
 };
 use crate::{StudyError, directory::table_path};
@@ -60,7 +60,7 @@ impl GroupSummary {
     /// [`StudyError::Io`] if a table cannot be read.
     pub fn read(manifest: &Manifest, directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
-        let (people, estimates) = (people_of(&table(PEOPLE_TABLE)?), table("estimates")?);
+        let (people, estimates) = (read_people(&table(PEOPLE_TABLE)?), table("estimates")?);
         let (failures, other) = failures(&estimates);
         let runs = manifest.runs.iter().filter(|run| run.counts).count();
         let verdict = Verdict::of(findings(runs, &failures, &people, other));
@@ -78,7 +78,7 @@ fn failures(estimates: &OutputTable) -> (Vec<RunFailure>, usize) {
     let [subject, condition, run, estimator, status, reason] =
         ["subject", "condition", "run", "estimator", "status", "reason"].map(|name| texts(estimates, name));
     let failed: Vec<usize> = (0..status.len()).filter(|i| status[*i] == "failed").collect();
-    let (unread, other): (Vec<usize>, Vec<usize>) = failed.into_iter().partition(|i| estimator[*i] == READ);
+    let (unread, other): (Vec<usize>, Vec<usize>) = failed.into_iter().partition(|i| estimator[*i] == READ_LABEL);
     let failure = |i: usize| RunFailure {
         subject: subject[i].clone(),
         condition: condition[i].clone(),
@@ -105,7 +105,7 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
     }
     for f in failures {
         let name = cell_name(&f.subject, &f.condition);
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "run-failed",
             format!("run {} of {name} could not be read: {}", f.run, f.reason),
         ));
@@ -114,7 +114,7 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
         let name = p.name();
         let reasons = p.reasons.join("; ");
         all.extend(match (p.status, p.verdict) {
-            (PersonStatus::Failed, _) => Some(Finding::doubt(
+            (PersonStatus::Failed, _) => Some(Finding::warning(
                 "condition-failed",
                 format!("there is no operator for {name}: {}", p.reason),
             )),
@@ -122,11 +122,11 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
                 "condition-changes",
                 format!("{name} has no operator for the whole run: {}", p.reason),
             )),
-            (_, Some(VerdictLevel::NotDetermined)) => Some(Finding::doubt(
+            (_, Some(VerdictLevel::NotDetermined)) => Some(Finding::warning(
                 "person-not-determined",
                 format!("the operator of {name} is not determined: {reasons}"),
             )),
-            (_, Some(VerdictLevel::Doubtful)) => Some(Finding::doubt(
+            (_, Some(VerdictLevel::Doubtful)) => Some(Finding::warning(
                 "person-doubtful",
                 format!("the operator of {name} is doubtful: {reasons}"),
             )),
@@ -161,11 +161,11 @@ mod tests {
         Person {
             verdict: Some(verdict),
             reasons: vec!["it is so".to_owned()],
-            ..Person::without(("P", "c"), PersonStatus::Fitted, "")
+            ..Person::without_operator(("P", "c"), PersonStatus::Fitted, "")
         }
     }
 
-    fn judged(runs: usize, failed: usize, people: &[Person]) -> Verdict {
+    fn group_verdict(runs: usize, failed: usize, people: &[Person]) -> Verdict {
         let failure = RunFailure {
             subject: "P".to_owned(),
             condition: "c".to_owned(),
@@ -178,24 +178,24 @@ mod tests {
     #[test]
     fn group_verdict_combines_people_and_failures() {
         use VerdictLevel::{Doubtful, NotDetermined, Trustworthy};
-        assert_eq!(judged(2, 0, &[person(Trustworthy)]).level, Trustworthy);
-        assert_eq!(judged(2, 1, &[person(Trustworthy)]).level, Doubtful);
-        assert_eq!(judged(2, 2, &[]).level, NotDetermined);
+        assert_eq!(group_verdict(2, 0, &[person(Trustworthy)]).level, Trustworthy);
+        assert_eq!(group_verdict(2, 1, &[person(Trustworthy)]).level, Doubtful);
+        assert_eq!(group_verdict(2, 2, &[]).level, NotDetermined);
         // The task of one of two people does not change.
         let both = [person(Trustworthy), person(NotDetermined)];
-        let verdict = judged(2, 0, &both);
+        let verdict = group_verdict(2, 0, &both);
         assert_eq!(verdict.level, Doubtful);
         assert_eq!(verdict.findings()[0].kind, "person-not-determined");
-        assert_eq!(judged(2, 0, &both[1..]).level, NotDetermined);
-        let failed = Person::without(("Q", "d"), PersonStatus::Failed, "too short");
-        assert_eq!(judged(2, 0, std::slice::from_ref(&failed)).level, NotDetermined);
-        let verdict = judged(2, 0, &[failed, person(Trustworthy)]);
+        assert_eq!(group_verdict(2, 0, &both[1..]).level, NotDetermined);
+        let failed = Person::without_operator(("Q", "d"), PersonStatus::Failed, "too short");
+        assert_eq!(group_verdict(2, 0, std::slice::from_ref(&failed)).level, NotDetermined);
+        let verdict = group_verdict(2, 0, &[failed, person(Trustworthy)]);
         assert_eq!(
             (verdict.level, verdict.findings()[0].kind),
             (Doubtful, "condition-failed")
         );
         // If the task changes in all conditions, the family is not fitted.
-        let changes = Person::without(("Q", "d"), PersonStatus::Changes, "at 40 s");
-        assert_eq!(judged(2, 0, &[changes]).level, Trustworthy);
+        let changes = Person::without_operator(("Q", "d"), PersonStatus::Changes, "at 40 s");
+        assert_eq!(group_verdict(2, 0, &[changes]).level, Trustworthy);
     }
 }

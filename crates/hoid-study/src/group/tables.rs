@@ -3,12 +3,12 @@
 use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema};
 
 /// Returns text columns with these names.
-pub(super) fn text<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = (&str, ColumnKind)> {
+pub(super) fn text_columns<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = (&str, ColumnKind)> {
     names.iter().map(|name| (name.as_ref(), ColumnKind::Text))
 }
 
 /// Returns columns of real numbers with these names.
-pub(super) fn real<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = (&str, ColumnKind)> {
+pub(super) fn real_columns<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = (&str, ColumnKind)> {
     names.iter().map(|name| (name.as_ref(), ColumnKind::Real))
 }
 
@@ -45,12 +45,12 @@ pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
 const SENTENCE_SEPARATOR: &str = " | ";
 
 /// Joins sentences into the text of one cell.
-pub(super) fn joined<'a>(sentences: impl Iterator<Item = &'a str>) -> String {
+pub(super) fn join_sentences<'a>(sentences: impl Iterator<Item = &'a str>) -> String {
     sentences.collect::<Vec<_>>().join(SENTENCE_SEPARATOR)
 }
 
 /// Splits the text of a cell into its sentences.
-pub(super) fn sentences(cell: &str) -> Vec<String> {
+pub(super) fn split_sentences(cell: &str) -> Vec<String> {
     cell.split(SENTENCE_SEPARATOR)
         .filter(|sentence| !sentence.is_empty())
         .map(str::to_owned)

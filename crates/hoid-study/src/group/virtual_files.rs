@@ -8,10 +8,10 @@ use hoid_model::Record;
 use super::{
     analysis_settings::AnalysisSettings,
     condition_settings::ConditionSettings,
-    manifest::{MANIFEST, Manifest, RunEntry},
+    manifest::{MANIFEST_FILE, Manifest, RunEntry},
     preparation_settings::PreparationSettings,
     read_settings::ReadSettings,
-    sampling_defects::{SamplingDefect, recorded},
+    sampling_defects::{SamplingDefect, recorded_table},
 };
 use crate::{StudyError, columns::Rows};
 
@@ -30,7 +30,7 @@ impl<'a> VirtualFiles<'a> {
     /// # Errors
     /// [`StudyError::ExperimentThere`] if the directory contains an experiment.
     pub fn check_no_experiment(directory: &Path) -> Result<(), StudyError> {
-        if directory.join(MANIFEST).exists() {
+        if directory.join(MANIFEST_FILE).exists() {
             return Err(StudyError::ExperimentThere {
                 directory: directory.display().to_string(),
             });
@@ -56,14 +56,14 @@ impl<'a> VirtualFiles<'a> {
     ///
     /// # Errors
     /// [`StudyError::Io`] if the file cannot be written.
-    pub fn run(
+    pub fn write_run(
         &mut self,
         (subject, condition, run): (u64, String, u64),
         record: &Record,
         noise: &[f64],
     ) -> Result<(), StudyError> {
         let file = format!("S{subject}_{condition}_{run}.csv");
-        let table = recorded(record, self.columns, self.defects, noise);
+        let table = recorded_table(record, self.columns, self.defects, noise);
         hoid_io::write_table(&self.directory.join(&file), &table)?;
         self.runs.push(RunEntry {
             then: None,
@@ -100,7 +100,9 @@ impl<'a> VirtualFiles<'a> {
             runs: self.runs,
         };
         let text = manifest.text();
-        hoid_io::write_atomically(&self.directory.join(MANIFEST), |file| file.write_all(text.as_bytes()))?;
+        hoid_io::write_atomically(&self.directory.join(MANIFEST_FILE), |file| {
+            file.write_all(text.as_bytes())
+        })?;
         Ok(manifest)
     }
 }

@@ -16,7 +16,7 @@ use hoid_sim::{
 
 use super::{
     analysis_settings::AnalysisSettings, condition_settings::ConditionSettings, manifest::Manifest,
-    sampling_defects::SamplingDefect, virtual_files::VirtualFiles, virtual_subjects::check_number,
+    sampling_defects::SamplingDefect, virtual_files::VirtualFiles, virtual_subjects::check_run_count,
 };
 use crate::{StudyError, columns::Rows};
 
@@ -56,7 +56,7 @@ impl Default for PeopleExperiment {
             runs: 5,
             between_runs: 0.03,
             population: Population::default(),
-            sample_time: SampleTime::SIXTIETH,
+            sample_time: SampleTime::AT_60_HZ,
             seed: 1,
             defects: Vec::new(),
         }
@@ -64,7 +64,7 @@ impl Default for PeopleExperiment {
 }
 
 /// Columns of a file, except t.
-const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
+const FILE_COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
 /// Columns of `truth.csv` for true values other than the parameters, and for settings of the recording.
 const OTHER_COLUMNS: [&str; 7] = [
     "crossover_rad_s",
@@ -94,10 +94,10 @@ pub fn simulate_people(
     let mut people = Vec::new();
     for subject in 1..=experiment.subjects {
         for (place, plant) in (0..).zip(&experiment.plants) {
-            people.push((subject, experiment.person(subject, place, *plant)?));
+            people.push((subject, experiment.draw_person(subject, place, *plant)?));
         }
     }
-    let mut files = VirtualFiles::new(directory, &COLUMNS, &experiment.defects)?;
+    let mut files = VirtualFiles::new(directory, &FILE_COLUMNS, &experiment.defects)?;
     let mut truth = Rows::new(&truth_schema());
     for (subject, person) in &people {
         for run in 1..=experiment.runs {
@@ -107,8 +107,8 @@ pub fn simulate_people(
                 ..person.run_seed(run)
             }
             .white_noise(found.record.len());
-            files.run((*subject, person.plant.to_string(), run), &found.record, &noise)?;
-            truth_row(&mut truth, *subject, run, person, &found)?;
+            files.write_run((*subject, person.plant.to_string(), run), &found.record, &noise)?;
+            write_truth_row(&mut truth, *subject, run, person, &found)?;
             each();
         }
     }
@@ -141,7 +141,7 @@ impl PeopleExperiment {
         if least.contains(&0) {
             return bad("there are no subjects, runs, plants or remnants, expected at least one of each".to_owned());
         }
-        check_number(&[self.subjects, self.runs, self.plants.len() as u64])?;
+        check_run_count(&[self.subjects, self.runs, self.plants.len() as u64])?;
         for (i, plant) in self.plants.iter().enumerate() {
             if self.plants[..i].contains(plant) {
                 return bad(format!("the plant {plant} is named twice; name each once"));
@@ -156,7 +156,7 @@ impl PeopleExperiment {
         Ok(())
     }
 
-    fn person(&self, subject: u64, place: u64, plant: Plant) -> Result<Person, StudyError> {
+    fn draw_person(&self, subject: u64, place: u64, plant: Plant) -> Result<Person, StudyError> {
         let task = Task {
             sample_time: self.sample_time,
             between_runs: self.between_runs,
@@ -195,17 +195,23 @@ fn truth_schema() -> TableSchema {
     }
 }
 
-fn truth_row(rows: &mut Rows, subject: u64, run: u64, person: &Person, found: &PersonRun) -> Result<(), StudyError> {
+fn write_truth_row(
+    rows: &mut Rows,
+    subject: u64,
+    run: u64,
+    person: &Person,
+    found: &PersonRun,
+) -> Result<(), StudyError> {
     let wrong = |error: ModelError| virtual_error(&SimError::Model(error));
     rows.start_row();
-    rows.text("subject", &format!("S{subject}"));
-    rows.text("condition", &person.plant.to_string());
-    rows.text("run", &run.to_string());
-    rows.text("form", &found.state.operator.form().to_string());
-    rows.text("remnant", &person.kind.to_string());
-    for parameter in found.state.operator.named() {
+    rows.set_text("subject", &format!("S{subject}"));
+    rows.set_text("condition", &person.plant.to_string());
+    rows.set_text("run", &run.to_string());
+    rows.set_text("form", &found.state.operator.form().to_string());
+    rows.set_text("remnant", &person.kind.to_string());
+    for parameter in found.state.operator.named_parameters() {
         if parameter.value.is_finite() {
-            rows.real(parameter.name, parameter.value);
+            rows.set_real(parameter.name, parameter.value);
         }
     }
     let margins = found.state.margins().map_err(wrong)?;
@@ -219,7 +225,7 @@ fn truth_row(rows: &mut Rows, subject: u64, run: u64, person: &Person, found: &P
         ("sample_time_s", Some(found.record.sample_time().s())),
     ] {
         if let Some(value) = value {
-            rows.real(name, value);
+            rows.set_real(name, value);
         }
     }
     Ok(())

@@ -25,7 +25,7 @@ use super::{
 };
 use crate::{
     StudyError,
-    columns::{OPERATOR, Rows},
+    columns::{OPERATOR_PARAMETERS, Rows},
 };
 
 /// A virtual experiment with simulated subjects.
@@ -52,7 +52,7 @@ pub struct VirtualExperiment {
 }
 
 /// Cell number of the random stream of subject 0; no cell of a study has a number near it.
-const SUBJECTS: u64 = u64::MAX;
+const SUBJECT_STREAM_CELL: u64 = u64::MAX;
 /// Maximum number of draws for a stable loop; if all fail, the spreads are too large.
 const MAX_DRAWS: usize = 100;
 
@@ -75,8 +75,8 @@ pub fn simulate_group(
             for run in 1..=experiment.runs {
                 let (scenario, record) = experiment.run(subject, cell as u64, *condition, run)?;
                 let noise = experiment.sampling_noise(subject, cell as u64, run, record.len());
-                files.run((subject, condition.to_string(), run), &record, &noise)?;
-                truth_row(&mut truth, subject, *condition, run, &scenario);
+                files.write_run((subject, condition.to_string(), run), &record, &noise)?;
+                write_truth_row(&mut truth, subject, *condition, run, &scenario);
                 each();
             }
         }
@@ -111,7 +111,7 @@ pub fn simulate_group(
 const MAX_RUNS: u64 = 100_000;
 
 /// Checks that an experiment does not have too many runs.
-pub(super) fn check_number(factors: &[u64]) -> Result<(), StudyError> {
+pub(super) fn check_run_count(factors: &[u64]) -> Result<(), StudyError> {
     let runs = factors.iter().try_fold(1_u64, |all, n| all.checked_mul(*n));
     if runs.is_some_and(|runs| runs <= MAX_RUNS) {
         return Ok(());
@@ -132,7 +132,7 @@ impl VirtualExperiment {
         if self.subjects == 0 || self.runs == 0 || self.conditions.is_empty() {
             return bad("there are no subjects, runs or conditions, expected at least one of each".to_owned());
         }
-        check_number(&[self.subjects, self.runs, self.conditions.len() as u64])?;
+        check_run_count(&[self.subjects, self.runs, self.conditions.len() as u64])?;
         for (name, spread) in [("subjects", self.between_subjects), ("runs", self.between_runs)] {
             if !(0.0..=1.0).contains(&spread) {
                 return bad(format!("the spread between {name} is {spread}, expected 0 to 1"));
@@ -165,7 +165,7 @@ impl VirtualExperiment {
         let deviates = |replication: u64| {
             let run_seed = RunSeed {
                 seed: self.seed,
-                cell: SUBJECTS - subject,
+                cell: SUBJECT_STREAM_CELL - subject,
                 replication,
             };
             run_seed.white_noise(6 * MAX_DRAWS)
@@ -215,7 +215,7 @@ impl VirtualExperiment {
     fn sampling_noise(&self, subject: u64, cell: u64, run: u64, samples: usize) -> Vec<f64> {
         RunSeed {
             seed: self.seed,
-            cell: SUBJECTS / 2 - subject * 1000 - cell,
+            cell: SUBJECT_STREAM_CELL / 2 - subject * 1000 - cell,
             replication: run,
         }
         .white_noise(samples)
@@ -233,7 +233,7 @@ fn truth_schema() -> TableSchema {
     };
     let mut columns = vec![text("subject"), text("condition"), text("run")];
     for when in ["initial", "last"] {
-        columns.extend(OPERATOR.iter().map(|name| real(format!("{name}_{when}"))));
+        columns.extend(OPERATOR_PARAMETERS.iter().map(|name| real(format!("{name}_{when}"))));
     }
     columns.extend(["tau_e", "noise_level"].map(|name| real(name.to_owned())));
     TableSchema {
@@ -242,18 +242,18 @@ fn truth_schema() -> TableSchema {
     }
 }
 
-fn truth_row(rows: &mut Rows, subject: u64, condition: Condition, run: u64, scenario: &Scenario) {
+fn write_truth_row(rows: &mut Rows, subject: u64, condition: Condition, run: u64, scenario: &Scenario) {
     rows.start_row();
-    rows.text("subject", &format!("S{subject}"));
-    rows.text("condition", &condition.to_string());
-    rows.text("run", &run.to_string());
+    rows.set_text("subject", &format!("S{subject}"));
+    rows.set_text("condition", &condition.to_string());
+    rows.set_text("run", &run.to_string());
     for (state, when) in [(&scenario.initial, "initial"), (&scenario.last, "last")] {
         for (name, _, estimate) in &OperatorEstimate::from(state.operator).rows()[..5] {
-            rows.real(&format!("{name}_{when}"), estimate.value);
+            rows.set_real(&format!("{name}_{when}"), estimate.value);
         }
     }
-    rows.real("tau_e", scenario.initial.operator.tau_e_s);
+    rows.set_real("tau_e", scenario.initial.operator.tau_e_s);
     if let RemnantStrength::Level { level, .. } = scenario.remnant.strength {
-        rows.real("noise_level", level);
+        rows.set_real("noise_level", level);
     }
 }

@@ -5,7 +5,7 @@ use hoid_model::Record;
 use super::analysis_settings::AnalysisSettings;
 
 /// Name of the window that covers the whole run.
-pub(super) const WHOLE: &str = "whole";
+pub(super) const WHOLE_RUN: &str = "whole";
 
 /// A time span of the run, with its name.
 #[derive(Clone, Copy)]
@@ -29,6 +29,6 @@ pub(super) fn windows(settings: &AnalysisSettings, record: &Record) -> [Window; 
     [
         window("first", first),
         window("last", last),
-        window(WHOLE, (start, end)),
+        window(WHOLE_RUN, (start, end)),
     ]
 }

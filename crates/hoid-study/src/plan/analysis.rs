@@ -11,11 +11,11 @@ use hoid_ident::{IdentError, NamedOrders, family::OperatorPrior, settings::Metho
 use hoid_model::{Form, Orders, Structure};
 
 /// Value of `method` for the operator of a person.
-pub(super) const OPERATOR: &str = registry::OPERATOR;
+pub(super) const OPERATOR_METHOD: &str = registry::OPERATOR;
 /// Value of `method` equivalent to `operator` with `change = "sigmoid"`.
-pub(super) const TIME_VARYING: &str = "time-varying";
+pub(super) const TIME_VARYING_METHOD: &str = "time-varying";
 /// Alternative name for `operator`.
-const FAMILY: &str = "family";
+const FAMILY_METHOD: &str = "family";
 
 /// Options of the registry that a plan does not use: either a plan has its own typed keys for them, or they do not
 /// apply to single runs.
@@ -36,10 +36,10 @@ const EXCLUDED_OPTIONS: [&str; 10] = [
 pub(super) fn methods() -> Vec<MethodSpec> {
     let in_plan = |spec: MethodSpec| {
         let name = match spec.name {
-            CHANGE => TIME_VARYING,
+            CHANGE => TIME_VARYING_METHOD,
             name => name,
         };
-        of_method(name, false)?;
+        request_for_method(name, false)?;
         let mut settings = spec.settings;
         settings.retain(|setting| !EXCLUDED_OPTIONS.contains(&setting.name));
         Some(MethodSpec { name, settings, ..spec })
@@ -49,16 +49,16 @@ pub(super) fn methods() -> Vec<MethodSpec> {
 
 /// Returns the estimator of a method that runs as in `hoid identify`, with its defaults and without a prior; `None` for
 /// any other method.
-pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> {
+pub(super) fn request_for_method(method: &str, changes: bool) -> Option<ResolvedRequest> {
     let estimator = match method {
-        TIME_VARYING => CHANGE,
-        OPERATOR | FAMILY if changes => CHANGE,
-        OPERATOR | FAMILY => OPERATOR,
+        TIME_VARYING_METHOD => CHANGE,
+        OPERATOR_METHOD | FAMILY_METHOD if changes => CHANGE,
+        OPERATOR_METHOD | FAMILY_METHOD => OPERATOR_METHOD,
         // In a plan these estimators have other names.
         registry::PEM | registry::REMNANT | CHANGE => return None,
         name => name,
     };
-    let mut asked = ResolvedRequest::of_estimator(estimator, Structure::BoxJenkins)?;
+    let mut asked = ResolvedRequest::from_estimator(estimator, Structure::BoxJenkins)?;
     if let ResolvedRequest::Operator(how) = &mut asked {
         how.estimator.prior = OperatorPrior::none();
     }
@@ -68,7 +68,7 @@ pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> 
 /// Returns the name of the estimator as a method of plans.
 pub(crate) fn name(asked: &ResolvedRequest) -> &'static str {
     match asked.estimator() {
-        CHANGE => TIME_VARYING,
+        CHANGE => TIME_VARYING_METHOD,
         name => name,
     }
 }
@@ -89,7 +89,7 @@ pub(super) fn with_orders(
             ..how
         }),
         ResolvedRequest::Polynomials(mut how) => {
-            let all = polynomials.named().map(|(name, n)| (name.to_owned(), n..=n));
+            let all = polynomials.named_orders().map(|(name, n)| (name.to_owned(), n..=n));
             how.estimator.orders = all.into_iter().collect();
             ResolvedRequest::Polynomials(how)
         }

@@ -101,14 +101,14 @@ impl Plan {
     /// # Errors
     /// [`StudyError::Plan`] if the plan is invalid.
     pub fn parse(text: &str, path: &str) -> Result<Self, StudyError> {
-        Self::of_text(text).map_err(|problem| StudyError::Plan {
+        Self::from_text(text).map_err(|problem| StudyError::Plan {
             path: path.to_owned(),
             line: problem.line,
-            reason: hoid_io::printable(&problem.reason),
+            reason: hoid_io::escape_control_characters(&problem.reason),
         })
     }
 
-    fn of_text(text: &str) -> Result<Self, PlanProblem> {
+    fn from_text(text: &str) -> Result<Self, PlanProblem> {
         let document = DeTable::parse(text).map_err(|error| PlanProblem {
             line: Some(error.span().map_or(1, |span| line_at(text, span.start))),
             reason: error.message().trim_end().to_owned(),
@@ -124,7 +124,7 @@ impl Plan {
         }
         let keys: Vec<String> = rest.get_ref().keys().map(|key| key.get_ref().to_string()).collect();
         let keys: Vec<&str> = keys.iter().map(String::as_str).filter(|key| *key != "keep").collect();
-        let head = single(&rest, text, &keys)?;
+        let head = single_variant(&rest, text, &keys)?;
         let at_head = |key: &str| head.line_of_key(key);
         let head_text: Head = head.read()?;
         check_head(&head_text, &at_head)?;
@@ -144,14 +144,14 @@ impl Plan {
             text: text.to_owned(),
         };
         for table in &scenarios {
-            for variant in variants(table, text, &hoid_io::WHOLE_KEYS)? {
+            for variant in variants(table, text, &hoid_io::LIST_VALUED_KEYS)? {
                 let index = plan.cells.len() as u64;
                 plan.cells.push(cell(&variant, index, plan.replications)?);
             }
         }
         let known: BTreeSet<&str> = plan.cells.iter().map(|cell| cell.scenario.as_str()).collect();
         let mut names = BTreeSet::new();
-        let whole = estimator_table::whole_keys();
+        let whole = estimator_table::non_axis_keys();
         let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
         for table in &estimators {
             let first_line = line_at(text, table.span().start);
@@ -189,7 +189,7 @@ impl Plan {
                         format!("versus is {name}, expected the name of an estimator above this one"),
                     ));
                 }
-                for cell in plan.cells.iter().filter(|cell| estimator.takes(&cell.scenario)) {
+                for cell in plan.cells.iter().filter(|cell| estimator.applies_to(&cell.scenario)) {
                     estimator
                         .check(&cell.resolved)
                         .map_err(|(key, reason)| problem(key, format!("{}: {reason}", estimator.label)))?;
@@ -198,7 +198,11 @@ impl Plan {
             }
         }
         for cell in &plan.cells {
-            if !plan.estimators.iter().any(|estimator| estimator.takes(&cell.scenario)) {
+            if !plan
+                .estimators
+                .iter()
+                .any(|estimator| estimator.applies_to(&cell.scenario))
+            {
                 return Err(PlanProblem {
                     line: None,
                     reason: format!(
@@ -278,11 +282,11 @@ impl Plan {
         self.estimators
             .iter()
             .enumerate()
-            .filter(|(_, estimator)| estimator.takes(&cell.scenario))
+            .filter(|(_, estimator)| estimator.applies_to(&cell.scenario))
     }
 
     /// Returns the number of estimates of the whole study: one per replication and estimator.
-    pub fn estimates(&self) -> u64 {
+    pub fn estimate_count(&self) -> u64 {
         let of = |cell: &Cell| cell.replications * self.estimators_of(cell).count() as u64;
         self.cells.iter().map(of).sum()
     }
@@ -348,7 +352,7 @@ fn tables_of<'a>(
 }
 
 /// Reads a table in which lists are not allowed.
-fn single(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Variant, PlanProblem> {
+fn single_variant(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Variant, PlanProblem> {
     let mut all = variants(table, text, whole)?;
     match (all.pop(), all.is_empty()) {
         (Some(one), true) => Ok(one),
@@ -364,8 +368,8 @@ fn cell(variant: &Variant, index: u64, replications: u64) -> Result<Cell, PlanPr
     let default = own.condition.clone().unwrap_or_else(|| "scenario".to_owned());
     let name = own.name.unwrap_or_else(|| default.clone());
     let scenario: Scenario =
-        hoid_io::parse_scenario(&variant.text, "", &name).map_err(|error| of_scenario(error, variant))?;
-    let resolved = scenario.resolve().map_err(|error| of_model(&error, variant))?;
+        hoid_io::parse_scenario(&variant.text, "", &name).map_err(|error| scenario_problem(error, variant))?;
+    let resolved = scenario.resolve().map_err(|error| model_problem(&error, variant))?;
     Ok(Cell {
         index,
         scenario: name,
@@ -384,7 +388,7 @@ fn is_noise_free(resolved: &ResolvedScenario) -> bool {
 }
 
 /// Converts an error of a scenario to a problem at a line of the plan.
-fn of_scenario(error: ScenarioFileError, variant: &Variant) -> PlanProblem {
+fn scenario_problem(error: ScenarioFileError, variant: &Variant) -> PlanProblem {
     match error {
         ScenarioFileError::Syntax { line, reason, .. } => PlanProblem {
             line: Some(variant.line(line)),
@@ -404,7 +408,7 @@ fn of_scenario(error: ScenarioFileError, variant: &Variant) -> PlanProblem {
             line: Some(variant.line(1)),
             reason,
         },
-        ScenarioFileError::Model { source, .. } => of_model(&source, variant),
+        ScenarioFileError::Model { source, .. } => model_problem(&source, variant),
         other => PlanProblem {
             line: Some(variant.line(1)),
             reason: other.to_string(),
@@ -412,7 +416,7 @@ fn of_scenario(error: ScenarioFileError, variant: &Variant) -> PlanProblem {
     }
 }
 
-fn of_model(error: &ModelError, variant: &Variant) -> PlanProblem {
+fn model_problem(error: &ModelError, variant: &Variant) -> PlanProblem {
     let line = match error {
         ModelError::UnreachableNoiseLevel { .. } => variant.line_of_key("remnant.noise_level"),
         ModelError::OutOfRange { quantity, .. } if quantity.starts_with("noise level") => {

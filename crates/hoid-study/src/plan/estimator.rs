@@ -17,12 +17,13 @@ use std::collections::BTreeMap;
 use hoid_analysis::ResolvedRequest;
 use hoid_ident::{Estimator, GreyBox, IdentError};
 use hoid_model::{Detrend, Orders, SampleTime, Structure, scenario::ResolvedScenario};
-use hoid_track::{Method, StartAt, TrackOptions};
+use hoid_track::{Method, StartSource, TrackOptions};
 
 use super::{
     analysis,
     estimator_table::{
-        EstimatorTable, FIT, GREY_BOX, OfScenario, Order, OrdersTable, RECORD, StartValue, method_names,
+        EstimatorTable, FIT_METHOD, GREY_BOX_METHOD, OfScenario, Order, OrdersTable, RECORD_METHOD, StartValue,
+        method_names,
     },
     grid::{Axis, Variant},
     problem::PlanProblem,
@@ -89,7 +90,7 @@ impl EstimatorCell {
         };
         let asked = table.identify_request(&at)?;
         let method = match table.method.as_str() {
-            FIT | GREY_BOX | RECORD => None,
+            FIT_METHOD | GREY_BOX_METHOD | RECORD_METHOD => None,
             _ if asked.is_some() => None,
             name => Some(hoid_survey::method(name).map_err(|_| at("method", unknown_method(name)))?),
         };
@@ -102,7 +103,7 @@ impl EstimatorCell {
         if asked.is_none() {
             table.check_placement(method.as_ref(), None, &at)?;
         }
-        if table.method == FIT && table.structure.is_none() {
+        if table.method == FIT_METHOD && table.structure.is_none() {
             return Err(at(
                 "structure",
                 "is missing, expected one such as \"arx\" or \"bj\"".to_owned(),
@@ -135,8 +136,8 @@ impl EstimatorCell {
             "given".clone_into(&mut start);
         }
         let task = match (table.method.as_str(), method) {
-            (RECORD, _) => Task::Describe,
-            (GREY_BOX, _) => Task::GreyBox(Box::new(table.grey_box(&at)?)),
+            (RECORD_METHOD, _) => Task::Describe,
+            (GREY_BOX_METHOD, _) => Task::GreyBox(Box::new(table.grey_box(&at)?)),
             _ if let Some(asked) = asked => Task::Analysis(Box::new(asked)),
             (_, Some(method)) => Task::Track(Box::new(table.track(method, structure, &at)?)),
             _ => Task::Fit(Box::new(table.fit(structure))),
@@ -161,7 +162,7 @@ impl EstimatorCell {
     }
 
     /// True if the estimator is applied to the records of a scenario.
-    pub fn takes(&self, scenario: &str) -> bool {
+    pub fn applies_to(&self, scenario: &str) -> bool {
         self.scenarios
             .as_ref()
             .is_none_or(|names| names.iter().any(|n| n == scenario))
@@ -181,9 +182,9 @@ impl EstimatorCell {
     /// Returns the method as named in the plan.
     pub fn method(&self) -> &'static str {
         match &self.task {
-            Task::Describe => RECORD,
-            Task::Fit(_) => FIT,
-            Task::GreyBox(_) => GREY_BOX,
+            Task::Describe => RECORD_METHOD,
+            Task::Fit(_) => FIT_METHOD,
+            Task::GreyBox(_) => GREY_BOX_METHOD,
             Task::Analysis(asked) => analysis::name(asked),
             Task::Track(options) => options.method.name(),
         }
@@ -226,7 +227,7 @@ impl EstimatorCell {
 
     /// Returns the start value of theta for these orders, with zero for coefficients that are not given; `None` if the
     /// plan gives no start.
-    pub(crate) fn theta(&self, orders: &Orders) -> Option<Vec<f64>> {
+    pub(crate) fn start_theta(&self, orders: &Orders) -> Option<Vec<f64>> {
         if self.start.is_empty() {
             return None;
         }
@@ -242,7 +243,7 @@ impl EstimatorCell {
             Task::Describe => {}
             Task::Fit(estimator) => {
                 estimator.orders = orders;
-                estimator.start = self.theta(&orders);
+                estimator.start = self.start_theta(&orders);
             }
             Task::GreyBox(grey) => grey.order = orders.nd..=orders.nd,
             Task::Analysis(asked) => {
@@ -253,8 +254,8 @@ impl EstimatorCell {
             }
             Task::Track(options) => {
                 options.orders = orders;
-                if let Some(theta) = self.theta(&orders) {
-                    options.start = StartAt::Theta(theta);
+                if let Some(theta) = self.start_theta(&orders) {
+                    options.start = StartSource::Theta(theta);
                 }
             }
         }
@@ -262,7 +263,7 @@ impl EstimatorCell {
     }
 
     fn with_orders(&self, asked: &ResolvedRequest, scenario: &ResolvedScenario) -> Result<ResolvedRequest, IdentError> {
-        let noise = self.orders.of_noise(scenario.scenario().remnant.order);
+        let noise = self.orders.noise_orders(scenario.scenario().remnant.order);
         analysis::with_orders(asked.clone(), &noise, &self.orders(scenario))
     }
 
@@ -323,7 +324,7 @@ impl EstimatorCell {
     fn start_span_s(&self) -> Option<(f64, f64)> {
         match &self.task {
             Task::Track(options) => match options.start {
-                StartAt::Span(span) => span,
+                StartSource::Span(span) => span,
                 _ => None,
             },
             _ => None,

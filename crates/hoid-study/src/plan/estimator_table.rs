@@ -8,14 +8,14 @@ use hoid_ident::{
     settings::{Kind, MethodSpec, Setting},
 };
 use hoid_model::{Detrend, NamedChoice, Orders, Structure};
-use hoid_track::{Method, StartAt, TrackOptions};
+use hoid_track::{Method, StartSource, TrackOptions};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, de::Error as _};
 
 use super::{analysis, problem::PlanProblem};
 
 /// Returns the keys whose value is itself a list or a table, for which a list is not an axis.
-pub fn whole_keys() -> Vec<String> {
+pub fn non_axis_keys() -> Vec<String> {
     let fixed = ["scenarios", "span_s", "start_span_s", "delay_s", "delay_range_s"].map(str::to_owned);
     let settings = methods().into_iter().flat_map(|spec| spec.settings);
     let spans = settings
@@ -98,7 +98,7 @@ impl OrdersTable {
     }
 
     /// Returns all given orders, for an estimator that has orders only of its noise model.
-    pub(super) fn of_noise(&self, remnant_order: usize) -> NamedOrders {
+    pub(super) fn noise_orders(&self, remnant_order: usize) -> NamedOrders {
         let numbers = [("na", self.na), ("nb", self.nb), ("nf", self.nf)];
         let numbers = numbers.map(|(name, n)| (name, n.map(Order::Number)));
         let all = numbers
@@ -194,7 +194,7 @@ impl EstimatorTable {
         asked: Option<&ResolvedRequest>,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<(), PlanProblem> {
-        let (fits, grey_box) = (self.method == FIT, self.method == GREY_BOX);
+        let (fits, grey_box) = (self.method == FIT_METHOD, self.method == GREY_BOX_METHOD);
         let operator = asked.is_some_and(|asked| asked.structure().is_none());
         let tracks = method.is_some();
         // A method that repeats a batch fit has no start coefficients and no time of the first update.
@@ -224,7 +224,7 @@ impl EstimatorTable {
             (
                 "max_iterations",
                 self.max_iterations.is_some(),
-                self.method != RECORD,
+                self.method != RECORD_METHOD,
                 "methods that search",
             ),
             ("versus", self.versus.is_some(), fits || grey_box, both),
@@ -258,7 +258,7 @@ impl EstimatorTable {
         if let (None, None, Some(key)) = (method, asked, self.settings.keys().next()) {
             return Err(at(key, unknown_key_problem(key)));
         }
-        if self.method == analysis::TIME_VARYING && self.change == Some(Change::None) {
+        if self.method == analysis::TIME_VARYING_METHOD && self.change == Some(Change::None) {
             return Err(at(
                 "change",
                 "is none, but method time-varying means operator with change = \"sigmoid\": leave one of them out"
@@ -317,7 +317,7 @@ impl EstimatorTable {
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<Option<ResolvedRequest>, PlanProblem> {
         let changes = self.change == Some(Change::Sigmoid);
-        let Some(mut asked) = analysis::of_method(&self.method, changes) else {
+        let Some(mut asked) = analysis::request_for_method(&self.method, changes) else {
             return Ok(None);
         };
         self.check_placement(None, Some(&asked), at)?;
@@ -329,7 +329,7 @@ impl EstimatorTable {
         for setting in settings.into_iter().flat_map(|spec| spec.settings) {
             let key = plan_key(&setting);
             if let Some(value) = left.remove(&key) {
-                let text = text_of(&value, setting.kind).map_err(|reason| at(&key, reason))?;
+                let text = value_text(&value, setting.kind).map_err(|reason| at(&key, reason))?;
                 given.push((setting, key, text));
             }
         }
@@ -359,7 +359,7 @@ impl EstimatorTable {
         for (setting, key, text) in given {
             let set = asked.set(setting.name, &text);
             let known = set.map_err(|error| match error {
-                AnalysisError::Ident(error) => at(&key, in_plan(&error)),
+                AnalysisError::Ident(error) => at(&key, problem_text(&error)),
                 AnalysisError::Option { reason, .. } => at(&key, format!("is invalid: {reason}")),
                 other => at(&key, format!("is invalid: {other}")),
             })?;
@@ -385,20 +385,20 @@ impl EstimatorTable {
             let Some(value) = left.remove(key.as_str()) else {
                 continue;
             };
-            let text = text_of(value, setting.kind).map_err(|reason| at(&key, reason))?;
+            let text = value_text(value, setting.kind).map_err(|reason| at(&key, reason))?;
             if !method.settings().list().iter().any(|own| own.name == setting.name) {
                 let of = methods_with(&key).join(", ");
                 return Err(at(&key, format!("has no effect here: it applies to {of}")));
             }
             method
                 .set(setting.name, &text)
-                .map_err(|error| at(&key, in_plan(&error)))?;
+                .map_err(|error| at(&key, problem_text(&error)))?;
         }
         if let Some(key) = left.keys().next() {
             return Err(at(key, unknown_key(&method)));
         }
         Ok(TrackOptions {
-            start: StartAt::Span(self.start_span_s),
+            start: StartSource::Span(self.start_span_s),
             update_from_s: self.update_from_s,
             search: self.search(),
             ..TrackOptions::new(method, structure, Orders::default())
@@ -407,16 +407,16 @@ impl EstimatorTable {
 }
 
 /// Values of `method` in addition to the names of the recursive methods.
-pub(super) const FIT: &str = "fit";
-pub(super) const GREY_BOX: &str = "grey-box";
-pub(super) const RECORD: &str = "record";
+pub(super) const FIT_METHOD: &str = "fit";
+pub(super) const GREY_BOX_METHOD: &str = "grey-box";
+pub(super) const RECORD_METHOD: &str = "record";
 
 /// Returns all values of `method`; the default of `hoid identify` is first.
 pub(super) fn method_names() -> Vec<&'static str> {
     let analysed = analysis::methods().into_iter().map(|spec| spec.name);
-    let (first, others): (Vec<_>, Vec<_>) = analysed.partition(|name| *name == analysis::OPERATOR);
+    let (first, others): (Vec<_>, Vec<_>) = analysed.partition(|name| *name == analysis::OPERATOR_METHOD);
     let recursive = hoid_survey::registry().into_iter().map(|spec| spec.name);
-    let own = [FIT, GREY_BOX, RECORD];
+    let own = [FIT_METHOD, GREY_BOX_METHOD, RECORD_METHOD];
     first.into_iter().chain(own).chain(others).chain(recursive).collect()
 }
 
@@ -433,8 +433,8 @@ pub(super) fn plan_key(setting: &Setting) -> String {
 }
 
 /// Converts a value of a plan to the form used on the command line.
-fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
-    let wrong = || format!("is {value}, expected {}", as_text(kind));
+fn value_text(value: &toml::Value, kind: Kind) -> Result<String, String> {
+    let wrong = || format!("is {value}, expected {}", kind_text(kind));
     Ok(match (value, kind) {
         (toml::Value::String(text), Kind::Prior) if hoid_io::is_fit_file(text) => {
             let reason = "is a file, but a plan must not depend on other files; give the parameters, such as \
@@ -447,7 +447,11 @@ fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
         (toml::Value::Boolean(b), _) => b.to_string(),
         (toml::Value::Array(ends), Kind::Span | Kind::OpenSpan | Kind::NumberOrSpan | Kind::Counts) => {
             match ends.as_slice() {
-                [low, high] => format!("{}..{}", text_of(low, Kind::Number)?, text_of(high, Kind::Number)?),
+                [low, high] => format!(
+                    "{}..{}",
+                    value_text(low, Kind::Number)?,
+                    value_text(high, Kind::Number)?
+                ),
                 _ => return Err(wrong()),
             }
         }
@@ -455,7 +459,7 @@ fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
             // `name` is the label of the table.
             let named = values.iter().filter(|(name, _)| *name != "name");
             let each: Vec<String> = named
-                .map(|(name, value)| Ok(format!("{name}={}", text_of(value, *of)?)))
+                .map(|(name, value)| Ok(format!("{name}={}", value_text(value, *of)?)))
                 .collect::<Result<_, String>>()?;
             each.join(",")
         }
@@ -463,7 +467,7 @@ fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
     })
 }
 
-fn as_text(kind: Kind) -> &'static str {
+fn kind_text(kind: Kind) -> &'static str {
     match kind {
         Kind::Flag => "true or false",
         Kind::Count => "a whole number",
@@ -481,7 +485,7 @@ fn as_text(kind: Kind) -> &'static str {
 }
 
 /// Returns the problem with a value, as text that follows its key.
-fn in_plan(error: &IdentError) -> String {
+fn problem_text(error: &IdentError) -> String {
     match error {
         IdentError::BadOption { found, expected, .. } => format!("is {found}, expected {expected}"),
         other => format!("is invalid: {other}"),
@@ -517,7 +521,7 @@ fn names<T: NamedChoice>(others: &[&'static str]) -> Vec<&'static str> {
 /// Deserialises a value of a choice from its name.
 fn choice<'de, T: NamedChoice, D: Deserializer<'de>>(from: D) -> Result<Option<T>, D::Error> {
     let name = String::deserialize(from)?;
-    T::of_name(&name).map(Some).map_err(D::Error::custom)
+    T::from_name(&name).map(Some).map_err(D::Error::custom)
 }
 
 /// Deserialises a value of a choice from its name; `None` for `auto`.
@@ -525,6 +529,6 @@ fn choice_or_auto<'de, T: NamedChoice, D: Deserializer<'de>>(from: D) -> Result<
     let name = String::deserialize(from)?;
     match name.as_str() {
         "auto" => Ok(None),
-        name => T::of_name(name).map(Some).map_err(D::Error::custom),
+        name => T::from_name(name).map(Some).map_err(D::Error::custom),
     }
 }

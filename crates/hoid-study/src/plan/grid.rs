@@ -121,7 +121,7 @@ fn combination(index: usize, count: usize, leaves: &[Leaf], source: &str, first_
                 value: shown.clone(),
             });
         }
-        let key: Vec<String> = leaf.path.iter().map(|part| quoted(part)).collect();
+        let key: Vec<String> = leaf.path.iter().map(|part| quote_key(part)).collect();
         let line = format!("{} = {written}\n", key.join("."));
         let at = line_at(source, leaf.start);
         // All lines of an entry refer to the line of its key. If a list spans several lines, the lines of its later
@@ -160,14 +160,14 @@ fn collect(
                 }
                 leaves.push(Leaf {
                     path: path.clone(),
-                    entries: array.iter().map(|entry| entry_of(entry, source)).collect(),
+                    entries: array.iter().map(|entry| entry_texts(entry, source)).collect(),
                     is_axis: true,
                     start,
                 });
             }
             _ => leaves.push(Leaf {
                 path: path.clone(),
-                entries: vec![entry_of(value, source)],
+                entries: vec![entry_texts(value, source)],
                 is_axis: false,
                 start,
             }),
@@ -178,8 +178,8 @@ fn collect(
 }
 
 /// Returns an entry as TOML, and as displayed.
-fn entry_of(entry: &Spanned<DeValue<'_>>, source: &str) -> (String, String) {
-    let written = written(entry, source);
+fn entry_texts(entry: &Spanned<DeValue<'_>>, source: &str) -> (String, String) {
+    let written = inline_toml(entry, source);
     let shown = match entry.get_ref() {
         DeValue::String(text) => text.to_string(),
         DeValue::Table(table) => table
@@ -194,26 +194,26 @@ fn entry_of(entry: &Spanned<DeValue<'_>>, source: &str) -> (String, String) {
 
 /// Writes a value on one line. A table under a separate heading has no contiguous text in the plan, so its text is
 /// assembled.
-fn written(value: &Spanned<DeValue<'_>>, source: &str) -> String {
+fn inline_toml(value: &Spanned<DeValue<'_>>, source: &str) -> String {
     match value.get_ref() {
         DeValue::Table(table) => {
             let mut fields: Vec<_> = table.iter().collect();
             fields.sort_by_key(|(key, _)| key.span().start);
             let fields: Vec<String> = fields
                 .into_iter()
-                .map(|(key, value)| format!("{} = {}", quoted(key.get_ref()), written(value, source)))
+                .map(|(key, value)| format!("{} = {}", quote_key(key.get_ref()), inline_toml(value, source)))
                 .collect();
             format!("{{ {} }}", fields.join(", "))
         }
         DeValue::Array(array) => {
-            let entries: Vec<String> = array.iter().map(|entry| written(entry, source)).collect();
+            let entries: Vec<String> = array.iter().map(|entry| inline_toml(entry, source)).collect();
             format!("[{}]", entries.join(", "))
         }
         _ => source[value.span()].to_owned(),
     }
 }
 
-fn quoted(key: &str) -> String {
+fn quote_key(key: &str) -> String {
     let bare = !key.is_empty() && key.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
     if bare { key.to_owned() } else { format!("{key:?}") }
 }

@@ -16,7 +16,7 @@ pub(crate) struct Head {
     #[serde(default)]
     pub description: String,
     /// Seed of the random streams. Default 1.
-    #[serde(default = "one")]
+    #[serde(default = "default_one")]
     pub seed: u64,
     /// Number of replications of each cell.
     pub replications: u64,
@@ -54,7 +54,7 @@ impl Default for Keep {
     }
 }
 
-fn one() -> u64 {
+fn default_one() -> u64 {
     1
 }
 

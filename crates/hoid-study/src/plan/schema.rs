@@ -8,7 +8,7 @@ use schemars::{SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
 
 use super::{
-    estimator_table::{EstimatorTable, methods, plan_key, whole_keys},
+    estimator_table::{EstimatorTable, methods, non_axis_keys, plan_key},
     head::Head,
 };
 
@@ -28,14 +28,14 @@ pub fn plan_schema_of(methods: &[MethodSpec]) -> String {
     let mut estimator = of(settings().into_generator(), 1).to_value();
     let mut scenario: Value = serde_json::from_str(&hoid_io::scenario_schema()).unwrap_or_default();
     add_settings(&mut estimator, methods);
-    let whole = whole_keys();
+    let whole = non_axis_keys();
     let whole: Vec<&str> = whole.iter().map(String::as_str).collect();
     for (table, whole) in [
         (&mut estimator, whole.as_slice()),
-        (&mut scenario, hoid_io::WHOLE_KEYS.as_slice()),
+        (&mut scenario, hoid_io::LIST_VALUED_KEYS.as_slice()),
     ] {
         strip(table);
-        with_lists(table, whole);
+        allow_lists(table, whole);
     }
     if let Some(properties) = plan.get_mut("properties").and_then(Value::as_object_mut) {
         let array = |items: Value| json!({ "type": "array", "minItems": 1, "items": items });
@@ -68,7 +68,7 @@ fn add_settings(estimator: &mut Value, methods: &[MethodSpec]) {
             .filter(|spec| spec.settings.iter().any(|other| other.name == setting.name))
             .map(|spec| spec.name)
             .collect();
-        let mut schema = of_kind(setting.kind);
+        let mut schema = kind_schema(setting.kind);
         if let Some(schema) = schema.as_object_mut() {
             let text = format!("{}. For {}.", setting.help, of.join(", "));
             schema.insert("description".to_owned(), text.into());
@@ -78,7 +78,7 @@ fn add_settings(estimator: &mut Value, methods: &[MethodSpec]) {
 }
 
 /// Returns the schema for a kind of value.
-fn of_kind(kind: Kind) -> Value {
+fn kind_schema(kind: Kind) -> Value {
     match kind {
         Kind::Flag => json!({ "type": "boolean" }),
         Kind::Count => json!({ "type": "integer", "minimum": 0 }),
@@ -95,7 +95,7 @@ fn of_kind(kind: Kind) -> Value {
         Kind::Choice(words) => json!({ "enum": words }),
         Kind::Named(of) => {
             // `name` labels one table of a list of tables.
-            json!({ "type": "object", "additionalProperties": of_kind(*of), "properties": { "name": { "type": "string" } } })
+            json!({ "type": "object", "additionalProperties": kind_schema(*of), "properties": { "name": { "type": "string" } } })
         }
     }
 }
@@ -109,7 +109,7 @@ fn strip(schema: &mut Value) {
 }
 
 /// Extends the schema of each value that is not a table, so that a list of such values is also valid.
-fn with_lists(table: &mut Value, whole: &[&str]) {
+fn allow_lists(table: &mut Value, whole: &[&str]) {
     let Some(properties) = table.get_mut("properties").and_then(Value::as_object_mut) else {
         return;
     };
@@ -118,7 +118,7 @@ fn with_lists(table: &mut Value, whole: &[&str]) {
             continue;
         }
         if schema.get("properties").is_some() {
-            with_lists(schema, &[]);
+            allow_lists(schema, &[]);
             continue;
         }
         let Some(object) = schema.as_object_mut() else { continue };

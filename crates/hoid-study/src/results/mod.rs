@@ -8,7 +8,7 @@
 //!
 //! let results = Results::read("out".as_ref())?;
 //! let query = Query::of("bias_b0").condition("C1").remnant_order(2).noise_level(0.1).name("BJ").nd(1).nk(29);
-//! let median = results.one(&query).map(|row| row.statistics.median);
+//! let median = results.find_one(&query).map(|row| row.statistics.median);
 //! let each = results.values(&query);
 //! # Ok::<(), hoid_study::StudyError>(())
 //! ```

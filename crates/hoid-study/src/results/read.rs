@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     Plan, Statistics, StudyError,
-    directory::PLAN,
+    directory::PLAN_FILE,
     run_record::RunRecord,
     tables::{Columns, table_path},
 };
@@ -26,11 +26,11 @@ impl Results {
         if !manifest.complete {
             return Err(StudyError::Unfinished { directory: shown() });
         }
-        let plan = Plan::read(&directory.join(PLAN))?.with_replications(manifest.replications)?;
+        let plan = Plan::read(&directory.join(PLAN_FILE))?.with_replications(manifest.replications)?;
         if plan.hash() != manifest.plan_sha256 {
             return Err(StudyError::OtherStudy {
                 directory: shown(),
-                reason: format!("its {PLAN} is not the plan that was run"),
+                reason: format!("its {PLAN_FILE} is not the plan that was run"),
             });
         }
         let mut results = Self::without_tables(plan);
@@ -67,7 +67,7 @@ impl Results {
         ];
         let [absolute_mean, truth] = [figure("absolute_mean")?, figure("truth")?];
         for (i, quantity) in quantities.iter().enumerate() {
-            let pair = table.pair(at, cells[i], &labels[i])?;
+            let pair = table.cell_estimator_index(at, cells[i], &labels[i])?;
             let statistics = Statistics {
                 count: count[i] as usize,
                 missing: missing[i] as usize,
@@ -116,10 +116,10 @@ impl Results {
     fn read_fits(&mut self, table: &Columns, at: &HashMap<(u64, String), usize>) -> Result<(), StudyError> {
         let (cells, labels, status) = (table.real("cell")?, table.text("estimator")?, table.text("status")?);
         for (i, label) in labels.iter().enumerate() {
-            let pair = table.pair(at, cells[i], label)?;
+            let pair = table.cell_estimator_index(at, cells[i], label)?;
             self.pairs[pair].fits.push(i);
         }
-        for name in table.numbers() {
+        for name in table.numeric_column_names() {
             self.fits.insert(name.to_owned(), table.real(name)?);
         }
         for (name, shown) in [("failed", "failed"), ("not_convertible", "not convertible")] {
@@ -135,7 +135,7 @@ impl Results {
     fn read_traces(&mut self, table: &Columns) -> Result<(), StudyError> {
         let (cells, labels, times) = (table.real("cell")?, table.text("estimator")?, table.real("t")?);
         let names: Vec<String> = table
-            .numbers()
+            .numeric_column_names()
             .filter_map(|name| name.strip_suffix("_median"))
             .map(str::to_owned)
             .collect();

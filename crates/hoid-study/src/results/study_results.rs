@@ -76,7 +76,7 @@ impl Results {
     }
 
     /// Returns the row of the summary that a query selects; `None` unless it selects exactly one.
-    pub fn one(&self, query: &Query) -> Option<&SummaryRow> {
+    pub fn find_one(&self, query: &Query) -> Option<&SummaryRow> {
         match self.find(query).as_slice() {
             [row] => Some(row),
             _ => None,

@@ -17,7 +17,7 @@ impl Results {
     /// value, otherwise the quantity itself. The traces follow the steps of the true values, with the relative error of
     /// replication 0 rounded to whole percent and with quartiles 1 % of the true value from the median.
     pub fn synthetic(plan: Plan, data: &dyn Fn(&Cell, &EstimatorCell, &str, u64) -> f64) -> Self {
-        const WITH_TRUTH: [&str; 14] = [
+        const QUANTITIES_WITH_TRUTH: [&str; 14] = [
             "a1",
             "a2",
             "f1",
@@ -56,7 +56,7 @@ impl Results {
         for pair in &mut results.pairs {
             let (cell, estimator) = (&results.plan.cells[pair.cell], &results.plan.estimators[pair.estimator]);
             for replication in 0..cell.replications {
-                for name in WITH_TRUTH
+                for name in QUANTITIES_WITH_TRUTH
                     .into_iter()
                     .chain(OTHER_COLUMNS)
                     .chain(["share_not_convertible"])
@@ -84,13 +84,13 @@ impl Results {
                 .take_while(|t| *t < scenario.measurement_s)
                 .collect();
             let mut parameters = BTreeMap::new();
-            for (i, name) in WITH_TRUTH[..11].iter().enumerate() {
+            for (i, name) in QUANTITIES_WITH_TRUTH[..11].iter().enumerate() {
                 let of = |state: &TrueState| match i {
                     0..2 => state.discrete[i],
                     2..6 => state.discrete[i - 2],
                     _ => state.operator[i - 6],
                 };
-                let [before, after] = cell.truth().map(|state| of(&state));
+                let [before, after] = cell.true_states().map(|state| of(&state));
                 let off = 1.0 + (100.0 * data(cell, estimator, name, 0)).round() / 100.0;
                 let at = |factor: f64| -> Vec<f64> {
                     times_s

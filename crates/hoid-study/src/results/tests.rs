@@ -1,5 +1,5 @@
 use super::*;
-use crate::{Plan, Query, RunOptions, Statistics, StudyError, directory::PLAN, run};
+use crate::{Plan, Query, RunOptions, Statistics, StudyError, directory::PLAN_FILE, run};
 
 const PLAN_TEXT: &str = r#"
 name = "tiny"
@@ -63,23 +63,23 @@ fn queries_find_their_rows() {
     let (_directory, results) = study(false);
     let arx = Query::of("bias_b0").name("ARX");
     assert_eq!(results.find(&arx).len(), 8);
-    assert!(results.one(&arx).is_none());
+    assert!(results.find_one(&arx).is_none());
     let one = arx.clone().remnant_order(2).noise_level(0.1).nk(29);
-    let row = results.one(&one).unwrap();
+    let row = results.find_one(&one).unwrap();
     assert_eq!((row.cell, row.nd, row.nk, row.decimate), (3, Some(0), Some(29), 1));
     assert_eq!(
         (row.condition.as_str(), row.t_n_s, row.statistics.count),
         ("C1", 0.06, 6)
     );
     assert_eq!(row.axes["remnant_order"], "2");
-    assert!(results.one(&one.clone().condition("C2")).is_none());
-    assert!(results.one(&one.quantity_of("bias_nothing")).is_none());
-    let rls = results.one(&Query::of("rms_K_e").axis("memory", "1s")).unwrap();
+    assert!(results.find_one(&one.clone().condition("C2")).is_none());
+    assert!(results.find_one(&one.with_quantity("bias_nothing")).is_none());
+    let rls = results.find_one(&Query::of("rms_K_e").axis("memory", "1s")).unwrap();
     assert_eq!(
         (rls.name.as_str(), rls.scenario.as_str(), rls.cell),
         ("RLS", "abrupt", 4)
     );
-    let record = results.one(&Query::of("noise_level_obtained").cell(1)).unwrap();
+    let record = results.find_one(&Query::of("noise_level_obtained").cell(1)).unwrap();
     assert_eq!((record.nk, record.name.as_str()), (None, "record"));
     let cells = results.cells(&Query::default().name("ARX").noise_level(0.1));
     assert_eq!(cells.iter().map(|cell| cell.index).collect::<Vec<_>>(), [1, 3]);
@@ -96,7 +96,7 @@ fn values_agree_with_the_summary() {
         let query = Query::of(quantity).name("ARX").remnant_order(2).noise_level(0.1).nk(29);
         let values = results.values(&query);
         let statistics = Statistics::of(&values);
-        let row = results.one(&query).unwrap();
+        let row = results.find_one(&query).unwrap();
         assert_eq!(values.len(), 6);
         // The numbers are the same, except for the order of additions.
         assert!(
@@ -120,7 +120,7 @@ fn values_agree_with_the_summary() {
         .noise_level(0.1)
         .nk(29);
     let mean = results.values(&rate).iter().sum::<f64>() / 6.0;
-    assert!((mean - results.one(&rate).unwrap().statistics.mean).abs() < 1e-15);
+    assert!((mean - results.find_one(&rate).unwrap().statistics.mean).abs() < 1e-15);
     assert!(results.values(&Query::default()).is_empty());
     assert!(results.values(&Query::of("nothing")).is_empty());
 }
@@ -129,7 +129,7 @@ fn values_agree_with_the_summary() {
 fn traces_are_read_by_cell_and_label() {
     let (_directory, results) = study(false);
     let label = &results
-        .one(&Query::of("rms_K_e").axis("memory", "2.56s"))
+        .find_one(&Query::of("rms_K_e").axis("memory", "2.56s"))
         .unwrap()
         .estimator;
     let traces = results.traces(4, label).unwrap();
@@ -168,7 +168,10 @@ fn csv_results_match_parquet_results() {
         let bits = |results: &Results| results.values(&query).iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         assert_eq!(bits(&parquet), bits(&csv), "{quantity}");
     }
-    let label = &csv.one(&Query::of("rms_K_e").axis("memory", "1s")).unwrap().estimator;
+    let label = &csv
+        .find_one(&Query::of("rms_K_e").axis("memory", "1s"))
+        .unwrap()
+        .estimator;
     assert_eq!(
         parquet.traces(4, label).unwrap().times_s,
         csv.traces(4, label).unwrap().times_s
@@ -186,7 +189,7 @@ fn missing_and_unfinished_studies_are_refused() {
         Err(StudyError::Unfinished { .. })
     ));
     let (directory, _) = study(false);
-    let path = directory.path().join(PLAN);
+    let path = directory.path().join(PLAN_FILE);
     let text = std::fs::read_to_string(&path).unwrap().replace("seed = 7", "seed = 8");
     std::fs::write(&path, text).unwrap();
     assert!(matches!(

@@ -12,14 +12,14 @@ use super::{
 use crate::{
     Plan, StudyError,
     columns::{Rows, Schemas, extra_axes},
-    directory::part,
+    directory::part_path,
     plan::EstimatorCell,
     statistics::{Statistics, rate},
     true_value::true_value,
 };
 
 /// Real columns that are settings, not quantities.
-const SETTINGS: [&str; 11] = [
+const SETTING_COLUMNS: [&str; 11] = [
     "noise_level",
     "T_n_true",
     "sample_time_s",
@@ -34,14 +34,14 @@ const SETTINGS: [&str; 11] = [
 ];
 
 /// The levels of a verdict, and the names of their rates.
-const LEVELS: [(VerdictLevel, &str); 3] = [
+const VERDICT_LEVELS: [(VerdictLevel, &str); 3] = [
     (VerdictLevel::Trustworthy, "trustworthy"),
     (VerdictLevel::Doubtful, "doubtful"),
     (VerdictLevel::NotDetermined, "not_determined"),
 ];
 
 /// Statistics in a row of the summary, in the order of their columns.
-const FIGURES: [&str; 14] = [
+const STATISTIC_COLUMNS: [&str; 14] = [
     "mean",
     "mean_se",
     "sd",
@@ -70,7 +70,7 @@ pub(crate) fn write_fits(
     let mut columns = setting_columns(plan);
     columns.push(("quantity".to_owned(), Text));
     columns.extend(["count", "missing", "outliers"].map(|name| (name.to_owned(), Whole)));
-    columns.extend(FIGURES.map(|name| (name.to_owned(), Real)));
+    columns.extend(STATISTIC_COLUMNS.map(|name| (name.to_owned(), Real)));
     let schema = schema(plan, columns);
     let extra = extra_axes(plan);
     let mut writer = TableWriter::create(path, &schema)?;
@@ -78,7 +78,7 @@ pub(crate) fn write_fits(
         .fits
         .columns
         .iter()
-        .filter(|c| c.kind == Real && !SETTINGS.contains(&c.name.as_str()))
+        .filter(|c| c.kind == Real && !SETTING_COLUMNS.contains(&c.name.as_str()))
         .map(|c| c.name.as_str())
         .collect();
     for (at, cell) in plan.cells.iter().enumerate() {
@@ -86,9 +86,9 @@ pub(crate) fn write_fits(
         let each = (quantities.len() + 4) * cell.replications as usize;
         let together = (MAX_VALUES / each.max(1)).clamp(1, estimators.len().max(1));
         for group in estimators.chunks(together) {
-            let mut collected = Collected::new(group, &quantities);
+            let mut collected = CollectedValues::new(group, &quantities);
             for (directory, block) in parts.get(&at).into_iter().flatten() {
-                collected.add(&hoid_io::read_table(&part(directory, *block, "fits"))?);
+                collected.add(&hoid_io::read_table(&part_path(directory, *block, "fits"))?);
             }
             let mut rows = Rows::new(&schema);
             for (estimator, found) in group.iter().zip(&collected.estimators) {
@@ -98,7 +98,7 @@ pub(crate) fn write_fits(
                         return;
                     }
                     start_row(&mut rows, &extra, cell, estimator);
-                    statistics_row(&mut rows, quantity, &statistics, values, truth);
+                    write_statistics_row(&mut rows, quantity, &statistics, values, truth);
                 };
                 for (name, values) in quantities.iter().zip(&found.values) {
                     let truth = true_value(cell, estimator, name);
@@ -122,15 +122,20 @@ pub(crate) fn write_fits(
                     ("diverged", found.diverged),
                 ];
                 if estimator.task.analysis().is_some() {
-                    rates.extend(LEVELS.iter().zip(found.levels).map(|((_, name), hits)| (*name, hits)));
+                    rates.extend(
+                        VERDICT_LEVELS
+                            .iter()
+                            .zip(found.levels)
+                            .map(|((_, name), hits)| (*name, hits)),
+                    );
                 }
                 for (name, hits) in rates {
                     let (p, se) = rate(hits, found.count);
                     start_row(&mut rows, &extra, cell, estimator);
-                    rows.text("quantity", name);
-                    rows.whole("count", found.count as u64);
-                    rows.real("mean", p);
-                    rows.real("mean_se", se);
+                    rows.set_text("quantity", name);
+                    rows.set_whole("count", found.count as u64);
+                    rows.set_real("mean", p);
+                    rows.set_real("mean_se", se);
                 }
                 for (name, value) in medians
                     .get(&(cell.index, estimator.label.clone()))
@@ -138,9 +143,9 @@ pub(crate) fn write_fits(
                     .flatten()
                 {
                     start_row(&mut rows, &extra, cell, estimator);
-                    rows.text("quantity", name);
-                    rows.whole("count", found.count as u64);
-                    rows.real("median", *value);
+                    rows.set_text("quantity", name);
+                    rows.set_whole("count", found.count as u64);
+                    rows.set_real("median", *value);
                 }
             }
             writer.append(&rows.into_table(Vec::new()))?;
@@ -149,11 +154,11 @@ pub(crate) fn write_fits(
     Ok(writer.finish()?)
 }
 
-fn statistics_row(rows: &mut Rows, quantity: &str, s: &Statistics, values: &[f64], truth: f64) {
-    rows.text("quantity", quantity);
-    rows.whole("count", s.count as u64);
-    rows.whole("missing", s.missing as u64);
-    rows.whole("outliers", s.outliers.len() as u64);
+fn write_statistics_row(rows: &mut Rows, quantity: &str, s: &Statistics, values: &[f64], truth: f64) {
+    rows.set_text("quantity", quantity);
+    rows.set_whole("count", s.count as u64);
+    rows.set_whole("missing", s.missing as u64);
+    rows.set_whole("outliers", s.outliers.len() as u64);
     let finite = values.iter().filter(|v| v.is_finite());
     let absolute_mean = finite.map(|v| v.abs()).sum::<f64>() / s.count as f64;
     let all = [
@@ -172,13 +177,13 @@ fn statistics_row(rows: &mut Rows, quantity: &str, s: &Statistics, values: &[f64
         absolute_mean,
         truth,
     ];
-    for (name, value) in FIGURES.iter().zip(all) {
-        rows.real(name, value);
+    for (name, value) in STATISTIC_COLUMNS.iter().zip(all) {
+        rows.set_real(name, value);
     }
 }
 
 /// The values of all replications of a cell, by estimator.
-struct Collected<'a> {
+struct CollectedValues<'a> {
     at: BTreeMap<&'a str, usize>,
     quantities: &'a [&'a str],
     estimators: Vec<EstimatorResults>,
@@ -195,10 +200,10 @@ struct EstimatorResults {
     converged: usize,
     diverged: usize,
     /// Number of fits at each verdict level.
-    levels: [usize; LEVELS.len()],
+    levels: [usize; VERDICT_LEVELS.len()],
 }
 
-impl<'a> Collected<'a> {
+impl<'a> CollectedValues<'a> {
     fn new(group: &[&'a EstimatorCell], quantities: &'a [&'a str]) -> Self {
         let empty = EstimatorResults {
             values: vec![Vec::new(); quantities.len()],
@@ -242,7 +247,7 @@ impl<'a> Collected<'a> {
             of.not_convertible += usize::from(is("status", row, "not convertible"));
             of.converged += usize::from(flag("converged", row));
             of.diverged += usize::from(flag("diverged", row));
-            for (count, (level, _)) in of.levels.iter_mut().zip(LEVELS) {
+            for (count, (level, _)) in of.levels.iter_mut().zip(VERDICT_LEVELS) {
                 *count += usize::from(is("verdict", row, level.choice_name()));
             }
         }

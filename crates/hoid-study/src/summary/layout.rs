@@ -49,27 +49,27 @@ pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSc
 pub(super) fn start_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
     let scenario = cell.resolved.scenario();
     rows.start_row();
-    rows.whole("cell", cell.index);
-    rows.text("scenario", &cell.scenario);
-    rows.text("condition", &cell.condition);
-    rows.whole("remnant_order", scenario.remnant.order as u64);
+    rows.set_whole("cell", cell.index);
+    rows.set_text("scenario", &cell.scenario);
+    rows.set_text("condition", &cell.condition);
+    rows.set_whole("remnant_order", scenario.remnant.order as u64);
     if let hoid_model::scenario::RemnantStrength::Level { level, .. } = scenario.remnant.strength {
-        rows.real("noise_level", level);
+        rows.set_real("noise_level", level);
     }
-    rows.real("T_n_true", scenario.remnant.time_constant_s);
-    rows.real("sample_time_s", scenario.sample_time.s());
+    rows.set_real("T_n_true", scenario.remnant.time_constant_s);
+    rows.set_real("sample_time_s", scenario.sample_time.s());
     for name in extra {
         let axis = cell.axes.iter().chain(&estimator.axes).find(|axis| axis.key == *name);
-        rows.text(name, axis.map_or("", |axis| axis.value.as_str()));
+        rows.set_text(name, axis.map_or("", |axis| axis.value.as_str()));
     }
-    rows.text("estimator", &estimator.label);
-    rows.text("name", &estimator.name);
-    rows.text("method", estimator.method());
+    rows.set_text("estimator", &estimator.label);
+    rows.set_text("name", &estimator.name);
+    rows.set_text("method", estimator.method());
     if estimator.structure().is_some() {
         let orders = estimator.orders(&cell.resolved);
-        rows.real("nd", orders.nd as f64);
-        rows.real("nk", orders.nk as f64);
+        rows.set_real("nd", orders.nd as f64);
+        rows.set_real("nk", orders.nk as f64);
     }
-    rows.text("start", &estimator.start);
-    rows.whole("decimate", estimator.decimate as u64);
+    rows.set_text("start", &estimator.start);
+    rows.set_whole("decimate", estimator.decimate as u64);
 }

@@ -8,8 +8,8 @@ use hoid_numerics::statistics::{mean, sample_variance};
 use super::layout::{MAX_VALUES, PartsOfCell, schema};
 use crate::{
     Plan, StudyError,
-    columns::{OPERATOR, Rows, Schemas},
-    directory::part,
+    columns::{OPERATOR_PARAMETERS, Rows, Schemas},
+    directory::part_path,
     plan::{Cell, EstimatorCell, Task},
     statistics::quantile,
 };
@@ -58,13 +58,16 @@ pub(crate) fn write_traces(
         for group in tracking.chunks(together) {
             let mut series: Vec<Series> = vec![Series::default(); group.len()];
             for (directory, block) in parts.get(&at).into_iter().flatten() {
-                let table = hoid_io::read_table(&part(directory, *block, "traces"))?;
+                let table = hoid_io::read_table(&part_path(directory, *block, "traces"))?;
                 collect_traces(&table, group, &names, &mut series);
             }
             let mut rows = Rows::new(&schema);
             for (estimator, series) in group.iter().zip(&series) {
                 let medians = series.write(&mut rows, cell, estimator, &names);
-                settling.insert((cell.index, estimator.label.clone()), settled(cell, &names, &medians));
+                settling.insert(
+                    (cell.index, estimator.label.clone()),
+                    settling_times(cell, &names, &medians),
+                );
             }
             writer.append(&rows.into_table(Vec::new()))?;
         }
@@ -113,10 +116,10 @@ impl Series {
         for (bits, parameters) in &self.0 {
             let t = f64::from_bits(*bits);
             rows.start_row();
-            rows.whole("cell", cell.index);
-            rows.text("estimator", &estimator.label);
-            rows.real("t", t);
-            rows.real("count", parameters.iter().map(Vec::len).max().unwrap_or(0) as f64);
+            rows.set_whole("cell", cell.index);
+            rows.set_text("estimator", &estimator.label);
+            rows.set_real("t", t);
+            rows.set_real("count", parameters.iter().map(Vec::len).max().unwrap_or(0) as f64);
             let mut of_time = Vec::with_capacity(names.len());
             for (name, values) in names.iter().zip(parameters) {
                 let mut sorted = values.clone();
@@ -130,7 +133,7 @@ impl Series {
                     ("median", median),
                     ("upper_quartile", quantile(&sorted, 0.75)),
                 ] {
-                    rows.real(&format!("{name}_{figure}"), value);
+                    rows.set_real(&format!("{name}_{figure}"), value);
                 }
             }
             medians.push((t, of_time));
@@ -141,13 +144,13 @@ impl Series {
 
 /// Returns the times after the change at which the median traces have covered 50 and 90 % of the steps of the
 /// operator's parameters.
-fn settled(cell: &Cell, names: &[&str], medians: &[(f64, Vec<f64>)]) -> Vec<(String, f64)> {
+fn settling_times(cell: &Cell, names: &[&str], medians: &[(f64, Vec<f64>)]) -> Vec<(String, f64)> {
     let Some(midpoint_s) = cell.resolved.scenario().schedule.change_s() else {
         return Vec::new();
     };
-    let [before, after] = cell.truth();
+    let [before, after] = cell.true_states();
     let mut found = Vec::new();
-    for (i, name) in OPERATOR.iter().enumerate() {
+    for (i, name) in OPERATOR_PARAMETERS.iter().enumerate() {
         let (from, to) = (before.operator[i], after.operator[i]);
         let Some(at) = names.iter().position(|n| n == name) else {
             continue;

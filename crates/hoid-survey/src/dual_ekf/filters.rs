@@ -2,18 +2,18 @@
 
 use std::ops::AddAssign;
 
-use hoid_core::bounds::within;
+use hoid_core::bounds::clamp;
 use hoid_model::{SampleTime, second_order::HeldStates};
-use hoid_track::building::OPERATOR;
+use hoid_track::building::OPERATOR_PARAMETER_COUNT;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::pade;
 
 /// Largest number of parameters: the operator parameters and the delay.
-pub(super) const MAX_PARAMETERS: usize = OPERATOR + 1;
+pub(super) const MAX_PARAMETERS: usize = OPERATOR_PARAMETER_COUNT + 1;
 
 /// Relative step of the central differences of A and B.
-const STEP: f64 = 1e-5;
+const RELATIVE_STEP: f64 = 1e-5;
 /// Largest number of times that a step of the parameters is halved.
 const MAX_HALVINGS: usize = 30;
 
@@ -40,7 +40,7 @@ pub(super) struct Filters {
 
 impl Filters {
     /// Returns A and B of the state equation for given parameters.
-    fn held(&self, w: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
+    fn state_equation(&self, w: &DVector<f64>) -> (DMatrix<f64>, DVector<f64>) {
         let n = self.x.len();
         let (mut a, mut b) = (DMatrix::zeros(n, n), DVector::zeros(n));
         a[(n - 1, n - 1)] = -self.d1;
@@ -74,15 +74,15 @@ impl Filters {
 
     /// Predicts the state x, its covariance P and its derivative dx/dw.
     pub fn predict(&mut self, e: f64) {
-        let (a, b) = self.held(&self.w);
+        let (a, b) = self.state_equation(&self.w);
         let mut slope = &a * &self.slope;
         // K_e and K_e_dot occur only in C.
         for i in 2..self.w.len() {
-            let by = STEP * self.w[i];
+            let by = RELATIVE_STEP * self.w[i];
             let moved = |by: f64| {
                 let mut w = self.w.clone();
                 w[i] += by;
-                let (a, b) = self.held(&w);
+                let (a, b) = self.state_equation(&w);
                 a * &self.x + b * e
             };
             let along = (moved(by) - moved(-by)) / (2.0 * by);
@@ -151,10 +151,10 @@ impl Filters {
     }
 
     /// Keeps the parameters within their bounds. Returns true if a parameter was changed.
-    pub fn bound(&mut self, bounds: &[[f64; 2]; MAX_PARAMETERS]) -> bool {
+    pub fn clamp_parameters(&mut self, bounds: &[[f64; 2]; MAX_PARAMETERS]) -> bool {
         let before = self.w.clone();
         for (w, bounds) in self.w.iter_mut().zip(bounds) {
-            *w = within(*w, *bounds);
+            *w = clamp(*w, *bounds);
         }
         self.w != before
     }

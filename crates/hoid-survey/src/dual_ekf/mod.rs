@@ -40,20 +40,20 @@ use hoid_model::{
 use hoid_track::{
     BoundOptions, Memory, Sample,
     building::{
-        About, Delay, OPERATOR, Recursion, RecursiveMethod, Reported, Setup, StartState, StepOutcome, bad,
-        physical_bounds,
+        Delay, MethodDescription, OPERATOR_PARAMETER_COUNT, Recursion, RecursiveMethod, ReportedModel, Setup,
+        StartState, StepOutcome, invalid_option, physical_bounds,
     },
 };
 use nalgebra::{DMatrix, DVector};
 
-use crate::known_noise::{check_first_order, lead_time_of};
+use crate::known_noise::{check_first_order, lead_time};
 use filters::{Filters, MAX_PARAMETERS};
 
 const NAME: &str = "dual-ekf";
 /// Range of the delay if it is estimated with a Padé approximation, s.
-const DELAYS_S: (f64, f64) = (0.05, 0.6);
+const DELAY_RANGE_S: (f64, f64) = (0.05, 0.6);
 /// Smallest initial standard error of each parameter, relative to its value, if the delay is estimated.
-const SMALLEST_RELATIVE_ERROR: f64 = 0.1;
+const MIN_RELATIVE_ERROR: f64 = 0.1;
 
 settings! {
     /// Options of the two filters.
@@ -83,8 +83,8 @@ settings! {
 }
 
 impl RecursiveMethod for DualEkfOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: NAME,
             help: "two alternating extended Kalman filters, of state and of parameters, for comparison",
             source: "Wan and Nelson 2001; Popovici, Zaal and Pool 2017",
@@ -105,7 +105,7 @@ impl RecursiveMethod for DualEkfOptions {
     fn check(&self, setup: &Setup) -> Result<(), IdentError> {
         check_first_order(NAME, setup)?;
         if self.pade > pade::MAX_ORDER {
-            return Err(bad(
+            return Err(invalid_option(
                 "the order of the Padé approximation",
                 self.pade.to_string(),
                 &format!("0 to {}", pade::MAX_ORDER),
@@ -127,7 +127,7 @@ impl RecursiveMethod for DualEkfOptions {
         true
     }
 
-    fn is_model_of_change(&self) -> bool {
+    fn models_change(&self) -> bool {
         true
     }
 
@@ -140,7 +140,7 @@ impl RecursiveMethod for DualEkfOptions {
     }
 
     fn track_delay_s(&self) -> Option<(f64, f64)> {
-        (self.pade > 0).then_some(DELAYS_S)
+        (self.pade > 0).then_some(DELAY_RANGE_S)
     }
 
     fn prepare(&mut self, record: &Record) {
@@ -161,7 +161,7 @@ struct DualEkf {
     first: Filters,
     bounds: [[f64; 2]; MAX_PARAMETERS],
     delay: DelayLine<Vec<f64>>,
-    reported: Reported,
+    reported: ReportedModel,
     /// Noise added to e, relative to the root mean square of e. `power` is the mean square of e, either given or
     /// computed from the samples so far.
     state_noise: f64,
@@ -186,8 +186,8 @@ impl DualEkf {
             });
         }
         let (ts, width) = (sample_time.s(), from.values.len());
-        let mut values = from.values[..OPERATOR].to_vec();
-        let mut errors: Vec<f64> = (0..OPERATOR)
+        let mut values = from.values[..OPERATOR_PARAMETER_COUNT].to_vec();
+        let mut errors: Vec<f64> = (0..OPERATOR_PARAMETER_COUNT)
             .map(|i| (from.variance * from.spread[i * width + i]).max(0.0).sqrt())
             .collect();
         let mut drifts = vec![own.gain_drift, own.gain_drift, own.nms_drift, own.nms_drift];
@@ -198,7 +198,7 @@ impl DualEkf {
         }
         // The standard errors of the start fit apply to its fixed delay; if the delay is estimated, the other
         // parameters are less certain.
-        let least = if own.pade > 0 { SMALLEST_RELATIVE_ERROR } else { 0.0 };
+        let least = if own.pade > 0 { MIN_RELATIVE_ERROR } else { 0.0 };
         let power = own.error_size.map_or(0.0, |size| size * size);
         let (n, p) = (3 + own.pade, values.len());
         let of = |value: fn(f64, f64, f64) -> f64| {
@@ -208,7 +208,7 @@ impl DualEkf {
         };
         let filters = Filters {
             sample_time,
-            d1: from.values[OPERATOR],
+            d1: from.values[OPERATOR_PARAMETER_COUNT],
             pade: own.pade,
             innovation_variance: from.variance,
             input_noise_variance: own.state_noise * own.state_noise * power,
@@ -219,15 +219,21 @@ impl DualEkf {
             walk: of(|value, _, drift| (drift * value).powi(2)) * ts,
             slope: DMatrix::zeros(n, p),
         };
-        let [k_e, k_e_dot, omega, zeta] = physical_bounds::<OPERATOR>(setup, sample_time)?;
+        let [k_e, k_e_dot, omega, zeta] = physical_bounds::<OPERATOR_PARAMETER_COUNT>(setup, sample_time)?;
         // With a Padé approximation the filters contain the delay, except for the one sample of the hold.
         let late = if own.pade == 0 { setup.orders.nk } else { 1 };
         Ok(Self {
             first: filters.clone(),
             filters,
-            bounds: [k_e, k_e_dot, omega, zeta, [DELAYS_S.0.max(ts), DELAYS_S.1.max(ts)]],
+            bounds: [
+                k_e,
+                k_e_dot,
+                omega,
+                zeta,
+                [DELAY_RANGE_S.0.max(ts), DELAY_RANGE_S.1.max(ts)],
+            ],
             delay: DelayLine::new(vec![0.0; late]),
-            reported: Reported::new(from, setup.orders.nk, sample_time),
+            reported: ReportedModel::new(from, setup.orders.nk, sample_time),
             state_noise: own.state_noise,
             has_given_variance: own.error_size.is_some(),
             power,
@@ -250,7 +256,7 @@ impl DualEkf {
     fn take(&mut self, sample: Sample, moves: bool) -> StepOutcome {
         self.predict(sample.e);
         let [innovation, expected] = self.filters.correct(sample.u, moves);
-        let mut shortened = moves && self.filters.bound(&self.bounds);
+        let mut shortened = moves && self.filters.clamp_parameters(&self.bounds);
         if self.filters.is_valid() && expected.is_finite() {
             self.expected = expected;
         } else {
@@ -260,15 +266,15 @@ impl DualEkf {
             self.restarts += 1;
             shortened = true;
         }
-        self.reported.set(self.eta());
+        self.reported.set_operator(self.eta());
         StepOutcome { innovation, shortened }
     }
 
-    fn eta(&self) -> [f64; OPERATOR] {
+    fn eta(&self) -> [f64; OPERATOR_PARAMETER_COUNT] {
         std::array::from_fn(|i| self.filters.w[i])
     }
 
-    fn of_eta(&self) -> [[f64; OPERATOR]; OPERATOR] {
+    fn eta_covariance(&self) -> [[f64; OPERATOR_PARAMETER_COUNT]; OPERATOR_PARAMETER_COUNT] {
         std::array::from_fn(|i| std::array::from_fn(|j| self.filters.p_w[(i, j)]))
     }
 }
@@ -292,7 +298,7 @@ impl State for DualEkf {
         ];
         visit_all(parts, each);
         // Numbers that the caller restored or changed must also lie within the bounds.
-        self.filters.bound(&self.bounds);
+        self.filters.clamp_parameters(&self.bounds);
     }
 }
 
@@ -301,7 +307,7 @@ impl Recursion for DualEkf {
         self.take(sample, true)
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         self.take(sample, false)
     }
 
@@ -314,7 +320,7 @@ impl Recursion for DualEkf {
     }
 
     fn covariance(&self, into: &mut [f64]) -> bool {
-        self.reported.covariance(&self.of_eta(), into);
+        self.reported.covariance(&self.eta_covariance(), into);
         true
     }
 
@@ -323,16 +329,19 @@ impl Recursion for DualEkf {
     }
 
     fn delay(&self) -> Option<Delay> {
-        let tau = *self.filters.w.get(OPERATOR)?;
+        let tau = *self.filters.w.get(OPERATOR_PARAMETER_COUNT)?;
         Some(Delay {
             nk: self.filters.sample_time.nk(tau),
-            tau_e_s: Estimate::with_variance(tau, self.filters.p_w[(OPERATOR, OPERATOR)]),
+            tau_e_s: Estimate::with_variance(
+                tau,
+                self.filters.p_w[(OPERATOR_PARAMETER_COUNT, OPERATOR_PARAMETER_COUNT)],
+            ),
         })
     }
 
     fn operator(&self) -> Option<OperatorEstimate> {
-        let (eta, c) = (self.eta(), self.of_eta());
-        let operator = self.reported.operator(eta, &c, lead_time_of(eta, &c));
+        let (eta, c) = (self.eta(), self.eta_covariance());
+        let operator = self.reported.operator(eta, &c, lead_time(eta, &c));
         Some(match self.delay() {
             Some(Delay { tau_e_s, .. }) => OperatorEstimate { tau_e_s, ..operator },
             None => operator,
@@ -345,7 +354,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use hoid_model::scenario::{Condition, Scenario};
     use hoid_sim::{RunSeed, Simulator};
-    use hoid_track::{Method, StartAt, TrackOptions, track};
+    use hoid_track::{Method, StartSource, TrackOptions, track};
 
     use super::*;
 
@@ -365,21 +374,21 @@ mod tests {
 
     fn options(own: DualEkfOptions, span_s: (f64, f64), nk: usize) -> TrackOptions {
         TrackOptions {
-            start: StartAt::Span(Some(span_s)),
+            start: StartSource::Span(Some(span_s)),
             ..TrackOptions::default_for(Method::from(own), nk)
         }
     }
 
     #[test]
     fn gains_after_a_change_are_close_on_average() {
-        const RUNS: u64 = 8;
+        const RUN_COUNT: u64 = 8;
         let mut mean = [0.0; 2];
-        for replication in 0..RUNS {
+        for replication in 0..RUN_COUNT {
             let record = run(Condition::C4, 0.1, replication);
             let trace = track(&record, &options(DualEkfOptions::default(), (0.0, 30.72), 29), 100).unwrap();
             let operator = trace.operator(64).unwrap();
-            mean[0] += operator.k_e_dot.value / 0.084 / RUNS as f64;
-            mean[1] += operator.omega_nm_rad_s.value / 11.25 / RUNS as f64;
+            mean[0] += operator.k_e_dot.value / 0.084 / RUN_COUNT as f64;
+            mean[1] += operator.omega_nm_rad_s.value / 11.25 / RUN_COUNT as f64;
         }
         // The standard errors of the means are 3 % and 1 %.
         assert!((mean[0] - 1.0).abs() < 0.12 && (mean[1] - 1.0).abs() < 0.1, "{mean:?}");

@@ -5,7 +5,7 @@ use hoid_core::divided_differences::DividedDifferences;
 /// Length of the augmented state X.
 pub(super) const N: usize = 6;
 /// Index of the first parameter in X.
-pub(super) const ETA: usize = 2;
+pub(super) const ETA_START: usize = 2;
 /// Covariance of X, stored by rows.
 pub(super) type Matrix = [[f64; N]; N];
 
@@ -28,14 +28,14 @@ pub(super) struct Model {
 }
 
 /// The four coefficients of the transition of p and v, with their derivatives with respect to omega and zeta.
-struct Hold {
+struct HoldCoefficients {
     /// `1 - A`, `R/omega^2`, R, `1 - A - 2 zeta R/omega`.
     values: [f64; 4],
     by_omega: [f64; 4],
     by_zeta: [f64; 4],
 }
 
-impl Hold {
+impl HoldCoefficients {
     fn at(omega: f64, zeta: f64, t: f64) -> Self {
         let d = DividedDifferences::at(-2.0 * zeta * omega * t, omega * omega * t * t);
         let s_zeta = -2.0 * omega * t;
@@ -68,17 +68,17 @@ impl Hold {
 
 impl Model {
     pub fn transition(&self, x: &[f64; N], e: f64) -> [f64; N] {
-        let [a, b, c, d] = Hold::at(x[4], x[5], self.ts).values;
+        let [a, b, c, d] = HoldCoefficients::at(x[4], x[5], self.ts).values;
         let (m, v) = (e - x[0], x[1]);
         [e - a * m + b * v, c * m + d * v, x[2], x[3], x[4], x[5]]
     }
 
     pub fn jacobian(&self, x: &[f64; N], e: f64) -> Matrix {
-        let hold = Hold::at(x[4], x[5], self.ts);
+        let hold = HoldCoefficients::at(x[4], x[5], self.ts);
         let [a, b, c, d] = hold.values;
         let (m, v) = (e - x[0], x[1]);
         let mut f = [[0.0; N]; N];
-        for (i, row) in f.iter_mut().enumerate().skip(ETA) {
+        for (i, row) in f.iter_mut().enumerate().skip(ETA_START) {
             row[i] = 1.0;
         }
         let by = |h: &[f64; 4]| [-h[0] * m + h[1] * v, h[2] * m + h[3] * v];

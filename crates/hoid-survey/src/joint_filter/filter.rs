@@ -1,7 +1,7 @@
 //! The recursion of the joint filter of state and parameters: start, bounds and restarts.
 
 use hoid_core::{
-    bounds::within,
+    bounds::clamp,
     delay::DelayLine,
     state::{State, visit_all},
 };
@@ -10,22 +10,22 @@ use hoid_model::{SampleTime, uncertainty::OperatorEstimate};
 
 use hoid_track::{
     Sample,
-    building::{OPERATOR, Recursion, Reported, Setup, StartState, StepOutcome, physical_bounds},
+    building::{OPERATOR_PARAMETER_COUNT, Recursion, ReportedModel, Setup, StartState, StepOutcome, physical_bounds},
 };
 
-use crate::known_noise::lead_time_of;
+use crate::known_noise::lead_time;
 
-use super::belief::{AugmentedState, ETA, Model, N};
+use super::belief::{AugmentedState, ETA_START, Model, N};
 
 /// Function that processes a sample and returns the innovation and its predicted variance.
 pub(super) type Update = fn(&Model, &mut AugmentedState, f64, f64) -> [f64; 2];
 
 /// Ratio of the assumed variance of n to the variance of the remnant. The ratio exceeds one because a coloured remnant
 /// is less informative than a white one of equal variance.
-const OUTPUT_NOISE: f64 = 10.0;
+const OUTPUT_NOISE_RATIO: f64 = 10.0;
 /// Variance per second of the noise that drives v in addition to the error, as a multiple of the variance of the
 /// remnant divided by `(g/omega)^2`, where g and omega are as in [`GAIN_DRIFT`].
-const STATE_NOISE: f64 = 10.0;
+const STATE_NOISE_RATIO: f64 = 10.0;
 /// Standard deviations of the drift of K_e and K_e_dot in one second, in units of `g = sqrt(K_e^2 + omega^2 K_e_dot^2)`
 /// and `g/omega`, where omega is the crossover frequency.
 const GAIN_DRIFT: [f64; 2] = [0.02, 0.05];
@@ -34,9 +34,9 @@ const CROSSOVER_RAD_S: f64 = 2.0;
 /// Standard deviation of the drift of omega_nm and zeta_nm in one second, relative to their values.
 const NEUROMUSCULAR_DRIFT: f64 = 0.003;
 /// Largest variance of a parameter, as a multiple of the square of its initial value.
-const LARGEST_VARIANCE: f64 = 25.0;
+const MAX_VARIANCE_RATIO: f64 = 25.0;
 /// Length of the computed impulse response of 1/D, samples.
-const RESPONSE: usize = 1000;
+const RESPONSE_SAMPLES: usize = 1000;
 
 /// The recursion of a joint filter.
 pub(crate) struct JointFilter {
@@ -44,9 +44,9 @@ pub(crate) struct JointFilter {
     model: Model,
     belief: AugmentedState,
     first: AugmentedState,
-    bounds: [[f64; 2]; OPERATOR],
+    bounds: [[f64; 2]; OPERATOR_PARAMETER_COUNT],
     delay: DelayLine<Vec<f64>>,
-    reported: Reported,
+    reported: ReportedModel,
     /// Predicted innovation variance at the last sample.
     expected: f64,
     restarts: u64,
@@ -73,10 +73,10 @@ impl JointFilter {
             x: [0.0; N],
             p: [[0.0; N]; N],
         };
-        for i in 0..OPERATOR {
-            belief.x[ETA + i] = from.values[i];
-            for j in 0..OPERATOR {
-                belief.p[ETA + i][ETA + j] = from.variance * from.spread[i * width + j];
+        for i in 0..OPERATOR_PARAMETER_COUNT {
+            belief.x[ETA_START + i] = from.values[i];
+            for j in 0..OPERATOR_PARAMETER_COUNT {
+                belief.p[ETA_START + i][ETA_START + j] = from.variance * from.spread[i * width + j];
             }
         }
         let model = model(&belief.x, from, sample_time);
@@ -85,9 +85,9 @@ impl JointFilter {
             model,
             first: belief,
             belief,
-            bounds: physical_bounds::<OPERATOR>(setup, sample_time)?,
+            bounds: physical_bounds::<OPERATOR_PARAMETER_COUNT>(setup, sample_time)?,
             delay: DelayLine::new(vec![0.0; setup.orders.nk]),
-            reported: Reported::new(from, setup.orders.nk, sample_time),
+            reported: ReportedModel::new(from, setup.orders.nk, sample_time),
             expected: from.variance,
             restarts: 0,
         })
@@ -95,7 +95,7 @@ impl JointFilter {
 
     /// Keeps the parameters within their bounds and limits their variances; restarts if a number is not finite. Returns
     /// true after a restart or if a parameter was changed.
-    fn hold(&mut self) -> bool {
+    fn limit_estimate(&mut self) -> bool {
         let mut cut = false;
         let sound =
             self.belief.x.iter().all(|x| x.is_finite()) && self.belief.p.iter().flatten().all(|p| p.is_finite());
@@ -105,35 +105,35 @@ impl JointFilter {
             return true;
         }
         for (i, bounds) in self.bounds.into_iter().enumerate() {
-            let x = &mut self.belief.x[ETA + i];
-            let bounded = within(*x, bounds);
+            let x = &mut self.belief.x[ETA_START + i];
+            let bounded = clamp(*x, bounds);
             cut |= bounded != *x;
             *x = bounded;
-            let largest = LARGEST_VARIANCE * self.first.x[ETA + i].powi(2);
-            let variance = self.belief.p[ETA + i][ETA + i];
+            let largest = MAX_VARIANCE_RATIO * self.first.x[ETA_START + i].powi(2);
+            let variance = self.belief.p[ETA_START + i][ETA_START + i];
             if variance > largest && largest > 0.0 {
                 let shrink = (largest / variance).sqrt();
                 for j in 0..N {
-                    self.belief.p[ETA + i][j] *= shrink;
-                    self.belief.p[j][ETA + i] *= shrink;
+                    self.belief.p[ETA_START + i][j] *= shrink;
+                    self.belief.p[j][ETA_START + i] *= shrink;
                 }
             }
         }
         cut
     }
 
-    fn eta(&self) -> [f64; OPERATOR] {
-        std::array::from_fn(|i| self.belief.x[ETA + i])
+    fn eta(&self) -> [f64; OPERATOR_PARAMETER_COUNT] {
+        std::array::from_fn(|i| self.belief.x[ETA_START + i])
     }
 
-    fn of_eta(&self) -> [[f64; OPERATOR]; OPERATOR] {
-        std::array::from_fn(|i| std::array::from_fn(|j| self.belief.p[ETA + i][ETA + j]))
+    fn eta_covariance(&self) -> [[f64; OPERATOR_PARAMETER_COUNT]; OPERATOR_PARAMETER_COUNT] {
+        std::array::from_fn(|i| std::array::from_fn(|j| self.belief.p[ETA_START + i][ETA_START + j]))
     }
 }
 
 fn model(x: &[f64; N], from: &StartState, sample_time: SampleTime) -> Model {
     let ts = sample_time.s();
-    let remnant = from.variance * power(&from.values[OPERATOR..]);
+    let remnant = from.variance * sum_of_squares(&from.values[OPERATOR_PARAMETER_COUNT..]);
     let [_, _, k_e, k_e_dot, omega, zeta] = *x;
     let g = (k_e * k_e + (CROSSOVER_RAD_S * k_e_dot).powi(2)).sqrt();
     let gain = [GAIN_DRIFT[0] * g, GAIN_DRIFT[1] * g / CROSSOVER_RAD_S];
@@ -141,19 +141,19 @@ fn model(x: &[f64; N], from: &StartState, sample_time: SampleTime) -> Model {
         ts,
         drift: [
             0.0,
-            STATE_NOISE * remnant * (CROSSOVER_RAD_S / g).powi(2) * ts,
+            STATE_NOISE_RATIO * remnant * (CROSSOVER_RAD_S / g).powi(2) * ts,
             gain[0] * gain[0] * ts,
             gain[1] * gain[1] * ts,
             (NEUROMUSCULAR_DRIFT * omega).powi(2) * ts,
             (NEUROMUSCULAR_DRIFT * zeta).powi(2) * ts,
         ],
-        noise: OUTPUT_NOISE * remnant,
+        noise: OUTPUT_NOISE_RATIO * remnant,
     }
 }
 
 /// Returns the sum of squares of the impulse response of 1/D.
-pub(super) fn power(d: &[f64]) -> f64 {
-    let mut response = vec![0.0; RESPONSE];
+pub(super) fn sum_of_squares(d: &[f64]) -> f64 {
+    let mut response = vec![0.0; RESPONSE_SAMPLES];
     response[0] = 1.0;
     hoid_core::filter::divide_in_place(d, &mut response);
     let sum: f64 = response.iter().map(|h| h * h).sum();
@@ -178,12 +178,12 @@ impl Recursion for JointFilter {
         let e = self.delay.step(sample.e);
         let [innovation, expected] = (self.update)(&self.model, &mut self.belief, e, sample.u);
         self.expected = expected;
-        let shortened = self.hold();
-        self.reported.set(self.eta());
+        let shortened = self.limit_estimate();
+        self.reported.set_operator(self.eta());
         StepOutcome { innovation, shortened }
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         let e = self.delay.step(sample.e);
         self.belief.x = self.model.transition(&self.belief.x, e);
         if !(self.belief.x[0].is_finite() && self.belief.x[1].is_finite()) {
@@ -197,7 +197,7 @@ impl Recursion for JointFilter {
     }
 
     fn bridge(&mut self, sample: Sample) {
-        self.follow(sample);
+        self.step_without_update(sample);
     }
 
     fn theta(&self) -> &[f64] {
@@ -205,7 +205,7 @@ impl Recursion for JointFilter {
     }
 
     fn covariance(&self, into: &mut [f64]) -> bool {
-        self.reported.covariance(&self.of_eta(), into);
+        self.reported.covariance(&self.eta_covariance(), into);
         true
     }
 
@@ -214,7 +214,7 @@ impl Recursion for JointFilter {
     }
 
     fn operator(&self) -> Option<OperatorEstimate> {
-        let (eta, c) = (self.eta(), self.of_eta());
-        Some(self.reported.operator(eta, &c, lead_time_of(eta, &c)))
+        let (eta, c) = (self.eta(), self.eta_covariance());
+        Some(self.reported.operator(eta, &c, lead_time(eta, &c)))
     }
 }

@@ -33,7 +33,7 @@ use hoid_model::{SampleTime, Structure};
 
 use hoid_track::{
     BoundOptions, Memory,
-    building::{About, Recursion, RecursiveMethod, Setup, StartState},
+    building::{MethodDescription, Recursion, RecursiveMethod, Setup, StartState},
 };
 
 use crate::known_noise::check_model_of_change;
@@ -45,8 +45,8 @@ use filter::JointFilter;
 macro_rules! joint_filter {
     ($options:ident, $name:literal, $help:literal, $source:literal, $step:path) => {
         impl RecursiveMethod for $options {
-            fn about(&self) -> About {
-                About {
+            fn description(&self) -> MethodDescription {
+                MethodDescription {
                     name: $name,
                     help: $help,
                     source: $source,
@@ -77,7 +77,7 @@ macro_rules! joint_filter {
                 true
             }
 
-            fn is_model_of_change(&self) -> bool {
+            fn models_change(&self) -> bool {
                 true
             }
 

@@ -1,8 +1,8 @@
 #![allow(clippy::unwrap_used)]
 use super::{
-    belief::{AugmentedState, ETA, Model, N},
+    belief::{AugmentedState, ETA_START, Model, N},
     ekf,
-    filter::power,
+    filter::sum_of_squares,
     ukf,
 };
 use crate::kernel::multiple_model::response::Response;
@@ -78,7 +78,7 @@ fn both_filters_agree_on_a_linear_model() {
 
 /// Near the true values, with small variances, the sigma points stay in the range in which the model is nearly linear.
 #[test]
-fn with_small_covariance_both_filters_nearly_agree() {
+fn both_filters_nearly_agree_for_small_covariance() {
     let mut p = [[0.0; N]; N];
     for (i, x) in X.iter().enumerate() {
         p[i][i] = (1e-4 * x).powi(2);
@@ -96,7 +96,7 @@ fn with_small_covariance_both_filters_nearly_agree() {
         ekf::step(&small, &mut extended, e, u);
         ukf::step(&small, &mut unscented, e, u);
     }
-    for i in ETA..N {
+    for i in ETA_START..N {
         let apart = (extended.x[i] - unscented.x[i]).abs();
         // The difference is due to second-order terms, for standard errors of about a thousandth.
         assert!(
@@ -108,7 +108,7 @@ fn with_small_covariance_both_filters_nearly_agree() {
 
 #[test]
 fn first_order_filter_power_matches_the_closed_form() {
-    assert!((power(&[-0.8]) - 1.0 / (1.0 - 0.64)).abs() < 1e-12);
-    assert_eq!(power(&[]), 1.0);
-    assert_eq!(power(&[-3.0]), 1.0);
+    assert!((sum_of_squares(&[-0.8]) - 1.0 / (1.0 - 0.64)).abs() < 1e-12);
+    assert_eq!(sum_of_squares(&[]), 1.0);
+    assert_eq!(sum_of_squares(&[-3.0]), 1.0);
 }

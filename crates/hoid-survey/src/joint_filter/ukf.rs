@@ -8,25 +8,25 @@ use super::belief::{AugmentedState, Matrix, Model, N};
 
 /// Processes a sample. Returns the innovation and its predicted variance.
 pub(crate) fn step(model: &Model, belief: &mut AugmentedState, e: f64, u: f64) -> [f64; 2] {
-    let moved = points(belief).map(|x| model.transition(&x, e));
+    let moved = sigma_points(belief).map(|x| model.transition(&x, e));
     belief.x = mean(&moved);
     belief.p = [[0.0; N]; N];
     for x in &moved {
         for i in 0..N {
             for j in 0..N {
-                belief.p[i][j] += (x[i] - belief.x[i]) * (x[j] - belief.x[j]) / COUNT as f64;
+                belief.p[i][j] += (x[i] - belief.x[i]) * (x[j] - belief.x[j]) / POINT_COUNT as f64;
             }
         }
     }
     for (i, q) in model.drift.iter().enumerate() {
         belief.p[i][i] += q;
     }
-    let drawn = points(belief);
+    let drawn = sigma_points(belief);
     let outputs = drawn.map(|x| Model::output(&x));
-    let output = outputs.iter().sum::<f64>() / COUNT as f64;
+    let output = outputs.iter().sum::<f64>() / POINT_COUNT as f64;
     let (mut expected, mut with) = (model.noise, [0.0; N]);
     for (x, y) in drawn.iter().zip(outputs) {
-        let away = (y - output) / COUNT as f64;
+        let away = (y - output) / POINT_COUNT as f64;
         expected += away * (y - output);
         for i in 0..N {
             with[i] += away * (x[i] - belief.x[i]);
@@ -46,9 +46,9 @@ pub(crate) fn step(model: &Model, belief: &mut AugmentedState, e: f64, u: f64) -
 }
 
 /// Number of sigma points.
-const COUNT: usize = 2 * N;
+const POINT_COUNT: usize = 2 * N;
 
-fn points(belief: &AugmentedState) -> [[f64; N]; COUNT] {
+fn sigma_points(belief: &AugmentedState) -> [[f64; N]; POINT_COUNT] {
     let root = root(&belief.p);
     let reach = (N as f64).sqrt();
     std::array::from_fn(|k| {
@@ -57,8 +57,8 @@ fn points(belief: &AugmentedState) -> [[f64; N]; COUNT] {
     })
 }
 
-fn mean(points: &[[f64; N]; COUNT]) -> [f64; N] {
-    std::array::from_fn(|i| points.iter().map(|x| x[i]).sum::<f64>() / COUNT as f64)
+fn mean(points: &[[f64; N]; POINT_COUNT]) -> [f64; N] {
+    std::array::from_fn(|i| points.iter().map(|x| x[i]).sum::<f64>() / POINT_COUNT as f64)
 }
 
 /// Returns L with `L L' = P`; a direction whose variance has become negative by rounding is omitted.

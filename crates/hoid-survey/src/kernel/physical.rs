@@ -8,7 +8,7 @@
 //! neuromuscular system.
 //!
 //! Each parameter stays within its bounds: a step is cut off at the bound. C (and D, with
-//! [`Stable::PredictorAndNoise`]) is kept stable by halving the step.
+//! [`StablePolynomials::PredictorAndNoise`]) is kept stable by halving the step.
 //!
 //! If the delay is a parameter, `tau_e = l Ts + delta`, and B has three coefficients after a delay of `nk = l + 1`
 //! samples. When tau_e passes a whole sample, B is shifted along the past input that the predictor keeps, without a
@@ -17,21 +17,21 @@
 
 use hoid_core::{
     adaptation::Adaptation,
-    bounds::within,
+    bounds::clamp,
     error_bars::{ErrorBars, ErrorPropagation},
     held_operator::{held_operator, held_operator_delayed},
     predictor::{Predictor, Regressor},
-    recursion::{Stable, Step, backtrack, ratio},
+    recursion::{StablePolynomials, Step, backtrack, ratio},
     sensitivities::{ErrorLayout, LinearForm, Sensitivities},
     shape::Shape,
 };
 
 /// Index of omega_nm in eta.
-const OMEGA: usize = 2;
+const OMEGA_INDEX: usize = 2;
 /// Index of zeta_nm in eta.
-const ZETA: usize = 3;
+const ZETA_INDEX: usize = 3;
 /// Index of tau_e in eta, if tau_e is a parameter.
-const TAU: usize = 4;
+const TAU_INDEX: usize = 4;
 
 /// Model of the recursion: orders, sample time and bounds.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,11 +45,11 @@ pub struct PhysicalModel<S, const N: usize> {
     /// Smallest and largest value of each parameter.
     pub bounds: [[f64; 2]; N],
     /// Noise polynomials that are kept stable.
-    pub stable: Stable,
+    pub stable: StablePolynomials,
 }
 
 /// The recursion. N is the capacity for parameters; K is the capacity for the errors of the filters
-/// ([`ErrorLayout::filter_errors`]; 0 for the default error bars); L is the number of past inputs that are kept, at
+/// ([`ErrorLayout::filter_error_count`]; 0 for the default error bars); L is the number of past inputs that are kept, at
 /// least nc: 2 if tau_e is not a parameter, otherwise 3 plus the range of the delay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
@@ -80,7 +80,7 @@ hoid_core::state!([S, const N: usize, const K: usize, const L: usize, A: hoid_co
 
 impl<S: Shape, const N: usize> PhysicalModel<S, N> {
     /// Number of operator parameters, which precede c and d in eta.
-    fn operator(&self) -> usize {
+    fn operator_parameter_count(&self) -> usize {
         self.shape.nb() + 2
     }
 
@@ -89,13 +89,13 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
         let noise = self.shape.nc() + self.shape.nd();
         let mut theta = [0.0; N];
         let mut jacobian = [[0.0; 5]; 5];
-        let (operator, mut whole_samples) = (self.operator(), 0);
+        let (operator, mut whole_samples) = (self.operator_parameter_count(), 0);
         if self.smallest_nk.is_some() {
-            let samples = eta[TAU] / self.sample_time;
+            let samples = eta[TAU_INDEX] / self.sample_time;
             // The tolerance allows for rounding errors: 0.29/0.01 is 28.999999999999996.
             let whole = libm::floor(samples * (1.0 + 1e-12) + 1e-12).max(0.0);
             whole_samples = whole as usize;
-            let delta = (eta[TAU] - whole * self.sample_time).clamp(0.0, self.sample_time);
+            let delta = (eta[TAU_INDEX] - whole * self.sample_time).clamp(0.0, self.sample_time);
             let (values, by) = held_operator_delayed(gains, delta, self.sample_time);
             jacobian = by;
             theta[..3].copy_from_slice(&values[..3]);
@@ -117,7 +117,7 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
         }
     }
 
-    fn within_bounds(&self, eta: &[f64; N]) -> bool {
+    fn is_within_bounds(&self, eta: &[f64; N]) -> bool {
         eta.iter()
             .zip(&self.bounds)
             .all(|(e, [low, high])| low <= e && e <= high)
@@ -135,14 +135,14 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         let orders = (shape.na(), shape.nb(), shape.nf()) == (0, nb, 2);
         let sound = orders
             && model.sample_time > 0.0
-            && model.bounds[OMEGA][0] > 0.0
-            && model.bounds[ZETA][0] > 0.0
-            && model.within_bounds(&eta);
-        if !sound || ErrorLayout::for_capacity::<S, K>(&shape).filter_errors() > K {
+            && model.bounds[OMEGA_INDEX][0] > 0.0
+            && model.bounds[ZETA_INDEX][0] > 0.0
+            && model.is_within_bounds(&eta);
+        if !sound || ErrorLayout::for_capacity::<S, K>(&shape).filter_error_count() > K {
             return None;
         }
         let polynomials = model.polynomials(&eta);
-        if !model.stable.holds(&shape, &polynomials.theta) {
+        if !model.stable.accepts(&shape, &polynomials.theta) {
             return None;
         }
         let mut recursion = Self {
@@ -178,7 +178,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
     #[inline(always)]
     fn chain_rule(&self, of_theta: [f64; N]) -> [f64; N] {
         let shape = self.model.shape;
-        let (operator, noise) = (self.model.operator(), shape.nc() + shape.nd());
+        let (operator, noise) = (self.model.operator_parameter_count(), shape.nc() + shape.nd());
         let nb = operator - 2;
         let jacobian = &self.polynomials.jacobian;
         let mut row = of_theta;
@@ -207,15 +207,18 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         let moved = self
             .adaptation
             .update(&self.psi, limited, &self.eta, self.bars.innovation_variance());
-        let (operator, noise) = (self.model.operator(), self.model.shape.nc() + self.model.shape.nd());
+        let (operator, noise) = (
+            self.model.operator_parameter_count(),
+            self.model.shape.nc() + self.model.shape.nd(),
+        );
         let (shape, stable) = (self.model.shape, self.model.stable);
         // The bounds keep the operator's part of theta stable; only the noise model has to be tested.
         let (allowed, mut eta) = backtrack(&self.eta, &moved.step, |eta| {
             let mut theta = [0.0; N];
             theta[operator - 2..operator - 2 + noise].copy_from_slice(&eta[operator..operator + noise]);
-            stable.holds(&shape, &theta)
+            stable.accepts(&shape, &theta)
         });
-        let (fraction, cut) = self.cut_at_bounds(&moved.step, allowed, &mut eta);
+        let (fraction, cut) = self.limit_to_bounds(&moved.step, allowed, &mut eta);
         let mut gain = moved.gain;
         for i in 0..N {
             gain[i] *= fraction[i] * used;
@@ -235,10 +238,10 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
     /// Limits the new estimate to the bounds. Returns the fraction of the step that remains for each parameter, which
     /// is `allowed` inside the bounds, and whether a parameter was limited.
     #[inline(always)]
-    fn cut_at_bounds(&self, step: &[f64; N], allowed: f64, eta: &mut [f64; N]) -> ([f64; N], bool) {
+    fn limit_to_bounds(&self, step: &[f64; N], allowed: f64, eta: &mut [f64; N]) -> ([f64; N], bool) {
         let (mut fraction, mut cut) = ([allowed; N], false);
         for i in 0..N {
-            let bounded = within(eta[i], self.model.bounds[i]);
+            let bounded = clamp(eta[i], self.model.bounds[i]);
             if bounded != eta[i] {
                 cut = true;
                 fraction[i] = if step[i] == 0.0 {
@@ -277,7 +280,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
     #[inline(always)]
     fn sensitivities(&self) -> (ErrorLayout, Sensitivities<N, K>) {
         if K == 0 {
-            return (ErrorLayout::NONE, Sensitivities::from_gradient(&self.psi));
+            return (ErrorLayout::NO_FILTER_ERRORS, Sensitivities::from_gradient(&self.psi));
         }
         let layout = ErrorLayout::of(&self.model.shape);
         let rows = self.predictor.sensitivities(&self.polynomials.theta, &layout);
@@ -286,7 +289,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
             filters: row.filters,
         };
         let layout = ErrorLayout {
-            noise: (self.model.operator(), layout.noise.1),
+            noise: (self.model.operator_parameter_count(), layout.noise.1),
             ..layout
         };
         let rows = Sensitivities {

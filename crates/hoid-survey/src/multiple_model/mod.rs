@@ -25,24 +25,24 @@ use hoid_ident::{Constraint, IdentError, settings, settings::Bounds};
 use hoid_track::{
     BoundOptions, Change, DelayOptions, GuardChoice, GuardOptions, Memory, Sample,
     building::{
-        About, Causal, Recursion, RecursiveMethod, Reported, Setup, StartState, StepOutcome, TwoSided,
-        bad as bad_option,
+        CausalRun, MethodDescription, Recursion, RecursiveMethod, ReportedModel, Setup, StartState, StepOutcome,
+        TwoSidedEstimate, invalid_option as bad_option,
     },
 };
 
 use crate::{
     kernel::multiple_model::{
-        MultipleModelFilter, change as kernel_change, hypothesis as kernel, prior::OPERATOR, response::Signals,
+        MultipleModelFilter, change as kernel_change, hypothesis as kernel, prior::PARAMETER_COUNT, response::Signals,
     },
-    known_noise::{LARGEST_ND, check_model_of_change},
+    known_noise::{MAX_ND, check_model_of_change},
 };
-use prior::{change_prior, delays, first_hypothesis, invalid_prior, out_of_range_error};
+use prior::{candidate_delays, change_prior, first_hypothesis, invalid_prior, out_of_range_error};
 
-/// Capacity for hypotheses if the delay is known; `WITH_DELAYS` is the capacity if it is tracked.
-const HYPOTHESES: usize = 16;
-const WITH_DELAYS: usize = 48;
+/// Capacity for hypotheses if the delay is known; `MAX_HYPOTHESES_WITH_DELAYS` is the capacity if it is tracked.
+const MAX_HYPOTHESES: usize = 16;
+const MAX_HYPOTHESES_WITH_DELAYS: usize = 48;
 /// Limit on innovations, in standard deviations.
-const LIMIT: f64 = 3.5;
+const INNOVATION_LIMIT: f64 = 3.5;
 /// Default order of the noise model; the odds require white innovations.
 const DEFAULT_ND: usize = 6;
 
@@ -68,8 +68,8 @@ settings! {
 }
 
 impl RecursiveMethod for MultipleModelOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: "multiple-model",
             help: "a bank of hypotheses about when the person changed, which sets its own memory and reports changes",
             source: "Andersson 1985; Willsky and Jones 1976; Adams and MacKay 2007; the book, page A person who changes",
@@ -106,13 +106,13 @@ impl RecursiveMethod for MultipleModelOptions {
         sample_time: SampleTime,
     ) -> Result<Box<dyn Recursion>, IdentError> {
         match setup.track_delay_s {
-            None => Ok(Box::new(MultipleModelRecursion::<HYPOTHESES>::new(
+            None => Ok(Box::new(MultipleModelRecursion::<MAX_HYPOTHESES>::new(
                 self,
                 setup,
                 from,
                 sample_time,
             )?)),
-            Some(_) => Ok(Box::new(MultipleModelRecursion::<WITH_DELAYS>::new(
+            Some(_) => Ok(Box::new(MultipleModelRecursion::<MAX_HYPOTHESES_WITH_DELAYS>::new(
                 self,
                 setup,
                 from,
@@ -125,7 +125,7 @@ impl RecursiveMethod for MultipleModelOptions {
         true
     }
 
-    fn is_model_of_change(&self) -> bool {
+    fn models_change(&self) -> bool {
         true
     }
 
@@ -136,20 +136,25 @@ impl RecursiveMethod for MultipleModelOptions {
         ))
     }
 
-    fn smooths(&self) -> bool {
+    fn requests_two_sided(&self) -> bool {
         self.smooth
     }
 
-    fn two_sided(&self, record: &Record, causal: &Causal, from: &StartState) -> Result<Vec<TwoSided>, IdentError> {
-        smoother::smooth(self.alarm, record, causal, from)
+    fn two_sided(
+        &self,
+        record: &Record,
+        causal: &CausalRun,
+        from: &StartState,
+    ) -> Result<Vec<TwoSidedEstimate>, IdentError> {
+        smoother::two_sided_estimates(self.alarm, record, causal, from)
     }
 
     fn guard(&self) -> Option<GuardChoice> {
         self.guard.guard.or(Some(GuardChoice::Yes))
     }
 
-    fn limit(&self) -> f64 {
-        self.limit.unwrap_or(LIMIT)
+    fn innovation_limit(&self) -> f64 {
+        self.limit.unwrap_or(INNOVATION_LIMIT)
     }
 
     fn bounds(&self) -> BTreeMap<String, Constraint> {
@@ -167,11 +172,11 @@ impl RecursiveMethod for MultipleModelOptions {
 
 /// The bank with its filters and with a delay line for the shortest delay.
 struct MultipleModelRecursion<const M: usize> {
-    model: Box<MultipleModelFilter<M, LARGEST_ND, Vec<Signals>>>,
+    model: Box<MultipleModelFilter<M, MAX_ND, Vec<Signals>>>,
     delay: DelayLine<Vec<f64>>,
     shortest: usize,
     sample_time: SampleTime,
-    reported: Reported,
+    reported: ReportedModel,
 }
 
 impl<const M: usize> MultipleModelRecursion<M> {
@@ -181,7 +186,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
         from: &StartState,
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
-        let (nk, delays) = (setup.orders.nk, delays(setup, sample_time));
+        let (nk, delays) = (setup.orders.nk, candidate_delays(setup, sample_time));
         let shortest = *delays.start();
         if !delays.contains(&nk) {
             return Err(invalid_prior(&format!(
@@ -190,7 +195,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
             )));
         }
         let first = first_hypothesis(from, 1.0, sample_time)?.with_extra_delay(nk - shortest);
-        let d = &from.values[OPERATOR..];
+        let d = &from.values[PARAMETER_COUNT..];
         let memory = vec![[0.0; 6]; delays.count()];
         let model =
             MultipleModelFilter::with_delays(first, d, change_prior(options.alarm, setup, sample_time)?, memory)
@@ -200,7 +205,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
             delay: DelayLine::new(vec![0.0; shortest]),
             shortest,
             sample_time,
-            reported: Reported::new(from, nk, sample_time),
+            reported: ReportedModel::new(from, nk, sample_time),
         })
     }
 
@@ -209,7 +214,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
     fn delay_s(&self, [later, variance]: [f64; 2]) -> Estimate {
         let ts = self.sample_time.s();
         let tau_e_s = (self.shortest as f64 - 1.0 + later) * ts;
-        match self.model.bank().delays() {
+        match self.model.bank().delay_count() {
             1 => Estimate::fixed(tau_e_s),
             _ => Estimate::with_variance(tau_e_s, variance * ts * ts),
         }
@@ -217,7 +222,7 @@ impl<const M: usize> MultipleModelRecursion<M> {
 }
 
 /// Converts a change declared by the kernel to seconds; `tau_e_s` is the delay before and after the change.
-fn declared(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Change {
+fn change_in_seconds(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Change {
     let (before, now) = (&change.before, &change.after);
     let pair = |i: usize| {
         let of = |b: &kernel::Snapshot| {
@@ -257,11 +262,11 @@ impl<const M: usize> Recursion for MultipleModelRecursion<M> {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         let step = self.model.step(x, sample.u);
-        self.reported.set(self.model.bank().mixture().eta);
+        self.reported.set_operator(self.model.bank().mixture().eta);
         step.into()
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         self.model.step_without_update(x, sample.u).into()
     }
@@ -303,6 +308,6 @@ impl<const M: usize> Recursion for MultipleModelRecursion<M> {
     fn change(&self) -> Option<Change> {
         let change = self.model.bank().change()?;
         let tau_e_s = [change.before, change.after].map(|b| self.delay_s(b.delay));
-        Some(declared(&change, tau_e_s, self.sample_time))
+        Some(change_in_seconds(&change, tau_e_s, self.sample_time))
     }
 }

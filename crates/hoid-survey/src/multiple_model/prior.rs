@@ -9,26 +9,26 @@ use hoid_track::building::{Setup, StartState, physical_bounds};
 
 use crate::kernel::multiple_model::{
     hypothesis::Hypothesis,
-    prior::{ChangePrior, DelayPrior, OPERATOR},
+    prior::{ChangePrior, DelayPrior, PARAMETER_COUNT},
 };
 
 /// Time between two births, s.
-const SPACING_S: f64 = 0.32;
+const BIRTH_INTERVAL_S: f64 = 0.32;
 /// Mean time between two changes, s.
-const BETWEEN_CHANGES_S: f64 = 60.0;
+const MEAN_CHANGE_INTERVAL_S: f64 = 60.0;
 /// Prior standard deviations of a change of K_e and of K_e_dot, in the units of [`ChangePrior::gain_jump`].
 const CHANGE_SD: [f64; 2] = [0.15, 0.5];
 /// Standard deviation of the drift of each gain in one second, in the units of [`ChangePrior::gain_drift`].
-const DRIFT: f64 = 0.005;
+const GAIN_DRIFT: f64 = 0.005;
 /// Standard deviations of the drift in one second just after a change, in the units of
 /// [`ChangePrior::transient_drift`]; `TRANSIENT_TIME_CONSTANT_S` is the time constant of its decay, s.
-const TRANSIENT_DRIFT: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
+const TRANSIENT_DRIFT: [f64; PARAMETER_COUNT] = [0.05, 0.25, 0.2, 0.2];
 const TRANSIENT_TIME_CONSTANT_S: f64 = 3.0;
 /// Prior standard deviations of a relative change of omega_nm and of zeta_nm. A hypothesis that omega_nm and zeta_nm
-/// also changed is created every `NEUROMUSCULAR_EVERY` births; `NEUROMUSCULAR_ODDS` are the odds of this change against
+/// also changed is created every `NEUROMUSCULAR_BIRTH_INTERVAL` births; `NEUROMUSCULAR_ODDS` are the odds of this change against
 /// a change of the gains alone.
-const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
-const NEUROMUSCULAR_EVERY: u32 = 4;
+const NEUROMUSCULAR_CHANGE_SD: [f64; 2] = [0.25, 0.4];
+const NEUROMUSCULAR_BIRTH_INTERVAL: u32 = 4;
 const NEUROMUSCULAR_ODDS: f64 = 0.3;
 /// Crossover frequency, which scales K_e_dot relative to K_e, rad/s.
 const CROSSOVER_RAD_S: f64 = 2.0;
@@ -39,24 +39,24 @@ const RETAINED_MEMORY_S: f64 = 1.0;
 /// Number of birth intervals for which a hypothesis is kept regardless of its predictions.
 const PROTECTED_BIRTHS: f64 = 4.0;
 /// Age from which a hypothesis can identify the changed parameters, s.
-const SETTLED_S: f64 = 0.5;
+const SETTLING_TIME_S: f64 = 0.5;
 /// Largest age at which a hypothesis represents a recent change, s.
-const RECENT_S: f64 = 4.0;
+const MAX_RECENT_AGE_S: f64 = 4.0;
 
 /// Interval between proposals of other delays, in births. The following constants are the number of delays proposed,
 /// the odds of a change of the delay against a change of the gains alone, the standard deviation of that change in s,
 /// and the probability of a delay next to the likeliest delay.
-const DELAYS_EVERY: u32 = 4;
-const DELAYS_PROPOSED: usize = 8;
+const DELAY_BIRTH_INTERVAL: u32 = 4;
+const PROPOSED_DELAY_COUNT: usize = 8;
 const DELAY_ODDS: f64 = 1.0;
-const DELAY_JUMP_S: f64 = 0.05;
+const DELAY_CHANGE_SD_S: f64 = 0.05;
 const NEIGHBOUR_PROBABILITY: f64 = 0.15;
 /// Effect of a delay error of 0.01 s on K_e, K_e_dot, omega_nm and zeta_nm, in the units of
 /// [`DelayPrior::error_per_sample`].
-const DELAY_ERROR_EFFECT: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
+const DELAY_ERROR_EFFECT: [f64; PARAMETER_COUNT] = [0.01, 0.03, 0.04, 0.08];
 
 /// Candidate delays as values of nk: nk itself, or all values of the tracked range.
-pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
+pub(super) fn candidate_delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
     match setup.track_delay_s {
         None => setup.orders.nk..=setup.orders.nk,
         Some((low, high)) => sample_time.nk(low)..=sample_time.nk(high),
@@ -69,35 +69,35 @@ pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<u
 /// The errors of [`physical_bounds`].
 pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -> Result<ChangePrior, IdentError> {
     let ts = sample_time.s();
-    let spacing = (SPACING_S / ts).round().max(1.0);
+    let spacing = (BIRTH_INTERVAL_S / ts).round().max(1.0);
     Ok(ChangePrior {
         sample_time: ts,
-        bounds: physical_bounds::<OPERATOR>(setup, sample_time)?,
+        bounds: physical_bounds::<PARAMETER_COUNT>(setup, sample_time)?,
         birth_interval: spacing as u32,
         // The probability of a change between two births is at most one half.
-        hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
+        hazard: (ts / MEAN_CHANGE_INTERVAL_S).min(0.5 / spacing),
         gain_jump: CHANGE_SD,
-        gain_drift: DRIFT * ts.sqrt(),
+        gain_drift: GAIN_DRIFT * ts.sqrt(),
         transient_drift: TRANSIENT_DRIFT.map(|u| u * ts.sqrt()),
         transient_time_constant: TRANSIENT_TIME_CONSTANT_S / ts,
-        neuromuscular_jump: NEUROMUSCULAR,
-        neuromuscular_every: NEUROMUSCULAR_EVERY,
+        neuromuscular_jump: NEUROMUSCULAR_CHANGE_SD,
+        neuromuscular_every: NEUROMUSCULAR_BIRTH_INTERVAL,
         neuromuscular_odds: NEUROMUSCULAR_ODDS,
         crossover: CROSSOVER_RAD_S,
         residuals_after_change: (RETAINED_MEMORY_S / ts).max(4.0),
         pruning_age: (PROTECTED_BIRTHS * spacing) as u64,
         outlier_limit: setup.limit,
-        settling_time: (SETTLED_S / ts).round() as u64,
-        change_window: (RECENT_S / ts).round().max(2.0 * spacing) as u64,
+        settling_time: (SETTLING_TIME_S / ts).round() as u64,
+        change_window: (MAX_RECENT_AGE_S / ts).round().max(2.0 * spacing) as u64,
         log_odds_threshold: alarm,
-        delay: match delays(setup, sample_time).count() {
-            1 => DelayPrior::KNOWN,
+        delay: match candidate_delays(setup, sample_time).count() {
+            1 => DelayPrior::KNOWN_DELAY,
             count => DelayPrior {
                 count,
-                propose_every: DELAYS_EVERY,
+                propose_every: DELAY_BIRTH_INTERVAL,
                 change_odds: DELAY_ODDS,
-                proposals: DELAYS_PROPOSED,
-                jump: DELAY_JUMP_S / ts,
+                proposals: PROPOSED_DELAY_COUNT,
+                jump: DELAY_CHANGE_SD_S / ts,
                 neighbour_probability: NEIGHBOUR_PROBABILITY,
                 error_per_sample: DELAY_ERROR_EFFECT.map(|w| w * ts / 0.01),
             },

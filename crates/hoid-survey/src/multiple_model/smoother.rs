@@ -24,7 +24,7 @@
 use crate::kernel::multiple_model::{
     bank::Bank,
     hypothesis::Hypothesis,
-    prior::{ChangePrior, OPERATOR},
+    prior::{ChangePrior, PARAMETER_COUNT},
     response::{Response, Signals},
     signal_ring::DelayedSignals,
 };
@@ -32,13 +32,13 @@ use hoid_model::Record;
 use hoid_numerics::{cholesky, products::dot};
 
 use hoid_ident::IdentError;
-use hoid_track::building::{Causal, Reported, Setup, StartState, TwoSided};
+use hoid_track::building::{CausalRun, ReportedModel, Setup, StartState, TwoSidedEstimate};
 
 use super::prior::{change_prior, first_hypothesis, out_of_range_error};
 
-/// Capacity for hypotheses; `SPACING_S` is the time between two births, s.
-const HYPOTHESES: usize = 64;
-const SPACING_S: f64 = 0.08;
+/// Capacity for hypotheses; `BIRTH_INTERVAL_S` is the time between two births, s.
+const MAX_HYPOTHESES: usize = 64;
+const BIRTH_INTERVAL_S: f64 = 0.08;
 /// Factor by which the covariance of the start fit is multiplied at the start of both runs.
 const START_COVARIANCE_FACTOR: f64 = 100.0;
 /// Time after which the effect of starting the filters at rest is negligible, in time constants of the neuromuscular
@@ -52,21 +52,21 @@ const OVERFLOW_LIMIT: f64 = 1e60;
 
 /// A forward or backward hypothesis in the form in which it is combined with others.
 #[derive(Debug, Clone, Copy)]
-struct Side {
+struct OneSidedHypothesis {
     log_weight: f64,
-    eta: [f64; OPERATOR],
-    covariance: [[f64; OPERATOR]; OPERATOR],
+    eta: [f64; PARAMETER_COUNT],
+    covariance: [[f64; PARAMETER_COUNT]; PARAMETER_COUNT],
     /// Half the logarithm of the determinant of the joint covariance of eta and the log innovation variance.
     size: f64,
     /// Logarithm of the innovation variance, and the variance of this logarithm.
     level: [f64; 2],
 }
 
-impl Side {
+impl OneSidedHypothesis {
     fn of(h: &Hypothesis) -> Self {
         let level = [
             h.innovation_variance.variance().max(f64::MIN_POSITIVE).ln(),
-            2.0 / h.innovation_variance.residuals().max(1.0),
+            2.0 / h.innovation_variance.residual_count().max(1.0),
         ];
         Self {
             log_weight: h.probability.ln(),
@@ -80,9 +80,9 @@ impl Side {
 
 /// Mean, covariance and innovation variance of a mixture.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Joined {
-    pub eta: [f64; OPERATOR],
-    pub covariance: [[f64; OPERATOR]; OPERATOR],
+pub(crate) struct Mixture {
+    pub eta: [f64; PARAMETER_COUNT],
+    pub covariance: [[f64; PARAMETER_COUNT]; PARAMETER_COUNT],
     pub variance: f64,
 }
 
@@ -93,26 +93,26 @@ type WhitenedSample = Option<(f64, Signals)>;
 ///
 /// # Errors
 /// [`IdentError::BadStart`] if the start cannot be used.
-pub(super) fn smooth(
+pub(super) fn two_sided_estimates(
     alarm: f64,
     record: &Record,
-    causal: &Causal,
+    causal: &CausalRun,
     from: &StartState,
-) -> Result<Vec<TwoSided>, IdentError> {
+) -> Result<Vec<TwoSidedEstimate>, IdentError> {
     let about = causal.last.map_or([from.values[2], from.values[3]], |o| {
         [o.omega_nm_rad_s.value, o.zeta_nm.value]
     });
-    let joined = two_sided(record, alarm, &causal.setup, causal.largest, from, about, &causal.rows)?;
-    let mut reported = Reported::new(from, causal.setup.orders.nk, record.sample_time());
+    let joined = pair_mixtures(record, alarm, &causal.setup, causal.largest, from, about, &causal.rows)?;
+    let mut reported = ReportedModel::new(from, causal.setup.orders.nk, record.sample_time());
     let p = reported.theta().len();
-    let mut row = |of: &Joined| {
+    let mut row = |of: &Mixture| {
         let mut covariance = vec![0.0; p * p];
-        reported.set(of.eta);
+        reported.set_operator(of.eta);
         reported.covariance(&of.covariance, &mut covariance);
-        TwoSided {
+        TwoSidedEstimate {
             theta: reported.theta().to_vec(),
             covariance,
-            operator: reported.operator(of.eta, &of.covariance, lead(of)),
+            operator: reported.operator(of.eta, &of.covariance, lead_time(of)),
             innovation_variance: of.variance,
         }
     };
@@ -120,7 +120,7 @@ pub(super) fn smooth(
 }
 
 /// Returns the mixtures of pairs at the requested samples; `rows` must be in ascending order.
-fn two_sided(
+fn pair_mixtures(
     record: &Record,
     alarm: f64,
     setup: &Setup,
@@ -128,9 +128,9 @@ fn two_sided(
     from: &StartState,
     about: [f64; 2],
     rows: &[usize],
-) -> Result<Vec<Joined>, IdentError> {
+) -> Result<Vec<Mixture>, IdentError> {
     let sample_time = record.sample_time();
-    let spacing = (SPACING_S / sample_time.s()).round().max(1.0);
+    let spacing = (BIRTH_INTERVAL_S / sample_time.s()).round().max(1.0);
     let default = change_prior(alarm, setup, sample_time)?;
     let supposed = ChangePrior {
         birth_interval: spacing as u32,
@@ -139,15 +139,18 @@ fn two_sided(
         ..default
     };
     let first = first_hypothesis(from, START_COVARIANCE_FACTOR, sample_time)?;
-    let bank = |first: Hypothesis| -> Result<Box<Bank<HYPOTHESES>>, IdentError> {
+    let bank = |first: Hypothesis| -> Result<Box<Bank<MAX_HYPOTHESES>>, IdentError> {
         Ok(Box::new(Bank::new(first, supposed).ok_or_else(out_of_range_error)?))
     };
-    let d = &from.values[OPERATOR..];
-    let seen = whitened(record, setup.orders.nk, largest, d, about);
+    let d = &from.values[PARAMETER_COUNT..];
+    let seen = whitened_samples(record, setup.orders.nk, largest, d, about);
     let mut front = bank(first)?;
-    let mut before: Vec<Vec<Side>> = Vec::with_capacity(rows.len());
+    let mut before: Vec<Vec<OneSidedHypothesis>> = Vec::with_capacity(rows.len());
     for (k, seen) in seen.iter().enumerate() {
-        front.update_hypotheses(seen.as_ref().map(|(y, r)| (*y, DelayedSignals::known(r))), about);
+        front.update_hypotheses(
+            seen.as_ref().map(|(y, r)| (*y, DelayedSignals::from_known_delay(r))),
+            about,
+        );
         if rows.get(before.len()) == Some(&k) {
             before.push(likely_hypotheses(&front));
         }
@@ -160,9 +163,12 @@ fn two_sided(
         if before.len().checked_sub(1).and_then(|last| rows.get(last)) == Some(&k)
             && let Some(before) = before.pop()
         {
-            joined.push(join(&before, &likely_hypotheses(&back)));
+            joined.push(mixture_product(&before, &likely_hypotheses(&back)));
         }
-        back.update_hypotheses(seen.as_ref().map(|(y, r)| (*y, DelayedSignals::known(r))), about);
+        back.update_hypotheses(
+            seen.as_ref().map(|(y, r)| (*y, DelayedSignals::from_known_delay(r))),
+            about,
+        );
     }
     joined.reverse();
     Ok(joined)
@@ -170,7 +176,7 @@ fn two_sided(
 
 /// Returns output and signals of every sample after the whitening filter D, with filters linearised about `about` and
 /// started at rest.
-fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<WhitenedSample> {
+fn whitened_samples(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<WhitenedSample> {
     let (e, u) = (record.input(), record.output());
     let sound = |v: f64| v.abs() <= largest;
     let mut response = Response::new(about, record.sample_time().s());
@@ -207,15 +213,15 @@ fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]
 
 /// Returns the likely hypotheses with the likeliest first, because a pair of likely hypotheses allows most other pairs
 /// to be skipped.
-fn likely_hypotheses(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
+fn likely_hypotheses(bank: &Bank<MAX_HYPOTHESES>) -> Vec<OneSidedHypothesis> {
     let likely = bank.hypotheses().filter(|h| h.probability >= MIN_RELATIVE_PROBABILITY);
-    let mut sides: Vec<Side> = likely.map(Side::of).collect();
+    let mut sides: Vec<OneSidedHypothesis> = likely.map(OneSidedHypothesis::of).collect();
     sides.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     sides
 }
 
 /// Returns the product of two mixtures.
-fn join(before: &[Side], after: &[Side]) -> Joined {
+fn mixture_product(before: &[OneSidedHypothesis], after: &[OneSidedHypothesis]) -> Mixture {
     let mut pairs: Vec<(f64, ForwardBackward)> = Vec::with_capacity(before.len() + after.len());
     let (mut most, least) = (f64::NEG_INFINITY, MIN_RELATIVE_PROBABILITY.ln());
     for f in before {
@@ -232,35 +238,35 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
         }
     }
     pairs.retain(|(log, _)| *log >= most + least);
-    let each: Vec<(f64, Joined)> = if pairs.is_empty() {
+    let each: Vec<(f64, Mixture)> = if pairs.is_empty() {
         // If no pair can be combined, the causal estimate is used.
-        let shares = before.iter().map(|f| (f.log_weight.exp(), unpaired(f)));
+        let shares = before.iter().map(|f| (f.log_weight.exp(), unpaired_mixture(f)));
         shares.collect()
     } else {
         let shares = pairs.iter().map(|(log, pair)| ((log - most).exp(), pair.product()));
         shares.collect()
     };
-    mixed(&each)
+    mixture_moments(&each)
 }
 
 /// Returns the mean and the covariance of a mixture.
-fn mixed(each: &[(f64, Joined)]) -> Joined {
+fn mixture_moments(each: &[(f64, Mixture)]) -> Mixture {
     let total: f64 = each.iter().map(|(share, _)| share).sum();
-    let mut mixture = Joined {
-        eta: [0.0; OPERATOR],
-        covariance: [[0.0; OPERATOR]; OPERATOR],
+    let mut mixture = Mixture {
+        eta: [0.0; PARAMETER_COUNT],
+        covariance: [[0.0; PARAMETER_COUNT]; PARAMETER_COUNT],
         variance: 0.0,
     };
     for (share, of) in each {
-        for i in 0..OPERATOR {
+        for i in 0..PARAMETER_COUNT {
             mixture.eta[i] += share / total * of.eta[i];
         }
         mixture.variance += share / total * of.variance;
     }
     for (share, of) in each {
-        let away: [f64; OPERATOR] = std::array::from_fn(|i| of.eta[i] - mixture.eta[i]);
-        for i in 0..OPERATOR {
-            for j in 0..OPERATOR {
+        let away: [f64; PARAMETER_COUNT] = std::array::from_fn(|i| of.eta[i] - mixture.eta[i]);
+        for i in 0..PARAMETER_COUNT {
+            for j in 0..PARAMETER_COUNT {
                 mixture.covariance[i][j] += share / total * (of.covariance[i][j] + away[i] * away[j]);
             }
         }
@@ -268,8 +274,8 @@ fn mixed(each: &[(f64, Joined)]) -> Joined {
     mixture
 }
 
-fn unpaired(f: &Side) -> Joined {
-    Joined {
+fn unpaired_mixture(f: &OneSidedHypothesis) -> Mixture {
+    Mixture {
         eta: f.eta,
         covariance: f.covariance,
         variance: f.level[0].exp(),
@@ -278,20 +284,20 @@ fn unpaired(f: &Side) -> Joined {
 
 /// A pair of a forward and a backward hypothesis, with `L L' = S` and `z = L^-1 (m_b - m_f)`.
 struct ForwardBackward<'a> {
-    f: &'a Side,
-    b: &'a Side,
-    root: [[f64; OPERATOR]; OPERATOR],
-    z: [f64; OPERATOR],
+    f: &'a OneSidedHypothesis,
+    b: &'a OneSidedHypothesis,
+    root: [[f64; PARAMETER_COUNT]; PARAMETER_COUNT],
+    z: [f64; PARAMETER_COUNT],
 }
 
 impl<'a> ForwardBackward<'a> {
     /// Lower bound of the decrease of the log weight due to the differences between f and b: `z'z` is not smaller than
     /// the squared difference of a single parameter divided by its variance. The constant 0.01 allows for rounding
     /// errors.
-    fn half_square(f: &Side, b: &Side) -> f64 {
+    fn half_square(f: &OneSidedHypothesis, b: &OneSidedHypothesis) -> f64 {
         let apart = b.level[0] - f.level[0];
         let mut square = 0.0_f64;
-        for i in 0..OPERATOR {
+        for i in 0..PARAMETER_COUNT {
             let away = b.eta[i] - f.eta[i];
             square = square.max(away * away / (f.covariance[i][i] + b.covariance[i][i]));
         }
@@ -300,12 +306,12 @@ impl<'a> ForwardBackward<'a> {
 
     /// Returns the logarithm of the weight of the pair, up to a constant, and the pair. `None` if S is not positive
     /// definite.
-    fn of(f: &'a Side, b: &'a Side) -> Option<(f64, Self)> {
+    fn of(f: &'a OneSidedHypothesis, b: &'a OneSidedHypothesis) -> Option<(f64, Self)> {
         let sum = std::array::from_fn(|i| std::array::from_fn(|j| f.covariance[i][j] + b.covariance[i][j]));
-        let root = factor(&sum)?;
+        let root = cholesky_factor(&sum)?;
         let mut z = std::array::from_fn(|i| b.eta[i] - f.eta[i]);
-        cholesky::forward(&root, OPERATOR, &mut z);
-        let determinant: f64 = (0..OPERATOR).map(|i| root[i][i]).product();
+        cholesky::substitute_forward(&root, PARAMETER_COUNT, &mut z);
+        let determinant: f64 = (0..PARAMETER_COUNT).map(|i| root[i][i]).product();
         let spread = f.level[1] + b.level[1];
         let apart = b.level[0] - f.level[0];
         let square = dot(&z, &z) + apart * apart / spread;
@@ -314,15 +320,15 @@ impl<'a> ForwardBackward<'a> {
     }
 
     /// Returns the combined estimate of the pair, by `P_f S^-1 x = (L^-1 P_f)' L^-1 x`.
-    fn product(&self) -> Joined {
+    fn product(&self) -> Mixture {
         let (f, b) = (self.f, self.b);
         let mut columns = f.covariance;
         columns
             .iter_mut()
-            .for_each(|column| cholesky::forward(&self.root, OPERATOR, column));
+            .for_each(|column| cholesky::substitute_forward(&self.root, PARAMETER_COUNT, column));
         let taken = |i: usize, j: usize| f.covariance[i][j] - dot(&columns[i], &columns[j]);
         let level = (f.level[0] * b.level[1] + b.level[0] * f.level[1]) / (f.level[1] + b.level[1]);
-        Joined {
+        Mixture {
             eta: std::array::from_fn(|i| f.eta[i] + dot(&columns[i], &self.z)),
             covariance: std::array::from_fn(|i| std::array::from_fn(|j| taken(i, j))),
             variance: level.exp(),
@@ -330,11 +336,11 @@ impl<'a> ForwardBackward<'a> {
     }
 }
 
-/// Returns L with `L L' = s`. The known products are summed before they are subtracted, as in [`cholesky::forward`];
-/// [`cholesky::factor`] gives the same result except for rounding errors.
-fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]> {
-    let mut l = [[0.0; OPERATOR]; OPERATOR];
-    for i in 0..OPERATOR {
+/// Returns L with `L L' = s`. The known products are summed before they are subtracted, as in [`cholesky::substitute_forward`];
+/// [`cholesky::cholesky_factor`] gives the same result except for rounding errors.
+fn cholesky_factor(s: &[[f64; PARAMETER_COUNT]; PARAMETER_COUNT]) -> Option<[[f64; PARAMETER_COUNT]; PARAMETER_COUNT]> {
+    let mut l = [[0.0; PARAMETER_COUNT]; PARAMETER_COUNT];
+    for i in 0..PARAMETER_COUNT {
         for j in 0..=i {
             let rest = s[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
             if i == j {
@@ -351,7 +357,7 @@ fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]
 }
 
 /// Returns T_L in s and its variance, from `E[K_e K_e_dot]/E[K_e^2]`.
-fn lead(row: &Joined) -> [f64; 2] {
+fn lead_time(row: &Mixture) -> [f64; 2] {
     let ([k_e, k_e_dot, ..], c) = (row.eta, &row.covariance);
     let square = k_e * k_e + c[0][0];
     let lead = (k_e * k_e_dot + c[0][1]) / square;

@@ -5,14 +5,15 @@ mod recursion;
 
 use std::collections::BTreeMap;
 
-use hoid_core::recursion::Stable;
+use hoid_core::recursion::StablePolynomials;
 use hoid_ident::{Constraint, IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
 use hoid_track::{
     BoundOptions, DelayOptions, GainOptions, GuardChoice, GuardOptions, Memory, StabilityOptions,
     building::{
-        About, DEFAULT_LIMIT, Plan, Recursion, RecursiveMethod, Setup, StartState, check_delay, check_operator_orders,
+        DEFAULT_LIMIT, MethodDescription, Plan, Recursion, RecursiveMethod, Setup, StartState, check_delay,
+        check_operator_orders,
     },
 };
 
@@ -34,8 +35,8 @@ settings! {
 }
 
 impl RecursiveMethod for PhysicalOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: "physical",
             help: "recursive prediction-error method in the operator's parameters",
             source: "Ljung 1999, section 11.5, with the Jacobian of the exact hold",
@@ -82,11 +83,11 @@ impl RecursiveMethod for PhysicalOptions {
         self.guard.guard.or(Some(GuardChoice::Yes))
     }
 
-    fn limit(&self) -> f64 {
+    fn innovation_limit(&self) -> f64 {
         self.gain.limit_or(DEFAULT_LIMIT)
     }
 
-    fn stable(&self) -> Stable {
+    fn stable(&self) -> StablePolynomials {
         self.stability.stable
     }
 

@@ -11,7 +11,9 @@ use hoid_ident::IdentError;
 use hoid_model::uncertainty::{Estimate, OperatorEstimate};
 use hoid_track::{
     Sample,
-    building::{Delay, Plan, Recursion, Scaled, StepOutcome, physical_bounds, scaled, too_many},
+    building::{
+        Delay, Plan, Recursion, ScaleCovariance, StepOutcome, physical_bounds, too_many_parameters, write_scaled,
+    },
 };
 
 use crate::kernel::physical::{PhysicalModel, PhysicalRpem};
@@ -23,7 +25,7 @@ use crate::kernel::physical::{PhysicalModel, PhysicalRpem};
 /// [`IdentError`] if options contradict each other, or if the start cannot be used.
 pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
     let o = plan.setup.polynomial_orders();
-    let p = plan.parameters();
+    let p = plan.parameter_count();
     let any = AnyShape {
         na: o.na,
         nb: o.nb,
@@ -32,7 +34,7 @@ pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
         nf: o.nf,
     };
     let of_operator = (o.na, o.nb, o.nc, o.nd, o.nf) == (0, 2, 0, 1, 2);
-    match (p, taps(plan)) {
+    match (p, stored_sample_count(plan)) {
         (5, None) if of_operator => with_capacity::<_, 5, 2, 5>(plan, FixedShape::<0, 2, 0, 1, 2>),
         (0..=8, None) => with_capacity::<_, 8, 8, 8>(plan, any),
         (0..=16, None) => with_capacity::<_, 16, 16, 16>(plan, any),
@@ -43,22 +45,22 @@ pub(super) fn build(plan: &Plan<'_>) -> Result<Box<dyn Recursion>, IdentError> {
             found: format!("{taps} samples"),
             expected: "at most 1024 samples; narrow the range, or sample more slowly".to_owned(),
         }),
-        _ => Err(too_many(p)),
+        _ => Err(too_many_parameters(p)),
     }
 }
 
 /// Smallest delay nk in samples; `None` if tau_e is not tracked.
-fn smallest_nk(plan: &Plan<'_>) -> Option<usize> {
+fn min_nk(plan: &Plan<'_>) -> Option<usize> {
     // The tolerance allows for rounding errors: 0.29/0.01 is 28.999999999999996.
     let whole = |low: f64| ((low / plan.sample_time.s() + 1e-9) as usize).saturating_add(1);
     plan.setup.track_delay_s.map(|(low, _)| whole(low))
 }
 
 /// Number of input samples to be kept; `None` if tau_e is not tracked.
-fn taps(plan: &Plan<'_>) -> Option<usize> {
+fn stored_sample_count(plan: &Plan<'_>) -> Option<usize> {
     let (_, longest) = plan.setup.track_delay_s?;
     let all = (longest / plan.sample_time.s()) as usize + 5;
-    Some(all.saturating_sub(smallest_nk(plan).unwrap_or(0)))
+    Some(all.saturating_sub(min_nk(plan).unwrap_or(0)))
 }
 
 fn with_capacity<S: Shape + Send + Sync + 'static, const N: usize, const K: usize, const L: usize>(
@@ -66,7 +68,7 @@ fn with_capacity<S: Shape + Send + Sync + 'static, const N: usize, const K: usiz
     shape: S,
 ) -> Result<Box<dyn Recursion>, IdentError> {
     let (setup, ts) = (plan.setup, plan.sample_time.s());
-    let smallest_nk = smallest_nk(plan);
+    let smallest_nk = min_nk(plan);
     let model = PhysicalModel {
         shape,
         smallest_nk,
@@ -74,24 +76,27 @@ fn with_capacity<S: Shape + Send + Sync + 'static, const N: usize, const K: usiz
         bounds: physical_bounds::<N>(setup, plan.sample_time)?,
         stable: setup.stable,
     };
-    let recursion =
-        PhysicalRpem::<S, N, K, L, _>::new(model, plan.values(), plan.gain::<N>(true)?, plan.bars::<N, K>()?)
-            .ok_or_else(|| IdentError::BadStart {
-                reason: "it lies outside the bounds of the physical parameters, or its noise model is not stable"
-                    .to_owned(),
-            })?;
-    Ok(Box::new(InPhysical {
+    let recursion = PhysicalRpem::<S, N, K, L, _>::new(
+        model,
+        plan.start_values(),
+        plan.gain::<N>(true)?,
+        plan.error_bars::<N, K>()?,
+    )
+    .ok_or_else(|| IdentError::BadStart {
+        reason: "it lies outside the bounds of the physical parameters, or its noise model is not stable".to_owned(),
+    })?;
+    Ok(Box::new(PhysicalRecursion {
         recursion,
         delay: DelayLine::new(vec![0.0; smallest_nk.unwrap_or(setup.orders.nk)]),
-        parameters: plan.parameters(),
+        parameters: plan.parameter_count(),
         tracked: smallest_nk.is_some(),
         fixed_tau_s: (setup.orders.nk as f64 - 1.0) * ts,
     }))
 }
 
-hoid_core::state!([S, const N: usize, const K: usize, const L: usize, A: State] InPhysical<S, N, K, L, A> { recursion, delay });
+hoid_core::state!([S, const N: usize, const K: usize, const L: usize, A: State] PhysicalRecursion<S, N, K, L, A> { recursion, delay });
 
-struct InPhysical<S, const N: usize, const K: usize, const L: usize, A> {
+struct PhysicalRecursion<S, const N: usize, const K: usize, const L: usize, A> {
     recursion: PhysicalRpem<S, N, K, L, A>,
     delay: DelayLine<Vec<f64>>,
     parameters: usize,
@@ -104,15 +109,15 @@ impl<
     const N: usize,
     const K: usize,
     const L: usize,
-    A: Adaptation<N> + Scaled + State + Send + Sync,
-> Recursion for InPhysical<S, N, K, L, A>
+    A: Adaptation<N> + ScaleCovariance + State + Send + Sync,
+> Recursion for PhysicalRecursion<S, N, K, L, A>
 {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         self.recursion.step(x, sample.u).into()
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         self.recursion.step_without_update(x, sample.u).into()
     }
@@ -142,7 +147,7 @@ impl<
     fn covariance(&self, into: &mut [f64]) -> bool {
         let p = self.parameters;
         let mut of_eta = vec![0.0; p * p];
-        scaled(
+        write_scaled(
             &self.recursion.normalised_covariance(),
             self.recursion.innovation_variance(),
             p,

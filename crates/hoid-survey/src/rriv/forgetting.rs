@@ -12,7 +12,7 @@ use hoid_core::{
     ud_covariance::UdCovariance,
 };
 
-use hoid_track::building::ROOM_WITHOUT_FIT;
+use hoid_track::building::VARIANCE_GROWTH_WITHOUT_FIT;
 
 /// Capacity for parameters.
 pub(crate) const CAPACITY: usize = 16;
@@ -51,7 +51,7 @@ impl Forgetting {
 
     fn of(factors: UdCovariance<CAPACITY>, lambda: [f64; CAPACITY]) -> Self {
         let matrix = factors.matrix();
-        let bound = std::array::from_fn(|i| ROOM_WITHOUT_FIT * matrix[i][i]);
+        let bound = std::array::from_fn(|i| VARIANCE_GROWTH_WITHOUT_FIT * matrix[i][i]);
         let covariance = Box::new(Covariance::new(factors, Rule::Exponential { lambda }, bound));
         Self {
             start: covariance.clone(),

@@ -7,15 +7,15 @@
 //! of the number of filters to the memory length.
 
 use super::forgetting::Forgetting;
-use hoid_track::building::{bounded, weighted};
+use hoid_track::building::{limit_magnitude, weighted_sum};
 
 /// Number of filters. The response of a loop lasts a second or two; 16 filters with a time constant of 16 samples span
 /// about 500 samples.
-const FILTERS: usize = 16;
+const FILTER_COUNT: usize = 16;
 /// Time constant of the filters in samples.
-const TIME_CONSTANT: f64 = 16.0;
+const TIME_CONSTANT_SAMPLES: f64 = 16.0;
 /// Memory length of the weights in samples.
-const MEMORY: f64 = 4096.0;
+const MEMORY_SAMPLES: f64 = 4096.0;
 /// Initial variance of the weights for signals of unit power; the prior at zero has the weight of a hundredth of a
 /// sample.
 const INITIAL_VARIANCE: f64 = 100.0;
@@ -24,8 +24,8 @@ const INITIAL_VARIANCE: f64 = 100.0;
 #[derive(Debug, Clone)]
 pub(crate) struct LaguerreRegression {
     pole: f64,
-    filters: [f64; FILTERS],
-    weights: [f64; FILTERS],
+    filters: [f64; FILTER_COUNT],
+    weights: [f64; FILTER_COUNT],
     p: Forgetting,
     /// Mean square of the external signal; `samples` is the number of samples.
     power: f64,
@@ -38,10 +38,10 @@ impl LaguerreRegression {
     /// Creates filters at rest with zero weights.
     pub fn new() -> Self {
         Self {
-            pole: (-1.0 / TIME_CONSTANT).exp(),
-            filters: [0.0; FILTERS],
-            weights: [0.0; FILTERS],
-            p: Forgetting::diagonal(INITIAL_VARIANCE, 1.0 - 1.0 / MEMORY),
+            pole: (-1.0 / TIME_CONSTANT_SAMPLES).exp(),
+            filters: [0.0; FILTER_COUNT],
+            weights: [0.0; FILTER_COUNT],
+            p: Forgetting::diagonal(INITIAL_VARIANCE, 1.0 - 1.0 / MEMORY_SAMPLES),
             power: 0.0,
             samples: 0.0,
         }
@@ -49,20 +49,20 @@ impl LaguerreRegression {
 
     /// Returns the part of e(t) that follows the external signal up to t.
     pub fn step(&mut self, external: f64, e: f64) -> f64 {
-        let external = bounded(external);
+        let external = limit_magnitude(external);
         self.filter(external);
-        let following = bounded(weighted(&self.weights, &self.filters));
+        let following = limit_magnitude(weighted_sum(&self.weights, &self.filters));
         self.samples += 1.0;
-        self.power += (external * external - self.power) / self.samples.min(MEMORY);
+        self.power += (external * external - self.power) / self.samples.min(MEMORY_SAMPLES);
         // The external signal is scaled to unit power, so P does not depend on its scale.
         let scale = self.power.sqrt().recip();
         if scale.is_finite() {
-            let z = self.filters.map(|v| bounded(scale * v));
-            let mut gain = [0.0; FILTERS];
+            let z = self.filters.map(|v| limit_magnitude(scale * v));
+            let mut gain = [0.0; FILTER_COUNT];
             self.p.gain(&z, &mut gain);
-            let error = bounded(scale * (e - following));
+            let error = limit_magnitude(scale * (e - following));
             for (w, g) in self.weights.iter_mut().zip(gain) {
-                *w = bounded(*w + g * error);
+                *w = limit_magnitude(*w + g * error);
             }
         }
         following
@@ -91,17 +91,17 @@ mod tests {
     #[test]
     fn filters_are_orthonormal() {
         let mut following = LaguerreRegression::new();
-        let mut gram = [[0.0; FILTERS]; FILTERS];
+        let mut gram = [[0.0; FILTER_COUNT]; FILTER_COUNT];
         for t in 0..4000 {
             following.filter(f64::from(u8::from(t == 0)));
-            for i in 0..FILTERS {
-                for j in 0..FILTERS {
+            for i in 0..FILTER_COUNT {
+                for j in 0..FILTER_COUNT {
                     gram[i][j] += following.filters[i] * following.filters[j];
                 }
             }
         }
-        for i in 0..FILTERS {
-            for j in 0..FILTERS {
+        for i in 0..FILTER_COUNT {
+            for j in 0..FILTER_COUNT {
                 // The impulse responses have decayed to the level of rounding errors.
                 assert!((gram[i][j] - f64::from(u8::from(i == j))).abs() < 1e-12, "{i} {j}");
             }
@@ -109,7 +109,7 @@ mod tests {
     }
 
     #[test]
-    fn follows_a_delayed_response_at_any_scale() {
+    fn delayed_response_is_followed_at_any_scale() {
         for scale in [1e-6, 1.0, 1e6] {
             let mut following = LaguerreRegression::new();
             let f = |t: i32| scale * ((0.05 * f64::from(t)).sin() + (0.31 * f64::from(t)).sin());

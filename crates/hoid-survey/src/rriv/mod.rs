@@ -24,7 +24,7 @@
 //! covariance of theta is therefore `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` for any gain. For lambda = 1 it
 //! equals the covariance of the batch method; with forgetting, C is about `P/(1 + lambda)`.
 //!
-//! **Stability.** A step of B and F is halved until the roots of F lie within a circle of radius [`RADIUS`].
+//! **Stability.** A step of B and F is halved until the roots of F lie within a circle of radius [`MAX_POLE_RADIUS`].
 
 mod filters;
 mod forgetting;
@@ -32,7 +32,7 @@ mod laguerre;
 mod options;
 
 use hoid_core::{
-    error_bars::LARGEST_GROWTH,
+    error_bars::MAX_VARIANCE_GROWTH,
     stability::roots_inside,
     state::{State, visit_all},
 };
@@ -41,10 +41,10 @@ use hoid_model::Orders;
 
 use hoid_track::{
     Sample,
-    building::{History, Recursion, StepOutcome, bounded, weighted},
+    building::{History, Recursion, StepOutcome, limit_magnitude, weighted_sum},
 };
 
-use filters::{Filtered, Parts, Simulated, fill_f};
+use filters::{FilteredHistory, ResponseHistory, ThetaParts, fill_f};
 use forgetting::{CAPACITY, Forgetting};
 use laguerre::LaguerreRegression;
 
@@ -52,11 +52,11 @@ pub use options::RrivOptions;
 
 /// Radius of the circle that must contain the roots of F; the filters then have time constants of at most 10 000
 /// samples.
-const RADIUS: f64 = 0.9999;
+const MAX_POLE_RADIUS: f64 = 0.9999;
 /// Number of halvings after which a step is omitted.
-const HALVINGS: usize = 20;
+const MAX_HALVINGS: usize = 20;
 /// Smallest weight of the newest theta in the low-pass filter of the auxiliary model.
-const MIN_SHARE: f64 = 1.0 / 1024.0;
+const MIN_FILTER_WEIGHT: f64 = 1.0 / 1024.0;
 /// Smallest innovation variance, as a fraction of the initial one.
 const MIN_VARIANCE_RATIO: f64 = 1e-16;
 
@@ -92,14 +92,14 @@ pub(crate) struct RefinedRecursion {
     newest_share: f64,
     system_gain: Forgetting,
     noise_gain: Forgetting,
-    measured: Simulated,
+    measured: ResponseHistory,
     /// Filters of the instruments and the last external value; `None` without an external signal.
-    instrument: Option<(LaguerreRegression, Simulated, f64)>,
-    output: Filtered,
+    instrument: Option<(LaguerreRegression, ResponseHistory, f64)>,
+    output: FilteredHistory,
     /// Past values of xi.
     output_errors: History,
     shortened: usize,
-    work: Work,
+    work: WorkArrays,
 }
 
 impl State for RefinedRecursion {
@@ -130,7 +130,7 @@ impl State for RefinedRecursion {
 
 /// Work arrays of one step.
 #[derive(Debug, Clone)]
-struct Work {
+struct WorkArrays {
     phi: Vec<f64>,
     z: Vec<f64>,
     psi: Vec<f64>,
@@ -151,8 +151,8 @@ impl RefinedRecursion {
     /// [`IdentError::BadOption`] if the orders include A or C, or if a factor is out of range; [`IdentError::BadStart`]
     /// if the start cannot be used.
     pub fn new(orders: Orders, start: RefinedStart<'_>, lambda: &[f64], external: bool) -> Result<Self, IdentError> {
-        let p = orders.parameters();
-        check(&orders, &start, lambda)?;
+        let p = orders.parameter_count();
+        check_arguments(&orders, &start, lambda)?;
         let variance = start.innovation_variance;
         let spread: Vec<f64> = start.covariance.iter().map(|c| c / variance).collect();
         let gain_of = |places: &[usize]| {
@@ -172,19 +172,22 @@ impl RefinedRecursion {
         Ok(Self {
             theta: start.theta.to_vec(),
             auxiliary: start.theta.to_vec(),
-            share: system.iter().map(|i| 1.0 - lambda[*i]).fold(MIN_SHARE, f64::max),
+            share: system
+                .iter()
+                .map(|i| 1.0 - lambda[*i])
+                .fold(MIN_FILTER_WEIGHT, f64::max),
             system_gain: gain_of(&system)?,
             noise_gain: gain_of(&noise)?,
             variance,
             least_variance: MIN_VARIANCE_RATIO * variance,
             samples: start.samples as f64,
             newest_share: 1.0 - lambda.iter().copied().fold(1.0, f64::min),
-            measured: Simulated::new(&orders),
-            instrument: external.then(|| (LaguerreRegression::new(), Simulated::new(&orders), 0.0)),
-            output: Filtered::new(&orders),
+            measured: ResponseHistory::new(&orders),
+            instrument: external.then(|| (LaguerreRegression::new(), ResponseHistory::new(&orders), 0.0)),
+            output: FilteredHistory::new(&orders),
             output_errors: History::new(orders.nd),
             shortened: 0,
-            work: Work {
+            work: WorkArrays {
                 phi: zeros.clone(),
                 z: zeros.clone(),
                 psi: zeros.clone(),
@@ -204,13 +207,13 @@ impl RefinedRecursion {
 
     /// Returns the number of steps that were shortened to keep F stable.
     #[cfg(test)]
-    pub fn shortened(&self) -> usize {
+    pub fn shortened_step_count(&self) -> usize {
         self.shortened
     }
 
     /// Processes a sample. If the output is missing, the prediction replaces it.
     fn take(&mut self, sample: Sample, output: Option<f64>, moves: bool) -> StepOutcome {
-        let e = bounded(sample.e);
+        let e = limit_magnitude(sample.e);
         let nk = self.orders.nk;
         self.measured.input.push(e);
         if let Some((following, simulated, last)) = &mut self.instrument {
@@ -218,16 +221,16 @@ impl RefinedRecursion {
             let followed = following.step(*last, e);
             simulated.input.push(followed);
         }
-        let before = Parts::of(&self.auxiliary, &self.orders);
+        let before = ThetaParts::of(&self.auxiliary, &self.orders);
         let predicted =
-            self.measured.response(before.b, before.f, nk) - weighted(before.d, self.output_errors.newest());
-        let u = bounded(output.unwrap_or(predicted));
-        let innovation = bounded(u - predicted);
-        let shortened = moves && self.estimate(u, innovation);
+            self.measured.response(before.b, before.f, nk) - weighted_sum(before.d, self.output_errors.newest_first());
+        let u = limit_magnitude(output.unwrap_or(predicted));
+        let innovation = limit_magnitude(u - predicted);
+        let shortened = moves && self.update_estimate(u, innovation);
         if moves {
-            self.follow_theta();
+            self.update_auxiliary_theta();
         }
-        let after = Parts::of(&self.auxiliary, &self.orders);
+        let after = ThetaParts::of(&self.auxiliary, &self.orders);
         let xi = u - self.measured.response(after.b, after.f, nk);
         self.output_errors.push(xi);
         self.measured.advance(&after, nk);
@@ -240,22 +243,22 @@ impl RefinedRecursion {
 
     /// Moves the theta of the auxiliary model toward the estimate, unless F would become unstable: for nf > 2 the
     /// region of stable F is not convex.
-    fn follow_theta(&mut self) {
+    fn update_auxiliary_theta(&mut self) {
         let w = &mut self.work;
         for (trial, (auxiliary, theta)) in w.trial.iter_mut().zip(self.auxiliary.iter().zip(&self.theta)) {
             *trial = auxiliary + self.share * (theta - auxiliary);
         }
-        if roots_inside(&w.trial[self.orders.nb + self.orders.nd..], RADIUS) {
+        if roots_inside(&w.trial[self.orders.nb + self.orders.nd..], MAX_POLE_RADIUS) {
             self.auxiliary.copy_from_slice(&w.trial);
         }
     }
 
     /// Updates theta, C and the innovation variance. Returns true if the step was shortened.
-    fn estimate(&mut self, u: f64, innovation: f64) -> bool {
+    fn update_estimate(&mut self, u: f64, innovation: f64) -> bool {
         let Orders { nb, nd, nf, nk, .. } = self.orders;
         let noise = nb..nb + nd;
-        let parts = Parts::of(&self.auxiliary, &self.orders);
-        let now = Parts::of(&self.theta, &self.orders);
+        let parts = ThetaParts::of(&self.auxiliary, &self.orders);
+        let now = ThetaParts::of(&self.theta, &self.orders);
         let w = &mut self.work;
         self.measured.regressors(&parts, nk, &mut w.psi);
         w.phi.copy_from_slice(&w.psi);
@@ -265,12 +268,12 @@ impl RefinedRecursion {
             Some((_, simulated, _)) => simulated.regressors(&parts, nk, &mut w.z),
             None => w.z.copy_from_slice(&w.psi),
         }
-        for (place, xi) in w.psi[noise.clone()].iter_mut().zip(self.output_errors.newest()) {
+        for (place, xi) in w.psi[noise.clone()].iter_mut().zip(self.output_errors.newest_first()) {
             *place = -xi;
         }
         let error = self.output.next(parts.d, parts.f, u)
-            - weighted(now.b, &w.phi[..nb])
-            - weighted(now.f, &w.phi[noise.end..]);
+            - weighted_sum(now.b, &w.phi[..nb])
+            - weighted_sum(now.f, &w.phi[noise.end..]);
 
         // Step of B and F.
         w.short[..nb].copy_from_slice(&w.z[..nb]);
@@ -280,16 +283,16 @@ impl RefinedRecursion {
         w.gain[noise.clone()].fill(0.0);
         w.gain[noise.end..].copy_from_slice(&w.short_gain[nb..nb + nf]);
         let mut share = 1.0;
-        for _ in 0..HALVINGS {
+        for _ in 0..MAX_HALVINGS {
             for (i, t) in w.trial.iter_mut().enumerate() {
-                *t = bounded(self.theta[i] + share * w.gain[i] * error);
+                *t = limit_magnitude(self.theta[i] + share * w.gain[i] * error);
             }
-            if roots_inside(&w.trial[noise.end..], RADIUS) {
+            if roots_inside(&w.trial[noise.end..], MAX_POLE_RADIUS) {
                 break;
             }
             share *= 0.5;
         }
-        if !roots_inside(&w.trial[noise.end..], RADIUS) {
+        if !roots_inside(&w.trial[noise.end..], MAX_POLE_RADIUS) {
             share = 0.0;
             w.trial.copy_from_slice(&self.theta);
         }
@@ -299,12 +302,12 @@ impl RefinedRecursion {
         // Step of D, from the residual xi of the auxiliary model.
         let gain = &mut w.short_gain[..nd];
         self.noise_gain.gain(&w.psi[noise.clone()], gain);
-        let parts = Parts::of(&self.auxiliary, &self.orders);
-        let now = Parts::of(&self.theta, &self.orders);
+        let parts = ThetaParts::of(&self.auxiliary, &self.orders);
+        let now = ThetaParts::of(&self.theta, &self.orders);
         let xi = u - self.measured.response(parts.b, parts.f, nk);
-        let error = bounded(xi - dot(&w.psi[noise.clone()], now.d));
+        let error = limit_magnitude(xi - dot(&w.psi[noise.clone()], now.d));
         for (t, g) in self.theta[noise.clone()].iter_mut().zip(gain.iter()) {
-            *t = bounded(*t + g * error);
+            *t = limit_magnitude(*t + g * error);
         }
         w.gain[noise.clone()].copy_from_slice(gain);
 
@@ -340,7 +343,7 @@ impl RefinedRecursion {
             let (by_phi, by_psi) = (dot(half, &w.phi), dot(half, &w.psi));
             for j in 0..=i {
                 let by = if row(j) { by_psi } else { by_phi };
-                let value = bounded(half[j] - w.gain[j] * by + w.gain[i] * w.gain[j]);
+                let value = limit_magnitude(half[j] - w.gain[j] * by + w.gain[i] * w.gain[j]);
                 self.spread[i * p + j] = value;
                 self.spread[j * p + i] = value;
             }
@@ -351,8 +354,8 @@ impl RefinedRecursion {
         }
         for i in 0..p {
             // The first-order recursion of C can be unstable although the recursion of theta is stable. Each variance
-            // is therefore limited to [`LARGEST_GROWTH`] times its initial value.
-            let limit = LARGEST_GROWTH * self.first_spread[i * (p + 1)];
+            // is therefore limited to [`MAX_VARIANCE_GROWTH`] times its initial value.
+            let limit = MAX_VARIANCE_GROWTH * self.first_spread[i * (p + 1)];
             let found = self.spread[i * (p + 1)];
             if limit > 0.0 && found > limit {
                 let share = (limit / found).sqrt();
@@ -371,7 +374,7 @@ impl Recursion for RefinedRecursion {
         self.take(sample, Some(sample.u), true)
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         self.take(sample, Some(sample.u), false)
     }
 
@@ -385,7 +388,7 @@ impl Recursion for RefinedRecursion {
 
     fn covariance(&self, into: &mut [f64]) -> bool {
         for (c, spread) in into.iter_mut().zip(&self.spread) {
-            *c = bounded(self.variance * spread);
+            *c = limit_magnitude(self.variance * spread);
         }
         true
     }
@@ -395,8 +398,8 @@ impl Recursion for RefinedRecursion {
     }
 }
 
-fn check(orders: &Orders, start: &RefinedStart<'_>, lambda: &[f64]) -> Result<(), IdentError> {
-    let p = orders.parameters();
+fn check_arguments(orders: &Orders, start: &RefinedStart<'_>, lambda: &[f64]) -> Result<(), IdentError> {
+    let p = orders.parameter_count();
     let bad = |reason: String| Err(IdentError::BadStart { reason });
     if orders.na + orders.nc > 0 || orders.nb == 0 {
         return Err(IdentError::BadOption {
@@ -433,9 +436,9 @@ fn check(orders: &Orders, start: &RefinedStart<'_>, lambda: &[f64]) -> Result<()
             start.innovation_variance
         ));
     }
-    if !roots_inside(&start.theta[p - orders.nf..], RADIUS) {
+    if !roots_inside(&start.theta[p - orders.nf..], MAX_POLE_RADIUS) {
         return bad(format!(
-            "F has a root outside the circle of radius {RADIUS}; start from a span that excites its poles"
+            "F has a root outside the circle of radius {MAX_POLE_RADIUS}; start from a span that excites its poles"
         ));
     }
     Ok(())

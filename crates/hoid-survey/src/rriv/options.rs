@@ -6,7 +6,7 @@ use hoid_model::{Record, SampleTime, Structure};
 use super::{RefinedRecursion, RefinedStart};
 use hoid_track::{
     Memory, MemoryOptions,
-    building::{About, Recursion, RecursiveMethod, Setup, StartState, bad, short_for_b},
+    building::{MethodDescription, Recursion, RecursiveMethod, Setup, StartState, invalid_option, short_memory_for_b},
 };
 
 settings! {
@@ -23,8 +23,8 @@ settings! {
 }
 
 impl RecursiveMethod for RrivOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: "rriv",
             help: "recursive refined instrumental variable",
             source: "Young 2011, chapters 7 and 8; Young 2015",
@@ -34,7 +34,7 @@ impl RecursiveMethod for RrivOptions {
     }
 
     fn default_memory(&self, parameter: &str) -> Memory {
-        short_for_b(parameter)
+        short_memory_for_b(parameter)
     }
 
     fn check(&self, setup: &Setup) -> Result<(), IdentError> {
@@ -42,7 +42,7 @@ impl RecursiveMethod for RrivOptions {
         if o.na == 0 && o.nc == 0 && o.nb > 0 && o.nf > 0 {
             return Ok(());
         }
-        Err(bad(
+        Err(invalid_option(
             "the structure of rriv",
             format!("{} with {o}", setup.structure),
             "bj with nc = 0, or oe",

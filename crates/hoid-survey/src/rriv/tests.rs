@@ -12,7 +12,7 @@ const F: [f64; 2] = [-1.5, 0.7];
 const D: [f64; 1] = [-0.8];
 const TRUTH: [f64; 5] = [1.0, 0.5, -0.8, -1.5, 0.7];
 
-fn textbook() -> Orders {
+fn textbook_orders() -> Orders {
     Orders {
         nb: 2,
         nd: 1,
@@ -45,14 +45,14 @@ fn open_loop(n: usize, replication: u64, d: &[f64], gain: f64) -> (Vec<f64>, Vec
 
 fn record(e: &[f64], u: &[f64]) -> Record {
     Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "", e.to_vec()),
         Channel::new("u", "", u.to_vec()),
     )
     .unwrap()
 }
 
-fn riv(record: &Record, orders: Orders) -> Fit {
+fn fit_riv(record: &Record, orders: Orders) -> Fit {
     let method = if orders.nd > 0 { IvMethod::RivBj } else { IvMethod::Sriv };
     InstrumentalVariable::new(method, orders)
         .fit(std::slice::from_ref(record))
@@ -60,7 +60,7 @@ fn riv(record: &Record, orders: Orders) -> Fit {
 }
 
 /// Starts from a fit, with filters warmed up on its samples.
-fn from_fit(fit: &Fit, warm: &Record, lambda: &[f64], external: bool) -> RefinedRecursion {
+fn recursion_from_fit(fit: &Fit, warm: &Record, lambda: &[f64], external: bool) -> RefinedRecursion {
     let start = RefinedStart {
         theta: fit.model().theta(),
         covariance: fit.covariance().unwrap(),
@@ -69,7 +69,7 @@ fn from_fit(fit: &Fit, warm: &Record, lambda: &[f64], external: bool) -> Refined
     };
     let mut recursion = RefinedRecursion::new(fit.orders(), start, lambda, external).unwrap();
     samples(warm).for_each(|s| {
-        recursion.follow(s);
+        recursion.step_without_update(s);
     });
     recursion
 }
@@ -91,18 +91,32 @@ fn errors(recursion: &RefinedRecursion) -> Vec<f64> {
 }
 
 #[test]
-fn without_forgetting_it_converges_to_the_batch_estimate() {
-    for (orders, d) in [(textbook(), &D[..]), (Orders { nd: 0, ..textbook() }, &[])] {
+fn estimate_without_forgetting_converges_to_the_batch_estimate() {
+    for (orders, d) in [
+        (textbook_orders(), &D[..]),
+        (
+            Orders {
+                nd: 0,
+                ..textbook_orders()
+            },
+            &[],
+        ),
+    ] {
         let mut worst = 0.0_f64;
         for replication in 0..4 {
             let (e, u) = open_loop(20_000, replication, d, 1.0);
             let first = 1000;
             let warm = record(&e[..first], &u[..first]);
-            let mut recursion = from_fit(&riv(&warm, orders), &warm, &vec![1.0; orders.parameters()], false);
+            let mut recursion = recursion_from_fit(
+                &fit_riv(&warm, orders),
+                &warm,
+                &vec![1.0; orders.parameter_count()],
+                false,
+            );
             samples(&record(&e[first..], &u[first..])).for_each(|s| {
                 recursion.step(s);
             });
-            let batch = riv(&record(&e, &u), orders);
+            let batch = fit_riv(&record(&e, &u), orders);
             for (i, found) in errors(&recursion).into_iter().enumerate() {
                 let error = batch.parameters()[i].1.standard_error.unwrap();
                 worst = worst.max((recursion.theta()[i] - batch.model().theta()[i]).abs() / error);
@@ -126,7 +140,7 @@ fn standard_errors_are_correct_with_any_forgetting() {
         for replication in 0..runs {
             let (e, u) = open_loop(3000, 100 + replication, &D, 1.0);
             let warm = record(&e[..1000], &u[..1000]);
-            let mut recursion = from_fit(&riv(&warm, textbook()), &warm, &lambda, false);
+            let mut recursion = recursion_from_fit(&fit_riv(&warm, textbook_orders()), &warm, &lambda, false);
             samples(&record(&e[1000..], &u[1000..])).for_each(|s| {
                 recursion.step(s);
             });
@@ -154,7 +168,7 @@ fn jump_of_the_gain_is_tracked() {
     for lambda in [[short; 5], [short, short, 1.0, 1.0, 1.0]] {
         let (e, u) = open_loop(6000, 7, &D, 2.0);
         let warm = record(&e[..1000], &u[..1000]);
-        let mut recursion = from_fit(&riv(&warm, textbook()), &warm, &lambda, false);
+        let mut recursion = recursion_from_fit(&fit_riv(&warm, textbook_orders()), &warm, &lambda, false);
         for (t, s) in samples(&record(&e, &u)).enumerate().skip(1000) {
             recursion.step(s);
             // The samples are before the jump and six memory lengths after it.
@@ -174,15 +188,15 @@ fn jump_of_the_gain_is_tracked() {
 }
 
 /// Function that returns e and u of sample t, computed from white noise.
-type Shape = fn(usize, f64) -> (f64, f64);
+type SignalShape = fn(usize, f64) -> (f64, f64);
 
 #[test]
 fn estimates_stay_finite_for_any_data() {
     let noise = RunSeed::default().white_noise(100_000);
     let (e, u) = open_loop(1000, 3, &D, 1.0);
     let warm = record(&e, &u);
-    let fit = riv(&warm, textbook());
-    let shapes: [(&str, Shape); 7] = [
+    let fit = fit_riv(&warm, textbook_orders());
+    let shapes: [(&str, SignalShape); 7] = [
         ("silence", |_, _| (0.0, 0.0)),
         ("constant", |_, _| (1.0, -3.0)),
         ("saturation", |t, x| (x, if (t / 37) % 2 == 0 { 1.0 } else { -1.0 })),
@@ -198,7 +212,7 @@ fn estimates_stay_finite_for_any_data() {
     for lambda in [[1.0; 5], [short; 5], [short, 1.0, 0.9, 1.0, short]] {
         for (name, shape) in shapes {
             for external in [true, false] {
-                let mut recursion = from_fit(&fit, &warm, &lambda, external);
+                let mut recursion = recursion_from_fit(&fit, &warm, &lambda, external);
                 for (t, x) in noise.iter().enumerate() {
                     let (e, u) = shape(t, *x);
                     let reference = (t % 3 == 0).then_some(0.5 * e);
@@ -226,7 +240,7 @@ fn silence_has_no_lasting_effect() {
     let (e, u) = open_loop(6000, 4, &D, 1.0);
     let warm = record(&e[..2000], &u[..2000]);
     for still in [(0.0, 0.0), (1.0, 5.0)] {
-        let mut recursion = from_fit(&riv(&warm, textbook()), &warm, &lambda, false);
+        let mut recursion = recursion_from_fit(&fit_riv(&warm, textbook_orders()), &warm, &lambda, false);
         for _ in 0..100_000 {
             recursion.step(Sample {
                 e: still.0,
@@ -237,7 +251,7 @@ fn silence_has_no_lasting_effect() {
         samples(&record(&e[2000..], &u[2000..])).for_each(|s| {
             recursion.step(s);
         });
-        let mut default = from_fit(&riv(&warm, textbook()), &warm, &lambda, false);
+        let mut default = recursion_from_fit(&fit_riv(&warm, textbook_orders()), &warm, &lambda, false);
         samples(&record(&e[2000..], &u[2000..])).for_each(|s| {
             default.step(s);
         });
@@ -274,10 +288,10 @@ fn pole_near_the_unit_circle_shortens_the_step() {
     for e in RunSeed::default().white_noise(500) {
         shortened += usize::from(recursion.step(Sample { e, u, reference: None }).shortened);
         u = 1.01 * u + e;
-        assert!(recursion.theta()[1].abs() < RADIUS);
+        assert!(recursion.theta()[1].abs() < MAX_POLE_RADIUS);
     }
     assert!(shortened > 0);
-    assert_eq!(recursion.shortened(), shortened);
+    assert_eq!(recursion.shortened_step_count(), shortened);
 }
 
 #[test]
@@ -290,11 +304,20 @@ fn invalid_arguments_are_refused() {
         samples: 100,
     };
     let make = |orders, start, lambda: &[f64]| RefinedRecursion::new(orders, start, lambda, false).map(drop);
-    assert_eq!(make(textbook(), start, &[1.0; 5]), Ok(()));
+    assert_eq!(make(textbook_orders(), start, &[1.0; 5]), Ok(()));
     for orders in [
-        Orders { na: 1, ..textbook() },
-        Orders { nc: 1, ..textbook() },
-        Orders { nb: 0, ..textbook() },
+        Orders {
+            na: 1,
+            ..textbook_orders()
+        },
+        Orders {
+            nc: 1,
+            ..textbook_orders()
+        },
+        Orders {
+            nb: 0,
+            ..textbook_orders()
+        },
     ] {
         assert!(matches!(
             make(orders, start, &[1.0; 5]),
@@ -303,7 +326,7 @@ fn invalid_arguments_are_refused() {
     }
     for lambda in [&[1.0; 4][..], &[0.0; 5], &[1.1; 5], &[f64::NAN; 5]] {
         assert!(matches!(
-            make(textbook(), start, lambda),
+            make(textbook_orders(), start, lambda),
             Err(IdentError::BadOption { .. })
         ));
     }
@@ -331,7 +354,7 @@ fn invalid_arguments_are_refused() {
         },
     ] {
         assert!(matches!(
-            make(textbook(), bad, &[1.0; 5]),
+            make(textbook_orders(), bad, &[1.0; 5]),
             Err(IdentError::BadStart { .. })
         ));
     }
@@ -341,14 +364,14 @@ fn invalid_arguments_are_refused() {
 fn missing_output_is_replaced_by_its_prediction() {
     let (e, u) = open_loop(2000, 5, &D, 1.0);
     let warm = record(&e[..1000], &u[..1000]);
-    let mut recursion = from_fit(&riv(&warm, textbook()), &warm, &[1.0; 5], false);
+    let mut recursion = recursion_from_fit(&fit_riv(&warm, textbook_orders()), &warm, &[1.0; 5], false);
     let theta = recursion.theta().to_vec();
     let (mut squares, mut count) = (0.0, 0.0);
     for (t, s) in samples(&record(&e[1000..], &u[1000..])).enumerate() {
         if t % 50 < 3 {
             recursion.bridge(Sample { u: f64::NAN, ..s });
         } else {
-            let innovation = recursion.follow(s).innovation;
+            let innovation = recursion.step_without_update(s).innovation;
             if t % 50 > 10 {
                 squares += innovation * innovation;
                 count += 1.0;

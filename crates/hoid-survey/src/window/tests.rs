@@ -32,7 +32,7 @@ fn samples(record: &Record) -> impl Iterator<Item = Sample> {
     })
 }
 
-fn part(record: &Record, from: usize, to: usize) -> Record {
+fn record_part(record: &Record, from: usize, to: usize) -> Record {
     let cut = |x: &[f64]| x[from..to].to_vec();
     Record::new(
         record.sample_time(),
@@ -51,11 +51,11 @@ fn every_fit_matches_the_batch_fit_of_its_window() {
         let (mut slow, mut farthest) = (0.0, 0.0_f64);
         let mut fits = 0;
         for (t, sample) in samples(&record).enumerate() {
-            let before = recursion.fits();
+            let before = recursion.fit_count();
             let clock = Instant::now();
             recursion.step(sample);
             let took = clock.elapsed().as_secs_f64();
-            if recursion.fits() == before {
+            if recursion.fit_count() == before {
                 continue;
             }
             (slow, fits) = (slow + took, fits + 1);
@@ -63,7 +63,7 @@ fn every_fit_matches_the_batch_fit_of_its_window() {
                 continue;
             }
             let batch = operator()
-                .fit(&[part(&record, (t + 1).saturating_sub(window), t + 1)])
+                .fit(&[record_part(&record, (t + 1).saturating_sub(window), t + 1)])
                 .unwrap();
             let mut covariance = vec![0.0; 25];
             assert!(recursion.covariance(&mut covariance));
@@ -92,11 +92,11 @@ fn time_of_a_fit() {
     let mut recursion = WindowRecursion::new(operator(), record.sample_time(), 2000, 10, None).unwrap();
     let (mut warm, mut compared) = (Vec::new(), Vec::new());
     for sample in samples(&record) {
-        let before = recursion.fits();
+        let before = recursion.fit_count();
         let clock = Instant::now();
         recursion.step(sample);
         let took = 1e3 * clock.elapsed().as_secs_f64();
-        if recursion.fits() > before && recursion.u.len() == 2000 {
+        if recursion.fit_count() > before && recursion.u.len() == 2000 {
             if recursion.since_comparison == 0 {
                 compared.push(took);
             } else {
@@ -122,7 +122,7 @@ fn last_theta_is_kept_without_excitation() {
     samples(&record).take(2000).for_each(|s| {
         recursion.step(s);
     });
-    assert!(recursion.fits() > 10);
+    assert!(recursion.fit_count() > 10);
     let still = Sample {
         e: 0.0,
         u: 0.0,
@@ -146,7 +146,7 @@ fn last_theta_is_kept_without_excitation() {
     samples(&record).skip(2000).take(1000).for_each(|s| {
         recursion.step(s);
     });
-    let batch = operator().fit(&[part(&record, 2200, 3000)]).unwrap();
+    let batch = operator().fit(&[record_part(&record, 2200, 3000)]).unwrap();
     for i in 0..5 {
         let error = batch.covariance().unwrap()[i * 6].sqrt();
         assert!((recursion.theta()[i] - batch.model().theta()[i]).abs() < 1e-3 * error);
@@ -167,7 +167,7 @@ fn start_is_kept_until_the_first_fit_even_if_wrong() {
             assert!(!recursion.covariance(&mut [0.0; 25]));
         }
     }
-    let batch = operator().fit(&[part(&record, 0, 2000)]).unwrap();
+    let batch = operator().fit(&[record_part(&record, 0, 2000)]).unwrap();
     for i in 0..5 {
         let error = batch.covariance().unwrap()[i * 6].sqrt();
         assert!((recursion.theta()[i] - batch.model().theta()[i]).abs() < 1e-3 * error);
@@ -179,13 +179,13 @@ fn window_collects_samples_without_fitting() {
     let record = run(Condition::C1, 4);
     let mut recursion = WindowRecursion::new(operator(), record.sample_time(), 1000, 100, None).unwrap();
     samples(&record).take(1500).for_each(|s| {
-        recursion.follow(s);
+        recursion.step_without_update(s);
     });
-    assert_eq!((recursion.fits(), recursion.theta()), (0, &[0.0; 5][..]));
+    assert_eq!((recursion.fit_count(), recursion.theta()), (0, &[0.0; 5][..]));
     samples(&record).skip(1500).take(1).for_each(|s| {
         recursion.step(s);
     });
-    assert_eq!(recursion.fits(), 1);
+    assert_eq!(recursion.fit_count(), 1);
     // The innovations of the following samples have the variance of the fit.
     let squares: f64 = samples(&record)
         .skip(1501)
@@ -198,12 +198,12 @@ fn window_collects_samples_without_fitting() {
 }
 
 /// Function that returns e and u of sample t, computed from white noise.
-type Shape = fn(usize, f64) -> (f64, f64);
+type SignalShape = fn(usize, f64) -> (f64, f64);
 
 #[test]
 fn estimates_stay_finite_for_any_data() {
     let noise = RunSeed::default().white_noise(4000);
-    let shapes: [(&str, Shape); 7] = [
+    let shapes: [(&str, SignalShape); 7] = [
         ("silence", |_, _| (0.0, 0.0)),
         ("constant", |_, _| (1.0, -3.0)),
         ("saturation", |t, x| (x, if (t / 37) % 2 == 0 { 1.0 } else { -1.0 })),
@@ -221,7 +221,7 @@ fn estimates_stay_finite_for_any_data() {
         let nk = if structure.has_input() { 5 } else { 0 };
         let estimator = Estimator::new(structure, structure.operator_orders(nk));
         for (name, shape) in shapes {
-            let mut recursion = WindowRecursion::new(estimator.clone(), SampleTime::HUNDREDTH, 300, 75, None).unwrap();
+            let mut recursion = WindowRecursion::new(estimator.clone(), SampleTime::AT_100_HZ, 300, 75, None).unwrap();
             for (t, x) in noise.iter().enumerate() {
                 let (e, u) = shape(t, *x);
                 let taken = recursion.step(Sample { e, u, reference: None });
@@ -242,7 +242,7 @@ fn estimates_stay_finite_for_any_data() {
 #[test]
 fn invalid_arguments_are_refused() {
     let make = |window, every, start: Option<(&[f64], Option<&[f64]>)>| {
-        WindowRecursion::new(operator(), SampleTime::HUNDREDTH, window, every, start)
+        WindowRecursion::new(operator(), SampleTime::AT_100_HZ, window, every, start)
     };
     assert!(matches!(make(50, 1, None), Err(IdentError::BadOption { .. })));
     assert!(matches!(make(2000, 0, None), Err(IdentError::BadOption { .. })));
@@ -257,5 +257,5 @@ fn invalid_arguments_are_refused() {
         Err(IdentError::BadStart { .. })
     ));
     let bad = Estimator::new(Structure::Arx, Orders::default());
-    assert!(WindowRecursion::new(bad, SampleTime::HUNDREDTH, 2000, 10, None).is_err());
+    assert!(WindowRecursion::new(bad, SampleTime::AT_100_HZ, 2000, 10, None).is_err());
 }

@@ -8,7 +8,7 @@ pub const TS: f64 = 0.01;
 pub const S1: [f64; 4] = [0.09, 0.036, 11.25, 0.35];
 
 /// Returns the prior at 100 Hz.
-pub fn prior_of(delay: DelayPrior) -> ChangePrior {
+pub fn prior_with_delay(delay: DelayPrior) -> ChangePrior {
     ChangePrior {
         sample_time: TS,
         bounds: [

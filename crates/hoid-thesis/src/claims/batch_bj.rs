@@ -2,14 +2,15 @@
 //! level.
 
 use super::{
-    batch_arx::conditions,
+    batch_arx::compare_conditions,
     claim::{Claim, Source, Theme},
     evidence::Evidence,
-    rules::{ACCEPTABLE, CLOSE_BIAS, LARGE_BIAS, LINEAR, Part},
+    rules::{ACCEPTABLE_BIAS, CLOSE_BIAS, LARGE_BIAS, MIN_LINEAR_R2, Part},
     settings::{
-        DELAYS, DISCRETE, HIGHER_ORDERS, LEVELS, ORDERS, Setting, TRUE_DELAY, WITHOUT_REMNANT, bias_of, settings,
+        DELAYS, DISCRETE_PARAMETERS, HIGHER_REMNANT_ORDERS, NOISE_LEVELS, REMNANT_ORDERS, Setting, TRUE_DELAY,
+        WITHOUT_REMNANT, bias_of, settings,
     },
-    statistics::{linearity, med},
+    statistics::{linearity, median_or_nan},
     value::Value,
 };
 
@@ -24,7 +25,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         measure: "Median bias at m0 = 2 to 4 minus that at m0 = 1, BJ(m* = m0), C1 and C2, n_k* = 29, percentage \
                   points, by coefficient and noise level.",
         plans: PLANS,
-        source: Source::Data(all_orders),
+        source: Source::Data(check_bias_independent_of_order),
     },
     Claim {
         id: "bj-close-to-zero",
@@ -33,7 +34,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "V.A.1, Fig. 6",
         measure: "Magnitude of the median bias, BJ(m* = m0), C1, n_k* = 29, by coefficient, m0 and noise level.",
         plans: PLANS,
-        source: Source::Data(close_to_zero),
+        source: Source::Data(check_bias_close_to_zero),
     },
     Claim {
         id: "bj-around-noise-free",
@@ -42,7 +43,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
         measure: "Median bias minus that at P_n = 0, BJ(m* = m0), C1, n_k* = 25 to 30, percentage points, by coefficient, m0 and noise level.",
         plans: PLANS,
-        source: Source::Data(around_noise_free),
+        source: Source::Data(check_bias_around_noise_free),
     },
     Claim {
         id: "bj-linear-in-delay",
@@ -51,7 +52,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "V.A.1, Fig. 6",
         measure: "R^2 of a straight line fitted to the median biases at n_k* = 25 to 30, BJ(m* = m0), by coefficient, m0 and noise level, C1.",
         plans: PLANS,
-        source: Source::Data(linear_in_delay),
+        source: Source::Data(check_bias_linear_in_delay),
     },
     Claim {
         id: "bj-lead-and-lag",
@@ -60,7 +61,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.2, Figs. D.5 to D.8",
         measure: "Median paired change in omega_nm from n_k* = 29 to each other delay, % of the true value, BJ(m* = m0), C1.",
         plans: PLANS,
-        source: Source::Data(lead_and_lag),
+        source: Source::Data(check_poles_follow_delay),
     },
     Claim {
         id: "bj-almost-exact",
@@ -69,7 +70,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "V.A.2, Fig. 10",
         measure: "Median response_error of BJ(m* = 1), C1, n_k* = 29, by m0 and noise level.",
         plans: PLANS,
-        source: Source::Data(almost_exact),
+        source: Source::Data(check_almost_exact_estimates),
     },
     Claim {
         id: "bj-m2-worst-without-remnant",
@@ -78,7 +79,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.2, Figs. D.5 to D.8",
         measure: "response_error of BJ(m* = 2) minus the largest of the other orders, without remnant, C1, n_k* = 25 to 28 and 30, %.",
         plans: PLANS,
-        source: Source::Data(second_order_worst),
+        source: Source::Data(check_second_order_worst),
     },
     Claim {
         id: "bj-t-n-100-percent",
@@ -87,7 +88,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.2, Fig. C.5",
         measure: "Magnitude of the median bias of T_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; the bias with exact retrieval is also shown.",
         plans: PLANS,
-        source: Source::Data(remnant_time_constant),
+        source: Source::Data(check_remnant_time_constant),
     },
     Claim {
         id: "bj-remnant-gain",
@@ -96,7 +97,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.2, Fig. C.5",
         measure: "Magnitude of the median bias of K_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; the bias with exact retrieval is also shown.",
         plans: PLANS,
-        source: Source::Data(remnant_gain),
+        source: Source::Data(check_remnant_gain),
     },
     Claim {
         id: "bj-c2-against-c1",
@@ -105,29 +106,29 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.2, Figs. C.4, C.12",
         measure: "Median |bias| in C2 minus that in C1, percentage points, BJ(m* = m0), n_k* = 29, by m0 and noise level.",
         plans: PLANS,
-        source: Source::Data(second_condition),
+        source: Source::Data(check_bias_in_second_condition),
     },
 ];
 
-fn all_orders(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_bias_independent_of_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|median bias minus that at m0 = 1| within 5 points");
-    for at in settings(&["C1", "C2"], &HIGHER_ORDERS, &LEVELS) {
-        for name in DISCRETE {
+    for at in settings(&["C1", "C2"], &HIGHER_REMNANT_ORDERS, &NOISE_LEVELS) {
+        for name in DISCRETE_PARAMETERS {
             let first = study.median(&Setting { m0: 1, ..at }.bj(&bias_of(name), 1, TRUE_DELAY))?;
             let found = study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?;
-            part.below(at.label(name), found.minus(first).abs(), CLOSE_BIAS);
+            part.add_below(at.label(name), found.minus(first).abs(), CLOSE_BIAS);
         }
     }
     Ok(vec![part])
 }
 
-fn close_to_zero(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_bias_close_to_zero(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("|median bias| within 5 %");
-    for at in settings(&["C1"], &ORDERS, &LEVELS) {
-        for name in DISCRETE {
-            part.below(
+    for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
+        for name in DISCRETE_PARAMETERS {
+            part.add_below(
                 at.label(name),
                 study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?.abs(),
                 CLOSE_BIAS,
@@ -137,17 +138,17 @@ fn close_to_zero(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![part])
 }
 
-fn around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_bias_around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut parts = Vec::new();
     for (is_true, label) in [(true, "n_k* = 29"), (false, "other n_k*")] {
         let mut part = Part::new(&format!("|median bias minus that at P_n = 0| within 5 points, {label}"));
-        for at in settings(&["C1"], &ORDERS, &LEVELS) {
+        for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
             for nk in DELAYS.into_iter().filter(|nk| (*nk == TRUE_DELAY) == is_true) {
-                for name in DISCRETE {
+                for name in DISCRETE_PARAMETERS {
                     let fit = |at: Setting| study.median(&at.bj(&bias_of(name), at.m0, nk));
                     let change = fit(at)?.minus(fit(Setting { level: 0.0, ..at })?);
-                    part.below(at.label(&format!("n_k* = {nk}, {name}")), change.abs(), CLOSE_BIAS);
+                    part.add_below(at.label(&format!("n_k* = {nk}, {name}")), change.abs(), CLOSE_BIAS);
                 }
             }
         }
@@ -156,62 +157,68 @@ fn around_noise_free(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(parts)
 }
 
-fn linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_bias_linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("R^2 of a straight line over n_k*, at least 0.9");
-    for at in settings(&["C1"], &ORDERS, &LEVELS) {
-        for name in DISCRETE {
+    for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
+        for name in DISCRETE_PARAMETERS {
             let queries = DELAYS.map(|nk| at.bj(&bias_of(name), at.m0, nk));
-            let found = study.of(&queries, &|s| linearity(&s.iter().map(|v| med(v)).collect::<Vec<_>>()))?;
-            part.above(at.label(name), found, LINEAR);
+            let found = study.of(&queries, &|s| {
+                linearity(&s.iter().map(|v| median_or_nan(v)).collect::<Vec<_>>())
+            })?;
+            part.add_above(at.label(name), found, MIN_LINEAR_R2);
         }
     }
     Ok(vec![part])
 }
 
-fn lead_and_lag(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_poles_follow_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut lower = Part::new("omega_nm at n_k* < 29 lower than at n_k* = 29");
     let mut higher = Part::new("omega_nm at n_k* = 30 higher than at n_k* = 29");
-    for at in settings(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
         let omega = |nk| at.bj("bias_omega_nm", at.m0, nk);
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
             let change = study.difference(&omega(nk), &omega(TRUE_DELAY))?;
             let label = at.label(&format!("n_k* = {nk}"));
             match nk < TRUE_DELAY {
-                true => lower.below(label, change, 0.0),
-                false => higher.above(label, change, 0.0),
+                true => lower.add_below(label, change, 0.0),
+                false => higher.add_above(label, change, 0.0),
             }
         }
     }
     Ok(vec![lower, higher])
 }
 
-fn almost_exact(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_almost_exact_estimates(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("median response_error within 10 %");
-    for at in settings(&["C1"], &ORDERS, &LEVELS) {
-        part.below(
+    for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
+        part.add_below(
             at.label(""),
             study.median(&at.bj("response_error", 1, TRUE_DELAY))?,
-            ACCEPTABLE,
+            ACCEPTABLE_BIAS,
         );
     }
     Ok(vec![part])
 }
 
-fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut part = Part::new("response_error of m* = 2 minus the largest of the others, above 0");
     for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
-        let queries = ORDERS.map(|m| WITHOUT_REMNANT.bj("response_error", m, nk));
+        let queries = REMNANT_ORDERS.map(|m| WITHOUT_REMNANT.bj("response_error", m, nk));
         let found = study.of(&queries, &|s| {
-            med(&s[1]) - [0, 2, 3].map(|i| med(&s[i])).into_iter().fold(f64::MIN, f64::max)
+            median_or_nan(&s[1])
+                - [0, 2, 3]
+                    .map(|i| median_or_nan(&s[i]))
+                    .into_iter()
+                    .fold(f64::MIN, f64::max)
         })?;
-        part.above(WITHOUT_REMNANT.label(&format!("n_k* = {nk}")), found, 0.0);
+        part.add_above(WITHOUT_REMNANT.label(&format!("n_k* = {nk}")), found, 0.0);
     }
-    for m in ORDERS {
-        part.show(
+    for m in REMNANT_ORDERS {
+        part.add_shown(
             format!("response_error of m* = {m} at n_k* = 25, %"),
             study.median(&WITHOUT_REMNANT.bj("response_error", m, 25))?,
         );
@@ -221,46 +228,46 @@ fn second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 /// Tests the bias of a remnant parameter retrieved as in the text (backward Euler), and shows it next to the bias of
 /// the exact retrieval.
-fn remnant(
+fn check_remnant_parameter(
     evidence: &Evidence<'_>,
     name: &str,
     mut part: Part,
     test: &dyn Fn(&mut Part, String, Value),
 ) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &HIGHER_REMNANT_ORDERS, &NOISE_LEVELS) {
         let found = study.median(&at.bj(&format!("bias_{name}_backward_euler"), at.m0, TRUE_DELAY))?;
         test(&mut part, at.label(""), found.abs());
         if at.level == 0.1 {
-            part.show(
+            part.add_shown(
                 format!("median bias of {name} at m0 = {}, backward Euler, %", at.m0),
                 found,
             );
             let exact = study.median(&at.bj(&bias_of(name), at.m0, TRUE_DELAY))?;
-            part.show(format!("median bias of {name} at m0 = {}, exact, %", at.m0), exact);
+            part.add_shown(format!("median bias of {name} at m0 = {}, exact, %", at.m0), exact);
         }
     }
     Ok(vec![part])
 }
 
-fn remnant_time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_remnant_time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let part = Part::new("|median bias| of T_n from 50 to 150 %");
-    remnant(evidence, "T_n", part, &|part, label, found| {
-        part.around(label, found, 100.0)
+    check_remnant_parameter(evidence, "T_n", part, &|part, label, found| {
+        part.add_around(label, found, 100.0)
     })
 }
 
-fn remnant_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_remnant_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let part = Part::new("|median bias| of K_n above 25 %");
-    remnant(evidence, "K_n", part, &|part, label, found| {
-        part.above(label, found, LARGE_BIAS)
+    check_remnant_parameter(evidence, "K_n", part, &|part, label, found| {
+        part.add_above(label, found, LARGE_BIAS)
     })
 }
 
-fn second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_bias_in_second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
-    conditions(
-        &|at, quantity| study.typical(&at.bj(quantity, at.m0, TRUE_DELAY)),
-        &ORDERS,
+    compare_conditions(
+        &|at, quantity| study.median_magnitude(&at.bj(quantity, at.m0, TRUE_DELAY)),
+        &REMNANT_ORDERS,
     )
 }

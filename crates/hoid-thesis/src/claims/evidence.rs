@@ -16,24 +16,24 @@ use std::collections::BTreeMap;
 
 use hoid_numerics::statistics::mean;
 use hoid_study::{
-    OPERATOR, Query, Results, TraceSummary, TrueState,
+    OPERATOR_PARAMETERS, Query, Results, TraceSummary, TrueState,
     plan::{EstimatorCell, Task},
 };
 use hoid_track::Memory;
 
 use super::{
-    statistics::{NO_VALUE, SMALLEST_VALID_SHARE, jackknife, magnitudes, mean_of, median_of, share_of},
+    statistics::{MIN_VALID_SHARE, MISSING_VALUE, jackknife, magnitudes, mean_of, median_of, share_value},
     value::Value,
 };
 
-/// Length of the span before the change that gives the initial level, s; `AFTER_S` is the length of the span at the end
+/// Length of the span before the change that gives the initial level, s; `FINAL_SPAN_S` is the length of the span at the end
 /// that gives the final level.
-const BEFORE_S: f64 = 10.24;
+const INITIAL_SPAN_S: f64 = 10.24;
 
-const AFTER_S: f64 = 15.36;
+const FINAL_SPAN_S: f64 = 15.36;
 
 /// Start of the second span of the batch fits of section V.B, s.
-const LAST_SPAN_FROM_S: f64 = 51.2;
+const LAST_SPAN_START_S: f64 = 51.2;
 
 /// The results of studies by the names of their plans.
 #[derive(Debug, Clone, Default)]
@@ -91,7 +91,7 @@ impl<'a> Study<'a> {
     pub fn truth(&self, query: &Query) -> Result<TrueState, String> {
         let cells = self.results.cells(query);
         let cell = cells.first().ok_or_else(|| format!("no cell matches {query}"))?;
-        Ok(cell.truth()[1])
+        Ok(cell.true_states()[1])
     }
 
     /// Median over replications.
@@ -105,7 +105,7 @@ impl<'a> Study<'a> {
     }
 
     /// Median of the magnitude, which is the typical error of one estimate.
-    pub fn typical(&self, query: &Query) -> Result<Value, String> {
+    pub fn median_magnitude(&self, query: &Query) -> Result<Value, String> {
         Ok(median_of(&magnitudes(&self.sample(query)?)))
     }
 
@@ -130,20 +130,20 @@ impl<'a> Study<'a> {
                 self.results.plan.name
             ));
         }
-        Ok(share_of(&self.results.values(query)))
+        Ok(share_value(&self.results.values(query)))
     }
 
     /// Bias of the median trace of a parameter over the span from 51.2 s to the end, in % of the true value at the end.
     pub fn trace_bias(&self, query: &Query, parameter: &str) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
-            return Ok(NO_VALUE);
+            return Ok(MISSING_VALUE);
         };
         // If only a few runs can be converted, their median carries no information about the others.
-        if OPERATOR.contains(&parameter)
-            && self.mean(&query.clone().quantity_of("share_not_convertible"))?.value > SMALLEST_VALID_SHARE
+        if OPERATOR_PARAMETERS.contains(&parameter)
+            && self.mean(&query.clone().with_quantity("share_not_convertible"))?.value > MIN_VALID_SHARE
         {
-            return Ok(NO_VALUE);
+            return Ok(MISSING_VALUE);
         }
         let replications = self.results.cells(query).first().map_or(1, |cell| cell.replications);
         let alike = if self
@@ -157,7 +157,7 @@ impl<'a> Study<'a> {
         };
         let (mut sum, mut errors, mut count) = (0.0, 0.0, 0.0);
         for (k, t) in traces.times_s.iter().enumerate() {
-            if *t >= LAST_SPAN_FROM_S {
+            if *t >= LAST_SPAN_START_S {
                 sum += (bands.median[k] - truth[1]) / truth[1];
                 errors += bands.error_of_median(k, replications) / truth[1].abs();
                 count += 1.0;
@@ -175,7 +175,7 @@ impl<'a> Study<'a> {
     pub fn trace_range(&self, query: &Query, parameter: &str, (from_s, to_s): (f64, f64)) -> Result<Value, String> {
         let (traces, truth) = self.trace(query, parameter)?;
         let Some(bands) = traces.parameters.get(parameter) else {
-            return Ok(NO_VALUE);
+            return Ok(MISSING_VALUE);
         };
         let replications = self.results.cells(query).first().map_or(1, |cell| cell.replications);
         let within = traces
@@ -199,7 +199,7 @@ impl<'a> Study<'a> {
         let (traces, _) = self.trace(query, parameter)?;
         let cell = self.results.cells(query);
         let (Some(bands), Some(cell)) = (traces.parameters.get(parameter), cell.first()) else {
-            return Ok(NO_VALUE);
+            return Ok(MISSING_VALUE);
         };
         let Some(midpoint_s) = cell.resolved.scenario().schedule.change_s() else {
             return Err(format!("the controlled element does not change in {query}"));
@@ -214,7 +214,10 @@ impl<'a> Study<'a> {
             let values: Vec<f64> = within.map(|(_, value)| *value).collect();
             mean(&values)
         };
-        let (from, to) = (level(midpoint_s - BEFORE_S, midpoint_s), level(end - AFTER_S, end));
+        let (from, to) = (
+            level(midpoint_s - INITIAL_SPAN_S, midpoint_s),
+            level(end - FINAL_SPAN_S, end),
+        );
         let settled = |errors: f64| {
             let first = traces.times_s.iter().enumerate().find(|(k, t)| {
                 let error = errors * (to - from).signum() * bands.error_of_median(*k, cell.replications);
@@ -246,14 +249,14 @@ impl<'a> Study<'a> {
             return Err(missing());
         };
         let traces = self.results.traces(cell.index, &estimator.label).ok_or_else(missing)?;
-        let operator = OPERATOR.iter().position(|name| *name == parameter);
+        let operator = OPERATOR_PARAMETERS.iter().position(|name| *name == parameter);
         let discrete = ["f1", "f2", "b0", "b1"].iter().position(|name| *name == parameter);
         let same = match parameter {
             "a1" => Some(0),
             "a2" => Some(1),
             _ => discrete,
         };
-        let truth = cell.truth().map(|state| match (operator, same) {
+        let truth = cell.true_states().map(|state| match (operator, same) {
             (Some(i), _) => state.operator[i],
             (None, Some(i)) => state.discrete[i],
             (None, None) => f64::NAN,
@@ -268,14 +271,14 @@ impl<'a> Study<'a> {
 /// True if the estimate of a parameter forgets within a small part of the span: a gain if the memory length of b is
 /// short, any other parameter if all memory lengths are short.
 fn has_short_memory(estimator: &EstimatorCell, parameter: &str) -> bool {
-    const LONGEST_S: f64 = 5.0;
+    const MAX_MEMORY_S: f64 = 5.0;
     const TEXT_SAMPLE_TIME_S: f64 = 0.01;
     let Task::Track(options) = &estimator.task else {
         return false;
     };
     let is_short = |memory: &Memory| match memory {
-        Memory::Samples(n) => n * TEXT_SAMPLE_TIME_S <= LONGEST_S,
-        Memory::Seconds(t) => *t <= LONGEST_S,
+        Memory::Samples(n) => n * TEXT_SAMPLE_TIME_S <= MAX_MEMORY_S,
+        Memory::Seconds(t) => *t <= MAX_MEMORY_S,
         Memory::Infinite => false,
     };
     let Some(given) = options.method.memories() else {

@@ -16,7 +16,7 @@ pub struct Finding {
     /// Parts of the claim with all their cells.
     pub parts: Vec<Part>,
     /// The measured numbers, a few for each part.
-    pub measured: Vec<Measured>,
+    pub measured: Vec<MeasuredNumber>,
     /// Number of cells that pass.
     pub passed: usize,
     /// Number of cells that exceed the claimed number.
@@ -31,7 +31,7 @@ pub struct Finding {
 
 /// A number measured in the cells of a part.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
+pub struct MeasuredNumber {
     /// Name of the number.
     pub label: String,
     /// Median over the cells that have a value.
@@ -63,18 +63,18 @@ impl Claim {
             exceeded: count(CellOutcome::Exceeds),
             failed: count(CellOutcome::Fails),
             of: parts.iter().map(|part| part.tests.len()).sum(),
-            measured: parts.iter().flat_map(measured).collect(),
-            text: as_text(&verdict, &parts),
+            measured: parts.iter().flat_map(measured_numbers).collect(),
+            text: verdict_text(&verdict, &parts),
             verdict,
             parts,
         }
     }
 }
 
-fn measured(part: &Part) -> Vec<Measured> {
+fn measured_numbers(part: &Part) -> Vec<MeasuredNumber> {
     let of = |figure: fn(&CellTest) -> f64| Statistics::of(&part.tests.iter().map(figure).collect::<Vec<_>>());
     let values = of(|test| test.measured.value);
-    let over_cells = Measured {
+    let over_cells = MeasuredNumber {
         label: part.label.clone(),
         value: values.median,
         error: of(|test| test.measured.error).median,
@@ -82,7 +82,7 @@ fn measured(part: &Part) -> Vec<Measured> {
         most: values.max,
         cells: values.count,
     };
-    let shown = part.shown.iter().map(|(label, value)| Measured {
+    let shown = part.shown.iter().map(|(label, value)| MeasuredNumber {
         label: label.clone(),
         value: value.value,
         error: value.error,
@@ -93,9 +93,9 @@ fn measured(part: &Part) -> Vec<Measured> {
     std::iter::once(over_cells).chain(shown).collect()
 }
 
-fn as_text(verdict: &Verdict, parts: &[Part]) -> String {
+fn verdict_text(verdict: &Verdict, parts: &[Part]) -> String {
     let of_part = |part: &Part| {
-        let (above, below) = part.beyond();
+        let (above, below) = part.outcome_counts_beyond_bounds();
         let open = part.count(CellOutcome::Undecided);
         let further = part.count(CellOutcome::Exceeds);
         let mut text = format!(

@@ -52,7 +52,7 @@ mod variance_and_zero;
 
 pub use claim::{Claim, Theme};
 pub use evidence::Evidence;
-pub use finding::{Finding, Measured};
+pub use finding::{Finding, MeasuredNumber};
 pub use rules::{Bound, CellOutcome, CellTest, Part, Verdict};
 pub use table::claims_table;
 pub use value::Value;

@@ -4,7 +4,7 @@ use super::{
     claim::{Claim, Source, Theme},
     evidence::Evidence,
     rules::{CLOSE_BIAS, Part},
-    settings::{DISCRETE, HIGHER_ORDERS, ORDERS, bias_of, settings, with_f},
+    settings::{DISCRETE_PARAMETERS, HIGHER_REMNANT_ORDERS, REMNANT_ORDERS, bias_of, name_with_f, settings},
 };
 use hoid_study::Query;
 
@@ -16,7 +16,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "A.4, Fig. A.1",
         measure: "Mean obtained level, (var u - var u0) / var u, minus the demanded level, in magnitude, C1, m0 = 1 to 4, 18 levels: within 0.02.",
         plans: &["noise-level"],
-        source: Source::Data(mean_level),
+        source: Source::Data(check_mean_level),
     },
     Claim {
         id: "noise-level-scatter",
@@ -25,7 +25,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "A.4, Fig. A.1",
         measure: "Standard deviation of the obtained level of one run, C1, m0 = 1 to 4, 18 levels: within 0.05.",
         plans: &["noise-level"],
-        source: Source::Data(scatter_of_level),
+        source: Source::Data(check_level_scatter),
     },
     Claim {
         id: "t-n-little-effect",
@@ -34,7 +34,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "VII; 6 (\"low relevance\")",
         measure: "Median bias at T_n = 0.2 s minus that at 0.06 s, C1 and C2, n_k* = 29, BJ(m* = 1), and ARX at m0 = 2 to 4, percentage points.",
         plans: &["remnant-time-constant"],
-        source: Source::Data(time_constant),
+        source: Source::Data(check_time_constant),
     },
     Claim {
         id: "pade-need-not-hurt",
@@ -43,29 +43,29 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "Conclusions of Part II; VII",
         measure: "Median paired difference in response_error, BJ with a Pade delay of order 1 to 3 at Ts = 0.02 to 0.08 s minus BJ at 0.01 s, C1, m0 = 1 and 2: within 5 points.",
         plans: &["decimation"],
-        source: Source::Data(pade),
+        source: Source::Data(check_pade_decimation),
     },
 ];
 
-fn mean_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_mean_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("noise-level")?;
     let mut part = Part::new("|mean obtained minus demanded level| within 0.02");
-    for at in settings(&["C1"], &ORDERS, &specified_levels()) {
+    for at in settings(&["C1"], &REMNANT_ORDERS, &specified_levels()) {
         let mut found = study.mean(&at.query("noise_level_obtained"))?;
         found.value -= at.level;
-        part.below(at.label(""), found.abs(), 0.02);
+        part.add_below(at.label(""), found.abs(), 0.02);
     }
     Ok(vec![part])
 }
 
-fn scatter_of_level(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_level_scatter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("noise-level")?;
     let mut part = Part::new("standard deviation of the obtained level within 0.05");
-    for at in settings(&["C1"], &ORDERS, &specified_levels()) {
+    for at in settings(&["C1"], &REMNANT_ORDERS, &specified_levels()) {
         let found = study.of(&[at.query("noise_level_obtained")], &|s| {
             hoid_study::Statistics::of(&s[0]).sd
         })?;
-        part.below(at.label(""), found, 0.05);
+        part.add_below(at.label(""), found, 0.05);
     }
     Ok(vec![part])
 }
@@ -75,20 +75,20 @@ fn specified_levels() -> [f64; 18] {
     std::array::from_fn(|i| (5 * (i + 1)) as f64 / 100.0)
 }
 
-fn time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("remnant-time-constant")?;
     let mut parts = Vec::new();
-    for (name, orders) in [("BJ", &ORDERS[..]), ("ARX", &HIGHER_ORDERS[..])] {
+    for (name, orders) in [("BJ", &REMNANT_ORDERS[..]), ("ARX", &HIGHER_REMNANT_ORDERS[..])] {
         let mut part = Part::new(&format!("{name}: |change in the median bias| within 5 points"));
         for at in settings(&["C1", "C2"], orders, &[0.1, 0.3]) {
-            for coefficient in DISCRETE {
+            for coefficient in DISCRETE_PARAMETERS {
                 let quantity = bias_of(&if name == "BJ" {
-                    with_f(coefficient)
+                    name_with_f(coefficient)
                 } else {
                     coefficient.to_owned()
                 });
                 let fit = |t_n_s| study.median(&at.query(&quantity).name(name).t_n_s(t_n_s));
-                part.below(at.label(coefficient), fit(0.2)?.minus(fit(0.06)?).abs(), CLOSE_BIAS);
+                part.add_below(at.label(coefficient), fit(0.2)?.minus(fit(0.06)?).abs(), CLOSE_BIAS);
             }
         }
         parts.push(part);
@@ -96,7 +96,7 @@ fn time_constant(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(parts)
 }
 
-fn pade(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_pade_decimation(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("decimation")?;
     let mut parts = Vec::new();
     for order in 1..=3 {
@@ -113,7 +113,7 @@ fn pade(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             let full = fit("BJ, whole delay", 1);
             for decimate in 2..=8 {
                 let found = study.difference(&fit(&format!("BJ, Pade {order}"), decimate), &full)?;
-                part.below(format!("m0 = {m0}, Ts = 0.0{decimate} s"), found, CLOSE_BIAS);
+                part.add_below(format!("m0 = {m0}, Ts = 0.0{decimate} s"), found, CLOSE_BIAS);
             }
         }
         parts.push(part);

@@ -39,7 +39,7 @@ use super::value::Value;
 /// Limit for a large bias, % of the true value.
 pub(super) const LARGE_BIAS: f64 = 25.0;
 /// Limit for an acceptable bias, % of the true value.
-pub(super) const ACCEPTABLE: f64 = 10.0;
+pub(super) const ACCEPTABLE_BIAS: f64 = 10.0;
 /// Limit for a bias close to zero or to another bias, percentage points of the true value.
 pub(super) const CLOSE_BIAS: f64 = 5.0;
 /// Smallest relevant difference, percentage points of the true value.
@@ -49,11 +49,11 @@ pub(super) const HEAVY_REDUCTION: f64 = 0.25;
 /// Smallest ratio for a quantity that is much higher.
 pub(super) const MUCH_HIGHER_RATIO: f64 = 1.5;
 /// Smallest R^2 of a linear trend.
-pub(super) const LINEAR: f64 = 0.9;
+pub(super) const MIN_LINEAR_R2: f64 = 0.9;
 
-const MARGIN: f64 = 2.0;
-const HOLDS_SHARE: f64 = 0.9;
-const HOLDS_IN_PART_SHARE: f64 = 0.5;
+const MARGIN_STANDARD_ERRORS: f64 = 2.0;
+const MIN_SHARE_TO_HOLD: f64 = 0.9;
+const MIN_SHARE_TO_HOLD_IN_PART: f64 = 0.5;
 
 /// Verdict on a claim from the data.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,7 +72,7 @@ pub enum Verdict {
 
 impl Verdict {
     /// The verdict as text, without the reason.
-    pub fn words(&self) -> &'static str {
+    pub fn text(&self) -> &'static str {
         match self {
             Self::Holds => "holds",
             Self::HoldsWithLargerEffect => "holds, and more so",
@@ -87,7 +87,7 @@ impl std::fmt::Display for Verdict {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::CannotBeTested(reason) => write!(f, "cannot be tested: {reason}"),
-            other => f.write_str(other.words()),
+            other => f.write_str(other.text()),
         }
     }
 }
@@ -136,7 +136,7 @@ impl CellTest {
         if !value.is_finite() || !error.is_finite() {
             return CellOutcome::Undecided;
         }
-        let margin = MARGIN * error;
+        let margin = MARGIN_STANDARD_ERRORS * error;
         let beyond = match self.bound {
             Bound::Above(limit) => value - limit,
             Bound::Below(limit) => limit - value,
@@ -184,7 +184,7 @@ impl Part {
     }
 
     /// Adds a number that is shown but not tested.
-    pub(super) fn show(&mut self, label: String, value: Value) {
+    pub(super) fn add_shown(&mut self, label: String, value: Value) {
         self.shown.push((label, value));
     }
 
@@ -193,32 +193,32 @@ impl Part {
     }
 
     /// Adds a cell in which the value is claimed to be larger than a limit.
-    pub(super) fn above(&mut self, label: String, measured: Value, limit: f64) {
+    pub(super) fn add_above(&mut self, label: String, measured: Value, limit: f64) {
         self.add(label, measured, Bound::Above(limit));
     }
 
     /// Adds a cell in which the value is claimed to be smaller than a limit.
-    pub(super) fn below(&mut self, label: String, measured: Value, limit: f64) {
+    pub(super) fn add_below(&mut self, label: String, measured: Value, limit: f64) {
         self.add(label, measured, Bound::Below(limit));
     }
 
     /// Adds a cell in which the value is claimed to be around a number.
-    pub(super) fn around(&mut self, label: String, measured: Value, number: f64) {
-        self.between(label, measured, 0.5 * number, 1.5 * number);
+    pub(super) fn add_around(&mut self, label: String, measured: Value, number: f64) {
+        self.add_between(label, measured, 0.5 * number, 1.5 * number);
     }
 
     /// Adds a cell in which an effect is claimed to have this size; a larger value is a larger effect.
-    pub(super) fn effect(&mut self, label: String, measured: Value, size: f64) {
+    pub(super) fn add_effect(&mut self, label: String, measured: Value, size: f64) {
         self.add(label, measured, Bound::Effect(0.5 * size, 1.5 * size));
     }
 
     /// Adds a cell in which the size of an effect is claimed to lie in a range.
-    pub(super) fn effect_between(&mut self, label: String, measured: Value, low: f64, high: f64) {
+    pub(super) fn add_effect_between(&mut self, label: String, measured: Value, low: f64, high: f64) {
         self.add(label, measured, Bound::Effect(low, high));
     }
 
     /// Adds a cell in which the value is claimed to lie in a range.
-    pub(super) fn between(&mut self, label: String, measured: Value, low: f64, high: f64) {
+    pub(super) fn add_between(&mut self, label: String, measured: Value, low: f64, high: f64) {
         self.add(label, measured, Bound::Between(low, high));
     }
 
@@ -228,7 +228,7 @@ impl Part {
     }
 
     /// Numbers of failed cells whose value is above and below the range of a claimed number.
-    pub fn beyond(&self) -> (usize, usize) {
+    pub fn outcome_counts_beyond_bounds(&self) -> (usize, usize) {
         let fails = self.tests.iter().filter(|test| test.outcome() == CellOutcome::Fails);
         fails.fold((0, 0), |(above, below), test| match test.bound {
             Bound::Between(low, _) | Bound::Effect(low, _) => {
@@ -251,11 +251,11 @@ impl Part {
             return None;
         }
         let share = |cells: usize| cells as f64 / decided as f64;
-        Some(if share(passes) >= HOLDS_SHARE {
+        Some(if share(passes) >= MIN_SHARE_TO_HOLD {
             Verdict::Holds
-        } else if share(passes + exceeds) >= HOLDS_SHARE {
+        } else if share(passes + exceeds) >= MIN_SHARE_TO_HOLD {
             Verdict::HoldsWithLargerEffect
-        } else if share(passes + exceeds) >= HOLDS_IN_PART_SHARE {
+        } else if share(passes + exceeds) >= MIN_SHARE_TO_HOLD_IN_PART {
             Verdict::HoldsInPart
         } else {
             Verdict::DoesNotHold
@@ -302,7 +302,7 @@ mod tests {
         let mut part = Part::new("by hand");
         for (count, value) in [(passes, 3.0), (fails, -3.0), (open, 1.0)] {
             for _ in 0..count {
-                part.above(String::new(), Value { value, error: 1.0 }, 0.0);
+                part.add_above(String::new(), Value { value, error: 1.0 }, 0.0);
             }
         }
         part
@@ -349,7 +349,7 @@ mod tests {
         let part = |values: &[f64]| {
             let mut part = Part::new("by hand");
             values.iter().for_each(|value| {
-                part.effect(
+                part.add_effect(
                     String::new(),
                     Value {
                         value: *value,
@@ -367,7 +367,7 @@ mod tests {
         let (plain, more, not) = (part(&[50.0]), part(&[284.0]), part(&[1.0]));
         assert_eq!(verdict(&[plain.clone(), more.clone()]), Verdict::HoldsWithLargerEffect);
         assert_eq!(verdict(&[more.clone(), not]), Verdict::HoldsInPart);
-        assert_eq!(more.beyond(), (0, 0));
+        assert_eq!(more.outcome_counts_beyond_bounds(), (0, 0));
     }
 
     #[test]

@@ -3,21 +3,21 @@
 use hoid_study::Query;
 
 /// Nonzero noise levels in the batch plans.
-pub(super) const LEVELS: [f64; 3] = [0.1, 0.2, 0.3];
+pub(super) const NOISE_LEVELS: [f64; 3] = [0.1, 0.2, 0.3];
 /// Orders of the simulated remnant.
-pub(super) const ORDERS: [usize; 4] = [1, 2, 3, 4];
+pub(super) const REMNANT_ORDERS: [usize; 4] = [1, 2, 3, 4];
 /// Orders of the simulated remnant above one.
-pub(super) const HIGHER_ORDERS: [usize; 3] = [2, 3, 4];
+pub(super) const HIGHER_REMNANT_ORDERS: [usize; 3] = [2, 3, 4];
 /// Delays in the batch plans, samples.
 pub(super) const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
 /// The simulated delay, samples.
 pub(super) const TRUE_DELAY: usize = 29;
 /// Coefficients by their names in the text.
-pub(super) const DISCRETE: [&str; 4] = ["a1", "a2", "b0", "b1"];
+pub(super) const DISCRETE_PARAMETERS: [&str; 4] = ["a1", "a2", "b0", "b1"];
 /// Neuromuscular parameters.
-pub(super) const NMS: [&str; 2] = ["omega_nm", "zeta_nm"];
+pub(super) const NMS_PARAMETERS: [&str; 2] = ["omega_nm", "zeta_nm"];
 /// Noise levels in the plan for section V.B.
-pub(super) const RECURSIVE_LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
+pub(super) const RECURSIVE_NOISE_LEVELS: [f64; 3] = [0.01, 0.1, 0.2];
 /// Setting without remnant, for which there is one record regardless of m0.
 pub(super) const WITHOUT_REMNANT: Setting = Setting {
     condition: "C1",
@@ -48,7 +48,7 @@ pub(super) fn settings(conditions: &[&'static str], orders: &[usize], levels: &[
 }
 
 /// Name of a quantity for models with F, in which a1 and a2 of the text are called f1 and f2.
-pub(super) fn with_f(quantity: &str) -> String {
+pub(super) fn name_with_f(quantity: &str) -> String {
     match quantity
         .strip_suffix("a1")
         .map(|stem| (stem, "f1"))
@@ -74,7 +74,7 @@ impl Setting {
 
     /// Query for the batch fit of a Box-Jenkins model with m* (`nd`) and nk* (`nk`).
     pub fn bj(self, quantity: &str, nd: usize, nk: usize) -> Query {
-        self.query(&with_f(quantity)).name("BJ").nd(nd).nk(nk)
+        self.query(&name_with_f(quantity)).name("BJ").nd(nd).nk(nk)
     }
 
     /// Query for recursive least squares.
@@ -84,7 +84,7 @@ impl Setting {
 
     /// Query for the recursive prediction-error method.
     pub fn rpem(self, quantity: &str) -> Query {
-        self.query(&with_f(quantity)).name("RPEM")
+        self.query(&name_with_f(quantity)).name("RPEM")
     }
 
     pub fn label(self, more: &str) -> String {

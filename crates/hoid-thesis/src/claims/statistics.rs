@@ -5,18 +5,18 @@
 //!   Official Statistics* 17, 2001): x_g is the value with the g-th tenth of the replications omitted from all samples,
 //!   and `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`. Estimators applied to the same records stay paired.
 
-use hoid_numerics::statistics::{mean, squared_deviations};
+use hoid_numerics::statistics::{mean, sum_of_squared_deviations};
 use hoid_study::{Statistics, statistics::median};
 
 use super::value::Value;
 
 /// Number of groups of the jackknife.
-const GROUPS: usize = 10;
+const GROUP_COUNT: usize = 10;
 /// Smallest share of the replications that must give a value.
-pub(super) const SMALLEST_VALID_SHARE: f64 = 0.5;
+pub(super) const MIN_VALID_SHARE: f64 = 0.5;
 
 /// Missing value, used if too few replications give a value.
-pub(super) const NO_VALUE: Value = Value {
+pub(super) const MISSING_VALUE: Value = Value {
     value: f64::NAN,
     error: f64::NAN,
 };
@@ -26,15 +26,15 @@ pub(super) fn magnitudes(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| v.abs()).collect()
 }
 
-/// True if the share of replications that give a value is at least [`SMALLEST_VALID_SHARE`].
+/// True if the share of replications that give a value is at least [`MIN_VALID_SHARE`].
 fn has_enough_values(values: &[f64]) -> bool {
     let finite = values.iter().filter(|v| v.is_finite()).count();
-    finite > 0 && finite as f64 >= SMALLEST_VALID_SHARE * values.len() as f64
+    finite > 0 && finite as f64 >= MIN_VALID_SHARE * values.len() as f64
 }
 
-fn value_of(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
+fn statistic_value(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
     if !has_enough_values(values) {
-        return NO_VALUE;
+        return MISSING_VALUE;
     }
     let (value, error) = figure(&Statistics::of(values));
     Value {
@@ -45,14 +45,14 @@ fn value_of(values: &[f64], figure: fn(&Statistics) -> (f64, f64)) -> Value {
 }
 
 pub(super) fn median_of(values: &[f64]) -> Value {
-    value_of(values, |s| (s.median, s.median_se))
+    statistic_value(values, |s| (s.median, s.median_se))
 }
 
 pub(super) fn mean_of(values: &[f64]) -> Value {
-    value_of(values, |s| (s.mean, s.mean_se))
+    statistic_value(values, |s| (s.mean, s.mean_se))
 }
 
-pub(super) fn share_of(values: &[f64]) -> Value {
+pub(super) fn share_value(values: &[f64]) -> Value {
     let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     let (n, p) = (finite.len() as f64, mean(&finite));
     Value {
@@ -62,7 +62,7 @@ pub(super) fn share_of(values: &[f64]) -> Value {
 }
 
 /// The median; NaN if there are not enough values.
-pub(super) fn med(values: &[f64]) -> f64 {
+pub(super) fn median_or_nan(values: &[f64]) -> f64 {
     if has_enough_values(values) {
         median(values)
     } else {
@@ -72,12 +72,12 @@ pub(super) fn med(values: &[f64]) -> f64 {
 
 /// The magnitude of the median.
 pub(super) fn median_bias(values: &[f64]) -> f64 {
-    med(values).abs()
+    median_or_nan(values).abs()
 }
 
 /// The median of the magnitude.
 pub(super) fn median_magnitude(values: &[f64]) -> f64 {
-    med(&magnitudes(values))
+    median_or_nan(&magnitudes(values))
 }
 
 /// The interquartile range.
@@ -120,7 +120,7 @@ pub(super) fn linearity(values: &[f64]) -> f64 {
 pub(super) fn jackknife(samples: &[Vec<f64>], f: &dyn Fn(&[Vec<f64>]) -> f64) -> Value {
     let value = f(samples);
     let n = samples.iter().map(Vec::len).max().unwrap_or(0);
-    let groups = GROUPS.min(n);
+    let groups = GROUP_COUNT.min(n);
     if groups < 2 {
         return Value { value, error: 0.0 };
     }
@@ -141,7 +141,7 @@ pub(super) fn jackknife(samples: &[Vec<f64>], f: &dyn Fn(&[Vec<f64>]) -> f64) ->
     let g = groups as f64;
     Value {
         value,
-        error: ((g - 1.0) / g * squared_deviations(&left)).sqrt(),
+        error: ((g - 1.0) / g * sum_of_squared_deviations(&left)).sqrt(),
     }
 }
 
@@ -175,7 +175,7 @@ mod tests {
     fn jackknife_keeps_pairs_together() {
         let a = normals(100, 3);
         let b: Vec<f64> = a.iter().map(|a| a + 1.0).collect();
-        let found = jackknife(&[a, b], &|s| med(&s[1]) - med(&s[0]));
+        let found = jackknife(&[a, b], &|s| median_or_nan(&s[1]) - median_or_nan(&s[0]));
         assert!((found.value - 1.0).abs() < 1e-12 && found.error < 1e-12, "{found:?}");
     }
 
@@ -186,14 +186,14 @@ mod tests {
         assert_eq!(median_of(&most).value, 1.5);
         assert!(
             median_of(&few).value.is_nan()
-                && med(&few).is_nan()
+                && median_or_nan(&few).is_nan()
                 && median_magnitude(&few).is_nan()
                 && interquartile_range(&few).is_nan()
         );
         assert_eq!(median_of(&[7.0]), Value { value: 7.0, error: 0.0 });
         assert_eq!(jackknife(&[vec![7.0]], &|s| s[0][0]), Value { value: 7.0, error: 0.0 });
         assert_eq!(
-            share_of(&[0.0; 30]),
+            share_value(&[0.0; 30]),
             Value {
                 value: 0.0,
                 error: 0.05

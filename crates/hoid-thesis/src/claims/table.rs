@@ -4,7 +4,7 @@ use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 
 use super::{
     claim::Claim,
-    finding::{Finding, Measured},
+    finding::{Finding, MeasuredNumber},
 };
 
 /// Creates a table of claims, one row for each, with the measurements as text and the first measured number.
@@ -17,7 +17,7 @@ pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
         name: name.to_owned(),
         values: ColumnValues::Whole(findings.iter().map(|(_, finding)| of(finding) as u64).collect()),
     };
-    let real = |name: &str, of: &dyn Fn(&Measured) -> f64| OutputColumn {
+    let real = |name: &str, of: &dyn Fn(&MeasuredNumber) -> f64| OutputColumn {
         name: name.to_owned(),
         values: ColumnValues::Real(
             findings

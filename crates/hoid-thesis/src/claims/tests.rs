@@ -10,11 +10,11 @@ use hoid_study::{
 
 /// Value of a replication of an estimator for a column: the relative error if there is a true
 /// value, otherwise the value.
-type Data = dyn Fn(&Cell, &EstimatorCell, &str, u64) -> f64;
+type SyntheticData = dyn Fn(&Cell, &EstimatorCell, &str, u64) -> f64;
 
 const REPLICATIONS: u64 = 20;
 
-fn synthetic(name: &str, data: &Data) -> Results {
+fn synthetic_results(name: &str, data: &SyntheticData) -> Results {
     let plan = TEXT_PLANS.iter().find(|plan| plan.name == name).unwrap();
     let plan = Plan::parse(plan.text, name)
         .unwrap()
@@ -24,7 +24,7 @@ fn synthetic(name: &str, data: &Data) -> Results {
 }
 
 /// Small symmetric errors that differ slightly between columns.
-fn scatter(column: &str, replication: u64) -> f64 {
+fn small_error(column: &str, replication: u64) -> f64 {
     let phase = column.bytes().map(f64::from).sum::<f64>();
     1e-3 * (phase + 2.4 * replication as f64).sin()
 }
@@ -64,8 +64,11 @@ fn claim_ids_are_unique_and_statements_short() {
 /// A query that selects nothing, or several estimators, would give a reason but no parts.
 #[test]
 fn each_claim_finds_its_cells_in_its_plans() {
-    let data: &Data = &|_, _, column, replication| 0.01 + scatter(column, replication);
-    let all: Vec<Results> = TEXT_PLANS.iter().map(|plan| synthetic(plan.name, data)).collect();
+    let data: &SyntheticData = &|_, _, column, replication| 0.01 + small_error(column, replication);
+    let all: Vec<Results> = TEXT_PLANS
+        .iter()
+        .map(|plan| synthetic_results(plan.name, data))
+        .collect();
     for claim in claims().iter().filter(|claim| !claim.plans.is_empty()) {
         let mut evidence = Evidence::new();
         all.iter()
@@ -88,12 +91,12 @@ fn each_claim_finds_its_cells_in_its_plans() {
 #[test]
 fn verdicts_depend_on_the_data() {
     let with_arx_bias = |of_b: f64| {
-        synthetic("bias", &move |_, estimator, column, replication| {
+        synthetic_results("bias", &move |_, estimator, column, replication| {
             let is_b = estimator.name == "ARX" && column.starts_with('b');
             if is_b {
-                of_b + scatter(column, replication)
+                of_b + small_error(column, replication)
             } else {
-                scatter(column, replication)
+                small_error(column, replication)
             }
         })
     };
@@ -103,13 +106,13 @@ fn verdicts_depend_on_the_data() {
         Verdict::DoesNotHold
     );
     let with_bj_bias = |of_fourth: f64| {
-        synthetic("bias", &move |cell, estimator, column, replication| {
+        synthetic_results("bias", &move |cell, estimator, column, replication| {
             let fourth =
                 estimator.name == "BJ" && cell.resolved.scenario().remnant.order == 4 && column.starts_with('b');
             if fourth {
-                of_fourth + scatter(column, replication)
+                of_fourth + small_error(column, replication)
             } else {
-                scatter(column, replication)
+                small_error(column, replication)
             }
         })
     };
@@ -122,22 +125,24 @@ fn verdicts_depend_on_the_data() {
         Verdict::HoldsInPart
     );
     let with_level = |off: f64| {
-        synthetic(
-            "noise-level",
-            &move |cell, _, column, replication| match cell.resolved.scenario().remnant.strength {
-                hoid_model::scenario::RemnantStrength::Level { level, .. } => {
-                    level + off + scatter(column, replication)
-                }
-                hoid_model::scenario::RemnantStrength::Gain { .. } => f64::NAN,
-            },
-        )
+        synthetic_results("noise-level", &move |cell, _, column, replication| match cell
+            .resolved
+            .scenario()
+            .remnant
+            .strength
+        {
+            hoid_model::scenario::RemnantStrength::Level { level, .. } => {
+                level + off + small_error(column, replication)
+            }
+            hoid_model::scenario::RemnantStrength::Gain { .. } => f64::NAN,
+        })
     };
     assert_eq!(verdict_of("noise-level-mean", &[with_level(0.01)]), Verdict::Holds);
     assert_eq!(
         verdict_of("noise-level-mean", &[with_level(-0.03)]),
         Verdict::DoesNotHold
     );
-    let nothing = synthetic("noise-level", &|_, _, _, _| f64::NAN);
+    let nothing = synthetic_results("noise-level", &|_, _, _, _| f64::NAN);
     assert!(matches!(
         verdict_of("noise-level-mean", &[nothing]),
         Verdict::CannotBeTested(_)
@@ -147,12 +152,12 @@ fn verdicts_depend_on_the_data() {
 #[test]
 fn traces_give_bias_and_settling() {
     // RPEM has an error of 3 %, RLS of 40 %.
-    let results = synthetic("recursive", &|cell, estimator, column, replication| {
+    let results = synthetic_results("recursive", &|cell, estimator, column, replication| {
         let off = match (estimator.name.as_str(), cell.resolved.scenario().remnant.order) {
             ("RLS", 1) => 0.4,
             _ => 0.03,
         };
-        off + scatter(column, replication)
+        off + small_error(column, replication)
     });
     assert_eq!(
         verdict_of("rls-large-at-m1", std::slice::from_ref(&results)),

@@ -40,7 +40,7 @@ impl Value {
 
     /// The ratio to a number that is based on other replications; the error is correct to first order.
     #[must_use]
-    pub fn over(self, other: Self) -> Self {
+    pub fn divided_by(self, other: Self) -> Self {
         let value = self.value / other.value;
         Self {
             value,
@@ -50,8 +50,8 @@ impl Value {
 
     /// Percentage by which the number is smaller than a number that is based on other replications.
     #[must_use]
-    pub fn less_than(self, other: Self) -> Self {
-        let ratio = self.over(other);
+    pub fn percent_less_than(self, other: Self) -> Self {
+        let ratio = self.divided_by(other);
         Self {
             value: 100.0 * (1.0 - ratio.value),
             error: 100.0 * ratio.error,
@@ -74,10 +74,10 @@ mod tests {
                 error: 0.25
             }
         );
-        let ratio = a.over(b);
+        let ratio = a.divided_by(b);
         // sqrt((0.3 / 8)^2 + (0.4 / 2)^2) = 0.203485
         assert!((ratio.value - 4.0).abs() < 1e-12 && (ratio.error - 4.0 * 0.203_485).abs() < 1e-5);
-        let less = b.less_than(a);
+        let less = b.percent_less_than(a);
         assert!((less.value - 75.0).abs() < 1e-12 && (less.error - 25.0 * 0.203_485).abs() < 1e-3);
     }
 }

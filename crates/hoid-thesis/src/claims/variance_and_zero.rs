@@ -10,8 +10,8 @@ use super::{
     claim::{Claim, Source, Theme},
     evidence::{Evidence, Study},
     rules::{LARGE_BIAS, MUCH_HIGHER_RATIO, Part},
-    settings::{HIGHER_ORDERS, LEVELS, ORDERS, Setting, TRUE_DELAY, bias_of, settings},
-    statistics::{interquartile_range, med, median_magnitude},
+    settings::{HIGHER_REMNANT_ORDERS, NOISE_LEVELS, REMNANT_ORDERS, Setting, TRUE_DELAY, bias_of, settings},
+    statistics::{interquartile_range, median_magnitude, median_or_nan},
     value::Value,
 };
 
@@ -27,7 +27,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.2, Fig. C.5",
         measure: "Magnitude of the median bias of the innovation variance relative to eq. B.12, BJ(m* = m0), C1, n_k* = 29: at m0 = 2 to 4, and its increase from each order to the next, m0 = 1 to 4.",
         plans: PLANS,
-        source: Source::Data(variance_by_order),
+        source: Source::Data(check_variance_by_order),
     },
     Claim {
         id: "bj-remnant-in-c2",
@@ -36,7 +36,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.2, Fig. C.13",
         measure: "Innovation variance (relative to eq. B.12) and K_n (backward Euler), BJ(m* = m0), n_k* = 29, by m0 and noise level: |median bias| in C2 minus that in C1; interquartile range in C2 divided by that in C1, at least 1.5.",
         plans: PLANS,
-        source: Source::Data(remnant_in_second),
+        source: Source::Data(check_remnant_in_second_condition),
     },
     Claim {
         id: "bj-b-at-wrong-delay",
@@ -45,7 +45,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.2, Fig. C.3",
         measure: "Magnitude of the median bias of b0 and b1, BJ(m* = m0), C1, n_k* = 25 and 26, by m0 and noise level; the same minus the magnitude for ARX, m0 = 1 to 4.",
         plans: PLANS,
-        source: Source::Data(wrong_delay),
+        source: Source::Data(check_wrong_delay),
     },
     Claim {
         id: "zero-in-c2",
@@ -54,7 +54,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "6.1.1, 6.1.2, Figs. D.10 to D.17",
         measure: "Median magnitude of the relative error of the zero 1/T_L in C2 minus that in C1, percentage points, n_k* = 29, by noise level: BJ(m* = m0), m0 = 1 to 4, and ARX, m0 = 2 to 4.",
         plans: PLANS,
-        source: Source::Data(zero_in_second),
+        source: Source::Data(check_zero_in_second_condition),
     },
     Claim {
         id: "zero-matters-in-c2",
@@ -63,7 +63,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         place: "Conclusions of Part II, Figs. D.9, D.18",
         measure: "Median magnitude of the relative error of the zero 1/T_L, ARX minus BJ(m* = m0), in C2 minus the same difference in C1, percentage points, n_k* = 29, m0 = 2 to 4, by noise level.",
         plans: PLANS,
-        source: Source::Data(zero_matters),
+        source: Source::Data(check_importance_of_zero),
     },
 ];
 
@@ -78,7 +78,7 @@ fn backward_euler_variance(study: Study<'_>, at: Setting) -> Result<f64, String>
 }
 
 /// Returns a statistic of the relative biases of the innovation variance, %.
-fn variance(study: Study<'_>, at: Setting, figure: fn(&[f64]) -> f64) -> Result<Value, String> {
+fn variance_bias(study: Study<'_>, at: Setting, figure: fn(&[f64]) -> f64) -> Result<Value, String> {
     let query = at.bj("innovation_variance", at.m0, TRUE_DELAY);
     study.sample(&query)?;
     let reference = backward_euler_variance(study, at)?;
@@ -88,23 +88,23 @@ fn variance(study: Study<'_>, at: Setting, figure: fn(&[f64]) -> f64) -> Result<
     })
 }
 
-fn variance_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_variance_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut important = Part::new("|median bias| of the innovation variance above 25 %, m0 >= 2");
     let mut growth = Part::new("|median bias| of the innovation variance minus that at the next lower m0, above 0");
-    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
-        let found = variance(study, at, med)?;
-        let below = variance(study, Setting { m0: at.m0 - 1, ..at }, med)?;
-        important.above(at.label(""), found.abs(), LARGE_BIAS);
-        growth.above(at.label(""), found.abs().minus(below.abs()), 0.0);
+    for at in settings(&["C1"], &HIGHER_REMNANT_ORDERS, &NOISE_LEVELS) {
+        let found = variance_bias(study, at, median_or_nan)?;
+        let below = variance_bias(study, Setting { m0: at.m0 - 1, ..at }, median_or_nan)?;
+        important.add_above(at.label(""), found.abs(), LARGE_BIAS);
+        growth.add_above(at.label(""), found.abs().minus(below.abs()), 0.0);
     }
-    for at in settings(&["C1"], &ORDERS, &[0.1]) {
-        important.show(
+    for at in settings(&["C1"], &REMNANT_ORDERS, &[0.1]) {
+        important.add_shown(
             format!("median bias at {}, relative to eq. B.12, %", at.label("")),
-            variance(study, at, med)?,
+            variance_bias(study, at, median_or_nan)?,
         );
         let exact = study.median(&at.bj(&bias_of("innovation_variance"), at.m0, TRUE_DELAY))?;
-        important.show(
+        important.add_shown(
             format!(
                 "median bias at {}, relative to the exactly held remnant, %",
                 at.label("")
@@ -115,45 +115,49 @@ fn variance_by_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     Ok(vec![important, growth])
 }
 
-fn remnant_in_second(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_remnant_in_second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let gain = |at: Setting, figure: fn(&[f64]) -> f64| {
         let query = at.bj("bias_K_n_backward_euler", at.m0, TRUE_DELAY);
         study.of(&[query], &|s| figure(&s[0]))
     };
-    let of_variance = |at: Setting, figure: fn(&[f64]) -> f64| variance(study, at, figure);
-    type Figure<'f> = &'f dyn Fn(Setting, fn(&[f64]) -> f64) -> Result<Value, String>;
-    let measured: [(&str, Figure<'_>); 2] = [("innovation variance", &of_variance), ("K_n", &gain)];
+    let of_variance = |at: Setting, figure: fn(&[f64]) -> f64| variance_bias(study, at, figure);
+    type BiasStatistic<'f> = &'f dyn Fn(Setting, fn(&[f64]) -> f64) -> Result<Value, String>;
+    let measured: [(&str, BiasStatistic<'_>); 2] = [("innovation variance", &of_variance), ("K_n", &gain)];
     let mut parts = Vec::new();
     for (name, of) in measured {
         let mut better = Part::new(&format!("{name}: |median bias| in C2 minus that in C1, below 0"));
         let mut wider = Part::new(&format!(
             "{name}: interquartile range of the bias in C2 divided by that in C1, above 1.5"
         ));
-        for at in settings(&["C1"], &ORDERS, &LEVELS) {
+        for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
             let second = Setting { condition: "C2", ..at };
-            better.below(at.label(""), of(second, med)?.abs().minus(of(at, med)?.abs()), 0.0);
-            let ratio = of(second, interquartile_range)?.over(of(at, interquartile_range)?);
-            wider.above(at.label(""), ratio, MUCH_HIGHER_RATIO);
+            better.add_below(
+                at.label(""),
+                of(second, median_or_nan)?.abs().minus(of(at, median_or_nan)?.abs()),
+                0.0,
+            );
+            let ratio = of(second, interquartile_range)?.divided_by(of(at, interquartile_range)?);
+            wider.add_above(at.label(""), ratio, MUCH_HIGHER_RATIO);
         }
         parts.extend([better, wider]);
     }
     Ok(parts)
 }
 
-fn wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let mut large = Part::new("BJ: |median bias| of b0 and b1 above 25 %");
     let mut smaller = Part::new("|median bias| of b0 and b1, BJ minus ARX, below 0");
-    for at in settings(&["C1"], &ORDERS, &LEVELS) {
+    for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
         for nk in FAR_DELAYS {
             for name in ["b0", "b1"] {
                 let [bj, arx] =
                     [at.bj(&bias_of(name), at.m0, nk), at.arx(&bias_of(name), nk)].map(|query| study.median(&query));
                 let (bj, arx) = (bj?.abs(), arx?.abs());
                 let label = at.label(&format!("n_k* = {nk}, {name}"));
-                large.above(label.clone(), bj, LARGE_BIAS);
-                smaller.below(label, bj.minus(arx), 0.0);
+                large.add_above(label.clone(), bj, LARGE_BIAS);
+                smaller.add_below(label, bj.minus(arx), 0.0);
             }
         }
     }
@@ -161,7 +165,7 @@ fn wrong_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 }
 
 /// Relative errors of the zero 1/T_L, %, computed from the relative errors of T_L.
-fn of_zero(t_l_percent: &[f64]) -> Vec<f64> {
+fn zero_errors(t_l_percent: &[f64]) -> Vec<f64> {
     let of = |error: &f64| 100.0 * (1.0 / (1.0 + error / 100.0) - 1.0);
     t_l_percent.iter().map(of).collect()
 }
@@ -171,34 +175,34 @@ fn of_zero(t_l_percent: &[f64]) -> Vec<f64> {
 fn zero_change(study: Study<'_>, of: &dyn Fn(Setting) -> Vec<hoid_study::Query>, at: Setting) -> Result<Value, String> {
     let error = |condition| {
         study.of(&of(Setting { condition, ..at }), &|s| {
-            let each: Vec<f64> = s.iter().map(|errors| median_magnitude(&of_zero(errors))).collect();
+            let each: Vec<f64> = s.iter().map(|errors| median_magnitude(&zero_errors(errors))).collect();
             each[0] - each.get(1).unwrap_or(&0.0)
         })
     };
     Ok(error("C2")?.minus(error("C1")?))
 }
 
-fn zero_in_second(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_zero_in_second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let bj = |at: Setting| vec![at.bj("bias_T_L", at.m0, TRUE_DELAY)];
     let arx = |at: Setting| vec![at.arx("bias_T_L", TRUE_DELAY)];
     let mut of_bj = Part::new("BJ: |error of the zero| in C2 minus that in C1, above 0");
-    for at in settings(&["C1"], &ORDERS, &LEVELS) {
-        of_bj.above(at.label(""), zero_change(study, &bj, at)?, 0.0);
+    for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
+        of_bj.add_above(at.label(""), zero_change(study, &bj, at)?, 0.0);
     }
     let mut of_arx = Part::new("ARX: |error of the zero| in C2 minus that in C1, above 0");
-    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
-        of_arx.above(at.label(""), zero_change(study, &arx, at)?, 0.0);
+    for at in settings(&["C1"], &HIGHER_REMNANT_ORDERS, &NOISE_LEVELS) {
+        of_arx.add_above(at.label(""), zero_change(study, &arx, at)?, 0.0);
     }
     Ok(vec![of_bj, of_arx])
 }
 
-fn zero_matters(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
+fn check_importance_of_zero(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("bias")?;
     let both = |at: Setting| vec![at.arx("bias_T_L", TRUE_DELAY), at.bj("bias_T_L", at.m0, TRUE_DELAY)];
     let mut part = Part::new("|error of the zero|, ARX minus BJ, in C2 minus that in C1, above 0");
-    for at in settings(&["C1"], &HIGHER_ORDERS, &LEVELS) {
-        part.above(at.label(""), zero_change(study, &both, at)?, 0.0);
+    for at in settings(&["C1"], &HIGHER_REMNANT_ORDERS, &NOISE_LEVELS) {
+        part.add_above(at.label(""), zero_change(study, &both, at)?, 0.0);
     }
     Ok(vec![part])
 }

@@ -8,7 +8,7 @@ use crate::ThesisError;
 
 /// Description of a comparator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct About {
+pub struct ComparatorDescription {
     /// Name of the comparator in a plan.
     pub name: &'static str,
     /// Short description.
@@ -61,7 +61,7 @@ impl TrackingResult {
     /// Adds the operator at the next requested sample and its response; the response is NaN if there is no operator.
     pub(super) fn push(&mut self, task: &Task<'_>, operator: Option<OperatorParameters>) -> Result<(), ThesisError> {
         self.response.push(match &operator {
-            Some(operator) => response_of(operator, task.record.sample_time(), task.omega_rad_s)?,
+            Some(operator) => delayed_response(operator, task.record.sample_time(), task.omega_rad_s)?,
             None => vec![Complex64::new(f64::NAN, f64::NAN); task.omega_rad_s.len()],
         });
         self.operator.push(operator);
@@ -72,7 +72,7 @@ impl TrackingResult {
 /// A method that is included for comparison with others.
 pub trait Comparator: Settings + Send + Sync {
     /// Returns the description of the method.
-    fn about(&self) -> About;
+    fn about(&self) -> ComparatorDescription;
 
     /// Tracks the operator over a record.
     ///
@@ -114,12 +114,12 @@ impl Task<'_> {
 }
 
 /// The response at given frequencies of an operator with any delay, including the zero-order hold.
-pub(crate) fn response_of(
+pub(crate) fn delayed_response(
     operator: &OperatorParameters,
     sample_time: SampleTime,
     omega_rad_s: &[f64],
 ) -> Result<Vec<Complex64>, ThesisError> {
-    let parameters = delayed_operator::delayed_parameters(operator);
+    let parameters = delayed_operator::delayed_operator_parameters(operator);
     let held = delayed_operator::delayed_operator(parameters, sample_time)?;
     let of = |omega: &f64| {
         let z = |k: usize| Complex64::from_polar(1.0, -omega * sample_time.s() * k as f64);

@@ -16,14 +16,14 @@ use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, Task, TrackingResult},
+    comparator::{Comparator, ComparatorDescription, Task, TrackingResult},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;
 
 const NAME: &str = "fourier";
 /// Ridge, as a fraction of the power of a line; it regularises lines that a short window cannot separate.
-const RIDGE: f64 = 1e-4;
+const RIDGE_SHARE: f64 = 1e-4;
 
 settings! {
     /// Options of the Fourier coefficients.
@@ -51,15 +51,15 @@ impl FourierCoefficients {
             let regressors: Vec<f64> = task.lines_rad_s.iter().flat_map(of).collect();
             equations.add(1.0, &regressors, &[e[k], u[k]]);
         }
-        let theta = equations.solve(NAME, &equations.ridge(RIDGE))?;
+        let theta = equations.solve(NAME, &equations.ridge(RIDGE_SHARE))?;
         let of = |i: usize| [0, 1].map(|j| Complex64::new(theta[(2 * i, j)], -theta[(2 * i + 1, j)]));
         Ok((0..task.lines_rad_s.len()).map(of).collect())
     }
 }
 
 impl Comparator for FourierCoefficients {
-    fn about(&self) -> About {
-        About {
+    fn about(&self) -> ComparatorDescription {
+        ComparatorDescription {
             name: NAME,
             help: "Fourier coefficients at the lines, in a moving window",
             source: "van Paassen and Mulder 1998",
@@ -100,10 +100,10 @@ mod tests {
         let u: Vec<f64> = (0..512)
             .map(|k| 2.0 * at(0, f64::from(k)) + at(1, f64::from(k) - 20.0))
             .collect();
-        let record = record_of(&e, &u);
+        let record = test_record(&e, &u);
         let task = Task {
             lines_rad_s: &omega,
-            ..task_of(&record, &[255], &omega)
+            ..test_task(&record, &[255], &omega)
         };
         let found = FourierCoefficients { window: 5.12 }.follow(&task).unwrap();
         // The ridge reduces e and u by the same fraction.
@@ -134,7 +134,7 @@ mod tests {
         }
         assert!(
             FourierCoefficients::default()
-                .follow(&task_of(&record_of(&[0.0; 99], &[0.0; 99]), &[9], &[]))
+                .follow(&test_task(&test_record(&[0.0; 99], &[0.0; 99]), &[9], &[]))
                 .is_err()
         );
     }

@@ -24,7 +24,7 @@ use hoid_model::OperatorParameters;
 use hoid_sim::RunSeed;
 
 use super::{
-    comparator::{About, Comparator, Task, TrackingResult},
+    comparator::{Comparator, ComparatorDescription, Task, TrackingResult},
     unit_responses::unit_responses,
 };
 use crate::ThesisError;
@@ -46,13 +46,13 @@ const RANGES: [(f64, f64); 9] = [
 /// Number of genes.
 const N: usize = RANGES.len();
 /// Index of the gene for t_M.
-const MIDPOINT: usize = 4;
+const MIDPOINT_INDEX: usize = 4;
 /// Number of members that are kept unchanged.
-const ELITE: usize = 2;
+const ELITE_COUNT: usize = 2;
 /// Number of members drawn in the tournament for each parent.
 const TOURNAMENT_SIZE: usize = 3;
 /// Distance beyond the parents within which a gene may lie, as a fraction of the distance between the parents.
-const BLEND: f64 = 0.5;
+const BLEND_EXTENSION: f64 = 0.5;
 
 settings! {
     /// Options of the genetic search.
@@ -93,7 +93,7 @@ impl GeneticSigmoid {
                 cell: generation as u64,
                 replication: 0,
             };
-            seed.uniform(n).into_iter()
+            seed.uniform_numbers(n).into_iter()
         };
         let mut numbers = drawn(0, self.population * N);
         let mut next = || numbers.next().unwrap_or_default();
@@ -106,7 +106,7 @@ impl GeneticSigmoid {
             let mut next = || numbers.next().unwrap_or_default();
             // The population contracts around the optimum, and the mutations become smaller accordingly.
             let size = 0.3 * (1.0 - generation as f64 / (self.generations + 1) as f64);
-            let mut children = all[..ELITE.min(all.len())].to_vec();
+            let mut children = all[..ELITE_COUNT.min(all.len())].to_vec();
             while children.len() < all.len() {
                 // The members are sorted, so the smallest index denotes the best member.
                 let mut parent = || {
@@ -116,7 +116,7 @@ impl GeneticSigmoid {
                 let (a, b) = (parent(), parent());
                 let genes = std::array::from_fn(|i| {
                     let (low, high) = (a.genes[i].min(b.genes[i]), a.genes[i].max(b.genes[i]));
-                    let beyond = BLEND * (high - low);
+                    let beyond = BLEND_EXTENSION * (high - low);
                     let mut gene = low - beyond + next() * (high - low + 2.0 * beyond);
                     let (moved, one, two) = (next(), next(), next());
                     if moved < self.mutation {
@@ -140,7 +140,7 @@ impl GeneticSigmoid {
             let (low, high) = RANGES[i];
             let value = low + genes[i] * (high - low);
             match i {
-                MIDPOINT => span_s.0 + length * (0.1 + 0.8 * genes[i]),
+                MIDPOINT_INDEX => span_s.0 + length * (0.1 + 0.8 * genes[i]),
                 5 | 7 => value.exp(),
                 _ => value,
             }
@@ -171,7 +171,7 @@ impl GeneticSigmoid {
     }
 
     /// Returns the start found by the genetic search, in the order of [`SigmoidChange::names`].
-    fn start(&self, task: &Task<'_>, e: &[f64], u: &[f64]) -> Vec<f64> {
+    fn genetic_start(&self, task: &Task<'_>, e: &[f64], u: &[f64]) -> Vec<f64> {
         let span_s = (task.record.time_s(0), task.record.time_s(e.len() - 1));
         let cost = |genes: &[f64; N]| Self::criterion(task, e, u, &Self::parameters(genes, span_s)).0;
         let best = Self::parameters(&self.search(&cost).genes, span_s);
@@ -183,7 +183,7 @@ impl GeneticSigmoid {
         let (e, u) = task.signals(NAME, 1000)?;
         let estimator = SigmoidChange {
             nd: Some(1),
-            start: Some(self.start(task, e, u)),
+            start: Some(self.genetic_start(task, e, u)),
             likelihood_intervals: false,
             ..SigmoidChange::default()
         };
@@ -193,8 +193,8 @@ impl GeneticSigmoid {
 
 /// Returns the operator of a fit at a time.
 fn operator_at(fit: &SigmoidFit, time_s: f64) -> Option<OperatorParameters> {
-    if !fit.change_found() {
-        return Some(fit.constant_operator().lead()?.parameters());
+    if !fit.has_change() {
+        return Some(fit.constant_operator().operator_estimate()?.parameters());
     }
     let gains = fit.gains_at(time_s);
     let constant = |name: &str| fit.last_operator().get(name).map(|estimate| estimate.value);
@@ -208,8 +208,8 @@ fn operator_at(fit: &SigmoidFit, time_s: f64) -> Option<OperatorParameters> {
 }
 
 impl Comparator for GeneticSigmoid {
-    fn about(&self) -> About {
-        About {
+    fn about(&self) -> ComparatorDescription {
+        ComparatorDescription {
             name: NAME,
             help: "maximum-likelihood fit of gains that follow a sigmoid, by a genetic search",
             source: "Zaal et al. 2009; Zaal and Sweet 2011",
@@ -283,7 +283,7 @@ mod tests {
             ..SigmoidChange::default()
         };
         let own = own.fit(std::slice::from_ref(&run.record)).unwrap();
-        assert!(genetic.change_found() && own.change_found());
+        assert!(genetic.has_change() && own.has_change());
         assert!(
             genetic.loss() < own.loss() * (1.0 + 1e-4),
             "{} {}",
@@ -294,10 +294,10 @@ mod tests {
 
     #[test]
     fn zero_input_is_refused() {
-        let silent = record_of(&[0.0; 4000], &[1.0; 4000]);
+        let silent = test_record(&[0.0; 4000], &[1.0; 4000]);
         assert!(
             GeneticSigmoid::default()
-                .follow(&task_of(&silent, &[3999], &[1.0]))
+                .follow(&test_task(&silent, &[3999], &[1.0]))
                 .is_err()
         );
     }

@@ -25,7 +25,7 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, Task, TrackingResult},
+    comparator::{Comparator, ComparatorDescription, Task, TrackingResult},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;
@@ -33,7 +33,7 @@ use crate::ThesisError;
 const NAME: &str = "lpv-subspace";
 /// Ridge, as a fraction of the mean diagonal, that keeps the predictor's normal equations positive definite if the
 /// input consists of a few lines.
-const RIDGE: f64 = 1e-9;
+const RIDGE_SHARE: f64 = 1e-9;
 
 settings! {
     /// Options of the subspace method.
@@ -81,7 +81,7 @@ impl Model {
 }
 
 /// Returns the scheduling signal mu at a time.
-fn scheduling(change: Option<(f64, f64)>, t_s: f64) -> f64 {
+fn scheduling_signal(change: Option<(f64, f64)>, t_s: f64) -> f64 {
     change.map_or(0.0, |(at_s, rate)| 1.0 / (1.0 + (-rate * (t_s - at_s)).exp()))
 }
 
@@ -99,7 +99,7 @@ impl LpvSubspace {
             }
             predictor.add(1.0, &regressors, &[output(k)]);
         }
-        let theta = predictor.solve(NAME, &predictor.ridge(RIDGE))?;
+        let theta = predictor.solve(NAME, &predictor.ridge(RIDGE_SHARE))?;
         // Row r of Gamma x(k) uses the coefficients from block r on, for the same past.
         let mut ahead = DMatrix::zeros(f, z.len() - p);
         for k in p..z.len() {
@@ -110,7 +110,7 @@ impl LpvSubspace {
             }
         }
         let states = self.states(&ahead)?;
-        self.of_states(z, &states)
+        self.model_from_states(z, &states)
     }
 
     /// Returns the state: the principal directions of the prediction of the future from the past, scaled to unit power.
@@ -141,7 +141,7 @@ impl LpvSubspace {
     }
 
     /// Estimates A, B and C for a known state.
-    fn of_states(&self, z: &[Vec<f64>], states: &DMatrix<f64>) -> Result<Model, ThesisError> {
+    fn model_from_states(&self, z: &[Vec<f64>], states: &DMatrix<f64>) -> Result<Model, ThesisError> {
         let (n, width, p) = (self.order, z[0].len(), self.past);
         let mut output = NormalEquations::new(n, 1);
         for (i, x) in states.column_iter().enumerate() {
@@ -166,8 +166,8 @@ impl LpvSubspace {
 }
 
 impl Comparator for LpvSubspace {
-    fn about(&self) -> About {
-        About {
+    fn about(&self) -> ComparatorDescription {
+        ComparatorDescription {
             name: NAME,
             help: "predictor-based subspace identification of an LPV model",
             source: "van Wingerden and Verhaegen 2009; Duarte et al. 2017",
@@ -183,7 +183,7 @@ impl Comparator for LpvSubspace {
         let sample = |first: usize| {
             let acting = (first..first + d).filter(|k| *k >= late).map(|k| e[k - late]);
             let v = acting.sum::<f64>() / d as f64;
-            let mu = scheduling(task.change, task.record.time_s(first));
+            let mu = scheduling_signal(task.change, task.record.time_s(first));
             match task.change {
                 Some(_) => vec![v, mu * v, u[first]],
                 None => vec![v, u[first]],
@@ -192,7 +192,7 @@ impl Comparator for LpvSubspace {
         let z: Vec<Vec<f64>> = (0..e.len() / d).map(|k| sample(k * d)).collect();
         let model = self.fit(&z)?;
         let at = |k: &usize| {
-            let mu = scheduling(task.change, task.record.time_s(*k));
+            let mu = scheduling_signal(task.change, task.record.time_s(*k));
             let of = |omega: &f64| {
                 let turn = |samples: f64| Complex64::from_polar(1.0, omega * ts * samples);
                 let mean: Complex64 = (0..d).map(|i| turn(i as f64 - late as f64) / d as f64).sum();
@@ -216,7 +216,7 @@ mod tests {
     /// A second-order system of the assumed structure, with white input and innovations of a tenth of the output: the
     /// response is correct before and after the change.
     #[test]
-    fn system_of_the_assumed_structure_is_found() {
+    fn system_of_the_assumed_structure_is_identified() {
         let white = |cell| {
             RunSeed {
                 cell,
@@ -228,7 +228,7 @@ mod tests {
         let (f1, f2) = (-1.5, 0.7);
         // Observable canonical form: x1 is the output without noise.
         let gains = |mu: f64| [1.0 + mu, 0.5 - 0.2 * mu];
-        let mu = |k: usize| scheduling(Some((60.0, 0.5)), 0.01 * k as f64);
+        let mu = |k: usize| scheduling_signal(Some((60.0, 0.5)), 0.01 * k as f64);
         let (mut x, mut z) = ([0.0; 2], Vec::new());
         for k in 0..v.len() {
             let eps = 0.4 * noise[k];
@@ -262,13 +262,13 @@ mod tests {
 
     #[test]
     fn operator_after_the_change_is_close_on_average() {
-        const RUNS: u64 = 4;
+        const RUN_COUNT: u64 = 4;
         let mut mean = [0.0; 2];
-        for replication in 0..RUNS {
+        for replication in 0..RUN_COUNT {
             let run = Run::replication(Condition::C4, 1, 0.1, replication);
             let found = LpvSubspace::default().follow(&run.task()).unwrap();
             for ((mean, found), expected) in mean.iter_mut().zip(&found.response).zip(run.responses()) {
-                *mean += error(found, &expected) / RUNS as f64;
+                *mean += error(found, &expected) / RUN_COUNT as f64;
             }
         }
         assert!(mean.iter().all(|off| *off < 0.35), "{mean:?}");
@@ -277,17 +277,21 @@ mod tests {
     #[test]
     fn too_high_order_is_refused() {
         let e: Vec<f64> = (0..2000).map(|k| (0.1 * f64::from(k)).sin()).collect();
-        let record = record_of(&e, &vec![0.0; 2000]);
+        let record = test_record(&e, &vec![0.0; 2000]);
         let refused = LpvSubspace::default()
-            .follow(&task_of(&record, &[1999], &[1.0]))
+            .follow(&test_task(&record, &[1999], &[1.0]))
             .unwrap_err();
         assert!(refused.to_string().contains("rank"), "{refused}");
         let many = LpvSubspace {
             future: 2,
             ..LpvSubspace::default()
         };
-        assert!(many.follow(&task_of(&record, &[1999], &[1.0])).is_err());
-        let short = record_of(&[1.0; 100], &[1.0; 100]);
-        assert!(LpvSubspace::default().follow(&task_of(&short, &[99], &[1.0])).is_err());
+        assert!(many.follow(&test_task(&record, &[1999], &[1.0])).is_err());
+        let short = test_record(&[1.0; 100], &[1.0; 100]);
+        assert!(
+            LpvSubspace::default()
+                .follow(&test_task(&short, &[99], &[1.0]))
+                .is_err()
+        );
     }
 }

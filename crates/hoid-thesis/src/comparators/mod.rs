@@ -29,8 +29,8 @@ mod rpem_by_vaf;
 mod unit_responses;
 mod wavelet;
 
-pub(crate) use comparator::response_of;
-pub use comparator::{About, Comparator, Task, TrackingResult};
+pub(crate) use comparator::delayed_response;
+pub use comparator::{Comparator, ComparatorDescription, Task, TrackingResult};
 pub use fourier::FourierCoefficients;
 pub use genetic_sigmoid::GeneticSigmoid;
 pub use lpv_subspace::LpvSubspace;
@@ -52,10 +52,10 @@ pub fn comparators() -> Vec<Box<dyn Comparator>> {
 
 /// Message that explains why a comparator, given by its name or the first word of the name, does not track a recording,
 /// and which command runs it; `None` if no comparator has this name.
-pub fn not_tracked(name: &str) -> Option<String> {
+pub fn untracked_comparator_message(name: &str) -> Option<String> {
     let typed = name.trim().to_ascii_lowercase();
-    let (_, about) = names().find(|(word, _)| *word == typed)?;
-    let About {
+    let (_, about) = names_and_descriptions().find(|(word, _)| *word == typed)?;
+    let ComparatorDescription {
         name,
         help,
         source,
@@ -81,9 +81,9 @@ pub fn not_tracked(name: &str) -> Option<String> {
     ))
 }
 
-/// The names that [`not_tracked`] accepts: the name of each comparator and its first word, such as `lpv`, unless that
+/// The names that [`untracked_comparator_message`] accepts: the name of each comparator and its first word, such as `lpv`, unless that
 /// word names a recursive method.
-pub fn names() -> impl Iterator<Item = (&'static str, About)> {
+pub fn names_and_descriptions() -> impl Iterator<Item = (&'static str, ComparatorDescription)> {
     let all = comparators().into_iter().map(|one| one.about());
     all.flat_map(|about| {
         let first = about.name.split('-').next().unwrap_or(about.name);

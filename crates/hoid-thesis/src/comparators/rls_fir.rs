@@ -24,7 +24,7 @@ use nalgebra::DMatrix;
 use num_complex::Complex64;
 
 use super::{
-    comparator::{About, Comparator, Task, TrackingResult},
+    comparator::{Comparator, ComparatorDescription, Task, TrackingResult},
     least_squares::NormalEquations,
 };
 use crate::ThesisError;
@@ -95,8 +95,8 @@ impl RlsFir {
 }
 
 impl Comparator for RlsFir {
-    fn about(&self) -> About {
-        About {
+    fn about(&self) -> ComparatorDescription {
+        ComparatorDescription {
             name: NAME,
             help: "regularised recursive least squares for a finite impulse response",
             source: "Olivari et al. 2016",
@@ -143,8 +143,8 @@ mod tests {
             ..RunSeed::default()
         }
         .white_noise(120);
-        let record = record_of(&e, &u);
-        let task = task_of(&record, &[59, 119], &[]);
+        let record = test_record(&e, &u);
+        let task = test_task(&record, &[59, 119], &[]);
         let found = method.impulse_responses(&task).unwrap();
         let power = u.iter().map(|u| u * u).sum::<f64>() / 120.0;
         for (at, found) in task.at.iter().zip(&found) {
@@ -193,8 +193,8 @@ mod tests {
             penalty: 1e-6,
             decay: 0.99,
         };
-        let record = record_of(&e, &u);
-        let task = task_of(&record, &[3999, 7999], &[3.0]);
+        let record = test_record(&e, &u);
+        let task = test_task(&record, &[3999, 7999], &[3.0]);
         let found = method.follow(&task).unwrap();
         for (row, gain) in found.response.iter().zip([0.5, 1.0]) {
             let expected = Complex64::from_polar(gain, -3.0 * 0.01 * 20.0);
@@ -209,23 +209,23 @@ mod tests {
         let e: Vec<f64> = (0..3000)
             .map(|k| (0.02 * k as f64).sin() + (0.005 * k as f64).cos())
             .collect();
-        let record = record_of(&e, &e);
+        let record = test_record(&e, &e);
         let method = RlsFir {
             nb: 256,
             ..RlsFir::default()
         };
-        let found = method.follow(&task_of(&record, &[2999], &[2.0])).unwrap();
+        let found = method.follow(&test_task(&record, &[2999], &[2.0])).unwrap();
         // With u = e, the response at the line is near 1, however uncertain the response at other frequencies is.
         assert!((found.response[0][0] - 1.0).norm() < 0.05, "{:?}", found.response);
-        let silent = record_of(&[0.0; 500], &[1.0; 500]);
+        let silent = test_record(&[0.0; 500], &[1.0; 500]);
         let refused = method
-            .follow(&task_of(&silent, &[499], &[2.0]))
+            .follow(&test_task(&silent, &[499], &[2.0]))
             .unwrap_err()
             .to_string();
         assert!(refused.contains("rls-fir") && refused.contains("zero"), "{refused}");
         assert!(
             method
-                .follow(&task_of(&record_of(&e[..200], &e[..200]), &[0], &[]))
+                .follow(&test_task(&test_record(&e[..200], &e[..200]), &[0], &[]))
                 .is_err()
         );
     }

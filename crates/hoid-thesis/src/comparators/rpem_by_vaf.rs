@@ -8,9 +8,9 @@
 
 use hoid_ident::{settings, settings::Bounds};
 use hoid_model::{PolynomialModel, Structure};
-use hoid_track::{CovarianceUpdates, Method, StartAt, TrackOptions, track_validated};
+use hoid_track::{CovarianceUpdates, Method, StartSource, TrackOptions, track_validated};
 
-use super::comparator::{About, Comparator, Task, TrackingResult};
+use super::comparator::{Comparator, ComparatorDescription, Task, TrackingResult};
 use crate::ThesisError;
 
 const NAME: &str = "rpem-by-vaf";
@@ -40,8 +40,8 @@ settings! {
 }
 
 impl Comparator for RpemByVaf {
-    fn about(&self) -> About {
-        About {
+    fn about(&self) -> ComparatorDescription {
+        ComparatorDescription {
             name: NAME,
             help: "recursive prediction-error method with a covariance update from the VAF of a validation set",
             source: "the thesis, section VII",
@@ -71,7 +71,7 @@ impl Comparator for RpemByVaf {
             ("stable", "noise"),
         ];
         let options = TrackOptions {
-            start: StartAt::Span(Some(task.start_s)),
+            start: StartSource::Span(Some(task.start_s)),
             ..TrackOptions::new(Method::rpem(), structure, orders)
         };
         let updates = CovarianceUpdates {

@@ -11,18 +11,18 @@ use hoid_sim::{RunSeed, Simulator};
 use num_complex::Complex64;
 
 use super::{
-    comparator::{Task, response_of},
-    comparators, names, not_tracked,
+    comparator::{Task, delayed_response},
+    comparators, names_and_descriptions, untracked_comparator_message,
 };
 
 /// Returns a record at 100 Hz.
-pub(super) fn record_of(e: &[f64], u: &[f64]) -> Record {
+pub(super) fn test_record(e: &[f64], u: &[f64]) -> Record {
     let channel = |name: &str, values: &[f64]| Channel::new(name, "deg", values.to_vec());
     Record::new(SampleTime::new(0.01).unwrap(), channel("e", e), channel("u", u)).unwrap()
 }
 
 /// Returns a task without lines.
-pub(super) fn task_of<'a>(record: &'a Record, at: &'a [usize], omega_rad_s: &'a [f64]) -> Task<'a> {
+pub(super) fn test_task<'a>(record: &'a Record, at: &'a [usize], omega_rad_s: &'a [f64]) -> Task<'a> {
     Task {
         record,
         at,
@@ -103,7 +103,7 @@ impl Run {
     /// The true responses at the requested samples.
     pub fn responses(&self) -> Vec<Vec<Complex64>> {
         let task = self.task();
-        let of = |k: &usize| response_of(&self.operator(*k), self.record.sample_time(), task.omega_rad_s).unwrap();
+        let of = |k: &usize| delayed_response(&self.operator(*k), self.record.sample_time(), task.omega_rad_s).unwrap();
         self.at.iter().map(of).collect()
     }
 }
@@ -155,7 +155,7 @@ fn all_comparators_follow_a_reference_run() {
 
 #[test]
 fn zero_input_and_late_samples_are_refused_by_all() {
-    let silent = record_of(&[0.0; 4000], &[1.0; 4000]);
+    let silent = test_record(&[0.0; 4000], &[1.0; 4000]);
     let moving = Run::of(Condition::C1, 1, 0.1);
     let beyond = Task {
         at: &[8192],
@@ -164,7 +164,7 @@ fn zero_input_and_late_samples_are_refused_by_all() {
     for comparator in comparators() {
         let name = comparator.about().name;
         let refused = comparator
-            .follow(&task_of(&silent, &[3999], &[1.0]))
+            .follow(&test_task(&silent, &[3999], &[1.0]))
             .unwrap_err()
             .to_string();
         assert!(refused.contains(name) && refused.contains("zero"), "{refused}");
@@ -181,15 +181,15 @@ fn non_recursive_methods_are_refused_with_advice() {
         ("rls-fir", "--method rls --structure fir"),
         ("LPV-subspace", "the whole record"),
     ] {
-        let message = not_tracked(typed).unwrap();
+        let message = untracked_comparator_message(typed).unwrap();
         assert!(
             message.contains(words) && message.contains("survey_methods"),
             "{message}"
         );
     }
     for typed in ["rpem", "rls", "kalman", ""] {
-        assert_eq!(not_tracked(typed), None, "{typed}");
+        assert_eq!(untracked_comparator_message(typed), None, "{typed}");
     }
-    let all: BTreeSet<&str> = names().map(|(name, _)| name).collect();
-    assert_eq!(all.len(), names().count());
+    let all: BTreeSet<&str> = names_and_descriptions().map(|(name, _)| name).collect();
+    assert_eq!(all.len(), names_and_descriptions().count());
 }

@@ -14,7 +14,7 @@
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
 
-use super::comparator::{About, Comparator, Task, TrackingResult};
+use super::comparator::{Comparator, ComparatorDescription, Task, TrackingResult};
 use crate::ThesisError;
 
 const NAME: &str = "wavelet";
@@ -49,8 +49,8 @@ impl WaveletRatio {
 }
 
 impl Comparator for WaveletRatio {
-    fn about(&self) -> About {
-        About {
+    fn about(&self) -> ComparatorDescription {
+        ComparatorDescription {
             name: NAME,
             help: "ratio of the wavelet transforms of u and e at the lines",
             source: "Thompson et al. 2004",
@@ -87,9 +87,9 @@ mod tests {
         let u: Vec<f64> = (0..6000)
             .map(|k| gain(k) * if k >= 10 { wave(k - 10) } else { 0.0 })
             .collect();
-        let record = record_of(&e, &u);
+        let record = test_record(&e, &u);
         let found = WaveletRatio::default()
-            .follow(&task_of(&record, &[1500, 4500], &[omega]))
+            .follow(&test_task(&record, &[1500, 4500], &[omega]))
             .unwrap();
         for (row, gain) in found.response.iter().zip([1.0, 3.0]) {
             let expected = Complex64::from_polar(gain, -omega * 0.1);
@@ -116,12 +116,16 @@ mod tests {
 
     #[test]
     fn zero_input_is_refused_and_zero_output_has_no_response() {
-        let silent = record_of(&[0.0; 50], &[1.0; 50]);
-        assert!(WaveletRatio::default().follow(&task_of(&silent, &[9], &[1.0])).is_err());
+        let silent = test_record(&[0.0; 50], &[1.0; 50]);
+        assert!(
+            WaveletRatio::default()
+                .follow(&test_task(&silent, &[9], &[1.0]))
+                .is_err()
+        );
         let e: Vec<f64> = (0..500).map(|k| (0.1 * f64::from(k)).sin()).collect();
-        let record = record_of(&e, &[0.0; 500]);
+        let record = test_record(&e, &[0.0; 500]);
         let found = WaveletRatio::default()
-            .follow(&task_of(&record, &[250], &[10.0]))
+            .follow(&test_task(&record, &[250], &[10.0]))
             .unwrap();
         assert!(found.response[0][0].norm() < 1e-12);
     }

@@ -28,7 +28,7 @@ mod recorded;
 use hoid_model::{Record, scenario::Condition};
 use rayon::prelude::*;
 
-pub use people::{EXPERIMENT, ExperimentPlan};
+pub use people::{EXPERIMENT_PLAN, ExperimentPlan};
 pub use recorded::RecordedPeople;
 
 use crate::ThesisError;
@@ -78,11 +78,11 @@ pub trait Experiment: Send + Sync {
     ///
     /// # Errors
     /// [`ThesisError::Study`] if the run cannot be read or simulated.
-    fn measured(&self, run: &RunKey) -> Result<MeasuredRun, ThesisError>;
+    fn read_run(&self, run: &RunKey) -> Result<MeasuredRun, ThesisError>;
 
     /// Number of estimates for a run: for each structure, the fits to two spans with every delay and with n_k*, and one
     /// recursive estimate.
-    fn estimates_of_run(&self) -> u64 {
+    fn estimate_count_per_run(&self) -> u64 {
         let (first, last) = self.delays();
         2 * (2 * (last + 1).saturating_sub(first) as u64 + 2 + 1)
     }
@@ -119,7 +119,7 @@ pub fn experiment(
         if !keep_running() {
             return None;
         }
-        let evaluated = people.measured(&key).and_then(|MeasuredRun { record, change_s }| {
+        let evaluated = people.read_run(&key).and_then(|MeasuredRun { record, change_s }| {
             let outcome = evaluate(&record, people.delays())?;
             Ok((change_s, outcome))
         });
@@ -149,7 +149,7 @@ mod tests {
             runs: 2,
             evaluated: 1,
             delays: (28, 30),
-            ..ExperimentPlan::parse(EXPERIMENT).unwrap()
+            ..ExperimentPlan::parse(EXPERIMENT_PLAN).unwrap()
         };
         let found = experiment(&plan, &|| (), &|| true).runs;
         let conditions: Vec<&str> = found.iter().map(|run| run.key.condition.as_str()).collect();

@@ -8,7 +8,7 @@ use super::{Experiment, ExperimentCondition, MeasuredRun, RunKey};
 use crate::ThesisError;
 
 /// Text of the built-in plan.
-pub const EXPERIMENT: &str = include_str!("../../plans/experiment.toml");
+pub const EXPERIMENT_PLAN: &str = include_str!("../../plans/experiment.toml");
 
 /// The virtual people of the experiment, and the processing of their runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -171,7 +171,7 @@ impl Experiment for ExperimentPlan {
     }
 
     /// Returns no time of change, because the record contains the simulated operator with its change.
-    fn measured(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
+    fn read_run(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
         let number = |key: &str, text: &str| {
             let number = text.parse::<u64>();
             number.map_err(|_| invalid_value(key, text, "a whole number, 1 or larger"))
@@ -192,7 +192,7 @@ mod tests {
 
     #[test]
     fn plan_matches_the_thesis_and_bad_values_are_refused() {
-        let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
+        let plan = ExperimentPlan::parse(EXPERIMENT_PLAN).unwrap();
         assert_eq!((plan.subjects, plan.runs, plan.evaluated), (3, 7, 5));
         for (from, to, named) in [
             ("runs = 7", "runs = 3", "evaluated"),
@@ -201,14 +201,14 @@ mod tests {
             ("subjects = 3", "people = 3", "people"),
             ("seed = 3006", "seed = -1", "seed"),
         ] {
-            let refused = ExperimentPlan::parse(&EXPERIMENT.replace(from, to)).unwrap_err();
+            let refused = ExperimentPlan::parse(&EXPERIMENT_PLAN.replace(from, to)).unwrap_err();
             assert!(refused.to_string().contains(named), "{refused}");
         }
     }
 
     #[test]
     fn runs_of_a_subject_differ_and_are_reproducible() {
-        let plan = ExperimentPlan::parse(EXPERIMENT).unwrap();
+        let plan = ExperimentPlan::parse(EXPERIMENT_PLAN).unwrap();
         let gain = |subject, run| {
             plan.record(subject, Condition::C1, run)
                 .unwrap()

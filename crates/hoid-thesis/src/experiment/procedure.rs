@@ -5,17 +5,17 @@ use hoid_model::{
     OperatorParameters, Orders, Record, Structure, remnant::RemnantDiscretisation, uncertainty::OperatorEstimate,
 };
 use hoid_numerics::statistics::mean;
-use hoid_track::{Method, StartAt, TrackOptions, track_from};
+use hoid_track::{Method, StartSource, TrackOptions, track_from};
 
 use crate::ThesisError;
 
 /// Length of the first and the last span of a run, which are used for the batch fits, as a fraction of the run: 30.72
 /// of 81.92 s.
-const SHARE: f64 = 0.375;
+const SPAN_SHARE: f64 = 0.375;
 /// Number of samples between stored estimates.
 const STORED_SAMPLE_INTERVAL: usize = 32;
 /// Memory length and initial covariance P0, as in section V.B.
-const SETTINGS: [(&str, &str); 2] = [("memory", "256"), ("covariance", "0.1")];
+const RECURSION_SETTINGS: [(&str, &str); 2] = [("memory", "256"), ("covariance", "0.1")];
 
 /// Coefficients and operator at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,8 +73,8 @@ pub fn evaluate(record: &Record, delays: (usize, usize)) -> Result<RunOutcome, T
     let spans_s = spans_s(record);
     let span = |(from_s, to_s): (f64, f64)| record.span(from_s, to_s);
     let spans = [span(spans_s[0])?, span(spans_s[1])?];
-    let arx = of_structure(record, &spans, Structure::Arx, delays)?;
-    let bj = of_structure(record, &spans, Structure::BoxJenkins, delays)?;
+    let arx = evaluate_structure(record, &spans, Structure::Arx, delays)?;
+    let bj = evaluate_structure(record, &spans, Structure::BoxJenkins, delays)?;
     Ok(RunOutcome {
         spans_s,
         nk: [arx.nk, bj.nk],
@@ -90,12 +90,12 @@ pub fn evaluate(record: &Record, delays: (usize, usize)) -> Result<RunOutcome, T
 fn spans_s(record: &Record) -> [(f64, f64); 2] {
     let from_s = record.time_s(0);
     let length_s = record.len() as f64 * record.sample_time().s();
-    let (first, last) = (SHARE * length_s, (1.0 - SHARE) * length_s);
+    let (first, last) = (SPAN_SHARE * length_s, (1.0 - SPAN_SHARE) * length_s);
     [(from_s, from_s + first), (from_s + last, from_s + length_s)]
 }
 
 /// Results for one structure.
-struct OfStructure {
+struct StructureResults {
     nk: usize,
     nk_of_span: [usize; 2],
     t_n_s: f64,
@@ -103,12 +103,12 @@ struct OfStructure {
     course: RecursiveTrace,
 }
 
-fn of_structure(
+fn evaluate_structure(
     record: &Record,
     spans: &[Record; 2],
     structure: Structure,
     delays: (usize, usize),
-) -> Result<OfStructure, ThesisError> {
+) -> Result<StructureResults, ThesisError> {
     let best = [
         best_delay(&spans[0], structure, delays)?,
         best_delay(&spans[1], structure, delays)?,
@@ -122,12 +122,12 @@ fn of_structure(
         estimator.fit(std::slice::from_ref(&spans[0]))?,
         estimator.fit(std::slice::from_ref(&spans[1]))?,
     ];
-    Ok(OfStructure {
+    Ok(StructureResults {
         nk,
         nk_of_span,
         t_n_s,
         batch: fits.each_ref().map(state_of_fit),
-        course: course(record, &fits[0])?,
+        course: track_from_fit(record, &fits[0])?,
     })
 }
 
@@ -174,7 +174,7 @@ fn time_constant(fits: &[Fit; 2]) -> f64 {
 }
 
 /// Tracks a record by RLS or RPEM, starting from the fit of the first span.
-fn course(record: &Record, start: &Fit) -> Result<RecursiveTrace, ThesisError> {
+fn track_from_fit(record: &Record, start: &Fit) -> Result<RecursiveTrace, ThesisError> {
     let (structure, orders) = (start.model().structure(), start.orders());
     let options = match structure {
         Structure::BoxJenkins => {
@@ -184,11 +184,11 @@ fn course(record: &Record, start: &Fit) -> Result<RecursiveTrace, ThesisError> {
         _ => TrackOptions::new(Method::rls(), structure, orders),
     };
     let options = TrackOptions {
-        start: StartAt::Span(Some(spans_s(record)[0])),
-        ..options.with(&SETTINGS)?
+        start: StartSource::Span(Some(spans_s(record)[0])),
+        ..options.with(&RECURSION_SETTINGS)?
     };
     let trace = track_from(record, &options, STORED_SAMPLE_INTERVAL, Some(start))?;
-    let places = places(&orders);
+    let places = parameter_indices(&orders);
     let mut course = RecursiveTrace::default();
     for row in 0..trace.len() {
         let theta = trace.theta(row);
@@ -196,7 +196,7 @@ fn course(record: &Record, start: &Fit) -> Result<RecursiveTrace, ThesisError> {
         course.times_s.push(trace.times_s()[row]);
         course.states.push(State {
             discrete: std::array::from_fn(|i| places[i].map_or(f64::NAN, |p| theta[p])),
-            operator: values(operator),
+            operator: operator_values(operator),
         });
         let n = theta.len();
         let covariance = trace.covariance(row);
@@ -210,7 +210,7 @@ fn course(record: &Record, start: &Fit) -> Result<RecursiveTrace, ThesisError> {
 }
 
 /// Returns the positions of a1, a2 (or f1, f2), b0, b1 and d1 in theta.
-fn places(orders: &Orders) -> [Option<usize>; 5] {
+fn parameter_indices(orders: &Orders) -> [Option<usize>; 5] {
     let names = orders.parameter_names();
     let of = |wanted: &[&str]| names.iter().position(|name| wanted.contains(&name.as_str()));
     [
@@ -223,15 +223,15 @@ fn places(orders: &Orders) -> [Option<usize>; 5] {
 }
 
 fn state_of_fit(fit: &Fit) -> State {
-    let places = places(&fit.orders());
+    let places = parameter_indices(&fit.orders());
     let theta = fit.model().theta();
     State {
         discrete: std::array::from_fn(|i| places[i].map_or(f64::NAN, |p| theta[p])),
-        operator: values(fit.operator().ok().map(|found| found.parameters())),
+        operator: operator_values(fit.operator().ok().map(|found| found.parameters())),
     }
 }
 
-fn values(operator: Option<OperatorParameters>) -> [f64; 5] {
+fn operator_values(operator: Option<OperatorParameters>) -> [f64; 5] {
     operator.map_or([f64::NAN; 5], |found| {
         let rows = OperatorEstimate::from(found).rows();
         [0, 1, 2, 3, 4].map(|i| rows[i].2.value)
@@ -261,7 +261,7 @@ fn true_state(record: &Record, k: usize) -> Option<State> {
     let held = operator.discretise(record.sample_time()).ok().map(|found| found.held);
     Some(State {
         discrete: held.map_or([f64::NAN; 4], |h| [h.f1, h.f2, h.b0, h.b1]),
-        operator: values(Some(operator)),
+        operator: operator_values(Some(operator)),
     })
 }
 

@@ -15,13 +15,13 @@ use std::path::{Path, PathBuf};
 use hoid_model::{ContinuousTransferFunction, scenario::Condition};
 use hoid_study::group::{ConditionSettings, Manifest, RecordedRun, RunEntry};
 
-use super::{EXPERIMENT, Experiment, ExperimentCondition, ExperimentPlan, MeasuredRun, RunKey};
+use super::{EXPERIMENT_PLAN, Experiment, ExperimentCondition, ExperimentPlan, MeasuredRun, RunKey};
 use crate::ThesisError;
 
 /// Frequency at which the slopes of elements are compared, rad/s.
-const NEAR_CROSSOVER_RAD_S: f64 = 2.0;
+const COMPARISON_OMEGA_RAD_S: f64 = 2.0;
 /// Limit between the slopes of a single and a double integrator.
-const SLOPE_BETWEEN: f64 = -1.5;
+const SLOPE_LIMIT: f64 = -1.5;
 /// Limit for the duration of the middle 80 % of a sudden change, s.
 const MAX_SUDDEN_S: f64 = 1.0;
 
@@ -57,7 +57,7 @@ impl RecordedPeople {
                 ),
             });
         }
-        let count = ExperimentPlan::parse(EXPERIMENT)?.evaluated as usize;
+        let count = ExperimentPlan::parse(EXPERIMENT_PLAN)?.evaluated as usize;
         let evaluated: Vec<RunEntry> = conditions
             .iter()
             .flat_map(|condition| last_runs(&manifest, &condition.name, count))
@@ -95,7 +95,7 @@ impl RecordedPeople {
     }
 
     /// Conditions that correspond to no condition of the text, with the reason.
-    pub fn left_out(&self) -> &[(String, String)] {
+    pub fn omitted_conditions(&self) -> &[(String, String)] {
         &self.left_out
     }
 }
@@ -113,7 +113,7 @@ impl Experiment for RecordedPeople {
         self.delays
     }
 
-    fn measured(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
+    fn read_run(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
         let entry = self.evaluated.iter().find(|entry| key_of(entry) == *key);
         let entry = entry.ok_or_else(|| ThesisError::Recordings {
             place: self.manifest.name.clone(),
@@ -172,7 +172,7 @@ fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, St
     let (mut found, mut others) = (Vec::new(), Vec::new());
     for name in names {
         let facts = manifest.conditions.get(name).cloned().unwrap_or_default();
-        match of_text(name, &facts) {
+        match matching_condition(name, &facts) {
             Ok(of_text) => found.push(ExperimentCondition {
                 name: name.to_owned(),
                 of_text,
@@ -184,7 +184,7 @@ fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, St
 }
 
 /// Returns the condition of the text in which the controlled element changes in the same way.
-fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
+fn matching_condition(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
     let unknown = |what: &str| {
         format!(
             "{what}: set controlled_element in [conditions.{name}], with changes_to, change_s and change_per_s if it \
@@ -225,8 +225,8 @@ fn of_text(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
 fn is_double(element: &str) -> Result<bool, String> {
     let element: ContinuousTransferFunction = element.parse().map_err(|error| format!("{error}"))?;
     let step = 1e-3_f64;
-    let log_gain = |shift: f64| element.response(NEAR_CROSSOVER_RAD_S * shift.exp()).norm().ln();
-    Ok((log_gain(step) - log_gain(-step)) / (2.0 * step) < SLOPE_BETWEEN)
+    let log_gain = |shift: f64| element.response(COMPARISON_OMEGA_RAD_S * shift.exp()).norm().ln();
+    Ok((log_gain(step) - log_gain(-step)) / (2.0 * step) < SLOPE_LIMIT)
 }
 
 #[cfg(test)]
@@ -234,7 +234,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn facts(before: &str, after: Option<&str>, change_per_s: Option<f64>) -> ConditionSettings {
+    fn condition_settings(before: &str, after: Option<&str>, change_per_s: Option<f64>) -> ConditionSettings {
         ConditionSettings {
             controlled_element: Some(before.to_owned()),
             change_s: after.map(|_| 50.0),
@@ -248,21 +248,24 @@ mod tests {
     fn conditions_are_matched_by_elements_and_change() {
         let (s1, s2) = ("90/(s(s+6))", "30/(s(s+.2))");
         for (found, expected) in [
-            (facts(s1, None, None), Condition::C1),
-            (facts(s2, None, None), Condition::C2),
-            (facts(s1, Some(s2), Some(0.5)), Condition::C3),
-            (facts(s1, Some(s2), Some(100.0)), Condition::C4),
-            (facts(s1, Some(s2), None), Condition::C4),
-            (facts(s2, Some(s1), Some(0.5)), Condition::C5),
-            (facts("-5/s^2", Some("4/s"), None), Condition::C6),
+            (condition_settings(s1, None, None), Condition::C1),
+            (condition_settings(s2, None, None), Condition::C2),
+            (condition_settings(s1, Some(s2), Some(0.5)), Condition::C3),
+            (condition_settings(s1, Some(s2), Some(100.0)), Condition::C4),
+            (condition_settings(s1, Some(s2), None), Condition::C4),
+            (condition_settings(s2, Some(s1), Some(0.5)), Condition::C5),
+            (condition_settings("-5/s^2", Some("4/s"), None), Condition::C6),
         ] {
             // A known element takes precedence over the name.
-            assert_eq!(of_text("C1", &found), Ok(expected), "{found:?}");
+            assert_eq!(matching_condition("C1", &found), Ok(expected), "{found:?}");
         }
-        assert_eq!(of_text("C5", &ConditionSettings::default()), Ok(Condition::C5));
-        let unknown = of_text("slow", &ConditionSettings::default()).unwrap_err();
+        assert_eq!(
+            matching_condition("C5", &ConditionSettings::default()),
+            Ok(Condition::C5)
+        );
+        let unknown = matching_condition("slow", &ConditionSettings::default()).unwrap_err();
         assert!(unknown.contains("[conditions.slow]"), "{unknown}");
-        let same = of_text("C3", &facts(s1, Some("80/(s(s+5))"), None)).unwrap_err();
+        let same = matching_condition("C3", &condition_settings(s1, Some("80/(s(s+5))"), None)).unwrap_err();
         assert!(same.contains("both resemble a single integrator"), "{same}");
     }
 

@@ -15,7 +15,7 @@ use super::{
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
 /// The displayed noise level; averages and medians at three levels would give twelve lines per panel.
-const LEVEL: f64 = 0.1;
+const NOISE_LEVEL: f64 = 0.1;
 
 pub(super) fn items() -> Vec<Item> {
     let mut all = Vec::new();
@@ -24,9 +24,9 @@ pub(super) fn items() -> Vec<Item> {
             .into_iter()
             .enumerate()
         {
-            all.push(Item::of_study(
+            all.push(Item::from_study(
                 format!("H.{}-average", 2 * i + k + 1),
-                format!("Average and median of recursive estimates, {what} parameters, condition {condition}, P_n = {LEVEL}"),
+                format!("Average and median of recursive estimates, {what} parameters, condition {condition}, P_n = {NOISE_LEVEL}"),
                 "Average over the runs at each time (dark), as in the thesis, and median (light). The average is clipped where it exceeds the range of the vertical axis.",
                 "recursive",
                 move |item, results| make(item, results, condition, rows),
@@ -47,7 +47,7 @@ fn make(item: &Item, results: &Results, condition: &str, rows: &[Row]) -> ItemOu
             let cell = Query::default()
                 .condition(condition)
                 .remnant_order(m0)
-                .noise_level(LEVEL);
+                .noise_level(NOISE_LEVEL);
             let mut curves = Vec::new();
             for (method, (estimator, column)) in [("RLS", of_rls), ("RPEM", of_rpem)].into_iter().enumerate() {
                 let cells = results.cells(&cell);
@@ -57,7 +57,7 @@ fn make(item: &Item, results: &Results, condition: &str, rows: &[Row]) -> ItemOu
                 };
                 for (k, t) in traces.times_s.iter().enumerate() {
                     let numbers = [m0 as f64, *t, bands.mean[k], bands.median[k], bands.sd[k]];
-                    data.row(&[name, estimator], &numbers);
+                    data.add_row(&[name, estimator], &numbers);
                 }
                 for (level, values) in [&bands.median, &bands.mean].into_iter().enumerate() {
                     curves.push(TraceCurve {
@@ -86,7 +86,7 @@ fn make(item: &Item, results: &Results, condition: &str, rows: &[Row]) -> ItemOu
         levels: ["median", "average"].map(str::to_owned).to_vec(),
         ..TraceGrid::default()
     };
-    item.drawn(trace_panels, &grid, data)
+    item.draw(trace_panels, &grid, data)
 }
 
 #[cfg(test)]

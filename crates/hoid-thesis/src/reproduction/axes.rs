@@ -4,7 +4,7 @@
 pub(super) const DELAYS: [usize; 5] = [26, 27, 28, 29, 30];
 
 /// Noise levels in the figures.
-pub(super) const LEVELS: [f64; 4] = [0.0, 0.1, 0.2, 0.3];
+pub(super) const NOISE_LEVELS: [f64; 4] = [0.0, 0.1, 0.2, 0.3];
 /// Remnant orders in all figures.
 pub(super) const REMNANT_ORDERS: [usize; 4] = [1, 2, 3, 4];
 

@@ -4,7 +4,7 @@
 use hoid_study::{Query, Results};
 
 use super::{
-    axes::{DELAYS, LEVELS, REMNANT_ORDERS, level_name, order_titles},
+    axes::{DELAYS, NOISE_LEVELS, REMNANT_ORDERS, level_name, order_titles},
     item::{Item, ItemOutput},
     table_builder::TableBuilder,
 };
@@ -30,7 +30,7 @@ impl Model {
     }
 
     /// Index of the method, which determines the hue.
-    pub(super) fn method(self) -> usize {
+    pub(super) fn method_index(self) -> usize {
         usize::from(self != Self::Arx)
     }
 
@@ -99,7 +99,7 @@ impl Parameters {
 }
 
 /// Limit, in %, up to which an ordinate is linear if [`has_large_biases`] is true.
-const LINEAR_WITHIN: f64 = 10.0;
+const LINEAR_LIMIT_PERCENT: f64 = 10.0;
 
 /// True if biases may reach thousands of times the true value: the remnant parameters of a first-order noise model
 /// differ from the parameters of a higher-order remnant.
@@ -148,7 +148,7 @@ fn item(name: &str, condition: &'static str, model: Model, parameters: Parameter
                 .push_str(" For m0 >= 2 the vertical axes of the last three are linear to 10 % and logarithmic above.");
         }
     }
-    Item::of_study(
+    Item::from_study(
         name,
         format!("Bias of {}, {}, condition {condition}", parameters.name(), model.name()),
         caption,
@@ -160,9 +160,9 @@ fn item(name: &str, condition: &'static str, model: Model, parameters: Parameter
 fn make(item: &Item, results: &Results, condition: &str, model: Model, parameters: Parameters) -> ItemOutput {
     // Without a remnant, the parameters of the remnant have no true values.
     let levels = if parameters == Parameters::Remnant {
-        &LEVELS[1..]
+        &NOISE_LEVELS[1..]
     } else {
-        &LEVELS[..]
+        &NOISE_LEVELS[..]
     };
     let mut data = TableBuilder::new(
         &["parameter", "outliers"],
@@ -192,7 +192,7 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
                     let query = model.of(query.noise_level(level).nk(nk), m0);
                     let s = BoxStatistics::of(&results.values(&query));
                     let outliers: Vec<String> = s.outliers.iter().map(f64::to_string).collect();
-                    data.row(
+                    data.add_row(
                         &[letters, &outliers.join(" ")],
                         &[
                             m0 as f64,
@@ -214,7 +214,7 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
                 name: format!("B_r({symbol})"),
                 unit: "%".to_owned(),
                 boxes,
-                linear_within: has_large_biases(model, m0, letters).then_some(LINEAR_WITHIN),
+                linear_within: has_large_biases(model, m0, letters).then_some(LINEAR_LIMIT_PERCENT),
                 ..BoxPanel::default()
             });
         }
@@ -230,9 +230,9 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
             .map(|level| BoxSeries {
                 name: level_name(*level),
                 shade: Shade {
-                    method: model.method(),
-                    level: LEVELS.iter().position(|l| l == level).unwrap_or(0),
-                    levels: LEVELS.len(),
+                    method: model.method_index(),
+                    level: NOISE_LEVELS.iter().position(|l| l == level).unwrap_or(0),
+                    levels: NOISE_LEVELS.len(),
                 },
             })
             .collect(),
@@ -241,5 +241,5 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
         with_zero: true,
         least_reach: 0.1,
     };
-    item.drawn(box_plots, &grid, data)
+    item.draw(box_plots, &grid, data)
 }

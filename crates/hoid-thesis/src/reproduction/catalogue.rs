@@ -15,21 +15,21 @@ pub fn items() -> Vec<Item> {
     all.extend(averages::items());
     all.extend(experiment::items());
     all.extend(further::items());
-    in_order(all)
+    sort_items(all)
 }
 
 /// The tables and figures of the experiment with recorded people, in the order of the text.
 pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
-    in_order(experiment::recorded_items(people))
+    sort_items(experiment::recorded_items(people))
 }
 
-fn in_order(mut all: Vec<Item>) -> Vec<Item> {
-    all.sort_by_cached_key(|item| place(&item.name));
+fn sort_items(mut all: Vec<Item>) -> Vec<Item> {
+    all.sort_by_cached_key(|item| sort_key(&item.name));
     all
 }
 
 /// Sort key: tables, then the figures of the article, then the figures of the appendices by number, then all others.
-fn place(name: &str) -> (u8, String, u32, String) {
+fn sort_key(name: &str) -> (u8, String, u32, String) {
     let number = |text: &str| text.parse::<f64>().map_or(0, |n| (10.0 * n) as u32);
     let parts = |text: &str| {
         let (n, more) = text.split_once('-').unwrap_or((text, ""));

@@ -1,6 +1,6 @@
 //! The page of the reproduction: tables, figures with their data, claims, and studies with their plans.
 
-use crate::claims::{Claim, Finding, Measured, Verdict};
+use crate::claims::{Claim, Finding, MeasuredNumber, Verdict};
 use hoid_io::{ColumnValues, OutputTable};
 use minijinja::{Value, context};
 
@@ -62,7 +62,7 @@ impl IndexPage {
                 Verdict::DoesNotHold => "not",
                 Verdict::CannotBeTested(_) => "open",
             };
-            let measured: Vec<String> = finding.measured.iter().map(measured).collect();
+            let measured: Vec<String> = finding.measured.iter().map(format_measured).collect();
             self.claims.push(context! {
                 heading, class, measured, id => claim.id, statement => claim.statement, place => claim.place, measure => claim.measure,
                 found => &finding.text, verdict => finding.verdict.to_string(),
@@ -79,7 +79,7 @@ impl IndexPage {
     }
 
     /// Returns the numbers of claims by verdict: hold, hold and more so, hold in part, do not hold, cannot be tested.
-    pub fn tally(&self) -> [usize; 5] {
+    pub fn verdict_counts(&self) -> [usize; 5] {
         self.tally
     }
 
@@ -119,7 +119,7 @@ impl IndexPage {
 }
 
 /// Formats a measured value with its error and, if there are several cells, its range over the cells.
-fn measured(of: &Measured) -> String {
+fn format_measured(of: &MeasuredNumber) -> String {
     let (value, error) = numbers::with_uncertainty(of.value, Some(of.error).filter(|error| *error > 0.0));
     let error = if of.error > 0.0 {
         format!(" \u{b1} {error}")
@@ -127,7 +127,12 @@ fn measured(of: &Measured) -> String {
         String::new()
     };
     let range = if of.cells > 1 {
-        format!(" ({} to {} in {} cells)", number(of.least), number(of.most), of.cells)
+        format!(
+            " ({} to {} in {} cells)",
+            format_number(of.least),
+            format_number(of.most),
+            of.cells
+        )
     } else {
         String::new()
     };
@@ -139,7 +144,7 @@ fn table_rows(table: &OutputTable) -> Vec<Vec<String>> {
     let rows = table.columns.first().map_or(0, |c| c.values.len());
     let cell = |values: &ColumnValues, row: usize| match values {
         ColumnValues::Real(v) if v[row].is_nan() => "\u{2013}".to_owned(),
-        ColumnValues::Real(v) => number(v[row]),
+        ColumnValues::Real(v) => format_number(v[row]),
         ColumnValues::Whole(v) => v[row].to_string(),
         ColumnValues::Text(v) => v[row].clone(),
     };
@@ -149,7 +154,7 @@ fn table_rows(table: &OutputTable) -> Vec<Vec<String>> {
 }
 
 /// Formats a number with up to six significant digits.
-fn number(value: f64) -> String {
+fn format_number(value: f64) -> String {
     if !value.is_finite() {
         return "\u{2013}".to_owned();
     }

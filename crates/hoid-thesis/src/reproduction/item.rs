@@ -9,13 +9,13 @@ use super::table_builder::TableBuilder;
 use crate::ThesisError;
 
 /// Name that selects the claims; it is used like the name of a table or figure.
-pub const CLAIMS: &str = "claims";
+pub const CLAIMS_NAME: &str = "claims";
 
 /// Results of the named plans by the name of the plan.
 pub type Studies = BTreeMap<String, Results>;
 
 /// Function that makes an item from the results of its plan.
-type Maker = Box<dyn Fn(&Item, Option<&Results>) -> ItemOutput + Send + Sync>;
+type MakeItem = Box<dyn Fn(&Item, Option<&Results>) -> ItemOutput + Send + Sync>;
 
 /// Runs that several items share and that belong to no plan. Shared runs are made before any item is drawn. Otherwise a
 /// thread that makes the runs for one item could, while waiting for some of these runs, start another item that waits
@@ -44,7 +44,7 @@ pub(super) struct ProgressCallbacks<'a> {
 
 impl ProgressCallbacks<'_> {
     /// Callbacks that report no progress and never cancel.
-    pub const NONE: ProgressCallbacks<'static> = ProgressCallbacks {
+    pub const IGNORED: ProgressCallbacks<'static> = ProgressCallbacks {
         done: &|_| (),
         keep_running: &|| true,
     };
@@ -61,7 +61,7 @@ pub struct Item {
     /// Plan whose results the item shows; `None` if it shows no results of a plan.
     pub plan: Option<&'static str>,
     pub(super) shared: Option<SharedRuns>,
-    make: Maker,
+    make: MakeItem,
 }
 
 impl std::fmt::Debug for Item {
@@ -71,7 +71,7 @@ impl std::fmt::Debug for Item {
 }
 
 /// Function that draws a grid of panels with a name and a title.
-type Drawing<G> = fn(&str, &str, &G) -> String;
+type DrawGrid<G> = fn(&str, &str, &G) -> String;
 
 /// The figure and the numbers of an item.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,13 +109,13 @@ impl Item {
 
     /// Adds runs that this item shares with other items.
     #[must_use]
-    pub(super) fn sharing(mut self, runs: &SharedRuns) -> Self {
+    pub(super) fn with_shared_runs(mut self, runs: &SharedRuns) -> Self {
         self.shared = Some(runs.clone());
         self
     }
 
     /// Creates an item that is made from the results of a study.
-    pub(super) fn of_study(
+    pub(super) fn from_study(
         name: impl Into<String>,
         title: impl Into<String>,
         caption: impl Into<String>,
@@ -129,10 +129,10 @@ impl Item {
     }
 
     /// Draws the figure of a grid and adds its data.
-    pub(super) fn drawn<G>(&self, draw: Drawing<G>, grid: &G, data: TableBuilder) -> ItemOutput {
+    pub(super) fn draw<G>(&self, draw: DrawGrid<G>, grid: &G, data: TableBuilder) -> ItemOutput {
         ItemOutput {
             svg: Some(draw(&self.name, &self.title, grid)),
-            data: data.table(&self.title),
+            data: data.build(&self.title),
         }
     }
 

@@ -38,5 +38,5 @@ mod traces;
 
 pub use catalogue::items;
 pub use index::{IndexPage, StudyEntry};
-pub use item::{CLAIMS, Item, ItemOutput, Studies};
+pub use item::{CLAIMS_NAME, Item, ItemOutput, Studies};
 pub use run::{Reproduction, ReproductionEvent, ReproductionSummary, reproduce};

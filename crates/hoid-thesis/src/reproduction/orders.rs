@@ -4,7 +4,7 @@
 use hoid_study::{Query, Results};
 
 use super::{
-    axes::{LEVELS, REMNANT_ORDERS, level_name},
+    axes::{NOISE_LEVELS, REMNANT_ORDERS, level_name},
     item::{Item, ItemOutput},
     table_builder::TableBuilder,
 };
@@ -16,7 +16,7 @@ const TRUE_DELAY: usize = 29;
 
 /// Quantity shown in a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Shown {
+enum MapQuantity {
     Vaf,
     VafDifference,
     Bias,
@@ -33,39 +33,44 @@ const BIASES: [(&str, &str, &str); 6] = [
 
 pub(super) fn items() -> Vec<Item> {
     let mut all = vec![
-        item("fig-7".to_owned(), "C1", 3, Shown::Vaf),
-        item("fig-8".to_owned(), "C1", 3, Shown::VafDifference),
+        item("fig-7".to_owned(), "C1", 3, MapQuantity::Vaf),
+        item("fig-8".to_owned(), "C1", 3, MapQuantity::VafDifference),
     ];
     for (condition, first) in [("C1", 1), ("C2", 9)] {
         for m0 in REMNANT_ORDERS {
-            all.push(item(format!("E.{}", first + 2 * (m0 - 1)), condition, m0, Shown::Vaf));
+            all.push(item(
+                format!("E.{}", first + 2 * (m0 - 1)),
+                condition,
+                m0,
+                MapQuantity::Vaf,
+            ));
             all.push(item(
                 format!("E.{}", first + 2 * (m0 - 1) + 1),
                 condition,
                 m0,
-                Shown::Bias,
+                MapQuantity::Bias,
             ));
         }
     }
     all
 }
 
-fn item(name: String, condition: &'static str, m0: usize, shown: Shown) -> Item {
+fn item(name: String, condition: &'static str, m0: usize, shown: MapQuantity) -> Item {
     let (what, how) = match shown {
-        Shown::Vaf => (
+        MapQuantity::Vaf => (
             "VAF of Box-Jenkins models",
             "Mean of VAF (eq. 39, simulated output) over the runs",
         ),
-        Shown::VafDifference => (
+        MapQuantity::VafDifference => (
             "VAF of Box-Jenkins minus that of ARX models",
             "Mean of the difference (eq. 40) over the runs, both models with the same delay",
         ),
-        Shown::Bias => (
+        MapQuantity::Bias => (
             "Absolute relative bias of Box-Jenkins models, P_n = 0.3",
             "Mean of the absolute relative bias (eq. 5.58) over the runs, P_n = 0.3",
         ),
     };
-    Item::of_study(
+    Item::from_study(
         name,
         format!("{what}, condition {condition}, m0 = {m0}"),
         format!("{how}, by delay nk* and order m* of the noise model; the cross marks the simulated delay and order."),
@@ -74,15 +79,15 @@ fn item(name: String, condition: &'static str, m0: usize, shown: Shown) -> Item 
     )
 }
 
-fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown) -> ItemOutput {
-    let vaf = if shown == Shown::VafDifference {
+fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: MapQuantity) -> ItemOutput {
+    let vaf = if shown == MapQuantity::VafDifference {
         "delta_vaf"
     } else {
         "vaf"
     };
     let mut data = TableBuilder::new(&["quantity"], &["noise_level", "nk", "m", "value"]);
     let panels: Vec<(String, String, f64, String)> = match shown {
-        Shown::Bias => BIASES
+        MapQuantity::Bias => BIASES
             .iter()
             .map(|(column, symbol, letters)| {
                 (
@@ -93,7 +98,7 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
                 )
             })
             .collect(),
-        _ => LEVELS
+        _ => NOISE_LEVELS
             .iter()
             .map(|level| (vaf.to_owned(), level_name(*level), *level, vaf.to_owned()))
             .collect(),
@@ -107,9 +112,9 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
                 .remnant_order(m0)
                 .noise_level(*level)
                 .nk(nk);
-            let row = results.one(&base.name("BJ").nd(m));
+            let row = results.find_one(&base.name("BJ").nd(m));
             row.map_or(f64::NAN, |row| {
-                if shown == Shown::Bias {
+                if shown == MapQuantity::Bias {
                     row.absolute_mean
                 } else {
                     row.statistics.mean
@@ -122,7 +127,7 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
             .collect();
         for (m, row) in REMNANT_ORDERS.iter().zip(&values) {
             for (nk, value) in DELAYS.iter().zip(row) {
-                data.row(&[letters], &[*level, *nk as f64, *m as f64, *value]);
+                data.add_row(&[letters], &[*level, *nk as f64, *m as f64, *value]);
             }
         }
         titles.push(title.clone());
@@ -143,19 +148,19 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         ordinate: "m^*".to_owned(),
         y_categories: REMNANT_ORDERS.iter().map(usize::to_string).collect(),
         value: match shown {
-            Shown::Vaf => "VAF (%)".to_owned(),
-            Shown::VafDifference => "\u{394}VAF (%)".to_owned(),
-            Shown::Bias => "|B_r| (%)".to_owned(),
+            MapQuantity::Vaf => "VAF (%)".to_owned(),
+            MapQuantity::VafDifference => "\u{394}VAF (%)".to_owned(),
+            MapQuantity::Bias => "|B_r| (%)".to_owned(),
         },
-        colours: if shown == Shown::VafDifference {
+        colours: if shown == MapQuantity::VafDifference {
             MapColours::Diverging
         } else {
             MapColours::Sequential
         },
         limits: None,
-        bar_per_row: shown == Shown::Bias,
+        bar_per_row: shown == MapQuantity::Bias,
         mark: "simulated".to_owned(),
     };
     let figure = grid(drawn, titles);
-    item.drawn(maps, &figure, data)
+    item.draw(maps, &figure, data)
 }

@@ -5,7 +5,7 @@ use hoid_model::{Complex64, Orders, PolynomialModel, Structure};
 use hoid_study::{Query, Results};
 
 use super::{
-    axes::{DELAYS, LEVELS, REMNANT_ORDERS, level_name},
+    axes::{DELAYS, NOISE_LEVELS, REMNANT_ORDERS, level_name},
     bias::Model,
     item::{Item, ItemOutput},
     table_builder::TableBuilder,
@@ -26,7 +26,7 @@ enum Curves {
 pub(super) fn items() -> Vec<Item> {
     let mut all = vec![item("fig-10".to_owned(), "C1", Curves::Both(Model::First))];
     for (condition, first) in [("C1", 1), ("C2", 10)] {
-        for (i, level) in LEVELS.into_iter().enumerate() {
+        for (i, level) in NOISE_LEVELS.into_iter().enumerate() {
             all.push(item(
                 format!("D.{}", first + i),
                 condition,
@@ -64,7 +64,7 @@ fn item(name: String, condition: &'static str, curves: Curves) -> Item {
             )
         }
     };
-    Item::of_study(
+    Item::from_study(
         name,
         format!("{title}, condition {condition}"),
         format!(
@@ -82,7 +82,7 @@ fn omegas() -> Vec<f64> {
 }
 
 /// Returns the response of the averaged model; `None` if no run gives a value.
-fn averaged(
+fn averaged_response(
     results: &Results,
     condition: &str,
     m0: usize,
@@ -104,7 +104,7 @@ fn averaged(
                 .remnant_order(m0)
                 .noise_level(level)
                 .nk(nk);
-            results.one(&model.of(query, m0)).map(|row| row.statistics.mean)
+            results.find_one(&model.of(query, m0)).map(|row| row.statistics.mean)
         })
         .collect();
     response(&theta?, nk, omega)
@@ -121,7 +121,7 @@ fn response(theta: &[f64], nk: usize, omega: &[f64]) -> Option<Vec<Complex64>> {
     let model = PolynomialModel::new(
         Structure::OutputError,
         orders,
-        hoid_model::SampleTime::HUNDREDTH,
+        hoid_model::SampleTime::AT_100_HZ,
         theta.to_vec(),
     )
     .ok()?;
@@ -149,7 +149,7 @@ fn make(item: &Item, results: &Results, condition: &str, curves: Curves) -> Item
                 let delay_s = nk as f64 * 0.01;
                 let curve = BodeCurve::of_response(&name, kind, shade, &omega, &response, delay_s);
                 for (i, w) in omega.iter().enumerate() {
-                    data.row(
+                    data.add_row(
                         &[model],
                         &[
                             m0 as f64,
@@ -167,25 +167,25 @@ fn make(item: &Item, results: &Results, condition: &str, curves: Curves) -> Item
             Curves::ByDelay(model, level) => {
                 for (i, nk) in DELAYS.into_iter().enumerate() {
                     let shade = Shade {
-                        method: model.method(),
+                        method: model.method_index(),
                         level: i,
                         levels: DELAYS.len(),
                     };
-                    if let Some(h) = averaged(results, condition, m0, model, level, nk, &omega) {
+                    if let Some(h) = averaged_response(results, condition, m0, model, level, nk, &omega) {
                         add(format!("n_k^* = {nk}"), LineKind::Line, shade, "estimate", level, nk, h);
                     }
                 }
             }
             Curves::Both(bj) => {
                 for model in [Model::Arx, bj] {
-                    for (i, level) in LEVELS.into_iter().enumerate() {
+                    for (i, level) in NOISE_LEVELS.into_iter().enumerate() {
                         let shade = Shade {
-                            method: model.method(),
+                            method: model.method_index(),
                             level: i,
-                            levels: LEVELS.len(),
+                            levels: NOISE_LEVELS.len(),
                         };
                         let name = if model == Model::Arx { "ARX" } else { "BJ" };
-                        if let Some(h) = averaged(results, condition, m0, model, level, TRUE_DELAY, &omega) {
+                        if let Some(h) = averaged_response(results, condition, m0, model, level, TRUE_DELAY, &omega) {
                             add(
                                 format!("{name}, {}", level_name(level)),
                                 LineKind::Line,
@@ -206,7 +206,7 @@ fn make(item: &Item, results: &Results, condition: &str, curves: Curves) -> Item
             .iter()
             .find(|cell| cell.condition == condition)
             .and_then(|cell| {
-                let [f1, f2, b0, b1] = cell.truth()[0].discrete;
+                let [f1, f2, b0, b1] = cell.true_states()[0].discrete;
                 response(&[b0, b1, f1, f2], TRUE_DELAY, &omega)
             });
         if let Some(h) = truth {
@@ -225,5 +225,5 @@ fn make(item: &Item, results: &Results, condition: &str, curves: Curves) -> Item
             curves: drawn,
         });
     }
-    item.drawn(bode_grid, &BodeGrid { columns }, data)
+    item.draw(bode_grid, &BodeGrid { columns }, data)
 }

@@ -19,7 +19,7 @@ use super::{
     catalogue::{items, recorded_items},
     experiment::NAME as EXPERIMENT_RUNS,
     index::{IndexPage, StudyEntry},
-    item::{CLAIMS, Item, ProgressCallbacks, Studies},
+    item::{CLAIMS_NAME, Item, ProgressCallbacks, Studies},
 };
 use hoid_report::write_page;
 
@@ -33,7 +33,7 @@ use crate::{
 /// Options of a reproduction.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reproduction {
-    /// Names of the selected tables, figures, appendices or studies, or [`CLAIMS`]; empty for everything.
+    /// Names of the selected tables, figures, appendices or studies, or [`CLAIMS_NAME`]; empty for everything.
     pub only: Vec<String>,
     /// Number of replications of each cell.
     pub replications: u64,
@@ -47,7 +47,7 @@ impl Default for Reproduction {
     fn default() -> Self {
         Self {
             only: Vec::new(),
-            replications: NamedPlan::REPLICATIONS,
+            replications: NamedPlan::DEFAULT_REPLICATIONS,
             jobs: None,
             recordings: None,
         }
@@ -99,7 +99,7 @@ pub fn reproduce(
         Some(_) if wanted.only != [EXPERIMENT_RUNS] => return Err(ThesisError::NotTheExperiment),
         Some(place) => {
             let people = RecordedPeople::open(place)?;
-            for (name, reason) in people.left_out() {
+            for (name, reason) in people.omitted_conditions() {
                 let note = format!("condition {name} is left out: {reason}");
                 notify(ReproductionEvent::Note(&note));
                 index.notes.push(note);
@@ -108,7 +108,7 @@ pub fn reproduce(
         }
         None => items(),
     };
-    let (chosen, with_claims) = chosen(all, wanted)?;
+    let (chosen, with_claims) = select_items(all, wanted)?;
     make_directory(directory)?;
     let _lock = DirectoryLock::take(directory)?;
     let mut plans: BTreeSet<&str> = chosen.iter().filter_map(|item| item.plan).collect();
@@ -117,7 +117,7 @@ pub fn reproduce(
     }
     let mut studies = Studies::new();
     for named in TEXT_PLANS.iter().filter(|named| plans.contains(named.name)) {
-        let Some((entry, results)) = study(named, wanted, directory, notify, keep_running)? else {
+        let Some((entry, results)) = run_or_read_study(named, wanted, directory, notify, keep_running)? else {
             return Ok(None);
         };
         notify(ReproductionEvent::Study(&entry));
@@ -167,7 +167,7 @@ pub fn reproduce(
     // The items are collected by position, so the page does not depend on the order in which they are drawn.
     let made: Vec<_> = chosen
         .par_iter()
-        .map(|item| write(item, &studies, directory))
+        .map(|item| write_item(item, &studies, directory))
         .collect::<Result<_, ThesisError>>()?;
     for (item, made) in chosen.iter().zip(&made) {
         index.add(item, made.svg.as_deref(), &made.data, &made.table);
@@ -186,11 +186,11 @@ pub fn reproduce(
         of_runs,
         ("tables and figures".to_owned(), chosen.len().to_string()),
     ];
-    if wanted.recordings.is_none() && wanted.replications < NamedPlan::REPLICATIONS {
+    if wanted.recordings.is_none() && wanted.replications < NamedPlan::DEFAULT_REPLICATIONS {
         index.notes.push(format!(
             "With only {} of {} replications, many claims remain undecided.",
             wanted.replications,
-            NamedPlan::REPLICATIONS
+            NamedPlan::DEFAULT_REPLICATIONS
         ));
     }
     let index = write_page(directory, "index.html", &index.to_html()?)?;
@@ -214,7 +214,7 @@ fn on_threads<R: Send>(jobs: Option<usize>, work: impl FnOnce() -> R + Send) -> 
 
 /// Returns the selected items, and true if the claims are selected. An item is selected by its name, its plan, the runs
 /// it shares, or the letter of an appendix. With recorded people no claims are selected.
-fn chosen(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), ThesisError> {
+fn select_items(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), ThesisError> {
     let only = &wanted.only;
     if only.is_empty() {
         return Ok((all, wanted.recordings.is_none()));
@@ -229,7 +229,7 @@ fn chosen(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), Th
     let names: Vec<&str> = only.iter().map(|name| name.trim()).collect();
     if let Some(name) = names
         .iter()
-        .find(|name| **name != CLAIMS && !all.iter().any(|item| means(item, name)))
+        .find(|name| **name != CLAIMS_NAME && !all.iter().any(|item| means(item, name)))
     {
         let known: Vec<&str> = all.iter().map(|item| item.name.as_str()).collect();
         return Err(ThesisError::UnknownItem {
@@ -240,7 +240,7 @@ fn chosen(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, bool), Th
     let items = all
         .into_iter()
         .filter(|item| names.iter().any(|name| means(item, name)));
-    Ok((items.collect(), names.contains(&CLAIMS)))
+    Ok((items.collect(), names.contains(&CLAIMS_NAME)))
 }
 
 /// Tests the claims of the text, writes their table, adds them to the page, and counts the verdicts.
@@ -252,11 +252,11 @@ fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Re
     let findings = findings(&evidence);
     write_table(&directory.join("tables/claims.csv"), &claims_table(&findings))?;
     index.add_claims(&findings);
-    Ok(index.tally())
+    Ok(index.verdict_counts())
 }
 
 /// Runs a named plan or reads its existing results. Returns `None` if the run was stopped.
-fn study(
+fn run_or_read_study(
     named: &NamedPlan,
     wanted: &Reproduction,
     directory: &Path,
@@ -288,7 +288,7 @@ fn study(
         name: plan.name.clone(),
         title: plan.title.clone(),
         directory: format!("studies/{}", plan.name),
-        estimates: plan.estimates(),
+        estimates: plan.estimate_count(),
         seconds: (outcome.estimates > 0).then(|| start_time.elapsed().as_secs_f64()),
     };
     Ok(Some((entry, Results::read(&directory)?)))
@@ -301,7 +301,7 @@ struct ItemFiles {
     table: OutputTable,
 }
 
-fn write(item: &Item, studies: &Studies, directory: &Path) -> Result<ItemFiles, ThesisError> {
+fn write_item(item: &Item, studies: &Studies, directory: &Path) -> Result<ItemFiles, ThesisError> {
     let made = item.make(studies);
     let folder = if made.svg.is_some() { "figures" } else { "tables" };
     let data = format!("{folder}/{}.csv", item.name);

@@ -62,7 +62,7 @@ pub(super) fn items() -> Vec<Item> {
             None,
             |item, _| schedules(item),
         ),
-        Item::of_study(
+        Item::from_study(
             "A.1",
             "Obtained and demanded noise level, condition C1",
             "Mean over the runs of (var u - var u0) / var u where u0 is the control in the run without remnant (A.4); band: plus and minus one standard deviation; dashed: the demanded level.",
@@ -76,12 +76,12 @@ fn forcing_table(title: &str) -> hoid_io::OutputTable {
     let mut data = TableBuilder::new(&[], &["k", "n_t", "omega_rad_s", "amplitude_deg", "phase_rad"]);
     for (k, s) in ForcingFunction::reference().sinusoids().iter().enumerate() {
         let cycles = (s.omega_rad_s * REFERENCE_PERIOD_S / std::f64::consts::TAU).round();
-        data.row(
+        data.add_row(
             &[],
             &[k as f64 + 1.0, cycles, s.omega_rad_s, s.amplitude_deg, s.phase_rad],
         );
     }
-    data.table(title)
+    data.build(title)
 }
 
 fn margins_of(state: &OperatingState) -> Option<Margins> {
@@ -117,9 +117,9 @@ fn states_table(title: &str) -> hoid_io::OutputTable {
         let (o, c) = (state.operator, state.controlled_element);
         let found = margins_of(&state);
         let of = |pick: fn(&Margins) -> Option<f64>| found.as_ref().and_then(pick).unwrap_or(f64::NAN);
-        let held = o.discretise(SampleTime::HUNDREDTH).ok();
+        let held = o.discretise(SampleTime::AT_100_HZ).ok();
         let [a1, a2, b0, b1] = held.map_or([f64::NAN; 4], |h| [h.held.f1, h.held.f2, h.held.b0, h.held.b1]);
-        data.row(
+        data.add_row(
             &[name],
             &[
                 c.k_c,
@@ -142,7 +142,7 @@ fn states_table(title: &str) -> hoid_io::OutputTable {
             ],
         );
     }
-    data.table(title)
+    data.build(title)
 }
 
 fn state_name(state: &OperatingState) -> &'static str {
@@ -159,9 +159,9 @@ fn conditions_table(title: &str) -> hoid_io::OutputTable {
             Schedule::Constant => state_name(&scenario.initial).to_owned(),
             _ => format!("{} to {}", state_name(&scenario.initial), state_name(&scenario.last)),
         };
-        data.row(&[&condition.to_string(), &states], &[rate, at]);
+        data.add_row(&[&condition.to_string(), &states], &[rate, at]);
     }
-    data.table(title)
+    data.build(title)
 }
 
 fn starts_table(title: &str) -> hoid_io::OutputTable {
@@ -176,9 +176,9 @@ fn starts_table(title: &str) -> hoid_io::OutputTable {
         }
         known.push(estimator.start.clone());
         let of = |name: &str| estimator.start_value(name).unwrap_or(f64::NAN);
-        data.row(&[&estimator.start], &[of("b0"), of("b1"), of("f1"), of("f2")]);
+        data.add_row(&[&estimator.start], &[of("b0"), of("b1"), of("f1"), of("f2")]);
     }
-    data.table(title)
+    data.build(title)
 }
 
 fn spectrum(item: &Item) -> ItemOutput {
@@ -190,7 +190,7 @@ fn spectrum(item: &Item) -> ItemOutput {
         .map(|s| 0.5 * s.amplitude_deg * s.amplitude_deg)
         .collect();
     let mut data = TableBuilder::new(&[], &["omega_rad_s", "power_deg2"]);
-    x.iter().zip(&y).for_each(|(x, y)| data.row(&[], &[*x, *y]));
+    x.iter().zip(&y).for_each(|(x, y)| data.add_row(&[], &[*x, *y]));
     let grid = CurveGrid {
         panels: vec![CurvePanel {
             name: "S_{ff}".to_owned(),
@@ -212,7 +212,7 @@ fn spectrum(item: &Item) -> ItemOutput {
         logarithmic_abscissa: true,
         ..CurveGrid::default()
     };
-    item.drawn(curves, &grid, data)
+    item.draw(curves, &grid, data)
 }
 
 fn schedules(item: &Item) -> ItemOutput {
@@ -233,7 +233,7 @@ fn schedules(item: &Item) -> ItemOutput {
             let y: Vec<f64> = x.iter().map(|t| resolved.parameters_at(*t).operator.k_e).collect();
             x.iter()
                 .zip(&y)
-                .for_each(|(t, k)| data.row(&[&condition.to_string()], &[*t, *k]));
+                .for_each(|(t, k)| data.add_row(&[&condition.to_string()], &[*t, *k]));
             drawn.push(Curve {
                 name: if i == 0 {
                     "C1, C3, C4".to_owned()
@@ -264,7 +264,7 @@ fn schedules(item: &Item) -> ItemOutput {
         logarithmic_abscissa: false,
         shared_ordinates: true,
     };
-    item.drawn(curves, &grid, data)
+    item.draw(curves, &grid, data)
 }
 
 fn noise_level(item: &Item, results: &Results) -> ItemOutput {
@@ -290,7 +290,7 @@ fn noise_level(item: &Item, results: &Results) -> ItemOutput {
         });
         for row in &rows {
             let s = &row.statistics;
-            data.row(
+            data.add_row(
                 &[],
                 &[m0 as f64, row.noise_level, s.mean, s.mean_se, s.sd, s.count as f64],
             );
@@ -319,5 +319,5 @@ fn noise_level(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: false,
         shared_ordinates: true,
     };
-    item.drawn(curves, &grid, data)
+    item.draw(curves, &grid, data)
 }

@@ -3,7 +3,7 @@
 use hoid_study::{Query, Results};
 
 use super::{
-    axes::{DELAYS, LEVELS, REMNANT_ORDERS, level_name, order_titles},
+    axes::{DELAYS, NOISE_LEVELS, REMNANT_ORDERS, level_name, order_titles},
     item::{Item, ItemOutput},
     table_builder::TableBuilder,
 };
@@ -12,7 +12,7 @@ use hoid_report::figures::{BoxGrid, BoxPanel, BoxRange, BoxSeries, BoxStatistics
 pub(super) fn items() -> Vec<Item> {
     (1..=8)
         .map(|start| {
-            Item::of_study(
+            Item::from_study(
                 format!("F.{start}"),
                 format!(
                     "Bias from start IC{start} minus that from the base start, Box-Jenkins with m* = m0, condition C1"
@@ -63,12 +63,12 @@ fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
                     let differences: Vec<f64> = other.iter().zip(&base).map(|(other, base)| other - base).collect();
                     (*level, differences)
                 };
-                let group: Vec<(f64, Vec<f64>)> = LEVELS.iter().map(of_level).collect();
+                let group: Vec<(f64, Vec<f64>)> = NOISE_LEVELS.iter().map(of_level).collect();
                 for (level, differences) in &group {
                     let s = BoxStatistics::of(differences);
                     let finite = || differences.iter().copied().filter(|v| v.is_finite());
                     most = finite().fold(most, |most, v| most.max(v.abs()));
-                    data.row(
+                    data.add_row(
                         &[letters],
                         &[
                             m0 as f64,
@@ -102,12 +102,12 @@ fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
             });
         }
     }
-    let series = LEVELS.iter().enumerate().map(|(i, level)| BoxSeries {
+    let series = NOISE_LEVELS.iter().enumerate().map(|(i, level)| BoxSeries {
         name: level_name(*level),
         shade: Shade {
             method: 1,
             level: i,
-            levels: LEVELS.len(),
+            levels: NOISE_LEVELS.len(),
         },
     });
     let grid = BoxGrid {
@@ -122,5 +122,5 @@ fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
         with_zero: true,
         least_reach: 0.01,
     };
-    item.drawn(box_plots, &grid, data)
+    item.draw(box_plots, &grid, data)
 }

@@ -16,7 +16,7 @@ impl TableBuilder {
         }
     }
 
-    pub fn row(&mut self, texts: &[&str], numbers: &[f64]) {
+    pub fn add_row(&mut self, texts: &[&str], numbers: &[f64]) {
         for ((_, column), text) in self.texts.iter_mut().zip(texts) {
             column.push((*text).to_owned());
         }
@@ -25,7 +25,7 @@ impl TableBuilder {
         }
     }
 
-    pub fn table(self, comment: &str) -> OutputTable {
+    pub fn build(self, comment: &str) -> OutputTable {
         let texts = self.texts.into_iter().map(|(name, values)| OutputColumn {
             name: name.to_owned(),
             values: ColumnValues::Text(values),

@@ -27,10 +27,10 @@ pub(super) const OPERATOR: [Row; 5] = [
 ];
 
 /// Estimator in a figure: index of the method for the colour, name in the plan, and its batch fits with their spans.
-type Curves = (usize, &'static str, &'static [(&'static str, f64, f64)]);
+type EstimatorCurves = (usize, &'static str, &'static [(&'static str, f64, f64)]);
 
-const RLS: Curves = (0, "RLS", &[("OLS first", 0.0, 30.72), ("OLS last", 51.2, 81.92)]);
-const RPEM: Curves = (1, "RPEM", &[("PEM first", 0.0, 30.72), ("PEM last", 51.2, 81.92)]);
+const RLS: EstimatorCurves = (0, "RLS", &[("OLS first", 0.0, 30.72), ("OLS last", 51.2, 81.92)]);
+const RPEM: EstimatorCurves = (1, "RPEM", &[("PEM first", 0.0, 30.72), ("PEM last", 51.2, 81.92)]);
 
 const CAPTION: &str = "Median over the runs at each time. The thesis shows averages, but one run in which K_e nearly \
                        vanishes would dominate the average of T_L. Coloured dots: batch fits to [0, 30.72] and \
@@ -39,17 +39,17 @@ const CAPTION: &str = "Median over the runs at each time. The thesis shows avera
 
 pub(super) fn items() -> Vec<Item> {
     let mut all = vec![
-        recursive("fig-11".to_owned(), "C4", &DISCRETE, "discrete parameters"),
-        recursive("fig-12".to_owned(), "C4", &OPERATOR, "operator parameters"),
+        recursive_item("fig-11".to_owned(), "C4", &DISCRETE, "discrete parameters"),
+        recursive_item("fig-12".to_owned(), "C4", &OPERATOR, "operator parameters"),
     ];
     for (i, condition) in ["C1", "C2", "C3", "C4", "C5", "C6"].into_iter().enumerate() {
-        all.push(recursive(
+        all.push(recursive_item(
             format!("H.{}", 2 * i + 1),
             condition,
             &DISCRETE,
             "discrete parameters",
         ));
-        all.push(recursive(
+        all.push(recursive_item(
             format!("H.{}", 2 * i + 2),
             condition,
             &OPERATOR,
@@ -61,7 +61,7 @@ pub(super) fn items() -> Vec<Item> {
         (&OPERATOR[..], "operator parameters", 5),
     ] {
         for m0 in REMNANT_ORDERS {
-            all.push(Item::of_study(
+            all.push(Item::from_study(
                 format!("G.{}", first + m0 - 1),
                 format!("RLS with a forgetting matrix, {what}, condition C3, m0 = {m0}"),
                 "Median over the runs at each time, by noise level; infinite memory for a1 and a2, 256 samples for b0 \
@@ -77,8 +77,8 @@ pub(super) fn items() -> Vec<Item> {
     all
 }
 
-fn recursive(name: String, condition: &'static str, rows: &'static [Row], what: &str) -> Item {
-    Item::of_study(
+fn recursive_item(name: String, condition: &'static str, rows: &'static [Row], what: &str) -> Item {
+    Item::from_study(
         name,
         format!("Recursive ARX and Box-Jenkins (m* = 1) estimates, {what}, condition {condition}"),
         CAPTION,
@@ -104,7 +104,7 @@ fn make(
     rows: &[Row],
     orders: &[usize],
     levels: &[f64],
-    estimators: &[Curves],
+    estimators: &[EstimatorCurves],
 ) -> ItemOutput {
     let mut data = TableBuilder::new(
         &["parameter", "estimator"],
@@ -136,7 +136,7 @@ fn make(
                         && let Some(bands) = trace.parameters.get(*column)
                     {
                         for (k, t) in trace.times_s.iter().enumerate() {
-                            data.row(
+                            data.add_row(
                                 &[name, estimator],
                                 &[
                                     *m0 as f64,
@@ -164,7 +164,7 @@ fn make(
                         if let Some(row) = row {
                             let s = &row.statistics;
                             for t in [*from, *to] {
-                                data.row(
+                                data.add_row(
                                     &[name, fit],
                                     &[
                                         *m0 as f64,
@@ -214,7 +214,7 @@ fn make(
         levels: levels.iter().map(|level| level_name(*level)).collect(),
         ..TraceGrid::default()
     };
-    item.drawn(trace_panels, &grid, data)
+    item.draw(trace_panels, &grid, data)
 }
 
 /// Time from which the estimates determine the range of their panels, s; before this time the estimates are still

@@ -19,14 +19,14 @@ use std::ops::Range;
 use hoid_model::{OperatorParameters, Record};
 use num_complex::Complex64;
 
-use crate::{ThesisError, comparators::TrackingResult, comparators::response_of};
+use crate::{ThesisError, comparators::TrackingResult, comparators::delayed_response};
 
 /// Spans over which the error of the response is averaged, s.
-const SPANS_S: [(f64, f64); 3] = [(30.72, 40.96), (40.96, 46.08), (61.44, 81.93)];
+const ERROR_SPANS_S: [(f64, f64); 3] = [(30.72, 40.96), (40.96, 46.08), (61.44, 81.93)];
 /// Time from which parameters are evaluated, s.
-const PARAMETERS_FROM_S: f64 = 10.0;
+const PARAMETER_START_S: f64 = 10.0;
 /// Indices of the evaluated lines of the forcing function.
-pub(super) const LINES: Range<usize> = 2..9;
+pub(super) const LINE_INDICES: Range<usize> = 2..9;
 
 /// Errors of one run, %; NaN if there is no estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +37,7 @@ pub struct Errors {
     pub operator: [f64; 5],
 }
 
-fn values(operator: &OperatorParameters) -> [f64; 5] {
+fn operator_values(operator: &OperatorParameters) -> [f64; 5] {
     let o = operator;
     [o.k_e, o.t_l_s, o.k_e_dot(), o.omega_nm_rad_s, o.zeta_nm]
 }
@@ -72,16 +72,20 @@ pub fn errors(
     let mut parameters = [const { Vec::new() }; 5];
     for (i, k) in at.iter().enumerate() {
         let (time_s, operator) = (record.time_s(*k), truth(record, *k));
-        let expected = response_of(&operator, record.sample_time(), omega_rad_s)?;
+        let expected = delayed_response(&operator, record.sample_time(), omega_rad_s)?;
         let off = |(h, h0): (&Complex64, &Complex64)| (h / h0 - 1.0).norm_sqr();
         let squares = found.response[i].iter().zip(&expected).map(off).sum::<f64>() / expected.len() as f64;
-        for (span, (from_s, to_s)) in spans.iter_mut().zip(SPANS_S) {
+        for (span, (from_s, to_s)) in spans.iter_mut().zip(ERROR_SPANS_S) {
             if (from_s..to_s).contains(&time_s) {
                 span.push(squares);
             }
         }
-        if let Some(own) = found.operator[i].filter(|_| time_s >= PARAMETERS_FROM_S) {
-            for ((all, own), expected) in parameters.iter_mut().zip(values(&own)).zip(values(&operator)) {
+        if let Some(own) = found.operator[i].filter(|_| time_s >= PARAMETER_START_S) {
+            for ((all, own), expected) in parameters
+                .iter_mut()
+                .zip(operator_values(&own))
+                .zip(operator_values(&operator))
+            {
                 all.push((own / expected - 1.0).powi(2));
             }
         }
@@ -122,7 +126,7 @@ mod tests {
         let found = TrackingResult {
             response: all
                 .iter()
-                .map(|o| response_of(o, record.sample_time(), &omega).unwrap())
+                .map(|o| delayed_response(o, record.sample_time(), &omega).unwrap())
                 .collect(),
             operator: all.into_iter().map(Some).collect(),
         };

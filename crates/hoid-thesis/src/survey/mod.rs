@@ -32,4 +32,4 @@ pub use table::survey_tables;
 
 /// File of the comparators of `research/notes/survey-methods.md`; the study of the same survey is the named plan
 /// [`SURVEY`](crate::plans::SURVEY).
-pub const COMPARATORS: &str = include_str!("../../plans/survey-comparators.toml");
+pub const COMPARATOR_PLAN: &str = include_str!("../../plans/survey-comparators.toml");

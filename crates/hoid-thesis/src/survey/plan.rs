@@ -87,7 +87,7 @@ mod tests {
     use super::*;
     use crate::plans::SURVEY;
 
-    const HEAD: &str = r#"
+    const PLAN_HEAD: &str = r#"
 name = "small"
 replications = 2
 [[scenarios]]
@@ -99,7 +99,7 @@ method = "rls"
 
     #[test]
     fn survey_plan_has_all_comparators() {
-        let plan = SurveyPlan::parse(SURVEY.text, super::super::COMPARATORS, "survey.toml").unwrap();
+        let plan = SurveyPlan::parse(SURVEY.text, super::super::COMPARATOR_PLAN, "survey.toml").unwrap();
         let methods: Vec<&str> = plan.comparators.iter().map(|(_, of)| of.about().name).collect();
         for comparator in comparators() {
             assert!(
@@ -112,11 +112,11 @@ method = "rls"
 
     #[test]
     fn options_are_set_and_unknown_names_refused() {
-        let parse = |tail: &str| SurveyPlan::parse(HEAD, &format!("[[comparators]]\n{tail}"), "small.toml");
+        let parse = |tail: &str| SurveyPlan::parse(PLAN_HEAD, &format!("[[comparators]]\n{tail}"), "small.toml");
         let plan = parse("name = \"FIR\"\nmethod = \"rls-fir\"\nnb = 64\n").unwrap();
         assert_eq!(plan.comparators[0].1.get("nb").as_deref(), Some("64"));
         assert!(
-            SurveyPlan::parse(HEAD, "", "small.toml")
+            SurveyPlan::parse(PLAN_HEAD, "", "small.toml")
                 .unwrap()
                 .comparators
                 .is_empty()

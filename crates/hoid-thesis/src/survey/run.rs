@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 
 use super::{
-    measure::{Errors, LINES, errors},
+    measure::{Errors, LINE_INDICES, errors},
     plan::SurveyPlan,
 };
 use crate::{
@@ -21,7 +21,7 @@ use crate::{
 /// Number of samples between stored estimates.
 const STORED_SAMPLE_INTERVAL: usize = 32;
 /// Number of the first replication used as a validation set; it is larger than the number of any evaluated run.
-const VALIDATION: u64 = 1 << 40;
+const VALIDATION_REPLICATION: u64 = 1 << 40;
 
 /// Errors of one method over the runs of one cell.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +56,12 @@ pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Met
                 };
                 simulator.run(seed, false)
             };
-            let found = methods_of(plan, cell, &run(replication)?, &run(VALIDATION + replication)?);
+            let found = method_results(
+                plan,
+                cell,
+                &run(replication)?,
+                &run(VALIDATION_REPLICATION + replication)?,
+            );
             each(&format!("cell {}, run {replication}", cell.index));
             Ok::<_, ThesisError>(found)
         };
@@ -87,10 +92,10 @@ struct MethodResult {
     seconds: f64,
 }
 
-fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Record) -> Vec<MethodResult> {
+fn method_results(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Record) -> Vec<MethodResult> {
     let scenario = cell.resolved.scenario();
     let lines: Vec<f64> = scenario.forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect();
-    let omega = &lines[LINES.start.min(lines.len())..LINES.end.min(lines.len())];
+    let omega = &lines[LINE_INDICES.start.min(lines.len())..LINE_INDICES.end.min(lines.len())];
     let at: Vec<usize> = (STORED_SAMPLE_INTERVAL - 1..record.len())
         .step_by(STORED_SAMPLE_INTERVAL)
         .collect();
@@ -118,7 +123,7 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
             }
         };
     let estimators = plan.study.estimators_of(cell).map(|(_, estimator)| {
-        let follow = || of_estimator(estimator, cell, &task);
+        let follow = || estimator_result(estimator, cell, &task);
         measured(&estimator.label, "", &follow)
     });
     let comparators = plan.comparators.iter().map(|(name, of)| {
@@ -130,9 +135,9 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
 
 /// Returns the result of an estimator of a study. A recursive method gives an estimate at each time, a batch fit the
 /// same estimate at all times.
-fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+fn estimator_result(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
     match estimator.task_for(&cell.resolved) {
-        StudyTask::Track(options) => of_trace(&track(task.record, &options, STORED_SAMPLE_INTERVAL)?, task),
+        StudyTask::Track(options) => trace_result(&track(task.record, &options, STORED_SAMPLE_INTERVAL)?, task),
         StudyTask::Fit(options) => {
             let (from_s, to_s) = estimator.span_s.unwrap_or((task.record.time_s(0), f64::INFINITY));
             let span = task
@@ -155,7 +160,7 @@ fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Resu
     }
 }
 
-fn of_trace(trace: &Trace, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+fn trace_result(trace: &Trace, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
     let (options, mut found) = (trace.options(), TrackingResult::default());
     for row in 0..task.at.len().min(trace.len()) {
         let theta = trace.theta(row).to_vec();

@@ -7,13 +7,13 @@ use hoid_study::{plan::Cell, statistics::median};
 use super::{measure::Errors, plan::SurveyPlan, run::MethodErrors};
 
 /// Returns the values displayed for one run: the response in three spans, and K_e, K_e_dot and omega_nm.
-fn shown(errors: &Errors) -> [f64; 6] {
+fn displayed_values(errors: &Errors) -> [f64; 6] {
     let ([before, through, after], o) = (errors.response, errors.operator);
     [before, through, after, o[0], o[2], o[3]]
 }
 
 /// Formats a value with about two digits, as a dash if it is missing, and as `> 1000` if the method diverged.
-fn digits(value: f64) -> String {
+fn format_two_digits(value: f64) -> String {
     match value {
         v if v.is_nan() => "–".to_owned(),
         v if v >= 1000.0 => "> 1000".to_owned(),
@@ -25,7 +25,7 @@ fn digits(value: f64) -> String {
 /// Returns the median over the runs of each displayed value, which is NaN unless more than half of the runs give a
 /// number, and the number of failed runs.
 fn medians(of: &MethodErrors) -> ([f64; 6], usize) {
-    let runs: Vec<[f64; 6]> = of.runs.iter().flatten().map(shown).collect();
+    let runs: Vec<[f64; 6]> = of.runs.iter().flatten().map(displayed_values).collect();
     let column = |i: usize| {
         let finite: Vec<f64> = runs.iter().map(|run| run[i]).filter(|x| x.is_finite()).collect();
         match 2 * finite.len() > of.runs.len() {
@@ -56,10 +56,10 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
     let mut first: Vec<&MethodErrors> = Vec::new();
     let mut each = String::new();
     for cell in &plan.study.cells {
-        each += &format!("\n### {}\n\n{}", heading(cell), head("failed"));
+        each += &format!("\n### {}\n\n{}", heading(cell), table_head("failed"));
         for of in found.iter().filter(|of| of.cell == cell.index) {
             let (row, failed) = medians(of);
-            let cells: Vec<String> = row.iter().map(|value| digits(*value)).collect();
+            let cells: Vec<String> = row.iter().map(|value| format_two_digits(*value)).collect();
             let failed = if failed > 0 { failed.to_string() } else { String::new() };
             each += &format!("| {} | {} | {failed} |\n", of.name, cells.join(" | "));
             if !everywhere.contains_key(of.name.as_str()) {
@@ -68,12 +68,12 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
             everywhere.entry(&of.name).or_default().push(row);
         }
     }
-    text += &head("ms per run");
+    text += &table_head("ms per run");
     for of in first {
         let rows = &everywhere[of.name.as_str()];
         let column = |i: usize| {
             let finite: Vec<f64> = rows.iter().map(|row| row[i]).filter(|x| x.is_finite()).collect();
-            digits(if finite.is_empty() { f64::NAN } else { median(&finite) })
+            format_two_digits(if finite.is_empty() { f64::NAN } else { median(&finite) })
         };
         let cells: Vec<String> = (0..6).map(column).collect();
         let mark = if of.extra_information.is_empty() { "" } else { " *" };
@@ -81,7 +81,7 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
             "| {}{mark} | {} | {} |\n",
             of.name,
             cells.join(" | "),
-            digits(1e3 * of.seconds)
+            format_two_digits(1e3 * of.seconds)
         );
     }
     let extra_information: Vec<String> = plan
@@ -96,7 +96,7 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
     )
 }
 
-fn head(last: &str) -> String {
+fn table_head(last: &str) -> String {
     format!("| method | H before | through | after | K_e | K_ė | ω_nm | {last} |\n|---|---|---|---|---|---|---|---|\n")
 }
 
@@ -129,7 +129,12 @@ mod tests {
         assert_eq!((row[0], row[1], failed), (12.0, 20.0, 1));
         assert!(row[3].is_nan());
         assert_eq!(
-            [digits(row[0]), digits(row[3]), digits(4e3), digits(9.96)],
+            [
+                format_two_digits(row[0]),
+                format_two_digits(row[3]),
+                format_two_digits(4e3),
+                format_two_digits(9.96)
+            ],
             ["12", "–", "> 1000", "10.0"]
         );
     }

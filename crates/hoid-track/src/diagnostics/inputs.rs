@@ -1,6 +1,6 @@
 //! Names the input whose response changed, for a model with two inputs.
 //!
-//! Rows at distances of at least [`APART_S`] are compared in pairs. With the difference d of a response at a frequency
+//! Rows at distances of at least [`MIN_ROW_DISTANCE_S`] are compared in pairs. With the difference d of a response at a frequency
 //! and the sum C of the covariances of its real and imaginary parts, `T = d' C^-1 d` (A. Wald, 1943) exceeds x with
 //! probability `exp(-x/2)` if nothing changes and the errors of the rows are independent. Rows within the memory of the
 //! recursion have similar errors, so the test then finds less than it could. The probability that the
@@ -14,17 +14,17 @@ use hoid_model::Finding;
 use crate::{response::Response, trace::Trace};
 
 /// Frequencies at which responses are compared, rad/s.
-const AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+const COMPARED_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Least time between compared rows, s.
-const APART_S: f64 = 10.0;
+const MIN_ROW_DISTANCE_S: f64 = 10.0;
 /// Largest number of rows that are compared.
-const ROWS: usize = 16;
+const MAX_ROWS: usize = 16;
 /// Probability, over all comparisons of an input, below which a change is named.
 const SIGNIFICANCE_LEVEL: f64 = 0.01;
 
 /// The largest change of a response.
 #[derive(Debug, Clone, Copy)]
-struct ChangeOfResponse {
+struct LargestChange {
     /// Times of the two rows, s.
     between_s: [f64; 2],
     omega_rad_s: f64,
@@ -36,13 +36,13 @@ struct ChangeOfResponse {
 impl Trace {
     /// Returns a note that names the input whose response changed; `None` for a model with one input and if neither
     /// changed. `rows` are the examined rows.
-    pub(super) fn changed_input(&self, rows: &[usize]) -> Option<Finding> {
+    pub(super) fn changed_input_finding(&self, rows: &[usize]) -> Option<Finding> {
         let further = self.options().further.as_ref()?;
         let own = self.largest_change(rows, |row, omega| Some(self.response_at(row, omega)));
         let of_further = self.largest_change(rows, |row, omega| self.further_response(row, omega));
         let channel = further.channel.as_str();
         let named =
-            |found: Option<ChangeOfResponse>| found.filter(|f| f.p_value < SIGNIFICANCE_LEVEL).map(|f| f.in_words());
+            |found: Option<LargestChange>| found.filter(|f| f.p_value < SIGNIFICANCE_LEVEL).map(|f| f.as_text());
         let message = match (named(own), named(of_further)) {
             (Some(own), Some(further)) => {
                 format!("the response to e changed {own}; the response to {channel} also changed, {further}")
@@ -63,18 +63,18 @@ impl Trace {
         &self,
         rows: &[usize],
         response: impl Fn(usize, f64) -> Option<Response>,
-    ) -> Option<ChangeOfResponse> {
-        let step = rows.len().div_ceil(ROWS).max(1);
+    ) -> Option<LargestChange> {
+        let step = rows.len().div_ceil(MAX_ROWS).max(1);
         let rows: Vec<usize> = rows.iter().rev().step_by(step).rev().copied().collect();
         let at = |row: usize| self.times_s()[row];
         let last = rows.len().checked_sub(1)?;
         let pairs: Vec<[usize; 2]> = (0..=last)
             .flat_map(|from| (from + 1..=last).map(move |to| [from, to]))
-            .filter(|[from, to]| at(rows[*to]) - at(rows[*from]) >= APART_S)
+            .filter(|[from, to]| at(rows[*to]) - at(rows[*from]) >= MIN_ROW_DISTANCE_S)
             .collect();
-        let comparisons = (AT_RAD_S.len() * pairs.len()) as f64;
-        let mut largest: Option<ChangeOfResponse> = None;
-        for omega_rad_s in AT_RAD_S {
+        let comparisons = (COMPARED_RAD_S.len() * pairs.len()) as f64;
+        let mut largest: Option<LargestChange> = None;
+        for omega_rad_s in COMPARED_RAD_S {
             let all: Vec<Response> = rows.iter().filter_map(|row| response(*row, omega_rad_s)).collect();
             if all.len() <= last {
                 continue;
@@ -84,12 +84,12 @@ impl Trace {
                 let before = from.checked_sub(1).unwrap_or(from + 1);
                 let after = if to < last { to + 1 } else { to - 1 };
                 let lasting = [[from, to], [before, to], [from, after]]
-                    .map(|[from, to]| wald(&[all[from], all[to]]))
+                    .map(|[from, to]| wald_statistic(&[all[from], all[to]]))
                     .into_iter()
                     .fold(f64::INFINITY, f64::min);
                 let p_value = (comparisons * (-0.5 * lasting).exp()).min(1.0);
                 if largest.is_none_or(|known| p_value < known.p_value) {
-                    largest = Some(ChangeOfResponse {
+                    largest = Some(LargestChange {
                         between_s: [at(rows[from]), at(rows[to])],
                         omega_rad_s,
                         responses: [all[from], all[to]],
@@ -102,8 +102,8 @@ impl Trace {
     }
 }
 
-impl ChangeOfResponse {
-    fn in_words(&self) -> String {
+impl LargestChange {
+    fn as_text(&self) -> String {
         let [before, after] = &self.responses;
         let turned = (after.phase_deg().value - before.phase_deg().value + 180.0).rem_euclid(360.0) - 180.0;
         format!(
@@ -119,7 +119,7 @@ impl ChangeOfResponse {
 }
 
 /// Returns `d' C^-1 d` for the difference d of two responses; zero without a positive covariance.
-fn wald([before, after]: &[Response; 2]) -> f64 {
+fn wald_statistic([before, after]: &[Response; 2]) -> f64 {
     let d = [0, 1].map(|part| after.value[part] - before.value[part]);
     let c = |i: usize, j: usize| before.covariance[i][j] + after.covariance[i][j];
     let determinant = c(0, 0) * c(1, 1) - c(0, 1) * c(1, 0);
@@ -143,12 +143,12 @@ mod tests {
             covariance: c,
         };
         let unit = [[0.5, 0.0], [0.0, 0.5]];
-        assert!((wald(&[response(0.0, unit), response(3.0, unit)]) - 9.0).abs() < 1e-12);
+        assert!((wald_statistic(&[response(0.0, unit), response(3.0, unit)]) - 9.0).abs() < 1e-12);
         // d = [1, 0], C = [[2, 1], [1, 2]]: d' C^-1 d = 2/3.
         let oblique = [[1.0, 0.5], [0.5, 1.0]];
-        assert!((wald(&[response(0.0, oblique), response(1.0, oblique)]) - 2.0 / 3.0).abs() < 1e-12);
+        assert!((wald_statistic(&[response(0.0, oblique), response(1.0, oblique)]) - 2.0 / 3.0).abs() < 1e-12);
         for useless in [[[0.0; 2]; 2], [[f64::NAN; 2]; 2]] {
-            assert_eq!(wald(&[response(0.0, useless), response(1.0, useless)]), 0.0);
+            assert_eq!(wald_statistic(&[response(0.0, useless), response(1.0, useless)]), 0.0);
         }
     }
 }

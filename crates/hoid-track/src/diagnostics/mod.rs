@@ -3,7 +3,7 @@
 //! A trace depends on its start and on its rows. Findings of [`hoid_ident::diagnostics`] about the start fit are
 //! included, at most as warnings, because the recursion may move away from the start. A change inside the start span is
 //! a note for methods that forget and a warning for the others. Of the rows in which the estimate is updated, at most
-//! [`ROWS`] are examined, evenly spaced:
+//! [`MAX_ROWS`] are examined, evenly spaced:
 //!
 //! | kind | observation |
 //! |---|---|
@@ -58,7 +58,7 @@ use self::operators::{Operator, operator_findings};
 use crate::trace::Trace;
 
 /// Largest number of rows that are examined.
-const ROWS: usize = 400;
+const MAX_ROWS: usize = 400;
 /// VAF in % below which the simulated start fit explains little.
 const MIN_START_VAF: f64 = 20.0;
 /// Share of shortened steps, and share of faulty samples, beyond which a finding is reported.
@@ -75,7 +75,7 @@ impl Trace {
     /// The errors of the residuals of the start fit.
     pub fn verdict(&self, record: &Record, choice: Option<&Choice>) -> Result<Verdict, IdentError> {
         let mut all = self.start_findings(record, choice)?;
-        let rows = self.rows_judged();
+        let rows = self.judged_rows();
         if rows.iter().any(|row| self.theta(*row).iter().any(|v| !v.is_finite())) {
             all.push(Finding::undetermined(
                 "not-finite",
@@ -88,16 +88,16 @@ impl Trace {
         all.extend(self.covariance_finding(&rows));
         all.extend(self.count_findings());
         all.extend(self.guard_findings());
-        all.extend(self.updated_at_rest(record));
+        all.extend(self.update_at_rest_finding(record));
         all.extend(self.idle_finding(record));
         all.extend(self.prior_value_finding());
-        all.extend(self.not_followed(record));
-        all.extend(self.changed_input(&rows));
+        all.extend(self.outdated_last_row_finding(record));
+        all.extend(self.changed_input_finding(&rows));
         if !all.iter().any(|finding| finding.kind == "gain") {
             all.extend(self.last_row_finding());
         }
         all.extend(self.many_changes_finding());
-        all.extend(self.missed_structure(record));
+        all.extend(self.missed_structure_finding(record));
         all.extend(self.response_finding.clone());
         all.extend(self.response_change_finding(record));
         all.extend(self.loop_response_finding(record));
@@ -114,7 +114,7 @@ impl Trace {
             severity: match finding.kind {
                 // A method that forgets follows a change within the start span. A method that weights the start against
                 // all later samples starts from a mean of the operators before and after this change.
-                "not-constant" if !self.options().method.is_model_of_change() => Severity::Note,
+                "not-constant" if !self.options().method.models_change() => Severity::Note,
                 _ => finding.severity.min(Severity::Doubt),
             },
             message: format!("start fit: {}", finding.message),
@@ -124,7 +124,7 @@ impl Trace {
         if fit.model().structure().has_input() {
             let vaf = fit.quality(&span)?.vaf_simulation;
             if vaf < MIN_START_VAF {
-                all.push(Finding::doubt(
+                all.push(Finding::warning(
                     "start-explains-little",
                     format!(
                         "the start fit explains {vaf:.0} % of u (VAF of the simulation, expected {MIN_START_VAF:.0} \
@@ -142,8 +142,8 @@ impl Trace {
         let operator = self
             .operator(row)
             .ok()
-            .filter(|_| self.options().method.starts_itself())?;
-        let open: Vec<&str> = (self.determined(&operator).into_iter())
+            .filter(|_| self.options().method.is_self_starting())?;
+        let open: Vec<&str> = (self.determinations(&operator).into_iter())
             .filter(|(name, yes)| !yes && ["omega_nm", "zeta_nm", "tau_e"].contains(name))
             .map(|(name, _)| name)
             .collect();
@@ -161,14 +161,14 @@ impl Trace {
 
     /// Returns the rows that are examined: rows in which the estimate is updated, evenly spaced, including the last
     /// row. For a method that needs no start fit, rows before its first estimate are excluded.
-    fn rows_judged(&self) -> Vec<usize> {
+    fn judged_rows(&self) -> Vec<usize> {
         let from = self.updated_from_s() - self.sample_time().s() / 2.0;
         let mut first = self.times_s().partition_point(|t| *t < from);
-        while self.options().method.starts_itself() && first + 1 < self.len() && self.covariance(first).is_none() {
+        while self.options().method.is_self_starting() && first + 1 < self.len() && self.covariance(first).is_none() {
             first += 1;
         }
         let count = self.len().saturating_sub(first);
-        let step = count.div_ceil(ROWS).max(1);
+        let step = count.div_ceil(MAX_ROWS).max(1);
         let mut rows: Vec<usize> = (first..self.len()).rev().step_by(step).collect();
         rows.reverse();
         rows
@@ -196,7 +196,7 @@ impl Trace {
             Some(_) => " for the memory in use; use a longer memory",
             None => "",
         };
-        Some(Finding::doubt(
+        Some(Finding::warning(
             "covariance-blown-up",
             format!(
                 "the standard error of {name} grows to {ratio:.0} times its median: for a while the data carry too little information{remedy}"
@@ -210,7 +210,7 @@ impl Trace {
         let samples = counts.samples.max(1) as f64;
         if counts.skipped as f64 > MAX_FAULT_SHARE * samples {
             let share = 100.0 * counts.skipped as f64 / samples;
-            all.push(Finding::doubt(
+            all.push(Finding::warning(
                 "faults",
                 format!("{share:.0} % of the samples are faulty in e or u; the estimate is kept constant there"),
             ));
@@ -223,7 +223,7 @@ impl Trace {
             samples
         };
         if counts.shortened as f64 > MAX_SHORTENED_SHARE * moved {
-            all.push(Finding::doubt(
+            all.push(Finding::warning(
                 "steps-shortened",
                 format!(
                     "{:.0} % of the steps were shortened to stay stable or within bounds: the estimate differs from \

@@ -6,20 +6,20 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use super::operators::is_other;
+use super::operators::has_other_form;
 use crate::tracker::Tracker;
 
 /// Time after a restart for which the estimate is doubtful, s.
-const UNSETTLED_S: f64 = 10.0;
+const SETTLING_S: f64 = 10.0;
 
 impl Tracker {
     /// Returns the reliability of the current estimate; `operator` is the result of [`Tracker::operator`].
-    pub fn level(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
+    pub fn verdict_level(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
         if self.theta().iter().any(|v| !v.is_finite()) {
             return VerdictLevel::NotDetermined;
         }
-        let unsettled = self.is_paused() || self.since_restart_s().is_some_and(|s| s < UNSETTLED_S);
-        let level = self.level_of_estimate(operator);
+        let unsettled = self.is_paused() || self.time_since_restart_s().is_some_and(|s| s < SETTLING_S);
+        let level = self.estimate_level(operator);
         if unsettled {
             level.max(VerdictLevel::Doubtful)
         } else {
@@ -27,8 +27,8 @@ impl Tracker {
         }
     }
 
-    fn level_of_estimate(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
-        if self.options().method.starts_itself() && self.covariance().is_none() {
+    fn estimate_level(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
+        if self.options().method.is_self_starting() && self.covariance().is_none() {
             return VerdictLevel::NotDetermined;
         }
         // If no coefficient has a standard error, the estimate is doubtful.
@@ -37,10 +37,10 @@ impl Tracker {
             return VerdictLevel::Doubtful;
         }
         match operator {
-            Ok(operator) => level_of_operator(operator, self.sample_time),
-            Err(_) if !is_other(operator) => VerdictLevel::Doubtful,
+            Ok(operator) => operator_level(operator, self.sample_time),
+            Err(_) if !has_other_form(operator) => VerdictLevel::Doubtful,
             Err(_) => {
-                let open = self.response_is_open();
+                let open = self.response_is_undetermined();
                 if open {
                     VerdictLevel::NotDetermined
                 } else {
@@ -51,7 +51,7 @@ impl Tracker {
     }
 
     /// True if the model has an input and no coefficient of B is two standard errors from zero.
-    fn response_is_open(&self) -> bool {
+    fn response_is_undetermined(&self) -> bool {
         let (names, estimates) = (self.parameter_names(), self.parameters());
         let mut of_b = names
             .iter()
@@ -62,7 +62,7 @@ impl Tracker {
     }
 }
 
-fn level_of_operator(operator: &OperatorEstimate, sample_time: SampleTime) -> VerdictLevel {
+fn operator_level(operator: &OperatorEstimate, sample_time: SampleTime) -> VerdictLevel {
     let mut gains = gain_findings(&[("", *operator)]);
     // A person who responds like a pure gain has no lead to determine.
     if !is_undetermined(&operator.k_e) && is_undetermined(&operator.k_e_dot) {

@@ -13,7 +13,7 @@ use crate::trace::Trace;
 pub(super) type Operator = Result<OperatorEstimate, NotConvertible>;
 
 /// True if the model does not have the orders or the form of an operator.
-pub(super) fn is_other(operator: &Operator) -> bool {
+pub(super) fn has_other_form(operator: &Operator) -> bool {
     matches!(
         operator,
         Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. } | NotConvertible::OtherForm { .. })
@@ -21,24 +21,24 @@ pub(super) fn is_other(operator: &Operator) -> bool {
 }
 
 /// Shares of the rows beyond which a finding is reported.
-const NOT_CONVERTIBLE: f64 = 0.05;
+const NOT_CONVERTIBLE_SHARE: f64 = 0.05;
 const UNDETERMINED_SHARE: f64 = 0.5;
 const IMPLAUSIBLE_SHARE: f64 = 0.25;
-const SIGN_SHARE: f64 = 0.02;
-const NEGATIVE_LEAD: f64 = 0.1;
+const SIGN_CHANGE_SHARE: f64 = 0.02;
+const NEGATIVE_LEAD_SHARE: f64 = 0.1;
 /// Upper bound of omega_nm in the physical recursions as a share of the Nyquist frequency, less rounding.
 const OMEGA_BOUND_SHARE: f64 = 0.4999;
 
 /// Returns the findings about the operators of the rows of a trace.
 pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Finding> {
     let mut all = Vec::new();
-    if operators.is_empty() || operators.iter().all(is_other) {
+    if operators.is_empty() || operators.iter().all(has_other_form) {
         return all;
     }
     let share = |count: usize, of: usize| count as f64 / of.max(1) as f64;
     let found: Vec<&OperatorEstimate> = operators.iter().filter_map(|o| o.as_ref().ok()).collect();
     let lacking = share(operators.len() - found.len(), operators.len());
-    if lacking > NOT_CONVERTIBLE {
+    if lacking > NOT_CONVERTIBLE_SHARE {
         let reason = operators.iter().find_map(|o| o.as_ref().err());
         let reason = reason.map_or(String::new(), |r| format!(", as {r}"));
         let words = format!(
@@ -49,7 +49,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
         let nothing = operators.iter().all(|o| matches!(o, Err(NotConvertible::ZeroGain)));
         all.push(match nothing {
             true => Finding::undetermined("not-convertible", words),
-            false => Finding::doubt("not-convertible", words),
+            false => Finding::warning("not-convertible", words),
         });
     }
     let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
@@ -62,7 +62,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
         },
         false => finding,
     };
-    all.extend(gains_over_rows(&rows_with, remembers).map(of_response));
+    all.extend(undetermined_gains_finding(&rows_with, remembers).map(of_response));
     all.extend(sign_finding(&rows_with));
     all.extend(lead_finding(&rows_with).map(of_response));
     let nyquist = trace.sample_time().nyquist_rad_s();
@@ -73,7 +73,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
             || (bounded && omega >= OMEGA_BOUND_SHARE * nyquist)
     });
     if implausible > IMPLAUSIBLE_SHARE {
-        all.push(Finding::doubt(
+        all.push(Finding::warning(
             "neuromuscular-lag",
             format!(
                 "in {:.0} % of the rows the two poles represent a lag and carry no information about the neuromuscular \
@@ -86,7 +86,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
         let near = 1e-6 * (high - low);
         let at_end = rows_with(&|o| o.tau_e_s.value <= low + near || o.tau_e_s.value >= high - near);
         if at_end > IMPLAUSIBLE_SHARE {
-            all.push(Finding::doubt(
+            all.push(Finding::warning(
                 "delay-at-bound",
                 format!(
                     "in {:.0} % of the rows the delay is at an end of its range {low} to {high} s; widen this range",
@@ -104,8 +104,8 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let beyond = |e: &Estimate, sign: f64| e.standard_error.is_some_and(|s| sign * e.value > 3.0 * s);
     let positive = rows_with(&|o| beyond(&o.k_e, 1.0));
     let negative = rows_with(&|o| beyond(&o.k_e, -1.0));
-    (positive > SIGN_SHARE && negative > SIGN_SHARE).then(|| {
-        Finding::doubt(
+    (positive > SIGN_CHANGE_SHARE && negative > SIGN_CHANGE_SHARE).then(|| {
+        Finding::warning(
             "gain-sign",
             format!(
                 "K_e is positive in {:.0} % of the rows and negative in {:.0} %: check whether the sign of e or u changes",
@@ -120,8 +120,8 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
 /// one.
 fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let negative = rows_with(&has_negative_lead);
-    (negative > NEGATIVE_LEAD).then(|| {
-        Finding::doubt(
+    (negative > NEGATIVE_LEAD_SHARE).then(|| {
+        Finding::warning(
             "negative-lead",
             format!(
                 "the lead T_L is negative in {:.0} % of the rows, by two standard errors of K_e and of K_e_dot: a gain \
@@ -138,7 +138,7 @@ type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 
 /// Finding about gains that are undetermined in most rows. For methods with a memory length, it recommends a longer
 /// one.
-fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
+fn undetermined_gains_finding(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let both = rows_with(&|o| is_undetermined(&o.k_e) && is_undetermined(&o.k_e_dot));
     if both > UNDETERMINED_SHARE {
@@ -155,7 +155,7 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
     let no_lead = rows_with(&|o| is_undetermined(&o.k_e_dot) && !is_undetermined(&o.k_e));
     if no_gain > UNDETERMINED_SHARE {
         let remedy = if remembers { "; use a longer memory" } else { "" };
-        return Some(Finding::doubt(
+        return Some(Finding::warning(
             "undetermined-parameter",
             format!(
                 "K_e is within two standard errors of zero in {} of the rows{remedy}",

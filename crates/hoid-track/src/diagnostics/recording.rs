@@ -2,23 +2,23 @@
 //! last row with the last few seconds.
 
 use hoid_ident::diagnostics::{has_negative_lead, is_undetermined, operator_step};
-use hoid_model::{Finding, Record, numbers::counted};
+use hoid_model::{Finding, Record, numbers::count_with_noun};
 
 use crate::{
     guard::{GuardAction, GuardChoice, GuardKind, TrackFault},
-    stationary::MIN_BOTH_S,
+    stationary::MIN_STATIONARY_BOTH_S,
     trace::Trace,
 };
 
 /// Share of held-back samples beyond which the finding about them is a warning.
-const MANY_HELD_BACK: f64 = 0.01;
+const HELD_BACK_SHARE: f64 = 0.01;
 /// Largest number of faulty spans that are listed individually.
 const MAX_NAMED_FAULTS: usize = 3;
 /// Lengths of the spans at the end of the record with which the last row is compared, s.
-const LAST_S: [f64; 2] = [16.0, 30.0];
+const LAST_SPANS_S: [f64; 2] = [16.0, 30.0];
 /// Smallest number of declared changes that counts as many, and length of record per change, s, above which the number
 /// does not count as many.
-const MANY_CHANGES: usize = 3;
+const MANY_CHANGE_COUNT: usize = 3;
 const RECORD_PER_CHANGE_S: f64 = 30.0;
 /// p-value of one of ten comparisons below which the end of the record differs from the last row.
 const P_VALUE_LIMIT: f64 = 1e-4;
@@ -40,9 +40,9 @@ impl Trace {
         if !held.is_empty() {
             let count = samples(&held);
             let sample = if count == 1.0 { "sample" } else { "samples" };
-            let words = format!("{count} {sample} held back as outliers ({})", named(&held));
-            all.push(match count > MANY_HELD_BACK * self.counts().samples as f64 {
-                true => Finding::doubt("held-back", words),
+            let words = format!("{count} {sample} held back as outliers ({})", list_faults(&held));
+            all.push(match count > HELD_BACK_SHARE * self.counts().samples as f64 {
+                true => Finding::warning("held-back", words),
                 false => Finding::note("held-back", words),
             });
         }
@@ -50,27 +50,30 @@ impl Trace {
         if !steps.is_empty() {
             let words = format!(
                 "{}, used as recorded ({})",
-                counted(steps.len(), "lasting jump"),
-                named(&steps)
+                count_with_noun(steps.len(), "lasting jump"),
+                list_faults(&steps)
             );
             all.push(Finding::note("steps-in-signals", words));
         }
         let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step));
         if !spans.is_empty() {
-            all.push(Finding::doubt(
+            all.push(Finding::warning(
                 "hostile-span",
                 format!(
                     "the estimate stays constant in {} in which e and u show no tracking ({})",
-                    counted(spans.len(), "span"),
-                    named(&spans)
+                    count_with_noun(spans.len(), "span"),
+                    list_faults(&spans)
                 ),
             ));
         }
         let again = of(&|f| matches!(f.action, GuardAction::Restarted | GuardAction::Relearnt));
         if !again.is_empty() {
-            all.push(Finding::doubt(
+            all.push(Finding::warning(
                 "restarted",
-                format!("the estimate was restarted after {}", counted(again.len(), "fault")),
+                format!(
+                    "the estimate was restarted after {}",
+                    count_with_noun(again.len(), "fault")
+                ),
             ));
         }
         all
@@ -78,7 +81,7 @@ impl Trace {
 
     /// Finding about spans in which e and u stay constant while the estimate is updated, because the guard was turned
     /// off: the spans carry no information, and the error bars go to zero with the innovations ([`crate::stationary`]).
-    pub(super) fn updated_at_rest(&self, record: &Record) -> Option<Finding> {
+    pub(super) fn update_at_rest_finding(&self, record: &Record) -> Option<Finding> {
         if self.options().method.guard() != Some(GuardChoice::No) {
             return None;
         }
@@ -87,8 +90,8 @@ impl Trace {
         let begun: Vec<usize> = (0..u.len()).filter(|k| begins(*k)).chain([u.len()]).collect();
         let longest = begun.windows(2).max_by_key(|of| of[1] - of[0])?;
         let [from, to] = [longest[0], longest[1]].map(|k| record.time_s(k));
-        (to - from >= MIN_BOTH_S).then(|| {
-            Finding::doubt(
+        (to - from >= MIN_STATIONARY_BOTH_S).then(|| {
+            Finding::warning(
                 "learnt-at-rest",
                 format!(
                     "neither e nor u moves from {from:.2} to {to:.2} s, but the estimate is updated there, and its \
@@ -102,7 +105,7 @@ impl Trace {
     /// not have recovered. A step of a parameter ([`operator_step`]) gives a finding if its p-value, given the errors
     /// of the step and of the row, is below [`P_VALUE_LIMIT`]. For a delay in whole samples, the step must also exceed
     /// one and a half samples.
-    pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
+    pub(super) fn outdated_last_row_finding(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
         // If gain and lead approximate another form, their response differs from the response of the estimate, so they
@@ -121,7 +124,7 @@ impl Trace {
                 .and_then(|(_, _, e)| e.standard_error)
         };
         let mut worst: Option<(f64, String)> = None;
-        for length in LAST_S {
+        for length in LAST_SPANS_S {
             let from = end - length;
             if from < record.time_s(0) {
                 continue;
@@ -149,7 +152,7 @@ impl Trace {
                 }
             }
         }
-        worst.map(|(_, words)| Finding::doubt("not-followed", words))
+        worst.map(|(_, words)| Finding::warning("not-followed", words))
     }
 
     /// Finding that neither gain is determined in the last row, regardless of earlier rows.
@@ -157,7 +160,7 @@ impl Trace {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let nothing = is_undetermined(&operator.k_e) && is_undetermined(&operator.k_e_dot) && !self.response_is_known;
         nothing.then(|| {
-            Finding::doubt(
+            Finding::warning(
                 "last-row",
                 "at the end of the record no gain differs from zero by two standard errors: report an earlier row",
             )
@@ -168,8 +171,8 @@ impl Trace {
     pub(super) fn many_changes_finding(&self) -> Option<Finding> {
         let changes = self.changes().len();
         let length = self.times_s().last()? - self.times_s().first()?;
-        (changes >= MANY_CHANGES && changes as f64 * RECORD_PER_CHANGE_S >= length).then(|| {
-            Finding::doubt(
+        (changes >= MANY_CHANGE_COUNT && changes as f64 * RECORD_PER_CHANGE_S >= length).then(|| {
+            Finding::warning(
                 "many-changes",
                 format!(
                     "{changes} changes are declared in {length:.0} s: people rarely change so often; more common \
@@ -191,7 +194,7 @@ impl Trace {
         Some(if left_out {
             Finding::note("idle-head", format!("{words}: left out of the start fit"))
         } else {
-            Finding::doubt(
+            Finding::warning(
                 "idle-head",
                 format!("{words}, which are in the start fit; start the fit after them"),
             )
@@ -200,7 +203,7 @@ impl Trace {
 }
 
 /// Lists the first faulty spans as text.
-fn named(faults: &[TrackFault]) -> String {
+fn list_faults(faults: &[TrackFault]) -> String {
     let one = |f: &TrackFault| format!("{} in {} at {:.2} to {:.2} s", f.kind, f.channel, f.from_s, f.to_s);
     let mut text = faults
         .iter()

@@ -6,19 +6,21 @@
 
 use std::ops::Range;
 
-use hoid_core::adaptive::{GAINS, STATES};
-use hoid_ident::diagnostics::{Course, LoopResponse, ResponseBasis, ResponseChange, loop_response, response_changes};
+use hoid_core::adaptive::{GAIN_COUNT, STATE_COUNT};
+use hoid_ident::diagnostics::{
+    LoopResponse, ResponseBasis, ResponseChange, TimeCourse, loop_response, response_changes,
+};
 use hoid_model::{Finding, Record};
 
-use super::structure::columns;
+use super::structure::transpose;
 use crate::trace::Trace;
 
 /// p-values below which the response is considered to vary within a stretch: by a step, a drift or an oscillation. The
 /// p-values count all frequencies and phases of an oscillation as independent, and take the larger of two variances for
 /// a step: of simulated people who do not change, about 1 % are below each of these limits.
-const UNLIKELY_STEP: f64 = 0.03;
-const UNLIKELY_DRIFT: f64 = 0.01;
-const UNLIKELY_OSCILLATION: f64 = 0.05;
+const STEP_P_VALUE: f64 = 0.03;
+const DRIFT_P_VALUE: f64 = 0.01;
+const OSCILLATION_P_VALUE: f64 = 0.05;
 /// Lag of a second basis, s, for people with a long lag, who respond like an integrator. The basis that explains u
 /// better is used.
 const LONG_LAG_S: f64 = 10.0;
@@ -30,16 +32,16 @@ const SETTLING_S: f64 = 3.0;
 /// the same forcing function.
 const MIN_RESPONSE_SHARE: f64 = 0.05;
 /// Time excluded from the stretches before and after a declared change, s.
-const EXCLUDED_S: f64 = 5.0;
+const EXCLUSION_S: f64 = 5.0;
 
 /// Signals and terms of a basis.
-struct Spanned {
+struct BasisSignals {
     columns: Vec<Vec<f64>>,
     terms: Vec<Vec<f64>>,
     lag_s: f64,
 }
 
-impl Spanned {
+impl BasisSignals {
     fn basis(&self) -> ResponseBasis<'_> {
         ResponseBasis {
             columns: &self.columns,
@@ -54,7 +56,7 @@ impl Trace {
     fn stretches(&self, record: &Record) -> Vec<Range<usize>> {
         let ts = self.sample_time().s();
         let sample = |t: f64| ((t - record.time_s(0)) / ts).round().clamp(0.0, record.len() as f64) as usize;
-        let mut from = sample(self.settled_s(record, SETTLING_S));
+        let mut from = sample(self.settled_from_s(record, SETTLING_S));
         let mut all = Vec::new();
         let mut times: Vec<f64> = self
             .changes()
@@ -63,8 +65,8 @@ impl Trace {
             .collect();
         times.sort_by(f64::total_cmp);
         for at in times {
-            all.push(from..sample(at - EXCLUDED_S));
-            from = from.max(sample(at + EXCLUDED_S));
+            all.push(from..sample(at - EXCLUSION_S));
+            from = from.max(sample(at + EXCLUSION_S));
         }
         all.push(from..record.len());
         all.retain(|stretch| stretch.start < stretch.end);
@@ -74,26 +76,26 @@ impl Trace {
     /// Returns the test results of all stretches, the most significant first; the p-values account for the number of
     /// stretches.
     pub(super) fn response_changes(&self, record: &Record) -> Vec<ResponseChange> {
-        let spanned: Vec<Spanned> = [self.lag_s(), LONG_LAG_S]
+        let spanned: Vec<BasisSignals> = [self.lag_s(), LONG_LAG_S]
             .into_iter()
-            .filter_map(|lag_s| self.spanned(record, lag_s))
+            .filter_map(|lag_s| self.basis_signals(record, lag_s))
             .collect();
-        let bases: Vec<ResponseBasis<'_>> = spanned.iter().map(Spanned::basis).collect();
+        let bases: Vec<ResponseBasis<'_>> = spanned.iter().map(BasisSignals::basis).collect();
         let mut all = response_changes(&bases, record.output(), &self.stretches(record), self.sample_time().s());
         all.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
         all
     }
 
-    fn spanned(&self, record: &Record, lag_s: f64) -> Option<Spanned> {
+    fn basis_signals(&self, record: &Record, lag_s: f64) -> Option<BasisSignals> {
         let (basis, signals) = self.signals(record, lag_s)?;
         let term = |i: usize| {
-            let mut gains = [0.0; STATES];
+            let mut gains = [0.0; STATE_COUNT];
             gains[i] = 1.0;
             basis.weights(&gains).to_vec()
         };
-        Some(Spanned {
-            columns: columns(&signals),
-            terms: (0..GAINS).map(term).collect(),
+        Some(BasisSignals {
+            columns: transpose(&signals),
+            terms: (0..GAIN_COUNT).map(term).collect(),
             lag_s,
         })
     }
@@ -102,11 +104,11 @@ impl Trace {
     /// basis; other methods forget, or model how people drift, and do not assume that a person is constant between
     /// changes.
     pub(super) fn response_change_finding(&self, record: &Record) -> Option<Finding> {
-        self.options().method.lag_of_basis_s()?;
+        self.options().method.basis_lag_s()?;
         let unlikely = |found: &ResponseChange| match found.course {
-            Course::Oscillation(_) => found.p_value / UNLIKELY_OSCILLATION,
-            Course::Step => found.p_value / UNLIKELY_STEP,
-            Course::Drift => found.p_value / UNLIKELY_DRIFT,
+            TimeCourse::Oscillation(_) => found.p_value / OSCILLATION_P_VALUE,
+            TimeCourse::Step => found.p_value / STEP_P_VALUE,
+            TimeCourse::Drift => found.p_value / DRIFT_P_VALUE,
         };
         let found = self
             .response_changes(record)
@@ -120,7 +122,7 @@ impl Trace {
         };
         let (name, p) = (found.name, found.p_value);
         let (kind, words) = match found.course {
-            Course::Step => (
+            TimeCourse::Step => (
                 "undeclared-change",
                 format!(
                     "the {name} of the person changes by {size} about {:.0} s after the start (p = {p:.0e}), where the \
@@ -128,11 +130,11 @@ impl Trace {
                     record.time_s(found.at) - record.time_s(0)
                 ),
             ),
-            Course::Drift => (
+            TimeCourse::Drift => (
                 "drifting",
                 format!("the {name} of the person drifts by {size} where the trace declares no change (p = {p:.0e})"),
             ),
-            Course::Oscillation(period) => (
+            TimeCourse::Oscillation(period) => (
                 "swaying",
                 format!(
                     "the {name} of the person oscillates by {size} with a period of about {period:.0} s (p = \
@@ -140,7 +142,7 @@ impl Trace {
                 ),
             ),
         };
-        Some(Finding::doubt(
+        Some(Finding::warning(
             kind,
             format!("{words}; the bands assume a person who does not change, and are too narrow here"),
         ))
@@ -156,7 +158,7 @@ impl Trace {
         let found = self
             .loop_response(record)
             .filter(|found| found.share < MIN_RESPONSE_SHARE)?;
-        Some(Finding::doubt(
+        Some(Finding::warning(
             "no-answer",
             format!(
                 "e does not respond to u as it would in a closed loop (the latest u explains {:.1} % of the \

@@ -16,17 +16,17 @@ const P_VALUE_LIMIT: f64 = 1e-3;
 /// p-value above which a corrected lag is considered to explain the residual.
 const LAG_P_VALUE: f64 = 0.02;
 /// Longest span that is examined, s, and the time excluded at its start, s, because the filters start at rest.
-const LONGEST_S: f64 = 120.0;
+const MAX_SPAN_S: f64 = 120.0;
 const SETTLING_S: f64 = 10.0;
 /// Lag of the basis for methods without one, s.
 const LAG_S: f64 = 3.0;
 
 impl Trace {
     /// Finding that the record contradicts the structure of the operator.
-    pub(super) fn missed_structure(&self, record: &Record) -> Option<Finding> {
+    pub(super) fn missed_structure_finding(&self, record: &Record) -> Option<Finding> {
         let found = self.residual_response(record)?;
         (found.p_value < P_VALUE_LIMIT).then(|| {
-            Finding::doubt(
+            Finding::warning(
                 "structure",
                 format!(
                     "structure missed: past errors explain more of u than the final operator can with any gains and \
@@ -41,18 +41,18 @@ impl Trace {
 
     /// Returns the result of the test; `None` for methods without a basis.
     pub(super) fn residual_response(&self, record: &Record) -> Option<ResidualResponse> {
-        self.options().method.lag_of_basis_s()?;
+        self.options().method.basis_lag_s()?;
         let ts = self.sample_time().s();
         let end = self.times_s().last()? + ts;
         let changed = self.changes().last().map(|(t, change)| t - change.seconds_ago);
         let from = self
-            .settled_s(record, SETTLING_S)
+            .settled_from_s(record, SETTLING_S)
             .max(changed.unwrap_or(f64::MIN))
-            .max(end - LONGEST_S);
+            .max(end - MAX_SPAN_S);
         let first = ((from - record.time_s(0)) / ts).round().max(0.0) as usize;
         let (basis, signals) = self.signals(record, self.lag_s())?;
-        let mut columns = columns(&signals);
-        columns.push(slower(&columns[0], basis.point().lag, ts));
+        let mut columns = transpose(&signals);
+        columns.push(apply_lag(&columns[0], basis.point().lag, ts));
         let of = |columns: &[Vec<f64>]| residual_response(columns, record.input(), record.output(), first, ts);
         let corrected = of(&columns)?;
         if corrected.p_value > LAG_P_VALUE {
@@ -64,7 +64,7 @@ impl Trace {
 
     /// Returns the time from which the filters of the basis have settled, s: a settling time after the start of the
     /// record or after the last faulty span that is neither an outlier nor a step.
-    pub(super) fn settled_s(&self, record: &Record, settling_s: f64) -> f64 {
+    pub(super) fn settled_from_s(&self, record: &Record, settling_s: f64) -> f64 {
         let outliers = [GuardKind::Outlier, GuardKind::Step];
         let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
         hostile.fold(record.time_s(0), |last, fault| last.max(fault.to_s)) + settling_s
@@ -72,7 +72,7 @@ impl Trace {
 
     /// Returns the lag of the basis of the method, s.
     pub(super) fn lag_s(&self) -> f64 {
-        self.options().method.lag_of_basis_s().unwrap_or(LAG_S)
+        self.options().method.basis_lag_s().unwrap_or(LAG_S)
     }
 
     /// Returns the basis of the operator of the last row with this lag, and the signals of the basis at each sample of
@@ -98,7 +98,7 @@ impl Trace {
 
 /// Passes a signal through the lag once more. The result serves to correct the lag, as the other columns correct poles
 /// and delay.
-fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
+fn apply_lag(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
     let pole = (-sample_time_s / lag_s).exp();
     let step = |state: &mut f64, z: &f64| {
         *state = pole * *state + (1.0 - pole) * z;
@@ -108,7 +108,7 @@ fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
 }
 
 /// Transposes rows to columns.
-pub(super) fn columns<const N: usize>(rows: &[[f64; N]]) -> Vec<Vec<f64>> {
+pub(super) fn transpose<const N: usize>(rows: &[[f64; N]]) -> Vec<Vec<f64>> {
     (0..N).map(|j| rows.iter().map(|row| row[j]).collect()).collect()
 }
 
@@ -124,7 +124,7 @@ mod tests {
     use super::*;
     use crate::{Method, TrackOptions, track};
 
-    fn run(replication: u64) -> Record {
+    fn simulated_record(replication: u64) -> Record {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let seed = RunSeed {
             seed: 4400,
@@ -144,7 +144,7 @@ mod tests {
         Record::new(record.sample_time(), channel("e", e.to_vec()), channel("u", u)).unwrap()
     }
 
-    fn found(record: &Record) -> ResidualResponse {
+    fn residual_response_of(record: &Record) -> ResidualResponse {
         let options = TrackOptions::default_for(Method::adaptive(), 29);
         track(record, &options, 50).unwrap().residual_response(record).unwrap()
     }
@@ -153,23 +153,27 @@ mod tests {
     fn missed_response_is_found_without_false_alarms() {
         // Of 30 people of the right form, 1.5 are expected to have a p-value below .05 by chance, with a standard
         // deviation of 1.2.
-        let clean: Vec<f64> = (0..30).map(|i| found(&run(i)).p_value).collect();
+        let clean: Vec<f64> = (0..30)
+            .map(|i| residual_response_of(&simulated_record(i)).p_value)
+            .collect();
         assert!(clean.iter().filter(|p| **p < 0.05).count() <= 6, "{clean:?}");
         assert!(clean.iter().all(|p| *p > P_VALUE_LIMIT), "{clean:?}");
         // An additional third of the gain .85 s after the error: far beyond the delay and its corrections.
-        let echoes: Vec<ResidualResponse> = (0..6).map(|i| found(&with_echo(&run(i), 0.33, 85))).collect();
+        let echoes: Vec<ResidualResponse> = (0..6)
+            .map(|i| residual_response_of(&with_echo(&simulated_record(i), 0.33, 85)))
+            .collect();
         let seen = echoes.iter().filter(|f| f.p_value < P_VALUE_LIMIT);
         assert!(seen.count() >= 5, "{echoes:?}");
     }
 
     #[test]
     fn short_records_and_other_methods_give_no_result() {
-        let record = run(0).span(0.0, 25.0).unwrap();
+        let record = simulated_record(0).span(0.0, 25.0).unwrap();
         let trace = track(&record, &TrackOptions::default_for(Method::adaptive(), 29), 50).unwrap();
         assert_eq!(trace.residual_response(&record), None);
         // A method without a basis is not tested.
-        let record = run(0);
+        let record = simulated_record(0);
         let trace = track(&record, &TrackOptions::default_for(Method::rls(), 29), 50).unwrap();
-        assert_eq!(trace.missed_structure(&record), None);
+        assert_eq!(trace.missed_structure_finding(&record), None);
     }
 }

@@ -9,23 +9,23 @@ use super::*;
 use crate::{Method, TrackOptions, Tracker, track};
 use hoid_model::uncertainty::OperatorEstimate;
 
-fn simulated(condition: Condition) -> Record {
+fn simulated_record(condition: Condition) -> Record {
     let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
     simulator.run(RunSeed::default(), false).unwrap()
 }
 
-fn kinds(verdict: &Verdict) -> Vec<&'static str> {
+fn finding_kinds(verdict: &Verdict) -> Vec<&'static str> {
     verdict.findings().iter().map(|f| f.kind).collect()
 }
 
-fn judged(record: &Record, options: &TrackOptions) -> Verdict {
+fn tracked_verdict(record: &Record, options: &TrackOptions) -> Verdict {
     track(record, options, 10).unwrap().verdict(record, None).unwrap()
 }
 
 /// The recursion of the thesis, without a guard, reported 11.3293 ± .0096 rad/s for a person who had left.
 #[test]
 fn update_at_rest_is_a_warning() {
-    let record = simulated(Condition::C1);
+    let record = simulated_record(Condition::C1);
     let stopped = |name: &str, values: &[f64]| {
         let values = (0..values.len()).map(|k| values[k.min(4100)]).collect();
         Channel::new(name, "", values)
@@ -36,24 +36,28 @@ fn update_at_rest_is_a_warning() {
         let options = TrackOptions::default_for(Method::rpem(), 29)
             .with(&[("guard", guard)])
             .unwrap();
-        let verdict = judged(record, &options);
-        assert_eq!(kinds(&verdict).contains(&"learnt-at-rest"), told, "{guard}: {verdict}");
+        let verdict = tracked_verdict(record, &options);
+        assert_eq!(
+            finding_kinds(&verdict).contains(&"learnt-at-rest"),
+            told,
+            "{guard}: {verdict}"
+        );
     }
 }
 
 #[test]
 fn prior_values_of_a_short_run_are_reported() {
-    let record = simulated(Condition::C1);
+    let record = simulated_record(Condition::C1);
     let options = TrackOptions::default_for(Method::adaptive(), 29);
-    let short = judged(&record.span(0.0, 3.0).unwrap(), &options);
-    assert!(kinds(&short).contains(&"supposed"), "{short}");
-    assert!(!kinds(&short).contains(&"not-convertible"), "{short}");
+    let short = tracked_verdict(&record.span(0.0, 3.0).unwrap(), &options);
+    assert!(finding_kinds(&short).contains(&"supposed"), "{short}");
+    assert!(!finding_kinds(&short).contains(&"not-convertible"), "{short}");
     let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
-    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::NotDetermined);
+    assert_eq!(tracker.verdict_level(&tracker.operator()), VerdictLevel::NotDetermined);
     for (e, u) in record.input().iter().zip(record.output()) {
         tracker.step(*e, *u);
     }
-    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
+    assert_eq!(tracker.verdict_level(&tracker.operator()), VerdictLevel::Trustworthy);
 }
 
 /// Returns a change in which no parameter differs.
@@ -77,7 +81,7 @@ fn change() -> crate::Change {
 /// An output of zero has no gain: there is no operator, which differs from a doubtful operator.
 #[test]
 fn zero_output_is_not_determined() {
-    let record = simulated(Condition::C1);
+    let record = simulated_record(Condition::C1);
     let input = Channel::new("e", "", record.input().to_vec());
     let silent = Channel::new("u", "", vec![0.0; record.len()]);
     let other = Record::new(record.sample_time(), input, silent).unwrap();
@@ -87,7 +91,7 @@ fn zero_output_is_not_determined() {
 }
 
 /// Returns a trace with an operator in each row, as from a recursion in physical parameters.
-fn tracked_in_physical_parameters(record: &Record, every: usize) -> Trace {
+fn physical_trace(record: &Record, every: usize) -> Trace {
     let options = TrackOptions::default_for(Method::rpem(), 29)
         .with(&[("memory", "20s")])
         .unwrap();
@@ -97,38 +101,38 @@ fn tracked_in_physical_parameters(record: &Record, every: usize) -> Trace {
 }
 
 /// Returns the kinds of the findings about a trace of C1 with changed rows.
-fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
-    let record = simulated(Condition::C1);
-    let mut trace = tracked_in_physical_parameters(&record, 100);
+fn finding_kinds_after(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
+    let record = simulated_record(Condition::C1);
+    let mut trace = physical_trace(&record, 100);
     change(&mut trace);
-    kinds(&trace.verdict(&record, None).unwrap())
+    finding_kinds(&trace.verdict(&record, None).unwrap())
 }
 
 #[test]
 fn each_defect_of_a_trace_has_its_finding() {
-    assert!(changed(|_| ()).is_empty());
-    let counted = changed(|trace| (trace.counts.shortened, trace.counts.skipped) = (1000, 1000));
+    assert!(finding_kinds_after(|_| ()).is_empty());
+    let counted = finding_kinds_after(|trace| (trace.counts.shortened, trace.counts.skipped) = (1000, 1000));
     assert_eq!(counted, ["faults", "steps-shortened"]);
     let open = |e: &mut Estimate| e.standard_error = Some(e.value.abs());
-    let one = changed(|trace| trace.operator.iter_mut().for_each(|o| open(&mut o.k_e)));
+    let one = finding_kinds_after(|trace| trace.operator.iter_mut().for_each(|o| open(&mut o.k_e)));
     assert_eq!(one, ["undetermined-parameter"]);
-    let both = changed(|trace| {
+    let both = finding_kinds_after(|trace| {
         for o in &mut trace.operator {
             open(&mut o.k_e);
             open(&mut o.k_e_dot);
         }
     });
     assert_eq!(both, ["gain"]);
-    let lag = changed(|trace| trace.operator.iter_mut().for_each(|o| o.zeta_nm.value = 4.0));
+    let lag = finding_kinds_after(|trace| trace.operator.iter_mut().for_each(|o| o.zeta_nm.value = 4.0));
     assert_eq!(lag, ["neuromuscular-lag"]);
-    let none = changed(|trace| trace.operator.iter_mut().for_each(|o| o.t_l_s.value = f64::NAN));
+    let none = finding_kinds_after(|trace| trace.operator.iter_mut().for_each(|o| o.t_l_s.value = f64::NAN));
     assert_eq!(none, ["not-convertible"]);
-    let grown = changed(|trace| {
+    let grown = finding_kinds_after(|trace| {
         let last = trace.covariance.len() - 1;
         trace.covariance[last] *= 1e4;
     });
     assert_eq!(grown, ["covariance-blown-up"]);
-    let at_the_end = changed(|trace| {
+    let at_the_end = finding_kinds_after(|trace| {
         let last = trace.operator.last_mut().unwrap();
         open(&mut last.k_e);
         open(&mut last.k_e_dot);
@@ -136,16 +140,16 @@ fn each_defect_of_a_trace_has_its_finding() {
     assert_eq!(at_the_end, ["last-row"]);
     // The record has 81.92 s: three changes are many, two are not.
     for (count, expected) in [(2, vec![]), (3, vec!["many-changes"])] {
-        let often = changed(|trace| trace.changes = vec![(40.0, change()); count]);
+        let often = finding_kinds_after(|trace| trace.changes = vec![(40.0, change()); count]);
         assert_eq!(often, expected);
     }
-    let broken = changed(|trace| *trace.theta.last_mut().unwrap() = f64::NAN);
+    let broken = finding_kinds_after(|trace| *trace.theta.last_mut().unwrap() = f64::NAN);
     assert_eq!(broken, ["not-finite"]);
 }
 
 #[test]
 fn unconvertible_orders_are_judged_by_their_coefficients() {
-    let record = simulated(Condition::C1);
+    let record = simulated_record(Condition::C1);
     let orders = Orders {
         na: 3,
         nb: 3,
@@ -154,9 +158,9 @@ fn unconvertible_orders_are_judged_by_their_coefficients() {
     };
     let options = TrackOptions::new(Method::rls(), Structure::Arx, orders);
     let tracker = Tracker::new(&options, Some(&record), record.sample_time()).unwrap();
-    assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
-    let verdict = judged(&record, &options);
-    assert!(!kinds(&verdict).contains(&"not-convertible"), "{verdict}");
+    assert_eq!(tracker.verdict_level(&tracker.operator()), VerdictLevel::Trustworthy);
+    let verdict = tracked_verdict(&record, &options);
+    assert!(!finding_kinds(&verdict).contains(&"not-convertible"), "{verdict}");
 }
 
 fn with_signals(record: &Record, e: Vec<f64>, u: Vec<f64>) -> Record {
@@ -164,35 +168,38 @@ fn with_signals(record: &Record, e: Vec<f64>, u: Vec<f64>) -> Record {
     Record::new(record.sample_time(), e, u).unwrap()
 }
 
-fn typical() -> TrackOptions {
+fn typical_options() -> TrackOptions {
     TrackOptions::default_for(Method::adaptive(), 29)
 }
 
 #[test]
 fn wrong_sign_is_reported_with_and_without_element() {
     let scenario = Scenario::condition(Condition::C1);
-    let record = simulated(Condition::C1);
+    let record = simulated_record(Condition::C1);
     let turned = record.input().iter().map(|e| -e).collect();
     let turned = with_signals(&record, turned, record.output().to_vec());
     let element = scenario.initial.controlled_element.transfer_function().unwrap();
     let with_element = TrackOptions {
         controlled_element: Some(element),
-        ..typical()
+        ..typical_options()
     };
     for (options, kinds_expected) in [
-        (typical(), ["sign"; 2]),
+        (typical_options(), ["sign"; 2]),
         (with_element, ["unstable-loop", "no-crossover"]),
     ] {
-        let clean = judged(&record, &options);
+        let clean = tracked_verdict(&record, &options);
         assert_eq!(clean.level, VerdictLevel::Trustworthy, "{clean}");
-        let told = judged(&turned, &options);
-        assert!(kinds(&told).iter().any(|kind| kinds_expected.contains(kind)), "{told}");
+        let told = tracked_verdict(&turned, &options);
+        assert!(
+            finding_kinds(&told).iter().any(|kind| kinds_expected.contains(kind)),
+            "{told}"
+        );
     }
 }
 
 #[test]
 fn output_of_another_run_is_reported() {
-    let record = simulated(Condition::C1);
+    let record = simulated_record(Condition::C1);
     let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
     let seed = RunSeed {
         replication: 1,
@@ -200,42 +207,42 @@ fn output_of_another_run_is_reported() {
     };
     let other = simulator.run(seed, false).unwrap();
     let exchanged = with_signals(&record, record.input().to_vec(), other.output().to_vec());
-    let told = judged(&exchanged, &typical());
-    assert!(kinds(&told).contains(&"no-answer"), "{told}");
-    assert!(!kinds(&judged(&record, &typical())).contains(&"no-answer"));
+    let told = tracked_verdict(&exchanged, &typical_options());
+    assert!(finding_kinds(&told).contains(&"no-answer"), "{told}");
+    assert!(!finding_kinds(&tracked_verdict(&record, &typical_options())).contains(&"no-answer"));
 }
 
 /// u is scaled after the simulation, so the loop does not respond to the change of the gain.
 #[test]
 fn drifting_and_oscillating_gains_are_reported() {
-    let record = simulated(Condition::C1);
+    let record = simulated_record(Condition::C1);
     let scaled = |gain: &dyn Fn(f64) -> f64| {
         let u = (0..record.len())
             .map(|k| gain(record.time_s(k)) * record.output()[k])
             .collect();
-        judged(&with_signals(&record, record.input().to_vec(), u), &typical())
+        tracked_verdict(&with_signals(&record, record.input().to_vec(), u), &typical_options())
     };
     let drifts = scaled(&|t| 1.0 - 0.5 * t / 82.0);
-    assert!(kinds(&drifts).contains(&"drifting"), "{drifts}");
+    assert!(finding_kinds(&drifts).contains(&"drifting"), "{drifts}");
     let sways = scaled(&|t| 1.0 + 0.4 * (t * 2.0 * std::f64::consts::PI / 20.0).sin());
-    assert!(kinds(&sways).contains(&"swaying"), "{sways}");
+    assert!(finding_kinds(&sways).contains(&"swaying"), "{sways}");
 }
 
 #[test]
 fn pure_gain_is_trustworthy_and_remedies_are_valid_options() {
-    let record = simulated(Condition::C1);
+    let record = simulated_record(Condition::C1);
     let lead_is_open = |mut trace: Trace| {
         for o in &mut trace.operator {
             o.k_e_dot.standard_error = Some(o.k_e_dot.value.abs());
         }
         trace.verdict(&record, None).unwrap()
     };
-    let verdict = lead_is_open(tracked_in_physical_parameters(&record, 10));
+    let verdict = lead_is_open(physical_trace(&record, 10));
     let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
     assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
     // For a method without a memory length, a longer one is not recommended.
     assert!(
-        !lead_is_open(track(&record, &typical(), 10).unwrap())
+        !lead_is_open(track(&record, &typical_options(), 10).unwrap())
             .to_string()
             .contains("memory")
     );
@@ -247,14 +254,14 @@ fn pure_gain_is_trustworthy_and_remedies_are_valid_options() {
         zeta_nm: Estimate::with_variance(0.3, 0.001),
         tau_e_s: Estimate::with_variance(0.2, 0.001),
     };
-    let record = simulated(Condition::C1);
-    let mut tracker = Tracker::new(&typical(), None, record.sample_time()).unwrap();
+    let record = simulated_record(Condition::C1);
+    let mut tracker = Tracker::new(&typical_options(), None, record.sample_time()).unwrap();
     for (e, u) in record.input().iter().zip(record.output()) {
         tracker.step(*e, *u);
     }
     for k_e_dot in [0.0, 1.0] {
         assert_eq!(
-            tracker.level(&Ok(operator(k_e_dot))),
+            tracker.verdict_level(&Ok(operator(k_e_dot))),
             VerdictLevel::Trustworthy,
             "{k_e_dot}"
         );

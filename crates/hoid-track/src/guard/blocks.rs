@@ -2,7 +2,7 @@
 
 use hoid_core::guard::{
     channel::ChannelGuard,
-    profile::{Block, CHANNELS, CONSTANT_FRACTION, Fault},
+    profile::{Block, CHANNEL_COUNT, CONSTANT_FRACTION, Fault},
 };
 
 use super::{Guard, MAX_LEVEL_RATIO, MIN_OUTLIER_SIZE, MIN_SNAPSHOT_AGE, SNAPSHOT_INTERVAL, event::GuardKind};
@@ -26,7 +26,7 @@ impl Guard {
             if self.pause.kind > 0 {
                 reference.start();
             } else if self.profile.is_unusual(&block) {
-                reference.suspect();
+                reference.mark_unusual();
             } else if fault.is_none() && reference.end_block(&block, self.block_length) {
                 self.start.restore(recursion);
                 self.sound_at = [0; 2];
@@ -40,7 +40,7 @@ impl Guard {
         }
         match fault {
             Some(fault) => {
-                let (kind, channel) = named(fault);
+                let (kind, channel) = kind_and_channel(fault);
                 let blocks = self.profile.duration_blocks(fault);
                 let seen = u64::from(blocks) * u64::from(self.block_length);
                 self.restore_older_state(recursion, seen);
@@ -85,7 +85,7 @@ impl Guard {
             self.restart_and_forget(recursion);
             self.profile = former;
             self.set_limits();
-        } else if fault.is_some_and(Fault::may_be_the_new_level) {
+        } else if fault.is_some_and(Fault::may_be_new_level) {
             self.pause.suspect_samples += u64::from(self.block_length);
         }
     }
@@ -107,18 +107,18 @@ impl Guard {
         if !self.profile.is_known() {
             return;
         }
-        let typical = *self.profile.typical();
+        let typical = *self.profile.typical_values();
         self.centre = typical.mean;
-        for c in 0..CHANNELS {
+        for c in 0..CHANNEL_COUNT {
             let size = typical.magnitude[c];
             self.largest[c] = if size > 0.0 {
                 MAX_LEVEL_RATIO * size
             } else {
                 f64::INFINITY
             };
-            self.channels[c].set_floor(MIN_OUTLIER_SIZE[c] * size);
+            self.channels[c].set_limit_floor(MIN_OUTLIER_SIZE[c] * size);
             let still = CONSTANT_FRACTION * typical.differences[c][0];
-            self.channels[c].set_resting(still);
+            self.channels[c].set_constant_tolerance(still);
             if !self.channels[c].is_known() {
                 self.channels[c].start_estimation(typical.differences[c]);
                 self.channels[c].start_detection();
@@ -130,7 +130,7 @@ impl Guard {
 }
 
 /// Returns the kind and the channel of a fault.
-fn named(fault: Fault) -> (GuardKind, usize) {
+fn kind_and_channel(fault: Fault) -> (GuardKind, usize) {
     match fault {
         Fault::FrozenInput => (GuardKind::Frozen, 0),
         Fault::FrozenOutput => (GuardKind::Frozen, 1),

@@ -1,12 +1,12 @@
 //! Schedule of the comparison between the estimate and the start model. To keep the cost low, only the first
-//! [`COMPARED_BLOCKS`] of every [`ROUND_BLOCKS`] blocks are compared; after an unusual block, all of the next
-//! [`SUSPECT_BLOCKS`] blocks are compared. In a round, the first [`SETTLING_BLOCKS`] blocks do not count, because the
+//! [`COMPARED_BLOCKS`] of every [`BLOCKS_PER_ROUND`] blocks are compared; after an unusual block, all of the next
+//! [`BLOCKS_AFTER_UNUSUAL`] blocks are compared. In a round, the first [`SETTLING_BLOCKS`] blocks do not count, because the
 //! filters of the start model start at rest.
 
 use hoid_core::{
     delay::DelayLine,
     guard::{
-        profile::{Block, CHANNELS},
+        profile::{Block, CHANNEL_COUNT},
         reference::ReferenceModel,
     },
     state::{State, visit_all},
@@ -14,15 +14,15 @@ use hoid_core::{
 
 /// Number of blocks in a round, number of blocks at its start that are compared, and number of the first of these, in
 /// which the filters settle.
-const ROUND_BLOCKS: u32 = 44;
+const BLOCKS_PER_ROUND: u32 = 44;
 const COMPARED_BLOCKS: u32 = 11;
 const SETTLING_BLOCKS: u32 = 3;
 /// Number of blocks that are compared after an unusual block.
-const SUSPECT_BLOCKS: u32 = 30;
+const BLOCKS_AFTER_UNUSUAL: u32 = 30;
 
 /// The start model with its delay line, and its place in the round.
 #[derive(Debug, Clone)]
-pub(super) struct Reference {
+pub(super) struct ReferenceComparison {
     model: ReferenceModel,
     delay: DelayLine<Vec<f64>>,
     /// Number of blocks of the round so far, and number of blocks that are compared in the round.
@@ -30,7 +30,7 @@ pub(super) struct Reference {
     compared: u32,
 }
 
-impl State for Reference {
+impl State for ReferenceComparison {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         visit_all(
             &mut [&mut self.model, &mut self.delay, &mut self.over, &mut self.compared],
@@ -39,7 +39,7 @@ impl State for Reference {
     }
 }
 
-impl Reference {
+impl ReferenceComparison {
     pub fn new(model: ReferenceModel, nk: usize) -> Self {
         Self {
             model,
@@ -52,22 +52,22 @@ impl Reference {
     /// Starts a round in which many blocks are compared, with all filters at rest.
     pub fn start(&mut self) {
         self.model.reset();
-        (self.over, self.compared) = (0, SUSPECT_BLOCKS);
+        (self.over, self.compared) = (0, BLOCKS_AFTER_UNUSUAL);
     }
 
     /// Marks the current block as unusual: it does not count, and the next blocks are compared.
-    pub fn suspect(&mut self) {
+    pub fn mark_unusual(&mut self) {
         if self.over >= self.compared {
             self.start();
         } else {
             self.model.skip_block();
-            self.compared = self.over.saturating_add(SUSPECT_BLOCKS);
+            self.compared = self.over.saturating_add(BLOCKS_AFTER_UNUSUAL);
         }
     }
 
     /// Takes a sample.
     #[inline]
-    pub fn take(&mut self, [e, u]: [f64; CHANNELS]) {
+    pub fn update(&mut self, [e, u]: [f64; CHANNEL_COUNT]) {
         let x = self.delay.step(e);
         if self.over < self.compared {
             self.model.step(x, u);
@@ -85,7 +85,7 @@ impl Reference {
             self.model.skip_block();
             false
         };
-        if self.over >= ROUND_BLOCKS.max(self.compared) {
+        if self.over >= BLOCKS_PER_ROUND.max(self.compared) {
             self.model.reset();
             (self.over, self.compared) = (0, COMPARED_BLOCKS);
         }

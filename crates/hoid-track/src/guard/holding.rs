@@ -1,9 +1,9 @@
 //! Held-back samples and their later treatment: interpolation, or use as recorded.
 
-use hoid_core::guard::profile::CHANNELS;
+use hoid_core::guard::profile::CHANNEL_COUNT;
 
 use super::{
-    Guard, Guarded, MAX_PULSE_SIZE, Raw,
+    Guard, GuardDecision, MAX_PULSE_SIZE, RawSample,
     event::{GuardAction, GuardKind},
 };
 use crate::recursion::{Recursion, Sample};
@@ -11,13 +11,13 @@ use crate::recursion::{Recursion, Sample};
 impl Guard {
     /// Handles a sample that is held back, or the sample with which the signals return.
     #[cold]
-    pub(super) fn hold(
+    pub(super) fn hold_back(
         &mut self,
         recursion: &mut dyn Recursion,
         sample: Sample,
         moves: bool,
         outliers: [bool; 2],
-    ) -> Guarded {
+    ) -> GuardDecision {
         if self.in_ring == 0 {
             self.before.take(recursion);
             self.channels_before = self.channels;
@@ -26,15 +26,15 @@ impl Guard {
         let place = self.in_ring;
         self.in_ring += 1;
         let mut clean = x;
-        let mut holds = [false; CHANNELS];
-        for c in 0..CHANNELS {
+        let mut holds = [false; CHANNEL_COUNT];
+        for c in 0..CHANNEL_COUNT {
             let channel = &mut self.channels[c];
-            let held = channel.held();
+            let held = channel.held_count();
             if held == 0 && !outliers[c] {
                 let errors = channel.errors(x[c]);
                 channel.accept(x[c], &errors);
-            } else if held > 0 && channel.is_back(x[c]) {
-                let (size, largest_move) = (channel.largest_error(), channel.largest_move());
+            } else if held > 0 && channel.has_returned(x[c]) {
+                let (size, largest_move) = (channel.largest_held_error(), channel.jump_threshold());
                 channel.resume(x[c]);
                 if c == 1 && self.is_pulse(place, held, size, x[c], largest_move) {
                     let first = place.saturating_sub(held as usize);
@@ -43,23 +43,23 @@ impl Guard {
                 }
                 self.report(GuardKind::Outlier, c, u64::from(held), size, GuardAction::Held, 1);
             } else {
-                clean[c] = channel.hold(x[c]);
+                clean[c] = channel.hold_back(x[c]);
                 holds[c] = true;
             }
         }
-        self.ring[place] = Raw {
+        self.ring[place] = RawSample {
             values: x,
             held: holds,
             moves,
         };
         if let Some(reference) = &mut self.reference {
-            reference.take(clean);
+            reference.update(clean);
         }
-        let lasting = (0..CHANNELS).find(|c| self.channels[*c].held() > self.longest);
+        let lasting = (0..CHANNEL_COUNT).find(|c| self.channels[*c].held_count() > self.longest);
         if let Some(c) = lasting.or((self.in_ring == self.ring.len()).then_some(0)) {
-            return self.lasting(recursion, c, sample);
+            return self.handle_lasting(recursion, c, sample);
         }
-        if holds == [false; CHANNELS] {
+        if holds == [false; CHANNEL_COUNT] {
             return self.reprocess(recursion, sample);
         }
         let sample = Sample {
@@ -70,9 +70,9 @@ impl Guard {
         if holds[1] {
             recursion.bridge(sample);
         } else {
-            recursion.follow(sample);
+            recursion.step_without_update(sample);
         }
-        Guarded {
+        GuardDecision {
             outcome: None,
             held: true,
         }
@@ -85,7 +85,7 @@ impl Guard {
             return false;
         };
         held >= self.shortest_pulse
-            && size <= MAX_PULSE_SIZE * self.profile.typical().magnitude[1]
+            && size <= MAX_PULSE_SIZE * self.profile.typical_values().magnitude[1]
             && (x - last).abs() <= largest_move
             && (x - last).abs() <= 0.5 * size
     }
@@ -93,8 +93,8 @@ impl Guard {
     /// Handles the return of both signals. The recursion takes the samples again from the start of the excursion.
     /// Held-back samples are replaced by values on a parabola through the last good sample, with its slope, and the
     /// next good sample.
-    fn reprocess(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
-        for c in 0..CHANNELS {
+    fn reprocess(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> GuardDecision {
+        for c in 0..CHANNEL_COUNT {
             let mut last = self.channels_before[c].last();
             let mut slope = self.channels_before[c].slope();
             let mut k = 0;
@@ -137,33 +137,36 @@ impl Guard {
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {
-                recursion.follow(taken)
+                recursion.step_without_update(taken)
             });
         }
         self.in_ring = 0;
-        Guarded { outcome, held: false }
+        GuardDecision { outcome, held: false }
     }
 
     /// Handles a signal that has been held back for too long to be an outlier.
-    fn lasting(&mut self, recursion: &mut dyn Recursion, c: usize, sample: Sample) -> Guarded {
+    fn handle_lasting(&mut self, recursion: &mut dyn Recursion, c: usize, sample: Sample) -> GuardDecision {
         let x = [sample.e, sample.u];
-        let (held, size) = (u64::from(self.channels[c].held()), self.channels[c].largest_error());
+        let (held, size) = (
+            u64::from(self.channels[c].held_count()),
+            self.channels[c].largest_held_error(),
+        );
         if !x[c].is_finite() {
             self.start_pause(GuardKind::Missing, c, held, 0.0);
-            return self.paused(recursion, sample);
+            return self.process_paused(recursion, sample);
         }
         if self.is_too_large(c, x[c]) {
             self.start_pause(GuardKind::Level, c, held, x[c].abs());
-            return self.paused(recursion, sample);
+            return self.process_paused(recursion, sample);
         }
         self.before.restore(recursion);
         self.channels = self.channels_before;
         let mut last = self.channels_before.map(|channel| channel.last());
         let mut outcome = None;
         for k in 0..self.in_ring {
-            let Raw { values, moves, .. } = self.ring[k];
-            let mut sound = [true; CHANNELS];
-            for i in 0..CHANNELS {
+            let RawSample { values, moves, .. } = self.ring[k];
+            let mut sound = [true; CHANNEL_COUNT];
+            for i in 0..CHANNEL_COUNT {
                 sound[i] = values[i].is_finite() && !self.is_too_large(i, values[i]);
                 if sound[i] {
                     last[i] = values[i];
@@ -180,7 +183,7 @@ impl Guard {
             match sound {
                 [true, true] if moves => outcome = Some(recursion.step(taken)),
                 [_, true] => {
-                    recursion.follow(taken);
+                    recursion.step_without_update(taken);
                 }
                 [_, false] => recursion.bridge(taken),
             }
@@ -197,6 +200,6 @@ impl Guard {
         if !is_target {
             self.report(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);
         }
-        Guarded { outcome, held: false }
+        GuardDecision { outcome, held: false }
     }
 }

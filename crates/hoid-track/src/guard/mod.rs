@@ -3,7 +3,7 @@
 //!
 //! | observation | input of the recursion | estimate | afterwards |
 //! |---|---|---|---|
-//! | outlier of up to [`LONGEST_S`] | predictions: of e by the guard, of u by the recursion | constant | the recursion is restored to its state before the outlier and takes the samples again; those that were held back are interpolated |
+//! | outlier of up to [`MAX_HELD_BACK_S`] | predictions: of e by the guard, of u by the recursion | constant | the recursion is restored to its state before the outlier and takes the samples again; those that were held back are interpolated |
 //! | lasting jump, or pulse of the hand | the same predictions | constant | the recursion is restored to its state before the jump and takes the samples as recorded: the result is the same as without a guard |
 //! | samples that are not numbers, for longer than an outlier | the same predictions | constant | the estimate is updated again once the filters have settled |
 //! | 30 times the typical magnitude | the long-run mean of e, the prediction of u | constant | the estimate is updated again once the filters have settled |
@@ -14,20 +14,20 @@
 //! continue smoothly, since the person responds only after the delay. A lasting jump of e, after which e moves as
 //! before while u continues as predicted, is therefore tracking and is not reported. A disturbed sensor recovers as
 //! fast as it failed: an excursion that ends with a jump is an outlier. A fast hand leaves a dead zone at once but
-//! returns over several samples: an excursion of u of [`PULSE_S`] or more within [`MAX_PULSE_SIZE`] times its mean
+//! returns over several samples: an excursion of u of [`MIN_PULSE_S`] or more within [`MAX_PULSE_SIZE`] times its mean
 //! magnitude, whose last step is within the normal moves of u, is a pulse and is used as recorded.
 //!
 //! **Restoring.** The state of a recursion consists of few numbers ([`hoid_core::state`]). It is stored at the start,
 //! when a sample is first held back, and every [`SNAPSHOT_INTERVAL`] blocks without a fault. Of the snapshots after
 //! such blocks, the last two are kept, and the newest one that is older than the time in which the rules detect a fault
-//! is restored. The ring of samples that may have to be taken again is twice [`LONGEST_S`] long, because both signals
+//! is restored. The ring of samples that may have to be taken again is twice [`MAX_HELD_BACK_S`] long, because both signals
 //! may be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached
 //! their size.
 //!
-//! **Filters have settled** when the delay and [`SETTLE_S`] have passed: after that time the slowest poles of people's
+//! **Filters have settled** when the delay and [`SETTLING_S`] have passed: after that time the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 %.
 //!
-//! A misfit, exchanged channels or a larger level that last for [`ACCEPTED_AFTER_S`] are accepted as normal: the
+//! A misfit, exchanged channels or a larger level that last for [`ACCEPTANCE_TIME_S`] are accepted as normal: the
 //! recursion restarts from its start, and the typical levels are estimated again. If the signals then return to their
 //! former levels, the former typical levels are used again. Silence has no time limit.
 //!
@@ -55,9 +55,9 @@ mod snapshot;
 use hoid_core::{
     guard::{
         channel::ChannelGuard,
-        profile::{Block, CHANNELS, Profile},
+        profile::{Block, CHANNEL_COUNT, Profile},
         reference::ReferenceModel,
-        resting::Resting,
+        resting::RestDetector,
     },
     state::{State, visit_all},
 };
@@ -65,15 +65,15 @@ use hoid_model::{Record, SampleTime};
 
 use crate::recursion::{Recursion, Sample, StepOutcome};
 
-use compared::Reference;
+use compared::ReferenceComparison;
 pub use event::{GuardAction, GuardChannel, GuardEvent, GuardKind, TrackFault};
 pub use options::{GuardChoice, GuardOptions};
 pub(crate) use snapshot::Snapshot;
 
 /// Longest run of held-back samples, s.
-const LONGEST_S: f64 = 0.1;
+const MAX_HELD_BACK_S: f64 = 0.1;
 /// Time beyond the delay in which the filters settle, s.
-pub(crate) const SETTLE_S: f64 = 2.0;
+pub(crate) const SETTLING_S: f64 = 2.0;
 /// Length of a block, s.
 const BLOCK_S: f64 = 1.0;
 /// Number of blocks without a fault between two snapshots, and smallest age, in blocks, of a snapshot that is restored.
@@ -83,16 +83,16 @@ const MIN_SNAPSHOT_AGE: u64 = 4;
 const MAX_LEVEL_RATIO: f64 = 30.0;
 /// Smallest size of an outlier as a multiple of the mean magnitude: e passes a low-pass filter before it reaches an
 /// innovation, while u enters the innovation directly.
-const MIN_OUTLIER_SIZE: [f64; CHANNELS] = [0.3, 1e-3];
+const MIN_OUTLIER_SIZE: [f64; CHANNEL_COUNT] = [0.3, 1e-3];
 /// Shortest pulse of the hand, s, and its largest size as a multiple of the mean magnitude.
-const PULSE_S: f64 = 0.03;
+const MIN_PULSE_S: f64 = 0.03;
 const MAX_PULSE_SIZE: f64 = 6.0;
 /// Time after which a misfit or swapped channels are accepted as normal, s.
-const ACCEPTED_AFTER_S: f64 = 120.0;
+const ACCEPTANCE_TIME_S: f64 = 120.0;
 
 /// Decision of the guard on a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Guarded {
+pub(crate) struct GuardDecision {
     /// Outcome of the recursion; `None` if the recursion did not take the sample as recorded.
     pub outcome: Option<StepOutcome>,
     /// True if the sample was held back or the estimate is paused.
@@ -101,13 +101,13 @@ pub(crate) struct Guarded {
 
 /// A sample as recorded; a missing or unreadable value is NaN.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Raw {
-    values: [f64; CHANNELS],
-    held: [bool; CHANNELS],
+struct RawSample {
+    values: [f64; CHANNEL_COUNT],
+    held: [bool; CHANNEL_COUNT],
     moves: bool,
 }
 
-hoid_core::state!([] Raw { values, held, moves });
+hoid_core::state!([] RawSample { values, held, moves });
 
 /// A pause, in which the estimate is kept constant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -142,26 +142,26 @@ pub(crate) struct Guard {
     settle: u64,
     sample_time: SampleTime,
     samples: u64,
-    channels: [ChannelGuard; CHANNELS],
+    channels: [ChannelGuard; CHANNEL_COUNT],
     profile: Profile,
-    resting: Resting,
+    resting: RestDetector,
     /// Typical values before they were last learnt again.
     former: Profile,
     block: Block,
     in_block: u32,
     sound_blocks: u32,
-    centre: [f64; CHANNELS],
-    largest: [f64; CHANNELS],
+    centre: [f64; CHANNEL_COUNT],
+    largest: [f64; CHANNEL_COUNT],
     /// States of the recursion and of the channels before the held-back samples, and these samples.
     before: Snapshot,
-    channels_before: [ChannelGuard; CHANNELS],
-    ring: Vec<Raw>,
+    channels_before: [ChannelGuard; CHANNEL_COUNT],
+    ring: Vec<RawSample>,
     in_ring: usize,
     sound: [Snapshot; 2],
     /// Sample number at which each snapshot was taken; 0 if there is no snapshot.
     sound_at: [u64; 2],
     start: Snapshot,
-    reference: Option<Reference>,
+    reference: Option<ReferenceComparison>,
     pause: Pause,
     restarts: u64,
     /// Sample number of the last restart.
@@ -216,30 +216,30 @@ impl Guard {
     /// numbers are held back.
     pub fn new(recursion: &mut dyn Recursion, nk: usize, span: Option<&Record>, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
-        let longest = (LONGEST_S / ts).round().max(1.0) as u32;
+        let longest = (MAX_HELD_BACK_S / ts).round().max(1.0) as u32;
         let channel = ChannelGuard::new(ts);
         let mut start = Snapshot::default();
         start.take(recursion);
         let mut guard = Self {
             block_length: (BLOCK_S / ts).round().max(4.0) as u32,
             longest,
-            shortest_pulse: (PULSE_S / ts).round().max(2.0) as u32,
-            settle: nk as u64 + (SETTLE_S / ts).round() as u64,
+            shortest_pulse: (MIN_PULSE_S / ts).round().max(2.0) as u32,
+            settle: nk as u64 + (SETTLING_S / ts).round() as u64,
             sample_time,
             samples: 0,
-            channels: [channel; CHANNELS],
+            channels: [channel; CHANNEL_COUNT],
             profile: Profile::new(),
-            resting: Resting::new(ts),
+            resting: RestDetector::new(ts),
             former: Profile::new(),
             block: Block::default(),
             in_block: 0,
             sound_blocks: 0,
-            centre: [0.0; CHANNELS],
-            largest: [f64::INFINITY; CHANNELS],
+            centre: [0.0; CHANNEL_COUNT],
+            largest: [f64::INFINITY; CHANNEL_COUNT],
             before: Snapshot::default(),
-            channels_before: [channel; CHANNELS],
+            channels_before: [channel; CHANNEL_COUNT],
             // Both signals may be held back, one after the other.
-            ring: vec![Raw::default(); 2 * longest as usize + 2],
+            ring: vec![RawSample::default(); 2 * longest as usize + 2],
             in_ring: 0,
             sound: [Snapshot::default(), Snapshot::default()],
             sound_at: [0; 2],
@@ -258,18 +258,18 @@ impl Guard {
 
     /// Takes a sample, in which NaN marks a missing value, and decides whether it reaches the recursion.
     #[inline]
-    pub fn take(&mut self, recursion: &mut dyn Recursion, sample: Sample, moves: bool) -> Guarded {
+    pub fn process(&mut self, recursion: &mut dyn Recursion, sample: Sample, moves: bool) -> GuardDecision {
         self.samples += 1;
         self.event = None;
         let x = [sample.e, sample.u];
-        self.resting.take(x[1]);
+        self.resting.update(x[1]);
         let errors = [self.channels[0].errors(x[0]), self.channels[1].errors(x[1])];
         let outliers = [
             self.channels[0].is_outlier(&errors[0]),
             self.channels[1].is_outlier(&errors[1]),
         ];
         let guarded = if self.pause.kind > 0 {
-            self.paused(recursion, sample)
+            self.process_paused(recursion, sample)
         } else if self.in_ring == 0 && !outliers[0] && !outliers[1] {
             self.channels[0].accept(x[0], &errors[0]);
             self.channels[1].accept(x[1], &errors[1]);
@@ -277,18 +277,18 @@ impl Guard {
             let outcome = if moves {
                 recursion.step(sample)
             } else {
-                recursion.follow(sample)
+                recursion.step_without_update(sample)
             };
             self.block.add_innovation(outcome.innovation);
             if let Some(reference) = &mut self.reference {
-                reference.take(x);
+                reference.update(x);
             }
-            Guarded {
+            GuardDecision {
                 outcome: Some(outcome),
                 held: false,
             }
         } else {
-            self.hold(recursion, sample, moves, outliers)
+            self.hold_back(recursion, sample, moves, outliers)
         };
         self.in_block += 1;
         if self.in_block >= self.block_length {
@@ -299,7 +299,7 @@ impl Guard {
 
     /// Compares the estimate with a start model, with the delay nk, from now on.
     pub fn compare_with(&mut self, model: ReferenceModel, nk: usize) {
-        self.reference = Some(Reference::new(model, nk));
+        self.reference = Some(ReferenceComparison::new(model, nk));
     }
 
     fn report(&mut self, kind: GuardKind, channel: usize, samples: u64, size: f64, action: GuardAction, after: u64) {
@@ -324,12 +324,12 @@ impl Guard {
     }
 
     /// Returns the number of restarts by the guard so far.
-    pub fn restarts(&self) -> u64 {
+    pub fn restart_count(&self) -> u64 {
         self.restarts
     }
 
     /// Returns the time since the last restart in s; `None` without a restart.
-    pub fn since_restart_s(&self) -> Option<f64> {
+    pub fn time_since_restart_s(&self) -> Option<f64> {
         (self.restarts > 0).then(|| (self.samples - self.restarted_at) as f64 * self.sample_time.s())
     }
 }

@@ -1,9 +1,9 @@
 //! Pauses: the estimate is kept constant, and the samples enter only the filters, if possible.
 
-use hoid_core::guard::profile::{Block, CHANNELS};
+use hoid_core::guard::profile::{Block, CHANNEL_COUNT};
 
 use super::{
-    ACCEPTED_AFTER_S, Guard, Guarded, Pause,
+    ACCEPTANCE_TIME_S, Guard, GuardDecision, Pause,
     event::{GuardAction, GuardKind},
 };
 use crate::recursion::{Recursion, Sample};
@@ -33,12 +33,12 @@ impl Guard {
 
     /// Handles a sample during a pause: it enters the filters of the recursion if possible.
     #[cold]
-    pub(super) fn paused(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
+    pub(super) fn process_paused(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> GuardDecision {
         self.resting.reject();
         let mut values = [sample.e, sample.u];
-        let mut good = [true; CHANNELS];
-        let mut errors = [[0.0; 4]; CHANNELS];
-        for c in 0..CHANNELS {
+        let mut good = [true; CHANNEL_COUNT];
+        let mut errors = [[0.0; 4]; CHANNEL_COUNT];
+        for c in 0..CHANNEL_COUNT {
             let x = values[c];
             good[c] = x.is_finite() && !self.is_too_large(c, x);
             if x.abs() > self.pause.size && self.pause.kind() == GuardKind::Level {
@@ -46,7 +46,7 @@ impl Guard {
             }
             if good[c] {
                 errors[c] = self.channels[c].errors(x);
-                self.channels[c].follow(x, &errors[c]);
+                self.channels[c].update_prediction(x, &errors[c]);
             } else {
                 values[c] = self.centre[c];
                 self.channels[c].restart(std::iter::once(values[c]));
@@ -59,7 +59,7 @@ impl Guard {
         };
         let mut outcome = None;
         if good[1] {
-            let followed = recursion.follow(taken);
+            let followed = recursion.step_without_update(taken);
             if good[0] {
                 self.block.add(&errors, values, self.centre);
                 self.block.add_innovation(followed.innovation);
@@ -68,13 +68,13 @@ impl Guard {
         } else {
             recursion.bridge(taken);
         }
-        let larger = (0..CHANNELS).any(|c| !good[c] && [sample.e, sample.u][c].is_finite());
+        let larger = (0..CHANNEL_COUNT).any(|c| !good[c] && [sample.e, sample.u][c].is_finite());
         self.pause.suspect_samples += u64::from(larger);
-        if self.pause.suspect_samples as f64 * self.sample_time.s() > ACCEPTED_AFTER_S {
+        if self.pause.suspect_samples as f64 * self.sample_time.s() > ACCEPTANCE_TIME_S {
             self.restart_and_forget(recursion);
-            return Guarded { outcome, held: true };
+            return GuardDecision { outcome, held: true };
         }
-        self.pause.good = if good == [true; CHANNELS] {
+        self.pause.good = if good == [true; CHANNEL_COUNT] {
             self.pause.good + 1
         } else {
             0
@@ -86,7 +86,7 @@ impl Guard {
             };
             self.end_pause(action);
         }
-        Guarded { outcome, held: true }
+        GuardDecision { outcome, held: true }
     }
 
     /// Ends a pause.
@@ -110,11 +110,11 @@ impl Guard {
         self.start.restore(recursion);
         self.former = std::mem::take(&mut self.profile);
         self.sound_at = [0; 2];
-        self.centre = [0.0; CHANNELS];
-        self.largest = [f64::INFINITY; CHANNELS];
+        self.centre = [0.0; CHANNEL_COUNT];
+        self.largest = [f64::INFINITY; CHANNEL_COUNT];
         for channel in &mut self.channels {
             channel.set_quantiles([0.0; 4]);
-            channel.set_floor(0.0);
+            channel.set_limit_floor(0.0);
         }
         self.end_pause(GuardAction::Relearnt);
     }

@@ -7,8 +7,8 @@
 //! ([`hoid_core::guard::channel`]). Spans in which u rests are learnt too.
 
 use hoid_core::guard::{
-    channel::ORDERS,
-    profile::{Block, CHANNELS, CONSTANT_FRACTION, Profile},
+    channel::ORDER_COUNT,
+    profile::{Block, CHANNEL_COUNT, CONSTANT_FRACTION, Profile},
 };
 use hoid_model::Record;
 use hoid_numerics::statistics::{mean, upper_quantile};
@@ -16,9 +16,9 @@ use hoid_numerics::statistics::{mean, upper_quantile};
 use super::Guard;
 
 /// Quantiles of the magnitude of a Gaussian variable, in standard deviations.
-const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
+const GAUSSIAN_QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
 /// Probability of the inner quantile of the differences, which is estimated directly.
-const INNER_PROBABILITY: f64 = 0.9;
+const INNER_QUANTILE_PROBABILITY: f64 = 0.9;
 /// Smallest number of blocks of a record from which typical values are learnt.
 const MIN_BLOCKS: usize = 5;
 
@@ -35,27 +35,27 @@ impl Guard {
             input => input,
         };
         let signals = [input, output];
-        let (mut outer, mut inner) = ([[0.0; ORDERS]; CHANNELS], [[0.0; ORDERS]; CHANNELS]);
+        let (mut outer, mut inner) = ([[0.0; ORDER_COUNT]; CHANNEL_COUNT], [[0.0; ORDER_COUNT]; CHANNEL_COUNT]);
         for (c, signal) in signals.iter().enumerate() {
             let mut differences = signal.to_vec();
-            let moves = moving(signal);
-            for j in 0..ORDERS {
+            let moves = moving_differences(signal);
+            for j in 0..ORDER_COUNT {
                 differences = differences.windows(2).map(|w| w[1] - w[0]).collect();
                 let of_moves: Vec<f64> = differences
                     .iter()
                     .zip(&moves[j..])
                     .filter_map(|(d, moves)| moves.then_some(d.abs()))
                     .collect();
-                outer[c][j] = tail(&of_moves);
-                inner[c][j] = quantile(of_moves, INNER_PROBABILITY);
+                outer[c][j] = tail_quantile(&of_moves);
+                inner[c][j] = quantile(of_moves, INNER_QUANTILE_PROBABILITY);
             }
         }
-        output.iter().for_each(|u| self.resting.take(*u));
+        output.iter().for_each(|u| self.resting.update(*u));
         let length = self.block_length as usize;
         if output.len() < MIN_BLOCKS * length {
             return;
         }
-        let centre = signals.map(|signal| middle(signal.to_vec()));
+        let centre = signals.map(|signal| median(signal.to_vec()));
         let blocks: Vec<Block> = (1..output.len() / length)
             .map(|n| {
                 let mut block = Block::default();
@@ -75,7 +75,7 @@ impl Guard {
                 block.means()
             })
             .collect();
-        let over = |of: &dyn Fn(&Block) -> f64| middle(blocks.iter().map(of).collect());
+        let over = |of: &dyn Fn(&Block) -> f64| median(blocks.iter().map(of).collect());
         let typical = Block {
             differences: std::array::from_fn(|c| std::array::from_fn(|j| over(&|b| b.differences[c][j]))),
             magnitude: std::array::from_fn(|c| over(&|b| b.magnitude[c])),
@@ -91,7 +91,7 @@ impl Guard {
 }
 
 /// Returns the median; zero if there are no values.
-fn middle(values: Vec<f64>) -> f64 {
+fn median(values: Vec<f64>) -> f64 {
     quantile(values, 0.5)
 }
 
@@ -102,7 +102,7 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
 }
 
 /// Returns for each first difference whether it is larger than for a constant signal.
-fn moving(signal: &[f64]) -> Vec<bool> {
+fn moving_differences(signal: &[f64]) -> Vec<bool> {
     let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let mean = mean(&sizes);
     sizes.iter().map(|size| *size > CONSTANT_FRACTION * mean).collect()
@@ -110,9 +110,9 @@ fn moving(signal: &[f64]) -> Vec<bool> {
 
 /// Returns the 99 % quantile of the magnitudes: the largest of its direct estimate and of two estimates from lower
 /// quantiles.
-fn tail(values: &[f64]) -> f64 {
+fn tail_quantile(values: &[f64]) -> f64 {
     let magnitudes: Vec<f64> = values.iter().map(|v| v.abs()).collect();
-    let scale = QUANTILES.map(|(share, deviations)| quantile(magnitudes.clone(), share) / deviations);
-    let [.., (_, deviations)] = QUANTILES;
+    let scale = GAUSSIAN_QUANTILES.map(|(share, deviations)| quantile(magnitudes.clone(), share) / deviations);
+    let [.., (_, deviations)] = GAUSSIAN_QUANTILES;
     deviations * scale.into_iter().fold(0.0, f64::max)
 }

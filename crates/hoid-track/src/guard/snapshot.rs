@@ -5,7 +5,7 @@ use hoid_core::state::State;
 use crate::recursion::Recursion;
 
 /// Largest length of a snapshot that is accepted from saved numbers.
-const MAX_LENGTH: usize = 1 << 20;
+const MAX_SNAPSHOT_LEN: usize = 1 << 20;
 
 /// The numbers that are the state of a recursion. Their memory grows to the size of the largest snapshot and is then
 /// reused.
@@ -18,7 +18,7 @@ impl State for Snapshot {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         let mut length = self.numbers.len();
         length.visit(each);
-        self.numbers.resize(length.min(MAX_LENGTH), 0.0);
+        self.numbers.resize(length.min(MAX_SNAPSHOT_LEN), 0.0);
         self.numbers.as_mut_slice().visit(each);
     }
 }

@@ -16,10 +16,11 @@ mod starting_point;
 
 use hoid_core::{
     adaptive::{
-        AdaptiveFilter, DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, PARAMETERS,
+        AdaptiveFilter, DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT,
         basis::Basis,
+        congruence,
         defaults::{self, DefaultOperator},
-        memory_needed, through,
+        memory_needed,
     },
     state::{State, visit_all},
 };
@@ -34,12 +35,12 @@ use crate::{
     change::Change,
     guard::{GuardChoice, GuardOptions},
     memory::Memory,
-    method::{About, RecursiveMethod, bad as bad_option, check_delay, check_operator_orders},
+    method::{MethodDescription, RecursiveMethod, check_delay, check_operator_orders, invalid_option as bad_option},
     person_prior::PersonPrior,
     recursion::{Recursion, Sample, StepOutcome},
-    reported::Reported,
+    reported::ReportedModel,
     response::Response,
-    setup::{DEFAULT_DELAY_S, Setup, StartAt},
+    setup::{DEFAULT_DELAY_S, Setup, StartSource},
     start::StartState,
 };
 
@@ -54,7 +55,7 @@ settings! {
         pub limit: Option<f64> = None,
         /// Length of past data that are replayed (0: each sample is used once, as on a microcontroller)
         #[setting(unit("s"), bounds(Bounds::NonNegative))]
-        pub replay: f64 = defaults::REPLAYED_S,
+        pub replay: f64 = defaults::REPLAY_SPAN_S,
         /// Prior knowledge of the person: population, none, NAME=CENTRE:SPREAD for omega_nm, zeta_nm, tau_e, T_I
         /// (relative spread), or a file from hoid identify --json
         #[setting(default("population"))]
@@ -67,8 +68,8 @@ settings! {
 }
 
 impl RecursiveMethod for AdaptiveOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: "adaptive",
             help: "gains in a basis common to all people, with its own noise model; needs no start fit",
             source: "McRuer and Jex 1967; Magill 1965; Chow 1960; White 1980; the book, page The default tracker",
@@ -82,7 +83,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn default_nd(&self) -> Option<usize> {
-        Some(defaults::ORDER)
+        Some(defaults::NOISE_ORDER)
     }
 
     /// Returns an infinite memory, which is not used: the memory follows from the weights of the drifts.
@@ -94,7 +95,7 @@ impl RecursiveMethod for AdaptiveOptions {
         check_operator_orders("adaptive", setup)?;
         check_delay(&setup.orders)?;
         let o = &setup.orders;
-        if o.nc != 0 || o.nd > LARGEST_ORDER {
+        if o.nc != 0 || o.nd > MAX_NOISE_ORDER {
             return Err(bad_option(
                 "the noise model of adaptive",
                 format!("nc={},nd={}", o.nc, o.nd),
@@ -102,9 +103,9 @@ impl RecursiveMethod for AdaptiveOptions {
             ));
         }
         let start = match setup.start {
-            StartAt::Theta(_) => Some("coefficients"),
-            StartAt::Nothing => Some("nothing"),
-            StartAt::Span(_) => None,
+            StartSource::Theta(_) => Some("coefficients"),
+            StartSource::Nothing => Some("nothing"),
+            StartSource::Span(_) => None,
         };
         if let Some(start) = start {
             return Err(bad_option(
@@ -130,7 +131,7 @@ impl RecursiveMethod for AdaptiveOptions {
         true
     }
 
-    fn starts_itself(&self) -> bool {
+    fn is_self_starting(&self) -> bool {
         true
     }
 
@@ -146,19 +147,19 @@ impl RecursiveMethod for AdaptiveOptions {
         self.guard.guard.or(Some(GuardChoice::Yes))
     }
 
-    fn limit(&self) -> f64 {
-        self.limit.unwrap_or(defaults::LIMIT)
+    fn innovation_limit(&self) -> f64 {
+        self.limit.unwrap_or(defaults::INNOVATION_LIMIT)
     }
 
-    fn spread_before(&self) -> Option<[f64; DYNAMICS]> {
+    fn prior_deviations(&self) -> Option<[f64; DYNAMICS_COUNT]> {
         // Parameters that an earlier fit determined count as known, regardless of the data.
         let known = self.prior.fit().is_some();
-        let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
+        let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::AT_100_HZ).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
     }
 
-    fn lag_of_basis_s(&self) -> Option<f64> {
-        let StartingPoint { point, .. } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
+    fn basis_lag_s(&self) -> Option<f64> {
+        let StartingPoint { point, .. } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::AT_100_HZ).ok()?;
         Some(point.lag)
     }
 
@@ -175,7 +176,7 @@ impl RecursiveMethod for AdaptiveOptions {
 /// The filter of the method with its reported estimate.
 struct AdaptiveRecursion {
     model: Box<AdaptiveFilter<Vec<f64>>>,
-    reported: Reported,
+    reported: ReportedModel,
 }
 
 impl AdaptiveRecursion {
@@ -191,7 +192,7 @@ impl AdaptiveRecursion {
         let is_given = nk != sample_time.nk(DEFAULT_DELAY_S);
         let beginning = StartingPoint::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
         let point = beginning.point;
-        let basis = Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?;
+        let basis = Basis::new(point, ts).ok_or_else(|| unusable_fit(&format!("a delay of {} s", point.tau)))?;
         let fit = options.prior.fit();
         let known = fit.map(|fit| initial_estimate(fit, &basis, sample_time)).transpose()?;
         let supposed = DefaultOperator {
@@ -199,10 +200,10 @@ impl AdaptiveRecursion {
             spread: beginning.spread,
             // An nd of 0 or 1 gives no information about the colour of the noise, so the default order is used.
             order: match setup.orders.nd {
-                0 | 1 => defaults::ORDER,
+                0 | 1 => defaults::NOISE_ORDER,
                 nd => nd,
             },
-            limit: options.limit(),
+            limit: options.innovation_limit(),
             false_alarms: options.false_alarms,
         };
         let memory = vec![0.0; memory_needed(ts, options.replay)];
@@ -211,10 +212,10 @@ impl AdaptiveRecursion {
             Some(known) => model.and_then(|model| model.with_initial_estimate(known)),
             None => model,
         };
-        let model = model.ok_or_else(|| unusable("this delay, sample time, prior and options"))?;
+        let model = model.ok_or_else(|| unusable_fit("this delay, sample time, prior and options"))?;
         let mut made = Self {
             model: Box::new(model),
-            reported: Reported::new(from, nk, sample_time),
+            reported: ReportedModel::new(from, nk, sample_time),
         };
         if known.is_some() {
             made.report();
@@ -229,20 +230,20 @@ impl AdaptiveRecursion {
 
     fn report(&mut self) {
         let [k_e, k_e_dot, omega, zeta, _] = self.model.operator();
-        self.reported.set([k_e, k_e_dot, omega, zeta]);
+        self.reported.set_operator([k_e, k_e_dot, omega, zeta]);
         self.reported.set_noise(self.model.d());
     }
 
     /// Returns K_e, K_e_dot, omega, zeta and tau before the last change, and the amounts by which they changed; the
     /// amount is zero for parameters that did not change.
-    fn of_change(&self) -> [[Estimate; PARAMETERS]; 2] {
+    fn change_estimates(&self) -> [[Estimate; PARAMETER_COUNT]; 2] {
         let detector = self.model.detector();
-        let map = self.model.gain_and_lead();
+        let map = self.model.gain_and_lead_matrix();
         let (at, hold) = (self.model.basis().point(), 0.5 * self.reported.sample_time_s());
         let beginning = [at.omega, at.zeta, at.tau - hold];
         let gain = |i: usize, state: &[f64], of: &dyn Fn(usize, usize) -> f64| {
             let value = map[i].iter().zip(state).map(|(m, s)| m * s).sum();
-            let pairs = (0..GAINS).flat_map(|a| (0..GAINS).map(move |b| (a, b)));
+            let pairs = (0..GAIN_COUNT).flat_map(|a| (0..GAIN_COUNT).map(move |b| (a, b)));
             let variance = pairs.map(|(a, b)| map[i][a] * of(a, b) * map[i][b]).sum();
             Estimate::with_variance(value, variance)
         };
@@ -250,14 +251,14 @@ impl AdaptiveRecursion {
         let before = |i: usize| match i {
             0 | 1 => gain(i, &told.before, &|a, b| told.covariance_before[a][b]),
             _ => {
-                let k = LINEAR + i - 2;
+                let k = LINEAR_COUNT + i - 2;
                 Estimate::with_variance(beginning[i - 2] + told.before[k], told.covariance_before[k][k])
             }
         };
         let difference = |i: usize| match i {
             0 | 1 => gain(i, &by.value, &|a, b| by.covariance[a][b]),
             _ => {
-                let k = LINEAR + i - 2;
+                let k = LINEAR_COUNT + i - 2;
                 Estimate::with_variance(by.value[k], by.covariance[k][k])
             }
         };
@@ -265,7 +266,7 @@ impl AdaptiveRecursion {
     }
 }
 
-fn unusable(what: &str) -> IdentError {
+fn unusable_fit(what: &str) -> IdentError {
     IdentError::BadStart {
         reason: format!("the basis cannot be computed for {what}; check nk and the sample time"),
     }
@@ -286,7 +287,7 @@ impl Recursion for AdaptiveRecursion {
         step.into()
     }
 
-    fn follow(&mut self, sample: Sample) -> StepOutcome {
+    fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
         self.model.step_without_update(sample.e, sample.u).into()
     }
 
@@ -305,8 +306,8 @@ impl Recursion for AdaptiveRecursion {
         let c = self.model.operator_covariance();
         let whole = std::array::from_fn(|i| std::array::from_fn(|j| c[i][j]));
         self.reported.covariance(&whole, into);
-        match self.model.noise().covariance() {
-            Some(of_d) => self.reported.set_covariance_of_noise(&of_d, into),
+        match self.model.noise_model().covariance() {
+            Some(of_d) => self.reported.write_noise_covariance(&of_d, into),
             None => return false,
         }
         true
@@ -339,10 +340,10 @@ impl Recursion for AdaptiveRecursion {
 
     fn change(&self) -> Option<Change> {
         let detector = self.model.detector();
-        if !detector.declared() {
+        if !detector.is_change_declared() {
             return None;
         }
-        let [old, by] = self.of_change();
+        let [old, by] = self.change_estimates();
         let z = |i: usize| match by[i].standard_error {
             Some(error) if error > 0.0 => by[i].value / error,
             _ => 0.0,
@@ -361,7 +362,7 @@ impl Recursion for AdaptiveRecursion {
         let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
         let level = (variance[1] / variance[0]).ln() / (log_variance * detector.typical_level()).sqrt();
         Some(Change {
-            seconds_ago: detector.ago_s(),
+            seconds_ago: detector.detection_delay_s(),
             odds: self.change_odds()?,
             k_e: pair(0),
             k_e_dot: pair(1),
@@ -379,7 +380,7 @@ impl Recursion for AdaptiveRecursion {
         let (value, by) = self.model.response_with_derivatives(omega_rad_s);
         self.has_response(value).then(|| Response {
             value,
-            covariance: through(&by, &self.model.state_covariance()),
+            covariance: congruence(&by, &self.model.state_covariance()),
         })
     }
 

@@ -14,13 +14,13 @@ use hoid_ident::{
 use hoid_model::{FittedOperator, Orders, Structure};
 
 use crate::{
-    method::{RecursiveMethod, bad, spec},
+    method::{RecursiveMethod, invalid_option, spec},
     person_prior::PersonPrior,
 };
 
 pub use adaptive::AdaptiveOptions;
 pub use rls::RlsOptions;
-pub use rpem::{DEFAULT_LIMIT, RpemOptions, short_for_b};
+pub use rpem::{DEFAULT_LIMIT, RpemOptions, short_memory_for_b};
 
 /// A recursive method with its options, described by [`RecursiveMethod`].
 #[derive(Debug)]
@@ -34,7 +34,7 @@ impl<M: RecursiveMethod> From<M> for Method {
 
 impl Clone for Method {
     fn clone(&self) -> Self {
-        Self(self.0.boxed())
+        Self(self.0.clone_boxed())
     }
 }
 
@@ -80,12 +80,12 @@ impl Method {
     /// True if orders, delay or memory are in samples. If they are not, a high sampling rate may be reduced
     /// ([`hoid_model::Decimation`]).
     pub fn counts_samples(&self) -> bool {
-        !(self.starts_itself() || self.is_model_of_change())
+        !(self.is_self_starting() || self.models_change())
     }
 
     /// Returns the name of the method on the command line.
     pub fn name(&self) -> &'static str {
-        self.about().name
+        self.description().name
     }
 
     /// Returns the options of the method by name.
@@ -103,7 +103,7 @@ impl Method {
         }
         let own: Vec<&str> = self.list().iter().map(|setting| setting.name).collect();
         let expected = format!("one of {}", own.join(", "));
-        Err(bad(
+        Err(invalid_option(
             name,
             format!("an option that the method {} does not have", self.name()),
             &expected,
@@ -127,7 +127,7 @@ impl Method {
         let source = fit.source.clone();
         match self.0.set_person_prior(PersonPrior::Fit(Box::new(fit))) {
             true => Ok(()),
-            false => Err(bad(
+            false => Err(invalid_option(
                 "prior",
                 source,
                 "the method `adaptive`, the only one that can start from an earlier fit",
@@ -147,7 +147,7 @@ impl Method {
 
     /// Returns the default structure of the method: Box-Jenkins, or the first that it supports.
     pub fn default_structure(&self) -> Structure {
-        let served = self.about().structures;
+        let served = self.description().structures;
         match served.first() {
             Some(first) if !served.contains(&Structure::BoxJenkins) => *first,
             _ => Structure::BoxJenkins,

@@ -8,7 +8,7 @@ use crate::{
     guard::{GuardChoice, GuardOptions},
     kernel::{Kernel, Plan},
     memory::Memory,
-    method::{About, RecursiveMethod, bad},
+    method::{MethodDescription, RecursiveMethod, invalid_option},
     recursion::Recursion,
     setup::Setup,
     shared_options::{GainOptions, WindupGuard},
@@ -27,12 +27,12 @@ settings! {
 }
 
 /// The default of the guard against windup, as text.
-const WINDUP_GUARD: &str =
+const DEFAULT_WINDUP_GUARD_TEXT: &str =
     "off for arx with a covariance and exponential forgetting (the recursion of the thesis), else as for physical";
 
 impl RecursiveMethod for RlsOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: "rls",
             help: "recursive least squares",
             source: "Ljung 1999, section 11.2; the thesis, section III",
@@ -41,7 +41,7 @@ impl RecursiveMethod for RlsOptions {
                 ("memory", "2.56s"),
                 ("limit", "inf"),
                 ("guard", "no"),
-                ("windup_guard", WINDUP_GUARD),
+                ("windup_guard", DEFAULT_WINDUP_GUARD_TEXT),
             ],
         }
     }
@@ -56,7 +56,7 @@ impl RecursiveMethod for RlsOptions {
         if setup.structure.is_linear() && o.nc == 0 && o.nd == 0 && o.nf == 0 && o.nb > 0 {
             return Ok(());
         }
-        Err(bad(
+        Err(invalid_option(
             "the structure of rls",
             format!("{} with {o}", setup.structure),
             "arx or fir; use rpem for structures with C, D or F",
@@ -72,7 +72,7 @@ impl RecursiveMethod for RlsOptions {
         Plan::new(setup, from, sample_time).build(Kernel::LeastSquares)
     }
 
-    fn takes_further_input(&self) -> bool {
+    fn supports_further_input(&self) -> bool {
         true
     }
 
@@ -83,7 +83,7 @@ impl RecursiveMethod for RlsOptions {
     /// The windup guard is off for ARX models with the settings of the thesis.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
-            Structure::Arx => self.gain.windup_guard(self.limit()),
+            Structure::Arx => self.gain.windup_guard(self.innovation_limit()),
             _ => self.gain.windup_guard,
         }
     }
@@ -93,7 +93,7 @@ impl RecursiveMethod for RlsOptions {
     }
 
     /// Innovations are not limited by default, as in the thesis.
-    fn limit(&self) -> f64 {
+    fn innovation_limit(&self) -> f64 {
         self.gain.limit_or(f64::INFINITY)
     }
 

@@ -1,7 +1,7 @@
 //! The recursive prediction-error method for every structure (L. Ljung, *System Identification*,
 //! 1999, section 11.5).
 
-use hoid_core::{predictor::Regressor, recursion::Stable};
+use hoid_core::{predictor::Regressor, recursion::StablePolynomials};
 use hoid_ident::{IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
@@ -10,7 +10,7 @@ use crate::{
     guard::{GuardChoice, GuardOptions},
     kernel::{Kernel, Plan},
     memory::Memory,
-    method::{About, RecursiveMethod, bad},
+    method::{MethodDescription, RecursiveMethod, invalid_option},
     recursion::Recursion,
     setup::Setup,
     shared_options::{DelayOptions, GainOptions, StabilityOptions, WindupGuard},
@@ -40,8 +40,8 @@ settings! {
 pub const DEFAULT_LIMIT: f64 = 5.0;
 
 impl RecursiveMethod for RpemOptions {
-    fn about(&self) -> About {
-        About {
+    fn description(&self) -> MethodDescription {
+        MethodDescription {
             name: "rpem",
             help: "recursive prediction-error method, for every structure",
             source: "Ljung 1999, section 11.5; the thesis, section III",
@@ -59,12 +59,12 @@ impl RecursiveMethod for RpemOptions {
     }
 
     fn default_memory(&self, parameter: &str) -> Memory {
-        short_for_b(parameter)
+        short_memory_for_b(parameter)
     }
 
     fn check(&self, setup: &Setup) -> Result<(), IdentError> {
         match setup.track_delay_s {
-            Some(_) if !setup.structure.has_input() => Err(bad(
+            Some(_) if !setup.structure.has_input() => Err(invalid_option(
                 "the range of the delay",
                 format!("a range with the structure {}, which has no input", setup.structure),
                 "a structure with an input, such as bj",
@@ -86,7 +86,7 @@ impl RecursiveMethod for RpemOptions {
         }
     }
 
-    fn takes_further_input(&self) -> bool {
+    fn supports_further_input(&self) -> bool {
         true
     }
 
@@ -97,7 +97,7 @@ impl RecursiveMethod for RpemOptions {
     /// The windup guard is off for Box-Jenkins models with the settings of the thesis.
     fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
         match structure {
-            Structure::BoxJenkins => self.gain.windup_guard(self.limit()),
+            Structure::BoxJenkins => self.gain.windup_guard(self.innovation_limit()),
             _ => self.gain.windup_guard,
         }
     }
@@ -106,7 +106,7 @@ impl RecursiveMethod for RpemOptions {
         self.guard.guard
     }
 
-    fn limit(&self) -> f64 {
+    fn innovation_limit(&self) -> f64 {
         self.gain.limit_or(DEFAULT_LIMIT)
     }
 
@@ -114,7 +114,7 @@ impl RecursiveMethod for RpemOptions {
         self.delay.track_delay_s
     }
 
-    fn stable(&self) -> Stable {
+    fn stable(&self) -> StablePolynomials {
         self.stability.stable
     }
 
@@ -124,7 +124,7 @@ impl RecursiveMethod for RpemOptions {
 }
 
 /// Short memory for B, which follows the gains, and long memories for the other polynomials.
-pub fn short_for_b(parameter: &str) -> Memory {
+pub fn short_memory_for_b(parameter: &str) -> Memory {
     if parameter.starts_with('b') {
         Memory::Seconds(2.56)
     } else {

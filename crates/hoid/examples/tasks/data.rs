@@ -16,7 +16,7 @@ use hoid::{model::Channel, prelude::*, sim::Signals};
 pub const NK: usize = 29;
 
 /// One run of C1 and the settings of its simulation.
-pub struct Shared {
+pub struct TaskData {
     pub simulator: Simulator,
     pub noise: Vec<f64>,
     pub record: Record,
@@ -31,10 +31,10 @@ pub fn run_seed(replication: u64) -> RunSeed {
     }
 }
 
-impl Shared {
+impl TaskData {
     pub fn new() -> Self {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
-        let noise = run_seed(0).white_noise(simulator.samples());
+        let noise = run_seed(0).white_noise(simulator.sample_count());
         let record = simulator.run(run_seed(0), false).unwrap();
         Self {
             simulator,
@@ -45,12 +45,12 @@ impl Shared {
 
     pub fn write(&self, directory: &Path) {
         std::fs::create_dir_all(directory).unwrap();
-        columns(
+        write_columns(
             &directory.join("record.csv"),
             [self.record.input(), self.record.output()],
         );
         let whole = self.simulator.run(run_seed(0), true).unwrap();
-        columns(
+        write_columns(
             &directory.join("loop.csv"),
             [whole.channel("f_t").unwrap(), &self.noise],
         );
@@ -64,7 +64,7 @@ impl Shared {
                 ("Ts".to_owned(), self.record.sample_time().s().into()),
                 (
                     "run_in".to_owned(),
-                    (self.simulator.samples() - self.record.len()).into(),
+                    (self.simulator.sample_count() - self.record.len()).into(),
                 ),
             ])
             .collect();
@@ -72,16 +72,16 @@ impl Shared {
     }
 }
 
-impl Shared {
+impl TaskData {
     /// Returns input and output of the measurement of a run.
-    pub fn measured(&self, run: &Signals) -> Record {
+    pub fn measured_record(&self, run: &Signals) -> Record {
         let from = run.e.len() - self.record.len();
         let channel = |name, values: &[f64]| Channel::new(name, "deg", values[from..].to_vec());
         Record::new(self.record.sample_time(), channel("e", &run.e), channel("u", &run.u)).unwrap()
     }
 }
 
-fn columns(file: &Path, of: [&[f64]; 2]) {
+fn write_columns(file: &Path, of: [&[f64]; 2]) {
     let mut text = String::new();
     for (a, b) in of[0].iter().zip(of[1]) {
         writeln!(text, "{a},{b}").unwrap();

@@ -13,33 +13,33 @@ use std::{hint::black_box, time::Instant};
 
 use hoid::{
     prelude::*,
-    track::{Method, StartAt, TrackOptions, track},
+    track::{Method, StartSource, TrackOptions, track},
 };
 
-use super::{data::NK, traced};
+use super::{data::NK, track_options};
 
 /// Number of samples in the tables over parameters.
-const SAMPLES: usize = 8192;
+const SAMPLE_COUNT: usize = 8192;
 /// A run shorter than this time is repeated, s.
-const SHORT_S: f64 = 0.3;
+const MIN_DURATION_S: f64 = 0.3;
 
 pub fn measure(name: &str, n: usize, further: &[String]) {
     let (samples, parameters) = match name.split_once(' ') {
-        Some((_, "parameters")) => (SAMPLES, Some(n)),
+        Some((_, "parameters")) => (SAMPLE_COUNT, Some(n)),
         _ => (n, None),
     };
     let record = record(samples);
     if let [file] = further {
-        return write(&record, file);
+        return write_record(&record, file);
     }
-    let work = work(name, parameters);
-    let before = resident_peak();
+    let work = task_closure(name, parameters);
+    let before = peak_memory();
     let start_time = Instant::now();
     work(&record);
     let mut seconds = start_time.elapsed().as_secs_f64();
-    let peak = resident_peak();
-    if seconds < SHORT_S {
-        let mut times: Vec<f64> = (0..(SHORT_S / seconds).clamp(3.0, 200.0) as usize)
+    let peak = peak_memory();
+    if seconds < MIN_DURATION_S {
+        let mut times: Vec<f64> = (0..(MIN_DURATION_S / seconds).clamp(3.0, 200.0) as usize)
             .map(|_| {
                 let start_time = Instant::now();
                 work(&record);
@@ -55,7 +55,7 @@ pub fn measure(name: &str, n: usize, further: &[String]) {
     );
 }
 
-fn work(name: &str, parameters: Option<usize>) -> Box<dyn Fn(&Record)> {
+fn task_closure(name: &str, parameters: Option<usize>) -> Box<dyn Fn(&Record)> {
     let (method, _) = name.split_once(' ').unwrap_or((name, ""));
     let half = |p: usize| Orders {
         na: p / 2,
@@ -83,10 +83,10 @@ fn work(name: &str, parameters: Option<usize>) -> Box<dyn Fn(&Record)> {
             })
         }
         "rls" | "rpem" => {
-            let mut options = traced(if method == "rls" { Method::rls() } else { Method::rpem() });
+            let mut options = track_options(if method == "rls" { Method::rls() } else { Method::rpem() });
             if let Some(p) = parameters {
                 options = TrackOptions {
-                    start: StartAt::Theta(vec![0.0; p]),
+                    start: StartSource::Theta(vec![0.0; p]),
                     orders: half(p),
                     ..options
                 };
@@ -122,16 +122,16 @@ fn record(samples: usize) -> Record {
         u.push(response + noise);
     }
     let (e, u) = (Channel::new("e", "deg", e), Channel::new("u", "deg", u));
-    Record::new(SampleTime::HUNDREDTH, e, u).unwrap()
+    Record::new(SampleTime::AT_100_HZ, e, u).unwrap()
 }
 
 /// Writes the record for the command-line program instead.
-fn write(record: &Record, file: &str) {
+fn write_record(record: &Record, file: &str) {
     hoid::io::write_record(std::path::Path::new(file), record).unwrap();
 }
 
 /// Returns the largest resident memory so far, bytes; zero if the system does not report it.
-fn resident_peak() -> u64 {
+fn peak_memory() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
     let kib = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());

@@ -27,24 +27,25 @@ mod growth;
 
 use std::{hint::black_box, path::Path, time::Instant};
 
-use data::{NK, Shared};
+use data::{NK, TaskData};
 use hoid::{
     core::{
         adaptation::Forgetting, covariance::Covariance, delay::DelayLine, error_bars::NoErrorBars,
-        predictor::Regressor, recursion::Stable, rls::Rls, rpem::Rpem, shape::FixedShape, ud_covariance::UdCovariance,
+        predictor::Regressor, recursion::StablePolynomials, rls::Rls, rpem::Rpem, shape::FixedShape,
+        ud_covariance::UdCovariance,
     },
     ident::order_selection::Criterion,
     lanes::InstructionSet,
     prelude::*,
     sim::Signals,
     thesis::reproduction::{Reproduction, reproduce},
-    track::{Method, StartAt, TrackOptions, track},
+    track::{Method, StartSource, TrackOptions, track},
 };
 
 /// Start of the recursive prediction-error method: b0, b1, d1, f1, f2.
 const RPEM_START: [f64; 5] = [0.04, -0.04, -0.8, -1.9, 0.92];
-const MEMORY: f64 = 256.0;
-const CELL_RUNS: u64 = 100;
+const MEMORY_SAMPLES: f64 = 256.0;
+const RUNS_PER_CELL: u64 = 100;
 const TASKS: [&str; 10] = [
     "arx",
     "bj",
@@ -79,7 +80,7 @@ fn main() {
             _ => panic!("unknown option {option}"),
         }
     }
-    let shared = Shared::new();
+    let shared = TaskData::new();
     shared.write(directory);
     for task in TASKS {
         if only.is_empty() || only.iter().any(|name| name == task) {
@@ -88,7 +89,7 @@ fn main() {
         }
     }
     if let Some(replications) = replications {
-        let (seconds, answer) = whole_text(directory, replications);
+        let (seconds, answer) = run_reproduction(directory, replications);
         print_task("reproduce", seconds, &answer);
     }
 }
@@ -101,22 +102,22 @@ fn print_task(task: &str, seconds: f64, answer: &[f64]) {
     );
 }
 
-fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
+fn run(task: &str, shared: &TaskData, effort: Effort) -> (f64, Vec<f64>) {
     let record = shared.record.clone();
     let one = std::slice::from_ref(&record);
     let estimator = |structure: Structure| Estimator::new(structure, structure.operator_orders(NK));
     let theta = |fit: &Fit| fit.model().theta().to_vec();
     let (arx, bj) = (estimator(Structure::Arx), estimator(Structure::BoxJenkins));
     match task {
-        "arx" => median(effort, || theta(&arx.fit(one).unwrap())),
-        "bj" => median(effort, || theta(&bj.fit(one).unwrap())),
+        "arx" => measure_median(effort, || theta(&arx.fit(one).unwrap())),
+        "bj" => measure_median(effort, || theta(&bj.fit(one).unwrap())),
         "rls" => {
             let mut history = Vec::with_capacity(record.len());
-            median(effort, || rls(record.input(), record.output(), &mut history).to_vec())
+            measure_median(effort, || rls(record.input(), record.output(), &mut history).to_vec())
         }
         "rpem" => {
             let mut history = Vec::with_capacity(record.len());
-            median(effort, || rpem(record.input(), record.output(), &mut history).to_vec())
+            measure_median(effort, || rpem(record.input(), record.output(), &mut history).to_vec())
         }
         "rls trace" | "rpem trace" => {
             let method = if task == "rls trace" {
@@ -124,15 +125,15 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
             } else {
                 Method::rpem()
             };
-            let options = traced(method);
-            median(effort, || {
+            let options = track_options(method);
+            measure_median(effort, || {
                 let trace = track(&record, &options, 1).unwrap();
                 trace.theta(trace.len() - 1).to_vec()
             })
         }
         "loop" => {
             let mut signals = Signals::default();
-            median(effort, || {
+            measure_median(effort, || {
                 shared.simulator.signals_into(&shared.noise, &mut signals).unwrap();
                 vec![*signals.e.last().unwrap(), *signals.u.last().unwrap()]
             })
@@ -140,29 +141,29 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
         "loop with noise" => {
             let (mut noise, mut signals) = (shared.noise.clone(), Signals::default());
             let mut replication = 0;
-            median(effort, || {
+            measure_median(effort, || {
                 replication += 1;
                 data::run_seed(replication).white_noise_into(&mut noise);
                 shared.simulator.signals_into(&noise, &mut signals).unwrap();
             })
-            .map_answer(|()| Vec::new())
+            .map_result(|()| Vec::new())
         }
         "cell" => {
             // As many runs as there are lanes are computed at a time, in existing memory.
-            let batch_size = InstructionSet::Best.lanes().unwrap();
+            let batch_size = InstructionSet::Best.lane_count().unwrap();
             let (mut noises, mut runs) = (vec![shared.noise.clone(); batch_size], Vec::new());
-            median(effort, || {
-                let mut records = Vec::with_capacity(CELL_RUNS as usize + batch_size);
-                for first_run in (0..CELL_RUNS).step_by(batch_size) {
-                    for (noise, replication) in noises.iter_mut().zip(first_run..CELL_RUNS) {
+            measure_median(effort, || {
+                let mut records = Vec::with_capacity(RUNS_PER_CELL as usize + batch_size);
+                for first_run in (0..RUNS_PER_CELL).step_by(batch_size) {
+                    for (noise, replication) in noises.iter_mut().zip(first_run..RUNS_PER_CELL) {
                         data::run_seed(replication).white_noise_into(noise);
                     }
                     let simulator = &shared.simulator;
                     simulator
                         .batched_signals_into(&noises, InstructionSet::Best, &mut runs)
                         .unwrap();
-                    let count = (CELL_RUNS - first_run) as usize;
-                    records.extend(runs.iter().take(count).map(|run| shared.measured(run)));
+                    let count = (RUNS_PER_CELL - first_run) as usize;
+                    records.extend(runs.iter().take(count).map(|run| shared.measured_record(run)));
                 }
                 let records: Vec<&Record> = records.iter().collect();
                 let mut sums = [0.0; 9];
@@ -170,13 +171,13 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
                     let both = [theta(&arx.unwrap()), theta(&bj.unwrap())].concat();
                     sums.iter_mut().zip(both).for_each(|(sum, value)| *sum += value);
                 }
-                sums.iter().map(|sum| sum / CELL_RUNS as f64).collect()
+                sums.iter().map(|sum| sum / RUNS_PER_CELL as f64).collect()
             })
         }
         "delays" => {
             let mut ranges = OrderRanges::from(bj.orders);
             ranges.nk = 20..=40;
-            median(effort, || choose_orders(&bj, &ranges, Criterion::Loss, one).unwrap()).map_answer(|choice| {
+            measure_median(effort, || choose_orders(&bj, &ranges, Criterion::Loss, one).unwrap()).map_result(|choice| {
                 let losses = choice.candidates.iter().map(|c| c.outcome.as_ref().unwrap().loss);
                 losses.collect()
             })
@@ -186,7 +187,7 @@ fn run(task: &str, shared: &Shared, effort: Effort) -> (f64, Vec<f64>) {
 }
 
 /// Runs `hoid reproduce`; returns the time and the number of items.
-fn whole_text(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
+fn run_reproduction(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
     let out = directory.join("reproduction");
     let _ = std::fs::remove_dir_all(&out);
     let wanted = Reproduction {
@@ -198,8 +199,8 @@ fn whole_text(directory: &Path, replications: u64) -> (f64, Vec<f64>) {
     (start_time.elapsed().as_secs_f64(), vec![made.items as f64])
 }
 
-fn forgetting<const N: usize>() -> Covariance<N> {
-    let lambda = [1.0 - 1.0 / MEMORY; N];
+fn forgetting_covariance<const N: usize>() -> Covariance<N> {
+    let lambda = [1.0 - 1.0 / MEMORY_SAMPLES; N];
     Covariance::new(
         UdCovariance::diagonal([0.1; N]),
         Forgetting::Exponential { lambda },
@@ -210,7 +211,13 @@ fn forgetting<const N: usize>() -> Covariance<N> {
 /// Recursive least squares from theta = 0; writes theta after each sample.
 pub fn rls(e: &[f64], u: &[f64], history: &mut Vec<[f64; 4]>) -> [f64; 4] {
     history.clear();
-    let mut recursion = Rls::new(FixedShape::<2, 2, 0, 0, 0>, [0.0; 4], forgetting::<4>(), NoErrorBars).unwrap();
+    let mut recursion = Rls::new(
+        FixedShape::<2, 2, 0, 0, 0>,
+        [0.0; 4],
+        forgetting_covariance::<4>(),
+        NoErrorBars,
+    )
+    .unwrap();
     let mut memory = [0.0; NK];
     let mut delay = DelayLine::new(&mut memory[..]);
     for (&e, &u) in e.iter().zip(u) {
@@ -226,9 +233,9 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
     let mut recursion = Rpem::<_, 5, 0, _, _>::new(
         FixedShape::<0, 2, 0, 1, 2>,
         Regressor::Gradient,
-        Stable::Predictor,
+        StablePolynomials::Predictor,
         RPEM_START,
-        forgetting::<5>(),
+        forgetting_covariance::<5>(),
         NoErrorBars,
     )
     .unwrap();
@@ -242,9 +249,9 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
 }
 
 /// Returns options of `track` with the same start and memory length.
-pub fn traced(method: Method) -> TrackOptions {
+pub fn track_options(method: Method) -> TrackOptions {
     let structure = method.default_structure();
-    let start = StartAt::Theta(match method == Method::rls() {
+    let start = StartSource::Theta(match method == Method::rls() {
         true => vec![0.0; 4],
         false => RPEM_START.to_vec(),
     });
@@ -253,17 +260,17 @@ pub fn traced(method: Method) -> TrackOptions {
         ..TrackOptions::new(method, structure, structure.operator_orders(NK))
     };
     options
-        .with(&[("memory", &MEMORY.to_string()), ("covariance", "0.1")])
+        .with(&[("memory", &MEMORY_SAMPLES.to_string()), ("covariance", "0.1")])
         .unwrap()
 }
 
 /// Result of a measurement: median time in s, and the last answer.
-trait Measured<T> {
-    fn map_answer<U>(self, map: impl FnOnce(T) -> U) -> (f64, U);
+trait Measurement<T> {
+    fn map_result<U>(self, map: impl FnOnce(T) -> U) -> (f64, U);
 }
 
-impl<T> Measured<T> for (f64, T) {
-    fn map_answer<U>(self, map: impl FnOnce(T) -> U) -> (f64, U) {
+impl<T> Measurement<T> for (f64, T) {
+    fn map_result<U>(self, map: impl FnOnce(T) -> U) -> (f64, U) {
         (self.0, map(self.1))
     }
 }
@@ -282,7 +289,7 @@ impl Default for Effort {
 }
 
 /// Runs the work once to warm up, and then at least as long and as often as the effort requires.
-fn median<T>(effort: Effort, mut work: impl FnMut() -> T) -> (f64, T) {
+fn measure_median<T>(effort: Effort, mut work: impl FnMut() -> T) -> (f64, T) {
     let start_time = Instant::now();
     let mut answer = black_box(work());
     let mut times = Vec::new();

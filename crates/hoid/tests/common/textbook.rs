@@ -31,8 +31,8 @@ pub struct Truth<'a> {
     pub f: &'a [f64],
 }
 
-const POLES: &[f64] = &[-1.5, 0.7];
-const GAINS: &[f64] = &[1.0, 0.5];
+const DENOMINATOR: &[f64] = &[-1.5, 0.7];
+const NUMERATOR: &[f64] = &[1.0, 0.5];
 
 impl Truth<'_> {
     /// Returns the system of a structure.
@@ -46,11 +46,11 @@ impl Truth<'_> {
         };
         let general = structure == Structure::General;
         Truth {
-            a: if general { &[-0.6] } else { keep('a', POLES) },
-            b: keep('b', GAINS),
+            a: if general { &[-0.6] } else { keep('a', DENOMINATOR) },
+            b: keep('b', NUMERATOR),
             c: keep('c', &[0.5]),
             d: keep('d', &[-0.8]),
-            f: keep('f', POLES),
+            f: keep('f', DENOMINATOR),
         }
     }
 
@@ -96,10 +96,10 @@ impl Truth<'_> {
             let t = u.len();
             u.push(w[t] + v[t] - past(&u, self.a, 1));
         }
-        let ts = SampleTime::HUNDREDTH;
+        let ts = SampleTime::AT_100_HZ;
         let output = Channel::new("u", "deg", u.split_off(run_in));
         if self.b.is_empty() {
-            Record::of_output(ts, output).unwrap()
+            Record::from_output(ts, output).unwrap()
         } else {
             Record::new(ts, Channel::new("e", "deg", e.split_off(run_in)), output).unwrap()
         }

@@ -11,21 +11,21 @@
 use hoid_model::Complex64;
 
 use super::super::{
-    entrant::{ReportedResponse, Task, of_complex},
+    entrant::{ReportedResponse, Task, complex_covariance},
     noise::levinson,
     operator::{Canonical, Operator, hold},
 };
 
 /// Number of regression coefficients: three gains and a constant.
-pub(super) const GAINS: usize = 4;
+pub(super) const GAIN_COUNT: usize = 4;
 /// Vector with one element for each regression coefficient; `Square` is the corresponding square matrix.
-pub(super) type Gains = [f64; GAINS];
-pub(super) type Square = [[f64; GAINS]; GAINS];
+pub(super) type Gains = [f64; GAIN_COUNT];
+pub(super) type Square = [[f64; GAIN_COUNT]; GAIN_COUNT];
 
 /// Order of the noise model.
-const ORDER: usize = 16;
+const NOISE_ORDER: usize = 16;
 /// Smallest sampling rate of the decimated signals, Hz.
-const RATE_HZ: f64 = 50.0;
+const MIN_RATE_HZ: f64 = 50.0;
 /// Time omitted at the start, because the filters start at rest, s.
 const SETTLING_S: f64 = 5.0;
 /// Limit of the residuals in the start span, standard deviations.
@@ -45,7 +45,7 @@ const NOMINAL: Operator = Operator {
 
 /// A sample after the whitening filter.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct White {
+pub(super) struct WhitenedSample {
     pub t_s: f64,
     pub x: Gains,
     pub y: f64,
@@ -55,8 +55,8 @@ pub(super) struct White {
 
 /// The whole run after the whitening filter, with the estimate from the start span.
 #[derive(Debug)]
-pub(super) struct Whitened {
-    pub samples: Vec<White>,
+pub(super) struct WhitenedRun {
+    pub samples: Vec<WhitenedSample>,
     /// Sample time of the decimated signals, s.
     pub every_s: f64,
     /// Gains from the start span; `covariance` is their covariance and `variance` the variance of the innovations.
@@ -68,7 +68,7 @@ pub(super) struct Whitened {
 }
 
 /// One decimated sample: time, regressors and u.
-struct Plain {
+struct DecimatedSample {
     t_s: f64,
     x: Gains,
     u: f64,
@@ -77,19 +77,19 @@ struct Plain {
 
 /// # Errors
 /// The reason, if the start span does not determine the gains.
-pub(super) fn whitened(task: &Task) -> Result<Whitened, String> {
+pub(super) fn whiten_run(task: &Task) -> Result<WhitenedRun, String> {
     let plain = regressors(task);
-    let thin = thinning(task);
+    let thin = decimation_factor(task);
     let every_s = thin as f64 * task.sample_time.s();
     let from = task.start_s.0 + SETTLING_S;
-    let in_start: Vec<usize> = (ORDER..plain.len())
+    let in_start: Vec<usize> = (NOISE_ORDER..plain.len())
         .filter(|i| !plain[*i].is_history && plain[*i].t_s >= from && plain[*i].t_s < task.start_s.1)
         .collect();
-    let mut a = vec![0.0; ORDER + 1];
+    let mut a = vec![0.0; NOISE_ORDER + 1];
     a[0] = 1.0;
     let mut fit = None;
     for round in 0..3 {
-        let white: Vec<White> = in_start
+        let white: Vec<WhitenedSample> = in_start
             .iter()
             .map(|i| at(&plain, *i, &a))
             .filter(|w| !w.is_void)
@@ -111,7 +111,7 @@ pub(super) fn whitened(task: &Task) -> Result<Whitened, String> {
     let values: Vec<f64> = in_start.iter().map(|i| plain[*i].u).collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let square = values.iter().map(|u| (u - mean).powi(2)).sum::<f64>() / values.len() as f64;
-    Ok(Whitened {
+    Ok(WhitenedRun {
         samples: (0..plain.len()).map(|i| at(&plain, i, &a)).collect(),
         every_s,
         size_u: square.sqrt(),
@@ -119,13 +119,13 @@ pub(super) fn whitened(task: &Task) -> Result<Whitened, String> {
     })
 }
 
-fn thinning(task: &Task) -> usize {
-    (1.0 / (task.sample_time.s() * RATE_HZ) + 1e-6).floor().max(1.0) as usize
+fn decimation_factor(task: &Task) -> usize {
+    (1.0 / (task.sample_time.s() * MIN_RATE_HZ) + 1e-6).floor().max(1.0) as usize
 }
 
-fn regressors(task: &Task) -> Vec<Plain> {
+fn regressors(task: &Task) -> Vec<DecimatedSample> {
     let ts = task.sample_time.s();
-    let thin = thinning(task);
+    let thin = decimation_factor(task);
     // Number of integration steps of at most 5 ms within a sample.
     let steps = (ts / 0.005 - 1e-9).ceil().max(1.0) as usize;
     let h = ts / steps as f64;
@@ -138,7 +138,7 @@ fn regressors(task: &Task) -> Vec<Plain> {
         }
         errors.push(last);
         if count % thin == 0 {
-            plain.push(Plain {
+            plain.push(DecimatedSample {
                 t_s: k.map_or(f64::NAN, |k| task.time_s(k)),
                 x: [state.x[0], state.x[1], state.x[2], 1.0],
                 u: if e.is_finite() { u } else { f64::NAN },
@@ -157,12 +157,12 @@ fn regressors(task: &Task) -> Vec<Plain> {
 }
 
 /// Returns a sample after the whitening filter `1 + a_1 q^-1 + ...`.
-fn at(plain: &[Plain], i: usize, a: &[f64]) -> White {
+fn at(plain: &[DecimatedSample], i: usize, a: &[f64]) -> WhitenedSample {
     let own = &plain[i];
-    let is_void = i < ORDER || own.is_history || plain[i - ORDER..=i].iter().any(|p| !p.u.is_finite());
-    let mut white = White {
+    let is_void = i < NOISE_ORDER || own.is_history || plain[i - NOISE_ORDER..=i].iter().any(|p| !p.u.is_finite());
+    let mut white = WhitenedSample {
         t_s: own.t_s,
-        x: [0.0; GAINS],
+        x: [0.0; GAIN_COUNT],
         y: 0.0,
         is_void,
     };
@@ -179,13 +179,13 @@ fn at(plain: &[Plain], i: usize, a: &[f64]) -> White {
 fn autocovariance(values: &[f64]) -> Vec<f64> {
     let n = values.len() as f64;
     let of = |lag: usize| values[lag..].iter().zip(values).map(|(a, b)| a * b).sum::<f64>() / n;
-    let mut all: Vec<f64> = (0..=ORDER).map(of).collect();
+    let mut all: Vec<f64> = (0..=NOISE_ORDER).map(of).collect();
     all[0] *= 1.0 + 1e-9;
     all
 }
 
 /// Solves the regression by least squares, with outliers limited in a second pass.
-fn least_squares(white: &[White]) -> Result<Whitened, String> {
+fn least_squares(white: &[WhitenedSample]) -> Result<WhitenedRun, String> {
     let mut sums = Sums::default();
     white.iter().for_each(|w| sums.add(&w.x, w.y));
     let first = sums.solve()?;
@@ -195,12 +195,12 @@ fn least_squares(white: &[White]) -> Result<Whitened, String> {
         let expected = product(&w.x, &first.theta);
         limited.add(&w.x, expected + (w.y - expected).clamp(-bound, bound));
     }
-    let Solved {
+    let Solution {
         theta,
         covariance,
         variance,
     } = limited.solve()?;
-    Ok(Whitened {
+    Ok(WhitenedRun {
         samples: Vec::new(),
         every_s: 0.0,
         theta,
@@ -221,7 +221,7 @@ pub(super) struct Sums {
 
 /// Solution of a regression.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Solved {
+pub(super) struct Solution {
     pub theta: Gains,
     pub covariance: Square,
     pub variance: f64,
@@ -238,8 +238,8 @@ impl Sums {
     }
 
     pub fn join(&mut self, other: &Self) {
-        for i in 0..GAINS {
-            for j in 0..GAINS {
+        for i in 0..GAIN_COUNT {
+            for j in 0..GAIN_COUNT {
                 self.xx[i][j] += other.xx[i][j];
             }
             self.xy[i] += other.xy[i];
@@ -250,15 +250,15 @@ impl Sums {
 
     /// # Errors
     /// The reason, if the gains are not determined.
-    pub fn solve(&self) -> Result<Solved, String> {
+    pub fn solve(&self) -> Result<Solution, String> {
         let inverse = inverse(&self.xx).ok_or("the gains are not determined")?;
         let theta: Gains = std::array::from_fn(|i| product(&inverse[i], &self.xy));
         let left = self.yy - product(&theta, &self.xy);
-        let variance = left.max(1e-12 * self.yy) / (self.n - GAINS as f64).max(1.0);
-        if !(variance.is_finite() && self.n > 2.0 * GAINS as f64) {
+        let variance = left.max(1e-12 * self.yy) / (self.n - GAIN_COUNT as f64).max(1.0);
+        if !(variance.is_finite() && self.n > 2.0 * GAIN_COUNT as f64) {
             return Err("too few samples for the gains".to_owned());
         }
-        Ok(Solved {
+        Ok(Solution {
             theta,
             covariance: inverse.map(|row| row.map(|c| c * variance)),
             variance,
@@ -276,8 +276,8 @@ fn inverse(matrix: &Square) -> Option<Square> {
     if scale.iter().any(|s| !(s.is_finite() && *s > 0.0)) {
         return None;
     }
-    let mut l = [[0.0; GAINS]; GAINS];
-    for i in 0..GAINS {
+    let mut l = [[0.0; GAIN_COUNT]; GAIN_COUNT];
+    for i in 0..GAIN_COUNT {
         for j in 0..=i {
             let known: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
             let own = matrix[i][j] / (scale[i] * scale[j]) - known;
@@ -288,27 +288,27 @@ fn inverse(matrix: &Square) -> Option<Square> {
             };
         }
     }
-    let mut of_l = [[0.0; GAINS]; GAINS];
-    for j in 0..GAINS {
-        for i in j..GAINS {
+    let mut of_l = [[0.0; GAIN_COUNT]; GAIN_COUNT];
+    for j in 0..GAIN_COUNT {
+        for i in j..GAIN_COUNT {
             let known: f64 = (j..i).map(|k| l[i][k] * of_l[k][j]).sum();
             of_l[i][j] = (if i == j { 1.0 } else { 0.0 } - known) / l[i][i];
         }
     }
     Some(std::array::from_fn(|i| {
-        std::array::from_fn(|j| (0..GAINS).map(|k| of_l[k][i] * of_l[k][j]).sum::<f64>() / (scale[i] * scale[j]))
+        std::array::from_fn(|j| (0..GAIN_COUNT).map(|k| of_l[k][i] * of_l[k][j]).sum::<f64>() / (scale[i] * scale[j]))
     }))
 }
 
 /// Returns the response of each regressor at a frequency, including the hold; zero for the constant.
-pub(super) fn regressor_responses(task: &Task, omega_rad_s: f64) -> [Complex64; GAINS] {
+pub(super) fn regressor_responses(task: &Task, omega_rad_s: f64) -> [Complex64; GAIN_COUNT] {
     let common = NOMINAL.response(omega_rad_s) * hold(omega_rad_s, task.sample_time);
     let s = Complex64::new(0.0, omega_rad_s);
     [common, common * s, common * s * s, Complex64::from(0.0)]
 }
 
 /// Returns the estimate of the response that corresponds to the gains.
-pub(super) fn reported(task: &Task, theta: &Gains, covariance: &Square) -> ReportedResponse {
+pub(super) fn reported_response(task: &Task, theta: &Gains, covariance: &Square) -> ReportedResponse {
     let covariance: Vec<f64> = covariance.iter().flatten().copied().collect();
     let each: Vec<_> = task
         .lines_rad_s
@@ -320,7 +320,7 @@ pub(super) fn reported(task: &Task, theta: &Gains, covariance: &Square) -> Repor
             .iter()
             .map(|g| g.iter().zip(theta).map(|(g, t)| g * t).sum())
             .collect(),
-        covariance: Some(each.iter().map(|g| of_complex(g, &covariance)).collect()),
+        covariance: Some(each.iter().map(|g| complex_covariance(g, &covariance)).collect()),
         parameters: Vec::new(),
     }
 }
@@ -335,13 +335,13 @@ mod tests {
             std::array::from_fn(|j| 10f64.powi((i + j) as i32) * if i == j { 2.0 } else { 0.5 })
         });
         let b = inverse(&a).unwrap();
-        for i in 0..GAINS {
-            for j in 0..GAINS {
-                let sum: f64 = (0..GAINS).map(|k| a[i][k] * b[k][j]).sum();
+        for i in 0..GAIN_COUNT {
+            for j in 0..GAIN_COUNT {
+                let sum: f64 = (0..GAIN_COUNT).map(|k| a[i][k] * b[k][j]).sum();
                 let expected = if i == j { 1.0 } else { 0.0 };
                 assert!((sum - expected).abs() < 1e-9, "{i} {j} {sum}");
             }
         }
-        assert!(inverse(&[[1.0; GAINS]; GAINS]).is_none());
+        assert!(inverse(&[[1.0; GAIN_COUNT]; GAIN_COUNT]).is_none());
     }
 }

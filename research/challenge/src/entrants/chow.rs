@@ -13,8 +13,8 @@ use std::collections::VecDeque;
 use hoid_model::Complex64;
 
 use super::{
-    super::entrant::{Alarm, Entrant, EntrantResult, Task, of_complex},
-    basis::{Solved, Square, Sums, product, regressor_responses, reported, whitened},
+    super::entrant::{Alarm, Entrant, EntrantResult, Task, complex_covariance},
+    basis::{Solution, Square, Sums, product, regressor_responses, reported_response, whiten_run},
 };
 
 /// Length of a block, s. `PRESENT_BLOCKS` and `PAST_BLOCKS` are the numbers of blocks in the present and the past, and
@@ -25,17 +25,17 @@ const PAST_BLOCKS: usize = 160;
 const MIN_PAST_BLOCKS: usize = 24;
 /// Number of blocks before an alarm that are kept.
 const KEPT_BLOCKS: usize = 12;
-const AT_RAD_S: f64 = 2.5;
+const TEST_OMEGA_RAD_S: f64 = 2.5;
 const RESIDUAL_LIMIT: f64 = 3.5;
-/// Ratio of T to its level above which a change is declared, if it is exceeded in `PERSISTENCE` consecutive blocks. In
+/// Ratio of T to its level above which a change is declared, if it is exceeded in `PERSISTENCE_BLOCKS` consecutive blocks. In
 /// runs 2 to 5 of the cases without a change (open seeds; 1.8 h), which are not in any table, ratios of 6, 8, 12 and 25
 /// are exceeded 32, 15, 9 and 5 times; without the cases with a missing and a silent span, 21, 5, 0 and 0 times.
 const THRESHOLD: f64 = 10.0;
-const PERSISTENCE: usize = 4;
+const PERSISTENCE_BLOCKS: usize = 4;
 /// Expectation of the logarithm of a chi-square variable with two degrees of freedom. The following constants are the
 /// prior of the level above it, the weight of this prior in blocks, the memory length of the mean in blocks, and the
 /// largest excess of a logarithm over the level.
-const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
+const MEAN_LOG_CHI_SQUARE: f64 = 0.115_931_515_658_412_45;
 const DEFAULT_LEVEL: f64 = 0.5;
 const PRIOR_WEIGHT: f64 = 10.0;
 const MAX_MEMORY_BLOCKS: f64 = 480.0;
@@ -49,21 +49,23 @@ impl Entrant for Chow {
     }
 
     fn follow(&self, task: &Task) -> Result<EntrantResult, String> {
-        let run = whitened(task)?;
-        let start = Solved {
+        let run = whiten_run(task)?;
+        let start = Solution {
             theta: run.theta,
             covariance: run.covariance,
             variance: run.variance,
         };
-        let gradient = regressor_responses(task, AT_RAD_S);
+        let gradient = regressor_responses(task, TEST_OMEGA_RAD_S);
         let per_block = (BLOCK_S / run.every_s).round() as usize;
         let (mut blocks, mut open) = (VecDeque::<Sums>::new(), Sums::default());
         let (mut before, mut whole, mut alarms) = (start, start, Vec::new());
-        let (mut level, mut levels, mut above) = (MEAN_LOG + DEFAULT_LEVEL, PRIOR_WEIGHT, 0);
+        let (mut level, mut levels, mut above) = (MEAN_LOG_CHI_SQUARE + DEFAULT_LEVEL, PRIOR_WEIGHT, 0);
         let mut answer = EntrantResult::default();
         for (i, sample) in run.samples.iter().enumerate() {
             while (task.asked_s.get(answer.estimates.len())).is_some_and(|t| *t < sample.t_s) {
-                answer.estimates.push(reported(task, &whole.theta, &whole.covariance));
+                answer
+                    .estimates
+                    .push(reported_response(task, &whole.theta, &whole.covariance));
             }
             if !sample.is_void {
                 let bound = RESIDUAL_LIMIT * before.variance.sqrt();
@@ -94,40 +96,40 @@ impl Entrant for Chow {
             };
             before = past;
             let t = distance(&gradient, &past, &now);
-            let relative = t / (level - MEAN_LOG).exp().max(1.0);
+            let relative = t / (level - MEAN_LOG_CHI_SQUARE).exp().max(1.0);
             levels = (levels + 1.0).min(MAX_MEMORY_BLOCKS);
             level += (t.max(0.05).ln().min(level + MAX_LOG_EXCESS) - level) / levels;
             above = if relative > THRESHOLD { above + 1 } else { 0 };
-            if above >= PERSISTENCE && sample.t_s >= task.start_s.1 {
+            if above >= PERSISTENCE_BLOCKS && sample.t_s >= task.start_s.1 {
                 above = 0;
                 alarms.push(Alarm {
                     t_s: sample.t_s,
                     of_remnant: false,
                 });
                 blocks.drain(..n - KEPT_BLOCKS);
-                if let Some(solved) = now_of(&blocks) {
+                if let Some(solved) = present_solution(&blocks) {
                     (before, whole) = (solved, solved);
                 }
             }
         }
-        answer
-            .estimates
-            .resize_with(task.asked_s.len(), || reported(task, &whole.theta, &whole.covariance));
+        answer.estimates.resize_with(task.asked_s.len(), || {
+            reported_response(task, &whole.theta, &whole.covariance)
+        });
         answer.alarms = Some(alarms);
         Ok(answer)
     }
 }
 
-fn now_of(blocks: &VecDeque<Sums>) -> Option<Solved> {
+fn present_solution(blocks: &VecDeque<Sums>) -> Option<Solution> {
     let mut sums = Sums::default();
     blocks.iter().for_each(|block| sums.join(block));
     sums.solve().ok()
 }
 
 /// Returns Wald's statistic for the difference between the responses.
-fn distance(gradient: &[Complex64], before: &Solved, now: &Solved) -> f64 {
+fn distance(gradient: &[Complex64], before: &Solution, now: &Solution) -> f64 {
     let flat = |c: &Square| c.iter().flatten().copied().collect::<Vec<f64>>();
-    let [a, b] = [before, now].map(|solved| of_complex(gradient, &flat(&solved.covariance)));
+    let [a, b] = [before, now].map(|solved| complex_covariance(gradient, &flat(&solved.covariance)));
     let [rr, ii, ri] = [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
     let d: Complex64 = (gradient.iter().zip(now.theta.iter().zip(&before.theta)))
         .map(|(g, (now, before))| g * (now - before))

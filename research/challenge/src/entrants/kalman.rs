@@ -7,11 +7,11 @@
 
 use super::{
     super::entrant::{Entrant, EntrantResult, Task},
-    basis::{GAINS, product, regressor_responses, reported, whitened},
+    basis::{GAIN_COUNT, product, regressor_responses, reported_response, whiten_run},
 };
 
-const DRIFT: f64 = 0.1;
-const DRIFT_AT_RAD_S: f64 = 2.0;
+const GAIN_DRIFT: f64 = 0.1;
+const DRIFT_OMEGA_RAD_S: f64 = 2.0;
 const RESIDUAL_LIMIT: f64 = 3.5;
 /// Memory length of the innovation variance, s.
 const MEMORY_S: f64 = 20.0;
@@ -24,37 +24,37 @@ impl Entrant for Kalman {
     }
 
     fn follow(&self, task: &Task) -> Result<EntrantResult, String> {
-        let run = whitened(task)?;
+        let run = whiten_run(task)?;
         let (mut theta, mut p, mut variance) = (run.theta, run.covariance, run.variance);
-        let worth = regressor_responses(task, DRIFT_AT_RAD_S);
+        let worth = regressor_responses(task, DRIFT_OMEGA_RAD_S);
         let response = worth
             .iter()
             .zip(&theta)
             .map(|(g, t)| g * t)
             .sum::<hoid_model::Complex64>();
-        let drift: [f64; GAINS] = std::array::from_fn(|i| match worth[i].norm() {
-            0.0 => (DRIFT * run.size_u).powi(2) * run.every_s,
-            size => (DRIFT * response.norm() / size).powi(2) * run.every_s,
+        let drift: [f64; GAIN_COUNT] = std::array::from_fn(|i| match worth[i].norm() {
+            0.0 => (GAIN_DRIFT * run.size_u).powi(2) * run.every_s,
+            size => (GAIN_DRIFT * response.norm() / size).powi(2) * run.every_s,
         });
         let forgets = 1.0 - (-run.every_s / MEMORY_S).exp();
         let mut answer = EntrantResult::default();
         for sample in &run.samples {
             while (task.asked_s.get(answer.estimates.len())).is_some_and(|t| *t < sample.t_s) {
-                answer.estimates.push(reported(task, &theta, &p));
+                answer.estimates.push(reported_response(task, &theta, &p));
             }
             if sample.is_void || sample.t_s < task.start_s.1 {
                 continue;
             }
-            (0..GAINS).for_each(|i| p[i][i] += drift[i]);
-            let px: [f64; GAINS] = std::array::from_fn(|i| product(&p[i], &sample.x));
+            (0..GAIN_COUNT).for_each(|i| p[i][i] += drift[i]);
+            let px: [f64; GAIN_COUNT] = std::array::from_fn(|i| product(&p[i], &sample.x));
             let expected = product(&px, &sample.x) + variance;
             let bound = RESIDUAL_LIMIT * expected.sqrt();
             let innovation = (sample.y - product(&theta, &sample.x)).clamp(-bound, bound);
-            for i in 0..GAINS {
+            for i in 0..GAIN_COUNT {
                 theta[i] += px[i] * innovation / expected;
             }
-            for i in 0..GAINS {
-                for j in 0..GAINS {
+            for i in 0..GAIN_COUNT {
+                for j in 0..GAIN_COUNT {
                     p[i][j] -= px[i] * px[j] / expected;
                 }
             }
@@ -62,7 +62,7 @@ impl Entrant for Kalman {
         }
         answer
             .estimates
-            .resize_with(task.asked_s.len(), || reported(task, &theta, &p));
+            .resize_with(task.asked_s.len(), || reported_response(task, &theta, &p));
         Ok(answer)
     }
 }

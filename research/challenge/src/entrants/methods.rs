@@ -8,7 +8,7 @@ use hoid_ident::{
     order_selection::{Criterion, default_operator_ranges},
 };
 use hoid_model::{Complex64, uncertainty::OperatorEstimate};
-use hoid_track::{Change, Method, Response, Sample, StartAt, TrackOptions, TrackPlan, Tracker, track};
+use hoid_track::{Change, Method, Response, Sample, StartSource, TrackOptions, TrackPlan, Tracker, track};
 
 use super::super::entrant::{Alarm, Entrant, EntrantResult, ReportedResponse, Task};
 
@@ -31,7 +31,7 @@ impl Entrant for MethodEntrant {
                 let rows = task.asked_s.iter().map(|t_s| row(t_s).min(trace.len() - 1));
                 let said = rows.map(|row| {
                     let each = (0..task.lines_rad_s.len()).map(|place| trace.response(row, place));
-                    reported(each.collect(), trace.operator(row).ok().as_ref())
+                    reported_response(each.collect(), trace.operator(row).ok().as_ref())
                 });
                 let verdict = trace.verdict(&record, None).map_err(|e| e.to_string())?;
                 Ok(EntrantResult {
@@ -40,7 +40,7 @@ impl Entrant for MethodEntrant {
                     findings: verdict.findings().iter().map(|f| f.kind.to_owned()).collect(),
                 })
             }
-            _ => over_samples(task, &options),
+            _ => track_samplewise(task, &options),
         }
     }
 }
@@ -48,7 +48,7 @@ impl Entrant for MethodEntrant {
 impl MethodEntrant {
     fn options(&self, task: &Task) -> Result<TrackOptions, String> {
         let with = |nk| TrackOptions {
-            start: StartAt::Span(Some(task.start_s)),
+            start: StartSource::Span(Some(task.start_s)),
             at_rad_s: task.lines_rad_s.clone(),
             ..TrackOptions::default_for(self.0.clone(), nk)
         };
@@ -71,17 +71,17 @@ impl MethodEntrant {
 fn alarms(changes: &[(f64, Change)]) -> Vec<Alarm> {
     let of = |(t_s, change): &(f64, Change)| Alarm {
         t_s: *t_s,
-        of_remnant: change.changed() == ["remnant"],
+        of_remnant: change.changed_quantities() == ["remnant"],
     };
     changes.iter().map(of).collect()
 }
 
 /// Tracks sample by sample, for data that a record cannot contain: missing samples, and the history of a second
 /// recording.
-fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, String> {
+fn track_samplewise(task: &Task, options: &TrackOptions) -> Result<EntrantResult, String> {
     let span = task.start_record().ok_or("the start span is not all there")?;
     let mut tracker = Tracker::new(options, Some(&span), task.sample_time).map_err(|e| e.to_string())?;
-    let moves_from = if options.method.covariance().is_none() && !options.method.starts_itself() {
+    let moves_from = if options.method.initial_covariance().is_none() && !options.method.is_self_starting() {
         task.start_s.1
     } else {
         f64::NEG_INFINITY
@@ -97,11 +97,11 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
         tracker.update(sample, t_s >= moves_from - task.sample_time.s() / 2.0);
         changes.extend(tracker.change().map(|change| (t_s, change)));
         // The last sample before the requested time, as in the rows of a trace.
-        while task.asked_s.get(next).is_some_and(|t| task.sample(*t) <= k + 1) {
+        while task.asked_s.get(next).is_some_and(|t| task.sample_index(*t) <= k + 1) {
             let each = task.lines_rad_s.iter().map(|omega| tracker.response(*omega));
             answer
                 .estimates
-                .push(reported(each.collect(), tracker.operator().ok().as_ref()));
+                .push(reported_response(each.collect(), tracker.operator().ok().as_ref()));
             next += 1;
         }
     }
@@ -110,7 +110,7 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
 }
 
 /// Returns the estimate at a time; it is empty if one of the responses is missing.
-fn reported(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -> ReportedResponse {
+fn reported_response(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -> ReportedResponse {
     let Some(responses) = responses else {
         return ReportedResponse::default();
     };
@@ -143,15 +143,15 @@ fn reported(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate
 mod tests {
     use super::*;
     use crate::{
-        RunOf, Seeds, cases,
-        measure::{EvaluationRun, posed_task},
+        CaseRun, Seeds, cases,
+        measure::{EvaluationRun, test_task},
     };
 
     fn task(name: &str) -> Task {
         let case = cases().into_iter().find(|case| case.name == name).unwrap();
-        posed_task(
+        test_task(
             &case,
-            RunOf {
+            CaseRun {
                 seeds: Seeds::Open,
                 number: 2,
             },
@@ -170,7 +170,7 @@ mod tests {
         ] {
             let own = MethodEntrant(method);
             let (over_record, options) = (own.follow(&task).unwrap(), own.options(&task).unwrap());
-            let by_sample = over_samples(&task, &options).unwrap();
+            let by_sample = track_samplewise(&task, &options).unwrap();
             assert_eq!(over_record.alarms, by_sample.alarms, "{}", own.name());
             assert_eq!(over_record.estimates.len(), task.asked_s.len());
             for (a, b) in over_record.estimates.iter().zip(&by_sample.estimates) {
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn adaptive_converges_in_a_loop_with_a_small_margin() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();
-        let of = RunOf {
+        let of = CaseRun {
             seeds: Seeds::Open,
             number: 1,
         };

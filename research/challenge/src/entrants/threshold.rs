@@ -6,8 +6,8 @@ use hoid_track::ErrorThreshold;
 
 use super::super::entrant::{Alarm, Entrant, EntrantResult, ReportedResponse, Task};
 
-const DEVIATIONS: f64 = 3.0;
-const SILENT_S: f64 = 8.0;
+const THRESHOLD_DEVIATIONS: f64 = 3.0;
+const MIN_ALARM_INTERVAL_S: f64 = 8.0;
 
 pub(super) struct Threshold;
 
@@ -25,8 +25,8 @@ impl Entrant for Threshold {
             let Some(t_s) = k.map(|k| task.time_s(k)).filter(|t| *t >= task.start_s.1) else {
                 continue;
             };
-            let silent = alarms.last().is_some_and(|last| t_s < last.t_s + SILENT_S);
-            if distance > DEVIATIONS && !silent {
+            let silent = alarms.last().is_some_and(|last| t_s < last.t_s + MIN_ALARM_INTERVAL_S);
+            if distance > THRESHOLD_DEVIATIONS && !silent {
                 alarms.push(Alarm { t_s, of_remnant: false });
             }
         }

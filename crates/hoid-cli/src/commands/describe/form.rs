@@ -1,6 +1,6 @@
 //! Text output of `hoid describe`.
 
-use hoid::analysis::Described;
+use hoid::analysis::DescribingFunctionResult;
 use hoid::ident::frequency::Realisation;
 use hoid::model::{ContinuousTransferFunction, uncertainty::Estimate};
 use hoid::report::numbers;
@@ -8,12 +8,12 @@ use hoid::report::numbers;
 use crate::text;
 
 /// A describing function to display, with the controlled element if one was given.
-pub struct Shown<'a> {
-    pub described: &'a Described,
+pub struct DescriptionReport<'a> {
+    pub described: &'a DescribingFunctionResult,
     pub element: Option<&'a ContinuousTransferFunction>,
 }
 
-impl Shown<'_> {
+impl DescriptionReport<'_> {
     /// Returns the heading in one line: the channels, the number of lines, and the runs or periods.
     pub fn title(&self) -> String {
         let (found, names) = (
@@ -27,7 +27,10 @@ impl Shown<'_> {
             }),
         );
         let (e, u) = names.unwrap_or_default();
-        let (n, period) = (found.function.runs.len(), numbers::plain(found.excitation.period_s()));
+        let (n, period) = (
+            found.function.runs.len(),
+            numbers::format_plain(found.excitation.period_s()),
+        );
         let periods = found.function.runs.first().map_or(1, |run| run.periods);
         let of = match (found.realisation, n) {
             (Realisation::Period, _) => format!("{n} periods of {period} s"),
@@ -43,7 +46,7 @@ impl Shown<'_> {
 
     /// Returns the page, with the verdict first; `verbose` adds all settings.
     pub fn page(&self, verbose: bool) -> String {
-        let Described { found, data, settings } = self.described;
+        let DescribingFunctionResult { found, data, settings } = self.described;
         let function = &found.function;
         let mut page = text::verdict(&found.verdict);
         let mut rows = text::table(&[
@@ -90,7 +93,7 @@ impl Shown<'_> {
         if verbose {
             page.push_str(&text::settings(settings));
         } else {
-            page.push_str(text::MORE_SETTINGS);
+            page.push_str(text::SETTINGS_HINT);
         }
         page
     }

@@ -2,12 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid::analysis::{Describing, without_offsets};
+use hoid::analysis::{DescribingFunctionOptions, without_offsets};
 use hoid::ident::frequency::DescriptionOptions;
 use hoid::report::figures;
 use serde_json::Value;
 
-use super::form::Shown;
+use super::form::DescriptionReport;
 use crate::{
     args::DescribeArgs,
     commands::{figure, output_paths, paper_table, reading},
@@ -27,8 +27,8 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         &[],
     )?;
     let (reading, offsets) = without_offsets(&reading::of(&args.read, Some(&args.mask), true)?);
-    let read = reading.files(&args.records, reading::report_problems)?;
-    let describing = Describing {
+    let read = reading.read_files(&args.records, reading::report_problems)?;
+    let describing = DescribingFunctionOptions {
         options: DescriptionOptions {
             excitation: args.excitation.clone(),
             lines_rad_s: args.lines.clone(),
@@ -42,7 +42,7 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         rate: args.read.prepare.rate.decimate,
     };
     let described = describing.run(read)?;
-    let shown = Shown {
+    let shown = DescriptionReport {
         described: &described,
         element: args.controlled_element.as_ref(),
     };
@@ -59,5 +59,5 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
     } else {
         output::show(&shown.page(args.show.verbose))?;
     }
-    CliError::of_verdict(&described.found.verdict)
+    CliError::check_verdict(&described.found.verdict)
 }

@@ -1,7 +1,7 @@
 //! Output for a finished group, as a page of text and as a JSON object.
 
 use hoid::ident::family::Parameter;
-use hoid::model::{Form, VerdictLevel, numbers::counted};
+use hoid::model::{Form, VerdictLevel, numbers::count_with_noun};
 use hoid::report::{PeopleTable, people_table};
 use hoid::study::group::{GroupSummary, Person, PersonChannel, RunFailure};
 use serde_json::{Map, Value, json};
@@ -9,14 +9,14 @@ use serde_json::{Map, Value, json};
 use crate::{json, text};
 
 /// A finished group with the files written for it.
-pub struct Finished<'a> {
+pub struct GroupReport<'a> {
     pub name: &'a str,
     pub summary: &'a GroupSummary,
     pub tables: Vec<String>,
     pub pages: Vec<String>,
 }
 
-impl Finished<'_> {
+impl GroupReport<'_> {
     /// Returns the page: failures and doubtful results, followed by the people.
     pub fn page(&self, verbose: bool) -> String {
         let GroupSummary {
@@ -39,8 +39,8 @@ impl Finished<'_> {
                 "\nOperators, each from all runs of a person in a condition\n{}\n{}\n\
                  Value \u{b1} standard error from the scatter between runs. Values that the data do not determine are \
                  in parentheses or are given as bounds (> is a 95 % limit). In brackets: Student's 95 % intervals.\n",
-                columns_of(&table, &in_loop),
-                columns_of(&table, &parameters),
+                format_columns(&table, &in_loop),
+                format_columns(&table, &parameters),
             ));
         }
         if verbose {
@@ -51,8 +51,8 @@ impl Finished<'_> {
         } else if let Some(first) = self.pages.first() {
             page.push_str(&format!(
                 "Report: {first}; {} and {} in the same directory, listed with -v.\n",
-                counted(self.pages.len() - 1, "page"),
-                counted(self.tables.len(), "table")
+                count_with_noun(self.pages.len() - 1, "page"),
+                count_with_noun(self.tables.len(), "table")
             ));
         }
         page
@@ -67,7 +67,7 @@ impl Finished<'_> {
             "verdict": json::verdict(&self.summary.verdict),
             "runs": self.summary.runs,
             "failures": self.summary.failures.iter().map(failure).collect::<Vec<_>>(),
-            "people": self.summary.people.iter().map(person).collect::<Vec<_>>(),
+            "people": self.summary.people.iter().map(person_json).collect::<Vec<_>>(),
             "tables": self.tables,
             "reports": self.pages,
         })
@@ -75,7 +75,7 @@ impl Finished<'_> {
 }
 
 /// Formats some columns of the table of people, since all columns would be too wide for a screen.
-fn columns_of(table: &PeopleTable, columns: &[usize]) -> String {
+fn format_columns(table: &PeopleTable, columns: &[usize]) -> String {
     let headings: Vec<&str> = columns.iter().map(|i| table.headings[*i].as_str()).collect();
     let mut rows = text::table(&headings);
     for cells in &table.rows {
@@ -84,7 +84,7 @@ fn columns_of(table: &PeopleTable, columns: &[usize]) -> String {
     rows.to_string()
 }
 
-fn person(p: &Person) -> Value {
+fn person_json(p: &Person) -> Value {
     let mut map = Map::new();
     let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
     set("subject", json!(p.subject));
@@ -99,17 +99,21 @@ fn person(p: &Person) -> Value {
         return Value::Object(map);
     };
     set("form", json!(p.form));
-    let parameters: Map<String, Value> = p.parameters.iter().map(|q| (q.name.clone(), parameter(q))).collect();
+    let parameters: Map<String, Value> = p
+        .parameters
+        .iter()
+        .map(|q| (q.name.clone(), parameter_json(q)))
+        .collect();
     set("parameters", Value::Object(parameters));
     if !p.channels.is_empty() {
-        set("channels", p.channels.iter().map(channel).collect());
+        set("channels", p.channels.iter().map(channel_json).collect());
     }
     if let (Some(crossover), Some(margin)) = (p.crossover_rad_s, p.phase_margin_deg) {
         set(
             "open_loop",
             json!({
-                "crossover_rad_s": json::estimate_within(&crossover, p.crossover_interval),
-                "phase_margin_deg": json::estimate_within(&margin, p.phase_margin_interval),
+                "crossover_rad_s": json::estimate_with_interval(&crossover, p.crossover_interval),
+                "phase_margin_deg": json::estimate_with_interval(&margin, p.phase_margin_interval),
             }),
         );
     }
@@ -125,8 +129,12 @@ fn person(p: &Person) -> Value {
 }
 
 /// Returns the response to a further input as a JSON object.
-fn channel(of: &PersonChannel) -> Value {
-    let parameters: Map<String, Value> = of.parameters.iter().map(|q| (q.name.clone(), parameter(q))).collect();
+fn channel_json(of: &PersonChannel) -> Value {
+    let parameters: Map<String, Value> = of
+        .parameters
+        .iter()
+        .map(|q| (q.name.clone(), parameter_json(q)))
+        .collect();
     json!({
         "input": of.name,
         "role": of.role.name(),
@@ -138,7 +146,7 @@ fn channel(of: &PersonChannel) -> Value {
 }
 
 /// Returns a parameter as a JSON object, in which an unbounded end of the interval is null.
-fn parameter(p: &Parameter) -> Value {
+fn parameter_json(p: &Parameter) -> Value {
     json!({
         "value": json::number(p.value),
         "standard_error": json::optional(p.standard_error),

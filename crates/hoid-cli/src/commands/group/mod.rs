@@ -13,12 +13,12 @@ use hoid::sim::people::{Population, Range};
 use hoid::study::{
     Outcome, RunOptions,
     group::{
-        ConditionElement, GroupSummary, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, commented,
-        inspect, run_group, simulate_group, simulate_people,
+        ConditionElement, GroupSummary, MANIFEST_FILE, Manifest, Pattern, PeopleExperiment, VirtualExperiment, inspect,
+        run_group, simulate_group, simulate_people, with_comments,
     },
 };
 
-use form::Finished;
+use form::GroupReport;
 
 use super::{figure, output_paths, paper_table, study::with_progress};
 use crate::{
@@ -28,7 +28,7 @@ use crate::{
 };
 
 /// Maximum number of reasons in the error message for a group without a result; the page contains all reasons.
-const REASONS_OF_EXIT: usize = 3;
+const MAX_LISTED_REASONS: usize = 3;
 
 pub fn run(args: &GroupArgs) -> Result<(), CliError> {
     match (&args.command, &args.run.manifest, &args.run.out) {
@@ -50,11 +50,11 @@ pub fn simulate(args: &SimulateGroupArgs) -> Result<(), CliError> {
         .subjects
         .saturating_mul(args.runs)
         .saturating_mul(conditions as u64);
-    let bar = output::progress(usize::try_from(total).unwrap_or(usize::MAX), "runs");
+    let bar = output::progress_bar(usize::try_from(total).unwrap_or(usize::MAX), "runs");
     let manifest = if args.people {
-        simulate_people(&people(args)?, &args.out, &|| bar.inc(1))
+        simulate_people(&people_experiment(args)?, &args.out, &|| bar.inc(1))
     } else {
-        simulate_group(&subjects(args), &args.out, &|| bar.inc(1))
+        simulate_group(&virtual_experiment(args), &args.out, &|| bar.inc(1))
     };
     bar.finish_and_clear();
     output::print(&format!(
@@ -66,7 +66,7 @@ pub fn simulate(args: &SimulateGroupArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-fn subjects(args: &SimulateGroupArgs) -> VirtualExperiment {
+fn virtual_experiment(args: &SimulateGroupArgs) -> VirtualExperiment {
     VirtualExperiment {
         subjects: args.subjects,
         conditions: args.conditions.clone(),
@@ -80,7 +80,7 @@ fn subjects(args: &SimulateGroupArgs) -> VirtualExperiment {
     }
 }
 
-fn people(args: &SimulateGroupArgs) -> Result<PeopleExperiment, CliError> {
+fn people_experiment(args: &SimulateGroupArgs) -> Result<PeopleExperiment, CliError> {
     let own = &args.people_options;
     let (low, high) = own.remnant_share;
     Ok(PeopleExperiment {
@@ -94,7 +94,7 @@ fn people(args: &SimulateGroupArgs) -> Result<PeopleExperiment, CliError> {
             remnant_share: Range::new(low, high),
             ..Population::default()
         },
-        sample_time: own.sample_time.map_or(Ok(SampleTime::SIXTIETH), SampleTime::new)?,
+        sample_time: own.sample_time.map_or(Ok(SampleTime::AT_60_HZ), SampleTime::new)?,
         seed: args.seed,
         defects: args.trouble.clone(),
     })
@@ -102,7 +102,7 @@ fn people(args: &SimulateGroupArgs) -> Result<PeopleExperiment, CliError> {
 
 fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     let pattern = Pattern::new(&args.pattern)?;
-    let path = args.out.clone().unwrap_or_else(|| args.directory.join(MANIFEST));
+    let path = args.out.clone().unwrap_or_else(|| args.directory.join(MANIFEST_FILE));
     let piped = path.as_os_str() == "-";
     if !piped && path.exists() {
         return Err(CliError::Usage(format!(
@@ -110,10 +110,10 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
             path.display()
         )));
     }
-    let (mut manifest, others) = Manifest::of_directory(&args.directory, &pattern)?;
+    let (mut manifest, others) = Manifest::from_directory(&args.directory, &pattern)?;
     let known = LookOptions {
         offset_samples: args.offset,
-        ..args.look.known()
+        ..args.look.to_options()
     };
     let evidence = inspect(&mut manifest, &args.directory, &known)?;
     ConditionElement::apply(&args.element, &mut manifest)
@@ -128,7 +128,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
             run.file = directory.join(&run.file);
         }
     }
-    let text = commented(&manifest.text(), &evidence);
+    let text = with_comments(&manifest.text(), &evidence);
     if piped {
         output::print(&text)?;
         return Ok(());
@@ -176,24 +176,24 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         csv: args.csv,
         ..RunOptions::default()
     };
-    let outcome = analysed(&manifest, path, out, &options)?;
+    let outcome = analyse_with_progress(&manifest, path, out, &options)?;
     let summary = GroupSummary::read(&manifest, out)?;
-    let pages = shown(&write_group_pages(&manifest, path, out)?);
+    let pages = path_texts(&write_group_pages(&manifest, path, out)?);
     if let Some(place) = &args.picture.figure {
-        draw(
+        write_figures(
             &group_figures(&manifest, out, args.picture.width)?,
             place,
             args.picture.width,
         )?;
     }
     let pooled = match args.pool {
-        true => Some(pooled::pooled(&manifest, &summary, out)?),
+        true => Some(pooled::write_pooled_estimates(&manifest, &summary, out)?),
         false => None,
     };
-    let finished = Finished {
+    let finished = GroupReport {
         name: &manifest.name,
         summary: &summary,
-        tables: shown(&outcome.tables),
+        tables: path_texts(&outcome.tables),
         pages,
     };
     paper_table::write(&args.show, || {
@@ -203,7 +203,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     if args.show.json {
         let mut object = finished.to_json();
         if let Some((populations, _)) = &pooled {
-            object["populations"] = pooled::objects(populations);
+            object["populations"] = pooled::populations_json(populations);
         }
         json::print(&object)?;
     } else {
@@ -211,14 +211,19 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         output::show(&format!("{}{of_all}", finished.page(args.show.verbose)))?;
     }
     if summary.verdict.level == VerdictLevel::NotDetermined {
-        let reasons: Vec<&str> = summary.verdict.reasons().take(REASONS_OF_EXIT).collect();
+        let reasons: Vec<&str> = summary.verdict.reasons().take(MAX_LISTED_REASONS).collect();
         return Err(CliError::NotDetermined(reasons.join("; ")));
     }
     Ok(())
 }
 
 /// Analyses the runs of a manifest, with a progress bar, and writes the results to a directory.
-pub fn analysed(manifest: &Manifest, path: &Path, out: &Path, options: &RunOptions) -> Result<Outcome, CliError> {
+pub fn analyse_with_progress(
+    manifest: &Manifest,
+    path: &Path,
+    out: &Path,
+    options: &RunOptions,
+) -> Result<Outcome, CliError> {
     let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
     let runs = manifest.runs.iter().filter(|run| run.counts).count();
     with_progress(&manifest.name, out, (runs, "runs"), |progress, should_continue| {
@@ -228,9 +233,9 @@ pub fn analysed(manifest: &Manifest, path: &Path, out: &Path, options: &RunOptio
 
 /// Writes one figure for each condition. With several conditions, the name of the condition is appended to the given
 /// file name.
-fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
+fn write_figures(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
     if figures.is_empty() {
-        output::notice(
+        output::add_notice(
             "",
             "no figure was written: it would show describing functions, but no condition in the manifest names its \
              excitation; add excitation to [conditions.NAME]"
@@ -240,7 +245,7 @@ fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Re
     for (condition, svg) in figures {
         let stem = place.file_stem().unwrap_or_default().to_string_lossy();
         let ending = place.extension().unwrap_or_default().to_string_lossy();
-        let of_condition = pooled::in_a_file_name(condition);
+        let of_condition = pooled::to_file_name(condition);
         let own = match figures.len() {
             1 => place.to_owned(),
             _ => place.with_file_name(format!("{stem}-{of_condition}.{ending}")),
@@ -250,6 +255,6 @@ fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Re
     Ok(())
 }
 
-fn shown(paths: &[PathBuf]) -> Vec<String> {
+fn path_texts(paths: &[PathBuf]) -> Vec<String> {
     paths.iter().map(|path| path.display().to_string()).collect()
 }

@@ -5,30 +5,30 @@ use std::path::{Path, PathBuf};
 
 use hoid::design::pool::{Population, pool, table};
 use hoid::ident::family::OperatorPrior;
-use hoid::model::numbers::{significant, with_uncertainty};
+use hoid::model::numbers::{format_significant, with_uncertainty};
 use hoid::study::group::{GroupSummary, Manifest};
 
 use serde_json::Value;
 
 use crate::{error::CliError, text};
 
-const TABLE: &str = "pooled.csv";
+const TABLE_FILE: &str = "pooled.csv";
 
 /// Computes the estimates with partial pooling and writes them to files. Returns the populations and the paths of the
 /// files.
-pub fn pooled(
+pub fn write_pooled_estimates(
     manifest: &Manifest,
     summary: &GroupSummary,
     out: &Path,
 ) -> Result<(Vec<Population>, Vec<PathBuf>), CliError> {
     let prior: OperatorPrior = manifest.analysis.prior.parse()?;
     let populations = pool(&summary.people, &prior);
-    let mut files = vec![out.join(TABLE)];
+    let mut files = vec![out.join(TABLE_FILE)];
     hoid::io::write_table(&files[0], &table(&populations))?;
     for population in &populations {
         let name = match populations.len() {
             1 => "population.json".to_owned(),
-            _ => format!("population-{}.json", in_a_file_name(&population.condition)),
+            _ => format!("population-{}.json", to_file_name(&population.condition)),
         };
         let text = format!("{:#}\n", population.json());
         let path = out.join(name);
@@ -39,12 +39,12 @@ pub fn pooled(
 }
 
 /// Converts the name of a condition for use in a file name.
-pub fn in_a_file_name(condition: &str) -> String {
+pub fn to_file_name(condition: &str) -> String {
     condition.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-' && c != '_', "-")
 }
 
 /// Returns the populations as JSON objects.
-pub fn objects(populations: &[Population]) -> Value {
+pub fn populations_json(populations: &[Population]) -> Value {
     populations.iter().map(Population::json).collect()
 }
 
@@ -72,7 +72,7 @@ pub fn page(populations: &[Population], files: &[PathBuf]) -> String {
                 rows.add_row([
                     once(population.condition.clone()),
                     once(parameter.name.clone()),
-                    once(significant(parameter.centre, 3)),
+                    once(format_significant(parameter.centre, 3)),
                     once(format!("{:.0} %", 100.0 * parameter.spread)),
                     person.subject.clone(),
                     person

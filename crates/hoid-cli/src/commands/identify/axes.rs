@@ -7,7 +7,7 @@ use super::{family_form::FamilyReport, request};
 use crate::{args::IdentifyArgs, commands::reading, error::CliError, json, output, text};
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
-    let ResolvedRequest::Operator(identification) = request::asked(args)? else {
+    let ResolvedRequest::Operator(identification) = request::resolve_request(args)? else {
         return Err(CliError::Usage(
             "--pair applies only to the structure operator, without --noise remnant or --change sigmoid".to_owned(),
         ));
@@ -23,10 +23,10 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
             "{option} requires a single axis; replace --pair with --input and --output"
         )));
     }
-    check_axes(&identification, &args.pair).map_err(CliError::of_options)?;
+    check_axes(&identification, &args.pair).map_err(CliError::from_options)?;
     let read = args.pair.iter().map(|pair| Ok((pair.clone(), recordings(args, pair)?)));
     let read = read.collect::<Result<Vec<_>, CliError>>()?;
-    let found = output::watched("fitting", || axes(&identification, read))?;
+    let found = output::run_with_spinner("fitting", || axes(&identification, read))?;
     if args.show.json {
         json::print(&Value::Object(axes_json(&found)?))?;
     } else {
@@ -34,7 +34,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     }
     let verdicts: Vec<_> = found
         .iter()
-        .map(|axis| CliError::of_verdict(&axis.identified.verdict))
+        .map(|axis| CliError::check_verdict(&axis.identified.verdict))
         .collect();
     // The command succeeds if the data determine the operator of at least one axis.
     if verdicts.iter().all(Result::is_err) {
@@ -48,7 +48,7 @@ fn recordings(args: &IdentifyArgs, pair: &AxisPair) -> Result<Recordings, CliErr
     let mut read = args.read.clone();
     read.inputs = vec![pair.input.clone()];
     read.output.clone_from(&pair.output);
-    Ok(reading::of(&read, Some(&args.mask), true)?.files(&args.records, reading::report_problems)?)
+    Ok(reading::of(&read, Some(&args.mask), true)?.read_files(&args.records, reading::report_problems)?)
 }
 
 fn page(args: &IdentifyArgs, identification: &Identification, all: &[Axis]) -> Result<String, CliError> {

@@ -1,6 +1,6 @@
 //! `hoid identify` by default: an operator of the family of operators.
 
-use hoid::analysis::{Identification, Identified, Recordings};
+use hoid::analysis::{Identification, IdentifiedModel, Recordings};
 use hoid::report::{Report, operator_figure, write_report};
 use serde_json::Value;
 
@@ -18,10 +18,10 @@ pub fn run(
     read: Recordings,
     other: Option<Recordings>,
 ) -> Result<(), CliError> {
-    let identified = output::watched("fitting", || identification.run(read))?;
+    let identified = output::run_with_spinner("fitting", || identification.run(read))?;
     let model = &identified.fit.operator(0).polynomial_fit;
     let validation = other.map(|other| identified.validated(model, other)).transpose()?;
-    let Identified { fit, data, .. } = &identified;
+    let IdentifiedModel { fit, data, .. } = &identified;
     let found = FamilyReport {
         identified: &identified,
         fit,
@@ -36,8 +36,8 @@ pub fn run(
         figure::write(path, &operator_figure(&identified), args.picture.width)?;
     }
     if let Some(directory) = &args.report {
-        let page = write_report(directory, &Report::of_operator(&identified).to_html()?)?;
-        output::notice("", format!("report: {}", page.display()));
+        let page = write_report(directory, &Report::from_operator_fit(&identified).to_html()?)?;
+        output::add_notice("", format!("report: {}", page.display()));
     }
     paper_table::write(&args.show, || Ok(identified.json()?))?;
     if args.show.json {
@@ -49,5 +49,5 @@ pub fn run(
     } else {
         output::show(&found.page(args.show.verbose)?)?;
     }
-    CliError::of_verdict(&fit.verdict)
+    CliError::check_verdict(&fit.verdict)
 }

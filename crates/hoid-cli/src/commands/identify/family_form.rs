@@ -1,28 +1,28 @@
 //! Text output for the operator of a person.
 
-use hoid::analysis::{Account, Identified, Setting};
+use hoid::analysis::{Account, IdentifiedModel, Setting};
 use hoid::ident::{
     ResponsePoint,
     family::{ChannelFit, ChannelRole, ClusterKind, FamilyFit, FormFigures, Intersample, LoopMeasures, Parameter},
     validation::GoodnessOfFit,
 };
 use hoid::model::{ContinuousTransferFunction, GainUnit, Record, uncertainty::Estimate};
-use hoid::report::{numbers, sentence_of_operator, undetermined};
+use hoid::report::{numbers, operator_sentence, undetermined_remark};
 
 use crate::{error::CliError, text};
 
 /// The delay for an error that is linear between its samples is printed in addition to tau_e only if the two delays
-/// differ by at least this number of standard errors of tau_e; `MIN_HALF_S` is the smallest such difference in s.
+/// differ by at least this number of standard errors of tau_e; `MIN_DIFFERENCE_S` is the smallest such difference in s.
 const MIN_DIFFERENCE_ERRORS: f64 = 2.0;
-const MIN_HALF_S: f64 = 0.007;
+const MIN_DIFFERENCE_S: f64 = 0.007;
 
 /// Frequencies in rad/s at which the product of the response to the target and the response of the controlled element
 /// is printed.
-const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
+const PRINTED_FREQUENCIES_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 
 /// An identified operator with all data of its page.
 pub struct FamilyReport<'a> {
-    pub identified: &'a Identified,
+    pub identified: &'a IdentifiedModel,
     pub fit: &'a FamilyFit,
     pub files: &'a [String],
     /// The records of the fit, with their means removed.
@@ -36,46 +36,49 @@ pub struct FamilyReport<'a> {
 impl FamilyReport<'_> {
     /// Returns the page; `verbose` adds details.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
-        let mut page = self.answer(verbose)?;
+        let mut page = self.summary(verbose)?;
         if !verbose {
-            page.push_str(text::MORE);
+            page.push_str(text::MORE_HINT);
             return Ok(page);
         }
-        page.push_str(&self.methods());
+        page.push_str(&self.method_table());
         if self.fit.forms.len() > 1 {
-            page.push_str(&format!("\n{}\n", forms(&self.fit.forms, self.fit.form.name())));
+            page.push_str(&format!("\n{}\n", form_table(&self.fit.forms, self.fit.form.name())));
         }
-        page.push_str(&self.about()?);
-        page.push_str(&text::levels(self.files, self.accounts));
+        page.push_str(&self.details()?);
+        page.push_str(&text::output_levels(self.files, self.accounts));
         page.push_str(&text::settings(self.settings));
         Ok(page)
     }
 
     /// Returns verdict, parameters with their intervals, loop, fit, and the records that were analysed.
-    fn answer(&self, verbose: bool) -> Result<String, CliError> {
+    fn summary(&self, verbose: bool) -> Result<String, CliError> {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
         let mut page = text::verdict(&fit.verdict);
         page.push_str(&self.fit.title());
         page.push('\n');
-        if let Some(words) = sentence_of_operator(self.identified) {
+        if let Some(words) = operator_sentence(self.identified) {
             page.push_str(&format!("{words}\n"));
         }
         for (k, of) in fit.operators.iter().enumerate() {
             if fit.operators.len() > 1 {
                 page.push_str(&format!("{}:\n", self.files[k]));
             }
-            page.push_str(&parameters(&of.parameters, &gain));
+            page.push_str(&parameter_table(&of.parameters, &gain));
             page.push('\n');
         }
         page.push_str(&self.intersample_sentence());
-        page.push_str(&self.channels(&gain, verbose));
+        page.push_str(&self.channel_responses(&gain, verbose));
         if let Some(element) = self.element {
             let here = fit.loop_measures(0, element);
-            page.push_str(&format!("Open loop with {element}: {}\n", measures(here.as_ref())));
+            page.push_str(&format!(
+                "Open loop with {element}: {}\n",
+                loop_measures_text(here.as_ref())
+            ));
             page.push_str(&text::loop_shape(&fit.loop_shape(0, element), verbose));
         }
-        page.push_str(&self.of_person());
+        page.push_str(&self.person_sentence());
         let quality = self.identified.quality()?;
         let coherence = fit.coherent_share;
         page.push_str(&format!(
@@ -101,19 +104,19 @@ impl FamilyReport<'_> {
     }
 
     /// Returns the responses to inputs other than the error.
-    fn channels(&self, gain: &GainUnit, verbose: bool) -> String {
+    fn channel_responses(&self, gain: &GainUnit, verbose: bool) -> String {
         let mut page = String::new();
         for channel in &self.fit.channels {
             let (name, role) = (&channel.name, channel.role);
             match &channel.response {
                 None => page.push_str(&format!(
                     "No response to {name} ({role}) was found ({} for the best of {} forms).\n",
-                    text::p_value(channel.p_value),
+                    text::format_p_value(channel.p_value),
                     channel.forms.len() - 1
                 )),
                 Some(of) => {
                     page.push_str(&format!("Response to {name} ({role}): {}\n", of.operator.form()));
-                    page.push_str(&parameters(&of.parameters, gain));
+                    page.push_str(&parameter_table(&of.parameters, gain));
                     page.push('\n');
                     page.push_str(&self.element_sentence(channel));
                 }
@@ -123,7 +126,7 @@ impl FamilyReport<'_> {
                 for form in &channel.forms {
                     rows.add_row([
                         form.form.map_or("no response", |form| form.name()).to_owned(),
-                        form.loss.map_or_else(String::new, numbers::plain),
+                        form.loss.map_or_else(String::new, numbers::format_plain),
                         form.criterion.map_or_else(String::new, |c| format!("{c:.1}")),
                     ]);
                 }
@@ -141,7 +144,7 @@ impl FamilyReport<'_> {
             return String::new();
         };
         let sampling = (self.fit.sample_time, self.fit.intersample);
-        let Some(points) = channel.frequency_response(&AT_RAD_S, sampling) else {
+        let Some(points) = channel.frequency_response(&PRINTED_FREQUENCIES_RAD_S, sampling) else {
             return String::new();
         };
         let one = |point: &ResponsePoint| {
@@ -155,7 +158,7 @@ impl FamilyReport<'_> {
                 .map(|db| gain * db * std::f64::consts::LN_10 / 20.0);
             format!(
                 "{} at {} rad/s ({phase:.0}{} deg)",
-                with_error(gain, of_gain),
+                value_with_error(gain, of_gain),
                 point.omega_rad_s,
                 error(point.phase_deg.standard_error)
             )
@@ -180,19 +183,19 @@ impl FamilyReport<'_> {
             };
         };
         let half = straight - tau.value;
-        if half < MIN_HALF_S || half < MIN_DIFFERENCE_ERRORS * tau.standard_error.unwrap_or(f64::INFINITY) {
+        if half < MIN_DIFFERENCE_S || half < MIN_DIFFERENCE_ERRORS * tau.standard_error.unwrap_or(f64::INFINITY) {
             return String::new();
         }
         format!(
             "tau_e applies to an error that is held between its samples; for an error logged from a faster or \
              continuous signal, tau_e is {} s (--intersample foh).\n",
-            text::significant(straight)
+            text::format_significant(straight)
         )
     }
 
     /// Returns a sentence with the standard errors for the person where they differ from those for the analysed runs;
     /// empty without run-to-run variation and for a fit with several operators.
-    fn of_person(&self) -> String {
+    fn person_sentence(&self) -> String {
         let fit = self.fit;
         if fit.run_to_run == 0.0 || fit.operators.len() > 1 {
             return String::new();
@@ -230,7 +233,7 @@ impl FamilyReport<'_> {
 
     /// Returns a table of the parameters by prediction error and by the other methods; empty if no other method gave a
     /// result.
-    fn methods(&self) -> String {
+    fn method_table(&self) -> String {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
         let lines = fit.lines.as_ref().map(|lines| lines.parameters());
@@ -249,11 +252,14 @@ impl FamilyReport<'_> {
         let mut rows = text::table(&heads);
         for (k, here) in fit.operator(0).parameters.iter().enumerate() {
             let other_values = others.iter().filter_map(|(_, of)| of.get(k));
-            let other_values = other_values.map(|(_, there)| with_error(there.value, there.standard_error));
+            let other_values = other_values.map(|(_, there)| value_with_error(there.value, there.standard_error));
             rows.add_row(
-                [named(here, &gain), with_error(here.value, here.standard_error)]
-                    .into_iter()
-                    .chain(other_values),
+                [
+                    name_with_unit(here, &gain),
+                    value_with_error(here.value, here.standard_error),
+                ]
+                .into_iter()
+                .chain(other_values),
             );
         }
         let mut page = format!("\n{rows}\n");
@@ -262,12 +268,15 @@ impl FamilyReport<'_> {
                 let at_lines = fit.loop_measures_at_lines(element);
                 page.push_str(&format!(
                     "Open loop from the fit at the lines: {}\n",
-                    measures(at_lines.as_ref())
+                    loop_measures_text(at_lines.as_ref())
                 ));
             }
             if fit.instrumental.as_ref().is_some_and(|i| i.termination.converged()) {
                 let by_instruments = fit.loop_measures_by_instruments(element);
-                page.push_str(&format!("Open loop by RIV-BJ: {}\n", measures(by_instruments.as_ref())));
+                page.push_str(&format!(
+                    "Open loop by RIV-BJ: {}\n",
+                    loop_measures_text(by_instruments.as_ref())
+                ));
             }
         }
         if let Some(lines) = &fit.lines {
@@ -283,33 +292,33 @@ impl FamilyReport<'_> {
             let pairs = agreement.pairs.iter().map(|pair| {
                 format!(
                     "{} and {} {}",
-                    pair.methods.0.words(),
-                    pair.methods.1.words(),
-                    text::p_value(pair.p_value)
+                    pair.methods.0.phrase(),
+                    pair.methods.1.phrase(),
+                    text::format_p_value(pair.p_value)
                 )
             });
             page.push_str(&format!(
                 "Agreement of the methods over {} that the data determine: {}; all together {}.\n",
-                numbers::counted(agreement.rows.len(), "coordinate"),
+                numbers::count_with_noun(agreement.rows.len(), "coordinate"),
                 pairs.collect::<Vec<_>>().join(", "),
-                text::p_value(agreement.p_value)
+                text::format_p_value(agreement.p_value)
             ));
         }
         page
     }
 
-    fn about(&self) -> Result<String, CliError> {
+    fn details(&self) -> Result<String, CliError> {
         let fit = self.fit;
         let mut page = String::from("\n");
         if let Some(free) = &fit.free_model {
             page.push_str(&format!(
                 "Box-Jenkins model of the same orders: loss {} (operator: {}), likelihood ratio {:.1} with {} degrees \
                  of freedom ({}).\n",
-                numbers::plain(free.loss),
-                numbers::plain(fit.loss),
+                numbers::format_plain(free.loss),
+                numbers::format_plain(fit.loss),
                 free.likelihood_ratio,
                 free.degrees_of_freedom,
-                text::p_value(free.p_value)
+                text::format_p_value(free.p_value)
             ));
         }
         let clusters = match fit.cluster_kind {
@@ -356,7 +365,7 @@ impl FamilyReport<'_> {
     }
 }
 
-fn named(p: &Parameter, gain: &GainUnit) -> String {
+fn name_with_unit(p: &Parameter, gain: &GainUnit) -> String {
     match gain.unit(&p.name, p.unit) {
         unit if unit.is_empty() => p.name.clone(),
         unit => format!("{} ({unit})", p.name),
@@ -365,7 +374,7 @@ fn named(p: &Parameter, gain: &GainUnit) -> String {
 
 /// Formats a value and its error with the digits that the error justifies; a value smaller than its error gets no
 /// spurious digits.
-fn with_error(value: f64, error: Option<f64>) -> String {
+fn value_with_error(value: f64, error: Option<f64>) -> String {
     match error {
         _ if value.is_infinite() => "infinite".to_owned(),
         Some(error) if error > value.abs() => "not known".to_owned(),
@@ -373,19 +382,19 @@ fn with_error(value: f64, error: Option<f64>) -> String {
             let (value, error) = numbers::with_uncertainty(value, error);
             format!("{value} ± {error}")
         }
-        None => numbers::plain(value),
+        None => numbers::format_plain(value),
     }
 }
 
 /// Formats parameters with their intervals, the share of the prior, and whether they are determined.
-fn parameters(of: &[Parameter], gain: &GainUnit) -> String {
+fn parameter_table(of: &[Parameter], gain: &GainUnit) -> String {
     let mut rows = text::table(&["parameter", "value", "95 % from", "to", "from prior"]);
     for p in of {
         let end = |v: f64| {
             if v.is_infinite() {
                 "open".to_owned()
             } else {
-                text::significant(v)
+                text::format_significant(v)
             }
         };
         let (low, high) = p
@@ -396,33 +405,37 @@ fn parameters(of: &[Parameter], gain: &GainUnit) -> String {
         } else {
             String::new()
         };
-        let value = match undetermined(p) {
-            "" => with_error(p.value, p.standard_error),
+        let value = match undetermined_remark(p) {
+            "" => value_with_error(p.value, p.standard_error),
             why => why.to_owned(),
         };
-        rows.add_row([named(p, gain), value, low, high, share]);
+        rows.add_row([name_with_unit(p, gain), value, low, high, share]);
     }
     rows.to_string()
 }
 
-fn measures(found: Option<&LoopMeasures>) -> String {
+fn loop_measures_text(found: Option<&LoopMeasures>) -> String {
     let Some(m) = found else {
         return "no crossover".to_owned();
     };
     let interval = |of: Option<(f64, f64)>| match of {
-        Some((low, high)) => format!(" (95 %: {} to {})", text::significant(low), text::significant(high)),
+        Some((low, high)) => format!(
+            " (95 %: {} to {})",
+            text::format_significant(low),
+            text::format_significant(high)
+        ),
         None => String::new(),
     };
     format!(
         "crossover {} rad/s{}, phase margin {} deg{}",
-        with_error(m.crossover_rad_s.value, m.crossover_rad_s.standard_error),
+        value_with_error(m.crossover_rad_s.value, m.crossover_rad_s.standard_error),
         interval(m.crossover_interval),
-        with_error(m.phase_margin_deg.value, m.phase_margin_deg.standard_error),
+        value_with_error(m.phase_margin_deg.value, m.phase_margin_deg.standard_error),
         interval(m.phase_margin_interval),
     )
 }
 
-fn forms(all: &[FormFigures], chosen: &str) -> String {
+fn form_table(all: &[FormFigures], chosen: &str) -> String {
     let mut rows = text::table(&[
         "form",
         "weight",
@@ -444,7 +457,7 @@ fn forms(all: &[FormFigures], chosen: &str) -> String {
             } else {
                 String::new()
             },
-            f.loss.map_or("none".to_owned(), numbers::plain),
+            f.loss.map_or("none".to_owned(), numbers::format_plain),
             f.criterion.map_or(String::new(), |c| format!("+{:.1}", c - least)),
             number(f.held_out),
             number(f.chi_squared),

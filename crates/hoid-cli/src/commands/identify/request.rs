@@ -6,15 +6,15 @@ use hoid::analysis::{Request, ResolvedRequest};
 
 use crate::{args::IdentifyArgs, error::CliError, output};
 
-/// Name of the option that gives the roles of inputs other than the error; `FEEDBACK` is the role of the error.
-pub const ROLE: &str = "role";
-const FEEDBACK: &str = "feedback";
+/// Name of the option that gives the roles of inputs other than the error; `FEEDBACK_ROLE` is the role of the error.
+pub const ROLE_OPTION: &str = "role";
+const FEEDBACK_ROLE: &str = "feedback";
 
 /// Returns the request after checking that the options are consistent.
 ///
 /// # Errors
 /// [`CliError::Usage`] if options are invalid or contradict each other.
-pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
+pub fn resolve_request(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
     let request = Request {
         structure: args.structure.clone(),
         method: Some(args.method.clone()),
@@ -22,11 +22,11 @@ pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
         faults: args.faults.faults,
         rate: args.read.prepare.rate.decimate,
     };
-    let (asked, notes) = request.resolve().map_err(CliError::of_options)?;
+    let (asked, notes) = request.resolve().map_err(CliError::from_options)?;
     for note in notes {
-        output::notice("", format!("note: {note}"));
+        output::add_notice("", format!("note: {note}"));
     }
-    match misplaced(args, &asked) {
+    match misplaced_option(args, &asked) {
         Some((option, with)) => Err(CliError::Usage(format!("{option} applies only to {with}"))),
         None => Ok(asked),
     }
@@ -37,19 +37,19 @@ pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
 /// # Errors
 /// [`CliError::Usage`] if an input other than the first has the role of the feedback.
 pub fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
-    let given = args.options.given();
+    let given = args.options.given_settings();
     let mut all: BTreeMap<String, String> = given.map(|(name, text)| (name.to_owned(), text.to_owned())).collect();
     let [first, further @ ..] = args.read.inputs.as_slice() else {
         return Ok(all);
     };
-    let typed = all.remove(ROLE).unwrap_or_default();
+    let typed = all.remove(ROLE_OPTION).unwrap_or_default();
     let mut roles: Vec<String> = Vec::new();
     for role in typed.split(',').map(str::trim).filter(|role| !role.is_empty()) {
         match role.split_once('=') {
-            Some((name, FEEDBACK)) if name == first => {}
-            Some((name, FEEDBACK)) => {
+            Some((name, FEEDBACK_ROLE)) if name == first => {}
+            Some((name, FEEDBACK_ROLE)) => {
                 return Err(CliError::Usage(format!(
-                    "--role {name}={FEEDBACK}: the first --input is the feedback, but it is {first}; give {name} first"
+                    "--role {name}={FEEDBACK_ROLE}: the first --input is the feedback, but it is {first}; give {name} first"
                 )));
             }
             _ => roles.push(role.to_owned()),
@@ -62,14 +62,14 @@ pub fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError
         }
     }
     if !roles.is_empty() {
-        all.insert(ROLE.to_owned(), roles.join(","));
+        all.insert(ROLE_OPTION.to_owned(), roles.join(","));
     }
     Ok(all)
 }
 
 /// Returns the first option of reading or writing that does not apply to the request, and the analysis to which that
 /// option does apply; `None` if all options apply.
-fn misplaced(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static str, &'static str)> {
+fn misplaced_option(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static str, &'static str)> {
     let changing = matches!(asked, ResolvedRequest::Change(_));
     let steady = "a model that does not change";
     let all = [

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use hoid::analysis::{
-    Excitation, Identified, PolynomialFit, Recordings, ResolvedRequest,
-    json::{BatchAnswer, PolynomialAnswer},
+    Excitation, IdentifiedModel, PolynomialFit, Recordings, ResolvedRequest,
+    json::{JsonFit, PolynomialResult},
 };
 use hoid::ident::{
     Choice, Fit, GreyBoxFit,
@@ -25,33 +25,33 @@ use crate::{
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     if let Some(structure) = several::structure(args) {
-        check_places(args)?;
+        check_paths(args)?;
         return several::run(args, structure);
     }
     if !args.pair.is_empty() {
         return axes::run(args);
     }
-    let asked = request::asked(args)?;
-    check_places(args)?;
+    let asked = request::resolve_request(args)?;
+    check_paths(args)?;
     paper_table::check(&args.show)?;
     if let Some(path) = &args.picture.figure {
         figure::check(path)?;
     }
     let first = args.read.with_one_input();
     let reading = reading::of(&first, Some(&args.mask), asked.has_input())?;
-    let read = reading.files(&args.records, reading::report_problems)?;
+    let read = reading.read_files(&args.records, reading::report_problems)?;
     let (rate, counts) = (args.read.prepare.rate.decimate, asked.counts_samples());
-    reading::report_kept_rate(read.kept_rate(rate, counts));
+    reading::report_kept_rate(read.kept_rate_message(rate, counts));
     // The validation file is read before anything is written, so an invalid file leaves no output.
     let other = args.validate.as_deref();
     let other = other
-        .map(|path| reading.file(path, reading::report_problems))
+        .map(|path| reading.read_file(path, reading::report_problems))
         .transpose()?;
     match asked {
         ResolvedRequest::Operator(identification) => family::run(args, &identification, read, other),
         ResolvedRequest::Change(identification) => sigmoid::run(args, &identification, read),
         ResolvedRequest::Remnant(identification) => {
-            let found = output::watched("fitting", || identification.run(read))?;
+            let found = output::run_with_spinner("fitting", || identification.run(read))?;
             show(
                 args,
                 &found,
@@ -61,7 +61,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
             )
         }
         ResolvedRequest::Polynomials(identification) => {
-            let found = output::watched("fitting", || identification.run(read))?;
+            let found = output::run_with_spinner("fitting", || identification.run(read))?;
             let PolynomialFit { fit, choice } = &found.fit;
             show(args, &found, fit, (choice.as_ref(), None), other)
         }
@@ -69,9 +69,9 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
 }
 
 /// Writes and prints the fit of a polynomial model.
-fn show<F: BatchAnswer>(
+fn show<F: JsonFit>(
     args: &IdentifyArgs,
-    found: &Identified<F>,
+    found: &IdentifiedModel<F>,
     fit: &Fit,
     (choice, grey_box): (Option<&Choice>, Option<&GreyBoxFit>),
     other: Option<Recordings>,
@@ -79,15 +79,15 @@ fn show<F: BatchAnswer>(
     let (data, verdict) = (&found.data, &found.verdict);
     let validation = other.map(|other| found.validated(fit, other)).transpose()?;
     let (records, with_input) = (&data.records, fit.model().structure().has_input());
-    let mut answer = PolynomialAnswer::of(found, fit)?;
+    let mut answer = PolynomialResult::of(found, fit)?;
     (answer.choice, answer.grey_box) = (choice, grey_box);
     if let Some(found) = &mut answer.remnant {
         *found = fit.remnant(args.remnant_discretisation);
     }
-    answer.ahead = args.horizon.map(|k| prediction_ahead(fit, records, k)).transpose()?;
+    answer.ahead = args.horizon.map(|k| prediction_quality(fit, records, k)).transpose()?;
     answer.validation = validation.as_ref().map(|v| (v.name.as_str(), v.quality));
     let pictured = with_input && (args.report.is_some() || args.picture.figure.is_some());
-    let described = pictured.then(|| description(args, data)).flatten();
+    let described = pictured.then(|| describing_function(args, data)).flatten();
     if let Some(path) = &args.picture.figure {
         figure::write(
             path,
@@ -111,10 +111,10 @@ fn show<F: BatchAnswer>(
                 parameters: Vec::new(),
             }),
             pictures: model_picture(fit, records, described.as_ref()).into_iter().collect(),
-            ..Report::of_identified(found)
+            ..Report::from_identified(found)
         };
         let page = write_report(directory, &report.to_html()?)?;
-        output::notice("", format!("report: {}", page.display()));
+        output::add_notice("", format!("report: {}", page.display()));
     }
     paper_table::write(&args.show, || Ok(answer.object()))?;
     if args.show.json {
@@ -122,19 +122,19 @@ fn show<F: BatchAnswer>(
     } else {
         output::show(&page(&answer, args.show.verbose))?;
     }
-    CliError::of_verdict(verdict)
+    CliError::check_verdict(verdict)
 }
 
 /// Returns the describing function of the records; `None` if they contain no recorded excitation or the computation
 /// fails.
-fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
-    data.described(&Excitation::default(), None, args.faults.faults)
+fn describing_function(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
+    data.describe(&Excitation::default(), None, args.faults.faults)
         .ok()
         .flatten()
 }
 
 /// Checks that outputs do not overwrite inputs, which may include the file of `--prior`.
-fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
+fn check_paths(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
     inputs.extend(args.validate.as_deref());
     inputs.extend(args.options.text("prior").map(Path::new));
@@ -150,7 +150,7 @@ fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
 }
 
 /// Returns k with the VAF and NRMSE of the prediction k samples ahead, over all records together.
-fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f64, f64), CliError> {
+fn prediction_quality(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f64, f64), CliError> {
     let (mut measured, mut predicted) = (Vec::new(), Vec::new());
     for record in records {
         let series = fit.predict_ahead(record, k)?;
@@ -161,7 +161,7 @@ fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f
 }
 
 /// Returns the result as a sentence.
-fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
+fn sentence(found: &PolynomialResult<'_>) -> Option<String> {
     let of = found.operator.as_ref().ok().filter(|_| found.has_operator());
     let named = of.iter().flat_map(|o| o.rows()).map(|(name, _, e)| (name, e.value));
     let margins = found.margins.as_ref();
@@ -173,18 +173,18 @@ fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
 }
 
 /// Returns the page; `verbose` adds details.
-fn page(found: &PolynomialAnswer<'_>, verbose: bool) -> String {
-    let mut page = answer(found);
+fn page(found: &PolynomialResult<'_>, verbose: bool) -> String {
+    let mut page = summary(found);
     if verbose {
         page.push_str(&details(found));
     } else {
-        page.push_str(text::MORE);
+        page.push_str(text::MORE_HINT);
     }
     page
 }
 
 /// Returns verdict, parameters with their intervals, fit, and the records that were analysed.
-fn answer(found: &PolynomialAnswer<'_>) -> String {
+fn summary(found: &PolynomialResult<'_>) -> String {
     let fit = found.fit;
     let gain = found.records.first().map(GainUnit::of).unwrap_or_default();
     let mut page = text::verdict(found.verdict);
@@ -239,7 +239,7 @@ fn answer(found: &PolynomialAnswer<'_>) -> String {
 }
 
 /// Returns the candidates tried, coefficients, roots, residual tests and settings.
-fn details(found: &PolynomialAnswer<'_>) -> String {
+fn details(found: &PolynomialResult<'_>) -> String {
     let fit = found.fit;
     let mut page = "\n".to_owned();
     if let Some(choice) = found.choice {
@@ -260,7 +260,7 @@ fn details(found: &PolynomialAnswer<'_>) -> String {
     if fit.covariance().is_some() {
         page.push_str(&text::residual_tests(found.files, &found.validations));
     }
-    page.push_str(&text::levels(found.files, found.accounts));
+    page.push_str(&text::output_levels(found.files, found.accounts));
     page.push_str(&text::settings(found.settings));
     page
 }

@@ -1,6 +1,6 @@
 //! `hoid identify` for polynomial models with several inputs.
 
-use hoid::analysis::{Recordings, SeveralInputsResult, roles, several_inputs};
+use hoid::analysis::{Recordings, SeveralInputsResult, parse_roles, several_inputs};
 use hoid::model::Structure;
 use serde_json::Value;
 
@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Options that apply to models with several inputs.
-const OPTIONS: [&str; 3] = ["orders", "nk", "role"];
+const SUPPORTED_OPTIONS: [&str; 3] = ["orders", "nk", "role"];
 
 /// Returns the structure if a polynomial model with several inputs is requested.
 pub fn structure(args: &IdentifyArgs) -> Option<Structure> {
@@ -22,7 +22,11 @@ pub fn structure(args: &IdentifyArgs) -> Option<Structure> {
 }
 
 pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
-    if let Some((name, _)) = args.options.given().find(|(name, _)| !OPTIONS.contains(name)) {
+    if let Some((name, _)) = args
+        .options
+        .given_settings()
+        .find(|(name, _)| !SUPPORTED_OPTIONS.contains(name))
+    {
         return Err(CliError::Usage(format!(
             "--{} does not apply to polynomials with several inputs; drop it, and use only --orders, --nk and --role",
             name.replace('_', "-")
@@ -47,16 +51,16 @@ pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
         text("nk"),
         &args.read.inputs,
     )
-    .map_err(CliError::of_options)?;
+    .map_err(CliError::from_options)?;
     let typed = request::options(args)?;
-    let of_further = typed.get(request::ROLE).map_or("", String::as_str);
-    let roles = roles(&args.read.inputs[1..], of_further).map_err(CliError::of_options)?;
+    let of_further = typed.get(request::ROLE_OPTION).map_or("", String::as_str);
+    let roles = parse_roles(&args.read.inputs[1..], of_further).map_err(CliError::from_options)?;
     paper_table::check(&args.show)?;
     let first = args.read.with_one_input();
     let read: Recordings =
-        reading::of(&first, Some(&args.mask), true)?.files(&args.records, reading::report_problems)?;
+        reading::of(&first, Some(&args.mask), true)?.read_files(&args.records, reading::report_problems)?;
     let rate = args.read.prepare.rate.decimate;
-    let found = output::watched("fitting", || {
+    let found = output::run_with_spinner("fitting", || {
         SeveralInputsResult::of(&model, roles, read, args.faults.faults, rate)
     })?;
     paper_table::write(&args.show, || Ok(found.json()))?;
@@ -65,7 +69,7 @@ pub fn run(args: &IdentifyArgs, structure: Structure) -> Result<(), CliError> {
     } else {
         output::show(&page(&found))?;
     }
-    CliError::of_verdict(&found.verdict)
+    CliError::check_verdict(&found.verdict)
 }
 
 fn page(found: &SeveralInputsResult) -> String {
@@ -87,7 +91,7 @@ fn page(found: &SeveralInputsResult) -> String {
     page.push_str(&format!(
         "Fit: VAF of the prediction {:.2} %, loss {}, {} residuals. Search: {}.\n",
         fit.vaf_prediction,
-        hoid::report::numbers::plain(fit.loss),
+        hoid::report::numbers::format_plain(fit.loss),
         fit.residuals,
         fit.termination
     ));

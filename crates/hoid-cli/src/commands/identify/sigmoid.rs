@@ -1,12 +1,12 @@
 //! `hoid identify --change sigmoid`: an operator whose gains change once.
 
-use hoid::analysis::{Account, Identification, Identified, Recordings, Setting};
+use hoid::analysis::{Account, Identification, IdentifiedModel, Recordings, Setting};
 use hoid::ident::{
     SigmoidChange, SigmoidFit,
     validation::{LjungBox, whiteness},
 };
 use hoid::io::write_record;
-use hoid::model::numbers::counted;
+use hoid::model::numbers::count_with_noun;
 use hoid::model::{Channel, Form, GainUnit, Record, Verdict};
 use hoid::report::numbers;
 use serde_json::Value;
@@ -18,12 +18,12 @@ pub fn run(
     identification: &Identification<SigmoidChange>,
     read: Recordings,
 ) -> Result<(), CliError> {
-    let identified = output::watched("fitting", || identification.run(read))?;
-    let Identified { fit, verdict, data, .. } = &identified;
+    let identified = output::run_with_spinner("fitting", || identification.run(read))?;
+    let IdentifiedModel { fit, verdict, data, .. } = &identified;
     let records = data.records.as_slice();
     if let Some(path) = &args.trace {
         write_record(path, &trace(fit, &records[0])?)?;
-        output::message(&format!("trace of {}: {}", args.records[0].display(), path.display()));
+        output::print_message(&format!("trace of {}: {}", args.records[0].display(), path.display()));
     }
     let test = |record: &Record| Ok(whiteness(&fit.residuals(record)?.values, fit.d().len()));
     let tests = records
@@ -45,7 +45,7 @@ pub fn run(
     } else {
         output::show(&found.page(args.show.verbose))?;
     }
-    CliError::of_verdict(verdict)
+    CliError::check_verdict(verdict)
 }
 
 /// Returns the changing parameters at each sample of a record, each with its standard error if that is known at all
@@ -61,7 +61,7 @@ fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
         let error = errors.map(|errors| Channel::new(format!("{}_se", of.name), of.unit, errors));
         for channel in [Some(value), error].into_iter().flatten() {
             trace = Some(match trace {
-                None => Record::of_output(record.sample_time(), channel)?.starting_at(record.time_s(0)),
+                None => Record::from_output(record.sample_time(), channel)?.starting_at(record.time_s(0)),
                 Some(trace) => trace.with_channel(channel)?,
             });
         }
@@ -71,7 +71,7 @@ fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
 }
 
 /// Returns the table of the operator's parameters before and after the change.
-fn before_and_after(fit: &SigmoidFit) -> String {
+fn before_after_table(fit: &SigmoidFit) -> String {
     let mut rows = text::table(&["parameter", "before the change", "", "after it", "", "unit"]);
     let (before, after) = (fit.initial_operator(), fit.last_operator());
     for (a, b) in before.parameters.iter().zip(&after.parameters) {
@@ -134,8 +134,8 @@ impl SigmoidReport<'_> {
         for (remark, names) in &remarks {
             page.push_str(&format!("{}: {remark}.\n", names.join(", ")));
         }
-        if fit.form() != Form::Lead && fit.change_found() {
-            page.push_str(&format!("{}\n", before_and_after(fit)));
+        if fit.form() != Form::Lead && fit.has_change() {
+            page.push_str(&format!("{}\n", before_after_table(fit)));
         }
         let interval = |name: &str, unit: &str, interval: Option<(f64, f64)>| {
             interval.map_or(String::new(), |(low, high)| {
@@ -152,26 +152,26 @@ impl SigmoidReport<'_> {
         if c.bic_difference > 0.0 { "lower" } else { "higher" },
         c.bic_difference.abs()
     ));
-        if !fit.change_found() {
+        if !fit.has_change() {
             page.push_str("The records show no change.\n");
         }
         page.push_str(&text::records(files, records, accounts, false));
         if !verbose {
-            page.push_str(text::MORE_CHANGE);
+            page.push_str(text::CHANGE_HINT);
             return page;
         }
         let t = fit.termination();
         page.push_str(&format!(
             "\nSearch: {}, {}, start: {}.\n",
             t.reason,
-            counted(t.iterations, "step"),
+            count_with_noun(t.iterations, "step"),
             fit.start()
         ));
         page.push_str(&format!(
             "Loss {} over {} residuals; innovation variance {}.\n",
-            numbers::plain(fit.loss()),
+            numbers::format_plain(fit.loss()),
             fit.residual_count(),
-            numbers::plain(fit.innovation_variance())
+            numbers::format_plain(fit.innovation_variance())
         ));
         // Residuals of the size of rounding errors contain no information.
         if fit.covariance().is_some() {

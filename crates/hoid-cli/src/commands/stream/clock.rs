@@ -5,14 +5,14 @@
 //! expected time.
 
 /// Gain with which the grid follows the times.
-const GAIN: f64 = 0.1;
+const GRID_GAIN: f64 = 0.1;
 /// Longest gap that is filled, s.
-pub const LONGEST_GAP_S: f64 = 10.0;
+pub const MAX_GAP_S: f64 = 10.0;
 /// Number of consecutive lines with earlier but increasing times after which the clock is assumed to have been set
 /// back.
 const SET_BACK_LINES: usize = 10;
 /// Number of samples by which the grid may be ahead of the times before this is reported.
-const MAX_LEAD_SAMPLES: f64 = 2.0;
+const MAX_ADVANCE_SAMPLES: f64 = 2.0;
 
 /// Number of lines over which the rate of the times is checked.
 const RATE_LINES: usize = 128;
@@ -22,7 +22,7 @@ const RATE_TOLERANCE: f64 = 0.05;
 /// Classification of a line by its time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
-    /// The next sample, after `missing` samples that must be filled in. If the gap is longer than [`LONGEST_GAP_S`],
+    /// The next sample, after `missing` samples that must be filled in. If the gap is longer than [`MAX_GAP_S`],
     /// `left_out` is true and `missing` is limited to that length.
     Sample { missing: usize, left_out: bool },
     /// A line whose time is not later than the time of the last line.
@@ -54,7 +54,7 @@ impl Clock {
     }
 
     /// Processes the time of a line.
-    pub fn take(&mut self, t: f64) -> Arrival {
+    pub fn classify(&mut self, t: f64) -> Arrival {
         let ts = self.sample_time_s;
         let next = Arrival::Sample {
             missing: 0,
@@ -82,7 +82,7 @@ impl Clock {
         }
         self.late = None;
         let steps = ((t - place) / ts).round().max(1.0);
-        let most = (LONGEST_GAP_S / ts).floor();
+        let most = (MAX_GAP_S / ts).floor();
         if steps - 1.0 > most {
             self.last = Some((t, t));
             return Arrival::Sample {
@@ -92,8 +92,8 @@ impl Clock {
         }
         let expected = place + steps * ts;
         self.steps.push(t - last_s);
-        self.too_fast |= expected - t > MAX_LEAD_SAMPLES * ts;
-        self.last = Some((expected + GAIN * (t - expected), t));
+        self.too_fast |= expected - t > MAX_ADVANCE_SAMPLES * ts;
+        self.last = Some((expected + GRID_GAIN * (t - expected), t));
         Arrival::Sample {
             missing: steps as usize - 1,
             left_out: false,
@@ -103,7 +103,7 @@ impl Clock {
     /// Returns the rate of the times in Hz if it differs from `--fs`. Called after each line, this function returns a
     /// value at most once in [`RATE_LINES`] lines. Both the median and the mean of the differences must deviate: the
     /// median is insensitive to single gaps, the mean to rounded times.
-    pub fn other_rate(&mut self) -> Option<f64> {
+    pub fn deviating_rate(&mut self) -> Option<f64> {
         if self.steps.len() < RATE_LINES {
             return None;
         }
@@ -115,9 +115,9 @@ impl Clock {
         (is_off(median) && is_off(mean)).then_some(1.0 / median)
     }
 
-    /// True, once, after the grid has run ahead of the times by more than [`MAX_LEAD_SAMPLES`] samples, because the
+    /// True, once, after the grid has run ahead of the times by more than [`MAX_ADVANCE_SAMPLES`] samples, because the
     /// times advance by less than the sample time per line.
-    pub fn too_fast(&mut self) -> bool {
+    pub fn grid_ran_ahead(&mut self) -> bool {
         std::mem::take(&mut self.too_fast)
     }
 }
@@ -126,8 +126,8 @@ impl Clock {
 mod tests {
     use super::*;
 
-    fn missing(clock: &mut Clock, t: f64) -> usize {
-        match clock.take(t) {
+    fn missing_samples(clock: &mut Clock, t: f64) -> usize {
+        match clock.classify(t) {
             Arrival::Sample { missing, .. } => missing,
             late => panic!("{t}: {late:?}"),
         }
@@ -140,38 +140,41 @@ mod tests {
             let k = f64::from(k);
             // A clock that is 0.1 % slow, with a jitter of 0.35 samples.
             let t = 0.010_01 * k + 0.0035 * (k * 2.3).sin();
-            assert_eq!(missing(&mut clock, t), 0, "{k}");
+            assert_eq!(missing_samples(&mut clock, t), 0, "{k}");
         }
         let mut clock = Clock::new(0.01);
         for (t, gap) in [(0.0, 0), (0.01, 0), (0.03, 1), (0.0401, 0), (0.14, 9), (9.14, 899)] {
-            assert_eq!(missing(&mut clock, t), gap, "{t}");
+            assert_eq!(missing_samples(&mut clock, t), gap, "{t}");
         }
         assert_eq!(
-            clock.take(100.0),
+            clock.classify(100.0),
             Arrival::Sample {
                 missing: 1000,
                 left_out: true
             }
         );
-        assert_eq!(missing(&mut clock, 100.01), 0);
-        assert!(!clock.too_fast());
+        assert_eq!(missing_samples(&mut clock, 100.01), 0);
+        assert!(!clock.grid_ran_ahead());
     }
 
     #[test]
     fn late_lines_are_dropped_until_the_clock_is_accepted() {
         let mut clock = Clock::new(0.01);
-        missing(&mut clock, 1.0);
+        missing_samples(&mut clock, 1.0);
         for t in [1.0, 0.5, 0.4, 1.0] {
-            assert_eq!(clock.take(t), Arrival::Behind { last_s: 1.0 });
+            assert_eq!(clock.classify(t), Arrival::Behind { last_s: 1.0 });
         }
-        assert_eq!(missing(&mut clock, 1.01), 0);
+        assert_eq!(missing_samples(&mut clock, 1.01), 0);
         // A single wrong time does not end the stream.
-        missing(&mut clock, 1e300);
+        missing_samples(&mut clock, 1e300);
         for k in 0..9 {
-            assert!(matches!(clock.take(1.02 + 0.01 * f64::from(k)), Arrival::Behind { .. }));
+            assert!(matches!(
+                clock.classify(1.02 + 0.01 * f64::from(k)),
+                Arrival::Behind { .. }
+            ));
         }
-        assert_eq!(missing(&mut clock, 1.11), 9);
-        assert_eq!(missing(&mut clock, 1.12), 0);
+        assert_eq!(missing_samples(&mut clock, 1.11), 9);
+        assert_eq!(missing_samples(&mut clock, 1.12), 0);
     }
 
     #[test]
@@ -179,8 +182,8 @@ mod tests {
         let rates = |t: &dyn Fn(f64) -> f64| -> Vec<f64> {
             let mut clock = Clock::new(0.01);
             let take = |k: u32| {
-                missing(&mut clock, t(f64::from(k)));
-                clock.other_rate()
+                missing_samples(&mut clock, t(f64::from(k)));
+                clock.deviating_rate()
             };
             (0..600).filter_map(take).collect()
         };
@@ -201,8 +204,8 @@ mod tests {
     fn too_fast_lines_are_detected() {
         let mut clock = Clock::new(0.01);
         for k in 0..200 {
-            assert_eq!(missing(&mut clock, 0.005 * f64::from(k)), 0);
+            assert_eq!(missing_samples(&mut clock, 0.005 * f64::from(k)), 0);
         }
-        assert!(clock.too_fast() && !clock.too_fast());
+        assert!(clock.grid_ran_ahead() && !clock.grid_ran_ahead());
     }
 }

@@ -29,8 +29,8 @@ use super::lines::StreamSample;
 
 const MAGIC: &[u8; 4] = b"hoid";
 /// Sizes of a sample and of an estimate, in bytes.
-const SAMPLE: usize = 40;
-const ESTIMATE: usize = 168;
+const SAMPLE_BYTES: usize = 40;
+const ESTIMATE_BYTES: usize = 168;
 
 /// Content of a datagram.
 #[derive(Debug, PartialEq)]
@@ -53,10 +53,10 @@ pub struct SampleDatagram {
 impl<'b> Datagram<'b> {
     pub fn of(bytes: &'b [u8]) -> Self {
         if let Some(rest) = bytes.strip_prefix(MAGIC) {
-            return match rest.first_chunk::<{ SAMPLE - 4 }>() {
-                Some(all) if rest.len() == SAMPLE - 4 => Self::Sample(SampleDatagram::of(all)),
+            return match rest.first_chunk::<{ SAMPLE_BYTES - 4 }>() {
+                Some(all) if rest.len() == SAMPLE_BYTES - 4 => Self::Sample(SampleDatagram::of(all)),
                 _ => Self::Unreadable(format!(
-                    "the datagram starts like a sample, but has {} bytes; expected {SAMPLE}",
+                    "the datagram starts like a sample, but has {} bytes; expected {SAMPLE_BYTES}",
                     bytes.len()
                 )),
             };
@@ -72,7 +72,7 @@ impl<'b> Datagram<'b> {
 }
 
 impl SampleDatagram {
-    fn of(bytes: &[u8; SAMPLE - 4]) -> Self {
+    fn of(bytes: &[u8; SAMPLE_BYTES - 4]) -> Self {
         let mut number = [0; 4];
         number.copy_from_slice(&bytes[..4]);
         let (numbers, _) = bytes[4..].as_chunks::<8>();
@@ -87,7 +87,7 @@ impl SampleDatagram {
     }
 
     /// Converts the sample to the form read from a line; an invalid value is NaN.
-    pub fn read(&self, sample_time: SampleTime, largest: f64) -> StreamSample {
+    pub fn to_sample(&self, sample_time: SampleTime, largest: f64) -> StreamSample {
         let sound = |v: f64| v.abs() <= largest;
         let fault = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));
         let faults: Vec<String> = [fault("e", self.e), fault("u", self.u)].into_iter().flatten().collect();
@@ -108,7 +108,7 @@ impl SampleDatagram {
 
 /// An estimate as a struct.
 pub struct EstimateDatagram {
-    bytes: [u8; ESTIMATE],
+    bytes: [u8; ESTIMATE_BYTES],
 }
 
 impl EstimateDatagram {
@@ -123,7 +123,7 @@ impl EstimateDatagram {
         let operator = tracker.map(|tracker| tracker.operator());
         let level = tracker
             .zip(operator.as_ref())
-            .map(|(tracker, operator)| tracker.level(operator));
+            .map(|(tracker, operator)| tracker.verdict_level(operator));
         let level = match level.unwrap_or(VerdictLevel::NotDetermined) {
             VerdictLevel::Trustworthy => 0_i32,
             VerdictLevel::Doubtful => 1,
@@ -146,13 +146,13 @@ impl EstimateDatagram {
         let numbers = std::iter::once(t.unwrap_or(f64::NAN))
             .chain(estimates.iter().chain(&of_loop).flat_map(pair))
             .chain([innovation.unwrap_or(f64::NAN), changed.unwrap_or(f64::NAN)]);
-        let mut all = Vec::with_capacity(ESTIMATE);
+        let mut all = Vec::with_capacity(ESTIMATE_BYTES);
         all.extend_from_slice(MAGIC);
         all.extend_from_slice(&sequence.to_le_bytes());
         all.extend(numbers.flat_map(f64::to_le_bytes));
         all.extend_from_slice(&level.to_le_bytes());
         all.extend_from_slice(&u32::from(tracker.is_some()).to_le_bytes());
-        let mut bytes = [0; ESTIMATE];
+        let mut bytes = [0; ESTIMATE_BYTES];
         bytes.copy_from_slice(&all);
         Self { bytes }
     }
@@ -177,7 +177,7 @@ mod tests {
     #[test]
     fn samples_are_read_as_structs_and_as_text() {
         let read = |bytes: &[u8]| match Datagram::of(bytes) {
-            Datagram::Sample(sample) => sample.read(SampleTime::HUNDREDTH, 1e6),
+            Datagram::Sample(sample) => sample.to_sample(SampleTime::AT_100_HZ, 1e6),
             other => panic!("{other:?}"),
         };
         let found = read(&sample(7, [f64::NAN, 0.5, -1.0, f64::NAN]));

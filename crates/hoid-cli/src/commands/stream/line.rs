@@ -146,7 +146,7 @@ impl StreamStatus<'_> {
     pub fn write(&self, buffer: &mut Vec<u8>) -> serde_json::Result<()> {
         let tracker = self.live.tracker();
         let operator = tracker.map(Tracker::operator);
-        let level = tracker.zip(operator.as_ref()).map(|(t, o)| t.level(o));
+        let level = tracker.zip(operator.as_ref()).map(|(t, o)| t.verdict_level(o));
         let line = Line {
             level: level
                 .unwrap_or(VerdictLevel::NotDetermined)
@@ -162,7 +162,7 @@ impl StreamStatus<'_> {
             }),
             // The operator is null if the orders of the model are not those of an operator.
             operator: (operator.zip(tracker))
-                .map(|(o, t)| json::tracked_operator(&o, |o| t.determined(o)))
+                .map(|(o, t)| json::tracked_operator(&o, |o| t.determinations(o)))
                 .filter(|o| !o.is_null()),
             response: tracker.filter(|t| !t.options().at_rad_s.is_empty()).map(|t| {
                 let at = &t.options().at_rad_s;
@@ -178,7 +178,7 @@ impl StreamStatus<'_> {
             counts: self.counts,
             event: self.event.as_ref().map(json::track_fault),
             fault: self.fault.as_deref(),
-            decimated: self.live.decimated().map(Rate::from),
+            decimated: self.live.decimation().map(Rate::from),
             findings: self.finding.map(json::finding).into_iter().collect(),
             warm_up: match self.live.stage() {
                 Stage::Collecting(warm_up) => Some(WarmUp {

@@ -3,7 +3,7 @@
 
 use std::io::{self, BufRead, ErrorKind};
 
-use hoid::io::{control_among, error_among};
+use hoid::io::{find_control_column, find_error_column};
 use serde::de::IgnoredAny;
 use serde_json::{Map, Value};
 
@@ -130,13 +130,13 @@ impl Columns {
     ///
     /// # Errors
     /// [`CliError::Stream`] if a header lacks a column.
-    pub fn read(&mut self, line: &str) -> Result<ParsedLine, CliError> {
+    pub fn parse_line(&mut self, line: &str) -> Result<ParsedLine, CliError> {
         let line = line.trim_matches(['\r', ' ', '\u{feff}']);
         if line.trim().is_empty() && !line.contains('\t') || line.starts_with('#') {
             return Ok(ParsedLine::Nothing);
         }
         if line.starts_with('{') {
-            return Ok(self.object(line));
+            return Ok(self.parse_object(line));
         }
         let separator = ['\t', ';', ','].into_iter().find(|s| line.contains(*s)).unwrap_or(',');
         let cells: Vec<&str> = line.split(separator).map(|c| c.trim().trim_matches('"')).collect();
@@ -144,12 +144,12 @@ impl Columns {
             Some(places) => places,
             None => {
                 if is_header(&cells) {
-                    self.places = Some(self.by_header(&cells)?);
+                    self.places = Some(self.positions_from_header(&cells)?);
                     return Ok(ParsedLine::Nothing);
                 }
-                match self.by_position(&cells) {
+                match self.positions_from_count(&cells) {
                     Some(places) => *self.places.insert(places),
-                    None => return Ok(ParsedLine::Unreadable(format!("no numbers: {}", shown(line)))),
+                    None => return Ok(ParsedLine::Unreadable(format!("no numbers: {}", quote(line)))),
                 }
             }
         };
@@ -158,38 +158,38 @@ impl Columns {
                 "{} cells, expected {}: {}",
                 cells.len(),
                 places.count,
-                shown(line)
+                quote(line)
             )));
         }
-        let of = |place: Option<usize>| place.map(|i| number(cells[i]));
-        Ok(self.sample(
+        let of = |place: Option<usize>| place.map(|i| parse_number(cells[i]));
+        Ok(self.new_sample(
             of(places.t),
             of(places.e),
-            number(cells[places.u]),
+            parse_number(cells[places.u]),
             of(places.reference),
         ))
     }
 
     /// Parses a JSON object with the names of the channels: `{"t": 0.01, "e": 0.5, "u": -1.0}`.
-    fn object(&self, line: &str) -> ParsedLine {
+    fn parse_object(&self, line: &str) -> ParsedLine {
         let object: Map<String, Value> = match serde_json::from_str(line) {
             Ok(object) => object,
-            Err(error) => return ParsedLine::Unreadable(format!("not a JSON object ({error}): {}", shown(line))),
+            Err(error) => return ParsedLine::Unreadable(format!("not a JSON object ({error}): {}", quote(line))),
         };
-        let of = |name: &str| object.get(name).map(number_of_json);
+        let of = |name: &str| object.get(name).map(json_number);
         let e = of(&self.input).filter(|_| self.with_input);
         match of(&self.output) {
-            Some(u) if e.is_some() || !self.with_input => self.sample(of("t"), e, u, of("f_t")),
+            Some(u) if e.is_some() || !self.with_input => self.new_sample(of("t"), e, u, of("f_t")),
             _ => ParsedLine::Unreadable(format!(
                 "the JSON object does not have both {}: {}",
-                self.names(),
-                shown(line)
+                self.required_channels(),
+                quote(line)
             )),
         }
     }
 
     /// Creates a sample from its numbers; missing numbers are `None`.
-    fn sample(
+    fn new_sample(
         &self,
         t: Option<Result<f64, Fault>>,
         e: Option<Result<f64, Fault>>,
@@ -230,7 +230,7 @@ impl Columns {
     }
 
     /// Returns the names of the required channels.
-    fn names(&self) -> String {
+    fn required_channels(&self) -> String {
         let input = if self.with_input {
             format!("{} and ", self.input)
         } else {
@@ -239,7 +239,7 @@ impl Columns {
         format!("{input}{}", self.output)
     }
 
-    fn by_header(&self, cells: &[&str]) -> Result<ColumnPositions, CliError> {
+    fn positions_from_header(&self, cells: &[&str]) -> Result<ColumnPositions, CliError> {
         let place = |name: &str| cells.iter().position(|c| *c == name);
         let e = place(&self.input);
         match (e, place(&self.output)) {
@@ -253,7 +253,7 @@ impl Columns {
             (e, u) => Err(CliError::Stream(format!(
                 "the header has the columns {}, expected {}; choose with --input and --output{}",
                 cells.join(", "),
-                self.names(),
+                self.required_channels(),
                 self.hint(cells, (e.is_none(), u.is_none()))
             ))),
         }
@@ -261,8 +261,8 @@ impl Columns {
 
     /// Returns a hint such as ", as --input err --output stick" if the missing columns exist under other names.
     fn hint(&self, cells: &[&str], (no_input, no_output): (bool, bool)) -> String {
-        let input = error_among(cells).filter(|_| no_input && self.with_input);
-        let output = control_among(cells).filter(|_| no_output);
+        let input = find_error_column(cells).filter(|_| no_input && self.with_input);
+        let output = find_control_column(cells).filter(|_| no_output);
         let named = [("--input", input), ("--output", output)];
         let words: Vec<String> = named
             .into_iter()
@@ -277,9 +277,9 @@ impl Columns {
 
     /// Returns the positions of the columns of a stream without a header, from the number of cells in a line of
     /// numbers: `e,u`, `t,e,u` or `t,e,u,f_t`; for a model without input `u` or `t,u`. `None` for any other line.
-    fn by_position(&self, cells: &[&str]) -> Option<ColumnPositions> {
-        let readable = |c: &str| matches!(number(c), Ok(_) | Err(Fault::Missing));
-        let any = cells.iter().any(|c| number(c).is_ok_and(f64::is_finite));
+    fn positions_from_count(&self, cells: &[&str]) -> Option<ColumnPositions> {
+        let readable = |c: &str| matches!(parse_number(c), Ok(_) | Err(Fault::Missing));
+        let any = cells.iter().any(|c| parse_number(c).is_ok_and(f64::is_finite));
         if !any || !cells.iter().all(|c| readable(c)) {
             return None;
         }
@@ -317,7 +317,7 @@ impl std::fmt::Display for Fault {
     }
 }
 
-fn number(cell: &str) -> Result<f64, Fault> {
+fn parse_number(cell: &str) -> Result<f64, Fault> {
     match cell.parse::<f64>() {
         Ok(value) => Ok(value),
         Err(_)
@@ -327,16 +327,16 @@ fn number(cell: &str) -> Result<f64, Fault> {
         {
             Err(Fault::Missing)
         }
-        Err(_) => Err(Fault::Text(shown(cell))),
+        Err(_) => Err(Fault::Text(quote(cell))),
     }
 }
 
 /// Returns the number in a JSON value.
-fn number_of_json(value: &Value) -> Result<f64, Fault> {
+fn json_number(value: &Value) -> Result<f64, Fault> {
     match value {
         Value::Null => Err(Fault::Missing),
-        Value::String(text) => number(text),
-        other => other.as_f64().ok_or_else(|| Fault::Text(shown(&other.to_string()))),
+        Value::String(text) => parse_number(text),
+        other => other.as_f64().ok_or_else(|| Fault::Text(quote(&other.to_string()))),
     }
 }
 
@@ -346,7 +346,7 @@ pub fn is_object(text: &str) -> bool {
 }
 
 /// Returns a text in quotation marks, shortened to a readable length.
-fn shown(text: &str) -> String {
+fn quote(text: &str) -> String {
     let cut: String = text.chars().take(MAX_CELL_CHARS).collect();
     let rest = if text.chars().count() > MAX_CELL_CHARS {
         "..."
@@ -360,7 +360,7 @@ fn shown(text: &str) -> String {
 fn is_header(cells: &[&str]) -> bool {
     let is_name = |c: &&str| {
         let first = c.chars().next();
-        first.is_some_and(|f| f.is_alphabetic() || f == '_') && number(c).is_err_and(|f| f != Fault::Missing)
+        first.is_some_and(|f| f.is_alphabetic() || f == '_') && parse_number(c).is_err_and(|f| f != Fault::Missing)
     };
     cells.len() > 1 && cells.iter().all(is_name) || cells == ["u"]
 }
@@ -369,8 +369,8 @@ fn is_header(cells: &[&str]) -> bool {
 mod tests {
     use super::*;
 
-    fn sample(columns: &mut Columns, line: &str) -> StreamSample {
-        match columns.read(line).unwrap() {
+    fn parse_sample(columns: &mut Columns, line: &str) -> StreamSample {
+        match columns.parse_line(line).unwrap() {
             ParsedLine::Sample(read) => read,
             other => panic!("{line}: {other:?}"),
         }
@@ -382,7 +382,7 @@ mod tests {
 
     #[test]
     fn json_objects_are_read_by_channel_name() {
-        let read = sample(
+        let read = parse_sample(
             &mut default_columns(),
             r#"{"t": 2, "e": 0.5, "u": -1e0, "f_t": 7, "button": [1]}"#,
         );
@@ -393,14 +393,16 @@ mod tests {
         assert!(read.fault.is_none());
         // Cells and objects, in any order.
         let mut columns = Columns::new("error", "stick", true, 10.0);
-        let read = sample(&mut columns, r#"{"stick": "3", "error": null}"#);
+        let read = parse_sample(&mut columns, r#"{"stick": "3", "error": null}"#);
         assert!(read.t.is_none() && read.e.is_nan() && read.u == 3.0 && !columns.are_known());
         assert_eq!(read.fault.unwrap(), "error is missing");
-        assert_eq!(sample(&mut columns, "1,2").u, 2.0);
-        let fault = sample(&mut columns, r#"{"stick": 11, "error": {}}"#).fault.unwrap();
+        assert_eq!(parse_sample(&mut columns, "1,2").u, 2.0);
+        let fault = parse_sample(&mut columns, r#"{"stick": 11, "error": {}}"#)
+            .fault
+            .unwrap();
         assert_eq!(fault, "error is \"{}\", not a number; stick is 1.1e1, beyond 10");
         let mut alone = Columns::new("e", "u", false, 1e6);
-        assert_eq!(sample(&mut alone, r#"{"e": 4, "u": 1}"#).e, 0.0);
+        assert_eq!(parse_sample(&mut alone, r#"{"e": 4, "u": 1}"#).e, 0.0);
         for (line, reason) in [
             ("{", "not a JSON object"),
             ("{\"t\": 1}", "does not have both e and u"),
@@ -408,7 +410,7 @@ mod tests {
             ("{\"t\": null, \"e\": 1, \"u\": 1}", "t is missing"),
             ("{\"e\": 1e999, \"u\": 1}", "not a JSON object"),
         ] {
-            match default_columns().read(line).unwrap() {
+            match default_columns().parse_line(line).unwrap() {
                 ParsedLine::Unreadable(fault) => assert!(fault.contains(reason), "{line}: {fault}"),
                 other => panic!("{line}: {other:?}"),
             }
@@ -423,25 +425,25 @@ mod tests {
             ("2 ; 0.5; -1", Some(2.0), None),
             ("2\t.5\t-1e0\t7\r", Some(2.0), Some(7.0)),
         ] {
-            let read = sample(&mut default_columns(), line);
+            let read = parse_sample(&mut default_columns(), line);
             assert_eq!((read.t, read.e, read.u, read.reference), (t, 0.5, -1.0, reference));
             assert!(read.fault.is_none());
         }
         let mut columns = default_columns();
         for nothing in ["", "  ", "# a comment", "t,f_t,\"e\",u,x"] {
-            assert_eq!(columns.read(nothing).unwrap(), ParsedLine::Nothing);
+            assert_eq!(columns.parse_line(nothing).unwrap(), ParsedLine::Nothing);
         }
-        let read = sample(&mut columns, "1,2,3,4,abc");
+        let read = parse_sample(&mut columns, "1,2,3,4,abc");
         assert_eq!(
             (read.t, read.reference, read.e, read.u),
             (Some(1.0), Some(2.0), 3.0, 4.0)
         );
-        let message = |header: &str| default_columns().read(header).unwrap_err().to_string();
+        let message = |header: &str| default_columns().parse_line(header).unwrap_err().to_string();
         assert!(message("t,y,z").ends_with("choose with --input and --output"));
         assert!(message("t,err,Stick [V]").ends_with("--output, as --input \"err\" --output \"Stick [V]\""));
         assert!(message("t,e,stick").ends_with("--output, as --output \"stick\""));
         let mut alone = Columns::new("e", "u", false, 1e6);
-        assert_eq!(sample(&mut alone, "3").u, 3.0);
+        assert_eq!(parse_sample(&mut alone, "3").u, 3.0);
     }
 
     #[test]
@@ -449,11 +451,11 @@ mod tests {
         let mut columns = default_columns();
         for unreadable in ["garbage", "\u{0}\u{1}", ",", "1,2,3,4,5"] {
             assert!(
-                matches!(columns.read(unreadable).unwrap(), ParsedLine::Unreadable(_)),
+                matches!(columns.parse_line(unreadable).unwrap(), ParsedLine::Unreadable(_)),
                 "{unreadable}"
             );
         }
-        sample(&mut columns, "1,2");
+        parse_sample(&mut columns, "1,2");
         for (line, fault) in [
             ("NaN,2", "e is NaN"),
             ("1,-inf", "u is -inf"),
@@ -462,12 +464,15 @@ mod tests {
             ("1,abc", "u is \"abc\", not a number"),
             ("1e999,2", "e is inf"),
         ] {
-            let read = sample(&mut columns, line);
+            let read = parse_sample(&mut columns, line);
             assert_eq!(read.fault.as_deref(), Some(fault));
             assert!(read.e.is_nan() || read.u.is_nan());
         }
         for unreadable in ["1", "1,2,3", "e,u,t", "t"] {
-            assert!(matches!(columns.read(unreadable).unwrap(), ParsedLine::Unreadable(_)));
+            assert!(matches!(
+                columns.parse_line(unreadable).unwrap(),
+                ParsedLine::Unreadable(_)
+            ));
         }
     }
 

@@ -24,7 +24,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use hoid::analysis::options_of_recursion;
+use hoid::analysis::recursion_options_error;
 use hoid::model::SampleTime;
 use hoid::track::{DEFAULT_WARM_UP_S, Live};
 
@@ -47,12 +47,12 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let sample_time = SampleTime::new(1.0 / args.fs)?;
     let asked = recursion::request(&args.recursion)?;
     let decimation = args.rate.of(asked.counts_samples());
-    if asked.method.smooths() {
+    if asked.method.requests_two_sided() {
         return Err(CliError::Usage(
             "--smooth applies only to hoid track, because a stream has no future samples".to_owned(),
         ));
     }
-    if args.warm_up.is_some() && asked.method.starts_itself() {
+    if args.warm_up.is_some() && asked.method.is_self_starting() {
         return Err(CliError::Usage(format!(
             "--warm-up applies only to methods with a start fit, but {} estimates from the first sample; drop \
              --warm-up, or choose --method physical",
@@ -60,9 +60,9 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
         )));
     }
     let warm_up_s = args.warm_up.unwrap_or(DEFAULT_WARM_UP_S);
-    let live = Live::new(&asked, sample_time, decimation, warm_up_s).map_err(options_of_recursion)?;
+    let live = Live::new(&asked, sample_time, decimation, warm_up_s).map_err(recursion_options_error)?;
     let plan = live.plan();
-    if args.recursion.start.is_some() && !plan.is_settled() {
+    if args.recursion.start.is_some() && !plan.has_fixed_orders() {
         return Err(CliError::Usage(
             "--start leaves no warm-up in which to search for nk and orders; give --nk and --orders as single numbers, \
              such as --nk 29 --orders nd=1"
@@ -73,19 +73,19 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let session = Arc::new(Mutex::new(Session::new(args, asked, live)?));
     end_on_interrupt(&session);
     match udp {
-        Some(udp) => over_udp(&udp, &session),
-        None => over_pipes(&session),
+        Some(udp) => run_over_udp(&udp, &session),
+        None => run_over_pipes(&session),
     }
 }
 
 /// Reads lines from standard input and writes lines to standard output until the input ends.
-fn over_pipes(session: &Mutex<Session>) -> Result<(), CliError> {
+fn run_over_pipes(session: &Mutex<Session>) -> Result<(), CliError> {
     let mut input = Lines::new(io::stdin().lock());
     let mut buffer = Vec::new();
     let broken = |e: io::Error| CliError::Stream(format!("standard input cannot be read: {e}"));
     while let Some(text) = input.next().map_err(broken)? {
         let mut session = lock(session);
-        if !session.take(text)? {
+        if !session.process_line(text)? {
             continue;
         }
         session.write(&mut buffer)?;
@@ -98,19 +98,19 @@ fn over_pipes(session: &Mutex<Session>) -> Result<(), CliError> {
         }
     }
     let session = lock(session);
-    output::message(&session.summary());
-    session.end()
+    output::print_message(&session.summary());
+    session.check_estimate()
 }
 
 /// Receives datagrams and sends datagrams until an interrupt.
-fn over_udp(udp: &Udp, session: &Mutex<Session>) -> Result<(), CliError> {
-    output::message(&format!("{udp}; an interrupt ends the stream."));
+fn run_over_udp(udp: &Udp, session: &Mutex<Session>) -> Result<(), CliError> {
+    output::print_message(&format!("{udp}; an interrupt ends the stream."));
     let mut bytes = udp::datagram_buffer();
     let mut buffer = Vec::new();
     loop {
         let received = udp.receive(&mut bytes)?;
         let mut session = lock(session);
-        session.take_datagram(received, |session, sequence| {
+        session.process_datagram(received, |session, sequence| {
             match sequence {
                 Some(sequence) => udp.send(session.estimate(sequence).bytes()),
                 None => {
@@ -135,8 +135,12 @@ fn end_on_interrupt(session: &Arc<Mutex<Session>>) {
         let asked = Instant::now();
         loop {
             if let Ok(session) = session.try_lock() {
-                output::message(&session.summary());
-                process::exit(session.end().map_or_else(|error| i32::from(error.exit_code()), |()| 0));
+                output::print_message(&session.summary());
+                process::exit(
+                    session
+                        .check_estimate()
+                        .map_or_else(|error| i32::from(error.exit_code()), |()| 0),
+                );
             }
             // A start fit may be in progress, or the reader may be blocked. Lines are written in one piece, so no line
             // is truncated.

@@ -4,12 +4,12 @@ use std::collections::VecDeque;
 
 use hoid::analysis::{Setting, settings_of_recursion};
 use hoid::ident::Choice;
-use hoid::model::numbers::counted;
+use hoid::model::numbers::count_with_noun;
 use hoid::model::{Finding, SampleTime};
 use hoid::track::{Change, Live, Sample, Stage, TrackFault, TrackOptions, TrackRequest};
 
 use super::{
-    clock::{Arrival, Clock, LONGEST_GAP_S},
+    clock::{Arrival, Clock, MAX_GAP_S},
     datagram::{Datagram, EstimateDatagram},
     line::{Counts, StreamStatus},
     lines::{Columns, ParsedLine, StreamSample, is_object},
@@ -61,7 +61,7 @@ impl Session {
             columns: Columns::new(&args.input, &args.output, with_input, largest),
             clock: Clock::new(sample_time.s()),
             sample_time,
-            scale: scale(args)?,
+            scale: scale_factors(args)?,
             every: args.every as u64,
             lines: 0,
             counts: Counts::default(),
@@ -89,42 +89,42 @@ impl Session {
             self.names = tracker.parameter_names();
         }
         let mut settings = settings_of_recursion(&self.asked, self.live.plan(), options, choice);
-        if let Some(done) = self.live.decimated() {
+        if let Some(done) = self.live.decimation() {
             settings.push(Setting::new("rate", format!("{done}, delayed by {:.3} s", done.lag_s)));
         }
         if self.scale != (1.0, 1.0) {
             let (e, u) = self.scale;
-            settings.push(Setting::new("scale", format!("e times {e}, u times {u}")).given(true));
+            settings.push(Setting::new("scale", format!("e times {e}, u times {u}")).with_given(true));
         }
         let each: Vec<String> = settings
             .iter()
             .map(|one| format!("{}: {}", one.name, one.value))
             .collect();
-        output::message(&format!("{when}; {}.", each.join("; ")));
+        output::print_message(&format!("{when}; {}.", each.join("; ")));
     }
 
     /// Processes a line of the input. Returns true if a line of the output is due.
-    pub fn take(&mut self, text: Result<String, String>) -> Result<bool, CliError> {
+    pub fn process_line(&mut self, text: Result<String, String>) -> Result<bool, CliError> {
         let line = match text {
-            Ok(text) => self.columns.read(&text)?,
+            Ok(text) => self.columns.parse_line(&text)?,
             Err(reason) => ParsedLine::Unreadable(reason),
         };
-        Ok(self.handle(line))
+        Ok(self.process_parsed_line(line))
     }
 
     /// Processes a parsed line. Returns true if a line of the output is due.
-    fn handle(&mut self, line: ParsedLine) -> bool {
+    fn process_parsed_line(&mut self, line: ParsedLine) -> bool {
         self.forget_innovation();
         match line {
             ParsedLine::Nothing => return false,
-            ParsedLine::Sample(read) => self.timed(read),
+            ParsedLine::Sample(read) => self.process_timed_sample(read),
             // The time of the next line shows whether a sample is missing.
             ParsedLine::Unreadable(reason) if self.columns.has_time() || !self.columns.are_known() => {
-                self.dropped(format!("{reason}: dropped"));
+                self.count_dropped_line(format!("{reason}: dropped"));
             }
             ParsedLine::Unreadable(reason) => {
-                self.fault(reason);
-                self.sample(f64::NAN, f64::NAN, None);
+                self.add_fault(reason);
+                self.process_sample(f64::NAN, f64::NAN, None);
             }
         }
         self.lines += 1;
@@ -136,7 +136,7 @@ impl Session {
     ///
     /// # Errors
     /// Errors of `answer`.
-    pub fn take_datagram(
+    pub fn process_datagram(
         &mut self,
         bytes: &[u8],
         mut answer: impl FnMut(&mut Self, Option<u32>) -> Result<(), CliError>,
@@ -144,7 +144,7 @@ impl Session {
         match Datagram::of(bytes) {
             Datagram::Sample(sample) => {
                 self.forget_innovation();
-                self.timed(sample.read(self.sample_time, self.live.plan().options().largest));
+                self.process_timed_sample(sample.to_sample(self.sample_time, self.live.plan().options().largest));
                 self.lines += 1;
                 if self.lines.is_multiple_of(self.every) {
                     answer(self, Some(sample.sequence))?;
@@ -157,18 +157,18 @@ impl Session {
                     text.lines().collect()
                 };
                 for line in lines {
-                    match self.columns.read(line) {
-                        Ok(ParsedLine::Unreadable(reason)) => self.dropped(format!("{reason}: dropped")),
-                        Err(error) => self.dropped(format!("{error}: dropped")),
+                    match self.columns.parse_line(line) {
+                        Ok(ParsedLine::Unreadable(reason)) => self.count_dropped_line(format!("{reason}: dropped")),
+                        Err(error) => self.count_dropped_line(format!("{error}: dropped")),
                         Ok(line) => {
-                            if self.handle(line) {
+                            if self.process_parsed_line(line) {
                                 answer(self, None)?;
                             }
                         }
                     }
                 }
             }
-            Datagram::Unreadable(reason) => self.dropped(format!("{reason}: dropped")),
+            Datagram::Unreadable(reason) => self.count_dropped_line(format!("{reason}: dropped")),
         }
         Ok(())
     }
@@ -183,27 +183,25 @@ impl Session {
     }
 
     /// Processes a sample at its time, after filling in missing samples.
-    fn timed(&mut self, read: StreamSample) {
+    fn process_timed_sample(&mut self, read: StreamSample) {
         if let Some(t) = read.t {
             self.has_time = true;
-            match self.clock.take(t) {
+            match self.clock.classify(t) {
                 Arrival::Behind { last_s } => {
-                    return self.dropped(format!(
+                    return self.count_dropped_line(format!(
                         "t = {t} s is not later than the last time, {last_s} s: dropped"
                     ));
                 }
                 Arrival::Sample { missing, left_out } => {
                     if left_out {
-                        self.fault(format!(
-                            "a gap before t = {t} s, of which {LONGEST_GAP_S} s are bridged"
-                        ));
+                        self.add_fault(format!("a gap before t = {t} s, of which {MAX_GAP_S} s are bridged"));
                     } else if missing > 0 {
-                        let missing = counted(missing, "sample");
-                        self.fault(format!("{missing} missing before t = {t} s, bridged"));
+                        let missing = count_with_noun(missing, "sample");
+                        self.add_fault(format!("{missing} missing before t = {t} s, bridged"));
                     }
                     for _ in 0..missing {
                         self.counts.bridged += 1;
-                        self.sample(f64::NAN, f64::NAN, None);
+                        self.process_sample(f64::NAN, f64::NAN, None);
                     }
                     self.t = Some(t);
                 }
@@ -211,19 +209,19 @@ impl Session {
             self.check_rate(t);
         }
         if let Some(fault) = read.fault {
-            self.fault(fault);
+            self.add_fault(fault);
         }
-        self.sample(self.scale.0 * read.e, self.scale.1 * read.u, read.reference);
+        self.process_sample(self.scale.0 * read.e, self.scale.1 * read.u, read.reference);
     }
 
     /// Prints one warning if the rate of the times differs from `--fs`. Once that rate has been measured, every line of
     /// the output contains the finding.
     fn check_rate(&mut self, t: f64) {
         let fs = 1.0 / self.sample_time.s();
-        let (hurried, other) = (self.clock.too_fast(), self.clock.other_rate());
+        let (hurried, other) = (self.clock.grid_ran_ahead(), self.clock.deviating_rate());
         let mut warn = |words: &str| {
             if !std::mem::replace(&mut self.rate_reported, true) {
-                output::message(&format!("warning: {words}"));
+                output::print_message(&format!("warning: {words}"));
             }
         };
         if let Some(hz) = other.filter(|_| self.rate.is_none()) {
@@ -232,7 +230,7 @@ impl Session {
                  lead and frequency are wrong by this ratio; set --fs to the rate of t, or correct t"
             );
             warn(&words);
-            self.rate = Some(Finding::doubt("sampling-rate", words));
+            self.rate = Some(Finding::warning("sampling-rate", words));
         } else if hurried {
             warn(&format!(
                 "at t = {t} s, t advances by less than the {} s per line that --fs {fs} implies; correct --fs or t",
@@ -244,12 +242,12 @@ impl Session {
     /// Discards the innovation, which belongs to a single sample. In a decimated stream the last innovation is kept for
     /// several lines.
     fn forget_innovation(&mut self) {
-        if self.live.decimated().is_none() {
+        if self.live.decimation().is_none() {
             self.innovation = None;
         }
     }
 
-    fn sample(&mut self, e: f64, u: f64, reference: Option<f64>) {
+    fn process_sample(&mut self, e: f64, u: f64, reference: Option<f64>) {
         self.counts.samples += 1;
         self.counts.skipped += u64::from(!(e.is_finite() && u.is_finite()));
         if !self.has_time {
@@ -278,13 +276,13 @@ impl Session {
         }
     }
 
-    fn dropped(&mut self, reason: String) {
+    fn count_dropped_line(&mut self, reason: String) {
         self.counts.dropped += 1;
-        self.fault(reason);
+        self.add_fault(reason);
     }
 
     /// Keeps a fault for the next line of the output; of many faults, only the last few are kept.
-    fn fault(&mut self, text: String) {
+    fn add_fault(&mut self, text: String) {
         if self.faults.len() == MAX_FAULTS {
             self.faults.pop_front();
         }
@@ -310,13 +308,13 @@ impl Session {
     }
 
     /// Returns an error if the stream ended without an estimate.
-    pub fn end(&self) -> Result<(), CliError> {
+    pub fn check_estimate(&self) -> Result<(), CliError> {
         let c = self.counts;
         if c.samples == 0 && c.dropped > 0 {
             return Err(CliError::NotDetermined(format!(
                 "no line of the stream contained a sample ({} dropped); expected e,u or t,e,u with decimal points, or \
                  a JSON object; the output lines contain the errors",
-                counted(c.dropped, "line")
+                count_with_noun(c.dropped, "line")
             )));
         }
         match self.live.stage() {
@@ -336,14 +334,14 @@ impl Session {
             c.samples,
             c.skipped,
             c.bridged,
-            counted(c.shortened, "step"),
-            counted(c.dropped, "line")
+            count_with_noun(c.shortened, "step"),
+            count_with_noun(c.dropped, "line")
         );
         if c.held > 0 || c.restarts > 0 {
             text.push_str(&format!(
                 " {} held back by the guard; the estimate was restarted {}.",
-                counted(c.held, "sample"),
-                counted(c.restarts, "time")
+                count_with_noun(c.held, "sample"),
+                count_with_noun(c.restarts, "time")
             ));
         }
         if let Stage::Collecting(warm_up) = self.live.stage() {
@@ -359,8 +357,8 @@ impl Session {
 }
 
 /// Returns the scale factors of e and u.
-fn scale(args: &StreamArgs) -> Result<(f64, f64), CliError> {
-    let mut all = reading::by_channel("--scale", &args.scale)?;
+fn scale_factors(args: &StreamArgs) -> Result<(f64, f64), CliError> {
+    let mut all = reading::values_by_channel("--scale", &args.scale)?;
     let mut take = |name: &str| all.remove(name).map_or(1.0, |scaling| scaling.factor());
     let factors = (take("e"), take("u"));
     match all.keys().next() {

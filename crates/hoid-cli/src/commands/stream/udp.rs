@@ -5,7 +5,7 @@ use std::{
     net::{IpAddr, SocketAddr, UdpSocket},
 };
 
-use crate::{args::UdpPlaces, error::CliError};
+use crate::{args::UdpAddresses, error::CliError};
 
 /// Maximum size of a datagram, bytes.
 const MAX_DATAGRAM_BYTES: usize = 1 << 16;
@@ -33,7 +33,7 @@ impl fmt::Display for Udp {
 impl Udp {
     /// # Errors
     /// [`CliError::Stream`] if the system does not provide the address.
-    pub fn bind(places: &UdpPlaces) -> Result<Self, CliError> {
+    pub fn bind(places: &UdpAddresses) -> Result<Self, CliError> {
         let socket = UdpSocket::bind(places.input).map_err(|error| {
             CliError::Stream(format!(
                 "cannot listen on {}: {error}; is another stream using it?",

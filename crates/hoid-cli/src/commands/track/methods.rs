@@ -1,25 +1,25 @@
 //! `hoid track --methods`: list of the recursive methods.
 
-use hoid::survey::{ListedMethod, listed};
+use hoid::survey::{ListedMethod, list_methods};
 use serde_json::{Value, json};
 
 use crate::{error::CliError, json, output};
 
 /// Prints the methods, one per line, or as a JSON list.
 pub fn list(as_json: bool) -> Result<(), CliError> {
-    let all = listed();
+    let all = list_methods();
     if as_json {
-        return json::print(&Value::Array(all.iter().map(object).collect()));
+        return json::print(&Value::Array(all.iter().map(method_json).collect()));
     }
-    let lines: String = all.iter().map(line).collect();
+    let lines: String = all.iter().map(method_line).collect();
     output::print(&lines)
 }
 
-fn structures(one: &ListedMethod) -> Vec<&'static str> {
+fn structure_names(one: &ListedMethod) -> Vec<&'static str> {
     one.spec.structures.iter().map(|structure| structure.name()).collect()
 }
 
-fn line(one: &ListedMethod) -> String {
+fn method_line(one: &ListedMethod) -> String {
     let mark = match (one.is_default, one.is_for_comparison) {
         (true, _) => "default",
         (_, true) => "survey",
@@ -30,18 +30,18 @@ fn line(one: &ListedMethod) -> String {
         "{:15} {mark:8} {} ({}; {})\n",
         spec.name,
         spec.help,
-        structures(one).join(", "),
+        structure_names(one).join(", "),
         spec.source
     )
 }
 
-fn object(one: &ListedMethod) -> Value {
+fn method_json(one: &ListedMethod) -> Value {
     let spec = &one.spec;
     json!({
         "name": spec.name,
         "help": spec.help,
         "source": spec.source,
-        "structures": structures(one),
+        "structures": structure_names(one),
         "default": one.is_default,
         "survey": one.is_for_comparison,
     })

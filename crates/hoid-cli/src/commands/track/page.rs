@@ -1,10 +1,10 @@
 //! Text output for a trace.
 
-use hoid::analysis::Tracked;
-use hoid::model::numbers::counted;
+use hoid::analysis::TrackingResult;
+use hoid::model::numbers::count_with_noun;
 use hoid::model::{GainUnit, uncertainty::Estimate};
 use hoid::report::numbers;
-use hoid::track::{Response, value_of};
+use hoid::track::{Response, operator_parameter};
 
 use crate::{error::CliError, text};
 
@@ -18,10 +18,10 @@ const COEFFICIENTS_SHOWN: usize = 6;
 ///
 /// # Errors
 /// Errors in evaluating the quality of the start fit.
-pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<String, CliError> {
+pub fn page(tracked: &TrackingResult, out: Option<&str>, verbose: bool) -> Result<String, CliError> {
     let mut page = text::verdict(&tracked.verdict);
-    page.push_str(&rows_shown(tracked));
-    page.push_str(&further_response(tracked));
+    page.push_str(&estimate_table(tracked));
+    page.push_str(&further_response_table(tracked));
     let errors = tracked.relative_errors();
     if !errors.is_empty() {
         let each: Vec<String> = errors
@@ -30,17 +30,17 @@ pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<Strin
             .collect();
         page.push_str(&format!(
             "RMS relative error, compared with the true values in the record, from {:.2} s on: {}.\n",
-            tracked.trace.times_s()[tracked.first_moved_row()],
+            tracked.trace.times_s()[tracked.first_updated_row()],
             each.join(", ")
         ));
     }
-    page.push_str(&open_loop(tracked));
-    page.push_str(&changes(tracked));
-    page.push_str(&counts(tracked));
+    page.push_str(&crossover_text(tracked));
+    page.push_str(&change_list(tracked));
+    page.push_str(&count_text(tracked));
     if let Some(choice) = &tracked.choice {
         page.push_str(&text::delay(choice));
     }
-    page.push_str(&covariance(tracked));
+    page.push_str(&covariance_text(tracked));
     page.push_str(&text::records(
         &tracked.data.names,
         &tracked.data.records,
@@ -54,13 +54,13 @@ pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<Strin
     if verbose {
         page.push_str(&details(tracked)?);
     } else {
-        page.push_str(text::MORE);
+        page.push_str(text::MORE_HINT);
     }
     Ok(page)
 }
 
 /// Returns the candidates tried, the start fit and the settings.
-fn details(tracked: &Tracked) -> Result<String, CliError> {
+fn details(tracked: &TrackingResult) -> Result<String, CliError> {
     let mut page = String::new();
     if let Some(choice) = &tracked.choice {
         page.push('\n');
@@ -82,7 +82,7 @@ fn details(tracked: &Tracked) -> Result<String, CliError> {
 }
 
 /// Returns the start covariances tried on a second run, if a second run was given.
-fn covariance(tracked: &Tracked) -> String {
+fn covariance_text(tracked: &TrackingResult) -> String {
     let Some((file, choice)) = tracked.chosen_covariance() else {
         return String::new();
     };
@@ -98,11 +98,11 @@ fn covariance(tracked: &Tracked) -> String {
 }
 
 /// Returns the rows that are printed, evenly spaced over the rows in which the estimate is updated.
-fn printed_rows(tracked: &Tracked) -> Vec<usize> {
+fn printed_rows(tracked: &TrackingResult) -> Vec<usize> {
     let Some(last) = tracked.trace.len().checked_sub(1) else {
         return Vec::new();
     };
-    let first = tracked.first_moved_row();
+    let first = tracked.first_updated_row();
     let shown = ROWS_SHOWN.min(last - first + 1);
     let mut picked: Vec<usize> = (0..shown)
         .map(|i| first + (last - first) * i / (shown - 1).max(1))
@@ -112,7 +112,7 @@ fn printed_rows(tracked: &Tracked) -> Vec<usize> {
 }
 
 /// Returns a table of the estimate at a few times.
-fn rows_shown(tracked: &Tracked) -> String {
+fn estimate_table(tracked: &TrackingResult) -> String {
     let trace = &tracked.trace;
     if trace.is_empty() {
         return String::new();
@@ -120,7 +120,7 @@ fn rows_shown(tracked: &Tracked) -> String {
     let with_operator = tracked.has_operator();
     let gain = GainUnit::of(tracked.record());
     let units = ["", "s", "s", "rad/s", "", "s"];
-    let suppose = tracked.trace.options().method.starts_itself();
+    let suppose = tracked.trace.options().method.is_self_starting();
     let mut bracketed = false;
     let mut header = vec!["t in s".to_owned()];
     if with_operator {
@@ -136,8 +136,8 @@ fn rows_shown(tracked: &Tracked) -> String {
     for row in printed_rows(tracked) {
         let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
         if with_operator {
-            let of = |name| value_of(&tracked.operators[row], name);
-            let determined = tracked.operators[row].as_ref().map(|o| trace.determined(o));
+            let of = |name| operator_parameter(&tracked.operators[row], name);
+            let determined = tracked.operators[row].as_ref().map(|o| trace.determinations(o));
             let determined = determined.unwrap_or_default();
             cells.extend(tracked.trace.operator_columns().into_iter().map(|n| {
                 let open = suppose && determined.iter().any(|(name, yes)| *name == n && !yes);
@@ -165,16 +165,16 @@ fn rows_shown(tracked: &Tracked) -> String {
 }
 
 /// Frequencies in rad/s at which the response to a further input is printed if the user gives none.
-const FURTHER_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+const FURTHER_FREQUENCIES_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 
 /// Returns the response to the further input at a few times; empty for a model with one input.
-fn further_response(tracked: &Tracked) -> String {
+fn further_response_table(tracked: &TrackingResult) -> String {
     let trace = &tracked.trace;
     let Some(further) = &trace.options().further else {
         return String::new();
     };
     let at = match trace.options().at_rad_s.as_slice() {
-        [] => &FURTHER_AT_RAD_S,
+        [] => &FURTHER_FREQUENCIES_RAD_S,
         given => given,
     };
     let mut header = vec!["t in s".to_owned()];
@@ -196,8 +196,9 @@ fn further_response(tracked: &Tracked) -> String {
 }
 
 /// Returns crossover and phase margin at the end of the trace; empty without a controlled element.
-fn open_loop(tracked: &Tracked) -> String {
-    let (Some(row), Some((rows, reason))) = (tracked.trace.len().checked_sub(1), tracked.without_crossover()) else {
+fn crossover_text(tracked: &TrackingResult) -> String {
+    let (Some(row), Some((rows, reason))) = (tracked.trace.len().checked_sub(1), tracked.rows_without_crossover())
+    else {
         return String::new();
     };
     let mut words = match tracked.trace.open_loop(row) {
@@ -218,14 +219,14 @@ fn open_loop(tracked: &Tracked) -> String {
         words.push_str(&format!(
             "{rows} of {} rows have no crossover; mostly because {}.\n",
             tracked.trace.len(),
-            reason.words()
+            reason.as_text()
         ));
     }
     words
 }
 
 /// Returns the list of the declared changes.
-fn changes(tracked: &Tracked) -> String {
+fn change_list(tracked: &TrackingResult) -> String {
     let trace = &tracked.trace;
     if trace.change_odds().is_empty() {
         return String::new();
@@ -235,7 +236,7 @@ fn changes(tracked: &Tracked) -> String {
     }
     let mut lines = String::new();
     for (t, c) in trace.changes() {
-        let changed = c.changed();
+        let changed = c.changed_quantities();
         lines.push_str(&format!(
             "Change at {:.2} s, declared at {t:.2} s: {}; log odds {:.1}.\n",
             t - c.seconds_ago,
@@ -250,23 +251,23 @@ fn changes(tracked: &Tracked) -> String {
     lines
 }
 
-fn counts(tracked: &Tracked) -> String {
+fn count_text(tracked: &TrackingResult) -> String {
     let c = tracked.trace.counts();
     let mut text = format!(
         "{} samples; {} skipped for a fault in e or u; {} shortened to stay stable or within bounds.\n",
         c.samples,
         c.skipped,
-        counted(c.shortened, "step")
+        count_with_noun(c.shortened, "step")
     );
     if c.held > 0 || c.restarts > 0 {
         text.push_str(&format!(
             "{} held back by the guard; the estimate was restarted {}.\n",
-            counted(c.held, "sample"),
-            counted(c.restarts, "time")
+            count_with_noun(c.held, "sample"),
+            count_with_noun(c.restarts, "time")
         ));
     }
     if tracked.has_operator() {
-        let none = tracked.not_converted();
+        let none = tracked.unconverted_rows();
         text.push_str(&format!(
             "{} of {} rows have no operator",
             none.rows,

@@ -2,18 +2,18 @@
 
 use std::path::PathBuf;
 
-use hoid::analysis::Tracked;
+use hoid::analysis::TrackingResult;
 use hoid::report::{BatchFit, TrackReport, batch_fit, default_batch_fits, figures::trace_panels, write_report};
 
 use crate::{args::TrackArgs, commands::figure, error::CliError, output};
 
 /// Writes the report page if `--report` gives a directory, and the figure of the parameters over time if `--figure`
 /// gives a file.
-pub fn write(args: &TrackArgs, tracked: &Tracked, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
+pub fn write(args: &TrackArgs, tracked: &TrackingResult, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
     if args.report.is_none() && args.picture.figure.is_none() {
         return Ok(None);
     }
-    let report = TrackReport::of_tracked(tracked, batch);
+    let report = TrackReport::from_tracked(tracked, batch);
     if let Some(path) = &args.picture.figure {
         let grid = match report.response_grid()? {
             Some(grid) => grid,
@@ -31,7 +31,7 @@ pub fn write(args: &TrackArgs, tracked: &Tracked, batch: &[BatchFit]) -> Result<
 /// Returns the batch fits with which the page compares the trace: the fits of the given spans, otherwise the start fit
 /// and a fit of the last third; empty without `--report`. If the last third cannot be fitted, its fit is omitted with a
 /// note.
-pub fn batch_fits(args: &TrackArgs, tracked: &Tracked) -> Result<Vec<BatchFit>, CliError> {
+pub fn batch_fits(args: &TrackArgs, tracked: &TrackingResult) -> Result<Vec<BatchFit>, CliError> {
     if args.report.is_none() {
         return Ok(Vec::new());
     }
@@ -45,7 +45,7 @@ pub fn batch_fits(args: &TrackArgs, tracked: &Tracked) -> Result<Vec<BatchFit>, 
     }
     let (all, missing) = default_batch_fits(trace, record);
     if let Some(error) = missing {
-        output::notice("", format!("the report has no batch fit of the last third: {error}"));
+        output::add_notice("", format!("the report has no batch fit of the last third: {error}"));
     }
     Ok(all)
 }

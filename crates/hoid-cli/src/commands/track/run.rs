@@ -21,7 +21,12 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     if let Some(path) = &args.out {
         check_table_path(path)?;
     }
-    let given = |name: &str| args.recursion.settings.given().any(|(option, _)| option == name);
+    let given = |name: &str| {
+        args.recursion
+            .settings
+            .given_settings()
+            .any(|(option, _)| option == name)
+    };
     if args.validate.is_some() && !args.update_covariance && given("covariance") {
         return Err(CliError::Usage(
             "--covariance gives the start covariance, and --validate chooses it; drop one, or add --update-covariance"
@@ -58,20 +63,20 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         None,
         tracking.recursion.structure().has_input(),
     )?;
-    let read = reading.file(record, reading::report_problems)?;
-    reading::report_kept_rate(read.kept_rate(tracking.rate, tracking.recursion.counts_samples()));
+    let read = reading.read_file(record, reading::report_problems)?;
+    reading::report_kept_rate(read.kept_rate_message(tracking.rate, tracking.recursion.counts_samples()));
     let other = args.validate.as_deref();
     let other = other
-        .map(|path| reading.file(path, reading::report_problems))
+        .map(|path| reading.read_file(path, reading::report_problems))
         .transpose()?;
     let plan = tracking.plan(&read)?;
-    let tracked = recursion::searching(&plan, |each| tracking.run(read, other, each))?;
+    let tracked = recursion::run_search(&plan, |each| tracking.run(read, other, each))?;
     let batch = report::batch_fits(args, &tracked)?;
     if let Some(path) = &args.out {
         write_table(path, &tracked.table())?;
     }
     if let Some(page) = report::write(args, &tracked, &batch)? {
-        output::notice("", format!("report: {}", page.display()));
+        output::add_notice("", format!("report: {}", page.display()));
     }
     let out = args.out.as_ref().map(|path| path.display().to_string());
     paper_table::write(&args.show, || Ok(tracked.json()?))?;
@@ -82,5 +87,5 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     } else {
         output::show(&page::page(&tracked, out.as_deref(), args.show.verbose)?)?;
     }
-    CliError::of_verdict(&tracked.verdict)
+    CliError::check_verdict(&tracked.verdict)
 }

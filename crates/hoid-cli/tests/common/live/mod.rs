@@ -22,7 +22,7 @@ pub use draw::Draw;
 /// Returns e and u at t: sinusoids with noise.
 pub fn sample(t_s: f64, draw: &mut Draw) -> (f64, f64) {
     let waves = |at: f64| (0.9 * at).sin() + 0.5 * (2.3 * at).sin() + 0.2 * (7.1 * at).sin();
-    (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * (2.0 * draw.share() - 1.0))
+    (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * (2.0 * draw.uniform() - 1.0))
 }
 
 /// Summary of a stream at its end.
@@ -61,7 +61,7 @@ impl Summary {
 }
 
 /// Sends a signal to a child process.
-pub fn signal(child: &Child, name: &str) {
+pub fn send_signal(child: &Child, name: &str) {
     let id = child.id().to_string();
     assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
 }

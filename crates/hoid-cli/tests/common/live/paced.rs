@@ -30,12 +30,12 @@ pub struct Tally {
 }
 
 impl Tally {
-    pub fn lost(&self) -> usize {
+    pub fn lost_count(&self) -> usize {
         self.sent - self.trips.len()
     }
 
     /// Returns the time within which this share of the answers arrived.
-    pub fn within(&self, share: f64) -> Duration {
+    pub fn latency_quantile(&self, share: f64) -> Duration {
         let mut sorted = self.trips.clone();
         sorted.sort_unstable();
         let last = sorted.len() - 1;
@@ -44,7 +44,7 @@ impl Tally {
 }
 
 /// Calls a function at each time k/rate.
-pub fn paced(rate_hz: usize, n: usize, mut call: impl FnMut(usize)) {
+pub fn call_at_rate(rate_hz: usize, n: usize, mut call: impl FnMut(usize)) {
     let start_time = Instant::now();
     for k in 0..n {
         let due = Duration::from_secs_f64(k as f64 / rate_hz as f64);
@@ -54,12 +54,12 @@ pub fn paced(rate_hz: usize, n: usize, mut call: impl FnMut(usize)) {
 }
 
 /// Sends structs over UDP.
-pub fn over_udp(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw) -> Tally {
+pub fn measure_udp(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw) -> Tally {
     let stream = Stream::new(program, rate_hz, &[]);
     let socket = stream.socket.try_clone().unwrap();
-    let receiver = thread::spawn(move || received(&socket, n));
+    let receiver = thread::spawn(move || receive_answers(&socket, n));
     let mut sent = Vec::with_capacity(n);
-    paced(rate_hz, n, |k| {
+    call_at_rate(rate_hz, n, |k| {
         let (e, u) = sample(k as f64 / rate_hz as f64, draw);
         let bytes = as_struct(k as u32, f64::NAN, e, u);
         sent.push(Instant::now());
@@ -75,7 +75,7 @@ pub fn over_udp(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw) -> Ta
 }
 
 /// Receives up to n answers until a timeout; returns their sequence numbers and arrival times.
-pub fn received(socket: &UdpSocket, n: usize) -> Vec<(u32, Instant)> {
+pub fn receive_answers(socket: &UdpSocket, n: usize) -> Vec<(u32, Instant)> {
     socket.set_read_timeout(Some(ANSWER_TIMEOUT)).unwrap();
     let mut all = Vec::with_capacity(n);
     let mut bytes = [0; 256];
@@ -89,7 +89,7 @@ pub fn received(socket: &UdpSocket, n: usize) -> Vec<(u32, Instant)> {
 }
 
 /// Sends lines through pipes. The reader pauses once, for `pause`, after the first hundred answers.
-pub fn over_pipes(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw, pause: Duration) -> Tally {
+pub fn measure_pipes(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw, pause: Duration) -> Tally {
     let mut child: Child = Command::new(program)
         .args(["stream", "--fs", &rate_hz.to_string()])
         .stdin(Stdio::piped())
@@ -112,7 +112,7 @@ pub fn over_pipes(program: &Path, rate_hz: usize, n: usize, draw: &mut Draw, pau
         all
     });
     let mut sent = Vec::with_capacity(n);
-    paced(rate_hz, n, |k| {
+    call_at_rate(rate_hz, n, |k| {
         let t_s = k as f64 / rate_hz as f64;
         let (e, u) = sample(t_s, draw);
         let line = format!("{t_s:?},{e:?},{u:?}\n");

@@ -5,14 +5,14 @@ use std::{net::UdpSocket, path::Path, time::Duration};
 
 use super::{
     Draw, Summary,
-    paced::{over_pipes, paced},
-    sample, signal,
-    udp::{PATIENCE, Stream, as_struct},
+    paced::{call_at_rate, measure_pipes},
+    sample, send_signal,
+    udp::{LONG_TIMEOUT, Stream, as_struct},
 };
 
 /// Sampling rate, Hz.
-const RATE: usize = 1000;
-const SLOW: usize = 100;
+const RATE_HZ: usize = 1000;
+const SLOW_RATE_HZ: usize = 100;
 
 /// Result of a case.
 pub struct Outcome {
@@ -32,7 +32,7 @@ fn outcome(what: &'static str, sent: usize, answered: usize, stream: Stream) -> 
 }
 
 /// Runs all cases.
-pub fn all(program: &Path, pause: Duration, hostile: usize, draw: &mut Draw) -> Vec<Outcome> {
+pub fn run_all_cases(program: &Path, pause: Duration, hostile: usize, draw: &mut Draw) -> Vec<Outcome> {
     vec![
         reader_of_pipe_stops(program, pause, draw),
         reader_of_udp_stops(program, pause, draw),
@@ -46,9 +46,9 @@ pub fn all(program: &Path, pause: Duration, hostile: usize, draw: &mut Draw) -> 
 
 /// A full pipe blocks the sender, so every sample is answered.
 pub fn reader_of_pipe_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
-    let n = (2.0 * pause.as_secs_f64() * RATE as f64) as usize + 500;
-    let tally = over_pipes(program, RATE, n, draw, pause);
-    assert_eq!((tally.lost(), tally.summary.samples), (0, n));
+    let n = (2.0 * pause.as_secs_f64() * RATE_HZ as f64) as usize + 500;
+    let tally = measure_pipes(program, RATE_HZ, n, draw, pause);
+    assert_eq!((tally.lost_count(), tally.summary.samples), (0, n));
     assert_eq!((tally.summary.skipped, tally.summary.dropped), (0, 0));
     Outcome {
         what: "the reader of the pipe stops",
@@ -86,13 +86,13 @@ fn send_until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)
 
 /// Answers that are not received are lost, but no samples are lost.
 pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
-    let stream = Stream::new(program, RATE, &[]);
+    let stream = Stream::new(program, RATE_HZ, &[]);
     let mut send = |k: usize| {
-        let (e, u) = sample(k as f64 / RATE as f64, draw);
+        let (e, u) = sample(k as f64 / RATE_HZ as f64, draw);
         stream.send(&as_struct(k as u32, f64::NAN, e, u));
     };
-    let n = (pause.as_secs_f64() * RATE as f64) as usize;
-    paced(RATE, n, &mut send);
+    let n = (pause.as_secs_f64() * RATE_HZ as f64) as usize;
+    call_at_rate(RATE_HZ, n, &mut send);
     let (sent, answered) = send_until_answered(&stream, n, send);
     let outcome = outcome("the reader of UDP stops", sent, answered, stream);
     let summary = outcome.summary;
@@ -103,17 +103,17 @@ pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> 
 
 /// Samples lost by the system while the stream was stopped are detected by their sequence numbers.
 pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
-    let stream = Stream::new(program, RATE, &[]);
+    let stream = Stream::new(program, RATE_HZ, &[]);
     let mut send = |k: usize| {
-        let (e, u) = sample(k as f64 / RATE as f64, draw);
+        let (e, u) = sample(k as f64 / RATE_HZ as f64, draw);
         stream.send(&as_struct(k as u32, f64::NAN, e, u));
     };
     send(0);
-    assert_eq!(stream.estimate().0, 0);
-    signal(&stream.child, "-STOP");
-    let n = (pause.as_secs_f64() * RATE as f64) as usize;
-    paced(RATE, n, |k| send(k + 1));
-    signal(&stream.child, "-CONT");
+    assert_eq!(stream.receive_estimate().0, 0);
+    send_signal(&stream.child, "-STOP");
+    let n = (pause.as_secs_f64() * RATE_HZ as f64) as usize;
+    call_at_rate(RATE_HZ, n, |k| send(k + 1));
+    send_signal(&stream.child, "-CONT");
     let (sent, answered) = send_until_answered(&stream, n + 1, send);
     let outcome = outcome("the stream stays constant", sent, answered + 1, stream);
     let summary = outcome.summary;
@@ -124,12 +124,12 @@ pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome
 
 /// A sender that restarts its sequence at zero is accepted after ten samples.
 pub fn sender_restarts(program: &Path, draw: &mut Draw) -> Outcome {
-    let mut stream = Stream::new(program, SLOW, &[]);
+    let mut stream = Stream::new(program, SLOW_RATE_HZ, &[]);
     let ask = |stream: &Stream, draw: &mut Draw| {
         for k in 0..200 {
-            let (e, u) = sample(k as f64 / SLOW as f64, draw);
+            let (e, u) = sample(k as f64 / SLOW_RATE_HZ as f64, draw);
             stream.send(&as_struct(k, f64::NAN, e, u));
-            assert_eq!(stream.estimate().0, k);
+            assert_eq!(stream.receive_estimate().0, k);
         }
     };
     ask(&stream, draw);
@@ -138,7 +138,7 @@ pub fn sender_restarts(program: &Path, draw: &mut Draw) -> Outcome {
     stream.socket = UdpSocket::bind("127.0.0.1:0").unwrap();
     stream.socket = UdpSocket::bind(place).unwrap();
     stream.socket.connect(("127.0.0.1", stream.port)).unwrap();
-    stream.socket.set_read_timeout(Some(PATIENCE)).unwrap();
+    stream.socket.set_read_timeout(Some(LONG_TIMEOUT)).unwrap();
     ask(&stream, draw);
     let outcome = outcome("the sender starts again", 400, 400, stream);
     assert_eq!((outcome.summary.dropped, outcome.summary.missing), (9, 9));
@@ -147,16 +147,16 @@ pub fn sender_restarts(program: &Path, draw: &mut Draw) -> Outcome {
 
 /// A stream that was killed and restarted answers from its first sample on; samples sent in the meantime are lost.
 pub fn stream_restarts(program: &Path, draw: &mut Draw) -> Outcome {
-    let stream = Stream::new(program, SLOW, &[]);
+    let stream = Stream::new(program, SLOW_RATE_HZ, &[]);
     let datagram = |k: u32, draw: &mut Draw| {
-        let (e, u) = sample(f64::from(k) / SLOW as f64, draw);
+        let (e, u) = sample(f64::from(k) / SLOW_RATE_HZ as f64, draw);
         as_struct(k, f64::NAN, e, u)
     };
     for k in 0..100 {
         stream.send(&datagram(k, draw));
-        assert_eq!(stream.estimate().0, k);
+        assert_eq!(stream.receive_estimate().0, k);
     }
-    let (port, socket) = stream.killed();
+    let (port, socket) = stream.kill();
     let mut refused = 0;
     for k in 100..150 {
         // The system reports a missing listener only at the next call.
@@ -165,10 +165,10 @@ pub fn stream_restarts(program: &Path, draw: &mut Draw) -> Outcome {
     assert!(refused > 0);
     // This clears errors that the system has not reported yet.
     let _ = socket.take_error();
-    let stream = Stream::at(program, SLOW, port, socket, &[]);
+    let stream = Stream::at(program, SLOW_RATE_HZ, port, socket, &[]);
     for k in 150..250 {
         stream.send(&datagram(k, draw));
-        assert_eq!(stream.estimate().0, k);
+        assert_eq!(stream.receive_estimate().0, k);
     }
     let outcome = outcome("the stream is killed and starts again", 250, 200, stream);
     assert_eq!((outcome.summary.samples, outcome.summary.skipped), (100, 0));
@@ -177,14 +177,14 @@ pub fn stream_restarts(program: &Path, draw: &mut Draw) -> Outcome {
 
 /// A forward jump of the time is a gap; a backward jump is accepted after ten samples.
 pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
-    let stream = Stream::new(program, SLOW, &[]);
+    let stream = Stream::new(program, SLOW_RATE_HZ, &[]);
     let mut sequence = 0;
     // The time jumps forward by 5 s, back by 4 s, and forward by an hour, of which 10 s are filled.
     for begin_s in [0.0, 6.0, 3.0, 3600.0] {
         for k in 0..100 {
-            let (e, u) = sample(f64::from(k) / SLOW as f64, draw);
-            stream.send(&as_struct(sequence, begin_s + f64::from(k) / SLOW as f64, e, u));
-            assert_eq!(stream.estimate().0, sequence);
+            let (e, u) = sample(f64::from(k) / SLOW_RATE_HZ as f64, draw);
+            stream.send(&as_struct(sequence, begin_s + f64::from(k) / SLOW_RATE_HZ as f64, e, u));
+            assert_eq!(stream.receive_estimate().0, sequence);
             sequence += 1;
         }
     }
@@ -195,14 +195,14 @@ pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
 
 /// Datagrams that are not samples, mixed with samples.
 pub fn hostile_datagrams(program: &Path, hostile: usize, draw: &mut Draw) -> Outcome {
-    let stream = Stream::new(program, SLOW, &[]);
+    let stream = Stream::new(program, SLOW_RATE_HZ, &[]);
     let mut sent = 0;
     for k in 0..hostile {
         stream.send(&invalid_datagram(draw));
         if k % 8 == 7 {
-            let (e, u) = sample(f64::from(sent) / SLOW as f64, draw);
+            let (e, u) = sample(f64::from(sent) / SLOW_RATE_HZ as f64, draw);
             stream.send(&as_struct(sent, f64::NAN, e, u));
-            assert_eq!(stream.estimate().0, sent);
+            assert_eq!(stream.receive_estimate().0, sent);
             sent += 1;
         }
     }
@@ -213,15 +213,15 @@ pub fn hostile_datagrams(program: &Path, hostile: usize, draw: &mut Draw) -> Out
 }
 
 fn invalid_datagram(draw: &mut Draw) -> Vec<u8> {
-    let length = 1 + draw.below(300);
+    let length = 1 + draw.integer_below(300);
     let any: Vec<u8> = (0..length).map(|_| draw.bits() as u8).collect();
     let text: String = any.iter().map(|byte| char::from(b'a' + byte % 26)).collect();
-    match draw.below(6) {
+    match draw.integer_below(6) {
         // No text starts with these bytes.
         0 => [&[0xff], any.as_slice()].concat(),
         1 => {
             let mut whole = as_struct(7, f64::NAN, 0.1, 0.1);
-            whole.truncate(4 + draw.below(36));
+            whole.truncate(4 + draw.integer_below(36));
             whole
         }
         2 => [as_struct(7, f64::NAN, 0.1, 0.1), any].concat(),

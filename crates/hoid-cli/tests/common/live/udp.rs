@@ -8,11 +8,11 @@ use std::{
     time::Duration,
 };
 
-use super::{remaining_output, signal};
+use super::{remaining_output, send_signal};
 
 /// Timeout, much longer than the latency of an answer.
-pub const PATIENCE: Duration = Duration::from_secs(60);
-const NUMBERS: usize = 19;
+pub const LONG_TIMEOUT: Duration = Duration::from_secs(60);
+const NUMBER_COUNT: usize = 19;
 
 /// A running stream.
 pub struct Stream {
@@ -32,7 +32,7 @@ impl Stream {
 
     /// Starts a stream at this port, with answers to this socket; for port 0 the system selects a port.
     pub fn at(program: &Path, rate_hz: usize, port: u16, socket: UdpSocket, arguments: &[&str]) -> Self {
-        socket.set_read_timeout(Some(PATIENCE)).unwrap();
+        socket.set_read_timeout(Some(LONG_TIMEOUT)).unwrap();
         let answers = socket.local_addr().unwrap().port();
         let mut child = Command::new(program)
             .args(["stream", "--fs", &rate_hz.to_string()])
@@ -65,7 +65,7 @@ impl Stream {
         self.socket.send(bytes).unwrap();
     }
 
-    pub fn answer(&self) -> Vec<u8> {
+    pub fn receive_answer(&self) -> Vec<u8> {
         let mut bytes = vec![0; 1 << 16];
         let length = self.receive(&mut bytes).unwrap();
         bytes.truncate(length);
@@ -77,8 +77,8 @@ impl Stream {
         self.socket.recv(bytes).ok()
     }
 
-    pub fn estimate(&self) -> (u32, [f64; NUMBERS], i32, u32) {
-        let bytes = self.answer();
+    pub fn receive_estimate(&self) -> (u32, [f64; NUMBER_COUNT], i32, u32) {
+        let bytes = self.receive_answer();
         assert_eq!((bytes.len(), &bytes[..4]), (168, b"hoid".as_slice()));
         let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
         let number = |i: usize| f64::from_le_bytes(bytes[8 + 8 * i..16 + 8 * i].try_into().unwrap());
@@ -87,12 +87,12 @@ impl Stream {
 
     /// Interrupts the stream and returns its messages.
     pub fn end(mut self) -> String {
-        signal(&self.child, "-INT");
+        send_signal(&self.child, "-INT");
         remaining_output(&mut self.child, &mut self.said)
     }
 
     /// Kills the stream; returns its port and the socket.
-    pub fn killed(mut self) -> (u16, UdpSocket) {
+    pub fn kill(mut self) -> (u16, UdpSocket) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
         (self.port, self.socket)

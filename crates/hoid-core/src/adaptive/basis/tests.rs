@@ -35,7 +35,7 @@ fn filter_output_matches_the_frequency_response() {
     let mut largest: f64 = 0.0;
     responses_of_signals(&mut basis, omega, ts, &mut |z, sin, cos| {
         let x = twin.regressors(z).x;
-        for i in 0..GAINS {
+        for i in 0..GAIN_COUNT {
             largest = largest.max((x[i] - (h[i][0] * sin + h[i][1] * cos)).abs());
         }
     });
@@ -49,7 +49,7 @@ fn derivatives_agree_with_finite_differences() {
     let (ts, omega, step) = (0.01, 4.0, 1e-5);
     let mut basis = Basis::new(point(), ts).unwrap();
     let twin = basis.clone();
-    let by: Vec<[Complex; GAINS]> = [[step, 0.0, 0.0], [0.0, step, 0.0], [0.0, 0.0, step]]
+    let by: Vec<[Complex; GAIN_COUNT]> = [[step, 0.0, 0.0], [0.0, step, 0.0], [0.0, 0.0, step]]
         .map(|c| {
             let [up, down] = [1.0, -1.0].map(|sign| twin.response(omega, point().moved(c.map(|c| sign * c))));
             core::array::from_fn(|i| core::array::from_fn(|k| (up[i][k] - down[i][k]) / (2.0 * step)))
@@ -59,7 +59,7 @@ fn derivatives_agree_with_finite_differences() {
     responses_of_signals(&mut basis, omega, ts, &mut |z, sin, cos| {
         let r = twin.regressors(z);
         for (found, expected) in r.by.iter().zip(&by) {
-            for i in 0..GAINS {
+            for i in 0..GAIN_COUNT {
                 let size = libm::hypot(expected[i][0], expected[i][1]);
                 largest = largest.max((found[i] - (expected[i][0] * sin + expected[i][1] * cos)).abs() / size);
             }
@@ -73,12 +73,12 @@ fn derivatives_agree_with_finite_differences() {
 #[test]
 fn weights_match_the_regressors() {
     let basis = Basis::new(point(), 0.01).unwrap();
-    let state: [f64; STATES] = [1.2, -0.7, 0.4, 0.3, 1.5, -0.04, 0.02];
+    let state: [f64; STATE_COUNT] = [1.2, -0.7, 0.4, 0.3, 1.5, -0.04, 0.02];
     let z: Signals = [0.3, -1.1, 0.7, 2.0, -5.0, 11.0];
     let r = basis.regressors(&z);
-    let expected: f64 = (0..GAINS)
+    let expected: f64 = (0..GAIN_COUNT)
         .map(|i| {
-            let corrected: f64 = (0..DYNAMICS).map(|j| state[4 + j] * r.by[j][i]).sum();
+            let corrected: f64 = (0..DYNAMICS_COUNT).map(|j| state[4 + j] * r.by[j][i]).sum();
             state[i] * (r.x[i] + corrected)
         })
         .sum();
@@ -113,7 +113,7 @@ fn moved_basis_converges_to_a_basis_at_the_new_point() {
             let z = moved.step(errors(moved, k));
             if k > 3400 {
                 let (a, b) = (always.regressors(&z), always.regressors(&expected));
-                for i in 0..GAINS {
+                for i in 0..GAIN_COUNT {
                     largest = largest.max((a.x[i] - b.x[i]).abs());
                     size = size.max(b.x[i].abs());
                 }
@@ -132,9 +132,11 @@ fn gain_with_lead_is_in_the_span() {
     // (K_e + K_e_dot s)(s + a).
     let (k_e, k_e_dot) = (0.09, 0.07);
     let raw = [k_e / 3.0, k_e_dot / 3.0 + k_e, k_e_dot];
-    let map = basis.gain_and_lead(&[1.0, 2.0, 4.0]);
+    let map = basis.gain_and_lead_matrix(&[1.0, 2.0, 4.0]);
     for (row, expected) in map.iter().zip([k_e, k_e_dot]) {
-        let found: f64 = (0..GAINS).map(|i| row[i] * raw[i] / basis.scale()[i]).sum();
+        let found: f64 = (0..GAIN_COUNT)
+            .map(|i| row[i] * raw[i] / basis.scale_factors()[i])
+            .sum();
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }
 }
@@ -144,7 +146,7 @@ fn basis_is_continuous_in_the_delay_and_refuses_invalid_points() {
     let run = |tau: f64| {
         let mut basis = Basis::new(Point { tau, ..point() }, 0.01).unwrap();
         let e = |k: i64| libm::sin(0.07 * k as f64);
-        let mut last = [0.0; SIGNALS];
+        let mut last = [0.0; SIGNAL_COUNT];
         for k in 0..500_i64 {
             let delay = basis.delay() as i64;
             last = basis.step(core::array::from_fn(|j| e(k - delay - j as i64)));
@@ -170,5 +172,5 @@ fn basis_is_continuous_in_the_delay_and_refuses_invalid_points() {
     assert!(bad.into_iter().all(|p| Basis::new(p, 0.01).is_none()));
     assert!(Basis::new(point(), 0.0).is_none());
     let mut still = Basis::new(point(), 0.01).unwrap();
-    assert_eq!(still.step([0.0; 3]), [0.0; SIGNALS]);
+    assert_eq!(still.step([0.0; 3]), [0.0; SIGNAL_COUNT]);
 }

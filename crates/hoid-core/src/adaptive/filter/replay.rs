@@ -1,14 +1,14 @@
 //! Replays: a new candidate reads the stored record again and then replaces the live candidate.
 //!
 //! In parallel with the live candidate, a second candidate, the trial, reads the stored record from its start,
-//! [`REPLAYED`] samples for each new sample, until it has caught up. Its basis is at the current estimate, its
+//! [`REPLAY_SAMPLES_PER_STEP`] samples for each new sample, until it has caught up. Its basis is at the current estimate, its
 //! whitening filter is the noise model of the residuals, and its dispersion comes from the innovations of the live
 //! candidate. When the trial has caught up, it becomes the live candidate and the next trial starts. With a delay of a
 //! few seconds, the estimate therefore equals the result of a prediction-error method over all stored data, iterated as
 //! in a Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a bounded cost per sample and
 //! with bit-identical results on every machine.
 //!
-//! To escape local minima, every second trial starts from another point. It makes [`STAGES`] passes over the record,
+//! To escape local minima, every second trial starts from another point. It makes [`STAGE_COUNT`] passes over the record,
 //! each from the result of the previous pass. It replaces the live candidate only if its evidence is better by
 //! [`TAKEOVER_NATS`].
 //!
@@ -17,38 +17,38 @@
 
 use core::ops::Range;
 
-use super::{AdaptiveFilter, store, through_filters, trust_region, variances};
+use super::{AdaptiveFilter, correction_variances, filter_output, store, trust_region};
 use crate::adaptive::{
     basis::Point,
     candidate::Candidate,
-    history::{History, Use},
+    history::{History, SampleUse},
     mixture::ChangePrior,
     saturation::Saturation,
 };
 
 /// Number of stored samples that a replay reads for each new sample.
-pub const REPLAYED: usize = 50;
+pub const REPLAY_SAMPLES_PER_STEP: usize = 50;
 /// Number of passes of a trial from another starting point. After the last pass the evidence of the trial must be
 /// better by `TAKEOVER_NATS`.
-const STAGES: u64 = 3;
+const STAGE_COUNT: u64 = 3;
 const TAKEOVER_NATS: f64 = 3.0;
 /// Amount in nats by which the evidence of a trial from the estimate may be lower than the evidence of the live
 /// candidate, since the trial starts with a wider prior.
-const TOLERATED_NATS: f64 = 20.0;
+const TOLERATED_DEFICIT_NATS: f64 = 20.0;
 /// Minimum number of samples for the first estimate, as a multiple of the order of the noise model.
-const MIN_ORDERS: u64 = 3;
+const MIN_SAMPLES_PER_ORDER: u64 = 3;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Makes the first estimate once there are enough samples: the best of the candidates from all starting points over
     /// the samples so far or, without replays, the candidate at the point of the person.
     pub(super) fn try_to_start(&mut self) {
-        let (ts, n) = (self.prior.sample_time, self.history.samples());
-        let enough = n as f64 * ts >= self.prior.hold && n >= MIN_ORDERS * self.prior.order as u64;
+        let (ts, n) = (self.prior.sample_time, self.history.sample_count());
+        let enough = n as f64 * ts >= self.prior.hold && n >= MIN_SAMPLES_PER_ORDER * self.prior.order as u64;
         if !enough || !self.powers.iter().all(|p| *p > 0.0) {
             return;
         }
-        if !self.replays_anything() {
-            if let Some(live) = self.candidate(self.prior.person, &self.prior_noise, 1.0) {
+        if !self.has_replays() {
+            if let Some(live) = self.build_candidate(self.prior.person, &self.prior_noise, 1.0) {
                 self.live = live;
                 self.started = true;
             }
@@ -58,10 +58,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let first = n.saturating_sub(self.history.capacity() as u64);
         let mut best: Option<(f64, Candidate)> = None;
         for start in self.prior.starts {
-            let Some(mut candidate) = self.candidate(start, &self.prior_noise, 1.0) else {
+            let Some(mut candidate) = self.build_candidate(start, &self.prior_noise, 1.0) else {
                 continue;
             };
-            if !read(
+            if !feed_samples(
                 &self.history,
                 &self.saturation,
                 &self.prior.changes,
@@ -83,7 +83,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// Log prior density of a point, up to a constant.
     fn log_prior(&self, point: Point) -> f64 {
-        let (p, is) = (self.prior.person, variances(&self.prior));
+        let (p, is) = (self.prior.person, correction_variances(&self.prior));
         let away = [point.omega - p.omega, point.zeta - p.zeta, point.tau - p.tau];
         -0.5 * away.iter().zip(is).map(|(a, v)| a * a / v).sum::<f64>()
     }
@@ -94,8 +94,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             self.start_replay();
             return;
         }
-        let to = (self.next_sample + REPLAYED as u64).min(self.history.samples());
-        let sound = read(
+        let to = (self.next_sample + REPLAY_SAMPLES_PER_STEP as u64).min(self.history.sample_count());
+        let sound = feed_samples(
             &self.history,
             &self.saturation,
             &self.prior.changes,
@@ -105,8 +105,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.next_sample = to;
         if !sound {
             self.replay_stage = 0;
-        } else if self.next_sample >= self.history.samples() {
-            self.decide();
+        } else if self.next_sample >= self.history.sample_count() {
+            self.finish_trial();
         }
     }
 
@@ -131,7 +131,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     fn start_from(&mut self, from: &Candidate, point: Point, stage: u64) {
         let mut d = from.noise.clone();
         d.solve();
-        let Some(trial) = self.candidate(point, &d, from.dispersion()) else {
+        let Some(trial) = self.build_candidate(point, &d, from.dispersion()) else {
             self.replay_stage = 0;
             return;
         };
@@ -140,12 +140,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let later = (trial.start.saturating_sub(from.start)) / from.block_samples().max(1);
         let guide = from.mixture.segments();
         let basis = trial.basis().clone();
-        self.trial = trial.with_guide(guide.carried(later, |state| from.carried(&basis, state)));
+        self.trial = trial.with_guide(guide.converted(later, |state| from.convert_state(&basis, state)));
         (self.replay_stage, self.next_sample) = (stage, self.trial.start);
     }
 
     /// Decides whether a trial that has caught up replaces the live candidate.
-    fn decide(&mut self) {
+    fn finish_trial(&mut self) {
         let mut trial = self.trial.clone();
         trial.clear_guide();
         let evidence = trial.evidence;
@@ -156,20 +156,20 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         // The evidence of two candidates can be compared only over the same samples.
         let same = trial.start == self.live.start;
         self.apply_population_prior(&mut trial);
-        if stage > 1 && stage <= STAGES {
+        if stage > 1 && stage <= STAGE_COUNT {
             let point = trial.point();
             self.start_from(&trial, point, stage + 1);
             return;
         }
         let takes_over = match stage {
-            1 => !same || evidence > self.live.evidence - TOLERATED_NATS,
+            1 => !same || evidence > self.live.evidence - TOLERATED_DEFICIT_NATS,
             _ => same && evidence > self.live.evidence + TAKEOVER_NATS,
         };
         // The operator that lost the comparison may predict nearly as well, so it widens the reported errors.
         if stage > 1 && same {
             let loser = if takes_over { &self.live } else { &trial };
             let deficit = (evidence - self.live.evidence).abs();
-            self.alternatives.put(
+            self.alternatives.store(
                 self.starting_point_index(),
                 loser.operator(),
                 deficit,
@@ -190,12 +190,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let mean = [p.omega - at.omega, p.zeta - at.zeta, p.tau - at.tau];
         candidate
             .mixture
-            .replace_prior(trust_region(at), variances(&self.prior), mean);
+            .replace_prior(trust_region(at), correction_variances(&self.prior), mean);
     }
 }
 
 /// Passes samples of the history to a candidate; returns false if a number has overflowed.
-fn read<E: AsRef<[f64]> + AsMut<[f64]>>(
+fn feed_samples<E: AsRef<[f64]> + AsMut<[f64]>>(
     history: &History<E>,
     saturation: &Saturation,
     changes: &ChangePrior,
@@ -206,17 +206,17 @@ fn read<E: AsRef<[f64]> + AsMut<[f64]>>(
         candidate.advance_basis(|age| history.error(sample, age));
         let (u, sample_use) = history.output(sample);
         let through = match sample_use {
-            Use::Update => {
-                let white = candidate.whitened(u);
+            SampleUse::Update => {
+                let white = candidate.whiten(u);
                 if !candidate.update(&white, u, changes) {
                     return false;
                 }
                 u
             }
-            Use::FilterOnly => u,
+            SampleUse::FilterOnly => u,
             _ => {
-                let predicted = u - candidate.innovation(&candidate.whitened(u));
-                through_filters(saturation, sample_use, u, predicted)
+                let predicted = u - candidate.innovation(&candidate.whiten(u));
+                filter_output(saturation, sample_use, u, predicted)
             }
         };
         store(candidate, sample_use, through);

@@ -17,7 +17,7 @@ pub(super) const BLOCK_S: f64 = 2.0;
 /// Largest total number of blocks in all records.
 const MAX_BLOCKS: usize = 96;
 /// Number of residuals in a piece of a long record.
-const PIECE: usize = 1 << 15;
+const RESIDUALS_PER_PIECE: usize = 1 << 15;
 
 /// Score and information of one block of a record.
 #[derive(Debug, Clone)]
@@ -91,13 +91,13 @@ pub(crate) fn score_blocks(
 
 /// Splits the blocks of a record into groups that are processed together.
 fn pieces(number: usize, residuals: usize) -> Vec<Range<usize>> {
-    let together = (PIECE * number / residuals.max(1)).max(1);
+    let together = (RESIDUALS_PER_PIECE * number / residuals.max(1)).max(1);
     let starts = (0..number).step_by(together);
     starts.map(|from| from..(from + together).min(number)).collect()
 }
 
 /// Computes the blocks of a fit in physical parameters, for the free elements of eta.
-pub(crate) fn physical_blocks<P: Parametrisation>(
+pub(crate) fn physical_score_blocks<P: Parametrisation>(
     criterion: &PhysicalCriterion<'_, P>,
     eta: &[f64],
     free: &[usize],

@@ -16,24 +16,28 @@ use std::f64::consts::PI;
 use statrs::distribution::{ContinuousCDF, Normal, StudentsT};
 
 /// Returns the two-sided p-value of a t statistic.
-pub(super) fn of_student(t: f64, freedom: f64) -> f64 {
+pub(super) fn student_p_value(t: f64, freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |d| 2.0 * d.sf(t.abs()))
 }
 
 /// Returns the p-value of the supremum over `instants` instants, given the p-value of a single instant;
 /// `smallest_share` is pi_0.
-pub(super) fn of_supremum(p_one: f64, instants: usize, smallest_share: f64) -> f64 {
+pub(super) fn supremum_p_value(p_one: f64, instants: usize, smallest_share: f64) -> f64 {
     let bonferroni = p_one * instants as f64;
     let Ok(normal) = Normal::new(0.0, 1.0) else {
         return bonferroni.min(1.0);
     };
     let c = normal.inverse_cdf(0.5 * p_one.max(1e-300)).powi(2);
-    let continuous = if c > 1.0 { de_long(c, smallest_share) } else { 1.0 };
+    let continuous = if c > 1.0 {
+        de_long_probability(c, smallest_share)
+    } else {
+        1.0
+    };
     bonferroni.min(continuous).min(1.0)
 }
 
 /// Returns De Long's probability that the supremum exceeds c.
-fn de_long(c: f64, pi_0: f64) -> f64 {
+fn de_long_probability(c: f64, pi_0: f64) -> f64 {
     let log_lambda = 2.0 * ((1.0 - pi_0) / pi_0).ln();
     (0.5 * c / PI).sqrt() * (-0.5 * c).exp() * ((1.0 - 1.0 / c) * log_lambda + 2.0 / c)
 }
@@ -46,7 +50,7 @@ mod tests {
     fn tail_probability_matches_andrews_table() {
         // D. W. K. Andrews, Econometrica 71 (2003) 395-397, p = 1, pi_0 = 0.15: the 10, 5 and 1 % points.
         for (level, c) in [(0.1, 7.12), (0.05, 8.68), (0.01, 12.16)] {
-            let found = de_long(c, 0.15);
+            let found = de_long_probability(c, 0.15);
             // The table comes from simulation; the tail is asymptotic.
             assert!((found / level - 1.0).abs() < 0.1, "{c}: {found}");
         }
@@ -54,10 +58,10 @@ mod tests {
 
     #[test]
     fn few_instants_use_the_bonferroni_bound() {
-        assert!((of_supremum(1e-6, 3, 0.05) - 3e-6).abs() < 1e-12);
-        assert!(of_supremum(1e-6, 100_000, 0.05) < 1e-3);
-        assert_eq!(of_supremum(1.0, 3, 0.05), 1.0);
-        assert!(of_supremum(0.0, 3, 0.05) <= 1e-300);
-        assert!((of_student(2.228, 10.0) - 0.05).abs() < 1e-4);
+        assert!((supremum_p_value(1e-6, 3, 0.05) - 3e-6).abs() < 1e-12);
+        assert!(supremum_p_value(1e-6, 100_000, 0.05) < 1e-3);
+        assert_eq!(supremum_p_value(1.0, 3, 0.05), 1.0);
+        assert!(supremum_p_value(0.0, 3, 0.05) <= 1e-300);
+        assert!((student_p_value(2.228, 10.0) - 0.05).abs() < 1e-4);
     }
 }

@@ -24,7 +24,7 @@
 //!
 //! **Level.** T is compared with Student's distribution with n - 2 degrees of freedom. The p-value of the supremum is
 //! the smaller of Bonferroni's bound and the value for continuous time ([`critical`]), corrected for the number of
-//! directions. The delay and the other parameters are tested separately, each at the level [`LEVEL`]. The directions
+//! directions. The delay and the other parameters are tested separately, each at the level [`SIGNIFICANCE_LEVEL`]. The directions
 //! are the parameters of the operator or, if the coefficients do not correspond to an operator, the coefficients.
 //!
 //! | file | contents |
@@ -47,29 +47,32 @@ mod tests;
 
 use hoid_model::Finding;
 
-pub(crate) use blocks::{physical_blocks, score_blocks};
-pub use search::Course;
-use search::{Change, strongest};
+pub(crate) use blocks::{physical_score_blocks, score_blocks};
+pub use search::TimeCourse;
+use search::{Change, strongest_step};
 pub(crate) use search::{Constancy, Direction};
 pub use steadiness::{ResponseBasis, ResponseChange, response_changes};
 use stretch::most_influential_block;
 
 /// Largest p-value at which a parameter counts as changed, both in the test of the delay and in the test of the other
 /// parameters.
-const LEVEL: f64 = 5e-4;
+const SIGNIFICANCE_LEVEL: f64 = 5e-4;
 /// Default relative standard deviation of a person's gain, crossover and delay from run to run. In six cells of ten runs
 /// of three people, each run identified alone, the crossover varied by 13 % in the median after the errors of the estimates were
 /// subtracted (7 to 21 %), and the gain by more (11 to 32 %).
-pub const RUN_TO_RUN: f64 = 0.13;
+pub const RUN_TO_RUN_DEVIATION: f64 = 0.13;
 
 impl Constancy<'_> {
     /// Returns a warning if a parameter changes, and a warning if a stretch dominates the fit. The test for a stretch
     /// assumes that the standard errors were computed from the model, not from the scatter of blocks.
     pub fn findings(&self) -> Vec<Finding> {
-        self.change().into_iter().chain(self.stretch()).collect()
+        self.change_finding()
+            .into_iter()
+            .chain(self.stretch_finding())
+            .collect()
     }
 
-    fn stretch(&self) -> Option<Finding> {
+    fn stretch_finding(&self) -> Option<Finding> {
         let found = most_influential_block(self)?;
         let time = |sample: usize| sample as f64 * self.sample_time_s;
         let to = found.to.map_or("the end".to_owned(), |to| format!("{:.0} s", time(to)));
@@ -84,7 +87,7 @@ impl Constancy<'_> {
             .iter()
             .map(|(name, by)| format!("{name} by {by:.1}"))
             .collect();
-        Some(Finding::doubt(
+        Some(Finding::warning(
             "stretch",
             format!(
                 "the fit depends on the stretch from {:.0} s to {to}{record}: leaving it out changes {} standard \
@@ -96,14 +99,17 @@ impl Constancy<'_> {
     }
 
     /// Returns a warning if a parameter changes, with the name of the parameter and the approximate time.
-    pub fn change(&self) -> Option<Finding> {
+    pub fn change_finding(&self) -> Option<Finding> {
         let records = self.blocks.last().map_or(0, |block| block.record + 1);
-        let of = |delay: bool| strongest(self, delay).filter(|change| change.p_value < LEVEL);
+        let of = |delay: bool| strongest_step(self, delay).filter(|change| change.p_value < SIGNIFICANCE_LEVEL);
         let mut found: Vec<Change> = [of(true), of(false)].into_iter().flatten().collect();
         found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
-        let words: Vec<String> = found.iter().map(|change| self.words(change, records)).collect();
+        let words: Vec<String> = found
+            .iter()
+            .map(|change| self.change_description(change, records))
+            .collect();
         (!words.is_empty()).then(|| {
-            Finding::doubt(
+            Finding::warning(
                 "not-constant",
                 format!(
                     "the person's response is not constant: {}; fit the parts separately, or use --change sigmoid or a \
@@ -114,7 +120,7 @@ impl Constancy<'_> {
         })
     }
 
-    fn words(&self, change: &Change, records: usize) -> String {
+    fn change_description(&self, change: &Change, records: usize) -> String {
         let at_s = change.at as f64 * self.sample_time_s;
         let place = match (records, change.at) {
             (0 | 1, _) => format!("about {at_s:.0} s after the start"),

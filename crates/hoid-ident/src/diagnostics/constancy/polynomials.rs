@@ -7,11 +7,11 @@
 
 use hoid_model::{
     Finding, Record,
-    delayed_operator::{delayed_operator_jacobian_within, delayed_parameters},
+    delayed_operator::{delayed_operator_jacobian_with_delay_samples, delayed_operator_parameters},
 };
 
 use super::{
-    Constancy, Direction, RUN_TO_RUN,
+    Constancy, Direction, RUN_TO_RUN_DEVIATION,
     blocks::{ScoreBlock, Scores, score_blocks},
 };
 use crate::{
@@ -23,7 +23,7 @@ use crate::{
 const CLIPPING_LIMIT: f64 = 1.345;
 /// If the sum of the scores of a parameter exceeds this number of standard deviations, the fit is not a least-squares
 /// minimum, for example because it was made for simulation or a prior has more weight than the data.
-const LARGEST_SCORE_SUM: f64 = 3.0;
+const MAX_SCORE_SUM: f64 = 3.0;
 
 impl Fit {
     /// Returns warnings if the operator changes over the records or a stretch dominates the fit. There are no warnings
@@ -40,14 +40,14 @@ impl Fit {
         let (orders, theta, ts) = (self.orders(), self.model.theta(), self.model.sample_time());
         let p = theta.len();
         let first = first_residual(&orders, self.initial_state);
-        let mut workspace = Workspace::of_thread();
+        let mut workspace = Workspace::borrow_from_thread();
         let bound = if self.robust {
             CLIPPING_LIMIT * self.innovation_variance.sqrt()
         } else {
             f64::INFINITY
         };
         let mut scores = |_: usize, data: Data<'_>| -> Option<Scores> {
-            let criterion = Criterion::of_record(orders, data, self.initial_state, first);
+            let criterion = Criterion::for_record(orders, data, self.initial_state, first);
             let mut eps = criterion.residuals_of(theta, 0, &mut workspace);
             eps.iter_mut().for_each(|x| *x = x.clamp(-bound, bound));
             let psi = self.jacobian_with_delay(&criterion, &mut workspace);
@@ -63,7 +63,7 @@ impl Fit {
         let off = |i: usize| {
             let information = over_all(&|block| block.information[i * (p + 1) + i]);
             over_all(&|block| block.score[i]).powi(2)
-                > LARGEST_SCORE_SUM * LARGEST_SCORE_SUM * self.innovation_variance * information
+                > MAX_SCORE_SUM * MAX_SCORE_SUM * self.innovation_variance * information
         };
         if (0..p).any(|i| !self.is_fixed_or_bounded[i] && off(i)) {
             return None;
@@ -72,7 +72,7 @@ impl Fit {
             blocks: &blocks,
             directions: &self.directions(),
             variance: self.innovation_variance,
-            run_to_run: RUN_TO_RUN,
+            run_to_run: RUN_TO_RUN_DEVIATION,
             sample_time_s: ts.s(),
         };
         Some(constancy.findings())
@@ -118,10 +118,10 @@ impl Fit {
         if self.is_fixed_or_bounded.contains(&true) {
             return None;
         }
-        let mut parameters = delayed_parameters(&self.operator().ok()?.parameters());
+        let mut parameters = delayed_operator_parameters(&self.operator().ok()?.parameters());
         parameters[4] = whole as f64 * ts.s();
         // The rows of the Jacobian are b0, b1, b2, f1, f2.
-        let slopes = delayed_operator_jacobian_within(whole, parameters, ts).ok()?;
+        let slopes = delayed_operator_jacobian_with_delay_samples(whole, parameters, ts).ok()?;
         let places = self.model.operator_positions();
         let named = [("K_e", ""), ("K_e_dot", " s"), ("omega_nm", " rad/s"), ("zeta_nm", "")];
         let of = |(k, (name, unit)): (usize, (&str, &'static str))| {

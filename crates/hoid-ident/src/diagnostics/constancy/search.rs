@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::{
     blocks::ScoreBlock,
-    critical::{of_student, of_supremum},
+    critical::{student_p_value, supremum_p_value},
 };
 
 /// Minimum number of blocks on each side of a change.
@@ -15,7 +15,7 @@ const MIN_BLOCKS_PER_SIDE: usize = 2;
 /// Shortest period of a periodic change, in blocks.
 const MIN_PERIOD_BLOCKS: f64 = 5.0;
 /// A change is tested only if at least this share of its information remains after estimating the constant parameters.
-const MIN_INFORMATION_LEFT: f64 = 1e-3;
+const MIN_REMAINING_INFORMATION_SHARE: f64 = 1e-3;
 /// Smallest eigenvalue of the information, scaled to a unit diagonal, for which a combination of parameters is
 /// determined.
 const MIN_EIGENVALUE: f64 = 1e-9;
@@ -46,7 +46,7 @@ pub(crate) struct Direction {
 
 /// Time course of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Course {
+pub enum TimeCourse {
     /// A jump.
     Step,
     /// A linear drift over the whole record.
@@ -58,7 +58,7 @@ pub enum Course {
 /// A significant change of a parameter.
 #[derive(Debug, Clone)]
 pub(super) struct Change {
-    pub course: Course,
+    pub course: TimeCourse,
     pub name: String,
     pub unit: &'static str,
     pub record: usize,
@@ -73,25 +73,25 @@ pub(super) struct Change {
 pub(super) struct Candidate {
     record: usize,
     at: usize,
-    course: Course,
+    course: TimeCourse,
     weights: Vec<f64>,
 }
 
 impl Candidate {
     /// Returns a step: a change of size one in a range of blocks, and zero in all other blocks.
-    fn of_blocks(record: usize, at: usize, blocks: std::ops::Range<usize>, all: usize) -> Self {
+    fn step(record: usize, at: usize, blocks: std::ops::Range<usize>, all: usize) -> Self {
         let weights = (0..all).map(|c| f64::from(u8::from(blocks.contains(&c)))).collect();
         Self {
             record,
             at,
-            course: Course::Step,
+            course: TimeCourse::Step,
             weights,
         }
     }
 }
 
 /// Test statistics of one candidate change.
-struct Tested {
+struct CandidateTest {
     set: usize,
     share: f64,
     u: f64,
@@ -102,14 +102,14 @@ struct Tested {
 }
 
 /// Returns the step with the smallest p-value: of the delay if `delay` is true, otherwise of the other parameters.
-pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
+pub(super) fn strongest_step(of: &Constancy<'_>, delay: bool) -> Option<Change> {
     let directions: Vec<_> = of.directions.iter().filter(|d| d.delay == delay).collect();
-    strongest_among(of, &directions, &sets(of.blocks))
+    strongest_change(of, &directions, &candidate_steps(of.blocks))
 }
 
 /// Returns the change with the smallest p-value among these directions and candidates, whether or not it is
 /// significant.
-pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], sets: &[Candidate]) -> Option<Change> {
+pub(super) fn strongest_change(of: &Constancy<'_>, directions: &[&Direction], sets: &[Candidate]) -> Option<Change> {
     let (blocks, n) = (of.blocks, of.blocks.len());
     let p = blocks.first()?.score.len();
     if n < 2 * MIN_BLOCKS_PER_SIDE || of.variance <= 0.0 || sets.is_empty() {
@@ -135,8 +135,8 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
     let mut best: Option<Change> = None;
     for direction in directions {
         let v = DVector::from_column_slice(&direction.vector);
-        let all: Vec<Tested> = (0..sets.len())
-            .filter_map(|k| tested(of, (&matrices, &scores), &inverse, (&v, direction.size), &sets[k], k))
+        let all: Vec<CandidateTest> = (0..sets.len())
+            .filter_map(|k| test_candidate(of, (&matrices, &scores), &inverse, (&v, direction.size), &sets[k], k))
             .collect();
         let mut ratios: Vec<f64> = all.iter().map(|t| t.by_blocks / t.by_model).collect();
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
@@ -145,13 +145,13 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
             // A periodic change affects all blocks alike; the variance for such a change uses the median scatter over all
             // candidates.
             let (scatter, freedom) = match sets[t.set].course {
-                Course::Step | Course::Drift => (t.by_blocks, n - 2),
-                Course::Oscillation(_) => (0.0, 4 * (n - 2)),
+                TimeCourse::Step | TimeCourse::Drift => (t.by_blocks, n - 2),
+                TimeCourse::Oscillation(_) => (0.0, 4 * (n - 2)),
             };
             let variance = scatter.max(t.by_model * typical.max(1.0)) + t.between_runs;
-            let p_one = of_student(t.u / variance.sqrt(), freedom as f64);
+            let p_one = student_p_value(t.u / variance.sqrt(), freedom as f64);
             let of_all = match sets[t.set].course {
-                Course::Step => of_supremum(p_one, all.len(), smallest.max(1e-3)),
+                TimeCourse::Step => supremum_p_value(p_one, all.len(), smallest.max(1e-3)),
                 _ => p_one * all.len() as f64,
             };
             let p_value = (of_all * directions.len() as f64).min(1.0);
@@ -174,17 +174,17 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
 
 /// Returns the candidate steps: each whole record if there are several records, and the part of a record after each
 /// block boundary.
-pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Candidate> {
+pub(super) fn candidate_steps(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     let records = blocks.last().map_or(0, |b| b.record + 1);
     let mut all = Vec::new();
     for record in 0..records {
         let from = blocks.partition_point(|b| b.record < record);
         let to = blocks.partition_point(|b| b.record <= record);
         if records > 1 && to - from >= MIN_BLOCKS_PER_SIDE {
-            all.push(Candidate::of_blocks(record, 0, from..to, blocks.len()));
+            all.push(Candidate::step(record, 0, from..to, blocks.len()));
         }
         for k in from + MIN_BLOCKS_PER_SIDE..(to + 1).saturating_sub(MIN_BLOCKS_PER_SIDE) {
-            all.push(Candidate::of_blocks(record, blocks[k].from, k..to, blocks.len()));
+            all.push(Candidate::step(record, blocks[k].from, k..to, blocks.len()));
         }
     }
     all
@@ -195,7 +195,7 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     let n = blocks.len();
     let weight = |c: usize| (c as f64 + 0.5) / n.max(1) as f64 - 0.5;
     let weights = (0..n).map(weight).collect();
-    let course = Course::Drift;
+    let course = TimeCourse::Drift;
     vec![Candidate {
         record: 0,
         at: 0,
@@ -215,7 +215,7 @@ pub(super) fn periodic_changes(blocks: &[ScoreBlock], block_s: f64) -> Vec<Candi
     let of = |frequency: f64, phase: u32| Candidate {
         record: 0,
         at: 0,
-        course: Course::Oscillation(block_s / frequency),
+        course: TimeCourse::Oscillation(block_s / frequency),
         weights: (0..n)
             .map(|c| (TAU * (c as f64 + 0.5) * frequency + FRAC_PI_4 * f64::from(phase)).sin())
             .collect(),
@@ -225,14 +225,14 @@ pub(super) fn periodic_changes(blocks: &[ScoreBlock], block_s: f64) -> Vec<Candi
         .collect()
 }
 
-fn tested(
+fn test_candidate(
     of: &Constancy<'_>,
     (matrices, scores): (&[DMatrix<f64>], &[DVector<f64>]),
     inverse: &DMatrix<f64>,
     (v, size): (&DVector<f64>, f64),
     set: &Candidate,
     index: usize,
-) -> Option<Tested> {
+) -> Option<CandidateTest> {
     let p = v.len();
     let along: Vec<DVector<f64>> = matrices.iter().map(|m| m * v).collect();
     let mut inside = DVector::zeros(p);
@@ -252,7 +252,7 @@ fn tested(
         of_runs[of.blocks[c].record] += v.dot(&moved);
     }
     let (u, r) = parts.iter().fold((0.0, 0.0), |(u, r), (h, rc)| (u + h, r + rc));
-    if r <= MIN_INFORMATION_LEFT * of_set || of_set <= 0.0 {
+    if r <= MIN_REMAINING_INFORMATION_SHARE * of_set || of_set <= 0.0 {
         return None;
     }
     let (delta, n) = (u / r, parts.len() as f64);
@@ -262,7 +262,7 @@ fn tested(
     } else {
         0.0
     };
-    Some(Tested {
+    Some(CandidateTest {
         set: index,
         share: of_set / information,
         u,

@@ -15,10 +15,10 @@ use nalgebra::DMatrix;
 
 use super::{
     blocks::{BLOCK_S, ScoreBlock},
-    critical::of_student,
-    search::{Change, Constancy, Course, Direction, drifts, periodic_changes, sets, strongest_among},
+    critical::student_p_value,
+    search::{Change, Constancy, Direction, TimeCourse, candidate_steps, drifts, periodic_changes, strongest_change},
 };
-use crate::diagnostics::whitened::{NOISE, OUTLIER_LIMIT, Whitened, solution, thinning};
+use crate::diagnostics::whitened::{NOISE_ORDER, OUTLIER_LIMIT, WhitenedFit, decimation_factor, solution};
 
 /// Minimum number of 2 s blocks for the test.
 const MIN_BLOCKS: usize = 8;
@@ -27,7 +27,7 @@ const MIN_BLOCKS: usize = 8;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResponseChange {
     /// Time course of the change.
-    pub course: Course,
+    pub course: TimeCourse,
     /// Name of the property that changes: `gain` or `delay`. A change of a lead is reported as `delay`.
     pub name: &'static str,
     /// First sample after a jump; 0 for a drift or a periodic change.
@@ -61,14 +61,14 @@ pub fn response_changes(
     stretches: &[Range<usize>],
     sample_time_s: f64,
 ) -> Vec<ResponseChange> {
-    let all: Vec<TestedStretch> = stretches
+    let all: Vec<StretchTests> = stretches
         .iter()
         .filter_map(|stretch| {
             let fits = bases
                 .iter()
                 .filter_map(|basis| ScoredStretch::of(basis, u, stretch, sample_time_s));
             let best = fits.min_by(|a, b| a.residual.total_cmp(&b.residual))?;
-            Some(best.tested(sample_time_s))
+            Some(best.test(sample_time_s))
         })
         .collect();
     let common = if all.len() > 1 { common_drift(&all) } else { None };
@@ -91,7 +91,7 @@ struct ScoredStretch {
 }
 
 /// Results of the tests of a stretch.
-struct TestedStretch {
+struct StretchTests {
     strongest: Vec<ResponseChange>,
     /// Drift of the gain and of the delay over the stretch, and the length of the stretch in blocks.
     drifts: [Option<Change>; 2],
@@ -100,10 +100,10 @@ struct TestedStretch {
 
 impl ScoredStretch {
     fn of(basis: &ResponseBasis<'_>, u: &[f64], stretch: &Range<usize>, sample_time_s: f64) -> Option<Self> {
-        let thin = thinning(sample_time_s);
+        let thin = decimation_factor(sample_time_s);
         let rows: Vec<usize> = stretch.clone().step_by(thin).collect();
         let block = (BLOCK_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;
-        let count = rows.len().saturating_sub(NOISE) / block;
+        let count = rows.len().saturating_sub(NOISE_ORDER) / block;
         if count < MIN_BLOCKS || rows.last()? >= &u.len() || basis.columns.iter().any(|c| c.len() != u.len()) {
             return None;
         }
@@ -112,7 +112,7 @@ impl ScoredStretch {
         let transient: Vec<f64> = (0..u.len()).map(|k| (-ago(k) / basis.lag_s).exp()).collect();
         let mut columns = basis.columns.to_vec();
         columns.push(transient);
-        let fit = Whitened::of(&columns, u, &rows, OUTLIER_LIMIT)?;
+        let fit = WhitenedFit::of(&columns, u, &rows, OUTLIER_LIMIT)?;
         let p = columns.len() + 1;
         // The directions use the gains of the numerator terms, because the coefficients of the individual signals are
         // too uncertain.
@@ -139,7 +139,7 @@ impl ScoredStretch {
             name: name.to_owned(),
             unit: "",
             vector,
-            delay: name == NAMES[1],
+            delay: name == PARAMETER_NAMES[1],
             size: 0.0,
         };
         let blocks = (0..count)
@@ -149,7 +149,7 @@ impl ScoredStretch {
                 let eps = fit.eps.rows(from, length);
                 ScoreBlock {
                     record: 0,
-                    from: rows[from + NOISE],
+                    from: rows[from + NOISE_ORDER],
                     score: (x.transpose() * eps).iter().copied().collect(),
                     information: (x.transpose() * x).iter().copied().collect(),
                 }
@@ -157,13 +157,16 @@ impl ScoredStretch {
             .collect();
         Some(Self {
             blocks,
-            directions: [direction(NAMES[0], gain), direction(NAMES[1], delay)],
-            variance: fit.eps.norm_squared() / (fit.eps.len() - p - NOISE) as f64,
+            directions: [
+                direction(PARAMETER_NAMES[0], gain),
+                direction(PARAMETER_NAMES[1], delay),
+            ],
+            variance: fit.eps.norm_squared() / (fit.eps.len() - p - NOISE_ORDER) as f64,
             residual: fit.eps.norm_squared(),
         })
     }
 
-    fn tested(&self, sample_time_s: f64) -> TestedStretch {
+    fn test(&self, sample_time_s: f64) -> StretchTests {
         let of = Constancy {
             blocks: &self.blocks,
             directions: &self.directions,
@@ -173,19 +176,19 @@ impl ScoredStretch {
         };
         let all: Vec<&Direction> = self.directions.iter().collect();
         let courses = [
-            sets(&self.blocks),
+            candidate_steps(&self.blocks),
             drifts(&self.blocks),
             periodic_changes(&self.blocks, BLOCK_S),
         ];
-        let drift = |direction: &Direction| strongest_among(&of, &[direction], &courses[1]);
-        TestedStretch {
+        let drift = |direction: &Direction| strongest_change(&of, &[direction], &courses[1]);
+        StretchTests {
             strongest: courses
                 .iter()
-                .filter_map(|sets| strongest_among(&of, &all, sets))
+                .filter_map(|sets| strongest_change(&of, &all, sets))
                 .filter_map(|change| {
                     Some(ResponseChange {
                         course: change.course,
-                        name: NAMES.into_iter().find(|name| *name == change.name)?,
+                        name: PARAMETER_NAMES.into_iter().find(|name| *name == change.name)?,
                         at: change.at,
                         by: [change.by, change.error],
                         p_value: change.p_value,
@@ -201,7 +204,7 @@ impl ScoredStretch {
 /// Returns the more significant of the two drifts (of gain and delay) that several stretches have in common: the mean
 /// rate of the stretches, weighted by their precision, as a change over all of them. Each stretch has its own response,
 /// so changes between stretches are not part of the drift.
-fn common_drift(all: &[TestedStretch]) -> Option<ResponseChange> {
+fn common_drift(all: &[StretchTests]) -> Option<ResponseChange> {
     let blocks: usize = all.iter().map(|stretch| stretch.blocks).sum();
     let of = |i: usize| {
         let (mut information, mut weighted) = (0.0, 0.0);
@@ -213,30 +216,30 @@ fn common_drift(all: &[TestedStretch]) -> Option<ResponseChange> {
         }
         let z = weighted / information.sqrt();
         (information > 0.0).then(|| ResponseChange {
-            course: Course::Drift,
-            name: NAMES[i],
+            course: TimeCourse::Drift,
+            name: PARAMETER_NAMES[i],
             at: 0,
             by: [weighted / information, information.sqrt().recip()].map(|rate| rate * blocks as f64),
-            p_value: (of_student(z, (blocks - 2 * all.len()) as f64) * NAMES.len() as f64).min(1.0),
+            p_value: (student_p_value(z, (blocks - 2 * all.len()) as f64) * PARAMETER_NAMES.len() as f64).min(1.0),
         })
     };
-    (0..NAMES.len())
+    (0..PARAMETER_NAMES.len())
         .filter_map(of)
         .min_by(|a, b| a.p_value.total_cmp(&b.p_value))
 }
 
-const NAMES: [&str; 2] = ["gain", "delay"];
+const PARAMETER_NAMES: [&str; 2] = ["gain", "delay"];
 
 #[cfg(test)]
 mod tests {
     use std::{f64::consts::TAU, slice, sync::LazyLock};
 
     use super::*;
-    use crate::diagnostics::whitened::stream;
+    use crate::diagnostics::whitened::random_number;
 
     const TS: f64 = 0.02;
     const N: usize = 4000;
-    const WHOLE: Range<usize> = 0..N;
+    const WHOLE_RECORD: Range<usize> = 0..N;
     static TERMS: LazyLock<Vec<Vec<f64>>> = LazyLock::new(|| vec![vec![1.0, 0.0], vec![0.0, 1.0]]);
 
     /// The basis of a response `b_1 z_1 + b_2 z_2`.
@@ -254,8 +257,8 @@ mod tests {
         let (mut z, mut u) = ([vec![0.0; N], vec![0.0; N]], vec![0.0; N]);
         let (mut w, mut v) = (0.0, 0.0);
         for t in 1..N {
-            w = 0.9 * w + stream(&mut seed);
-            v = 0.9 * v + stream(&mut seed);
+            w = 0.9 * w + random_number(&mut seed);
+            v = 0.9 * v + random_number(&mut seed);
             z[0][t] = z[0][t - 1] + TS * w;
             z[1][t] = w;
             u[t] = gain(t as f64 * TS) * (3.0 * z[0][t] + z[1][t]) + 0.5 * v;
@@ -266,29 +269,29 @@ mod tests {
     /// Returns the changes found for this time course of the gain.
     fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<ResponseChange> {
         let (z, u) = run(seed, gain);
-        response_changes(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS)
+        response_changes(&[basis(&z)], &u, slice::from_ref(&WHOLE_RECORD), TS)
     }
 
-    fn p_value(found: &[ResponseChange], is: impl Fn(Course) -> bool) -> f64 {
+    fn p_value(found: &[ResponseChange], is: impl Fn(TimeCourse) -> bool) -> f64 {
         let of_course = found.iter().filter(|found| is(found.course));
         of_course.map(|found| found.p_value).fold(1.0, f64::min)
     }
 
     #[test]
     fn jumps_drifts_and_oscillations_are_distinguished() {
-        let step = |c| c == Course::Step;
-        let drift = |c| c == Course::Drift;
-        let sway = |c| matches!(c, Course::Oscillation(_));
+        let step = |c| c == TimeCourse::Step;
+        let drift = |c| c == TimeCourse::Drift;
+        let sway = |c| matches!(c, TimeCourse::Oscillation(_));
         for seed in 1..6 {
             let jumps = of(seed, |t| if t < 40.0 { 1.0 } else { 0.6 });
             assert!(p_value(&jumps, step) < 1e-4 && p_value(&jumps, sway) > 1e-3);
-            let found = jumps.iter().find(|found| found.course == Course::Step).unwrap();
+            let found = jumps.iter().find(|found| found.course == TimeCourse::Step).unwrap();
             assert!((found.at as f64 * TS - 40.0).abs() <= 10.0, "{found:?}");
             assert!(p_value(&of(seed, |t| 1.0 - 0.5 * t / 80.0), drift) < 1e-4);
             let periodic_changes = of(seed, |t| 1.0 + 0.3 * (TAU * t / 16.0).sin());
             assert!(p_value(&periodic_changes, sway) < 1e-4);
             let found = periodic_changes.iter().find(|found| sway(found.course)).unwrap();
-            let Course::Oscillation(period) = found.course else {
+            let TimeCourse::Oscillation(period) = found.course else {
                 unreachable!()
             };
             assert!((period - 16.0).abs() < 2.5, "{period}");
@@ -311,7 +314,7 @@ mod tests {
         let drift = |gain: &dyn Fn(f64) -> f64, seed| {
             let (z, u) = run(seed, gain);
             p_value(&response_changes(&[basis(&z)], &u, &halves, TS), |course| {
-                course == Course::Drift
+                course == TimeCourse::Drift
             })
         };
         let (mut shared, mut one) = (0, 0);
@@ -321,7 +324,7 @@ mod tests {
             shared += usize::from(drift(&falls, seed) < 1e-3);
             let (z, u) = run(seed, falls);
             let first = response_changes(&[basis(&z)], &u, &halves[..1], TS);
-            one += usize::from(p_value(&first, |course| course == Course::Drift) < 1e-3);
+            one += usize::from(p_value(&first, |course| course == TimeCourse::Drift) < 1e-3);
             assert!(drift(&|t| if t < 40.0 { 1.0 } else { 0.6 }, seed) > 1e-3);
         }
         assert!(shared >= 15 && one < shared, "{shared} {one}");
@@ -331,15 +334,15 @@ mod tests {
     fn best_fitting_basis_is_used() {
         let (z, u) = run(7, |t| 1.0 - 0.3 * t / 80.0);
         let (other, _) = run(8, |_| 1.0);
-        let alone = response_changes(&[basis(&z)], &u, slice::from_ref(&WHOLE), TS);
+        let alone = response_changes(&[basis(&z)], &u, slice::from_ref(&WHOLE_RECORD), TS);
         assert_eq!(
-            response_changes(&[basis(&other), basis(&z)], &u, slice::from_ref(&WHOLE), TS),
+            response_changes(&[basis(&other), basis(&z)], &u, slice::from_ref(&WHOLE_RECORD), TS),
             alone
         );
         // A transient of the lag that started before the stretch does not affect the result.
         let early = |t: usize| 5.0 * (-(t as f64) * TS).exp();
         let decaying: Vec<f64> = u.iter().enumerate().map(|(t, u)| u + early(t)).collect();
-        let with = response_changes(&[basis(&z)], &decaying, slice::from_ref(&WHOLE), TS);
+        let with = response_changes(&[basis(&z)], &decaying, slice::from_ref(&WHOLE_RECORD), TS);
         for (with, alone) in with.iter().zip(&alone) {
             assert!(
                 (with.by[0] - alone.by[0]).abs() < 1e-3 * alone.by[1],
@@ -351,7 +354,7 @@ mod tests {
     #[test]
     fn zero_columns_and_short_records_give_no_result() {
         let columns = [vec![0.0; N], vec![0.0; N]];
-        assert!(response_changes(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&WHOLE), TS).is_empty());
+        assert!(response_changes(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&WHOLE_RECORD), TS).is_empty());
         assert!(response_changes(&[basis(&columns)], &vec![1.0; N], slice::from_ref(&(0..500)), TS).is_empty());
     }
 }

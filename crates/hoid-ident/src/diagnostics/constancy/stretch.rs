@@ -8,7 +8,7 @@
 //! where the columns of J are the tested directions (the jackknife of a group, to first order: B. Efron, *The
 //! Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3). By chance one of n blocks changes a
 //! parameter by about `1/sqrt n` of its standard error. A block is reported if it changes a parameter by more than
-//! [`REPORTED_CHANGE`] standard errors and by more than [`REPORTED_CHANGE`] times the root sum of squares
+//! [`MIN_REPORTED_CHANGE`] standard errors and by more than [`MIN_REPORTED_CHANGE`] times the root sum of squares
 //! `sqrt(sum delta^2)` of all other blocks. The sum of squares over all blocks estimates the variance of the parameter;
 //! a block above these limits alone makes this estimate several times the variance of the model.
 
@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 use super::search::{Constancy, pseudo_inverse};
 
 /// A block is reported if it changes a parameter by more than this number of standard errors.
-const REPORTED_CHANGE: f64 = 2.0;
+const MIN_REPORTED_CHANGE: f64 = 2.0;
 /// Minimum change for records with few blocks, as a multiple of the change that a single block causes by chance.
 const MIN_RATIO_TO_CHANCE: f64 = 4.5;
 /// Minimum number of blocks for the test.
@@ -75,7 +75,7 @@ pub(super) fn most_influential_block(of: &Constancy<'_>) -> Option<Stretch> {
     };
     let largest = |c: usize| (0..m).map(|k| ratio(c, k)).fold(0.0, f64::max);
     let (c, most) = (0..n).map(|c| (c, largest(c))).max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let threshold = REPORTED_CHANGE.max(MIN_RATIO_TO_CHANCE / ((n - 1) as f64).sqrt());
+    let threshold = MIN_REPORTED_CHANGE.max(MIN_RATIO_TO_CHANCE / ((n - 1) as f64).sqrt());
     (most > threshold).then(|| Stretch {
         record: of.blocks[c].record,
         from: of.blocks[c].from,
@@ -104,7 +104,7 @@ mod tests {
     };
 
     /// Regression on a column of ones; each block has ten residuals with the given mean.
-    fn constancy(means: &[f64], variance: f64) -> Option<Stretch> {
+    fn influential_stretch(means: &[f64], variance: f64) -> Option<Stretch> {
         let blocks: Vec<ScoreBlock> = means
             .iter()
             .enumerate()
@@ -134,9 +134,9 @@ mod tests {
     #[test]
     fn reported_change_equals_a_fit_without_the_block() {
         let mut means = vec![0.1, -0.1, 0.05, -0.05, 0.1, -0.1, 0.0, 0.0];
-        assert_eq!(constancy(&means, 1.0), None);
+        assert_eq!(influential_stretch(&means, 1.0), None);
         means[3] = 8.0;
-        let found = constancy(&means, 1.0).unwrap();
+        let found = influential_stretch(&means, 1.0).unwrap();
         assert_eq!((found.from, found.to), (30, Some(40)));
         // The mean of all blocks is 1.00625, the mean of the others is 0.007, and the standard error is 1/sqrt 80.
         let (all, others) = (8.05 / 8.0, 0.05 / 7.0);
@@ -146,14 +146,14 @@ mod tests {
         );
         means[7] = 8.0;
         means[3] = 0.0;
-        assert_eq!(constancy(&means, 1.0).unwrap().to, None);
+        assert_eq!(influential_stretch(&means, 1.0).unwrap().to, None);
     }
 
     #[test]
     fn scatter_of_all_blocks_is_not_a_stretch() {
         let means = [3.0, -2.0, 2.5, -3.0, 3.0, -2.5, 2.0, -3.0];
-        assert_eq!(constancy(&means, 1.0), None);
-        assert_eq!(constancy(&[5.0, 0.0, 0.0], 1.0), None);
-        assert_eq!(constancy(&[0.0; 8], 0.0), None);
+        assert_eq!(influential_stretch(&means, 1.0), None);
+        assert_eq!(influential_stretch(&[5.0, 0.0, 0.0], 1.0), None);
+        assert_eq!(influential_stretch(&[0.0; 8], 0.0), None);
     }
 }

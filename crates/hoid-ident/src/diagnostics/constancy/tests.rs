@@ -9,7 +9,7 @@ use hoid_sim::{RunSeed, Simulator};
 use super::{
     Constancy, Direction,
     blocks::score_blocks,
-    search::{Change, strongest},
+    search::{Change, strongest_step},
 };
 use crate::{
     Estimator, Fit, GreyBox,
@@ -17,7 +17,7 @@ use crate::{
     linalg::least_squares::{dot, solve_symmetric},
 };
 
-fn simulated(condition: Condition, replication: u64) -> Record {
+fn simulated_record(condition: Condition, replication: u64) -> Record {
     let streams = RunSeed {
         seed: 90_210,
         replication,
@@ -33,7 +33,7 @@ fn box_jenkins(records: &[Record]) -> Fit {
 }
 
 /// Delays u by this number of samples from `at` on.
-fn late(record: &Record, at: usize, by: usize) -> Record {
+fn delay_output(record: &Record, at: usize, by: usize) -> Record {
     let u: Vec<f64> = (0..record.len())
         .map(|t| record.output()[if t >= at { t - by } else { t }])
         .collect();
@@ -41,7 +41,7 @@ fn late(record: &Record, at: usize, by: usize) -> Record {
     Record::new(record.sample_time(), input, Channel::new("u", "", u)).unwrap()
 }
 
-fn not_constant(fit: &Fit, records: &[Record]) -> Option<Finding> {
+fn constancy_finding(fit: &Fit, records: &[Record]) -> Option<Finding> {
     let verdict = fit.verdict(records, None).unwrap();
     verdict.findings().iter().find(|f| f.kind == "not-constant").cloned()
 }
@@ -56,8 +56,8 @@ fn changes_are_detected_without_false_alarms() {
         (Condition::C5, true),
         (Condition::C6, true),
     ] {
-        let record = simulated(condition, 1);
-        let found = not_constant(
+        let record = simulated_record(condition, 1);
+        let found = constancy_finding(
             &box_jenkins(std::slice::from_ref(&record)),
             std::slice::from_ref(&record),
         );
@@ -67,7 +67,7 @@ fn changes_are_detected_without_false_alarms() {
 
 #[test]
 fn jump_of_the_delay_is_reported_with_its_time() {
-    let record = late(&simulated(Condition::C1, 2), 4100, 8);
+    let record = delay_output(&simulated_record(Condition::C1, 2), 4100, 8);
     let records = std::slice::from_ref(&record);
     let verdicts = [
         box_jenkins(records).verdict(records, None).unwrap(),
@@ -87,15 +87,15 @@ fn jump_of_the_delay_is_reported_with_its_time() {
 
 #[test]
 fn only_a_differing_run_is_reported() {
-    let mut records = vec![simulated(Condition::C1, 3), simulated(Condition::C1, 4)];
-    assert_eq!(not_constant(&box_jenkins(&records), &records), None);
-    records.push(simulated(Condition::C2, 5));
-    let words = not_constant(&box_jenkins(&records), &records).unwrap().message;
+    let mut records = vec![simulated_record(Condition::C1, 3), simulated_record(Condition::C1, 4)];
+    assert_eq!(constancy_finding(&box_jenkins(&records), &records), None);
+    records.push(simulated_record(Condition::C2, 5));
+    let words = constancy_finding(&box_jenkins(&records), &records).unwrap().message;
     assert!(words.contains("in record 3 compared with the others"), "{words}");
 }
 
 /// Uniform random numbers between -1/2 and 1/2.
-fn uniform(seed: u64) -> impl FnMut() -> f64 {
+fn uniform_numbers(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed;
     move || {
         state = state
@@ -114,7 +114,7 @@ struct Regression {
 
 impl Regression {
     fn new(seed: u64, n: usize, memory: f64, jump: f64) -> Self {
-        let mut draw = uniform(seed);
+        let mut draw = uniform_numbers(seed);
         let mut signal = || {
             let mut x = 0.0;
             (0..n)
@@ -132,15 +132,15 @@ impl Regression {
     }
 
     /// Returns the least-squares coefficients of these columns.
-    fn solved(&self, columns: &[&[f64]]) -> Vec<f64> {
+    fn solve(&self, columns: &[&[f64]]) -> Vec<f64> {
         let gram: Vec<f64> = columns.iter().flat_map(|a| columns.iter().map(|b| dot(a, b))).collect();
         let right: Vec<f64> = columns.iter().map(|a| dot(a, &self.y)).collect();
         solve_symmetric(&gram, &right).unwrap()
     }
 
-    fn strongest(&self) -> Change {
+    fn strongest_change(&self) -> Change {
         let columns: Vec<&[f64]> = self.x.iter().map(Vec::as_slice).collect();
-        let theta = self.solved(&columns);
+        let theta = self.solve(&columns);
         let eps: Vec<f64> = (0..self.y.len())
             .map(|t| self.y[t] - theta[0] * self.x[0][t] - theta[1] * self.x[1][t])
             .collect();
@@ -162,20 +162,20 @@ impl Regression {
             run_to_run: 0.06,
             sample_time_s: 0.01,
         };
-        strongest(&constancy, false).unwrap()
+        strongest_step(&constancy, false).unwrap()
     }
 }
 
 #[test]
 fn change_equals_the_coefficient_of_its_regressor() {
     let regression = Regression::new(5, 4000, 0.9, 0.8);
-    let found = regression.strongest();
+    let found = regression.strongest_change();
     assert!(found.at.abs_diff(2000) <= 200 && found.p_value < 1e-4, "{found:?}");
     // Reference: least squares with the regressor of the change as an additional column.
     let changed_input: Vec<f64> = (0..4000)
         .map(|t| if t >= found.at { regression.x[0][t] } else { 0.0 })
         .collect();
-    let theta = regression.solved(&[&regression.x[0], &regression.x[1], &changed_input]);
+    let theta = regression.solve(&[&regression.x[0], &regression.x[1], &changed_input]);
     assert!((found.by - theta[2]).abs() < 1e-9, "{} and {}", found.by, theta[2]);
 }
 
@@ -187,7 +187,7 @@ fn false_alarm_rate_does_not_exceed_the_level() {
         let alarms = (0..runs)
             .filter(|k| {
                 Regression::new(1000 + u64::from(*k), 4000, memory, 0.0)
-                    .strongest()
+                    .strongest_change()
                     .p_value
                     < 0.05
             })
@@ -200,9 +200,9 @@ fn false_alarm_rate_does_not_exceed_the_level() {
 
 #[test]
 fn short_and_noise_free_records_give_no_finding() {
-    let record = simulated(Condition::C1, 7);
+    let record = simulated_record(Condition::C1, 7);
     let short = [record.span(0.0, 5.0).unwrap()];
-    let found = not_constant(&box_jenkins(&short), &short);
+    let found = constancy_finding(&box_jenkins(&short), &short);
     assert_eq!(found, None);
     let quiet: Vec<f64> = (0..3000)
         .map(|t| if t >= 29 { 0.3 * record.input()[t - 29] } else { 0.0 })
@@ -215,5 +215,5 @@ fn short_and_noise_free_records_give_no_finding() {
         ..hoid_model::Orders::default()
     };
     let fit = Estimator::new(Structure::Fir, orders).fit(&exact).unwrap();
-    assert_eq!(not_constant(&fit, &exact), None);
+    assert_eq!(constancy_finding(&fit, &exact), None);
 }

@@ -6,41 +6,41 @@ use super::spectra::Spectra;
 use crate::linalg::least_squares::{LeastSquares, add_scaled, dot};
 
 /// Scan of the delay of the element, s: smallest delay, largest delay, step.
-const DELAYS_S: (f64, f64, f64) = (-0.05, 0.3, 0.01);
+const DELAY_SCAN_S: (f64, f64, f64) = (-0.05, 0.3, 0.01);
 /// Half width of the smoothing window of the residual spectrum, in natural logarithms of the frequency.
 const SMOOTHING_HALF_WIDTH: f64 = 0.35;
 /// Number of iterations in which the weights are computed.
-const ROUNDS: usize = 3;
+const ROUND_COUNT: usize = 3;
 
 /// Least-squares fit of an element with `m` zeros and `n` poles; coefficients in descending powers of s.
-pub(super) struct Fitted {
+pub(super) struct ElementFit {
     pub(super) num: Vec<f64>,
     pub(super) den: Vec<f64>,
     pub(super) delay_s: f64,
     pub(super) unexplained: f64,
 }
 
-impl Fitted {
+impl ElementFit {
     pub(super) fn of(spectra: &[Spectra], m: usize, n: usize, sample_time_s: f64) -> Option<Self> {
         let mut weights: Vec<Vec<f64>> = spectra.iter().map(|s| vec![1.0; s.omega.len()]).collect();
         let mut num = vec![1.0];
         let mut best = None;
-        for round in 0..ROUNDS {
+        for round in 0..ROUND_COUNT {
             let rows: Vec<Rows> = (spectra.iter().zip(&weights))
                 .map(|(s, w)| Rows::of(s, w, &num, m, n))
                 .collect();
-            let (from, to, step) = DELAYS_S;
+            let (from, to, step) = DELAY_SCAN_S;
             let scan = (0..=((to - from) / step).round() as usize).map(|k| from + k as f64 * step);
-            let found = least(scan.flat_map(|delay| Solved::all(&rows, delay)))?;
+            let found = best_solution(scan.flat_map(|delay| Solution::candidates(&rows, delay)))?;
             let near = (-4..=4).map(|k| found.delay_s + 0.25 * f64::from(k) * step.min(sample_time_s));
-            let found = least(near.flat_map(|delay| Solved::all(&rows, delay)))?;
+            let found = best_solution(near.flat_map(|delay| Solution::candidates(&rows, delay)))?;
             num = found.theta[n..=n + m].iter().rev().copied().collect();
-            if round + 1 < ROUNDS {
+            if round + 1 < ROUND_COUNT {
                 let mut rest = found.residuals.as_slice();
                 for (w, s) in weights.iter_mut().zip(spectra) {
                     let (own, after) = rest.split_at(2 * s.omega.len());
                     rest = after;
-                    smooth(w, own, &s.omega, found.power);
+                    update_weights(w, own, &s.omega, found.power);
                 }
             }
             best = Some(found);
@@ -84,15 +84,15 @@ impl<'a> Rows<'a> {
             .collect();
         let powers = |of: &[Complex64], i: usize| -> Vec<f64> {
             let value = |k: usize| of[k] * factor[k] * s(k).powu(i as u32);
-            stacked(all.clone().map(value))
+            real_and_imaginary_parts(all.clone().map(value))
         };
         let ones = vec![Complex64::new(1.0, 0.0); spectra.omega.len()];
         let mut transient: Vec<Vec<f64>> = Vec::new();
         for i in 0..=n + 1 {
             let mut column = powers(&ones, i);
             let before = dot(&column, &column).sqrt();
-            remove(&mut column, &transient);
-            remove(&mut column, &transient);
+            project_out(&mut column, &transient);
+            project_out(&mut column, &transient);
             let norm = dot(&column, &column).sqrt();
             if norm > 1e-9 * before {
                 column.iter_mut().for_each(|v| *v /= norm);
@@ -101,7 +101,7 @@ impl<'a> Rows<'a> {
         }
         let free = |of: &[Complex64], i: usize| {
             let mut column = powers(of, i);
-            remove(&mut column, &transient);
+            project_out(&mut column, &transient);
             column
         };
         Self {
@@ -120,7 +120,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Returns the columns of B, delayed by `delay_s`, and the columns of `B kappa`, delayed by `of_disturbances_s`.
-    fn of_inputs(&self, delay_s: f64, of_disturbances_s: f64) -> Vec<Vec<f64>> {
+    fn input_columns(&self, delay_s: f64, of_disturbances_s: f64) -> Vec<Vec<f64>> {
         let disturbances = self.spectra.disturbances.iter().map(|d| (d, of_disturbances_s));
         let inputs = [(&self.spectra.u, delay_s)].into_iter().chain(disturbances);
         let column = |of: &[Complex64], delay_s: f64, i: usize| {
@@ -128,8 +128,8 @@ impl<'a> Rows<'a> {
                 let s = Complex64::new(0.0, omega);
                 of[k] * self.spectra.hold[k] * self.factor[k] * s.powu(i as u32) * (-s * delay_s).exp()
             };
-            let mut column = stacked(self.spectra.omega.iter().enumerate().map(value));
-            remove(&mut column, &self.transient);
+            let mut column = real_and_imaginary_parts(self.spectra.omega.iter().enumerate().map(value));
+            project_out(&mut column, &self.transient);
             column
         };
         inputs
@@ -140,12 +140,12 @@ impl<'a> Rows<'a> {
 }
 
 /// Returns the real parts of all values, followed by their imaginary parts.
-fn stacked(values: impl Iterator<Item = Complex64> + Clone) -> Vec<f64> {
+fn real_and_imaginary_parts(values: impl Iterator<Item = Complex64> + Clone) -> Vec<f64> {
     values.clone().map(|v| v.re).chain(values.map(|v| v.im)).collect()
 }
 
 /// Removes the components of a column along the orthonormal columns.
-fn remove(column: &mut [f64], orthonormal: &[Vec<f64>]) {
+fn project_out(column: &mut [f64], orthonormal: &[Vec<f64>]) {
     for q in orthonormal {
         let along = dot(q, column);
         add_scaled(column, -along, q);
@@ -153,7 +153,7 @@ fn remove(column: &mut [f64], orthonormal: &[Vec<f64>]) {
 }
 
 /// Least-squares solution of the loop equations of all records, for one delay.
-struct Solved {
+struct Solution {
     /// Coefficients `a_0 .. a_{n-1}`, `b_0 .. b_m` of u, followed by the coefficients of the disturbances and of the
     /// targets.
     theta: Vec<f64>,
@@ -164,10 +164,10 @@ struct Solved {
     residuals: Vec<f64>,
 }
 
-impl Solved {
+impl Solution {
     /// Returns the solution with the same delay for the disturbances as for u and, if there are disturbances, the
     /// solution without a delay for them.
-    fn all(rows: &[Rows<'_>], delay_s: f64) -> impl Iterator<Item = Self> {
+    fn candidates(rows: &[Rows<'_>], delay_s: f64) -> impl Iterator<Item = Self> {
         let disturbed = rows.iter().any(|rows| !rows.spectra.disturbances.is_empty());
         let on_time = (disturbed && delay_s != 0.0).then_some(0.0);
         let cases = [Some(delay_s), on_time].into_iter().flatten();
@@ -179,7 +179,7 @@ impl Solved {
             .iter()
             .map(|rows| {
                 let negative = rows.of_e.iter().map(|c| c.iter().map(|v| -v).collect::<Vec<_>>());
-                let inputs = rows.of_inputs(delay_s, of_disturbances_s);
+                let inputs = rows.input_columns(delay_s, of_disturbances_s);
                 let inputs = inputs.into_iter().map(|c| c.iter().map(|v| -v).collect());
                 negative.chain(inputs).chain(rows.of_targets.iter().cloned()).collect()
             })
@@ -212,13 +212,13 @@ impl Solved {
     }
 }
 
-fn least(all: impl Iterator<Item = Solved>) -> Option<Solved> {
+fn best_solution(all: impl Iterator<Item = Solution>) -> Option<Solution> {
     all.min_by(|a, b| a.sum_of_squares.total_cmp(&b.sum_of_squares))
 }
 
 /// Updates the weights from the smoothed spectrum of the residuals, from which the previous weights are removed. A
 /// floor at the level of rounding errors retains all frequencies of exact data.
-fn smooth(weights: &mut [f64], residuals: &[f64], omega: &[f64], power: f64) {
+fn update_weights(weights: &mut [f64], residuals: &[f64], omega: &[f64], power: f64) {
     let n = omega.len();
     let own: Vec<f64> = (0..n)
         .map(|k| (residuals[k].powi(2) + residuals[n + k].powi(2)) / weights[k].powi(2))

@@ -5,24 +5,24 @@ use std::f64::consts::PI;
 use hoid_model::{Complex64, Record};
 
 use crate::{
-    diagnostics::other_inputs::TARGETS,
+    diagnostics::other_inputs::TARGET_CHANNELS,
     frequency::{COMMON_EXCITATIONS, spectrum::coefficients},
 };
 
 /// Names of channels that hold a disturbance at u.
-const DISTURBANCES: [&str; 3] = ["d", "f_d", "disturbance"];
+const DISTURBANCE_CHANNELS: [&str; 3] = ["d", "f_d", "disturbance"];
 /// Range of the tested frequencies, rad/s: the frequencies at which people move u.
 const BAND_RAD_S: (f64, f64) = (0.3, 12.0);
 /// Number of frequencies that is sufficient; further samples of a record and further records are not used.
 pub(super) const MAX_FREQUENCIES: usize = 1000;
 
 /// Names of the exogenous channels of the loop.
-pub(super) struct Exogenous {
+pub(super) struct ExogenousChannels {
     targets: Vec<String>,
     disturbances: Vec<String>,
 }
 
-impl Exogenous {
+impl ExogenousChannels {
     /// Selects the channels of all records that have the name of a target or a disturbance and vary in at least one
     /// record. An excitation with another name counts as both.
     pub(super) fn of(records: &[Record], excitation: Option<&str>) -> Self {
@@ -43,8 +43,8 @@ impl Exogenous {
             names.into_iter().filter(moves).map(str::to_owned).collect()
         };
         Self {
-            targets: of(&TARGETS, &DISTURBANCES),
-            disturbances: of(&DISTURBANCES, &TARGETS),
+            targets: of(&TARGET_CHANNELS, &DISTURBANCE_CHANNELS),
+            disturbances: of(&DISTURBANCE_CHANNELS, &TARGET_CHANNELS),
         }
     }
 }
@@ -61,7 +61,7 @@ pub(super) struct Spectra {
 }
 
 impl Spectra {
-    pub(super) fn of(record: &Record, exogenous: &Exogenous) -> Option<Self> {
+    pub(super) fn of(record: &Record, exogenous: &ExogenousChannels) -> Option<Self> {
         let ts = record.sample_time().s();
         let most = (2.0 * PI * MAX_FREQUENCIES as f64 / (BAND_RAD_S.1 * ts)) as usize;
         let samples = record.len().min(most);

@@ -3,13 +3,13 @@ use std::f64::consts::TAU;
 use hoid_model::{Channel, SampleTime};
 
 use super::*;
-use crate::diagnostics::whitened::stream;
+use crate::diagnostics::whitened::random_number;
 
 const TS_S: f64 = 0.02;
 
 /// Simulates a loop around `gain/(s(s + lag))`. The person has a gain, a lead, a delay of 0.2 s, and noise. The target
 /// is a sum of seven sines, the disturbance a sum of seven other sines; the disturbance is recorded if `recorded`.
-fn loop_of(gain: f64, lag: f64, late: usize, recorded: bool, seed: u64) -> Record {
+fn simulate_loop(gain: f64, lag: f64, late: usize, recorded: bool, seed: u64) -> Record {
     let n = 3000;
     let mut seed = seed;
     let decay = (-lag * TS_S).exp();
@@ -24,7 +24,7 @@ fn loop_of(gain: f64, lag: f64, late: usize, recorded: bool, seed: u64) -> Recor
     for k in 0..n {
         let (r, d) = (sines(k, 0), 0.3 * sines(k, 1));
         let e = r - position;
-        noise = 0.9 * noise + 0.3 * stream(&mut seed);
+        noise = 0.9 * noise + 0.3 * random_number(&mut seed);
         let past = |lag: usize| k.checked_sub(lag).map_or(0.0, |k| signals[0][k]);
         let u = (12.0 * past(10) - 10.5 * past(11)) / 90.0 + 0.05 * noise;
         for (signal, value) in signals.iter_mut().zip([e, u, r, d]) {
@@ -55,7 +55,7 @@ fn element(gain: f64, lag: f64) -> ContinuousTransferFunction {
 #[test]
 fn element_of_the_loop_is_found_and_a_wrong_one_rejected() {
     for seed in 0..3 {
-        let record = [loop_of(90.0, 6.0, 0, true, seed)];
+        let record = [simulate_loop(90.0, 6.0, 0, true, seed)];
         for given in [
             element(90.0, 6.0),
             element(45.0, 6.0),
@@ -65,34 +65,46 @@ fn element_of_the_loop_is_found_and_a_wrong_one_rejected() {
             let found = recorded_element(&record, &given, None).unwrap();
             assert!(found.unexplained < 1e-4, "{found:?}");
             assert_eq!(found.element, element(90.0, 6.0), "{found:?}");
-            assert_eq!(found.is_given(), given == element(90.0, 6.0), "{found:?}");
-            assert_eq!(found.finding(&given).is_none(), found.is_given());
+            assert_eq!(found.matches_given(), given == element(90.0, 6.0), "{found:?}");
+            assert_eq!(found.finding(&given).is_none(), found.matches_given());
         }
     }
     // Elements of other orders: a gain, and an integrator alone.
     let integrator = ContinuousTransferFunction::new(&[15.0], &[1.0, 0.0]).unwrap();
     assert!(
-        !recorded_element(&[loop_of(90.0, 6.0, 0, true, 1)], &integrator, None)
+        !recorded_element(&[simulate_loop(90.0, 6.0, 0, true, 1)], &integrator, None)
             .unwrap()
-            .is_given()
+            .matches_given()
     );
 }
 
 #[test]
 fn records_with_different_elements_give_no_element() {
-    let records = [loop_of(30.0, 0.2, 0, true, 1), loop_of(30.0, 0.2, 0, true, 2)];
+    let records = [
+        simulate_loop(30.0, 0.2, 0, true, 1),
+        simulate_loop(30.0, 0.2, 0, true, 2),
+    ];
     let found = recorded_element(&records, &element(30.0, 0.2), Some("r")).unwrap();
-    assert!(found.is_given() && found.element == element(30.0, 0.2), "{found:?}");
+    assert!(
+        found.matches_given() && found.element == element(30.0, 0.2),
+        "{found:?}"
+    );
     // No single element explains the signals of two records with different elements.
-    let two = [loop_of(90.0, 6.0, 0, true, 1), loop_of(30.0, 0.2, 0, true, 2)];
+    let two = [
+        simulate_loop(90.0, 6.0, 0, true, 1),
+        simulate_loop(30.0, 0.2, 0, true, 2),
+    ];
     assert_eq!(recorded_element(&two, &element(90.0, 6.0), None), None);
 }
 
 #[test]
 fn delay_of_the_machine_is_found_with_its_element() {
-    let record = [loop_of(60.0, 6.0, 5, true, 4)];
+    let record = [simulate_loop(60.0, 6.0, 5, true, 4)];
     let found = recorded_element(&record, &element(60.0, 6.0), None).unwrap();
-    assert!((found.delay_s - 0.1).abs() < 0.003 && found.is_given(), "{found:?}");
+    assert!(
+        (found.delay_s - 0.1).abs() < 0.003 && found.matches_given(),
+        "{found:?}"
+    );
     let message = found.finding(&element(60.0, 6.0)).unwrap().message;
     assert!(
         message.starts_with("the recorded element is 60/(s^2 + 6s) with an additional delay of 100 ms:"),
@@ -101,7 +113,7 @@ fn delay_of_the_machine_is_found_with_its_element() {
     let given = element(60.0, 6.0).with_delay(0.1).unwrap();
     assert_eq!(recorded_element(&record, &given, None).unwrap().finding(&given), None);
     // A shift of one sample can be due to the recorder.
-    let record = [loop_of(60.0, 6.0, 1, true, 4)];
+    let record = [simulate_loop(60.0, 6.0, 1, true, 4)];
     assert_eq!(
         recorded_element(&record, &element(60.0, 6.0), None)
             .unwrap()
@@ -113,9 +125,9 @@ fn delay_of_the_machine_is_found_with_its_element() {
 #[test]
 fn missing_or_short_signals_give_no_element() {
     // The person responds to the disturbance, so u is not independent of it.
-    let record = loop_of(90.0, 6.0, 0, false, 1);
+    let record = simulate_loop(90.0, 6.0, 0, false, 1);
     assert_eq!(recorded_element(&[record], &element(45.0, 6.0), None), None);
-    let record = loop_of(90.0, 6.0, 0, true, 1);
+    let record = simulate_loop(90.0, 6.0, 0, true, 1);
     let short = record.span(0.0, 6.0).unwrap();
     assert_eq!(recorded_element(&[short], &element(90.0, 6.0), None), None);
     let rests = record.map_signals(|values| values.fill(0.0)).unwrap();

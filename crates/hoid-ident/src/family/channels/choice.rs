@@ -13,8 +13,8 @@ use crate::{
     criterion::Workspace,
     family::{
         channel::{Channel, ChannelFit, ChannelForm},
-        channel_lines::{AtChannelLines, ChannelMinimum, InForm, own_places},
-        prediction::{NoiseOrders, Prediction},
+        channel_lines::{ChannelInForm, ChannelLineFitter, ChannelMinimum, own_coordinates},
+        prediction::{NoiseOrders, PredictionProblem},
         prediction_fit::PredictionFit,
     },
 };
@@ -32,13 +32,13 @@ fn chance_probability(ratio: f64, more: usize, forms: usize) -> f64 {
 }
 
 /// Result of the selection of forms at the lines.
-pub(in crate::family) struct Compared<'a> {
+pub(in crate::family) struct LineSelection<'a> {
     /// Comparison of the forms for each input.
     pub fits: Vec<ChannelFit>,
     /// Inputs with a response, with starting values for the prediction error search.
     pub channels: Vec<Channel<'a>>,
     /// The same inputs, in the representation that fits at the lines require.
-    pub in_form: Vec<InForm>,
+    pub in_form: Vec<ChannelInForm>,
 }
 
 impl FurtherInputs<'_> {
@@ -50,26 +50,26 @@ impl FurtherInputs<'_> {
     /// [`IdentError::NoFiniteLoss`] if no form of a channel could be fitted.
     pub fn choose_at_lines<'a>(
         &self,
-        at: &AtChannelLines<'_>,
+        at: &ChannelLineFitter<'_>,
         operators: &[Form],
         begun: Vec<Vec<Channel<'a>>>,
-    ) -> Result<Compared<'a>, IdentError> {
-        let best_of = |channels: &[InForm]| {
+    ) -> Result<LineSelection<'a>, IdentError> {
+        let best_of = |channels: &[ChannelInForm]| {
             let fits = operators
                 .iter()
                 .filter_map(|&form| Some((form, at.fit(form, channels)?)));
             fits.min_by(|a, b| a.1.criterion().total_cmp(&b.1.criterion()))
         };
-        let mut in_use: Vec<InForm> = (begun.iter().enumerate())
-            .filter_map(|(k, forms)| Some(self.in_form(k, forms.first()?.form, at.sampling)))
+        let mut in_use: Vec<ChannelInForm> = (begun.iter().enumerate())
+            .filter_map(|(k, forms)| Some(self.channel_in_form(k, forms.first()?.form, at.sampling)))
             .collect();
         let mut compared = Vec::with_capacity(begun.len());
         let mut best = None;
         for (k, asked) in self.all.iter().enumerate() {
-            let others: Vec<InForm> = in_use.iter().filter(|c| c.index != k).copied().collect();
+            let others: Vec<ChannelInForm> = in_use.iter().filter(|c| c.index != k).copied().collect();
             let with = |form: Form| {
                 let mut all = others.clone();
-                all.push(self.in_form(k, form, at.sampling));
+                all.push(self.channel_in_form(k, form, at.sampling));
                 all.sort_by_key(|channel| channel.index);
                 all
             };
@@ -99,7 +99,7 @@ impl FurtherInputs<'_> {
             };
             let mut rows = vec![row(None, without.as_ref())];
             rows.extend(fits.iter().map(|(form, fit)| row(Some(*form), fit.as_ref())));
-            compared.push(ChannelFit::compared(asked, rows, p_value));
+            compared.push(ChannelFit::from_comparison(asked, rows, p_value));
             if p_value < SIGNIFICANCE_LEVEL || asked.forms.len() == 1 {
                 in_use = with(form);
                 best = Some(fit.1.clone());
@@ -109,7 +109,7 @@ impl FurtherInputs<'_> {
             }
         }
         let mut start = best.map(|fit| fit.coordinates).unwrap_or_default();
-        let own = |channel: &InForm| own_places(channel.form, at.neuromuscular).len();
+        let own = |channel: &ChannelInForm| own_coordinates(channel.form, at.neuromuscular).len();
         let of_channels: usize = in_use.iter().map(own).sum();
         start.drain(..start.len().saturating_sub(of_channels));
         let mut channels = Vec::with_capacity(in_use.len());
@@ -122,7 +122,7 @@ impl FurtherInputs<'_> {
                 ..begun.clone()
             });
         }
-        Ok(Compared {
+        Ok(LineSelection {
             fits: compared,
             channels,
             in_form: in_use,
@@ -136,7 +136,7 @@ impl FurtherInputs<'_> {
     /// [`IdentError::NoFiniteLoss`] if no form of a channel could be fitted.
     pub fn choose<'a>(
         &self,
-        prediction: &mut Prediction<'a>,
+        prediction: &mut PredictionProblem<'a>,
         begun: Vec<Vec<Channel<'a>>>,
         (form, starts): ((Form, bool), &[Vec<f64>]),
         noise: NoiseOrders,
@@ -147,7 +147,7 @@ impl FurtherInputs<'_> {
             let asked = &self.all[k];
             let others: Vec<Channel<'a>> = prediction.channels.iter().filter(|c| c.index != k).cloned().collect();
             let mut best_of = |channel: Option<&Channel<'a>>| -> Option<PredictionFit<'a>> {
-                let tried = Prediction {
+                let tried = PredictionProblem {
                     channels: others.iter().chain(channel).cloned().collect(),
                     ..prediction.clone()
                 };
@@ -166,16 +166,16 @@ impl FurtherInputs<'_> {
             let inflation = fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.inflation));
             let inflation = inflation.fold(f64::NAN, f64::min);
             let value = |fit: &PredictionFit<'a>| {
-                fit.residuals as f64 * fit.loss.ln() / inflation + 2.0 * fit.parameters() as f64
+                fit.residuals as f64 * fit.loss.ln() / inflation + 2.0 * fit.parameter_count() as f64
             };
-            let cost = |fit: &PredictionFit<'a>| value(fit) + (COST_PER_PARAMETER - 2.0) * fit.parameters() as f64;
+            let cost = |fit: &PredictionFit<'a>| value(fit) + (COST_PER_PARAMETER - 2.0) * fit.parameter_count() as f64;
             let best = (fits.iter())
                 .filter_map(|(channel, fit)| Some((channel, fit.as_ref()?)))
                 .min_by(|a, b| cost(a.1).total_cmp(&cost(b.1)));
             let (best, fit) = best.ok_or(IdentError::NoFiniteLoss)?;
             let p_value = without.as_ref().map_or(0.0, |without| {
                 let ratio = fit.residuals as f64 * (without.loss / fit.loss).ln() / inflation;
-                let more = fit.parameters().saturating_sub(without.parameters()).max(1);
+                let more = fit.parameter_count().saturating_sub(without.parameter_count()).max(1);
                 chance_probability(ratio, more, fits.len())
             });
             let least = std::iter::once(value(fit))
@@ -188,7 +188,7 @@ impl FurtherInputs<'_> {
             };
             let mut rows = vec![row(None, without.as_ref())];
             rows.extend(fits.iter().map(|(channel, fit)| row(Some(channel.form), fit.as_ref())));
-            compared.push(ChannelFit::compared(asked, rows, p_value));
+            compared.push(ChannelFit::from_comparison(asked, rows, p_value));
             let has_response = p_value < SIGNIFICANCE_LEVEL || asked.forms.len() == 1;
             let chosen = has_response.then(|| {
                 let own = &fit.layout().channels[others.len()];

@@ -21,7 +21,7 @@ fn task(motion: Option<FamilyOperator>, share: f64) -> FamilyScenario {
         operator: operator(Form::Lead, &[0.6, 0.5], 0.25),
         controlled_element: "3/(s(s+1))".parse().unwrap(),
     };
-    let mut scenario = FamilyScenario::new(state, SampleTime::HUNDREDTH);
+    let mut scenario = FamilyScenario::new(state, SampleTime::AT_100_HZ);
     let sum = |rms, interleaved| MultiSine {
         rms,
         interleaved,
@@ -67,7 +67,7 @@ fn fit(records: &[Record], forms: &[Form], intersample: Intersample) -> FamilyFi
     estimator.fit(records).unwrap()
 }
 
-fn named<'p>(parameters: &'p [Parameter], name: &str) -> &'p Parameter {
+fn find_parameter<'p>(parameters: &'p [Parameter], name: &str) -> &'p Parameter {
     parameters.iter().find(|p| p.name == name).unwrap()
 }
 
@@ -88,10 +88,10 @@ fn response_of_the_semicircular_canals_is_found() {
         assert!(findings.iter().all(|f| f.kind != "inputs-together"), "{findings:?}");
         let own = &found.operators[0].parameters;
         for (parameter, truth) in [
-            (named(&response.parameters, "K_m"), GAIN),
-            (named(&response.parameters, "tau_f"), 0.18),
-            (named(own, "K_e"), 0.6),
-            (named(own, "tau_e"), 0.25),
+            (find_parameter(&response.parameters, "K_m"), GAIN),
+            (find_parameter(&response.parameters, "tau_f"), 0.18),
+            (find_parameter(own, "K_e"), 0.6),
+            (find_parameter(own, "tau_e"), 0.25),
         ] {
             let off = parameter.value - truth;
             let most = parameter.standard_error.map_or(0.15 * truth.abs(), |error| 3.5 * error);
@@ -108,7 +108,7 @@ fn gain_and_derivative_responses_to_motion_are_found() {
         let found = fit(&records, &[], Intersample::Auto);
         let response = found.channels[0].response.as_ref().unwrap();
         assert_eq!(response.operator.form(), form, "{:?}", found.channels[0].forms);
-        let gain = named(&response.parameters, form.gain().0);
+        let gain = find_parameter(&response.parameters, form.gain_name_and_unit().0);
         let off = (gain.value - head[0]) / gain.standard_error.unwrap();
         assert!(off.abs() < 3.5, "{form} {off}");
     }
@@ -121,7 +121,7 @@ fn no_motion_response_is_found_where_there_is_none() {
         let records: Vec<Record> = (0..3).map(|k| run(&scenario, 100 + 10 * seed + k)).collect();
         let found = fit(&records, &[], Intersample::Auto);
         assert!(found.channels[0].response.is_none(), "{seed}: {:?}", found.channels[0]);
-        assert_eq!(found.channels[0].forms.len(), Form::OF_MOTION.len() + 1);
+        assert_eq!(found.channels[0].forms.len(), Form::MOTION_FORMS.len() + 1);
     }
 }
 
@@ -131,14 +131,14 @@ fn no_motion_response_is_found_where_there_is_none() {
 fn noise_free_motion_response_is_recovered_exactly() {
     let mut scenario = task(Some(operator(Form::Canals, &[GAIN], 0.18)), 0.0);
     let late = fit(&[run(&scenario, 1)], &[Form::Canals], Intersample::Zoh);
-    let late = named(&late.channels[0].response.as_ref().unwrap().parameters, "K_m").value;
+    let late = find_parameter(&late.channels[0].response.as_ref().unwrap().parameters, "K_m").value;
     assert!((late / GAIN - 1.0).abs() < 0.015, "{late}");
     scenario.run_in_s = 0.0;
     let record = run(&scenario, 1);
     let found = fit(std::slice::from_ref(&record), &[Form::Canals], Intersample::Zoh);
     let response = found.channels[0].response.as_ref().unwrap();
     for (name, truth) in [("K_m", GAIN), ("tau_f", 0.18)] {
-        let off = named(&response.parameters, name).value / truth - 1.0;
+        let off = find_parameter(&response.parameters, name).value / truth - 1.0;
         println!("{name} {off:e}");
         assert!(off.abs() < 1e-4, "{name} {off}");
     }

@@ -15,7 +15,7 @@ use crate::{
 const TS: f64 = 0.02;
 
 /// Returns a normal deviate.
-fn normal(random: &mut ChaCha8Rng) -> f64 {
+fn normal_deviate(random: &mut ChaCha8Rng) -> f64 {
     let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
     (0..12).map(|_| uniform()).sum::<f64>() - 6.0
 }
@@ -90,7 +90,7 @@ impl Task {
                 let f: f64 = held.f.iter().enumerate().map(|(j, f)| f * past(out, k, j + 1)).sum();
                 out[k] = b - f;
             }
-            slow = 0.9 * slow + 0.03 * normal(&mut random);
+            slow = 0.9 * slow + 0.03 * normal_deviate(&mut random);
             let moved = w[k] + v[k] + slow;
             u[k] = moved.signum() * (moved.abs() - self.dead_zone).max(0.0);
         }
@@ -122,7 +122,7 @@ fn estimator() -> FamilyEstimator {
     }
 }
 
-fn within(parameters: &[Parameter], name: &str, truth: f64) -> f64 {
+fn normalised_error(parameters: &[Parameter], name: &str, truth: f64) -> f64 {
     let found = parameters
         .iter()
         .find(|p| p.name == name)
@@ -150,9 +150,9 @@ fn responses_to_error_and_target_are_found() {
         (&response.parameters, "tau_f", 0.2),
     ] {
         assert!(
-            within(all, name, truth).abs() < 3.0,
+            normalised_error(all, name, truth).abs() < 3.0,
             "{name} {}",
-            within(all, name, truth)
+            normalised_error(all, name, truth)
         );
     }
     assert!(fit.lines.is_some(), "the lines of d and r");
@@ -177,7 +177,7 @@ fn responses_to_error_and_target_are_found() {
         ..estimator()
     };
     let one_input = one.fit(std::slice::from_ref(&record)).unwrap();
-    let findings = other_inputs::of_family(&one, &one_input, std::slice::from_ref(&record));
+    let findings = other_inputs::family_findings(&one, &one_input, std::slice::from_ref(&record));
     assert!(
         findings
             .iter()
@@ -232,7 +232,7 @@ fn absent_target_response_is_not_found() {
             ..estimator()
         };
         let records = [record];
-        let findings = other_inputs::of_family(&one, &one.fit(&records).unwrap(), &records);
+        let findings = other_inputs::family_findings(&one, &one.fit(&records).unwrap(), &records);
         assert!(findings.is_empty(), "{findings:?}");
     }
 }
@@ -252,7 +252,7 @@ fn preview_gives_a_negative_delay() {
     let fit = estimator.fit(&[record]).unwrap();
     let response = fit.channels[0].response.as_ref().unwrap();
     println!("{response:#?}");
-    assert!(within(&response.parameters, "tau_f", -0.2).abs() < 3.0);
+    assert!(normalised_error(&response.parameters, "tau_f", -0.2).abs() < 3.0);
 }
 
 #[test]
@@ -325,7 +325,7 @@ fn dead_zone_is_not_mistaken_for_a_target_response() {
         channels: Vec::new(),
         ..estimator()
     };
-    let found = other_inputs::of_family(&one, &one.fit(&records).unwrap(), &records);
+    let found = other_inputs::family_findings(&one, &one.fit(&records).unwrap(), &records);
     println!("{found:?}");
     assert!(
         found.iter().all(|f| f.severity == hoid_model::Severity::Note),

@@ -1,6 +1,6 @@
 use super::*;
 
-fn white(n: usize) -> Vec<f64> {
+fn white_noise(n: usize) -> Vec<f64> {
     // A linear congruential generator (D. E. Knuth, MMIX), shifted to zero mean.
     let mut state = 7_u64;
     (0..n)
@@ -25,7 +25,7 @@ const SYSTEM: [f64; 4] = [-1.5, 0.7, 1.0, 0.5];
 
 /// Returns input and output of the system, which is not at rest when the record starts.
 fn record() -> (Vec<f64>, Vec<f64>) {
-    let x = white(600);
+    let x = white_noise(600);
     let mut u = vec![0.0; 600];
     fir(&SYSTEM[2..], 3, &x, &mut u);
     divide_in_place(&SYSTEM[..2], &mut u);
@@ -36,7 +36,7 @@ fn record() -> (Vec<f64>, Vec<f64>) {
 fn noise_free_system_is_found_with_any_filter_and_instruments() {
     let (e, u) = record();
     let data = vec![Data::new(&e, &u), Data::new(&e[40..], &u[40..])];
-    let problem = IvProblem::new(&ORDERS, data.clone(), Source::measured(&data));
+    let problem = IvProblem::new(&ORDERS, data.clone(), Source::measured_inputs(&data));
     let (c, d, f) = ([0.4], [-0.8, 0.1], [-1.2, 0.5]);
     let filters = [
         Prefilter::default(),
@@ -48,7 +48,10 @@ fn noise_free_system_is_found_with_any_filter_and_instruments() {
     ];
     for filter in filters {
         let equation = problem.equation(filter, &[-1.0, 0.3, 1.0, 1.0]);
-        assert_eq!(equation.y.len(), problem.rows(filter.d.len()).iter().sum::<usize>());
+        assert_eq!(
+            equation.y.len(),
+            problem.row_counts(filter.d.len()).iter().sum::<usize>()
+        );
         for (found, truth) in problem.solve(&equation).unwrap().iter().zip(SYSTEM) {
             // The condition number of these regressors is about 1e2.
             assert!((found - truth).abs() < 1e-11, "{found} {truth}");
@@ -73,7 +76,7 @@ fn each_source_affects_only_its_own_rows() {
         },
     ];
     let split = IvProblem::new(&ORDERS, data.clone(), sources);
-    let plain = IvProblem::new(&ORDERS, data.clone(), Source::measured(&data));
+    let plain = IvProblem::new(&ORDERS, data.clone(), Source::measured_inputs(&data));
     let d = [-0.5];
     let filter = Prefilter {
         d: &d,

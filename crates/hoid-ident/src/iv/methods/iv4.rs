@@ -30,31 +30,31 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
 };
 
 /// Order of the autoregression L, as a multiple of na + nb.
-const ORDERS: usize = 4;
+const ORDER_FACTOR: usize = 4;
 /// Minimum number of rows for each coefficient of the autoregression.
-const ROWS_EACH: usize = 10;
+const MIN_ROWS_PER_COEFFICIENT: usize = 10;
 
 fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Result<IvSolution, IdentError> {
     // Step 1: the estimate is biased by the coloured v, but the output simulated with it is correlated with the true
     // output, which is sufficient for instruments.
-    let (start, _) = problem.stabilised(&problem.least_squares(Prefilter::default())?)?;
+    let (start, _) = problem.stabilise(&problem.least_squares(Prefilter::default())?)?;
     // Step 2: IV estimate with simulated instruments.
     let second = problem.equation(Prefilter::default(), &start);
     let system = problem.solve(&second)?;
     // Step 3: L whitens v, which minimises the variance (Ljung 1999, eq. 15.24).
-    let rows = problem.rows(0);
+    let rows = problem.row_counts(0);
     let shortest = rows.iter().min().copied().unwrap_or(0);
-    let order = (ORDERS * (problem.poles + problem.nb)).min(shortest / ROWS_EACH);
+    let order = (ORDER_FACTOR * (problem.poles + problem.nb)).min(shortest / MIN_ROWS_PER_COEFFICIENT);
     let (_, whitening) = noise_model(&split_by_record(&second.residual(&system), &rows), 0, order);
     let filter = Prefilter {
         d: &whitening,
         ..Prefilter::default()
     };
     // Step 4: IV estimate of the filtered equation.
-    let (stable, _) = problem.stabilised(&system)?;
+    let (stable, _) = problem.stabilise(&system)?;
     let last = problem.equation(filter, &stable);
     let theta = problem.solve(&last)?;
-    let residual = split_by_record(&last.residual(&theta), &problem.rows(order));
+    let residual = split_by_record(&last.residual(&theta), &problem.row_counts(order));
     Ok(IvSolution {
         covariance: covariance(&last.z, &last.phi, |_| true, &residual),
         theta,

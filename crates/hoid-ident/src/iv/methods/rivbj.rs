@@ -42,8 +42,8 @@ fn solve(
     limits: IterationLimits,
 ) -> Result<IvSolution, IdentError> {
     let mut noise_before: Option<NoiseModel> = None;
-    let last = refined::settle(limits, problem, |system| {
-        let noise = noise_of(system, problem, criterion, noise_before.as_ref());
+    let last = refined::iterate_to_convergence(limits, problem, |system| {
+        let noise = estimate_noise_model(system, problem, criterion, noise_before.as_ref());
         noise_before = Some(noise.clone());
         noise
     })?;
@@ -62,7 +62,7 @@ fn solve(
 }
 
 /// Returns C and D of the noise model for a system with stable F.
-fn noise_of(
+fn estimate_noise_model(
     system: &[f64],
     problem: &IvProblem<'_>,
     criterion: &Criterion<'_>,
@@ -100,7 +100,7 @@ fn noise_of(
         start,
         &SearchOptions::default(),
         None,
-        &mut Workspace::of_thread(),
+        &mut Workspace::borrow_from_thread(),
     ) {
         Some(minimum) => {
             let (d, c) = minimum.theta.split_at(nd);
@@ -124,12 +124,12 @@ fn covariance(
     // Only rows that are contained in both the equation and the residuals are used.
     let nd = o.nd;
     let first = (problem.first + nd).max(criterion.first);
-    let mut workspace = Workspace::of_thread();
+    let mut workspace = Workspace::borrow_from_thread();
     let mut residual = Vec::new();
     let mut psi: Vec<Vec<f64>> = vec![Vec::new(); theta.len()];
     let mut w: Vec<Vec<f64>> = vec![Vec::new(); theta.len()];
     let mut end = 0;
-    for (record, rows) in problem.rows(nd).into_iter().enumerate() {
+    for (record, rows) in problem.row_counts(nd).into_iter().enumerate() {
         let eps = criterion.residuals_of(theta, record, &mut workspace);
         residual.push(eps[first - criterion.first..].to_vec());
         let gradient = criterion.jacobian(theta, record, &mut workspace);

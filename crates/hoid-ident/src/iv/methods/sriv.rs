@@ -27,12 +27,12 @@ pub(super) const ALGORITHM: Algorithm = Algorithm {
 };
 
 fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, limits: IterationLimits) -> Result<IvSolution, IdentError> {
-    let last = refined::settle(limits, problem, |_| NoiseModel::default())?;
+    let last = refined::iterate_to_convergence(limits, problem, |_| NoiseModel::default())?;
     let (poles, b) = last.system.split_at(problem.poles);
     let theta: Vec<f64> = b.iter().chain(poles).copied().collect();
     let covariance = (last.termination.reason != Reason::UnstableEstimate)
         .then(|| {
-            let residual = split_by_record(&last.equation.residual(&last.system), &problem.rows(0));
+            let residual = split_by_record(&last.equation.residual(&last.system), &problem.row_counts(0));
             let in_order = |columns: &[Vec<f64>]| {
                 let (poles, b) = columns.split_at(problem.poles);
                 [b, poles].concat()

@@ -14,9 +14,9 @@ fn waves(n: usize, count: usize) -> Vec<Vec<f64>> {
     (0..count).map(|k| wave(n, 0.3 + 0.1 * k as f64)).collect()
 }
 
-fn leading(columns: &[Vec<f64>]) -> Vec<Lagged<'_>> {
+fn unshifted_columns(columns: &[Vec<f64>]) -> Vec<LaggedColumn<'_>> {
     (columns.iter())
-        .map(|values| Lagged {
+        .map(|values| LaggedColumn {
             values,
             is_shift_of_previous: false,
         })
@@ -25,7 +25,7 @@ fn leading(columns: &[Vec<f64>]) -> Vec<Lagged<'_>> {
 
 /// Returns the product by its definition: `count` partial sums, added in this order, and then the samples after the
 /// last whole block.
-fn in_partial_sums(x: &[f64], y: &[f64], count: usize) -> f64 {
+fn product_in_partial_sums(x: &[f64], y: &[f64], count: usize) -> f64 {
     let mut sums = [0.0; 8];
     let whole = x.len() - x.len() % count;
     for t in 0..whole {
@@ -37,7 +37,7 @@ fn in_partial_sums(x: &[f64], y: &[f64], count: usize) -> f64 {
 }
 
 /// Returns the number of partial sums of the k-th of n products with one column: eight for the last of an odd number.
-fn partial_sums(k: usize, n: usize) -> usize {
+fn partial_sum_count(k: usize, n: usize) -> usize {
     if n % 2 == 1 && k + 1 == n { 8 } else { 4 }
 }
 
@@ -49,10 +49,11 @@ fn products_are_bit_identical_on_each_path() {
         for count in 1..=8 {
             let columns = waves(n, count);
             for path in InstructionSet::available() {
-                let found = path.with_four_lanes(Gram(&leading(&columns))).unwrap();
+                let found = path.with_four_lanes(Gram(&unshifted_columns(&columns))).unwrap();
                 for i in 0..count {
                     for j in i..count {
-                        let defined = in_partial_sums(&columns[i], &columns[j], partial_sums(j - i, count - i));
+                        let defined =
+                            product_in_partial_sums(&columns[i], &columns[j], partial_sum_count(j - i, count - i));
                         for found in [found[i * count + j], found[j * count + i]] {
                             assert_eq!(
                                 found.to_bits(),
@@ -71,7 +72,7 @@ fn products_are_bit_identical_on_each_path() {
 fn two_lags_in_one_pass_are_bit_identical_to_the_tiles() {
     for n in LENGTHS.map(|n| n + 1) {
         let (u, e) = (wave(n + 2, 0.05), wave(n + 2, 0.11));
-        let of = |x: &'static [f64], lag: usize| Lagged {
+        let of = |x: &'static [f64], lag: usize| LaggedColumn {
             values: &x[2 - lag..n + 2 - lag],
             is_shift_of_previous: lag > 0,
         };
@@ -80,7 +81,7 @@ fn two_lags_in_one_pass_are_bit_identical_to_the_tiles() {
         for path in InstructionSet::available() {
             let found = path.with_four_lanes(Gram(&columns)).unwrap();
             let same = |i: usize, j: usize, count: usize| {
-                let defined = in_partial_sums(columns[i].values, columns[j].values, count);
+                let defined = product_in_partial_sums(columns[i].values, columns[j].values, count);
                 assert_eq!(
                     found[i * 5 + j].to_bits(),
                     defined.to_bits(),
@@ -114,15 +115,15 @@ fn residuals_are_bit_identical_on_each_path() {
                     }
                     (in_fours..p).for_each(|k| *r -= term(k));
                 }
-                defined.squares += in_partial_sums(&r, &r, 8);
+                defined.squares += product_in_partial_sums(&r, &r, 8);
                 for k in 0..p {
-                    defined.products[k] += in_partial_sums(&r, of(k + 1), partial_sums(k, p));
+                    defined.products[k] += product_in_partial_sums(&r, of(k + 1), partial_sum_count(k, p));
                 }
             }
             for path in InstructionSet::available() {
                 let mut found = ResidualProducts::new(p);
                 let task = Residuals {
-                    columns: &leading(&columns),
+                    columns: &unshifted_columns(&columns),
                     factors: &factors[..p],
                     of: &mut found,
                 };
@@ -163,8 +164,8 @@ fn shifted_columns_give_the_same_matrix() {
     let (u, e) = (wave(200, 0.05), wave(200, 0.11));
     let lagged = |x: &'static [f64], lag: usize| &x[10 - lag..200 - lag];
     let (u, e): (&'static [f64], &'static [f64]) = (u.leak(), e.leak());
-    let columns = |follow: bool| -> Vec<Lagged<'static>> {
-        let of = |x, lag, follows| Lagged {
+    let columns = |follow: bool| -> Vec<LaggedColumn<'static>> {
+        let of = |x, lag, follows| LaggedColumn {
             values: lagged(x, lag),
             is_shift_of_previous: follows && follow,
         };

@@ -6,7 +6,7 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 
-use super::{by_normal_equations, regress};
+use super::{regress, solve_normal_equations};
 use crate::criterion::Data;
 
 fn orders(na: usize, nb: usize, nk: usize) -> Orders {
@@ -20,7 +20,7 @@ fn orders(na: usize, nb: usize, nk: usize) -> Orders {
 
 /// Returns the solution by QR, without normal equations. The residuals start at sample `first`, and the regressors use
 /// the samples before it.
-fn by_qr(orders: &Orders, data: &[Data<'_>], first: usize) -> (Vec<f64>, f64, Vec<f64>) {
+fn solve_by_qr(orders: &Orders, data: &[Data<'_>], first: usize) -> (Vec<f64>, f64, Vec<f64>) {
     let p = orders.na + orders.nb;
     let mut columns: Vec<f64> = Vec::new();
     for lag in 1..=orders.na {
@@ -58,12 +58,12 @@ fn normal_equations_match_qr() {
         });
         let data = Data::of(&records);
         assert_eq!(
-            by_normal_equations(&orders, &data, 50).is_some(),
+            solve_normal_equations(&orders, &data, 50).is_some(),
             by_products,
             "{condition}"
         );
         let found = regress(&orders, &data, 50).unwrap();
-        let (theta, squares, inverse) = by_qr(&orders, &data, 50);
+        let (theta, squares, inverse) = solve_by_qr(&orders, &data, 50);
         // The two solutions differ by rounding; the scaled normal matrix has a condition number of up to 1e7.
         for (a, b) in found.theta.iter().zip(&theta) {
             assert!((a - b).abs() < 1e-11 * b.abs(), "{condition}: {a} and {b}");
@@ -84,7 +84,8 @@ fn ill_conditioned_problems_are_solved_by_qr() {
     let u: Vec<f64> = (0..n)
         .map(|t| (0.07 * f64::from(t)).sin() + 0.3 * (2.3 * f64::from(t)).cos())
         .collect();
-    let decide = |o: &Orders, e: &[f64], u: &[f64], first| by_normal_equations(o, &[Data::new(e, u)], first).is_some();
+    let decide =
+        |o: &Orders, e: &[f64], u: &[f64], first| solve_normal_equations(o, &[Data::new(e, u)], first).is_some();
     let two = orders(1, 1, 1);
     assert!(decide(&two, &e, &u, 2));
     // Zeros before the record, a constant input, dependent columns, and an exact fit.

@@ -60,7 +60,7 @@ impl Columns {
         to: usize,
         products: &mut [f64],
     ) {
-        let (p1, width) = (self.count(), zero.lanes());
+        let (p1, width) = (self.count(), zero.lane_count());
         for i in 0..p1 {
             if self.is_shift_of_previous(i) {
                 continue;
@@ -103,7 +103,7 @@ impl Columns {
     /// rows at both ends make up the difference between their products and the products of the previous columns.
     #[inline(always)]
     pub fn add_row<R: Number>(&self, zero: R, signals: &SignalBuffers, row: usize, sign: f64, products: &mut [f64]) {
-        let (p1, width) = (self.count(), zero.lanes());
+        let (p1, width) = (self.count(), zero.lane_count());
         for i in 0..p1 {
             for j in 0..=i {
                 if self.is_shift_of_previous(i) && self.is_shift_of_previous(j) {
@@ -120,7 +120,7 @@ impl Columns {
     /// Completes the matrix of products from the summed products, and projects out the initial states.
     #[inline(always)]
     pub fn complete<R: Number>(&self, zero: R, inside: &[R], nf: usize, products: &mut [f64]) {
-        let (p1, width) = (self.count(), zero.lanes());
+        let (p1, width) = (self.count(), zero.lane_count());
         for i in 0..p1 {
             for j in 0..=i {
                 let at = (i * p1 + j) * width;

@@ -9,24 +9,24 @@ use super::{lane_products::add_scaled, signal_buffers::SignalBuffers};
 /// recursions of s and r run in parallel, and values that are not needed later are not stored. The arithmetic
 /// operations are the same as in separate passes. Returns false for other orders, without computing anything.
 #[inline(always)]
-pub(super) fn all_at_once<R: Number>(
+pub(super) fn filter_all<R: Number>(
     zero: R,
     [b, d, f]: [&[f64]; 3],
     data: [&[f64]; 2],
     signals: &mut SignalBuffers,
     at: usize,
 ) -> bool {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     if f.len() != 2 * width {
         return false;
     }
     match (b.len() / width, d.len() / width) {
-        (2, 0) => all_of_orders::<R, 2, 0>(zero, [b, d, f], data, signals, at),
-        (2, 1) => all_of_orders::<R, 2, 1>(zero, [b, d, f], data, signals, at),
-        (2, 2) => all_of_orders::<R, 2, 2>(zero, [b, d, f], data, signals, at),
-        (3, 0) => all_of_orders::<R, 3, 0>(zero, [b, d, f], data, signals, at),
-        (3, 1) => all_of_orders::<R, 3, 1>(zero, [b, d, f], data, signals, at),
-        (3, 2) => all_of_orders::<R, 3, 2>(zero, [b, d, f], data, signals, at),
+        (2, 0) => filter_all_of_orders::<R, 2, 0>(zero, [b, d, f], data, signals, at),
+        (2, 1) => filter_all_of_orders::<R, 2, 1>(zero, [b, d, f], data, signals, at),
+        (2, 2) => filter_all_of_orders::<R, 2, 2>(zero, [b, d, f], data, signals, at),
+        (3, 0) => filter_all_of_orders::<R, 3, 0>(zero, [b, d, f], data, signals, at),
+        (3, 1) => filter_all_of_orders::<R, 3, 1>(zero, [b, d, f], data, signals, at),
+        (3, 2) => filter_all_of_orders::<R, 3, 2>(zero, [b, d, f], data, signals, at),
         _ => return false,
     }
     true
@@ -35,7 +35,7 @@ pub(super) fn all_at_once<R: Number>(
 /// Returns one row, i.e. one sample of all lanes.
 #[inline(always)]
 fn row<R: Number>(zero: R, rows: &[f64], index: usize) -> R {
-    zero.load(&rows[index * zero.lanes()..])
+    zero.load(&rows[index * zero.lane_count()..])
 }
 
 /// Returns one row, or zeros if its index is not below `end`.
@@ -45,14 +45,14 @@ fn row_below<R: Number>(zero: R, rows: &[f64], index: usize, end: usize) -> R {
 }
 
 #[inline(always)]
-fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
+fn filter_all_of_orders<R: Number, const NB: usize, const ND: usize>(
     zero: R,
     [b, d, f]: [&[f64]; 3],
     [e, u]: [&[f64]; 2],
     signals: &mut SignalBuffers,
     at: usize,
 ) {
-    let (width, end) = (zero.lanes(), at + e.len());
+    let (width, end) = (zero.lane_count(), at + e.len());
     let (b0, b1, b2) = (row(zero, b, 0), row(zero, b, 1), row_below(zero, b, 2, NB));
     let (d1, d2) = (row_below(zero, d, 0, ND), row_below(zero, d, 1, ND));
     let (f1, f2) = (row(zero, f, 0), row(zero, f, 1));
@@ -96,14 +96,14 @@ fn all_of_orders<R: Number, const NB: usize, const ND: usize>(
 
 /// Computes `s = e/F`, `w = B s` (stored in r) and `v = u - w` from index `at` on.
 #[inline(always)]
-pub(super) fn respond<R: Number>(
+pub(super) fn compute_response<R: Number>(
     zero: R,
     [b, f]: [&[f64]; 2],
     [e, u]: [&[f64]; 2],
     signals: &mut SignalBuffers,
     at: usize,
 ) {
-    let (width, end) = (zero.lanes(), at + e.len());
+    let (width, end) = (zero.lane_count(), at + e.len());
     if (b.len(), f.len()) == (2 * width, 2 * width) {
         // For the orders of the operator, the response is computed in one pass.
         let (b0, b1) = (zero.load(b), zero.load(&b[width..]));
@@ -139,7 +139,7 @@ pub(super) fn respond<R: Number>(
 /// Computes `r = w/F` (in place of w) from index `at` on, and `x_f = D r`.
 #[inline(always)]
 pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [f64], x_f: &mut [f64], at: usize) {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     if (d.len(), f.len()) == (width, 2 * width) {
         let (d1, f1, f2) = (zero.load(d), zero.load(f), zero.load(&f[width..]));
         let (mut r1, mut r2) = (zero.load(&r[at - width..]), zero.load(&r[at - 2 * width..]));
@@ -166,7 +166,7 @@ fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
 /// Computes `y <- y/F` from index `at` on; the previous values are already filtered.
 #[inline(always)]
 fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     if f.len() == 2 * width {
         let (f1, f2) = (zero.load(f), zero.load(&f[width..]));
         let (mut y1, mut y2) = (zero.load(&y[at - width..]), zero.load(&y[at - 2 * width..]));
@@ -190,7 +190,7 @@ fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
 /// Computes `y = D x` for x from index `at` on.
 #[inline(always)]
 pub(super) fn whiten<R: Number>(zero: R, d: &[f64], x: &[f64], y: &mut [f64], at: usize) {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     let end = at + y.len();
     if d.is_empty() {
         y.copy_from_slice(&x[at..end]);
@@ -214,7 +214,7 @@ pub(super) fn whiten<R: Number>(zero: R, d: &[f64], x: &[f64], y: &mut [f64], at
 /// Computes `y = D x` of order N in one pass; x starts N rows before y.
 #[inline(always)]
 fn whiten_by<R: Number, const N: usize>(zero: R, d: &[f64], x: &[f64], y: &mut [f64]) {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     let mut k = [zero; N];
     for i in 0..N {
         k[i] = zero.load(&d[i * width..]);
@@ -232,7 +232,7 @@ fn whiten_by<R: Number, const N: usize>(zero: R, d: &[f64], x: &[f64], y: &mut [
 /// Computes `y = B x` for x from index `at` on.
 #[inline(always)]
 fn fir<R: Number>(zero: R, b: &[f64], x: &[f64], y: &mut [f64], at: usize) {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     let end = at + y.len();
     y.fill(0.0);
     for (j, bj) in b.chunks_exact(width).enumerate() {

@@ -32,8 +32,8 @@ pub(crate) fn fit_each(
     if !plain || records.iter().any(|record| record.len() != n) {
         return None;
     }
-    path.lanes()?;
-    let mut workspace = Workspace::of_thread();
+    path.lane_count()?;
+    let mut workspace = Workspace::borrow_from_thread();
     let criteria: Vec<_> = (records.iter())
         .map(|record| settings.criterion(std::slice::from_ref(*record), 0))
         .collect();
@@ -41,7 +41,7 @@ pub(crate) fn fit_each(
         .map(|found| {
             found
                 .as_ref()
-                .map(|(criterion, ts)| (settings.constrained(criterion), *ts))
+                .map(|(criterion, ts)| (settings.constrained_criterion(criterion), *ts))
         })
         .collect();
     let mut slow = if settings.start.is_none() {
@@ -86,6 +86,6 @@ fn poles_of_averages(
         .collect();
     search(all.iter_mut().flatten().collect(), path, workspace);
     (all.into_iter())
-        .map(|continuation| continuation.map(Continuation::slow).unwrap_or_default())
+        .map(|continuation| continuation.map(Continuation::into_slow_poles).unwrap_or_default())
         .collect()
 }

@@ -20,7 +20,7 @@ use super::{
 /// Number of samples of an impulse response between two tests of whether it has decayed.
 const TEST_INTERVAL: usize = 128;
 /// A response has decayed if its last values are below this limit; its first value is 1.
-const DECAYED: f64 = 1e-17;
+const DECAY_LIMIT: f64 = 1e-17;
 /// Minimum share of the sum of squares of a column that must be outside the space of the previous columns.
 const MIN_INDEPENDENT_SHARE: f64 = 1e-12;
 
@@ -49,7 +49,7 @@ impl<R: Number> InitialStateResponses<R> {
         signals: &mut SignalBuffers,
         dependent: &mut Vec<bool>,
     ) -> Self {
-        let width = zero.lanes();
+        let width = zero.lane_count();
         let (nd, nf) = (d.len() / width, f.len() / width);
         let longest = residuals + nd;
         signals.h.allocate((longest + 2 * nf) * width);
@@ -74,13 +74,13 @@ impl<R: Number> InitialStateResponses<R> {
         };
         dependent.clear();
         dependent.resize(width, false);
-        responses.make_orthogonal(zero, signals, dependent);
+        responses.orthogonalise(zero, signals, dependent);
         responses
     }
 
     #[inline(always)]
-    fn make_orthogonal(&mut self, zero: R, signals: &mut SignalBuffers, dependent: &mut [bool]) {
-        let (width, nf, rows) = (zero.lanes(), self.nf, self.rows);
+    fn orthogonalise(&mut self, zero: R, signals: &mut SignalBuffers, dependent: &mut [bool]) {
+        let (width, nf, rows) = (zero.lane_count(), self.nf, self.rows);
         let mut s = vec![zero; nf * nf];
         for j in (0..nf).step_by(2) {
             let last = (j + 1).min(nf - 1);
@@ -137,7 +137,7 @@ impl<R: Number> InitialStateResponses<R> {
     /// Returns an element of the original column k; `row` may be the row before the first.
     #[inline(always)]
     fn at(&self, zero: R, signals: &SignalBuffers, k: usize, row: isize) -> R {
-        zero.load(&signals.g[(self.nf + self.nd - k).wrapping_add_signed(row) * zero.lanes()..])
+        zero.load(&signals.g[(self.nf + self.nd - k).wrapping_add_signed(row) * zero.lane_count()..])
     }
 
     /// Returns the orthogonal column k.
@@ -150,7 +150,7 @@ impl<R: Number> InitialStateResponses<R> {
     /// of the span, the residuals start in row `counted`.
     #[inline(always)]
     pub fn eliminate(&self, zero: R, signals: &mut SignalBuffers, regressed: usize, counted: usize) {
-        let (width, nf) = (zero.lanes(), self.nf);
+        let (width, nf) = (zero.lane_count(), self.nf);
         let (from, to) = (counted * width, (counted + self.rows) * width);
         let eps = &signals.eps[from..to];
         let mut x = Vec::with_capacity(nf);
@@ -159,7 +159,7 @@ impl<R: Number> InitialStateResponses<R> {
             let pair = [self.column(signals, k, width), self.column(signals, last, width)];
             x.extend_from_slice(&two_products(zero, eps, pair)[..=last - k]);
         }
-        self.forward(&mut x);
+        self.forward_substitute(&mut x);
         for k in (0..nf).rev() {
             for i in k + 1..nf {
                 x[k] = x[k] - self.second[i * nf + k] * x[i];
@@ -190,7 +190,7 @@ impl<R: Number> InitialStateResponses<R> {
     /// eps, the first column, is zero.
     #[inline(always)]
     pub fn components(&self, zero: R, columns: &Columns, signals: &SignalBuffers, counted: usize) -> Vec<R> {
-        let (width, nf, count) = (zero.lanes(), self.nf, columns.count());
+        let (width, nf, count) = (zero.lane_count(), self.nf, columns.count());
         let mut inside = vec![zero; count * nf];
         let end = counted + self.rows;
         for k in 0..nf {
@@ -207,14 +207,14 @@ impl<R: Number> InitialStateResponses<R> {
             }
         }
         for of_column in inside.chunks_exact_mut(nf) {
-            self.forward(of_column);
+            self.forward_substitute(of_column);
         }
         inside
     }
 
     /// Computes `y <- L^-1 y`, where L is the second factor.
     #[inline(always)]
-    fn forward(&self, y: &mut [R]) {
+    fn forward_substitute(&self, y: &mut [R]) {
         for k in 0..self.nf {
             for j in 0..k {
                 y[k] = y[k] - self.second[k * self.nf + j] * y[j];
@@ -238,7 +238,7 @@ fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
                 continue;
             }
             let square = s[k * nf + k];
-            for lane in 0..zero.lanes() {
+            for lane in 0..zero.lane_count() {
                 let own = rest.lane(lane);
                 let independent = own > MIN_INDEPENDENT_SHARE * square.lane(lane);
                 dependent[lane] |= !independent;
@@ -252,7 +252,7 @@ fn factor<R: Number>(zero: R, nf: usize, s: &mut [R], dependent: &mut [bool]) {
 /// Computes `y(t) += sum_k x_k s(t-k)`; row `at` of s belongs to t = 0.
 #[inline(always)]
 fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     let (from, count) = (at * width, y.len());
     if let [x0, x1] = *x {
         let rows = s[from..from + count]
@@ -274,7 +274,7 @@ fn add_shifts<R: Number>(zero: R, x: &[R], s: &[f64], at: usize, y: &mut [f64]) 
 /// the response.
 #[inline(always)]
 fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]) -> usize {
-    let (width, nf) = (zero.lanes(), f.len() / zero.lanes());
+    let (width, nf) = (zero.lane_count(), f.len() / zero.lane_count());
     h[..nf * width].fill(0.0);
     let mut impulse = zero.splat(1.0);
     let mut ends = vec![usize::MAX; width];
@@ -292,7 +292,7 @@ fn impulse_response<R: Number>(zero: R, f: &[f64], longest: usize, h: &mut [f64]
         rows = to;
         for (lane, end) in ends.iter_mut().enumerate() {
             // All subsequent values depend only on the last nf values.
-            let gone = (rows - nf..rows).all(|row| h[row * width + lane].abs() < DECAYED);
+            let gone = (rows - nf..rows).all(|row| h[row * width + lane].abs() < DECAY_LIMIT);
             if gone {
                 *end = rows.min(*end);
             }

@@ -5,7 +5,7 @@ use hoid_lanes::Number;
 /// Returns `x' y` for four signals y.
 #[inline(always)]
 pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]; 4]) -> [R; 4] {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     let mut sums = (zero, zero, zero, zero);
     let others =
         (a.chunks_exact(width).zip(b.chunks_exact(width))).zip(c.chunks_exact(width).zip(d.chunks_exact(width)));
@@ -22,7 +22,7 @@ pub(super) fn four_products<R: Number>(zero: R, x: &[f64], [a, b, c, d]: [&[f64]
 /// Returns `x' y` for two signals y.
 #[inline(always)]
 pub(super) fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -> [R; 2] {
-    let width = zero.lanes();
+    let width = zero.lane_count();
     let mut sums = (zero, zero);
     for ((x, a), b) in x
         .chunks_exact(width)
@@ -39,7 +39,7 @@ pub(super) fn two_products<R: Number>(zero: R, x: &[f64], [a, b]: [&[f64]; 2]) -
 /// Computes `y += k x`.
 #[inline(always)]
 pub(super) fn add_scaled<R: Number>(k: R, x: &[f64], y: &mut [f64]) {
-    let width = k.lanes();
+    let width = k.lane_count();
     for (y, x) in y.chunks_exact_mut(width).zip(x.chunks_exact(width)) {
         (k.load(y) + k * k.load(x)).store(y);
     }

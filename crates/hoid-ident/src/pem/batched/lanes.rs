@@ -15,7 +15,14 @@ use crate::{
 /// Completes all searches in parallel lanes; all records have the same length and the same orders.
 pub(super) fn search(open: Vec<&mut impl LinearisationClient>, path: InstructionSet, workspace: &mut Workspace) {
     let first = open.first().map(|client| client.criterion());
-    let lanes = first.and_then(|c| Some(Lanes::new(c.orders, c.first, c.data.first()?.u.len(), path.lanes()?)));
+    let lanes = first.and_then(|c| {
+        Some(Lanes::new(
+            c.orders,
+            c.first,
+            c.data.first()?.u.len(),
+            path.lane_count()?,
+        ))
+    });
     if let Some(mut lanes) = lanes {
         lanes.search(open, path, workspace);
     }
@@ -62,7 +69,7 @@ impl Lanes {
         for (values, rows) in [
             (&mut memory.e, n),
             (&mut memory.u, n),
-            (&mut memory.theta, orders.parameters()),
+            (&mut memory.theta, orders.parameter_count()),
         ] {
             values.allocate(rows * width);
             values.fill(0.0);
@@ -90,7 +97,7 @@ impl Lanes {
                         searching[lane] = None;
                         break;
                     };
-                    self.put(lane, next.criterion().data[0]);
+                    self.load_record(lane, next.criterion().data[0]);
                     searching[lane] = Some(next);
                 }
                 // A lane without a record keeps its previous theta.
@@ -132,7 +139,7 @@ impl Lanes {
     }
 
     /// Puts a record into a lane.
-    pub fn put(&mut self, lane: usize, record: Data<'_>) {
+    pub fn load_record(&mut self, lane: usize, record: Data<'_>) {
         for (lanes, values) in [(&mut self.memory.e, record.e), (&mut self.memory.u, record.u)] {
             for (row, value) in lanes.chunks_exact_mut(self.width).zip(values) {
                 row[lane] = *value;
@@ -143,7 +150,7 @@ impl Lanes {
     /// Returns the linearisation in a lane after a pass.
     pub fn linearisation(&self, lane: usize) -> Linearisation {
         let o = &self.orders;
-        let p = o.parameters();
+        let p = o.parameter_count();
         let product = |i: usize, j: usize| self.memory.sums.products[(i * (p + 1) + j) * self.width + lane];
         // The columns of psi are x_b, -v and -x_f.
         let sign = |i: usize| if i < o.nb { 1.0 } else { -1.0 };

@@ -21,14 +21,14 @@ use hoid_model::Orders;
 
 use super::{
     columns::Columns,
-    filters::{all_at_once, filter_response, respond, whiten},
+    filters::{compute_response, filter_all, filter_response, whiten},
     initial_state_responses::InitialStateResponses,
     normal_equations::NormalEquations,
     signal_buffers::SignalBuffers,
 };
 
 /// Number of samples that are computed and multiplied at a time.
-const SPAN: usize = 64;
+const SPAN_LENGTH: usize = 64;
 
 /// Input and memory of one pass over the records in all lanes.
 pub(super) struct Pass<'a> {
@@ -51,7 +51,7 @@ impl LaneTask for Pass<'_> {
 
     #[inline(always)]
     fn run<R: Number>(self, zero: R) {
-        let width = zero.lanes();
+        let width = zero.lane_count();
         let Self {
             orders: o,
             first,
@@ -74,7 +74,7 @@ impl LaneTask for Pass<'_> {
         let states = InitialStateResponses::of(zero, [d, f], n - first, signals, &mut sums.dependent);
         let first_row = o.nk;
         let mut to = first + states.rows;
-        signals.prepare(history, (to - first_row).max(SPAN), width);
+        signals.prepare(history, (to - first_row).max(SPAN_LENGTH), width);
         sums.products.clear();
         sums.products.resize(columns.count() * columns.count() * width, 0.0);
         let products = &mut sums.products;
@@ -90,8 +90,8 @@ impl LaneTask for Pass<'_> {
                 &u[from * width..to * width],
             );
             let mut counted = history;
-            if from == first_row || !all_at_once(zero, [b, d, f], [inputs, outputs], signals, at) {
-                respond(zero, [b, f], [inputs, outputs], signals, at);
+            if from == first_row || !filter_all(zero, [b, d, f], [inputs, outputs], signals, at) {
+                compute_response(zero, [b, f], [inputs, outputs], signals, at);
                 if from == first_row {
                     // w is unknown until all of its regressors are inside the record.
                     signals.r[at..at + (regressed - first_row) * width].fill(0.0);
@@ -114,9 +114,9 @@ impl LaneTask for Pass<'_> {
             let mut done = counted;
             while done < history + count {
                 let next = if done == counted && from == first_row {
-                    done + o.nf - 1 + SPAN
+                    done + o.nf - 1 + SPAN_LENGTH
                 } else {
-                    done + SPAN
+                    done + SPAN_LENGTH
                 };
                 let next = next.min(history + count);
                 columns.add_products(zero, signals, done, next, products);
@@ -128,7 +128,7 @@ impl LaneTask for Pass<'_> {
                 break;
             }
             signals.carry_over_tail(history, count, width);
-            (from, to) = (to, (to + SPAN).min(n));
+            (from, to) = (to, (to + SPAN_LENGTH).min(n));
         }
         columns.complete(zero, &inside, o.nf, products);
     }

@@ -36,7 +36,7 @@ fn runs(count: u64, samples: usize) -> Vec<Record> {
     (0..count).map(run).collect()
 }
 
-fn by_reference(records: &[Record]) -> Vec<&Record> {
+fn references(records: &[Record]) -> Vec<&Record> {
     records.iter().collect()
 }
 
@@ -53,9 +53,9 @@ fn orders(nb: usize, nd: usize, nf: usize, nk: usize) -> Orders {
 /// Returns the criterion of each record in a lane, each at its own theta.
 fn pass(o: Orders, records: &[Record], thetas: &[Vec<f64>], path: InstructionSet) -> Vec<(Linearisation, bool)> {
     let first = first_residual(&o, InitialState::Estimate);
-    let mut lanes = Lanes::new(o, first, records[0].len(), path.lanes().unwrap());
+    let mut lanes = Lanes::new(o, first, records[0].len(), path.lane_count().unwrap());
     for (lane, (record, theta)) in records.iter().zip(thetas).enumerate().take(lanes.width) {
-        lanes.put(lane, Data::of(std::slice::from_ref(record))[0]);
+        lanes.load_record(lane, Data::of(std::slice::from_ref(record))[0]);
         for (i, value) in theta.iter().enumerate() {
             lanes.memory.theta[i * lanes.width + lane] = *value;
         }
@@ -66,7 +66,7 @@ fn pass(o: Orders, records: &[Record], thetas: &[Vec<f64>], path: InstructionSet
         .collect()
 }
 
-fn all(there: &Linearisation) -> Vec<f64> {
+fn all_sums(there: &Linearisation) -> Vec<f64> {
     let mut all = vec![there.sum_of_squares];
     all.extend(&there.descent);
     all.extend(&there.gram);
@@ -111,7 +111,7 @@ fn lane_criterion_matches_a_single_record() {
                 further: Vec::new(),
             };
             let alone = criterion.linearise(&thetas[lane], &mut Workspace::default());
-            let p = o.parameters();
+            let p = o.parameter_count();
             let size = |i: usize| match i {
                 0 => alone.sum_of_squares,
                 i if i <= p => (alone.sum_of_squares * alone.gram[(i - 1) * (p + 1)]).sqrt(),
@@ -120,7 +120,7 @@ fn lane_criterion_matches_a_single_record() {
                     (alone.gram[j * (p + 1)] * alone.gram[k * (p + 1)]).sqrt()
                 }
             };
-            for (i, (a, b)) in all(&found).into_iter().zip(all(&alone)).enumerate() {
+            for (i, (a, b)) in all_sums(&found).into_iter().zip(all_sums(&alone)).enumerate() {
                 // Rounding errors of filters with poles near the unit circle, relative to the sizes of the columns.
                 assert!(
                     (a - b).abs() <= 1e-11 * size(i),
@@ -135,7 +135,7 @@ fn lane_criterion_matches_a_single_record() {
 fn lane_is_bit_identical_on_every_path_and_alone() {
     let (records, o) = (runs(8, 1200), orders(2, 2, 2, 29));
     let thetas: Vec<Vec<f64>> = (0..8).map(|lane| theta(&o, lane)).collect();
-    let bits = |there: &Linearisation| -> Vec<u64> { all(there).into_iter().map(f64::to_bits).collect() };
+    let bits = |there: &Linearisation| -> Vec<u64> { all_sums(there).into_iter().map(f64::to_bits).collect() };
     let best = pass(o, &records, &thetas, InstructionSet::Best);
     for path in InstructionSet::available() {
         for lane in 0..best.len() {
@@ -157,7 +157,7 @@ fn batched_fits_match_single_fits() {
             start,
             ..Estimator::new(Structure::BoxJenkins, orders(2, nd, 2, 29))
         };
-        let each = fit_each(&estimator, &by_reference(&records), InstructionSet::Best).unwrap();
+        let each = fit_each(&estimator, &references(&records), InstructionSet::Best).unwrap();
         for (record, found) in records.iter().zip(each) {
             let (found, alone) = (found.unwrap(), estimator.fit(std::slice::from_ref(record)).unwrap());
             assert_eq!(found.start(), alone.start());
@@ -177,7 +177,7 @@ fn batched_fits_are_bit_identical_on_every_path_and_alone() {
     let records = runs(5, 2048);
     let estimator = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
     let bits = |records: &[Record], path: InstructionSet| -> Vec<Vec<u64>> {
-        let fits = fit_each(&estimator, &by_reference(records), path).unwrap();
+        let fits = fit_each(&estimator, &references(records), path).unwrap();
         let theta = |fit: Result<Fit, IdentError>| fit.unwrap().model().theta().iter().map(|t| t.to_bits()).collect();
         fits.into_iter().map(theta).collect()
     };
@@ -204,7 +204,7 @@ fn bad_record_does_not_affect_other_fits() {
     );
     records[1] = silent.unwrap();
     let estimator = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
-    let each = estimator.fit_each(&by_reference(&records));
+    let each = estimator.fit_each(&references(&records));
     for (record, found) in records.iter().zip(each) {
         match (found, estimator.fit(std::slice::from_ref(record))) {
             (Ok(found), Ok(alone)) => assert!((found.loss() - alone.loss()).abs() <= 1e-12 * alone.loss()),
@@ -220,13 +220,13 @@ fn unsupported_batches_are_fitted_one_by_one() {
     let mut records = runs(2, 1024);
     let bj = Estimator::new(Structure::BoxJenkins, orders(2, 1, 2, 29));
     let arx = Estimator::new(Structure::Arx, Structure::Arx.operator_orders(29));
-    assert!(fit_each(&arx, &by_reference(&records), InstructionSet::Best).is_none());
+    assert!(fit_each(&arx, &references(&records), InstructionSet::Best).is_none());
     // The pass has no C.
     let with_c = Orders { nc: 1, ..bj.orders };
     let with_c = Estimator::new(Structure::BoxJenkins, with_c);
-    assert!(fit_each(&with_c, &by_reference(&records), InstructionSet::Best).is_none());
-    assert!(arx.fit_each(&by_reference(&records)).into_iter().all(|fit| fit.is_ok()));
+    assert!(fit_each(&with_c, &references(&records), InstructionSet::Best).is_none());
+    assert!(arx.fit_each(&references(&records)).into_iter().all(|fit| fit.is_ok()));
     records[1] = records[1].span(0.0, 9.0).unwrap();
-    assert!(fit_each(&bj, &by_reference(&records), InstructionSet::Best).is_none());
-    assert!(bj.fit_each(&by_reference(&records)).into_iter().all(|fit| fit.is_ok()));
+    assert!(fit_each(&bj, &references(&records), InstructionSet::Best).is_none());
+    assert!(bj.fit_each(&references(&records)).into_iter().all(|fit| fit.is_ok()));
 }

@@ -12,7 +12,7 @@ fn theta(layout: &Layout) -> Vec<f64> {
         .enumerate()
         .take(layout.varying)
     {
-        let [a, b] = Layout::ends(i);
+        let [a, b] = Layout::end_indices(i);
         (theta[a], theta[b]) = (first, last);
     }
     (theta[layout.midpoint], theta[layout.log_rate]) = (3.1, f64::ln(2.0));
@@ -33,7 +33,7 @@ fn criterion<'a>(layout: Layout, e: &'a [f64], u: &'a [f64]) -> ChangeCriterion<
     ChangeCriterion {
         layout,
         data: vec![Data { e, u, start_s: -0.3 }],
-        sample_time: SampleTime::HUNDREDTH,
+        sample_time: SampleTime::AT_100_HZ,
         first: 20 + layout.nd,
         limits: vec![(f64::NEG_INFINITY, f64::INFINITY); layout.len()],
         piece: None,
@@ -44,7 +44,7 @@ fn criterion<'a>(layout: Layout, e: &'a [f64], u: &'a [f64]) -> ChangeCriterion<
     }
 }
 
-fn all() -> impl Iterator<Item = Layout> {
+fn all_layouts() -> impl Iterator<Item = Layout> {
     let pairs = Form::ALL.into_iter().flat_map(|form| [(form, true), (form, false)]);
     pairs
         .filter(|(form, neuromuscular)| form.is_proper(*neuromuscular))
@@ -54,7 +54,7 @@ fn all() -> impl Iterator<Item = Layout> {
 #[test]
 fn gradient_agrees_with_finite_differences() {
     let (e, u) = record(700);
-    for layout in all() {
+    for layout in all_layouts() {
         let mut c = criterion(layout, &e, &u);
         let theta = theta(&layout);
         // The criterion includes a prior.
@@ -96,16 +96,16 @@ fn gradient_agrees_with_finite_differences() {
 #[test]
 fn initial_state_of_noise_free_data_is_fitted_exactly() {
     let (e, _) = record(1500);
-    for layout in all() {
+    for layout in all_layouts() {
         let layout = Layout { nd: 0, ..layout };
         let theta = &theta(&layout)[..layout.len()];
-        let unit = UnitOperator::of(&layout, theta, None, SampleTime::HUNDREDTH).unwrap();
+        let unit = UnitOperator::of(&layout, theta, None, SampleTime::AT_100_HZ).unwrap();
         let y: Vec<Vec<f64>> = (0..unit.b.len()).map(|i| unit.response(i, &e)).collect();
         let at = |t: usize| {
             if t < unit.nk {
                 return 0.0;
             }
-            let g = Instant::at(&layout, theta, -0.3 + 0.01 * t as f64 - theta[layout.delay]);
+            let g = SigmoidPoint::at(&layout, theta, -0.3 + 0.01 * t as f64 - theta[layout.delay]);
             (0..y.len()).map(|i| g.numerator(i) * y[i][t - unit.nk]).sum()
         };
         let u: Vec<f64> = (0..1500).map(at).collect();
@@ -122,7 +122,7 @@ fn initial_state_of_noise_free_data_is_fitted_exactly() {
 #[test]
 fn only_the_first_state_is_used_without_a_change() {
     let (e, u) = record(600);
-    for layout in all() {
+    for layout in all_layouts() {
         let mut c = ChangeCriterion {
             changes: false,
             ..criterion(layout, &e, &u)
@@ -137,11 +137,11 @@ fn only_the_first_state_is_used_without_a_change() {
         c.penalty = vec![prior(0), prior(1)];
         let at = c.linearise(&theta(&layout), &mut Workspace::default());
         let mut other = theta(&layout);
-        for place in layout.of_the_change() {
+        for place in layout.change_indices() {
             other[place] *= 1.3;
         }
         let there = c.linearise(&other, &mut Workspace::default());
         assert_eq!(at.sum_of_squares, there.sum_of_squares, "{layout:?}");
-        assert!(layout.of_the_change().iter().all(|&i| at.descent[i] == 0.0));
+        assert!(layout.change_indices().iter().all(|&i| at.descent[i] == 0.0));
     }
 }

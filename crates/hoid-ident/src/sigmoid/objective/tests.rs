@@ -5,11 +5,11 @@ use super::*;
 /// Indices of a gain and a lead in theta.
 const K_E: [usize; 2] = [0, 1];
 const T_L: [usize; 2] = [2, 3];
-const MIDPOINT: usize = 4;
-const OMEGA: usize = 6;
-const ZETA: usize = 7;
-const DELAY: usize = 8;
-const NOISE: usize = 9;
+const MIDPOINT_INDEX: usize = 4;
+const OMEGA_INDEX: usize = 6;
+const ZETA_INDEX: usize = 7;
+const DELAY_INDEX: usize = 8;
+const NOISE_INDEX: usize = 9;
 
 /// Returns a record with an initial state that is not at rest, a nonzero rate and coloured noise.
 pub(super) fn record(n: usize) -> (Vec<f64>, Vec<f64>) {
@@ -38,9 +38,9 @@ fn criterion<'a>(e: &'a [f64], u: &'a [f64], nd: usize) -> ChangeCriterion<'a> {
     ChangeCriterion {
         layout: Layout::new(Form::Lead, true, nd),
         data: vec![Data { e, u, start_s: -0.3 }],
-        sample_time: SampleTime::HUNDREDTH,
+        sample_time: SampleTime::AT_100_HZ,
         first: 20 + nd,
-        limits: vec![(f64::NEG_INFINITY, f64::INFINITY); NOISE + nd],
+        limits: vec![(f64::NEG_INFINITY, f64::INFINITY); NOISE_INDEX + nd],
         piece: None,
         changes: true,
         weights: None,
@@ -57,7 +57,7 @@ fn gradient_agrees_with_finite_differences() {
             let mut c = criterion(&e, &u, nd);
             c.level = level;
             if weighted {
-                let rows = c.residuals();
+                let rows = c.residual_count();
                 c.weights = Some(vec![(0..rows).map(|t| if t < 500 { 1.3 } else { 0.7 }).collect()]);
             }
             let theta = theta(nd);
@@ -135,7 +135,7 @@ fn initial_state_of_noise_free_data_is_fitted_exactly() {
             if t < unit.nk {
                 return 0.0;
             }
-            let g = Instant::at(&whole.layout, &theta, -0.3 + 0.01 * t as f64 - theta[DELAY]);
+            let g = SigmoidPoint::at(&whole.layout, &theta, -0.3 + 0.01 * t as f64 - theta[DELAY_INDEX]);
             g.numerator(0) * y[0][t - unit.nk] + g.numerator(1) * y[1][t - unit.nk]
         })
         .collect();
@@ -160,10 +160,10 @@ fn only_the_first_state_is_used_without_a_change() {
     };
     let at = c.linearise(&theta(1), &mut Workspace::default());
     let mut other = theta(1);
-    (other[K_E[1]], other[T_L[1]], other[MIDPOINT]) = (0.5, 0.1, 1.0);
+    (other[K_E[1]], other[T_L[1]], other[MIDPOINT_INDEX]) = (0.5, 0.1, 1.0);
     let there = c.linearise(&other, &mut Workspace::default());
     assert_eq!(at.sum_of_squares, there.sum_of_squares);
-    assert!(c.layout.of_the_change().iter().all(|&i| at.descent[i] == 0.0));
+    assert!(c.layout.change_indices().iter().all(|&i| at.descent[i] == 0.0));
 }
 
 #[test]
@@ -172,10 +172,10 @@ fn invalid_parameters_are_infeasible() {
     let c = criterion(&e, &u, 1);
     assert!(c.is_feasible(&theta(1)));
     for (i, value) in [
-        (ZETA, -0.1),
-        (OMEGA, 0.0),
-        (DELAY, -0.01),
-        (DELAY, 0.5),
+        (ZETA_INDEX, -0.1),
+        (OMEGA_INDEX, 0.0),
+        (DELAY_INDEX, -0.01),
+        (DELAY_INDEX, 0.5),
         (K_E[0], f64::NAN),
     ] {
         let mut wrong = theta(1);

@@ -5,10 +5,10 @@ use std::ops::Range;
 use super::column_path::ColumnPath;
 use super::numbers::Numbers;
 use crate::IoError;
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 /// A column interpolated to the times of another stream.
-pub(super) struct Aligned {
+pub(super) struct AlignedColumn {
     pub(super) numbers: Numbers,
     /// Rows of the other stream whose time lies within the stream of the column.
     pub(super) rows: Range<usize>,
@@ -16,15 +16,15 @@ pub(super) struct Aligned {
 }
 
 /// Interpolates the column `column_path` to the times of the stream with the path `neighbour`.
-pub(super) fn aligned(
+pub(super) fn align_column(
     column_paths: &[ColumnPath],
     column_path: &ColumnPath,
     neighbour: &str,
     file: &str,
-) -> Result<Aligned, IoError> {
+) -> Result<AlignedColumn, IoError> {
     let (from, to) = (
-        times(column_paths, &column_path.parent, file)?,
-        times(column_paths, neighbour, file)?,
+        stream_times(column_paths, &column_path.parent, file)?,
+        stream_times(column_paths, neighbour, file)?,
     );
     let values = column_path.numbers().map(Numbers::values).unwrap_or_default();
     let (Some(first), Some(last)) = (from.first(), from.last()) else {
@@ -41,7 +41,7 @@ pub(super) fn aligned(
             known = later;
             known_values = known_values.get(1..).unwrap_or_default();
         }
-        between(known, known_values, *t)
+        interpolate(known, known_values, *t)
     };
     let numbers: Vec<f64> = to.iter().map(value).collect();
     let hz = |t: &[f64]| match t {
@@ -51,13 +51,13 @@ pub(super) fn aligned(
     let (from_hz, to_hz) = (hz(&from), hz(&to));
     let mut note = format!(
         "{} is interpolated linearly from {from_hz:.3} Hz to the {to_hz:.3} Hz of {}, where both have samples",
-        shown(&column_path.path),
-        shown(neighbour)
+        abbreviate(&column_path.path),
+        abbreviate(neighbour)
     );
     if from_hz > 1.5 * to_hz {
         note.push_str("; no low-pass filter was applied");
     }
-    Ok(Aligned {
+    Ok(AlignedColumn {
         numbers: Numbers::from_f64(&numbers),
         rows: start..end.max(start),
         note,
@@ -65,7 +65,7 @@ pub(super) fn aligned(
 }
 
 /// Evaluates the line through the first two points at `at`.
-fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
+fn interpolate(t: &[f64], values: &[f64], at: f64) -> f64 {
     match (t, values) {
         ([t0, t1, ..], [v0, v1, ..]) => {
             let part = (at - t0) / (t1 - t0);
@@ -78,7 +78,7 @@ fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
 }
 
 /// Returns the times of a structure; they must increase.
-fn times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<Vec<f64>, IoError> {
+fn stream_times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<Vec<f64>, IoError> {
     let time = column_paths
         .iter()
         .find(|column_path| column_path.parent == place && column_path.name() == "t");
@@ -93,7 +93,7 @@ fn times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<Vec<f64
         None => Ok(times),
         Some((row, previous, found)) => Err(IoError::NotIncreasing {
             file: file.to_owned(),
-            place: format!("stream {}, row {row}", shown(place)),
+            place: format!("stream {}, row {row}", abbreviate(place)),
             found,
             previous,
         }),
@@ -122,21 +122,21 @@ mod tests {
             .iter()
             .flat_map(|entry| entry.column_paths(Indexing::Python))
             .collect();
-        let found = aligned(&column_paths, &column_paths[1], "b", "f").unwrap();
+        let found = align_column(&column_paths, &column_paths[1], "b", "f").unwrap();
         assert_eq!(found.rows, 1..6);
         assert_eq!(found.numbers.values()[1..6], [0.0, 5.0, 10.0, 0.0, -10.0]);
         assert!(matches!(
-            aligned(&column_paths, &column_paths[1], "c", "f"),
+            align_column(&column_paths, &column_paths[1], "c", "f"),
             Err(IoError::NotIncreasing { .. })
         ));
         assert!(
-            aligned(&column_paths, &column_paths[1], "d", "f")
+            align_column(&column_paths, &column_paths[1], "d", "f")
                 .unwrap()
                 .rows
                 .is_empty()
         );
         assert!(matches!(
-            aligned(&column_paths, &column_paths[1], "e", "f"),
+            align_column(&column_paths, &column_paths[1], "e", "f"),
             Err(IoError::NoRows { .. })
         ));
     }

@@ -4,13 +4,13 @@
 //! matrix in this direction is a column of data with its own path: `x(:,2)` or `x(2,:)` in MATLAB notation, counted
 //! from 1, `x[:,1]` or `x[1,:]` in Python notation, counted from 0. In a square matrix the first index is time.
 
-use super::contents::{Contents, Entry, Indexing, OBJECT, Value};
+use super::contents::{Contents, Entry, Indexing, OBJECT_PREFIX, Value};
 use super::numbers::Numbers;
 use crate::IoError;
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 /// A matrix with more channels than this counts as an image.
-const MAX_LINES: usize = 256;
+const MAX_MATRIX_CHANNELS: usize = 256;
 
 /// One column of a file, with its path.
 #[derive(Debug, Clone)]
@@ -19,12 +19,12 @@ pub(crate) struct ColumnPath {
     /// Path of the enclosing structure; empty at top level.
     pub(crate) parent: String,
     pub(crate) unit: String,
-    pub(crate) holds: Holds,
+    pub(crate) holds: ColumnContents,
 }
 
 /// Contents of a column.
 #[derive(Debug, Clone)]
-pub(crate) enum Holds {
+pub(crate) enum ColumnContents {
     Numbers(Numbers),
     Texts(Vec<String>),
     Unread(String),
@@ -34,16 +34,16 @@ impl ColumnPath {
     /// Returns the number of rows; 0 for unsupported content.
     pub(crate) fn len(&self) -> usize {
         match &self.holds {
-            Holds::Numbers(numbers) => numbers.len(),
-            Holds::Texts(texts) => texts.len(),
-            Holds::Unread(_) => 0,
+            ColumnContents::Numbers(numbers) => numbers.len(),
+            ColumnContents::Texts(texts) => texts.len(),
+            ColumnContents::Unread(_) => 0,
         }
     }
 
     /// Returns the numbers of the column; `None` if it does not hold numbers.
     pub(crate) fn numbers(&self) -> Option<&Numbers> {
         match &self.holds {
-            Holds::Numbers(numbers) => Some(numbers),
+            ColumnContents::Numbers(numbers) => Some(numbers),
             _ => None,
         }
     }
@@ -59,25 +59,25 @@ impl ColumnPath {
     }
 
     /// Returns the error that explains why this column is not numeric.
-    pub(super) fn refused(&self, file: &str) -> IoError {
+    pub(super) fn not_numeric_error(&self, file: &str) -> IoError {
         IoError::Unsupported {
             file: file.to_owned(),
-            found: format!("{} holds {}", shown(&self.path), self.what()),
+            found: format!("{} holds {}", abbreviate(&self.path), self.description()),
             remedy: "save the column as an array of real numbers",
         }
     }
 
     /// True if the value is a MATLAB object.
     pub(super) fn holds_object(&self) -> bool {
-        matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
+        matches!(&self.holds, ColumnContents::Unread(what) if what.starts_with(OBJECT_PREFIX))
     }
 
     /// Describes the contents of the column in words.
-    pub(crate) fn what(&self) -> String {
+    pub(crate) fn description(&self) -> String {
         match &self.holds {
-            Holds::Numbers(numbers) => numbers.kind().name().to_owned(),
-            Holds::Texts(_) => String::from("text"),
-            Holds::Unread(what) => what.clone(),
+            ColumnContents::Numbers(numbers) => numbers.kind().name().to_owned(),
+            ColumnContents::Texts(_) => String::from("text"),
+            ColumnContents::Unread(what) => what.clone(),
         }
     }
 }
@@ -117,14 +117,14 @@ impl Entry {
         };
         let one = |holds| vec![column_path(self.path.clone(), holds)];
         match &self.value {
-            Value::Texts(texts) => one(Holds::Texts(texts.clone())),
-            Value::Unread(what) => one(Holds::Unread(what.clone())),
+            Value::Texts(texts) => one(ColumnContents::Texts(texts.clone())),
+            Value::Unread(what) => one(ColumnContents::Unread(what.clone())),
             Value::Array(array) => {
                 let sides: Vec<usize> = array.dims.iter().copied().filter(|side| *side != 1).collect();
                 match sides.as_slice() {
-                    [] | [_] => one(Holds::Numbers(array.numbers.clone())),
-                    [..] if sides.contains(&0) => one(Holds::Numbers(array.numbers.clone())),
-                    [rows, columns] if array.dims.len() == 2 && *rows.min(columns) <= MAX_LINES => {
+                    [] | [_] => one(ColumnContents::Numbers(array.numbers.clone())),
+                    [..] if sides.contains(&0) => one(ColumnContents::Numbers(array.numbers.clone())),
+                    [rows, columns] if array.dims.len() == 2 && *rows.min(columns) <= MAX_MATRIX_CHANNELS => {
                         let count = *rows.min(columns);
                         let along_first = rows >= columns;
                         let name = |k: usize| match (indexing, along_first) {
@@ -134,12 +134,12 @@ impl Entry {
                             (Indexing::Python, false) => format!("{}[{k},:]", self.path),
                         };
                         (0..count)
-                            .map(|k| column_path(name(k), Holds::Numbers(array.line(k, along_first))))
+                            .map(|k| column_path(name(k), ColumnContents::Numbers(array.line(k, along_first))))
                             .collect()
                     }
                     _ => {
                         let sides: Vec<String> = array.dims.iter().map(usize::to_string).collect();
-                        one(Holds::Unread(format!("an array of {}", sides.join(" x "))))
+                        one(ColumnContents::Unread(format!("an array of {}", sides.join(" x "))))
                     }
                 }
             }
@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn parent_of_a_path() {
+    fn parent_is_the_path_without_its_last_part() {
         assert_eq!(parent("e"), "");
         assert_eq!(parent("data.run(3).e"), "data.run(3)");
         assert_eq!(parent("run(3).x(:,2)"), "run(3)");

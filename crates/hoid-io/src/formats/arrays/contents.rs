@@ -10,10 +10,10 @@ pub(crate) enum Indexing {
 }
 
 /// Name of the array in which comments are stored as text.
-pub(crate) const COMMENTS: &str = "hoid_comments";
+pub(crate) const COMMENTS_ARRAY: &str = "hoid_comments";
 
 /// First words of the description of a MATLAB object.
-pub(crate) const OBJECT: &str = "an object of the class";
+pub(crate) const OBJECT_PREFIX: &str = "an object of the class";
 
 /// The value at a path.
 #[derive(Debug, Clone)]
@@ -85,7 +85,7 @@ impl Contents {
         {
             text.retain(|c| !c.is_control());
         }
-        let at = entries.iter().position(|entry| entry.path == COMMENTS);
+        let at = entries.iter().position(|entry| entry.path == COMMENTS_ARRAY);
         let comments = match at.map(|at| entries.remove(at).value) {
             Some(Value::Texts(texts)) => texts,
             _ => Vec::new(),

@@ -20,8 +20,8 @@ mod results;
 mod selection;
 
 pub(crate) use array::Array;
-pub(crate) use column_path::{ColumnPath, Holds};
-pub(crate) use contents::{COMMENTS, Contents, Entry, Indexing, OBJECT, Value};
+pub(crate) use column_path::{ColumnContents, ColumnPath};
+pub(crate) use contents::{COMMENTS_ARRAY, Contents, Entry, Indexing, OBJECT_PREFIX, Value};
 pub(crate) use numbers::{Kind, Numbers};
 pub(crate) use results::output_table_of;
-pub(crate) use selection::{MOMENTS, TIMES, table_of};
+pub(crate) use selection::{CLOCK_TIME_UNIT, TIME_NAMES, table_of};

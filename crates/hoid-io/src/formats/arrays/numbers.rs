@@ -127,7 +127,7 @@ impl Numbers {
 
     /// Returns the number at an index; NaN if the index is out of range.
     pub(crate) fn value(&self, at: usize) -> f64 {
-        let Some(bytes) = self.bytes_of(at) else {
+        let Some(bytes) = self.bytes_at(at) else {
             return f64::NAN;
         };
         let number = |n: [u8; 8]| (u64::from_le_bytes(n), i64::from_le_bytes(n));
@@ -145,8 +145,8 @@ impl Numbers {
     }
 
     /// Returns the 8-byte integer at an index.
-    pub(crate) fn whole(&self, at: usize) -> Option<i64> {
-        self.bytes_of(at).map(i64::from_le_bytes)
+    pub(crate) fn integer(&self, at: usize) -> Option<i64> {
+        self.bytes_at(at).map(i64::from_le_bytes)
     }
 
     /// Returns all numbers as `f64`.
@@ -157,7 +157,7 @@ impl Numbers {
     /// Returns all numbers as counts; `None` if any of them is not a nonnegative integer.
     pub(crate) fn counts(&self) -> Option<Vec<u64>> {
         let count = |at: usize| {
-            let n = self.bytes_of(at).map(u64::from_le_bytes)?;
+            let n = self.bytes_at(at).map(u64::from_le_bytes)?;
             match self.kind {
                 Kind::U8 | Kind::U16 | Kind::U32 | Kind::U64 => Some(n),
                 Kind::I8 | Kind::I16 | Kind::I32 | Kind::I64 => {
@@ -171,7 +171,7 @@ impl Numbers {
     }
 
     /// Returns the bytes of a number, little-endian, padded with zeros.
-    fn bytes_of(&self, at: usize) -> Option<[u8; 8]> {
+    fn bytes_at(&self, at: usize) -> Option<[u8; 8]> {
         let size = self.kind.size();
         let from = at.checked_mul(self.step)?.checked_add(self.start)?;
         let stored = self.bytes.get(from..from.checked_add(size)?)?;

@@ -1,20 +1,20 @@
 //! Conversion of all arrays of a file to a table of results.
 
-use super::column_path::Holds;
+use super::column_path::ColumnContents;
 use super::contents::Contents;
 use crate::IoError;
 use crate::results::{ColumnValues, OutputColumn, OutputTable};
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 /// Converts all columns to a table of results.
 pub(crate) fn output_table_of(contents: Contents, file: &str) -> Result<OutputTable, IoError> {
     let mut columns: Vec<OutputColumn> = Vec::new();
     for column_path in contents.column_paths() {
-        let error = || column_path.refused(file);
+        let error = || column_path.not_numeric_error(file);
         let values = match &column_path.holds {
-            Holds::Texts(texts) => ColumnValues::Text(texts.clone()),
-            Holds::Unread(_) => return Err(error()),
-            Holds::Numbers(numbers) => match numbers.counts() {
+            ColumnContents::Texts(texts) => ColumnValues::Text(texts.clone()),
+            ColumnContents::Unread(_) => return Err(error()),
+            ColumnContents::Numbers(numbers) => match numbers.counts() {
                 Some(counts) if numbers.kind().is_whole() => ColumnValues::Whole(counts),
                 _ => ColumnValues::Real(numbers.values()),
             },
@@ -22,9 +22,9 @@ pub(crate) fn output_table_of(contents: Contents, file: &str) -> Result<OutputTa
         if let Some(first) = columns.first().filter(|first| first.values.len() != values.len()) {
             return Err(IoError::UnequalColumns {
                 file: file.to_owned(),
-                column: shown(&column_path.path),
+                column: abbreviate(&column_path.path),
                 found: values.len(),
-                other: shown(&first.name),
+                other: abbreviate(&first.name),
                 expected: first.values.len(),
             });
         }

@@ -15,13 +15,13 @@ use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::{Column, ColumnExpression, Precision, Signal, Source, Table, read_comments};
 use crate::time::is_time;
-use crate::wording::{list, shown};
+use crate::wording::{abbreviate, list_names};
 
 /// Names of the time column, in order of precedence.
-pub(crate) const TIMES: [&str; 2] = ["t", "time"];
+pub(crate) const TIME_NAMES: [&str; 2] = ["t", "time"];
 
 /// Unit of clock times, which are converted to seconds since the first clock time.
-pub(crate) const MOMENTS: &str = "s from the first";
+pub(crate) const CLOCK_TIME_UNIT: &str = "s from the first";
 
 /// Maximum number of columns of a record; further columns are omitted.
 const MAX_COLUMNS: usize = 1024;
@@ -52,14 +52,14 @@ impl Source for ArraySource<'_> {
 pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a str) -> Result<Table<'a>, IoError> {
     let column_paths = contents.column_paths();
     let expressions: Vec<&ColumnExpression> = options.input.iter().chain([&options.output]).collect();
-    let named = Named::of(&column_paths, &expressions, file)?;
+    let named = NamedColumns::of(&column_paths, &expressions, file)?;
     // In `used`, the columns of the input are first and the columns of the output last.
     let mut used: Vec<usize> = Vec::new();
     for expression in &expressions {
         let resolved = expression.resolve(&named.names(), file).map_err(|error| {
             // If the file contains a MATLAB object, the object is assumed to hold the signals.
             let object = column_paths.iter().find(|column_path| column_path.holds_object());
-            object.map_or(error, |object| object.refused(file))
+            object.map_or(error, |object| object.not_numeric_error(file))
         });
         let terms = match resolved? {
             Signal::Column(a) | Signal::Negative(a) => vec![a],
@@ -74,19 +74,22 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     let mut columns: Vec<(String, &ColumnPath, Numbers)> = Vec::new();
     let mut shared = None;
     for (name, column_path) in used.iter().filter_map(|at| named.columns.get(*at)) {
-        let mut numbers = column_path.numbers().ok_or_else(|| column_path.refused(file))?.clone();
+        let mut numbers = column_path
+            .numbers()
+            .ok_or_else(|| column_path.not_numeric_error(file))?
+            .clone();
         if contents.own_clocks && column_path.parent != neighbour {
-            let aligned = clocks::aligned(&column_paths, column_path, neighbour, file)?;
+            let aligned = clocks::align_column(&column_paths, column_path, neighbour, file)?;
             notes.push(aligned.note);
             numbers = aligned.numbers;
-            shared = Some(common(shared, aligned.rows));
+            shared = Some(common_rows(shared, aligned.rows));
         }
         if let Some((first, _, rows)) = columns.first().filter(|(_, _, rows)| rows.len() != numbers.len()) {
             return Err(IoError::UnequalColumns {
                 file: file.to_owned(),
-                column: shown(name),
+                column: abbreviate(name),
                 found: numbers.len(),
-                other: shown(first),
+                other: abbreviate(first),
                 expected: rows.len(),
             });
         }
@@ -102,7 +105,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
         && let Some(time) = time_of_same_group(&column_paths, neighbour, rows)
     {
         if time.name() != "t" {
-            notes.push(format!("{} is taken as t", shown(&time.path)));
+            notes.push(format!("{} is taken as t", abbreviate(&time.path)));
         }
         columns.extend(time.numbers().map(|numbers| (String::from("t"), time, numbers.clone())));
     }
@@ -129,7 +132,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     if !left_out.is_empty() {
         notes.push(format!(
             "left out, because they are not columns of {rows} numbers: {}",
-            list(&left_out)
+            list_names(&left_out)
         ));
     }
     // Only rows in which all streams have samples are kept.
@@ -155,7 +158,7 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     })
 }
 
-fn common(known: Option<Range<usize>>, rows: Range<usize>) -> Range<usize> {
+fn common_rows(known: Option<Range<usize>>, rows: Range<usize>) -> Range<usize> {
     match known {
         Some(known) => known.start.max(rows.start)..known.end.min(rows.end),
         None => rows,
@@ -166,32 +169,32 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
     let values = numbers.values();
     Column {
         name: name.to_owned(),
-        unit: if column_path.unit == MOMENTS {
+        unit: if column_path.unit == CLOCK_TIME_UNIT {
             String::from("s")
         } else {
             column_path.unit.clone()
         },
         role: String::new(),
         precision: if is_time(name) {
-            Precision::of_times(&values, numbers.kind().is_single())
+            Precision::from_times(&values, numbers.kind().is_single())
         } else {
             Precision::default()
         },
         values,
         texts: Vec::new(),
-        moments: column_path.unit == MOMENTS,
+        moments: column_path.unit == CLOCK_TIME_UNIT,
         filled_rows: Vec::new(),
         is_held: false,
     }
 }
 
 /// Columns with the names that expressions may use.
-struct Named<'a> {
+struct NamedColumns<'a> {
     /// All paths, followed by the shorter names that match exactly one path.
     columns: Vec<(String, &'a ColumnPath)>,
 }
 
-impl<'a> Named<'a> {
+impl<'a> NamedColumns<'a> {
     fn of(column_paths: &'a [ColumnPath], expressions: &[&ColumnExpression], file: &str) -> Result<Self, IoError> {
         let paths: Vec<&str> = column_paths
             .iter()
@@ -204,7 +207,7 @@ impl<'a> Named<'a> {
                 if paths.contains(&name) {
                     continue;
                 }
-                match ends(column_paths, name).as_slice() {
+                match paths_ending_in(column_paths, name).as_slice() {
                     [one] => aliases.push((name.to_owned(), *one)),
                     [] => {}
                     several => {
@@ -216,8 +219,8 @@ impl<'a> Named<'a> {
             if let Some((name, paths)) = ambiguous {
                 return Err(IoError::AmbiguousColumn {
                     file: file.to_owned(),
-                    asked: shown(name),
-                    found: list(&paths),
+                    asked: abbreviate(name),
+                    found: list_names(&paths),
                 });
             }
         }
@@ -235,7 +238,7 @@ impl<'a> Named<'a> {
 }
 
 /// Returns the columns whose paths end in a name, compared part by part.
-fn ends<'a>(column_paths: &'a [ColumnPath], name: &str) -> Vec<&'a ColumnPath> {
+fn paths_ending_in<'a>(column_paths: &'a [ColumnPath], name: &str) -> Vec<&'a ColumnPath> {
     let ending = |name: &str| -> Vec<&'a ColumnPath> {
         let ends = |column_path: &&ColumnPath| {
             (column_path.path.strip_suffix(name)).is_some_and(|before| before.is_empty() || before.ends_with('.'))
@@ -262,7 +265,7 @@ fn time_of_same_group<'a>(column_paths: &'a [ColumnPath], neighbour: &str, rows:
                 .filter(is_time)
                 .find(|column_path| column_path.numbers().is_some_and(|numbers| numbers.len() == rows))
         };
-        let found = TIMES.iter().find_map(time);
+        let found = TIME_NAMES.iter().find_map(time);
         if found.is_some() || place.is_empty() {
             return found;
         }

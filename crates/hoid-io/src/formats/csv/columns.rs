@@ -10,7 +10,7 @@ use crate::IoError;
 use crate::formats::format::RowWriter;
 use crate::results::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};
 use crate::table::{Cell, check_names};
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 /// State of a CSV file that is written in groups of rows.
 struct CsvColumns {
@@ -28,7 +28,7 @@ pub(super) fn start_with_tabs(file: &mut dyn Write, schema: &TableSchema) -> io:
 }
 
 impl RowWriter for CsvColumns {
-    fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()> {
+    fn write_rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()> {
         let mut csv = self.writer(file);
         let mut cell = String::new();
         for row in 0..columns.first().map_or(0, Values::len) {
@@ -94,7 +94,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
         return Err(IoError::Empty { file: file.to_owned() });
     };
     let separator = separator(header_line, lines.next());
-    let (names, kinds, rows) = survey(text, file, separator)?;
+    let (names, kinds, rows) = survey_columns(text, file, separator)?;
     let mut values: Vec<ColumnValues> = kinds
         .iter()
         .map(|kind| match kind {
@@ -117,7 +117,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
                     Cell::Number(value) => value,
                     Cell::Missing | Cell::Text => f64::NAN,
                 }),
-                ColumnValues::Whole(values) => values.push(whole(cell).unwrap_or_default()),
+                ColumnValues::Whole(values) => values.push(parse_integer(cell).unwrap_or_default()),
                 ColumnValues::Text(values) => values.push(unescape_formula(cell).to_owned()),
             }
         }
@@ -132,7 +132,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<OutputTable, IoError> {
 }
 
 /// Determines the names and kinds of the columns, and the number of rows.
-fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<ColumnKind>, usize), IoError> {
+fn survey_columns(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<ColumnKind>, usize), IoError> {
     let mut reader = reader(text.as_bytes(), separator);
     let mut record = csv::ByteRecord::new();
     let mut names: Vec<String> = Vec::new();
@@ -153,7 +153,7 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
                 return Err(IoError::NoHeader {
                     file: file.to_owned(),
                     place: line(),
-                    found: shown(&names.join(", ")),
+                    found: abbreviate(&names.join(", ")),
                 });
             }
             check_names(&names, file, &mut Vec::new())?;
@@ -172,7 +172,7 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
         for (kind, cell) in kinds.iter_mut().zip(&record) {
             let cell = utf8(cell);
             *kind = match *kind {
-                ColumnKind::Whole if whole(cell).is_some() => ColumnKind::Whole,
+                ColumnKind::Whole if parse_integer(cell).is_some() => ColumnKind::Whole,
                 ColumnKind::Whole | ColumnKind::Real if Cell::parse(cell) != Cell::Text => ColumnKind::Real,
                 _ => ColumnKind::Text,
             };
@@ -185,7 +185,7 @@ fn survey(text: &str, file: &str, separator: u8) -> Result<(Vec<String>, Vec<Col
 }
 
 /// Parses an integer as hoid writes it: digits without leading zeros.
-fn whole(cell: &str) -> Option<u64> {
+fn parse_integer(cell: &str) -> Option<u64> {
     let digits = cell.bytes().all(|b| b.is_ascii_digit()) && (cell == "0" || !cell.starts_with('0'));
     digits.then(|| cell.parse().ok()).flatten()
 }

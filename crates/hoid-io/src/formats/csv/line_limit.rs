@@ -57,7 +57,7 @@ impl LineLimit {
 ///
 /// # Errors
 /// [`IoError::LongLine`]; [`IoError::Unreadable`].
-pub(in crate::formats) fn whole_text(path: &Path, file: &str) -> Result<Vec<u8>, IoError> {
+pub(in crate::formats) fn read_whole_text(path: &Path, file: &str) -> Result<Vec<u8>, IoError> {
     let unreadable = |source| IoError::Unreadable {
         file: file.to_owned(),
         source,
@@ -110,18 +110,18 @@ mod tests {
     fn text_without_line_ends_is_refused() {
         let file = tempfile::Builder::new().suffix(".csv").tempfile().unwrap();
         std::fs::write(file.path(), "t,\"e\"\n0,1\n").unwrap();
-        assert_eq!(whole_text(file.path(), "run.csv").unwrap(), b"t,\"e\"\n0,1\n");
+        assert_eq!(read_whole_text(file.path(), "run.csv").unwrap(), b"t,\"e\"\n0,1\n");
         File::options()
             .write(true)
             .open(file.path())
             .unwrap()
             .set_len(1 << 30)
             .unwrap();
-        let error = whole_text(file.path(), "run.csv").unwrap_err().to_string();
+        let error = read_whole_text(file.path(), "run.csv").unwrap_err().to_string();
         assert!(error.contains("within 32 MB after byte 10"), "{error}");
         std::fs::write(file.path(), "").unwrap();
-        assert_eq!(whole_text(file.path(), "run.csv").unwrap(), b"");
-        let missing = whole_text(&file.path().with_extension("no"), "run.csv");
+        assert_eq!(read_whole_text(file.path(), "run.csv").unwrap(), b"");
+        let missing = read_whole_text(&file.path().with_extension("no"), "run.csv");
         assert!(matches!(missing, Err(IoError::Unreadable { .. })));
     }
 }

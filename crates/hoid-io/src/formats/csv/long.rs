@@ -11,39 +11,44 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::foreign::converted_to_plain_csv;
+use super::foreign::convert_to_plain_csv;
 use super::line_limit::{LineLimit, MAX_LINE_BYTES};
-use super::plain::{Layout, RowStarts, plain_rows};
+use super::plain::{Layout, RowStarts, read_plain_rows};
 use super::span_end::SpanEnd;
-use super::table::{Parsed, nth_row, parsed};
+use super::table::{ParsedText, nth_row, parse_text};
 use crate::IoError;
 use crate::record::ReadOptions;
-use crate::table::{Cell, Column, Source, Table, check_selected, selected};
+use crate::table::{Cell, Column, Source, Table, check_selected, select_columns};
 use crate::time::{is_time, is_time_unit, may_be_time};
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 /// Minimum size, in bytes, of a file that is read block by block.
 const MIN_LONG_FILE_BYTES: u64 = 16 << 20;
 /// Number of bytes read to obtain the header and the first rows.
-const HEAD: usize = 256 << 10;
+const HEAD_BYTES: usize = 256 << 10;
 /// Size of the first block in bytes; each further block is twice as long as the previous block, up to
 /// [`MAX_LINE_BYTES`].
-const BLOCK: usize = 1 << 20;
+const FIRST_BLOCK_BYTES: usize = 1 << 20;
 /// Number of positions in the unread part of a file at which the time is probed.
-const PROBES: u32 = 64;
+const PROBE_COUNT: u32 = 64;
 /// Number of bytes read at a probed position; it exceeds the length of a line.
-const PROBE: usize = 64 << 10;
+const PROBE_BYTES: usize = 64 << 10;
 
 /// Reads the table of a long text; `None` if the text is short, or if it contains anything other than plain numbers.
 ///
 /// # Errors
 /// [`IoError::Unreadable`]; [`IoError::LongLine`].
 pub(crate) fn table<'a>(path: &Path, file: &'a str, options: &ReadOptions) -> Result<Option<Table<'a>>, IoError> {
-    of_length(path, file, options, MIN_LONG_FILE_BYTES)
+    read_long_table(path, file, options, MIN_LONG_FILE_BYTES)
 }
 
 /// Reads the table of a text of at least `long` bytes.
-fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -> Result<Option<Table<'a>>, IoError> {
+fn read_long_table<'a>(
+    path: &Path,
+    file: &'a str,
+    options: &ReadOptions,
+    long: u64,
+) -> Result<Option<Table<'a>>, IoError> {
     let unreadable = |source| IoError::Unreadable {
         file: file.to_owned(),
         source,
@@ -54,15 +59,15 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     if !about.is_file() || about.len() < long {
         return Ok(None);
     }
-    let mut text = Text {
+    let mut text = LongText {
         file: File::open(path).map_err(unreadable)?,
         at: 0,
         buffer: Vec::new(),
         lines: 0,
         length: about.len() as usize,
-        next: BLOCK,
+        next: FIRST_BLOCK_BYTES,
     };
-    let Some(mut parsed) = text.head(file).map_err(unreadable)? else {
+    let Some(mut parsed) = text.read_head(file).map_err(unreadable)? else {
         return Ok(None);
     };
     let separator = parsed.separator;
@@ -74,7 +79,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     }
     let wanted: Vec<bool> = (parsed.columns.iter().enumerate())
         .map(|(at, Column { name, unit, .. })| {
-            options.wants(name) || may_be_time(at, name, options.time.as_ref()) || is_time_unit(unit)
+            options.needs_column(name) || may_be_time(at, name, options.time.as_ref()) || is_time_unit(unit)
         })
         .collect();
     let times: Vec<bool> = names.iter().map(|name| is_time(name)).collect();
@@ -96,7 +101,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
     let mut may_end = end.is_some();
     let mut limit = LineLimit::starting_at(text.at);
     while let Some(base) = text.advance(&mut limit, file)? {
-        let read = plain_rows(text.lines(), 0, layout, |run| {
+        let read = read_plain_rows(text.lines(), 0, layout, |run| {
             run.starts
                 .iter()
                 .for_each(|start| parsed.starts.push(base.saturating_add(*start)));
@@ -111,7 +116,7 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         }
         if let Some(end) = end.as_ref().filter(|end| may_end && end.is_reached(&parsed)) {
             may_end = false;
-            let probed = end.time_column().map(|column| text.probed(column, separator));
+            let probed = end.time_column().map(|column| text.probe_column(column, separator));
             let probed = probed.transpose().map_err(unreadable)?;
             if end.is_last(&parsed, &probed.unwrap_or_default()) {
                 break;
@@ -132,11 +137,11 @@ fn of_length<'a>(path: &Path, file: &'a str, options: &ReadOptions, long: u64) -
         source: Box::new(source),
         notes: parsed.notes,
     };
-    Ok(Some(selected(table, |at, _| wanted.get(at) == Some(&true))))
+    Ok(Some(select_columns(table, |at, _| wanted.get(at) == Some(&true))))
 }
 
 /// A text file that is read block by block from start to end.
-struct Text {
+struct LongText {
     file: File,
     /// Position of the next unread byte.
     at: usize,
@@ -148,33 +153,33 @@ struct Text {
     next: usize,
 }
 
-impl Text {
+impl LongText {
     /// Reads the first lines as for any other table; `None` unless the table contains only numbers with decimal points.
-    fn head(&mut self, file: &str) -> io::Result<Option<Parsed>> {
-        let mut bytes = self.bytes(0, HEAD)?;
+    fn read_head(&mut self, file: &str) -> io::Result<Option<ParsedText>> {
+        let mut bytes = self.read_at(0, HEAD_BYTES)?;
         let Some(line) = bytes.iter().rposition(|byte| *byte == b'\n') else {
             return Ok(None);
         };
         bytes.truncate(line.saturating_add(1));
         self.at = bytes.len();
-        let last = self.bytes(self.length.saturating_sub(1), 1)?;
+        let last = self.read_at(self.length.saturating_sub(1), 1)?;
         let is_marked = bytes.starts_with(b"\xef\xbb\xbf");
         if last != b"\n" || is_marked || bytes.contains(&0) {
             return Ok(None);
         }
         // If the head is rewritten, the rest of the text may need the same changes.
         let found = bytes.clone();
-        if !converted_to_plain_csv(&mut bytes).is_empty() || bytes != found {
+        if !convert_to_plain_csv(&mut bytes).is_empty() || bytes != found {
             return Ok(None);
         }
         self.file.seek(SeekFrom::Start(self.at as u64))?;
-        let is_plain = |parsed: &Parsed| {
+        let is_plain = |parsed: &ParsedText| {
             let numbers = parsed.columns.iter().all(|column| !column.moments);
             numbers && !parsed.commas && parsed.starts.len() == parsed.rows
         };
         let parsed = std::str::from_utf8(&bytes)
             .ok()
-            .and_then(|text| parsed(text, file).ok());
+            .and_then(|text| parse_text(text, file).ok());
         Ok(parsed.filter(is_plain))
     }
 
@@ -209,7 +214,7 @@ impl Text {
     }
 
     /// Reads up to `most` bytes from position `from` of the file, regardless of the current reading position.
-    fn bytes(&mut self, from: usize, most: usize) -> io::Result<Vec<u8>> {
+    fn read_at(&mut self, from: usize, most: usize) -> io::Result<Vec<u8>> {
         self.file.seek(SeekFrom::Start(from as u64))?;
         let mut bytes = Vec::with_capacity(most);
         (&mut self.file).take(most as u64).read_to_end(&mut bytes)?;
@@ -218,13 +223,13 @@ impl Text {
 
     /// Returns the values of a column at several positions in the unread part of the file, in the order of the file;
     /// NaN where no value was found.
-    fn probed(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
+    fn probe_column(&mut self, column: usize, separator: u8) -> io::Result<Vec<f64>> {
         let here = self.at;
         let from = here.saturating_sub(self.buffer.len().saturating_sub(self.lines));
         // If the file grows while it is read, the reading position may exceed the original length.
         let rest = self.length.saturating_sub(from) as f64;
         let value = |text: &mut Self, part: f64| -> io::Result<f64> {
-            let bytes = text.bytes(from.saturating_add((rest * part) as usize), PROBE)?;
+            let bytes = text.read_at(from.saturating_add((rest * part) as usize), PROBE_BYTES)?;
             // A probed position may be in the middle of a line; the next line is complete.
             let line = bytes.split(|byte| *byte == b'\n').nth(1).unwrap_or_default();
             let row = nth_row(line, 0, separator);
@@ -236,7 +241,7 @@ impl Text {
         };
         // The fractional parts of multiples of the golden ratio are not periodic, so they do not coincide with trials
         // of equal length.
-        let mut parts: Vec<f64> = (1..=PROBES)
+        let mut parts: Vec<f64> = (1..=PROBE_COUNT)
             .map(|k| (f64::from(k) * 0.618_033_988_749_895).fract())
             .collect();
         parts.sort_unstable_by(f64::total_cmp);
@@ -260,14 +265,14 @@ struct LongSource<'a> {
 impl LongSource<'_> {
     /// Returns the position and the cells of a row.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
-        let (from, behind) = self.starts.before(row)?;
+        let (from, behind) = self.starts.nearest_kept(row)?;
         let mut file = File::open(&self.path).ok()?;
         file.seek(SeekFrom::Start(from as u64)).ok()?;
         // The bytes read end at the next row with a known position, or a fixed length after the start of the last row.
         let end = self
             .starts
-            .before(row.saturating_add(RowStarts::KEPT_ROW_INTERVAL))
-            .map_or(self.starts.last()?.saturating_add(PROBE), |next| next.0);
+            .nearest_kept(row.saturating_add(RowStarts::KEPT_ROW_INTERVAL))
+            .map_or(self.starts.last()?.saturating_add(PROBE_BYTES), |next| next.0);
         let mut bytes = Vec::new();
         file.take(end.saturating_sub(from) as u64)
             .read_to_end(&mut bytes)
@@ -301,7 +306,7 @@ impl Source for LongSource<'_> {
     fn cell(&self, row: usize, column: usize) -> String {
         let record = self.row(row).map(|(_, record)| record);
         let cell = record.as_ref().and_then(|record| record.get(column));
-        cell.map_or_else(String::new, |cell| shown(&String::from_utf8_lossy(cell)))
+        cell.map_or_else(String::new, |cell| abbreviate(&String::from_utf8_lossy(cell)))
     }
 }
 
@@ -320,7 +325,7 @@ mod tests {
     }
 
     /// Six columns at 100 Hz, of which one is a word; times start again after `trial` rows.
-    fn text(rows: usize, trial: usize) -> String {
+    fn table_text(rows: usize, trial: usize) -> String {
         let mut text = String::from("# units: e deg\nt,e,word,u,x,n\n");
         for row in 0..rows {
             let (t, x) = ((row % trial) as f64 / 100.0, row as f64);
@@ -344,10 +349,10 @@ mod tests {
 
     #[test]
     fn long_reader_matches_the_whole_text_reader() {
-        let text = text(60_000, 60_000);
+        let text = table_text(60_000, 60_000);
         let file = file(&text);
         let options = options_for(&["n"], None);
-        let found = of_length(file.path(), "run.csv", &options, 0).unwrap().unwrap();
+        let found = read_long_table(file.path(), "run.csv", &options, 0).unwrap().unwrap();
         let whole = parse(text.as_bytes(), "run.csv").unwrap();
         assert_eq!((found.names(), found.rows), (vec!["t", "e", "u", "n"], 60_000));
         for (at, in_whole) in [0, 1, 3, 5].into_iter().enumerate() {
@@ -366,34 +371,34 @@ mod tests {
         }
         // The whole text is read if the column of words is requested, or if the word is quoted.
         assert!(
-            of_length(file.path(), "run.csv", &ReadOptions::default(), 0)
+            read_long_table(file.path(), "run.csv", &ReadOptions::default(), 0)
                 .unwrap()
                 .is_none()
         );
         let missing = options_for(&["z"], None);
-        assert!(of_length(file.path(), "run.csv", &missing, 0).unwrap().is_none());
+        assert!(read_long_table(file.path(), "run.csv", &missing, 0).unwrap().is_none());
         let last = text.rfind(",go,").unwrap();
         let quoted = format!("{},\"go\",{}", &text[..last], &text[last + 4..]);
-        let found = of_length(self::file(&quoted).path(), "run.csv", &options, 0).unwrap();
+        let found = read_long_table(self::file(&quoted).path(), "run.csv", &options, 0).unwrap();
         assert!(found.is_none());
     }
 
     /// A recorder may still write to a file that is being read.
     #[test]
     fn a_file_may_grow_while_it_is_read() {
-        let written = text(40_000, 40_000);
+        let written = table_text(40_000, 40_000);
         let file = file(&written);
-        let mut growing = Text {
+        let mut growing = LongText {
             file: File::open(file.path()).unwrap(),
             at: 0,
             buffer: Vec::new(),
             lines: 0,
             length: 1000,
-            next: BLOCK,
+            next: FIRST_BLOCK_BYTES,
         };
         growing.advance(&mut LineLimit::default(), "run.csv").unwrap();
         assert!(growing.lines > growing.length);
-        assert_eq!(growing.probed(0, b',').unwrap().len(), PROBES as usize);
+        assert_eq!(growing.probe_column(0, b',').unwrap().len(), PROBE_COUNT as usize);
     }
 
     /// A recorder that was stopped by a full disk or a power cut may leave any number of zero bytes.
@@ -405,7 +410,7 @@ mod tests {
         whole.set_len(1 << 30).unwrap();
         whole.seek(SeekFrom::End(-1)).unwrap();
         whole.write_all(b"\n").unwrap();
-        let error = of_length(file.path(), "run.csv", &ReadOptions::default(), 0)
+        let error = read_long_table(file.path(), "run.csv", &ReadOptions::default(), 0)
             .err()
             .unwrap();
         let words = "run.csv: no line ends within 32 MB after byte 400004";
@@ -415,14 +420,14 @@ mod tests {
     /// The size of a sparse file may require more memory for its rows than any computer has.
     #[cfg(target_os = "linux")]
     #[test]
-    fn sparse_file_is_left_to_the_whole_text_reader() {
+    fn sparse_file_is_not_read_block_by_block() {
         let rows = "1,2\n".repeat(100_000);
         let file = file(&format!("t,e\n{rows}x,\"y\"\n"));
         let mut whole = File::options().write(true).open(file.path()).unwrap();
         // If the file system does not support files of this length, there is nothing to test.
         let end = whole.set_len(1 << 43).and_then(|()| whole.seek(SeekFrom::End(-1)));
         if end.and_then(|_| whole.write_all(b"\n")).is_ok() {
-            let found = of_length(file.path(), "run.csv", &ReadOptions::default(), 0);
+            let found = read_long_table(file.path(), "run.csv", &ReadOptions::default(), 0);
             assert!(found.unwrap().is_none());
         }
     }
@@ -430,19 +435,21 @@ mod tests {
     #[test]
     fn reading_stops_after_the_span_unless_time_restarts() {
         let rows = |text: &str, options: &ReadOptions| {
-            let table = of_length(file(text).path(), "run.csv", options, 0).unwrap().unwrap();
+            let table = read_long_table(file(text).path(), "run.csv", options, 0)
+                .unwrap()
+                .unwrap();
             (
                 table.rows,
                 table.columns[0].values.iter().filter(|t| **t < 10.0).count(),
             )
         };
-        let (first, in_span) = rows(&text(200_000, 200_000), &options_for(&[], Some(10.0)));
+        let (first, in_span) = rows(&table_text(200_000, 200_000), &options_for(&[], Some(10.0)));
         assert!((1000..60_000).contains(&first), "{first}");
         assert_eq!(in_span, 1000);
-        assert_eq!(rows(&text(200_000, 200_000), &options_for(&[], None)).0, 200_000);
+        assert_eq!(rows(&table_text(200_000, 200_000), &options_for(&[], None)).0, 200_000);
         // In trials of 1000 s, each trial contains the requested span, so the whole file is read.
         assert_eq!(
-            rows(&text(200_000, 100_000), &options_for(&[], Some(10.0))),
+            rows(&table_text(200_000, 100_000), &options_for(&[], Some(10.0))),
             (200_000, 2000)
         );
         // The span also ends the reading if samples are counted, or if the time is in another unit.
@@ -450,8 +457,8 @@ mod tests {
             sampling_hz: Some(100.0),
             ..options_for(&[], Some(10.0))
         };
-        assert!(rows(&text(200_000, 200_000), &counted).0 < 60_000);
-        let ms = text(200_000, 200_000).replacen("\nt,", "\ntime_ms,", 1);
+        assert!(rows(&table_text(200_000, 200_000), &counted).0 < 60_000);
+        let ms = table_text(200_000, 200_000).replacen("\nt,", "\ntime_ms,", 1);
         let whole = rows(&ms, &options_for(&[], Some(10.0)));
         assert_eq!(whole.0, 200_000, "2000 ms are not 10 s");
         assert!(rows(&ms, &options_for(&[], Some(0.01))).0 < 60_000);

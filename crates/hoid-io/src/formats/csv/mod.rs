@@ -23,18 +23,18 @@ mod table;
 mod text;
 
 pub(super) use foreign::is_table;
-pub(super) use line_limit::{LineLimit, whole_text};
+pub(super) use line_limit::{LineLimit, read_whole_text};
 pub(super) use long::table as long_table;
 pub(crate) use record::write_with_commas as write_record;
 
-use crate::formats::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, FormatReader, FormatWriter};
 
 /// Format that is written with commas and read with any separator.
 pub(super) const CSV: Format = Format {
     name: "CSV",
     extensions: &["csv", "txt"],
-    reading: READING,
-    writing: Writing::Rows(columns::start_with_commas),
+    reading: TABLE_READER,
+    writing: FormatWriter::Rows(columns::start_with_commas),
     record: Some(record::write_with_commas),
 };
 
@@ -42,14 +42,14 @@ pub(super) const CSV: Format = Format {
 pub(super) const TSV: Format = Format {
     name: "CSV",
     extensions: &["tsv"],
-    reading: READING,
-    writing: Writing::Rows(columns::start_with_tabs),
+    reading: TABLE_READER,
+    writing: FormatWriter::Rows(columns::start_with_tabs),
     record: Some(record::write_with_tabs),
 };
 
-const READING: Reading = Reading::Table {
+const TABLE_READER: FormatReader = FormatReader::Table {
     record: |bytes, file| {
-        let notes = foreign::converted_to_plain_csv(bytes);
+        let notes = foreign::convert_to_plain_csv(bytes);
         let mut table = table::parse(bytes, file)?;
         table.notes.extend(notes);
         Ok(table)

@@ -20,7 +20,7 @@ const PART_BYTES: usize = 4 << 20;
 /// are frequent.
 const FIRST_PART_BYTES: usize = 64 << 10;
 /// Maximum number of threads.
-const THREADS: usize = 8;
+const MAX_THREADS: usize = 8;
 /// Positions of rows in the text of a table: of every [`KEPT_ROW_INTERVAL`](RowStarts::KEPT_ROW_INTERVAL)-th row and of
 /// the last row.
 #[derive(Debug, Default)]
@@ -54,7 +54,7 @@ impl RowStarts {
     }
 
     /// Returns the kept position of the nearest row at or before `row`, and the number of rows from that row to `row`.
-    pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
+    pub(super) fn nearest_kept(&self, row: usize) -> Option<(usize, usize)> {
         Some((
             *self.kept.get(row / Self::KEPT_ROW_INTERVAL)?,
             row % Self::KEPT_ROW_INTERVAL,
@@ -64,7 +64,7 @@ impl RowStarts {
 
 /// Consecutive plain rows, as read by one thread.
 #[derive(Debug, Default)]
-pub(super) struct Plain {
+pub(super) struct PlainRows {
     /// Values, one vector for each column.
     pub(super) values: Vec<Vec<f64>>,
     /// Precision of the columns for which it was requested.
@@ -87,12 +87,12 @@ pub(super) struct Layout<'a> {
 
 /// Reads plain rows starting at position `from` and passes them to `take`, run by run; returns the position of the
 /// first row that is not plain.
-pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take: impl FnMut(Plain)) -> usize {
-    let threads = thread::available_parallelism().map_or(1, |n| n.get().min(THREADS));
+pub(super) fn read_plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take: impl FnMut(PlainRows)) -> usize {
+    let threads = thread::available_parallelism().map_or(1, |n| n.get().min(MAX_THREADS));
     let mut at = from;
     let first = from..end_of_part(bytes, from, FIRST_PART_BYTES);
     if !first.is_empty() {
-        let run = run(bytes, first.clone(), layout);
+        let run = read_plain_part(bytes, first.clone(), layout);
         at = run.end;
         take(run);
         if at < first.end {
@@ -107,19 +107,19 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
             parts.push(start..end);
             start = end;
         }
-        let runs: Vec<Plain> = if let [only] = parts.as_slice() {
-            vec![run(bytes, only.clone(), layout)]
+        let runs: Vec<PlainRows> = if let [only] = parts.as_slice() {
+            vec![read_plain_part(bytes, only.clone(), layout)]
         } else {
             thread::scope(|scope| {
                 let each = |part: &Range<usize>| {
                     let part = part.clone();
-                    scope.spawn(move || run(bytes, part, layout))
+                    scope.spawn(move || read_plain_part(bytes, part, layout))
                 };
                 let running: Vec<_> = parts.iter().map(each).collect();
                 // If a thread panicked, the full CSV reader reads its part.
                 let joined = running.into_iter().zip(&parts);
                 joined
-                    .map(|(thread, part)| thread.join().unwrap_or_else(|_| Plain::nothing(layout, part.start)))
+                    .map(|(thread, part)| thread.join().unwrap_or_else(|_| PlainRows::empty(layout, part.start)))
                     .collect()
             })
         };
@@ -141,8 +141,8 @@ fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
     line.map_or(bytes.len(), |(at, _)| at.saturating_add(1))
 }
 
-impl Plain {
-    fn nothing(layout: Layout<'_>, at: usize) -> Self {
+impl PlainRows {
+    fn empty(layout: Layout<'_>, at: usize) -> Self {
         let columns = layout.with_precision.len();
         Self {
             values: vec![Vec::new(); columns],
@@ -154,9 +154,9 @@ impl Plain {
 }
 
 /// Reads the plain rows of a part.
-fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
+fn read_plain_part(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> PlainRows {
     let columns = layout.with_precision.len();
-    let mut found = Plain::nothing(layout, part.start);
+    let mut found = PlainRows::empty(layout, part.start);
     let mut rest = bytes.get(part.clone()).unwrap_or_default();
     let at = |rest: &[u8]| part.end.saturating_sub(rest.len());
     // Memory is reserved on the assumption that all rows are about as long as the first row.
@@ -177,7 +177,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
             rest = remaining;
             continue;
         }
-        let Some(remaining) = plain_row(rest, layout, &mut row, &mut printed) else {
+        let Some(remaining) = parse_plain_row(rest, layout, &mut row, &mut printed) else {
             break;
         };
         found.starts.push(at(rest));
@@ -202,7 +202,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
 
 /// Reads the numbers of a row, and returns the text after the row; `None` if the row is not plain.
 #[inline]
-fn plain_row<'a>(
+fn parse_plain_row<'a>(
     mut rest: &'a [u8],
     layout: Layout<'_>,
     row: &mut [f64],

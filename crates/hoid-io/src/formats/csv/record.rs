@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use hoid_model::Record;
 
 use super::text::escape_formula;
-use crate::record::{channels, comments};
+use crate::record::{comments, ordered_channels};
 
 /// Writes the record, separated by commas.
 pub(crate) fn write_with_commas(file: &mut dyn Write, record: &Record) -> io::Result<()> {
@@ -20,7 +20,7 @@ pub(super) fn write_with_tabs(file: &mut dyn Write, record: &Record) -> io::Resu
 
 /// Writes the record with enough digits to reproduce the numbers exactly.
 fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()> {
-    let channels = channels(record);
+    let channels = ordered_channels(record);
     for comment in comments(record, &channels) {
         writeln!(file, "# {comment}")?;
     }
@@ -36,7 +36,7 @@ fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()>
         let row = columns.iter_mut().filter_map(Iterator::next);
         for value in std::iter::once(record.time_s(k)).chain(row) {
             text.clear();
-            shortest(&mut text, value);
+            write_shortest(&mut text, value);
             csv.write_field(&text)?;
         }
         csv.write_record(None::<&[u8]>)?;
@@ -45,7 +45,7 @@ fn write(file: &mut dyn Write, record: &Record, separator: u8) -> io::Result<()>
 }
 
 /// Writes the fewest digits that reproduce the number exactly, with an exponent if that is shorter.
-fn shortest(text: &mut String, value: f64) {
+fn write_shortest(text: &mut String, value: f64) {
     let size = value.abs();
     let written = if size == 0.0 || (1e-5..1e16).contains(&size) {
         write!(text, "{value}")
@@ -76,7 +76,7 @@ mod tests {
             1e15 + 0.5,
         ] {
             let mut text = String::new();
-            shortest(&mut text, value);
+            write_shortest(&mut text, value);
             assert_eq!(text.parse::<f64>().unwrap().to_bits(), value.to_bits(), "{text}");
             assert!(text.len() < 25, "{text}");
         }

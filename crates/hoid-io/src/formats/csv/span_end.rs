@@ -4,7 +4,7 @@
 //! may lie in a later trial. The time is therefore probed at several positions in the unread part; unless the probed
 //! times increase to the end of the file, the whole file is read.
 
-use super::table::Parsed;
+use super::table::ParsedText;
 use crate::record::ReadOptions;
 use crate::table::{Source, Table};
 use crate::time::with_time;
@@ -36,7 +36,7 @@ impl Source for PlaceholderSource<'_> {
 
 impl SpanEnd {
     /// Determines the end of the requested span from the first rows; `None` if all rows are needed.
-    pub(super) fn of(head: &Parsed, file: &str, options: &ReadOptions) -> Option<Self> {
+    pub(super) fn of(head: &ParsedText, file: &str, options: &ReadOptions) -> Option<Self> {
         let to_s = options.span_s.1?;
         // Rows after the span may be needed to interpolate a sparse column or to find trials.
         if !options.sparse.is_empty() || options.trial.is_some() {
@@ -83,7 +83,7 @@ impl SpanEnd {
     }
 
     /// True if the rows read so far include rows of the span and extend beyond its end.
-    pub(super) fn is_reached(&self, read: &Parsed) -> bool {
+    pub(super) fn is_reached(&self, read: &ParsedText) -> bool {
         match *self {
             Self::Row(rows) => read.starts.len() >= rows,
             Self::Time { column, from, to } => read.columns.get(column).is_some_and(|column| {
@@ -103,7 +103,7 @@ impl SpanEnd {
 
     /// True if no unread row lies in the span: the times increase through the rows read so far and on through the times
     /// probed in the unread part. A probed time is NaN if none was found.
-    pub(super) fn is_last(&self, read: &Parsed, probed: &[f64]) -> bool {
+    pub(super) fn is_last(&self, read: &ParsedText, probed: &[f64]) -> bool {
         let Some(column) = self.time_column() else {
             return true;
         };

@@ -17,15 +17,15 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use super::foreign::mismatch;
-use super::plain::{Layout, RowStarts, plain_rows};
+use super::plain::{Layout, RowStarts, read_plain_rows};
 use super::text::{
-    comments, has_decimal_commas, is_comment_or_blank, is_unit, open_line, place, reader, row_start, separator, text,
-    unescape_formula,
+    comments, has_decimal_commas, is_comment_or_blank, is_unit, place, reader, row_start, separator, text,
+    unescape_formula, unterminated_line,
 };
 use crate::IoError;
-use crate::table::{Cell, Column, Source, Table, check_names, check_number, read_comments, with_decimal_point};
-use crate::time::{Moments, is_time};
-use crate::wording::{list, shown};
+use crate::table::{Cell, Column, Source, Table, check_column_count, check_names, read_comments, with_decimal_point};
+use crate::time::{ClockTimes, is_time};
+use crate::wording::{abbreviate, list_names};
 
 /// The text of the file, which is parsed again if an error message needs a line or a cell.
 struct CsvSource<'a> {
@@ -40,7 +40,7 @@ struct CsvSource<'a> {
 impl CsvSource<'_> {
     /// Returns the position in the text and the cells of a row.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
-        let (from, behind) = self.starts.before(row)?;
+        let (from, behind) = self.starts.nearest_kept(row)?;
         let (start, record) = nth_row(self.text.as_bytes().get(from..)?, behind, self.separator)?;
         Some((from.saturating_add(start), record))
     }
@@ -76,7 +76,7 @@ impl Source for CsvSource<'_> {
     fn cell(&self, row: usize, column: usize) -> String {
         let record = self.row(row).map(|(_, record)| record);
         let cell = record.as_ref().and_then(|record| record.get(column));
-        cell.map_or_else(String::new, |cell| shown(&String::from_utf8_lossy(cell)))
+        cell.map_or_else(String::new, |cell| abbreviate(&String::from_utf8_lossy(cell)))
     }
 
     fn is_open(&self, row: usize) -> bool {
@@ -86,7 +86,7 @@ impl Source for CsvSource<'_> {
 }
 
 /// The columns of a text, and the positions of its rows.
-pub(super) struct Parsed {
+pub(super) struct ParsedText {
     pub(super) columns: Vec<Column>,
     pub(super) rows: usize,
     pub(super) separator: u8,
@@ -100,17 +100,17 @@ pub(super) struct Parsed {
 /// Reads the table from the bytes of a CSV file.
 pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoError> {
     let text = text(bytes, file)?;
-    let parsed = parsed(text, file)?;
+    let parsed = parse_text(text, file)?;
     let source = CsvSource {
         file,
         text,
         separator: parsed.separator,
         starts: parsed.starts,
-        open: open_line(text),
+        open: unterminated_line(text),
     };
     let mut notes = parsed.notes;
     let last = parsed.rows.checked_sub(1).filter(|last| source.is_open(*last));
-    notes.extend(last.and_then(|last| cut_number(&source, last)));
+    notes.extend(last.and_then(|last| truncated_number_note(&source, last)));
     Ok(Table {
         columns: parsed.columns,
         rows: parsed.rows,
@@ -121,7 +121,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
 }
 
 /// Reads the columns of a text.
-pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
+pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> {
     let mut lines = text.lines().filter(|line| !is_comment_or_blank(line));
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
@@ -152,24 +152,24 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
     let (names, first) = first.ok_or_else(|| IoError::Empty { file: file.to_owned() })?;
     let mut notes = Vec::new();
     let mut columns = header(&names, commas, file, &mut || place(bytes, first.start), &mut notes)?;
-    let mut rows = Rows {
+    let mut rows = RowReader {
         file,
         bytes,
         separator,
         commas,
-        open: open_line(text),
+        open: unterminated_line(text),
         times: columns.iter().map(|column| is_time(&column.name)).collect(),
         wanted: vec![true; columns.len()],
-        moments: columns.iter().map(|_| Moments::default()).collect(),
+        moments: columns.iter().map(|_| ClockTimes::default()).collect(),
         starts: RowStarts::default(),
         empty_at_end: 0,
     };
     let mut at = first.end;
     while at < bytes.len() {
-        at = rows.plain(at, &mut columns);
-        at = rows.whole(at, &mut columns)?;
+        at = rows.read_plain(at, &mut columns);
+        at = rows.read_with_full_reader(at, &mut columns)?;
     }
-    let Rows {
+    let RowReader {
         starts, empty_at_end, ..
     } = rows;
     // Rows that contain only separators are ignored at the end of the table, where spreadsheets leave them.
@@ -183,7 +183,7 @@ pub(super) fn parsed(text: &str, file: &str) -> Result<Parsed, IoError> {
     if commas {
         notes.push(String::from("the commas in the numbers are taken as decimal commas"));
     }
-    Ok(Parsed {
+    Ok(ParsedText {
         sample_time_s: read_comments(comments(text), &mut columns),
         columns,
         rows: count,
@@ -212,7 +212,7 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
 const FULL_READER_ROWS: usize = 256;
 
 /// Reader that adds the rows of a text to the columns of a table.
-struct Rows<'a> {
+struct RowReader<'a> {
     file: &'a str,
     bytes: &'a [u8],
     separator: u8,
@@ -221,14 +221,14 @@ struct Rows<'a> {
     /// True for each column that may be a time.
     times: Vec<bool>,
     wanted: Vec<bool>,
-    moments: Vec<Moments>,
+    moments: Vec<ClockTimes>,
     starts: RowStarts,
     empty_at_end: usize,
 }
 
-impl Rows<'_> {
+impl RowReader<'_> {
     /// Reads plain rows starting at position `from`; returns the position of the first line that is not plain.
-    fn plain(&mut self, from: usize, columns: &mut [Column]) -> usize {
+    fn read_plain(&mut self, from: usize, columns: &mut [Column]) -> usize {
         if self.commas {
             return from;
         }
@@ -238,7 +238,7 @@ impl Rows<'_> {
             wanted: &self.wanted,
         };
         let (moments, starts, empty_at_end) = (&mut self.moments, &mut self.starts, &mut self.empty_at_end);
-        plain_rows(self.bytes, from, layout, |run| {
+        read_plain_rows(self.bytes, from, layout, |run| {
             if run.starts.is_empty() {
                 return;
             }
@@ -257,7 +257,7 @@ impl Rows<'_> {
 
     /// Reads at most [`FULL_READER_ROWS`] rows starting at position `from` with the full CSV reader; returns the
     /// position of the next row.
-    fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
+    fn read_with_full_reader(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
         let mut reader = reader(self.bytes.get(from..).unwrap_or_default(), self.separator);
         let mut record = csv::ByteRecord::new();
         for _ in 0..FULL_READER_ROWS {
@@ -266,13 +266,13 @@ impl Rows<'_> {
             }
             if !is_blank_line(&record) {
                 let start = row_start(self.bytes, from.saturating_add(position(&record)));
-                self.row(&record, start, columns)?;
+                self.add_row(&record, start, columns)?;
             }
         }
         Ok(from.saturating_add(reader.position().byte() as usize))
     }
 
-    fn row(&mut self, record: &csv::ByteRecord, start: usize, columns: &mut [Column]) -> Result<(), IoError> {
+    fn add_row(&mut self, record: &csv::ByteRecord, start: usize, columns: &mut [Column]) -> Result<(), IoError> {
         let line = || place(self.bytes, start);
         if record.len() < columns.len() && self.open.is_some_and(|open| start >= open) {
             return Err(IoError::CutRow {
@@ -320,7 +320,7 @@ const COMPARED_LINES: usize = 8;
 /// Detects a truncated last number and returns a note; `None` unless the last line has no line end, its last cell is at
 /// least two characters shorter than the last cell of each of the [`COMPARED_LINES`] lines before, and these all have a
 /// decimal point.
-fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
+fn truncated_number_note(source: &CsvSource<'_>, last: usize) -> Option<String> {
     let last_cell = |row: usize| {
         let (start, _) = source.row(row)?;
         let line = source.text.get(start..)?.lines().next().unwrap_or_default();
@@ -339,7 +339,7 @@ fn cut_number(source: &CsvSource<'_>, last: usize) -> Option<String> {
         format!(
             "the last line of the file has no line ending, and its last number ({}) is shorter than those above: the \
              line may be truncated; exclude it with --to",
-            shown(cut)
+            abbreviate(cut)
         )
     })
 }
@@ -351,7 +351,7 @@ fn header(
     place: &mut dyn FnMut() -> String,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Column>, IoError> {
-    check_number(record.len(), file)?;
+    check_column_count(record.len(), file)?;
     let names: Vec<String> = record
         .iter()
         .map(|name| unescape_formula(String::from_utf8_lossy(name).trim()).to_owned())
@@ -361,7 +361,7 @@ fn header(
         return Err(IoError::NoHeader {
             file: file.to_owned(),
             place: place(),
-            found: shown(&names.join(", ")),
+            found: abbreviate(&names.join(", ")),
         });
     }
     let names = with_unique_names(names, notes);
@@ -392,7 +392,10 @@ fn with_unique_names(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String>
         .map(|(new, _)| new.as_str())
         .collect();
     if !renamed.is_empty() {
-        notes.push(format!("columns with the same name are renamed: {}", list(&renamed)));
+        notes.push(format!(
+            "columns with the same name are renamed: {}",
+            list_names(&renamed)
+        ));
     }
     found
 }
@@ -529,7 +532,7 @@ mod tests {
     }
 
     #[test]
-    fn moments_become_seconds_from_the_first() {
+    fn clock_times_become_seconds_from_the_first() {
         let values = |cells: &str| {
             let text = format!("t,e\n{cells}");
             let table = parse(text.as_bytes(), "run.csv").unwrap();
@@ -550,7 +553,7 @@ mod tests {
     }
 
     #[test]
-    fn cut_file_is_reported() {
+    fn truncated_file_is_reported() {
         let rows: String = (0..20).map(|k| format!("{k}.00,0.12{k:02},-0.5{k:02}1\n")).collect();
         let text = format!("t,e,u\n{rows}");
         let notes = |text: &str| parse(text.as_bytes(), "run.csv").unwrap().notes;
@@ -570,7 +573,7 @@ mod tests {
         // A short row in the middle of a file is not reported as truncation.
         assert!(message(b"t,e,u\n0,1\n1,2,3").contains("line 2: 2 values, expected 3"));
         let table = parse(b"t,e,u\n0,1,2\n1,2,-", "run.csv").unwrap();
-        let error = table.bad_value(2, 1, 0..2).to_string();
+        let error = table.bad_value_error(2, 1, 0..2).to_string();
         assert!(
             error.contains("line 3") && error.contains("ends in the middle"),
             "{error}"

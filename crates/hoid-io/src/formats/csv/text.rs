@@ -22,17 +22,17 @@ pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> 
 }
 
 /// First characters at which a spreadsheet executes a cell.
-const RUN: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
+const FORMULA_STARTS: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
 /// True if a spreadsheet may execute a cell; numbers and single signs are not executed.
-fn is_run(cell: &str) -> bool {
-    cell.starts_with(RUN) && !["-", "+"].contains(&cell) && !matches!(Cell::parse(cell), Cell::Number(_))
+fn is_formula(cell: &str) -> bool {
+    cell.starts_with(FORMULA_STARTS) && !["-", "+"].contains(&cell) && !matches!(Cell::parse(cell), Cell::Number(_))
 }
 
 /// Returns a text as it is written to the file: a text that a spreadsheet would execute is preceded by an apostrophe,
 /// which marks it as text and which [`unescape_formula`] removes.
 pub(crate) fn escape_formula(cell: &str) -> Cow<'_, str> {
-    if is_run(cell.trim_start_matches('\'')) {
+    if is_formula(cell.trim_start_matches('\'')) {
         Cow::Owned(format!("'{cell}"))
     } else {
         Cow::Borrowed(cell)
@@ -42,13 +42,13 @@ pub(crate) fn escape_formula(cell: &str) -> Cow<'_, str> {
 /// Restores the original text from the result of [`escape_formula`].
 pub(crate) fn unescape_formula(cell: &str) -> &str {
     match cell.strip_prefix('\'') {
-        Some(meant) if is_run(meant.trim_start_matches('\'')) => meant,
+        Some(meant) if is_formula(meant.trim_start_matches('\'')) => meant,
         _ => cell,
     }
 }
 
 /// Returns the position of the last line if this line has no line end, otherwise `None`.
-pub(crate) fn open_line(text: &str) -> Option<usize> {
+pub(crate) fn unterminated_line(text: &str) -> Option<usize> {
     let ends = ['\n', '\r'];
     (!text.ends_with(ends)).then(|| text.trim_end_matches(|c| !ends.contains(&c)).len())
 }
@@ -198,7 +198,7 @@ mod tests {
             ("a\r\n", None),
             ("a\n", None),
         ] {
-            assert_eq!(open_line(text), at, "{text:?}");
+            assert_eq!(unterminated_line(text), at, "{text:?}");
         }
     }
 }

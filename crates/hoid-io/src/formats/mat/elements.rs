@@ -2,7 +2,7 @@
 //! of up to 4 bytes may be stored in the tag.
 
 /// Length of the file header of version 5.
-pub(super) const HEADER: usize = 128;
+pub(super) const HEADER_BYTES: usize = 128;
 
 /// Data types with the numbers assigned by MathWorks.
 pub(super) mod data {

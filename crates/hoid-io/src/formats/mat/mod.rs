@@ -26,13 +26,13 @@ mod version73;
 mod write;
 
 use crate::formats::arrays::{Contents, Indexing};
-use crate::formats::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, FormatReader, FormatWriter};
 
 pub(super) const MAT: Format = Format {
     name: "MATLAB",
     extensions: &["mat"],
-    reading: Reading::Arrays(read::read),
-    writing: Writing::Columns(write::write),
+    reading: FormatReader::Arrays(read::read),
+    writing: FormatWriter::Columns(write::write),
     record: None,
 };
 
@@ -40,9 +40,9 @@ pub(super) const MAT: Format = Format {
 pub(super) const HDF5: Format = Format {
     name: "HDF5",
     extensions: &["h5", "hdf5"],
-    reading: Reading::Arrays(|bytes, file| {
+    reading: FormatReader::Arrays(|bytes, file| {
         version73::read(bytes, file, Indexing::Python).map(|entries| Contents::new(entries, Indexing::Python))
     }),
-    writing: Writing::ReadOnly("hoid only reads this format; .npz and .mat hold the same arrays"),
+    writing: FormatWriter::ReadOnly("hoid only reads this format; .npz and .mat hold the same arrays"),
     record: None,
 };

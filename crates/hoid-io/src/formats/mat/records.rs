@@ -8,7 +8,7 @@ use hdf5_pure::{CompoundMember, Datatype, DatatypeByteOrder};
 use crate::formats::arrays::{Kind, Numbers};
 
 /// Returns the numbers of a field in all records of `size` bytes; `None` if the field is not numeric.
-pub(super) fn field(records: &Rc<Vec<u8>>, size: usize, member: &CompoundMember) -> Option<Numbers> {
+pub(super) fn field_numbers(records: &Rc<Vec<u8>>, size: usize, member: &CompoundMember) -> Option<Numbers> {
     let (kind, order) = match &member.datatype {
         Datatype::FloatingPoint { size, byte_order, .. } => match size {
             2 => (Kind::F16, byte_order),

@@ -5,15 +5,15 @@ use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
 use crate::formats::budget::Budget;
 
 /// Size, in bytes, of the five numbers in a header.
-const HEADER: usize = 20;
-const LONGEST_NAME: usize = 256;
+const HEADER_BYTES: usize = 20;
+const MAX_NAME_CHARS: usize = 256;
 
 /// Reads the variables of a file.
 pub(super) fn read(bytes: &[u8], budget: &mut Budget, file: &str) -> Result<Vec<Entry>, IoError> {
     let mut rest = bytes;
     let mut entries = Vec::new();
     while !rest.is_empty() {
-        let (entry, remaining) = variable(rest).map_err(|found| IoError::Damaged {
+        let (entry, remaining) = read_variable(rest).map_err(|found| IoError::Damaged {
             file: file.to_owned(),
             found: format!("variable {}: {found}", entries.len().saturating_add(1)),
         })?;
@@ -24,9 +24,9 @@ pub(super) fn read(bytes: &[u8], budget: &mut Budget, file: &str) -> Result<Vec<
     Ok(entries)
 }
 
-fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
+fn read_variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
     let header = bytes
-        .get(..HEADER)
+        .get(..HEADER_BYTES)
         .ok_or_else(|| format!("the file is truncated: it ends after {} bytes", bytes.len()))?;
     let number = |at: usize, big_endian: bool| {
         let bytes = header
@@ -57,8 +57,8 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         other => return Err(format!("its number type {other} is unknown")),
     };
     let [rows, columns, imaginary, name] = [1, 2, 3, 4].map(|at| number(at, big_endian) as usize);
-    if name > LONGEST_NAME {
-        return Err(format!("its name has {name} bytes, expected at most {LONGEST_NAME}"));
+    if name > MAX_NAME_CHARS {
+        return Err(format!("its name has {name} bytes, expected at most {MAX_NAME_CHARS}"));
     }
     let count = rows.checked_mul(columns);
     let length = count.and_then(|count| {
@@ -70,7 +70,7 @@ fn variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
         let there = bytes.len();
         format!("the file is truncated, or a size is wrong: {rows} x {columns} numbers end after {there} bytes")
     };
-    let named = bytes.get(HEADER..).and_then(|named| named.split_at_checked(name));
+    let named = bytes.get(HEADER_BYTES..).and_then(|named| named.split_at_checked(name));
     let (text, data) = named.ok_or_else(ends)?;
     let (data, rest) = length
         .and_then(|length| data.split_at_checked(length))

@@ -4,12 +4,12 @@ use std::io::Read;
 
 use flate2::read::ZlibDecoder;
 
-use super::elements::{Elements, HEADER, data};
-use super::objects::object;
+use super::elements::{Elements, HEADER_BYTES, data};
+use super::objects::describe_object;
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
 use crate::formats::budget::{Budget, MAX_NESTING};
-use crate::wording::{short_error, shown};
+use crate::wording::{abbreviate, short_error};
 
 const CELL: u32 = 1;
 const STRUCT: u32 = 2;
@@ -22,25 +22,25 @@ const UINT64: u32 = 15;
 const FUNCTION: u32 = 16;
 const OPAQUE: u32 = 17;
 /// Flag that marks an array of complex numbers.
-const COMPLEX: u32 = 0x800;
+const COMPLEX_FLAG: u32 = 0x800;
 /// Longest name accepted, in characters; MATLAB allows 63.
-const LONGEST_NAME: usize = 256;
+const MAX_NAME_CHARS: usize = 256;
 /// Approximate memory of an entry in bytes, without its path and its values.
 const ENTRY_BYTES: u64 = 256;
 
 /// Reason why a variable cannot be read: a violation of the format, or another error.
-enum Stop {
+enum VariableError {
     Damaged(String),
     Other(IoError),
 }
 
-impl From<String> for Stop {
+impl From<String> for VariableError {
     fn from(found: String) -> Self {
         Self::Damaged(found)
     }
 }
 
-impl From<IoError> for Stop {
+impl From<IoError> for VariableError {
     fn from(error: IoError) -> Self {
         Self::Other(error)
     }
@@ -48,7 +48,7 @@ impl From<IoError> for Stop {
 
 /// Reads the variables of a file.
 pub(super) fn read(bytes: &[u8], big_endian: bool, budget: &mut Budget, file: &str) -> Result<Vec<Entry>, IoError> {
-    let mut elements = Elements::new(bytes.get(HEADER..).unwrap_or_default(), big_endian);
+    let mut elements = Elements::new(bytes.get(HEADER_BYTES..).unwrap_or_default(), big_endian);
     let mut reader = Reader {
         entries: Vec::new(),
         budget,
@@ -57,9 +57,9 @@ pub(super) fn read(bytes: &[u8], big_endian: bool, budget: &mut Budget, file: &s
     let mut variable = 0_usize;
     while !elements.is_empty() {
         variable = variable.saturating_add(1);
-        reader.variable(&mut elements).map_err(|stop| match stop {
-            Stop::Other(error) => error,
-            Stop::Damaged(found) => IoError::Damaged {
+        reader.read_variable(&mut elements).map_err(|stop| match stop {
+            VariableError::Other(error) => error,
+            VariableError::Damaged(found) => IoError::Damaged {
                 file: file.to_owned(),
                 found: format!("variable {variable}: {found}"),
             },
@@ -85,7 +85,7 @@ struct VariablePath<'a> {
 }
 
 impl Reader<'_> {
-    fn variable(&mut self, elements: &mut Elements<'_>) -> Result<(), Stop> {
+    fn read_variable(&mut self, elements: &mut Elements<'_>) -> Result<(), VariableError> {
         // At top level an element that extends beyond the end of the file indicates truncation.
         let cut = |found: String| format!("the file is truncated, or a length is wrong: {found}");
         let element = elements.next().map_err(cut)?;
@@ -95,10 +95,10 @@ impl Reader<'_> {
             depth: 0,
         };
         match element.kind {
-            data::MATRIX => self.matrix(element.bytes, elements.big_endian, top),
+            data::MATRIX => self.read_matrix(element.bytes, elements.big_endian, top),
             data::COMPRESSED => {
-                let bytes = self.inflated(element.bytes, elements.big_endian)?;
-                self.matrix(&bytes, elements.big_endian, top)
+                let bytes = self.inflate(element.bytes, elements.big_endian)?;
+                self.read_matrix(&bytes, elements.big_endian, top)
             }
             // Programs may store other data between the variables.
             _ => Ok(()),
@@ -107,8 +107,8 @@ impl Reader<'_> {
 
     /// Decompresses the data of a matrix. The tag gives an upper bound of their length, since Octave counts the data in
     /// a tag twice.
-    fn inflated(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, Stop> {
-        let failed = |error: std::io::Error| Stop::Damaged(short_error(&error.to_string()));
+    fn inflate(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, VariableError> {
+        let failed = |error: std::io::Error| VariableError::Damaged(short_error(&error.to_string()));
         let mut decoder = ZlibDecoder::new(bytes);
         let mut tag = [0; 8];
         decoder.read_exact(&mut tag).map_err(failed)?;
@@ -131,7 +131,7 @@ impl Reader<'_> {
     }
 
     /// Reads an array of any class, part by part.
-    fn matrix(&mut self, bytes: &[u8], big_endian: bool, place: VariablePath<'_>) -> Result<(), Stop> {
+    fn read_matrix(&mut self, bytes: &[u8], big_endian: bool, place: VariablePath<'_>) -> Result<(), VariableError> {
         // An element without data is a field that is not set.
         if bytes.is_empty() {
             return self.push(place, place.path, Value::Array(Array::vector(Numbers::from_f64(&[]))));
@@ -148,9 +148,9 @@ impl Reader<'_> {
             let name = String::from_utf8_lossy(parts.next()?.bytes).into_owned();
             let system = parts.next()?;
             let of = parts.next().unwrap_or(system).bytes;
-            let what = object(&String::from_utf8_lossy(of));
+            let what = describe_object(&String::from_utf8_lossy(of));
             let path = if place.depth == 0 {
-                shown(&name)
+                abbreviate(&name)
             } else {
                 place.path.to_owned()
             };
@@ -159,7 +159,7 @@ impl Reader<'_> {
         let dims = parts.of(data::INT32, "the size of an array")?;
         let dims: Vec<usize> = parts.u32s(dims).iter().map(|side| *side as usize).collect();
         let count = dims.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));
-        let count = count.ok_or_else(|| format!("an array of {}", shown(&format!("{dims:?}"))))?;
+        let count = count.ok_or_else(|| format!("an array of {}", abbreviate(&format!("{dims:?}"))))?;
         if dims.len() > MAX_NESTING {
             return Err(format!("an array of {} dimensions, expected at most {MAX_NESTING}", dims.len()).into());
         }
@@ -173,11 +173,11 @@ impl Reader<'_> {
             ..place
         };
         match class {
-            CELL => self.cell(parts, count, place),
-            STRUCT => self.structure(parts, count, place),
+            CELL => self.read_cell(parts, count, place),
+            STRUCT => self.read_structure(parts, count, place),
             OBJECT => {
                 parts.next()?;
-                self.structure(parts, count, place)
+                self.read_structure(parts, count, place)
             }
             CHAR => {
                 let bytes = parts.clone().next().map_or(0, |element| element.bytes.len());
@@ -189,9 +189,9 @@ impl Reader<'_> {
             }
             SPARSE => self.add_unreadable(place, "a sparse matrix"),
             FUNCTION => self.add_unreadable(place, "a function"),
-            DOUBLE..=UINT64 if flags & COMPLEX != 0 => self.add_unreadable(place, "complex numbers"),
+            DOUBLE..=UINT64 if flags & COMPLEX_FLAG != 0 => self.add_unreadable(place, "complex numbers"),
             DOUBLE..=UINT64 => {
-                let numbers = self.numbers(&mut parts, class, count)?;
+                let numbers = self.read_numbers(&mut parts, class, count)?;
                 let array = Array {
                     numbers,
                     dims,
@@ -204,7 +204,7 @@ impl Reader<'_> {
     }
 
     /// Reads numbers, which may be stored in a shorter type than the type of their class.
-    fn numbers(&mut self, parts: &mut Elements<'_>, class: u32, count: usize) -> Result<Numbers, Stop> {
+    fn read_numbers(&mut self, parts: &mut Elements<'_>, class: u32, count: usize) -> Result<Numbers, VariableError> {
         let element = parts.next()?;
         let kind = match element.kind {
             data::INT8 => Kind::I8,
@@ -233,7 +233,12 @@ impl Reader<'_> {
     }
 
     /// Reads one or more structures with the same fields.
-    fn structure(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
+    fn read_structure(
+        &mut self,
+        mut parts: Elements<'_>,
+        count: usize,
+        place: VariablePath<'_>,
+    ) -> Result<(), VariableError> {
         let depth = next_depth(place)?;
         let length = parts.of(data::INT32, "the length of the field names")?;
         let length = parts.u32s(length).first().map_or(0, |length| *length as usize);
@@ -258,20 +263,25 @@ impl Reader<'_> {
                     path: &path,
                     depth,
                 };
-                self.matrix(matrix, parts.big_endian, place)?;
+                self.read_matrix(matrix, parts.big_endian, place)?;
             }
         }
         Ok(())
     }
 
     /// Reads a cell array, in which each cell has its own path; if all cells hold text, they form one column.
-    fn cell(&mut self, mut parts: Elements<'_>, count: usize, place: VariablePath<'_>) -> Result<(), Stop> {
+    fn read_cell(
+        &mut self,
+        mut parts: Elements<'_>,
+        count: usize,
+        place: VariablePath<'_>,
+    ) -> Result<(), VariableError> {
         let depth = next_depth(place)?;
         let before = self.entries.len();
         for at in 0..count {
             let matrix = parts.of(data::MATRIX, "a cell")?;
             let path = format!("{}{{{}}}", place.path, at.saturating_add(1));
-            self.matrix(
+            self.read_matrix(
                 matrix,
                 parts.big_endian,
                 VariablePath {
@@ -294,11 +304,11 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn add_unreadable(&mut self, place: VariablePath<'_>, what: &str) -> Result<(), Stop> {
+    fn add_unreadable(&mut self, place: VariablePath<'_>, what: &str) -> Result<(), VariableError> {
         self.push(place, place.path, Value::Unread(what.to_owned()))
     }
 
-    fn push(&mut self, place: VariablePath<'_>, path: &str, value: Value) -> Result<(), Stop> {
+    fn push(&mut self, place: VariablePath<'_>, path: &str, value: Value) -> Result<(), VariableError> {
         let bytes = (path.len().saturating_add(place.parent.len()) as u64).saturating_add(ENTRY_BYTES);
         self.budget.take(bytes, self.file)?;
         let mut entry = Entry::new(path, value);
@@ -308,7 +318,7 @@ impl Reader<'_> {
     }
 }
 
-fn next_depth(place: VariablePath<'_>) -> Result<usize, Stop> {
+fn next_depth(place: VariablePath<'_>) -> Result<usize, VariableError> {
     if place.depth == MAX_NESTING {
         return Err(format!("structures nested more than {MAX_NESTING} deep").into());
     }
@@ -318,9 +328,9 @@ fn next_depth(place: VariablePath<'_>) -> Result<usize, Stop> {
 /// Reads a name, which may be padded with null bytes.
 fn name(bytes: &[u8]) -> Result<String, String> {
     let name = bytes.split(|byte| *byte == 0).next().unwrap_or_default();
-    if name.len() > LONGEST_NAME {
+    if name.len() > MAX_NAME_CHARS {
         return Err(format!(
-            "a name of {} bytes, expected at most {LONGEST_NAME}",
+            "a name of {} bytes, expected at most {MAX_NAME_CHARS}",
             name.len()
         ));
     }

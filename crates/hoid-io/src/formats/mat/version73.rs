@@ -7,11 +7,11 @@ use std::rc::Rc;
 
 use hdf5_pure::{AttrValue, DType, Dataset, Datatype, Error, File, Group, H5Element, Object};
 
-use super::{objects::object, records};
+use super::{objects::describe_object, records};
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Indexing, Kind, Numbers, Value};
 use crate::formats::budget::{Budget, MAX_NESTING};
-use crate::formats::guarded::guarded;
+use crate::formats::guarded::guard_read;
 use crate::wording::short_error;
 
 /// Memory in bytes charged for each visit to a group or dataset, because links may be circular.
@@ -21,15 +21,15 @@ const MAX_REFERENCES: u64 = 1 << 16;
 
 /// Reads the variables of a file; `indexing` determines whether dimensions are in the order of MATLAB or numpy.
 pub(super) fn read(bytes: Vec<u8>, file: &str, indexing: Indexing) -> Result<Vec<Entry>, IoError> {
-    guarded(file, || {
+    guard_read(file, || {
         let mut reader = Reader {
             entries: Vec::new(),
             budget: Budget::of(bytes.len()),
             indexing,
             file,
         };
-        let opened = File::from_bytes(bytes).map_err(|error| reader.damaged("its head", &error))?;
-        reader.group(&opened.root(), "", 0)?;
+        let opened = File::from_bytes(bytes).map_err(|error| reader.read_error("its head", &error))?;
+        reader.read_group(&opened.root(), "", 0)?;
         Ok(reader.entries)
     })
 }
@@ -43,7 +43,7 @@ struct Reader<'a> {
 
 impl Reader<'_> {
     /// Converts an error of the HDF5 crate to damage or an unsupported feature.
-    fn damaged(&self, place: &str, error: &Error) -> IoError {
+    fn read_error(&self, place: &str, error: &Error) -> IoError {
         let what = error.to_string();
         let cut = if what.contains("unexpected EOF") {
             "the file is truncated, or a length is wrong: "
@@ -68,7 +68,7 @@ impl Reader<'_> {
     }
 
     /// Reads a group, which is a structure or the root of the file.
-    fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), IoError> {
+    fn read_group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT_BYTES, self.file)?;
         if depth > MAX_NESTING {
             return Err(IoError::Damaged {
@@ -83,15 +83,15 @@ impl Reader<'_> {
                 format!("{path}.{name}")
             }
         };
-        let datasets = group.iter_datasets().map_err(|error| self.damaged(path, &error))?;
+        let datasets = group.iter_datasets().map_err(|error| self.read_error(path, &error))?;
         for (name, dataset) in datasets {
-            self.dataset(&dataset, path, &inside(&name), depth)?;
+            self.read_dataset(&dataset, path, &inside(&name), depth)?;
         }
-        let groups = group.iter_groups().map_err(|error| self.damaged(path, &error))?;
+        let groups = group.iter_groups().map_err(|error| self.read_error(path, &error))?;
         for (name, group) in groups {
             // MATLAB stores internal data in groups whose name starts with #.
             if !(depth == 0 && name.starts_with('#')) {
-                self.group(&group, &inside(&name), depth.saturating_add(1))?;
+                self.read_group(&group, &inside(&name), depth.saturating_add(1))?;
             }
         }
         Ok(())
@@ -99,9 +99,9 @@ impl Reader<'_> {
 
     /// Reads a dataset. For a dataset in an array of structures, `parent` is the element of the array, and `path`
     /// starts with it.
-    fn dataset(&mut self, dataset: &Dataset, parent: &str, path: &str, depth: usize) -> Result<(), IoError> {
+    fn read_dataset(&mut self, dataset: &Dataset, parent: &str, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT_BYTES, self.file)?;
-        let error = |reader: &Self, error: Error| reader.damaged(path, &error);
+        let error = |reader: &Self, error: Error| reader.read_error(path, &error);
         let attributes = dataset.attrs().map_err(|e| error(self, e))?;
         let class = match attributes.get("MATLAB_class") {
             Some(AttrValue::String(class) | AttrValue::AsciiString(class)) => class.as_str(),
@@ -109,7 +109,7 @@ impl Reader<'_> {
         };
         let class = class.trim_end_matches('\0');
         if attributes.contains_key("MATLAB_object_decode") {
-            return self.push(parent, path, Value::Unread(object(class)));
+            return self.push(parent, path, Value::Unread(describe_object(class)));
         }
         if attributes.contains_key("MATLAB_empty") {
             return match class {
@@ -136,7 +136,7 @@ impl Reader<'_> {
             if count > MAX_REFERENCES {
                 return self.push(parent, path, Value::Unread(format!("{count} references")));
             }
-            return self.references(dataset, class == "cell", (parent, path), depth);
+            return self.read_references(dataset, class == "cell", (parent, path), depth);
         }
         self.budget.take(bytes, self.file)?;
         let rows = dims.first().map_or(1, |rows| (*rows).min(count as usize));
@@ -146,38 +146,38 @@ impl Reader<'_> {
             _ => {}
         }
         let value = match kind {
-            DType::U16 if class == "char" => Value::Texts(texts(&self.all::<u16>(dataset, path)?, &dims)),
-            DType::F64 => self.array::<f64>(dataset, path, Kind::F64, dims)?,
-            DType::F32 => self.array::<f32>(dataset, path, Kind::F32, dims)?,
-            DType::I8 | DType::Enum(_) if size == 1 => self.array::<i8>(dataset, path, Kind::I8, dims)?,
-            DType::I16 => self.array::<i16>(dataset, path, Kind::I16, dims)?,
-            DType::I32 => self.array::<i32>(dataset, path, Kind::I32, dims)?,
-            DType::I64 => self.array::<i64>(dataset, path, Kind::I64, dims)?,
-            DType::U8 => self.array::<u8>(dataset, path, Kind::U8, dims)?,
-            DType::U16 => self.array::<u16>(dataset, path, Kind::U16, dims)?,
-            DType::U32 => self.array::<u32>(dataset, path, Kind::U32, dims)?,
-            DType::U64 => self.array::<u64>(dataset, path, Kind::U64, dims)?,
+            DType::U16 if class == "char" => Value::Texts(texts(&self.read_all::<u16>(dataset, path)?, &dims)),
+            DType::F64 => self.read_array::<f64>(dataset, path, Kind::F64, dims)?,
+            DType::F32 => self.read_array::<f32>(dataset, path, Kind::F32, dims)?,
+            DType::I8 | DType::Enum(_) if size == 1 => self.read_array::<i8>(dataset, path, Kind::I8, dims)?,
+            DType::I16 => self.read_array::<i16>(dataset, path, Kind::I16, dims)?,
+            DType::I32 => self.read_array::<i32>(dataset, path, Kind::I32, dims)?,
+            DType::I64 => self.read_array::<i64>(dataset, path, Kind::I64, dims)?,
+            DType::U8 => self.read_array::<u8>(dataset, path, Kind::U8, dims)?,
+            DType::U16 => self.read_array::<u16>(dataset, path, Kind::U16, dims)?,
+            DType::U32 => self.read_array::<u32>(dataset, path, Kind::U32, dims)?,
+            DType::U64 => self.read_array::<u64>(dataset, path, Kind::U64, dims)?,
             DType::String => Value::Texts(dataset.read_string().map_err(|e| error(self, e))?),
             DType::VariableLengthString => Value::Unread(String::from("text of variable length")),
             DType::Compound(fields) if matches!(fields.as_slice(), [(name, _), _] if name == "real") => {
                 Value::Unread(String::from("complex numbers"))
             }
-            DType::Compound(_) => return self.table(dataset, (parent, path)),
+            DType::Compound(_) => return self.read_table(dataset, (parent, path)),
             _ => Value::Unread(String::from("something other than numbers")),
         };
         self.push(parent, path, value)
     }
 
     /// Reads a table of records; each field gets the path `path.field`.
-    fn table(&mut self, dataset: &Dataset, (parent, path): (&str, &str)) -> Result<(), IoError> {
-        let kind = dataset.datatype().map_err(|error| self.damaged(path, &error))?;
+    fn read_table(&mut self, dataset: &Dataset, (parent, path): (&str, &str)) -> Result<(), IoError> {
+        let kind = dataset.datatype().map_err(|error| self.read_error(path, &error))?;
         let Datatype::Compound { size, members } = kind else {
             return self.push(parent, path, Value::Unread(String::from("records of an unknown type")));
         };
-        let bytes = dataset.read_raw().map_err(|error| self.damaged(path, &error))?;
+        let bytes = dataset.read_raw().map_err(|error| self.read_error(path, &error))?;
         let (bytes, size) = (Rc::new(bytes), size as usize);
         for member in &members {
-            let value = match records::field(&bytes, size, member) {
+            let value = match records::field_numbers(&bytes, size, member) {
                 Some(numbers) => Value::Array(Array::vector(numbers)),
                 None => Value::Unread(String::from("something other than numbers")),
             };
@@ -188,7 +188,7 @@ impl Reader<'_> {
 
     /// Reads a cell array, whose cells get the paths `path{k}`, or one field of an array of structures, with the paths
     /// `parent(k).field`.
-    fn references(
+    fn read_references(
         &mut self,
         dataset: &Dataset,
         cells: bool,
@@ -222,8 +222,8 @@ impl Reader<'_> {
                 _ => (parent.to_owned(), format!("{path}{{{}}}", at.saturating_add(1))),
             };
             match object {
-                Object::Dataset(dataset) => self.dataset(&dataset, &parent, &path, depth.saturating_add(1))?,
-                Object::Group(group) => self.group(&group, &path, depth.saturating_add(1))?,
+                Object::Dataset(dataset) => self.read_dataset(&dataset, &parent, &path, depth.saturating_add(1))?,
+                Object::Group(group) => self.read_group(&group, &path, depth.saturating_add(1))?,
                 _ => {}
             }
         }
@@ -250,18 +250,18 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn all<T: H5Element>(&self, dataset: &Dataset, path: &str) -> Result<Vec<T>, IoError> {
-        dataset.read::<T>().map_err(|error| self.damaged(path, &error))
+    fn read_all<T: H5Element>(&self, dataset: &Dataset, path: &str) -> Result<Vec<T>, IoError> {
+        dataset.read::<T>().map_err(|error| self.read_error(path, &error))
     }
 
-    fn array<T: H5Element + Bytes>(
+    fn read_array<T: H5Element + LittleEndianBytes>(
         &self,
         dataset: &Dataset,
         path: &str,
         kind: Kind,
         dims: Vec<usize>,
     ) -> Result<Value, IoError> {
-        let values = self.all::<T>(dataset, path)?;
+        let values = self.read_all::<T>(dataset, path)?;
         let mut bytes = Vec::with_capacity(values.len().saturating_mul(kind.size()));
         values.iter().for_each(|value| value.append(&mut bytes));
         let numbers = Numbers::new(bytes, kind, false);
@@ -296,13 +296,13 @@ fn texts(units: &[u16], dims: &[usize]) -> Vec<String> {
 }
 
 /// Numbers that can be converted to little-endian bytes.
-trait Bytes {
+trait LittleEndianBytes {
     fn append(&self, bytes: &mut Vec<u8>);
 }
 
 macro_rules! bytes {
     ($($number:ty),*) => {$(
-        impl Bytes for $number {
+        impl LittleEndianBytes for $number {
             fn append(&self, bytes: &mut Vec<u8>) {
                 bytes.extend_from_slice(&self.to_le_bytes());
             }

@@ -12,11 +12,11 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::npy::{self, NpyError};
 use crate::IoError;
-use crate::formats::arrays::{COMMENTS, Contents, Entry, Indexing};
+use crate::formats::arrays::{COMMENTS_ARRAY, Contents, Entry, Indexing};
 use crate::formats::budget::Budget;
-use crate::formats::guarded::guarded;
+use crate::formats::guarded::guard_read;
 use crate::results::{TableSchema, Values};
-use crate::wording::{short_error, shown, start_of};
+use crate::wording::{abbreviate, quote_start, short_error};
 
 /// Reads the arrays from the bytes of a file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
@@ -24,26 +24,27 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         return Err(IoError::WrongFormat {
             file: file.to_owned(),
             format: "NPZ",
-            found: start_of(bytes),
+            found: quote_start(bytes),
             expected: "a zip archive, which starts with PK",
         });
     }
-    guarded(file, || members(bytes, file))
+    guard_read(file, || read_members(bytes, file))
 }
 
-fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
+fn read_members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     let mut budget = Budget::of(bytes.len());
-    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|error| refused(&error, "the archive", file))?;
+    let mut archive =
+        ZipArchive::new(Cursor::new(bytes)).map_err(|error| archive_error(&error, "the archive", file))?;
     let mut entries: Vec<Entry> = Vec::new();
     let mut others = Vec::new();
     for index in 0..archive.len() {
         let mut member = archive
             .by_index(index)
-            .map_err(|error| refused(&error, &format!("member {}", index.saturating_add(1)), file))?;
+            .map_err(|error| archive_error(&error, &format!("member {}", index.saturating_add(1)), file))?;
         let path = match member.name() {
             Ok(name) => name.into_owned(),
             Err(error) => {
-                return Err(refused(
+                return Err(archive_error(
                     &error,
                     &format!("the name of member {}", index.saturating_add(1)),
                     file,
@@ -51,12 +52,12 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
             }
         };
         let Some(name) = path.strip_suffix(".npy") else {
-            others.push(shown(&path));
+            others.push(abbreviate(&path));
             continue;
         };
         let damaged = |what: &str| IoError::Damaged {
             file: file.to_owned(),
-            found: format!("array {}: {what}", shown(name)),
+            found: format!("array {}: {what}", abbreviate(name)),
         };
         let size = member.size();
         budget.take(size, file)?;
@@ -83,7 +84,7 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     Ok(contents)
 }
 
-fn refused(error: &ZipError, place: &str, file: &str) -> IoError {
+fn archive_error(error: &ZipError, place: &str, file: &str) -> IoError {
     let found = format!("{place}: {}", short_error(&error.to_string()));
     let file = file.to_owned();
     match error {
@@ -103,7 +104,7 @@ pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Value
         .compression_method(CompressionMethod::Stored)
         .last_modified_time(DateTime::default());
     let mut member = |name: &str, values: Values<'_>| -> io::Result<()> {
-        let bytes = npy::written(values);
+        let bytes = npy::npy_bytes(values);
         let large = bytes.len() as u64 >= u64::from(u32::MAX);
         archive.start_file(format!("{name}.npy"), options.large_file(large))?;
         archive.write_all(&bytes)
@@ -112,7 +113,7 @@ pub(super) fn write(file: &mut dyn Write, schema: &TableSchema, columns: &[Value
         member(&column.name, *values)?;
     }
     if !schema.comments.is_empty() {
-        member(COMMENTS, Values::Text(&schema.comments))?;
+        member(COMMENTS_ARRAY, Values::Text(&schema.comments))?;
     }
     file.write_all(archive.finish()?.get_ref())
 }

@@ -35,16 +35,16 @@ const MAX_NESTING: usize = 6;
 /// Parses the header text, which lies between the length and the data.
 pub(super) fn parse(text: &str) -> Option<Header> {
     let mut reader = Reader { rest: text };
-    reader.token('{')?;
+    reader.expect_token('{')?;
     let (mut descr, mut fortran_order, mut shape) = (None, None, None);
-    while reader.token('}').is_none() {
+    while reader.expect_token('}').is_none() {
         let key = reader.text()?;
-        reader.token(':')?;
+        reader.expect_token(':')?;
         let value = reader.literal(0)?;
         match (key.as_str(), value) {
             ("descr", Literal::Text(text)) => descr = Some(Descr::Plain(text)),
             ("descr", Literal::Sequence(fields)) => {
-                descr = Some(Descr::Fields(fields.iter().map(field).collect::<Option<_>>()?))
+                descr = Some(Descr::Fields(fields.iter().map(parse_field).collect::<Option<_>>()?))
             }
             ("fortran_order", Literal::Flag(flag)) => fortran_order = Some(flag),
             ("shape", Literal::Sequence(sides)) => {
@@ -56,8 +56,8 @@ pub(super) fn parse(text: &str) -> Option<Header> {
             }
             _ => return None,
         }
-        if reader.token(',').is_none() {
-            reader.token('}')?;
+        if reader.expect_token(',').is_none() {
+            reader.expect_token('}')?;
             break;
         }
     }
@@ -70,7 +70,7 @@ pub(super) fn parse(text: &str) -> Option<Header> {
 }
 
 /// Parses a field (name and type, or name, type and shape). The name may be a pair of title and name.
-fn field(field: &Literal) -> Option<(String, Option<String>)> {
+fn parse_field(field: &Literal) -> Option<(String, Option<String>)> {
     let Literal::Sequence(parts) = field else { return None };
     let name = match parts.first()? {
         Literal::Text(name) => name.clone(),
@@ -91,7 +91,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn token(&mut self, token: char) -> Option<()> {
+    fn expect_token(&mut self, token: char) -> Option<()> {
         self.rest = self.rest.trim_start();
         self.rest = self.rest.strip_prefix(token)?;
         Some(())
@@ -125,15 +125,15 @@ impl Reader<'_> {
             '\'' | '"' => self.text().map(Literal::Text),
             '(' | '[' => {
                 let end = if first == '(' { ')' } else { ']' };
-                self.token(first)?;
+                self.expect_token(first)?;
                 let mut items = Vec::new();
-                while self.token(end).is_none() {
+                while self.expect_token(end).is_none() {
                     if depth == MAX_NESTING {
                         return None;
                     }
                     items.push(self.literal(depth.saturating_add(1))?);
-                    if self.token(',').is_none() {
-                        self.token(end)?;
+                    if self.expect_token(',').is_none() {
+                        self.expect_token(end)?;
                         break;
                     }
                 }

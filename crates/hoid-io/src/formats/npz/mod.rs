@@ -12,20 +12,20 @@ mod header;
 mod npy;
 mod single;
 
-use crate::formats::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, FormatReader, FormatWriter};
 
 pub(super) const NPZ: Format = Format {
     name: "NPZ",
     extensions: &["npz"],
-    reading: Reading::Arrays(|bytes, file| archive::read(&bytes, file)),
-    writing: Writing::Columns(archive::write),
+    reading: FormatReader::Arrays(|bytes, file| archive::read(&bytes, file)),
+    writing: FormatWriter::Columns(archive::write),
     record: None,
 };
 
 pub(super) const NPY: Format = Format {
     name: "NPY",
     extensions: &["npy"],
-    reading: Reading::Arrays(single::read),
-    writing: Writing::ReadOnly("hoid only reads this format, which holds one unnamed array"),
+    reading: FormatReader::Arrays(single::read),
+    writing: FormatWriter::ReadOnly("hoid only reads this format, which holds one unnamed array"),
     record: None,
 };

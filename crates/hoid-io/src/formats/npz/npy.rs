@@ -4,18 +4,18 @@ use std::rc::Rc;
 
 use super::header::{self, Descr, Header};
 use crate::IoError;
-use crate::formats::arrays::{Array, Entry, Kind, MOMENTS, Numbers, Value};
+use crate::formats::arrays::{Array, CLOCK_TIME_UNIT, Entry, Kind, Numbers, Value};
 use crate::formats::budget::Budget;
 use crate::results::Values;
-use crate::wording::{shown, start_of};
+use crate::wording::{abbreviate, quote_start};
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// Number of bytes before a header: the magic bytes, the version, and the header length in two bytes (version 1) or
 /// four bytes (versions 2 and 3).
-const BEFORE_SHORT: usize = MAGIC.len() + 4;
-const BEFORE_LONG: usize = MAGIC.len() + 6;
+const SHORT_PREFIX_BYTES: usize = MAGIC.len() + 4;
+const LONG_PREFIX_BYTES: usize = MAGIC.len() + 6;
 /// Longest valid header in bytes; a longer one counts as damage.
-const LONGEST_HEADER: usize = 1 << 20;
+const MAX_HEADER_BYTES: usize = 1 << 20;
 /// Alignment of the start of the data in bytes.
 const ALIGNMENT: usize = 64;
 
@@ -86,7 +86,7 @@ impl Item {
             ('f', size) => return unread("numbers of extended precision", size),
             ('c', size) => return unread("complex numbers", size),
             ('M' | 'm', _) => {
-                return match clock_unit(plain) {
+                return match clock_unit_s(plain) {
                     Some(unit_s) => Self::Clock {
                         big_endian,
                         unit_s,
@@ -104,7 +104,7 @@ impl Item {
     /// Returns the unit that the type implies; empty if there is none.
     fn unit(&self) -> String {
         String::from(match self {
-            Self::Clock { moments: true, .. } => MOMENTS,
+            Self::Clock { moments: true, .. } => CLOCK_TIME_UNIT,
             Self::Clock { moments: false, .. } => "s",
             _ => "",
         })
@@ -137,10 +137,10 @@ pub(super) fn entries(
             let item = Item::of(descr);
             vec![Entry {
                 unit: item.unit(),
-                ..Entry::new(name, plain(&item, &header, data())?)
+                ..Entry::new(name, plain_value(&item, &header, data())?)
             }]
         }
-        Descr::Fields(fields) => structured(fields, &header, data())?
+        Descr::Fields(fields) => structured_values(fields, &header, data())?
             .into_iter()
             .map(|(field, value)| Entry::field(if alone { "" } else { name }, &field, value))
             .collect(),
@@ -171,12 +171,12 @@ fn reserve_memory(header: &Header, budget: &mut Budget, file: &str) -> Result<()
 fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
     let damaged = |what: &str| NpyError::Damaged(what.to_owned());
     if !bytes.starts_with(MAGIC) {
-        return Err(NpyError::NoMagic(start_of(bytes)));
+        return Err(NpyError::NoMagic(quote_start(bytes)));
     }
     let rest = bytes.get(MAGIC.len()..).unwrap_or_default();
     let (length, before) = match rest {
-        [1, _, a, b, ..] => (usize::from(u16::from_le_bytes([*a, *b])), BEFORE_SHORT),
-        [2 | 3, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, BEFORE_LONG),
+        [1, _, a, b, ..] => (usize::from(u16::from_le_bytes([*a, *b])), SHORT_PREFIX_BYTES),
+        [2 | 3, _, a, b, c, d, ..] => (u32::from_le_bytes([*a, *b, *c, *d]) as usize, LONG_PREFIX_BYTES),
         [version, ..] if !(1..=3).contains(version) => {
             return Err(NpyError::Damaged(format!(
                 "the array has version {version}, expected 1 to 3"
@@ -184,9 +184,9 @@ fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
         }
         _ => return Err(damaged("the array ends within its header")),
     };
-    if length > LONGEST_HEADER {
+    if length > MAX_HEADER_BYTES {
         return Err(NpyError::Damaged(format!(
-            "the header of an array has {length} bytes, expected at most {LONGEST_HEADER}"
+            "the header of an array has {length} bytes, expected at most {MAX_HEADER_BYTES}"
         )));
     }
     let end = before.saturating_add(length);
@@ -195,13 +195,17 @@ fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
         .ok_or_else(|| damaged("the array ends within its header"))?;
     // The text is Latin 1 before version 3, UTF-8 in version 3; everything that hoid needs, except names, is ASCII.
     let text = String::from_utf8_lossy(text);
-    let header = header::parse(&text)
-        .ok_or_else(|| NpyError::Damaged(format!("the header of an array cannot be parsed: {}", shown(&text))))?;
+    let header = header::parse(&text).ok_or_else(|| {
+        NpyError::Damaged(format!(
+            "the header of an array cannot be parsed: {}",
+            abbreviate(&text)
+        ))
+    })?;
     Ok((header, end))
 }
 
 /// Returns the number of items; an error if their total size is not `bytes`.
-fn count(header: &Header, size: usize, bytes: usize) -> Result<usize, NpyError> {
+fn item_count(header: &Header, size: usize, bytes: usize) -> Result<usize, NpyError> {
     let count = header
         .shape
         .iter()
@@ -211,16 +215,16 @@ fn count(header: &Header, size: usize, bytes: usize) -> Result<usize, NpyError> 
         (Some(count), Some(expected)) if expected == bytes => Ok(count),
         _ => Err(NpyError::Damaged(format!(
             "an array of {} items of {size} bytes holds {bytes} bytes",
-            shown(&format!("{:?}", header.shape))
+            abbreviate(&format!("{:?}", header.shape))
         ))),
     }
 }
 
-fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError> {
+fn plain_value(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError> {
     let Some(size) = item.size() else {
-        return Ok(unread(item));
+        return Ok(unread_value(item));
     };
-    let count = count(header, size, data.len())?;
+    let count = item_count(header, size, data.len())?;
     Ok(match item {
         Item::Numbers { kind, big_endian } => Value::Array(Array {
             numbers: Numbers::new(data, *kind, *big_endian),
@@ -229,26 +233,28 @@ fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError>
         }),
         // Items of length zero take no bytes, so the data do not limit their number.
         Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } => Value::Texts(vec![String::new(); count]),
-        Item::Unicode { big_endian, .. } => {
-            Value::Texts(data.chunks_exact(size).map(|text| unicode(text, *big_endian)).collect())
-        }
-        Item::Bytes { .. } => Value::Texts(data.chunks_exact(size).map(latin).collect()),
+        Item::Unicode { big_endian, .. } => Value::Texts(
+            data.chunks_exact(size)
+                .map(|text| decode_unicode(text, *big_endian))
+                .collect(),
+        ),
+        Item::Bytes { .. } => Value::Texts(data.chunks_exact(size).map(decode_bytes).collect()),
         Item::Clock {
             big_endian,
             unit_s,
             moments,
         } => Value::Array(Array {
-            numbers: clock(&Numbers::new(data, Kind::I64, *big_endian), *unit_s, *moments),
+            numbers: clock_seconds(&Numbers::new(data, Kind::I64, *big_endian), *unit_s, *moments),
             dims: header.shape.clone(),
             last_fastest: !header.fortran_order,
         }),
-        Item::Unread { .. } => unread(item),
+        Item::Unread { .. } => unread_value(item),
     })
 }
 
 /// Returns the time unit in s of a type such as `M8[ns]` or `m8[10us]`; `None` for months and years, which have no
 /// fixed duration.
-fn clock_unit(descr: &str) -> Option<f64> {
+fn clock_unit_s(descr: &str) -> Option<f64> {
     let unit = descr.strip_prefix(['M', 'm'])?.strip_prefix("8[")?.strip_suffix(']')?;
     let from = unit.find(|c: char| !c.is_ascii_digit())?;
     let count = if from == 0 { 1.0 } else { unit[..from].parse().ok()? };
@@ -266,9 +272,9 @@ fn clock_unit(descr: &str) -> Option<f64> {
 }
 
 /// Converts the counts of a clock to s, for clock times relative to the first one; an invalid count (NaT) becomes NaN.
-fn clock(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
+fn clock_seconds(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
     let known: Vec<Option<i64>> = (0..counts.len())
-        .map(|at| counts.whole(at).filter(|n| *n != i64::MIN))
+        .map(|at| counts.integer(at).filter(|n| *n != i64::MIN))
         .collect();
     let first = known.iter().flatten().next().copied().filter(|_| moments).unwrap_or(0);
     // Dividing by 1e9 keeps digits that multiplying by 1e-9 would lose.
@@ -284,14 +290,14 @@ fn clock(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
     Numbers::from_f64(&values)
 }
 
-fn unread(item: &Item) -> Value {
+fn unread_value(item: &Item) -> Value {
     match item {
         Item::Unread { what, .. } => Value::Unread((*what).to_owned()),
         _ => Value::Unread(String::from("an unknown type")),
     }
 }
 
-fn structured(
+fn structured_values(
     fields: &[(String, Option<String>)],
     header: &Header,
     data: Vec<u8>,
@@ -314,7 +320,7 @@ fn structured(
         .iter()
         .try_fold(0_usize, |sum, (.., size)| sum.checked_add(*size))
         .unwrap_or(usize::MAX);
-    count(header, item, data.len())?;
+    item_count(header, item, data.len())?;
     let data = Rc::new(data);
     let mut offset = 0_usize;
     let mut values = Vec::with_capacity(items.len());
@@ -329,9 +335,9 @@ fn structured(
                 let numbers = Numbers::field(&data, kind, big_endian, offset, item);
                 Value::Array(Array::vector(numbers))
             }
-            Item::Unicode { big_endian, .. } if size > 0 => texts(&|text| unicode(text, big_endian)),
-            Item::Bytes { .. } if size > 0 => texts(&latin),
-            other => unread(&other),
+            Item::Unicode { big_endian, .. } if size > 0 => texts(&|text| decode_unicode(text, big_endian)),
+            Item::Bytes { .. } if size > 0 => texts(&decode_bytes),
+            other => unread_value(&other),
         };
         // Fields without a name are padding.
         if !name.is_empty() {
@@ -342,7 +348,7 @@ fn structured(
     Ok(values)
 }
 
-fn unicode(bytes: &[u8], big_endian: bool) -> String {
+fn decode_unicode(bytes: &[u8], big_endian: bool) -> String {
     let character = |c: &[u8]| {
         let mut c = <[u8; 4]>::try_from(c).unwrap_or_default();
         if big_endian {
@@ -354,7 +360,7 @@ fn unicode(bytes: &[u8], big_endian: bool) -> String {
     text.trim_end_matches('\0').to_owned()
 }
 
-fn latin(bytes: &[u8]) -> String {
+fn decode_bytes(bytes: &[u8]) -> String {
     let text = bytes
         .iter()
         .rposition(|byte| *byte != 0)
@@ -363,7 +369,7 @@ fn latin(bytes: &[u8]) -> String {
 }
 
 /// Returns a one-dimensional array in the format written by numpy.
-pub(super) fn written(values: Values<'_>) -> Vec<u8> {
+pub(super) fn npy_bytes(values: Values<'_>) -> Vec<u8> {
     let (descr, data): (String, Vec<u8>) = match values {
         Values::Real(values) => (
             String::from("<f8"),
@@ -387,11 +393,15 @@ pub(super) fn written(values: Values<'_>) -> Vec<u8> {
         header::quoted(&descr),
         values.len()
     );
-    let whole = BEFORE_SHORT.saturating_add(header.len()).saturating_add(1);
+    let whole = SHORT_PREFIX_BYTES.saturating_add(header.len()).saturating_add(1);
     let padding = whole.next_multiple_of(ALIGNMENT).saturating_sub(whole);
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');
-    let mut bytes = Vec::with_capacity(BEFORE_SHORT.saturating_add(header.len()).saturating_add(data.len()));
+    let mut bytes = Vec::with_capacity(
+        SHORT_PREFIX_BYTES
+            .saturating_add(header.len())
+            .saturating_add(data.len()),
+    );
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&[1, 0]);
     // The header of a one-dimensional array is far shorter than 2^16 bytes.

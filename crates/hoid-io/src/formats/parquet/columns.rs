@@ -1,7 +1,7 @@
 //! Columns as read, before conversion.
 
 /// Metadata key of the comments, one comment per line.
-pub(super) const COMMENTS: &str = "hoid.comments";
+pub(super) const COMMENTS_KEY: &str = "hoid.comments";
 
 /// The values of a column.
 #[derive(Debug, Clone, PartialEq)]

@@ -16,15 +16,15 @@ mod record;
 mod results;
 mod write;
 
-use crate::formats::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, FormatReader, FormatWriter};
 
 pub(super) const PARQUET: Format = Format {
     name: "Parquet",
     extensions: &["parquet", "pq"],
-    reading: Reading::Table {
+    reading: FormatReader::Table {
         record: |bytes, file| record::parse(std::mem::take(bytes), file),
         results: results::read,
     },
-    writing: Writing::Rows(write::start),
+    writing: FormatWriter::Rows(write::start),
     record: None,
 };

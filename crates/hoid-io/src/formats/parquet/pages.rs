@@ -78,24 +78,24 @@ impl PageHeader {
             levels: 0,
             is_compressed: true,
         };
-        header.structure(bytes, None, 0)?;
+        header.read_structure(bytes, None, 0)?;
         Some(header)
     }
 
     /// Reads the fields of a structure; `inside` is the number of the field of the header that holds it.
-    fn structure(&mut self, bytes: &mut &[u8], inside: Option<i64>, depth: usize) -> Option<()> {
+    fn read_structure(&mut self, bytes: &mut &[u8], inside: Option<i64>, depth: usize) -> Option<()> {
         if depth > MAX_NESTING {
             return None;
         }
         let mut field = 0_i64;
         loop {
-            let head = byte(bytes)?;
+            let head = read_byte(bytes)?;
             let kind = head & 15;
             if kind == STOP {
                 return Some(());
             }
             field = match head >> 4 {
-                0 => zigzag(bytes)?,
+                0 => read_zigzag(bytes)?,
                 delta => field.checked_add(i64::from(delta))?,
             };
             match kind {
@@ -104,9 +104,9 @@ impl PageHeader {
                         self.is_compressed = kind == TRUE;
                     }
                 }
-                BYTE => drop(byte(bytes)?),
-                4..=6 => self.number(inside, field, zigzag(bytes)?)?,
-                STRUCT => self.structure(
+                BYTE => drop(read_byte(bytes)?),
+                4..=6 => self.store_number(inside, field, read_zigzag(bytes)?)?,
+                STRUCT => self.read_structure(
                     bytes,
                     Some(if depth == 0 { field } else { -1 }),
                     depth.saturating_add(1),
@@ -116,7 +116,7 @@ impl PageHeader {
         }
     }
 
-    fn number(&mut self, inside: Option<i64>, field: i64, value: i64) -> Option<()> {
+    fn store_number(&mut self, inside: Option<i64>, field: i64, value: i64) -> Option<()> {
         let place = match (inside, field) {
             (None, 2) => &mut self.decompressed,
             (None, 3) => &mut self.compressed,
@@ -134,35 +134,35 @@ impl PageHeader {
     /// Skips a value that does not affect the decompressed size.
     fn skip_field(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
         match kind {
-            TRUE | FALSE | BYTE => drop(byte(bytes)?),
-            4..=6 => drop(zigzag(bytes)?),
+            TRUE | FALSE | BYTE => drop(read_byte(bytes)?),
+            4..=6 => drop(read_zigzag(bytes)?),
             DOUBLE => *bytes = bytes.get(8..)?,
             BINARY => {
-                let length = usize::try_from(varint(bytes)?).ok()?;
+                let length = usize::try_from(read_varint(bytes)?).ok()?;
                 *bytes = bytes.get(length..)?;
             }
             LIST | SET => {
-                let head = byte(bytes)?;
+                let head = read_byte(bytes)?;
                 let count = match head >> 4 {
-                    15 => varint(bytes)?,
+                    15 => read_varint(bytes)?,
                     count => u64::from(count),
                 };
-                self.each(bytes, count, &[head & 15], depth)?;
+                self.skip_elements(bytes, count, &[head & 15], depth)?;
             }
             MAP => {
-                let count = varint(bytes)?;
+                let count = read_varint(bytes)?;
                 if count > 0 {
-                    let kinds = byte(bytes)?;
-                    self.each(bytes, count, &[kinds >> 4, kinds & 15], depth)?;
+                    let kinds = read_byte(bytes)?;
+                    self.skip_elements(bytes, count, &[kinds >> 4, kinds & 15], depth)?;
                 }
             }
-            STRUCT => self.structure(bytes, Some(-1), depth)?,
+            STRUCT => self.read_structure(bytes, Some(-1), depth)?,
             _ => return None,
         }
         Some(())
     }
 
-    fn each(&mut self, bytes: &mut &[u8], count: u64, kinds: &[u8], depth: usize) -> Option<()> {
+    fn skip_elements(&mut self, bytes: &mut &[u8], count: u64, kinds: &[u8], depth: usize) -> Option<()> {
         // Each element of a list takes at least one byte.
         if depth > MAX_NESTING || count > bytes.len() as u64 {
             return None;
@@ -176,16 +176,16 @@ impl PageHeader {
     }
 }
 
-fn byte(bytes: &mut &[u8]) -> Option<u8> {
+fn read_byte(bytes: &mut &[u8]) -> Option<u8> {
     let (first, rest) = bytes.split_first()?;
     *bytes = rest;
     Some(*first)
 }
 
-fn varint(bytes: &mut &[u8]) -> Option<u64> {
+fn read_varint(bytes: &mut &[u8]) -> Option<u64> {
     let mut value = 0_u64;
     for shift in (0..70).step_by(7) {
-        let next = byte(bytes)?;
+        let next = read_byte(bytes)?;
         value |= u64::from(next & 0x7f).checked_shl(shift)?;
         if next < 0x80 {
             return Some(value);
@@ -194,8 +194,8 @@ fn varint(bytes: &mut &[u8]) -> Option<u64> {
     None
 }
 
-fn zigzag(bytes: &mut &[u8]) -> Option<i64> {
-    let value = varint(bytes)?;
+fn read_zigzag(bytes: &mut &[u8]) -> Option<i64> {
+    let value = read_varint(bytes)?;
     Some((value >> 1).cast_signed() ^ (value & 1).cast_signed().wrapping_neg())
 }
 
@@ -212,7 +212,7 @@ mod tests {
     const GZIP: fn() -> Compression = || Compression::GZIP(GzipLevel::default());
 
     /// Returns a data page whose header also has a text and a list, which are skipped.
-    fn page(unpacked: i64, values: i64, packed: &[u8]) -> Vec<u8> {
+    fn data_page(unpacked: i64, values: i64, packed: &[u8]) -> Vec<u8> {
         let put = |bytes: &mut Vec<u8>, value: i64| {
             let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();
             while rest >= 0x80 {
@@ -235,7 +235,7 @@ mod tests {
         bytes
     }
 
-    fn zipped(bytes: &[u8]) -> Vec<u8> {
+    fn gzip(bytes: &[u8]) -> Vec<u8> {
         let mut encoder = GzEncoder::new(Vec::new(), Level::default());
         encoder.write_all(bytes).unwrap();
         encoder.finish().unwrap()
@@ -243,27 +243,30 @@ mod tests {
 
     #[test]
     fn page_sizes_are_read_and_checked_for_gzip() {
-        let honest = page(800, 100, &zipped(&[0; 800]));
+        let honest = data_page(800, 100, &gzip(&[0; 800]));
         assert_eq!(decompressed_size(&honest, GZIP(), 100), Some(800));
         // The second page follows the last value and is not examined.
         let two = [honest.clone(), vec![0xff; 40]].concat();
         assert_eq!(decompressed_size(&two, GZIP(), 100), Some(800));
         assert_eq!(decompressed_size(&two, GZIP(), 101), None);
-        let two = [honest, page(2_000_000_000, 100, &[1, 2, 3])].concat();
+        let two = [honest, data_page(2_000_000_000, 100, &[1, 2, 3])].concat();
         assert_eq!(decompressed_size(&two, Compression::SNAPPY, 200), Some(2_000_000_800));
-        let lying = page(800, 100, &zipped(&[0; 900]));
+        let lying = data_page(800, 100, &gzip(&[0; 900]));
         assert_eq!(decompressed_size(&lying, GZIP(), 100), None);
         assert_eq!(decompressed_size(&lying, Compression::SNAPPY, 100), Some(800));
     }
 
     #[test]
-    fn invalid_page_headers_are_none() {
-        let whole = page(800, 100, &zipped(&[0; 800]));
+    fn invalid_page_headers_give_none() {
+        let whole = data_page(800, 100, &gzip(&[0; 800]));
         assert_eq!(decompressed_size(&[], GZIP(), 100), Some(0));
         for cut in 1..whole.len() {
             assert_eq!(decompressed_size(&whole[..cut], GZIP(), 100), None, "{cut}");
         }
-        assert_eq!(decompressed_size(&page(-1, 100, &[]), Compression::SNAPPY, 100), None);
+        assert_eq!(
+            decompressed_size(&data_page(-1, 100, &[]), Compression::SNAPPY, 100),
+            None
+        );
         // The headers have structures without an end, or a list that is longer than its data.
         assert_eq!(decompressed_size(&[0x1c; 100], GZIP(), 1), None);
         assert_eq!(

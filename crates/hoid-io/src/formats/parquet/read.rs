@@ -16,37 +16,37 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
 use super::{
-    columns::{COMMENTS, Data, ReadColumn, ReadFile},
+    columns::{COMMENTS_KEY, Data, ReadColumn, ReadFile},
     pages,
 };
 use crate::IoError;
 use crate::formats::budget::Budget;
-use crate::formats::guarded::guarded;
-use crate::table::check_number;
-use crate::wording::{short_error, shown, start_of};
+use crate::formats::guarded::guard_read;
+use crate::table::check_column_count;
+use crate::wording::{abbreviate, quote_start, short_error};
 
 /// Magic bytes at the start and the end of a file.
 const MAGIC: &[u8; 4] = b"PAR1";
 /// Maximum number of rows (a month at 100 samples/s); files with more rows are refused before they exhaust the memory.
 const MAX_ROWS: usize = 1 << 28;
-const TIME: &str = "a date or time";
+const TIME_DESCRIPTION: &str = "a date or time";
 /// Number of ns in a µs and in a ms.
-const MICRO: i64 = 1_000;
-const MILLI: i64 = 1_000_000;
+const NS_PER_US: i64 = 1_000;
+const NS_PER_MS: i64 = 1_000_000;
 /// Memory in bytes of a value (as a number and as the index of a missing value), or of a text without its characters.
-const VALUE: u64 = 16;
-const TEXT: u64 = 24;
+const VALUE_BYTES: u64 = 16;
+const TEXT_BYTES: u64 = 24;
 /// Number of values read at a time.
 const VALUES_PER_READ: usize = 1 << 16;
 
 /// Reads the columns from the bytes of a file.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
-    check_ends(&bytes, file)?;
-    guarded(file, || columns(bytes.into(), file))
+    check_magic(&bytes, file)?;
+    guard_read(file, || read_columns(bytes.into(), file))
 }
 
 /// Checks that the file is a Parquet file; the error describes the actual contents.
-fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
+fn check_magic(bytes: &[u8], file: &str) -> Result<(), IoError> {
     let file = || file.to_owned();
     let found = if bytes.is_empty() {
         String::from("it is empty")
@@ -57,7 +57,7 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
             remedy: "write it without encryption",
         });
     } else if !bytes.starts_with(MAGIC) {
-        start_of(bytes)
+        quote_start(bytes)
     } else if bytes.len() < 12 {
         String::from("it ends after its first bytes")
     } else if !bytes.ends_with(MAGIC) {
@@ -71,7 +71,7 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     Err(IoError::NotParquet { file: file(), found })
 }
 
-fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
+fn read_columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     let size = bytes.len();
     let damaged = |found: String| IoError::Damaged {
         file: file.to_owned(),
@@ -89,7 +89,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
         });
     }
     let leaves = footer.schema_descr().num_columns();
-    check_number(leaves, file)?;
+    check_column_count(leaves, file)?;
     let mut budget = Budget::of(size);
     for group in reader.metadata().row_groups() {
         for chunk in group.columns() {
@@ -97,7 +97,10 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
         }
     }
     // All columns are converted to numbers, including those that are not used.
-    budget.take((rows as u64).saturating_mul(VALUE).saturating_mul(leaves as u64), file)?;
+    budget.take(
+        (rows as u64).saturating_mul(VALUE_BYTES).saturating_mul(leaves as u64),
+        file,
+    )?;
     let mut grouped = 0_usize;
     for group in reader.metadata().row_groups() {
         grouped = grouped.saturating_add(count(group.num_rows())?);
@@ -109,7 +112,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
         for chunk in group.columns() {
             let place = || {
                 let name = chunk.column_path().string();
-                format!("column {}, row group {}", shown(&name), number.saturating_add(1))
+                format!("column {}, row group {}", abbreviate(&name), number.saturating_add(1))
             };
             if chunk.file_path().is_some() {
                 continue;
@@ -132,7 +135,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     }
     let mut column = |(index, descriptor): (usize, &ColumnDescPtr)| {
         let parts: Vec<&str> = descriptor.path().parts().iter().map(|part| part.trim()).collect();
-        let mut leaf = ColumnPath {
+        let mut leaf = LeafColumn {
             reader: &reader,
             file,
             index,
@@ -141,7 +144,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             budget: &mut budget,
         };
         Ok(ReadColumn {
-            data: leaf.data(descriptor)?,
+            data: leaf.read_data(descriptor)?,
             name: leaf.name,
             single: descriptor.physical_type() == Type::FLOAT
                 || descriptor.logical_type_ref() == Some(&LogicalType::Float16),
@@ -151,7 +154,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     let leaves = footer.schema_descr().columns().iter().enumerate();
     let pairs = footer.key_value_metadata().into_iter().flatten();
     let comments = pairs
-        .filter(|pair| pair.key == COMMENTS)
+        .filter(|pair| pair.key == COMMENTS_KEY)
         .find_map(|pair| pair.value.as_ref());
     Ok(ReadFile {
         columns: leaves.map(&mut column).collect::<Result<_, IoError>>()?,
@@ -161,7 +164,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
 }
 
 /// A column in all row groups of a file.
-struct ColumnPath<'a> {
+struct LeafColumn<'a> {
     reader: &'a SerializedFileReader<Bytes>,
     file: &'a str,
     index: usize,
@@ -170,10 +173,10 @@ struct ColumnPath<'a> {
     budget: &'a mut Budget,
 }
 
-impl ColumnPath<'_> {
+impl LeafColumn<'_> {
     /// Reads the values by their converted type, which the crate `parquet` derives from the logical type where the two
     /// are equivalent, and otherwise by their logical type.
-    fn data(&mut self, column: &ColumnDescriptor) -> Result<Data, IoError> {
+    fn read_data(&mut self, column: &ColumnDescriptor) -> Result<Data, IoError> {
         use ConvertedType as C;
         let unit = 10_f64.powi(column.type_scale());
         let logical = column.logical_type_ref();
@@ -181,52 +184,59 @@ impl ColumnPath<'_> {
             return Ok(Data::Unread("a list"));
         }
         Ok(match (column.physical_type(), column.converted_type()) {
-            (Type::BOOLEAN, _) => Data::Signed(self.values::<BoolType, _>(|value| i64::from(*value))?),
-            (Type::FLOAT, _) => Data::Real(self.values::<FloatType, _>(|value| f64::from(*value))?),
-            (Type::DOUBLE, _) => Data::Real(self.values::<DoubleType, _>(|value| *value)?),
-            (Type::INT96, _) => Data::Moments(self.values::<Int96Type, _>(Int96::to_nanos)?),
+            (Type::BOOLEAN, _) => Data::Signed(self.read_values::<BoolType, _>(|value| i64::from(*value))?),
+            (Type::FLOAT, _) => Data::Real(self.read_values::<FloatType, _>(|value| f64::from(*value))?),
+            (Type::DOUBLE, _) => Data::Real(self.read_values::<DoubleType, _>(|value| *value)?),
+            (Type::INT96, _) => Data::Moments(self.read_values::<Int96Type, _>(Int96::to_nanos)?),
             (Type::INT32, C::TIME_MILLIS) => {
-                Data::Moments(self.values::<Int32Type, _>(|ms| i64::from(*ms).saturating_mul(MILLI))?)
+                Data::Moments(self.read_values::<Int32Type, _>(|ms| i64::from(*ms).saturating_mul(NS_PER_MS))?)
             }
             (Type::INT64, _) if let Some(unit_ns) = clock_ns(column) => {
-                Data::Moments(self.values::<Int64Type, _>(|value| value.saturating_mul(unit_ns))?)
+                Data::Moments(self.read_values::<Int64Type, _>(|value| value.saturating_mul(unit_ns))?)
             }
             (_, C::DATE | C::TIME_MILLIS | C::TIME_MICROS | C::TIMESTAMP_MILLIS | C::TIMESTAMP_MICROS) => {
-                Data::Unread(TIME)
+                Data::Unread(TIME_DESCRIPTION)
             }
-            (Type::INT32, C::DECIMAL) => Data::Real(self.values::<Int32Type, _>(|value| f64::from(*value) / unit)?),
-            (Type::INT64, C::DECIMAL) => Data::Real(self.values::<Int64Type, _>(|value| *value as f64 / unit)?),
+            (Type::INT32, C::DECIMAL) => {
+                Data::Real(self.read_values::<Int32Type, _>(|value| f64::from(*value) / unit)?)
+            }
+            (Type::INT64, C::DECIMAL) => Data::Real(self.read_values::<Int64Type, _>(|value| *value as f64 / unit)?),
             (Type::INT32, C::UINT_8 | C::UINT_16 | C::UINT_32) => {
-                Data::Unsigned(self.values::<Int32Type, _>(|value| u64::from(value.cast_unsigned()))?)
+                Data::Unsigned(self.read_values::<Int32Type, _>(|value| u64::from(value.cast_unsigned()))?)
             }
-            (Type::INT64, C::UINT_64) => Data::Unsigned(self.values::<Int64Type, _>(|value| value.cast_unsigned())?),
-            (Type::INT32, _) => Data::Signed(self.values::<Int32Type, _>(|value| i64::from(*value))?),
-            (Type::INT64, _) => Data::Signed(self.values::<Int64Type, _>(|value| *value)?),
-            (Type::FIXED_LEN_BYTE_ARRAY, C::DECIMAL) if column.type_length() <= 16 => {
-                Data::Real(self.values::<FixedLenByteArrayType, _>(|value| signed(value.data()) as f64 / unit)?)
+            (Type::INT64, C::UINT_64) => {
+                Data::Unsigned(self.read_values::<Int64Type, _>(|value| value.cast_unsigned())?)
             }
+            (Type::INT32, _) => Data::Signed(self.read_values::<Int32Type, _>(|value| i64::from(*value))?),
+            (Type::INT64, _) => Data::Signed(self.read_values::<Int64Type, _>(|value| *value)?),
+            (Type::FIXED_LEN_BYTE_ARRAY, C::DECIMAL) if column.type_length() <= 16 => Data::Real(
+                self.read_values::<FixedLenByteArrayType, _>(|value| big_endian_integer(value.data()) as f64 / unit)?,
+            ),
             (_, C::DECIMAL) => Data::Unread("decimal numbers of variable length or more than 16 bytes"),
             (Type::FIXED_LEN_BYTE_ARRAY, _) if logical == Some(&LogicalType::Float16) => {
-                Data::Real(self.values::<FixedLenByteArrayType, _>(|value| f16_to_f64(value.data()))?)
+                Data::Real(self.read_values::<FixedLenByteArrayType, _>(|value| f16_to_f64(value.data()))?)
             }
-            (Type::BYTE_ARRAY, C::UTF8 | C::ENUM | C::JSON) => {
-                Data::Text(self.values::<ByteArrayType, _>(|value| String::from_utf8_lossy(value.data()).into_owned())?)
-            }
+            (Type::BYTE_ARRAY, C::UTF8 | C::ENUM | C::JSON) => Data::Text(
+                self.read_values::<ByteArrayType, _>(|value| String::from_utf8_lossy(value.data()).into_owned())?,
+            ),
             _ => Data::Unread("binary data"),
         })
     }
 
     /// Returns one value per row; the rows of missing values are recorded.
-    fn values<T: DataType, V: Default + Weight>(&mut self, of: impl Fn(&T::T) -> V) -> Result<Vec<V>, IoError> {
+    fn read_values<T: DataType, V: Default + OwnedMemory>(
+        &mut self,
+        of: impl Fn(&T::T) -> V,
+    ) -> Result<Vec<V>, IoError> {
         let mut values = Vec::new();
         for group in 0..self.reader.num_row_groups() {
-            self.group::<T, V>(group, &of, &mut values)
+            self.read_group::<T, V>(group, &of, &mut values)
                 .map_err(|error| self.error(group, error))?;
         }
         Ok(values)
     }
 
-    fn group<T: DataType, V: Default + Weight>(
+    fn read_group<T: DataType, V: Default + OwnedMemory>(
         &mut self,
         group: usize,
         of: &impl Fn(&T::T) -> V,
@@ -235,10 +245,10 @@ impl ColumnPath<'_> {
         let metadata = self.reader.metadata().row_group(group);
         let chunk = metadata.column(self.index);
         match chunk.compression() {
-            Compression::ZSTD(_) => return Err(refused("is compressed with Zstandard")),
-            Compression::BROTLI(_) => return Err(refused("is compressed with Brotli")),
-            Compression::LZO => return Err(refused("is compressed with LZO")),
-            _ if chunk.file_path().is_some() => return Err(refused("keeps its values in another file")),
+            Compression::ZSTD(_) => return Err(unsupported_error("is compressed with Zstandard")),
+            Compression::BROTLI(_) => return Err(unsupported_error("is compressed with Brotli")),
+            Compression::LZO => return Err(unsupported_error("is compressed with LZO")),
+            _ if chunk.file_path().is_some() => return Err(unsupported_error("keeps its values in another file")),
             _ => {}
         }
         if chunk.num_values() != metadata.num_rows() {
@@ -279,8 +289,8 @@ impl ColumnPath<'_> {
     }
 
     /// Reserves the memory that the values own outside their vector.
-    fn reserve_for_values<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
-        let bytes = values.iter().map(Weight::bytes).sum();
+    fn reserve_for_values<V: OwnedMemory>(&mut self, values: &[V]) -> Result<(), ParquetError> {
+        let bytes = values.iter().map(OwnedMemory::owned_bytes).sum();
         let taken = self.budget.take(bytes, self.file);
         taken.map_err(|error| ParquetError::External(Box::new(error)))
     }
@@ -288,7 +298,11 @@ impl ColumnPath<'_> {
     /// Converts an error of the crate `parquet` and adds the column and the row group.
     fn error(&self, group: usize, error: ParquetError) -> IoError {
         let file = self.file.to_owned();
-        let place = format!("column {}, row group {}", shown(&self.name), group.saturating_add(1));
+        let place = format!(
+            "column {}, row group {}",
+            abbreviate(&self.name),
+            group.saturating_add(1)
+        );
         match error {
             ParquetError::NYI(what) => IoError::Unsupported {
                 file,
@@ -311,20 +325,20 @@ impl ColumnPath<'_> {
 }
 
 /// Memory that a value owns outside the vector in which it is stored.
-trait Weight {
+trait OwnedMemory {
     /// Returns this memory in bytes.
-    fn bytes(&self) -> u64 {
+    fn owned_bytes(&self) -> u64 {
         0
     }
 }
 
-impl Weight for f64 {}
-impl Weight for i64 {}
-impl Weight for u64 {}
+impl OwnedMemory for f64 {}
+impl OwnedMemory for i64 {}
+impl OwnedMemory for u64 {}
 
-impl Weight for String {
-    fn bytes(&self) -> u64 {
-        TEXT.saturating_add(self.len() as u64)
+impl OwnedMemory for String {
+    fn owned_bytes(&self) -> u64 {
+        TEXT_BYTES.saturating_add(self.len() as u64)
     }
 }
 
@@ -335,21 +349,21 @@ fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
         Some(LogicalType::Time(clock)) => &clock.unit,
         _ => {
             return match column.converted_type() {
-                ConvertedType::TIMESTAMP_MILLIS => Some(MILLI),
-                ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS => Some(MICRO),
+                ConvertedType::TIMESTAMP_MILLIS => Some(NS_PER_MS),
+                ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS => Some(NS_PER_US),
                 _ => None,
             };
         }
     };
     Some(match unit {
-        TimeUnit::MILLIS => MILLI,
-        TimeUnit::MICROS => MICRO,
+        TimeUnit::MILLIS => NS_PER_MS,
+        TimeUnit::MICROS => NS_PER_US,
         TimeUnit::NANOS => 1,
     })
 }
 
 /// Creates the error for valid but unsupported content.
-fn refused(what: &str) -> ParquetError {
+fn unsupported_error(what: &str) -> ParquetError {
     ParquetError::NYI(what.to_owned())
 }
 
@@ -359,7 +373,7 @@ fn f16_to_f64(bytes: &[u8]) -> f64 {
 }
 
 /// Converts a big-endian integer of up to 16 bytes.
-fn signed(bytes: &[u8]) -> i128 {
+fn big_endian_integer(bytes: &[u8]) -> i128 {
     let negative = bytes.first().is_some_and(|first| *first >= 0x80);
     let sign = if negative { -1 } else { 0_i128 };
     bytes.iter().fold(sign, |value, byte| value << 8 | i128::from(*byte))
@@ -371,9 +385,9 @@ mod tests {
 
     #[test]
     fn big_endian_integers_are_decoded() {
-        assert_eq!(signed(&[]), 0);
-        assert_eq!(signed(&[0xff, 0xfe]), -2);
-        assert_eq!(signed(&[0x01, 0x00]), 256);
-        assert_eq!(signed(&i128::MIN.to_be_bytes()), i128::MIN);
+        assert_eq!(big_endian_integer(&[]), 0);
+        assert_eq!(big_endian_integer(&[0xff, 0xfe]), -2);
+        assert_eq!(big_endian_integer(&[0x01, 0x00]), 256);
+        assert_eq!(big_endian_integer(&i128::MIN.to_be_bytes()), i128::MIN);
     }
 }

@@ -7,8 +7,8 @@ use super::columns::{Data, ReadColumn};
 use super::read::read;
 use crate::IoError;
 use crate::table::{Cell, Column, Precision, Source, Table, check_names, read_comments};
-use crate::time::{Moments, is_time, seconds};
-use crate::wording::shown;
+use crate::time::{ClockTimes, is_time, seconds_between};
+use crate::wording::abbreviate;
 
 /// The original cells of a file, for messages about values that are not finite numbers.
 struct ParquetSource<'a> {
@@ -53,7 +53,7 @@ impl Source for ParquetSource<'_> {
                 let cell = found.and_then(|k| infinite.get(k));
                 cell.map_or_else(|| String::from("NaN"), |(_, value)| value.to_string())
             }
-            Some(Cells::Texts { texts, .. }) => texts.get(row).map_or_else(String::new, |text| shown(text)),
+            Some(Cells::Texts { texts, .. }) => texts.get(row).map_or_else(String::new, |text| abbreviate(text)),
             Some(Cells::Moments { .. }) => String::from("a date or time"),
             Some(Cells::Unread(what)) => String::from(*what),
             None => String::new(),
@@ -95,7 +95,7 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
         Data::Signed(values) => values.into_iter().map(|value| value as f64).collect(),
         Data::Unsigned(values) => values.into_iter().map(|value| value as f64).collect(),
         Data::Text(texts) => {
-            let mut moments = Moments::default();
+            let mut moments = ClockTimes::default();
             for text in &texts {
                 match Cell::parse(text) {
                     Cell::Number(value) => {
@@ -114,9 +114,9 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
             let first = first.map_or(0, |(_, moment)| *moment);
             column.moments = true;
             column.unit = String::from("s");
-            column.values = moments.into_iter().map(|ns| seconds(ns, first)).collect();
-            without(&mut column.values, &nulls);
-            column.precision = Precision::of_times(&column.values, single);
+            column.values = moments.into_iter().map(|ns| seconds_between(ns, first)).collect();
+            mark_missing(&mut column.values, &nulls);
+            column.precision = Precision::from_times(&column.values, single);
             return (column, Cells::Moments { nulls });
         }
         Data::Unread(what) => {
@@ -125,9 +125,9 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
             return (column, Cells::Unread(what));
         }
     };
-    without(&mut column.values, &nulls);
+    mark_missing(&mut column.values, &nulls);
     if is_time(&column.name) {
-        column.precision = Precision::of_times(&column.values, single);
+        column.precision = Precision::from_times(&column.values, single);
     }
     let infinite = column
         .values
@@ -139,7 +139,7 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
 }
 
 /// Marks the values of the given rows as missing.
-pub(super) fn without(values: &mut [f64], nulls: &[usize]) {
+pub(super) fn mark_missing(values: &mut [f64], nulls: &[usize]) {
     for row in nulls {
         if let Some(value) = values.get_mut(*row) {
             *value = f64::NAN;

@@ -2,23 +2,23 @@
 
 use super::columns::{Data, ReadColumn};
 use super::read::read as read_columns;
-use super::record::without;
+use super::record::mark_missing;
 use crate::IoError;
 use crate::results::{ColumnValues, OutputColumn, OutputTable};
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 /// Reads the columns of a file, with their original kinds.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
     let read = read_columns(bytes, file)?;
     let unread = |name: &str, what: &str| IoError::Unsupported {
         file: file.to_owned(),
-        found: format!("column {} holds {what}", shown(name)),
+        found: format!("column {} holds {what}", abbreviate(name)),
         remedy: "write the table without it",
     };
     let mut columns = Vec::with_capacity(read.columns.len());
     for ReadColumn { name, data, nulls, .. } in read.columns {
         let real = |mut values: Vec<f64>| {
-            without(&mut values, &nulls);
+            mark_missing(&mut values, &nulls);
             ColumnValues::Real(values)
         };
         let values = match data {

@@ -14,7 +14,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties, WriterVersi
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
-use super::columns::COMMENTS;
+use super::columns::COMMENTS_KEY;
 use crate::formats::format::RowWriter;
 use crate::results::{ColumnKind, ColumnSchema, TableSchema, Values};
 
@@ -34,7 +34,7 @@ pub(super) fn start(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Bo
 
 impl RowWriter for Writer {
     /// Writes a row group.
-    fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()> {
+    fn write_rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()> {
         self.append(columns)?;
         self.write_buffered(file)
     }
@@ -46,8 +46,8 @@ impl RowWriter for Writer {
 
 impl Writer {
     fn start(file: &mut dyn Write, schema: &TableSchema) -> io::Result<Self> {
-        let comments =
-            (!schema.comments.is_empty()).then(|| vec![KeyValue::new(COMMENTS.to_owned(), schema.comments.join("\n"))]);
+        let comments = (!schema.comments.is_empty())
+            .then(|| vec![KeyValue::new(COMMENTS_KEY.to_owned(), schema.comments.join("\n"))]);
         let properties = WriterProperties::builder()
             .set_writer_version(WriterVersion::PARQUET_1_0)
             .set_created_by(CREATED_BY.to_owned())
@@ -60,7 +60,7 @@ impl Writer {
         let fields: Result<_> = schema
             .columns
             .iter()
-            .map(|column| field(column).map(Arc::new))
+            .map(|column| schema_field(column).map(Arc::new))
             .collect();
         let schema = Type::group_type_builder("schema").with_fields(fields?).build()?;
         let inner = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties))?;
@@ -101,7 +101,7 @@ impl Writer {
 }
 
 /// A column of the schema.
-fn field(column: &ColumnSchema) -> Result<Type> {
+fn schema_field(column: &ColumnSchema) -> Result<Type> {
     let (physical, logical, repetition) = match column.kind {
         ColumnKind::Real => (Physical::DOUBLE, None, Repetition::OPTIONAL),
         ColumnKind::Whole => (

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 use super::header::{self, Footer, Header};
 use crate::formats::arrays::Kind;
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 const STREAM_HEADER: u16 = 2;
 const SAMPLES: u16 = 3;
@@ -37,11 +37,11 @@ pub(super) enum Samples {
 }
 
 /// Reads bytes from front to back.
-struct Bytes<'a> {
+struct ByteReader<'a> {
     rest: &'a [u8],
 }
 
-impl<'a> Bytes<'a> {
+impl<'a> ByteReader<'a> {
     fn take(&mut self, length: usize) -> Option<&'a [u8]> {
         let (taken, rest) = self.rest.split_at_checked(length)?;
         self.rest = rest;
@@ -69,8 +69,8 @@ impl<'a> Bytes<'a> {
 
 /// Reads the streams of a file, which starts with the magic bytes. Returns the streams in the order of their headers
 /// and, if the last chunk is truncated, its position; all chunks before it are complete.
-pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), String> {
-    let mut rest = Bytes {
+pub(super) fn read_streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), String> {
+    let mut rest = ByteReader {
         rest: bytes.get(4..).unwrap_or_default(),
     };
     let mut streams: Vec<Stream> = Vec::new();
@@ -85,7 +85,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
             }
             return Err(ends());
         };
-        let mut content = Bytes { rest: taken };
+        let mut content = ByteReader { rest: taken };
         let tag = content.array().map(u16::from_le_bytes).ok_or_else(ends)?;
         if !matches!(tag, STREAM_HEADER | SAMPLES | CLOCK_OFFSET | STREAM_FOOTER) {
             continue;
@@ -94,8 +94,12 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
         let damaged = |what: String| format!("stream {id}, the chunk at byte {at}: {what}");
         if tag == STREAM_HEADER {
             let header = header::parse(content.rest).map_err(damaged)?;
-            let samples = empty(&header.format)
-                .ok_or_else(|| damaged(format!("the channel format \"{}\" is unknown", shown(&header.format))))?;
+            let samples = empty_samples(&header.format).ok_or_else(|| {
+                damaged(format!(
+                    "the channel format \"{}\" is unknown",
+                    abbreviate(&header.format)
+                ))
+            })?;
             if known.insert(id, streams.len()).is_some() {
                 return Err(damaged(String::from("the stream has two headers")));
             }
@@ -114,23 +118,23 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
         let stream = stream.ok_or_else(|| damaged(String::from("the stream has no header")))?;
         if tag == STREAM_FOOTER {
             // The footer is not needed to read the samples; it is only compared with them.
-            match header::footer(content.rest) {
+            match header::parse_footer(content.rest) {
                 Ok(footer) => stream.footer = Some(footer),
                 Err(why) => stream.unread_footer = Some(why),
             }
             continue;
         }
         let read = if tag == SAMPLES {
-            stream.samples(&mut content)
+            stream.read_samples(&mut content)
         } else {
-            stream.offset(&mut content)
+            stream.read_offset(&mut content)
         };
         read.ok_or_else(|| damaged(String::from("it ends in the middle of a sample")))?;
     }
     Ok((streams, None))
 }
 
-fn empty(format: &str) -> Option<Samples> {
+fn empty_samples(format: &str) -> Option<Samples> {
     let kind = match format {
         "string" => return Some(Samples::Texts(Vec::new())),
         "double64" => Kind::F64,
@@ -160,7 +164,7 @@ impl Stream {
                 "stream {} ({}): its footer states {stated} samples, but {read} are present: part of the file is \
                  missing",
                 self.id,
-                shown(&self.header.name)
+                abbreviate(&self.header.name)
             ));
         }
         let ends = self.stamps.first().zip(self.stamps.last());
@@ -177,14 +181,14 @@ impl Stream {
                     "stream {} ({}): its footer states that the {what} sample is at {stated} s, but it is at {found} \
                      s: part of the file is missing",
                     self.id,
-                    shown(&self.header.name)
+                    abbreviate(&self.header.name)
                 ));
             }
         }
         Ok(())
     }
 
-    fn samples(&mut self, content: &mut Bytes<'_>) -> Option<()> {
+    fn read_samples(&mut self, content: &mut ByteReader<'_>) -> Option<()> {
         // No memory is reserved for the stated number of samples; each sample takes at least one byte.
         for _ in 0..content.length()? {
             let stamp = match content.array::<1>()? {
@@ -207,7 +211,7 @@ impl Stream {
         Some(())
     }
 
-    fn offset(&mut self, content: &mut Bytes<'_>) -> Option<()> {
+    fn read_offset(&mut self, content: &mut ByteReader<'_>) -> Option<()> {
         self.offsets.push((content.f64()?, content.f64()?));
         Some(())
     }

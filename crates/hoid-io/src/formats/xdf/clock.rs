@@ -7,7 +7,7 @@
 //! `t + b_0 + b_1 t`. If the clock was reset, each part between resets has its own line. Finally, in a stream with a
 //! nominal rate, the time stamps between two breaks are replaced by their least-squares line over the sample index.
 //!
-//! Unlike in pyxdf, lost samples also count as a break: a step of more than [`LOST_SAMPLES`] nominal sample times `T`
+//! Unlike in pyxdf, lost samples also count as a break: a step of more than [`LOST_SAMPLE_LIMIT`] nominal sample times `T`
 //! after which the time stamps remain late. The lateness is the difference between the medians of `t_k - k T` before
 //! the step and after it, where as many samples after the step are skipped as would have been lost. Samples that arrive
 //! late and catch up count as jitter. Without this rule a loss of one second would be spread over the recording and
@@ -17,34 +17,34 @@ use std::ops::Range;
 
 use super::chunks::Stream;
 use crate::time::sampling::{pairs, steps};
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 /// Unit of the offsets in the fit, s; the loss is linear for deviations above one unit.
 const UNIT_S: f64 = 1e-4;
-const ITERATIONS: usize = 1000;
+const MAX_ITERATIONS: usize = 1000;
 /// Limits for a reset of the clock (multiple of the median absolute deviation, and s). The time between two offset
-/// measurements must differ from its median by more than both limits, and the offset step by more than [`RESET_VALUE`].
-const RESET_TIME: (f64, f64) = (5.0, 5.0);
-const RESET_VALUE: (f64, f64) = (10.0, 1.0);
-/// A break is a step longer than this time in s and longer than [`BREAK_SAMPLES`] nominal sample times.
-const BREAK_S: f64 = 1.0;
-const BREAK_SAMPLES: f64 = 500.0;
+/// measurements must differ from its median by more than both limits, and the offset step by more than [`RESET_VALUE_LIMITS`].
+const RESET_TIME_LIMITS: (f64, f64) = (5.0, 5.0);
+const RESET_VALUE_LIMITS: (f64, f64) = (10.0, 1.0);
+/// A break is a step longer than this time in s and longer than [`MIN_BREAK_SAMPLES`] nominal sample times.
+const MIN_BREAK_S: f64 = 1.0;
+const MIN_BREAK_SAMPLES: f64 = 500.0;
 
 /// Step, and subsequent lateness, above which samples count as lost, in nominal sample times.
-const LOST_SAMPLES: f64 = 4.0;
+const LOST_SAMPLE_LIMIT: f64 = 4.0;
 /// Number of samples on each side of a step from whose medians the lateness is computed.
 const SAMPLES_PER_SIDE: usize = 25;
 /// Relative deviation of the sampling rate from the nominal rate above which the deviation is reported.
 const MAX_RATE_DEVIATION: f64 = 0.02;
 
 /// Returns the times of the samples, s.
-pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
+pub(super) fn sample_times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
     let mut times = stream.stamps.clone();
     if times.is_empty() {
         return times;
     }
     let parts = synchronise(&mut times, &stream.offsets);
-    let name = shown(&stream.header.name);
+    let name = abbreviate(&stream.header.name);
     let resets = match parts {
         0 => String::from(
             "no clock offsets were recorded: the time stamps are taken as times on the clock of the recorder",
@@ -62,8 +62,8 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
         ));
         return times;
     }
-    let longest = BREAK_S.max(BREAK_SAMPLES * stream.nominal_step_s());
-    let (parts, effective_hz) = straighten(&mut times, longest, stream.nominal_step_s());
+    let longest = MIN_BREAK_S.max(MIN_BREAK_SAMPLES * stream.nominal_step_s());
+    let (parts, effective_hz) = dejitter(&mut times, longest, stream.nominal_step_s());
     if let Some(hz) = effective_hz.filter(|hz| (hz / nominal_hz - 1.0).abs() > MAX_RATE_DEVIATION) {
         notes.push(format!(
             "stream {name}: the time stamps give {hz:.4} Hz, but the stated rate is {nominal_hz} Hz: samples are lost at \
@@ -84,11 +84,11 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
 
 /// Converts time stamps to the clock of the recorder; returns the number of fitted lines.
 fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
-    let parts = resets(offsets);
+    let parts = ranges_between_resets(offsets);
     let mut rest = times;
     for part in &parts {
         let of_part = offsets.get(part.clone()).unwrap_or_default();
-        let (b0, b1) = line(of_part);
+        let (b0, b1) = fit_line(of_part);
         // A part ends before the first time stamp that is closer to the offsets of the next part.
         let end = match (of_part.last(), offsets.get(part.end)) {
             (Some((end, _)), Some((next, _))) => rest.iter().position(|t| (t - end).abs() >= (t - next).abs()),
@@ -102,23 +102,23 @@ fn synchronise(times: &mut [f64], offsets: &[(f64, f64)]) -> usize {
 }
 
 /// Returns for each part between resets of the clock the range of its offsets.
-fn resets(offsets: &[(f64, f64)]) -> Vec<Range<usize>> {
+fn ranges_between_resets(offsets: &[(f64, f64)]) -> Vec<Range<usize>> {
     if offsets.is_empty() {
         return Vec::new();
     }
     let (times, values): (Vec<f64>, Vec<f64>) = offsets.iter().copied().unzip();
     let [times, values] = [times, values].map(|of| steps(&of).collect::<Vec<f64>>());
-    let glitches = glitches(&times, RESET_TIME)
+    let glitches = outlier_flags(&times, RESET_TIME_LIMITS)
         .into_iter()
-        .zip(glitches(&values, RESET_VALUE));
+        .zip(outlier_flags(&values, RESET_VALUE_LIMITS));
     let each = (1..).zip(times.iter().zip(glitches));
     let breaks = each.filter(|(_, (step, (time, value)))| **step < 0.0 || *time && *value);
-    parts(breaks.map(|(at, _)| at), offsets.len())
+    split_at_breaks(breaks.map(|(at, _)| at), offsets.len())
 }
 
 /// True for each step that differs from the median by more than `deviations` median absolute deviations and by more
 /// than `least`.
-fn glitches(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
+fn outlier_flags(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
     let middle = median(steps);
     let off: Vec<f64> = steps.iter().map(|step| (step - middle).abs()).collect();
     let typical = median(&off) + f64::EPSILON;
@@ -139,14 +139,14 @@ fn median(values: &[f64]) -> f64 {
 }
 
 /// Divides `count` items into parts; each break is the index of the first item of the next part.
-fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<Range<usize>> {
+fn split_at_breaks(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<Range<usize>> {
     let mut first = 0;
     let ends = breaks.chain([count]);
     ends.map(|end| std::mem::replace(&mut first, end)..end).collect()
 }
 
 /// Fits the line `b_0 + b_1 c` to offsets with Huber's loss; returns zeros if the offsets do not determine a line.
-fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
+fn fit_line(offsets: &[(f64, f64)]) -> (f64, f64) {
     if let [(_, offset)] = offsets {
         return (*offset, 0.0);
     }
@@ -161,7 +161,7 @@ fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     }
     let (mut z, mut w) = (vec![0.0; c.len()], vec![0.0; c.len()]);
     let mut x = (0.0, 0.0);
-    for _ in 0..ITERATIONS {
+    for _ in 0..MAX_ITERATIONS {
         let (mut right, mut right_c) = (0.0, 0.0);
         for (((c, y), z), w) in c.iter().zip(&y).zip(&z).zip(&w) {
             let target = y + z - w;
@@ -183,12 +183,12 @@ fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
 }
 
 /// True if samples were lost before the k-th sample: after a long step the time stamps remain late.
-fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
+fn samples_were_lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
     let Some([before, now]) = times.get(k.saturating_sub(1)..=k) else {
         return false;
     };
     let late_s = now - before - nominal_s;
-    if nominal_s.is_nan() || nominal_s <= 0.0 || late_s.is_nan() || late_s <= LOST_SAMPLES * nominal_s {
+    if nominal_s.is_nan() || nominal_s <= 0.0 || late_s.is_nan() || late_s <= LOST_SAMPLE_LIMIT * nominal_s {
         return false;
     }
     let lateness = |rows: Range<usize>| {
@@ -200,16 +200,16 @@ fn lost(times: &[f64], k: usize, nominal_s: f64) -> bool {
     let from = come.min(times.len().saturating_sub(SAMPLES_PER_SIDE)).max(k);
     let shift_s =
         lateness(from..from.saturating_add(SAMPLES_PER_SIDE)) - lateness(k.saturating_sub(SAMPLES_PER_SIDE)..k);
-    shift_s > LOST_SAMPLES * nominal_s && shift_s > 0.5 * late_s
+    shift_s > LOST_SAMPLE_LIMIT * nominal_s && shift_s > 0.5 * late_s
 }
 
 /// Replaces the time stamps between two breaks by their least-squares line; returns the number of parts and the mean
 /// rate in Hz.
-fn straighten(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Option<f64>) {
+fn dejitter(times: &mut [f64], longest_s: f64, nominal_s: f64) -> (usize, Option<f64>) {
     let breaks = (1..)
         .zip(pairs(times))
-        .filter(|(k, (before, t))| (t - before).abs() > longest_s || lost(times, *k, nominal_s));
-    let parts = parts(breaks.map(|(k, _)| k), times.len());
+        .filter(|(k, (before, t))| (t - before).abs() > longest_s || samples_were_lost(times, *k, nominal_s));
+    let parts = split_at_breaks(breaks.map(|(k, _)| k), times.len());
     let (mut steps, mut duration_s) = (0.0, 0.0);
     for part in &parts {
         let part = times.get_mut(part.clone()).unwrap_or_default();
@@ -243,7 +243,7 @@ mod tests {
         let mut offsets: Vec<(f64, f64)> = (0..40)
             .map(|k| (1e5 + 5.0 * f64::from(k), 3.0 - 1e-4 * 5.0 * f64::from(k)))
             .collect();
-        let (b0, b1) = line(&offsets);
+        let (b0, b1) = fit_line(&offsets);
         // Offsets near 1e5 s have a rounding error of 1e-11 s.
         assert!(
             (b0 + b1 * 1e5 - 3.0).abs() < 1e-9 && (b1 + 1e-4).abs() < 1e-11,
@@ -251,21 +251,21 @@ mod tests {
         );
         // An outlier of 0.5 s shifts the line by less than a ten-thousandth of the outlier.
         offsets[7].1 += 0.5;
-        let (b0, b1) = line(&offsets);
+        let (b0, b1) = fit_line(&offsets);
         assert!(
             (b0 + b1 * 1e5 - 3.0).abs() < 5e-5 && (b1 + 1e-4).abs() < 1e-6,
             "{b0} {b1}"
         );
-        assert_eq!(line(&[(1.0, 2.0)]), (2.0, 0.0));
-        assert_eq!(line(&[(1.0, 2.0), (1.0, 3.0)]), (0.0, 0.0));
-        assert_eq!(line(&[(f64::NAN, 2.0), (1.0, f64::INFINITY)]), (0.0, 0.0));
+        assert_eq!(fit_line(&[(1.0, 2.0)]), (2.0, 0.0));
+        assert_eq!(fit_line(&[(1.0, 2.0), (1.0, 3.0)]), (0.0, 0.0));
+        assert_eq!(fit_line(&[(f64::NAN, 2.0), (1.0, f64::INFINITY)]), (0.0, 0.0));
     }
 
     #[test]
     fn clock_resets_are_found() {
         let mut offsets: Vec<(f64, f64)> = (0..10).map(|k| (5.0 * f64::from(k), 1.0)).collect();
         offsets.extend((0..10).map(|k| (5.0 * f64::from(k), 100.0)));
-        assert_eq!(resets(&offsets), [0..10, 10..20]);
+        assert_eq!(ranges_between_resets(&offsets), [0..10, 10..20]);
         let mut times: Vec<f64> = (0..50).map(f64::from).chain((0..50).map(f64::from)).collect();
         assert_eq!(synchronise(&mut times, &offsets[..10]), 1);
         assert_eq!((times[0], times[49]), (1.0, 50.0));
@@ -277,7 +277,7 @@ mod tests {
         let mut times: Vec<f64> = (0..100)
             .map(|k| 0.01 * f64::from(k) + if k >= 60 { 3.0 } else { 0.0 } + 1e-4 * f64::from(k % 2))
             .collect();
-        let (parts, hz) = straighten(&mut times, 1.0, 0.01);
+        let (parts, hz) = dejitter(&mut times, 1.0, 0.01);
         assert_eq!(parts, 2);
         assert!((hz.unwrap() - 100.0).abs() < 0.1);
         // Alternating jitter of 1e-4 s tilts a line over 40 samples by less than 1e-6 s per sample.
@@ -287,7 +287,7 @@ mod tests {
                 .enumerate()
                 .all(|(k, pair)| k == 59 || (pair[1] - pair[0] - 0.01).abs() < 1e-6)
         );
-        assert_eq!(straighten(&mut [5.0], 1.0, 0.0), (1, None));
+        assert_eq!(dejitter(&mut [5.0], 1.0, 0.0), (1, None));
     }
 
     #[test]
@@ -298,7 +298,7 @@ mod tests {
                 .filter(|k| !(500..500 + lost).contains(k))
                 .map(|k| 0.01 * f64::from(k) + 0.002 * (f64::from(k) * 1.7).sin())
                 .collect();
-            let (parts, hz) = straighten(&mut times, 5.0, 0.01);
+            let (parts, hz) = dejitter(&mut times, 5.0, 0.01);
             assert_eq!(parts, 2, "{lost}");
             assert!((hz.unwrap() - 100.0).abs() < 0.1, "{lost}: {hz:?}");
             assert!(
@@ -316,6 +316,6 @@ mod tests {
                 }
             })
             .collect();
-        assert_eq!(straighten(&mut times, 5.0, 0.01).0, 1);
+        assert_eq!(dejitter(&mut times, 5.0, 0.01).0, 1);
     }
 }

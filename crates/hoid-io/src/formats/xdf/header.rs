@@ -80,7 +80,7 @@ pub(super) struct Footer {
 }
 
 /// Parses the footer in the bytes of a chunk.
-pub(super) fn footer(bytes: &[u8]) -> Result<Footer, String> {
+pub(super) fn parse_footer(bytes: &[u8]) -> Result<Footer, String> {
     let text = String::from_utf8_lossy(bytes);
     let document = Document::parse(text.trim_start_matches('\u{feff}'))
         .map_err(|error| format!("its footer: {}", short_error(&error.to_string())))?;

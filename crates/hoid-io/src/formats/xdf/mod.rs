@@ -15,12 +15,12 @@ mod clock;
 mod header;
 mod streams;
 
-use crate::formats::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, FormatReader, FormatWriter};
 
 pub(super) const XDF: Format = Format {
     name: "XDF",
     extensions: &["xdf"],
-    reading: Reading::Arrays(|bytes, file| streams::read(&bytes, file)),
-    writing: Writing::ReadOnly("hoid only reads this format"),
+    reading: FormatReader::Arrays(|bytes, file| streams::read(&bytes, file)),
+    writing: FormatWriter::ReadOnly("hoid only reads this format"),
     record: None,
 };

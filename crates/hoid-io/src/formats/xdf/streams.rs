@@ -8,10 +8,10 @@ use super::clock;
 use crate::IoError;
 use crate::formats::arrays::{Array, Contents, Entry, Indexing, Numbers, Value};
 use crate::formats::budget::Budget;
-use crate::wording::{shown, start_of};
+use crate::wording::{abbreviate, quote_start};
 
 /// Approximate memory of an entry, in bytes.
-const ENTRY: u64 = 512;
+const ENTRY_BYTES: u64 = 512;
 
 /// Reads the streams from the bytes of a file.
 pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
@@ -19,12 +19,12 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         return Err(IoError::WrongFormat {
             file: file.to_owned(),
             format: "XDF",
-            found: start_of(bytes),
+            found: quote_start(bytes),
             expected: "\"XDF:\" at the start",
         });
     }
     let mut budget = Budget::of(bytes.len());
-    let (streams, cut) = chunks::streams(bytes).map_err(|found| IoError::Damaged {
+    let (streams, cut) = chunks::read_streams(bytes).map_err(|found| IoError::Damaged {
         file: file.to_owned(),
         found,
     })?;
@@ -45,20 +45,23 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         if let Some(why) = &stream.unread_footer {
             notes.push(format!(
                 "stream {}: {why}; its {} samples are read, but others may be missing",
-                shown(&stream.header.name),
+                abbreviate(&stream.header.name),
                 stream.stamps.len()
             ));
         } else if let (None, Some(first), Some(last)) = (&stream.footer, stream.stamps.first(), stream.stamps.last()) {
             notes.push(format!(
                 "stream {} has no footer: the file was cut short, or its recorder never closed it; {} samples over \
                  {:.3} s are present, and any after them are lost",
-                shown(&stream.header.name),
+                abbreviate(&stream.header.name),
                 stream.stamps.len(),
                 last - first
             ));
         }
     }
-    let times: Vec<Vec<f64>> = streams.iter().map(|stream| clock::times(stream, &mut notes)).collect();
+    let times: Vec<Vec<f64>> = streams
+        .iter()
+        .map(|stream| clock::sample_times(stream, &mut notes))
+        .collect();
     let first = times
         .iter()
         .filter_map(|times| times.first())
@@ -70,7 +73,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
             "t counts from the first sample, which is at {start:.6} s on the clock of the recorder"
         ));
     }
-    let mut names = Names::default();
+    let mut names = UniqueNames::default();
     let mut entries = Vec::new();
     for (stream, times) in streams.into_iter().zip(times) {
         let name = match stream.header.name.trim() {
@@ -79,7 +82,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         };
         let parent = names.unique(&name);
         budget.take(
-            ENTRY.saturating_mul((stream.header.channels as u64).saturating_add(1)),
+            ENTRY_BYTES.saturating_mul((stream.header.channels as u64).saturating_add(1)),
             file,
         )?;
         entries.extend(entries_of(
@@ -96,7 +99,7 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
 
 /// Returns the time stamps and the channels of a stream as entries.
 fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
-    let mut names = Names::default();
+    let mut names = UniqueNames::default();
     let times = Value::Array(Array::vector(Numbers::from_f64(times)));
     let mut entries = vec![Entry {
         unit: String::from("s"),
@@ -136,13 +139,13 @@ fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
 
 /// Makes names unique by appending a number to the second and each further use of a name.
 #[derive(Default)]
-struct Names {
+struct UniqueNames {
     known: HashSet<String>,
     /// Number to try next for a name.
     next: HashMap<String, usize>,
 }
 
-impl Names {
+impl UniqueNames {
     fn unique(&mut self, name: &str) -> String {
         let mut unique = name.to_owned();
         let number: &mut usize = self.next.entry(unique.clone()).or_insert(2);
@@ -161,13 +164,13 @@ mod tests {
     #[test]
     fn times_match_pyxdf() {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures/xdf");
-        let streams = chunks::streams(&std::fs::read(folder.join("tracking.xdf")).unwrap())
+        let streams = chunks::read_streams(&std::fs::read(folder.join("tracking.xdf")).unwrap())
             .unwrap()
             .0;
         let expected = std::fs::read_to_string(folder.join("expected.csv")).unwrap();
         let mut compared = 0;
         for stream in streams {
-            let times = clock::times(&stream, &mut Vec::new());
+            let times = clock::sample_times(&stream, &mut Vec::new());
             let start = format!("{},", stream.header.name);
             for line in expected.lines().filter_map(|line| line.strip_prefix(start.as_str())) {
                 let (row, t) = line.split_once(',').unwrap();

@@ -30,20 +30,20 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
         4 => {
             let class = *draw.one_of(&[CELL, STRUCTURE]);
             let many = 1 << (10 + draw.below(21));
-            let mut inside = array(class, [many, 1], "x");
+            let mut inside = array_header(class, [many, 1], "x");
             if class == STRUCTURE {
                 inside.extend([word(5 | 4 << 16), word(8), word(1), word(8 * 200)].concat());
                 inside.extend((0..200_u32).flat_map(|k| format!("f{k:07}").into_bytes()));
             }
-            file(&[packed(&element(&inside))])
+            file(&[compress(&matrix_element(&inside))])
         }
         // Nested cells.
         _ => {
             let deep = 1 << (4 + draw.below(10));
-            let inside = (0..deep).fold(array(DOUBLE, [0, 0], ""), |inside, _| {
-                [array(CELL, [1, 1], ""), element(&inside)].concat()
+            let inside = (0..deep).fold(array_header(DOUBLE, [0, 0], ""), |inside, _| {
+                [array_header(CELL, [1, 1], ""), matrix_element(&inside)].concat()
             });
-            file(&[packed(&element(&inside))])
+            file(&[compress(&matrix_element(&inside))])
         }
     }
 }
@@ -53,7 +53,7 @@ fn word(n: u32) -> [u8; 4] {
 }
 
 /// Returns flags, sizes and name of an array.
-fn array(class: u32, sizes: [u32; 2], name: &str) -> Vec<u8> {
+fn array_header(class: u32, sizes: [u32; 2], name: &str) -> Vec<u8> {
     let mut head = [word(6), word(8), word(class), word(0)].concat();
     head.extend([word(5), word(8), word(sizes[0]), word(sizes[1])].concat());
     head.extend([word(1), word(name.len() as u32)].concat());
@@ -62,19 +62,19 @@ fn array(class: u32, sizes: [u32; 2], name: &str) -> Vec<u8> {
     head
 }
 
-fn element(inside: &[u8]) -> Vec<u8> {
+fn matrix_element(inside: &[u8]) -> Vec<u8> {
     [&word(MATRIX)[..], &word(inside.len() as u32), inside].concat()
 }
 
 /// Returns the variable e, which consists of zeros.
 pub fn variable(class: u32, sizes: [u32; 2], stored: u32, bytes: u32, megabytes: usize) -> Vec<u8> {
-    let head = array(class, sizes, "e");
+    let head = array_header(class, sizes, "e");
     let length = head.len() as u32 + 8 + bytes;
     let beginning = [&word(MATRIX)[..], &word(length), &head, &word(stored), &word(bytes)].concat();
     zeros::zlib(&beginning, megabytes)
 }
 
-fn packed(element: &[u8]) -> Vec<u8> {
+fn compress(element: &[u8]) -> Vec<u8> {
     zeros::zlib(element, 0)
 }
 

@@ -24,16 +24,16 @@ use crate::{
     memory,
     mutations::{
         draw::Draw,
-        readers::{self, Answers},
-        spent::Spent,
+        readers::{self, ReadCounts},
+        spent::ProcessorTime,
     },
 };
 
 /// Makes a bomb.
-type Maker = fn(&mut Draw) -> Vec<u8>;
+type BombMaker = fn(&mut Draw) -> Vec<u8>;
 
 /// The formats, with the extensions that determine their readers.
-pub const FORMATS: [(&str, &str, Maker); 7] = [
+pub const FORMATS: [(&str, &str, BombMaker); 7] = [
     ("Parquet", "parquet", parquet::bomb),
     ("NPZ", "npz", npz::bomb),
     ("MAT", "mat", mat::bomb),
@@ -44,21 +44,21 @@ pub const FORMATS: [(&str, &str, Maker); 7] = [
 ];
 
 /// Makes bomb `number` of a format at a path and gives it to all its readers; returns the time taken.
-pub fn burst(path: &Path, maker: Maker, number: u64) -> (Answers, Duration) {
+pub fn run_bomb(path: &Path, maker: BombMaker, number: u64) -> (ReadCounts, Duration) {
     let bytes = maker(&mut Draw::new(54, number));
     fs::write(path, &bytes).unwrap();
     let length = bytes.len();
     drop(bytes);
-    memory::forget_peak();
-    let start = Spent::now();
-    let settings = |refused: bool| Answers {
+    memory::reset_peak();
+    let start = ProcessorTime::now();
+    let settings = |refused: bool| ReadCounts {
         read: u64::from(!refused),
         refused: u64::from(refused),
     };
     let answers = match path.extension().and_then(|ending| ending.to_str()) {
         Some("toml") => settings(read_any_scenario(path).is_err()),
         Some("json") => settings(read_fit(path).is_err()),
-        _ => readers::all(path, length, number),
+        _ => readers::read_with_all(path, length, number),
     };
     (answers, start.elapsed())
 }

@@ -22,10 +22,12 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
         0..=2 => {
             let rows = bytes / kind.1;
             let shape = *draw.one_of(&[[rows, 0], [1, rows], [rows / 4, 4], [1 << 40, 0]]);
-            archive(&[member("e", &head(kind.0, &shape), megabytes)])
+            archive(&[member("e", &array_header(kind.0, &shape), megabytes)])
         }
         // Several members, each of them below the limit.
-        3 => archive(&["e", "u", "x", "y", "z"].map(|name| member(name, &head("|b1", &[32 * MEGABYTE, 0]), 32))),
+        3 => {
+            archive(&["e", "u", "x", "y", "z"].map(|name| member(name, &array_header("|b1", &[32 * MEGABYTE, 0]), 32)))
+        }
         // A structure with many fields.
         4 => {
             let fields: String = (0..1 << (8 + draw.below(8)))
@@ -39,14 +41,14 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
         }
         _ => {
             let names: Vec<String> = (0..1 << (8 + draw.below(6))).map(|k| format!("c{k}")).collect();
-            let small = head("<f8", &[4, 0]);
+            let small = array_header("<f8", &[4, 0]);
             archive(&names.iter().map(|name| member(name, &small, 0)).collect::<Vec<_>>())
         }
     }
 }
 
 /// The header of an array; a second size of 0 is omitted.
-pub fn head(kind: &str, shape: &[usize; 2]) -> String {
+pub fn array_header(kind: &str, shape: &[usize; 2]) -> String {
     let second = if shape[1] == 0 {
         String::new()
     } else {

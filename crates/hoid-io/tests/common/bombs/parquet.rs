@@ -17,10 +17,10 @@ use super::zeros::{self, MEGABYTE};
 use crate::mutations::draw::Draw;
 
 /// Number of rows of a row group.
-pub const GROUP: usize = 1 << 18;
+pub const ROWS_PER_GROUP: usize = 1 << 18;
 /// Encodings of the format.
-const PLAIN: u64 = 0;
-const RUN_LENGTHS: u64 = 3;
+const PLAIN_ENCODING: u64 = 0;
+const RUN_LENGTH_ENCODING: u64 = 3;
 
 /// A page with an arbitrary header.
 pub struct Page<'a> {
@@ -38,7 +38,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let values = 1 << (20 + draw.below(12));
     match draw.below(9) {
         // The data decompress to more than the stated size.
-        0 => page(&Page {
+        0 => file_with_page(&Page {
             compression: gzip(),
             optional: false,
             values: 100,
@@ -46,7 +46,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             packed: &zeros::gzip(megabytes),
         }),
         // The stated size exceeds the data.
-        1 => page(&Page {
+        1 => file_with_page(&Page {
             compression: *draw.one_of(&[
                 gzip(),
                 Compression::SNAPPY,
@@ -59,7 +59,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             packed: &[0; 20],
         }),
         // The data match the header.
-        2 => page(&Page {
+        2 => file_with_page(&Page {
             compression: gzip(),
             optional: false,
             values: (megabytes * MEGABYTE / 8) as u64,
@@ -69,10 +69,10 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
         // One run of nulls.
         3 => {
             let mut run = Vec::new();
-            number(&mut run, values << 1);
+            append_number(&mut run, values << 1);
             run.push(0);
             let packed = [&(run.len() as u32).to_le_bytes()[..], &run].concat();
-            page(&Page {
+            file_with_page(&Page {
                 compression: Compression::UNCOMPRESSED,
                 optional: true,
                 values,
@@ -80,24 +80,24 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
                 packed: &packed,
             })
         }
-        4 => columns(10_001 + draw.below(10_000)),
-        5 => groups("message m { required double e; }", 1000 + draw.below(4000), 0),
-        6 => groups("message m { required binary e (UTF8); }", 1, 1 << (10 + draw.below(9))),
-        7 => groups(
+        4 => file_with_columns(10_001 + draw.below(10_000)),
+        5 => file_with_groups("message m { required double e; }", 1000 + draw.below(4000), 0),
+        6 => file_with_groups("message m { required binary e (UTF8); }", 1, 1 << (10 + draw.below(9))),
+        7 => file_with_groups(
             "message m { required int64 t (TIMESTAMP_MICROS); }",
             1 + draw.below(48),
-            GROUP,
+            ROWS_PER_GROUP,
         ),
-        _ => groups(
+        _ => file_with_groups(
             "message m { required double e; required double u; }",
             1 + draw.below(32),
-            GROUP,
+            ROWS_PER_GROUP,
         ),
     }
 }
 
 /// A file with a given number of groups with the same values, which are stored only once.
-pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
+pub fn file_with_groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
     let mut writer = writer(schema, Compression::UNCOMPRESSED, true);
     for _ in 0..groups {
         let mut group = writer.next_row_group().unwrap();
@@ -120,9 +120,9 @@ pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
 }
 
 /// A file with a given number of columns and no rows.
-pub fn columns(count: usize) -> Vec<u8> {
+pub fn file_with_columns(count: usize) -> Vec<u8> {
     let each: String = (0..count).map(|k| format!("required double c{k}; ")).collect();
-    groups(&format!("message m {{ {each} }}"), 0, 0)
+    file_with_groups(&format!("message m {{ {each} }}"), 0, 0)
 }
 
 fn writer(schema: &str, compression: Compression, dictionary: bool) -> SerializedFileWriter<Vec<u8>> {
@@ -136,11 +136,11 @@ fn writer(schema: &str, compression: Compression, dictionary: bool) -> Serialize
 
 /// Appends a number as in page headers (compact protocol of Thrift: the sign is in the lowest bit, with seven bits per
 /// byte).
-fn signed(page: &mut Vec<u8>, value: u64) {
-    number(page, value << 1);
+fn append_signed(page: &mut Vec<u8>, value: u64) {
+    append_number(page, value << 1);
 }
 
-fn number(page: &mut Vec<u8>, mut rest: u64) {
+fn append_number(page: &mut Vec<u8>, mut rest: u64) {
     while rest >= 0x80 {
         page.push(rest as u8 | 0x80);
         rest >>= 7;
@@ -149,7 +149,7 @@ fn number(page: &mut Vec<u8>, mut rest: u64) {
 }
 
 /// A file with one column, e, of one page.
-pub fn page(of: &Page) -> Vec<u8> {
+pub fn file_with_page(of: &Page) -> Vec<u8> {
     let schema = match of.optional {
         true => "message m { optional double e; }",
         false => "message m { required double e; }",
@@ -167,14 +167,14 @@ pub fn page(of: &Page) -> Vec<u8> {
     let honest = bytes::Bytes::from(writer.into_inner().unwrap());
     // PageHeader { type 0, unpacked, packed, DataPageHeader { values, encoding, levels by runs } }.
     let mut page = vec![0x15, 0, 0x15];
-    signed(&mut page, of.unpacked);
+    append_signed(&mut page, of.unpacked);
     page.push(0x15);
-    signed(&mut page, of.packed.len() as u64);
+    append_signed(&mut page, of.packed.len() as u64);
     page.extend([0x2c, 0x15]);
-    signed(&mut page, of.values);
-    for encoding in [PLAIN, RUN_LENGTHS, RUN_LENGTHS] {
+    append_signed(&mut page, of.values);
+    for encoding in [PLAIN_ENCODING, RUN_LENGTH_ENCODING, RUN_LENGTH_ENCODING] {
         page.push(0x15);
-        signed(&mut page, encoding);
+        append_signed(&mut page, encoding);
     }
     page.extend([0, 0]);
     page.extend(of.packed);

@@ -5,7 +5,7 @@ use crate::mutations::draw::Draw;
 
 /// Makes a bomb of a scenario.
 pub fn toml(draw: &mut Draw) -> Vec<u8> {
-    let bytes = length(draw);
+    let bytes = random_length(draw);
     let times = |text: &str| text.repeat(bytes / text.len());
     let numbered = |each: &dyn Fn(usize) -> String| (0..bytes / 12).map(each).collect::<String>();
     match draw.below(12) {
@@ -27,7 +27,7 @@ pub fn toml(draw: &mut Draw) -> Vec<u8> {
 
 /// Makes a bomb of a fit.
 pub fn json(draw: &mut Draw) -> Vec<u8> {
-    let bytes = length(draw);
+    let bytes = random_length(draw);
     let times = |text: &str| text.repeat(bytes / text.len());
     match draw.below(8) {
         0 => times("["),
@@ -46,6 +46,6 @@ pub fn json(draw: &mut Draw) -> Vec<u8> {
 }
 
 /// Draws a length from one kilobyte to sixteen megabytes.
-fn length(draw: &mut Draw) -> usize {
+fn random_length(draw: &mut Draw) -> usize {
     1 << (10 + draw.below(15))
 }

@@ -15,50 +15,52 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     match draw.below(8) {
         // The stated numbers of channels and samples exceed the contents.
         0 => {
-            chunk(&mut file, HEADER, &header(1, large, kind, "100", ""));
-            chunk(&mut file, SAMPLES, &samples(&large.to_le_bytes(), &[0; 64]));
+            append_chunk(&mut file, HEADER, &stream_header(1, large, kind, "100", ""));
+            append_chunk(&mut file, SAMPLES, &samples_chunk(&large.to_le_bytes(), &[0; 64]));
         }
         1 => {
-            chunk(&mut file, HEADER, &header(1, 2, kind, "100", ""));
-            chunk(&mut file, SAMPLES, &samples(&u64::MAX.to_le_bytes(), &[0; 64]));
+            append_chunk(&mut file, HEADER, &stream_header(1, 2, kind, "100", ""));
+            append_chunk(&mut file, SAMPLES, &samples_chunk(&u64::MAX.to_le_bytes(), &[0; 64]));
         }
         // Texts of any length, and empty texts.
         2 => {
-            chunk(&mut file, HEADER, &header(1, 1, "string", "0", ""));
+            append_chunk(&mut file, HEADER, &stream_header(1, 1, "string", "0", ""));
             let text = [&[0, 8][..], &large.to_le_bytes()].concat();
-            chunk(&mut file, SAMPLES, &samples(&1_u64.to_le_bytes(), &text));
+            append_chunk(&mut file, SAMPLES, &samples_chunk(&1_u64.to_le_bytes(), &text));
         }
         3 => {
             let count = 8 * many;
-            chunk(&mut file, HEADER, &header(1, 1, "string", "100", ""));
-            chunk(
+            append_chunk(&mut file, HEADER, &stream_header(1, 1, "string", "100", ""));
+            append_chunk(
                 &mut file,
                 SAMPLES,
-                &samples(&(count as u64).to_le_bytes(), &[0, 1, 0].repeat(count)),
+                &samples_chunk(&(count as u64).to_le_bytes(), &[0, 1, 0].repeat(count)),
             );
         }
         // Each sample takes one byte.
         4 => {
             let count = 8 * many;
-            chunk(&mut file, HEADER, &header(1, 2, "int8", "1e-3", ""));
-            chunk(
+            append_chunk(&mut file, HEADER, &stream_header(1, 2, "int8", "1e-3", ""));
+            append_chunk(
                 &mut file,
                 SAMPLES,
-                &samples(&(count as u64).to_le_bytes(), &vec![0; 3 * count]),
+                &samples_chunk(&(count as u64).to_le_bytes(), &vec![0; 3 * count]),
             );
         }
         // Nested elements.
         5 => {
             let nested = ["<a>".repeat(many), "</a>".repeat(many)].concat();
-            chunk(&mut file, HEADER, &header(1, 2, kind, "100", &nested));
+            append_chunk(&mut file, HEADER, &stream_header(1, 2, kind, "100", &nested));
         }
-        6 => (0..many as u32 / 4).for_each(|id| chunk(&mut file, HEADER, &header(id, 2, kind, "100", ""))),
+        6 => {
+            (0..many as u32 / 4).for_each(|id| append_chunk(&mut file, HEADER, &stream_header(id, 2, kind, "100", "")))
+        }
         // A jump of years between two samples, and the same jump in the clock offsets.
         _ => {
-            chunk(&mut file, HEADER, &header(1, 2, "int8", "1e6", ""));
+            append_chunk(&mut file, HEADER, &stream_header(1, 2, "int8", "1e6", ""));
             let at = |t: f64| [&[8][..], &t.to_le_bytes(), &[1, 2]].concat();
             let two = [at(0.0), at(0.01), at(large as f64), at(1e300)].concat();
-            chunk(&mut file, SAMPLES, &samples(&4_u64.to_le_bytes(), &two));
+            append_chunk(&mut file, SAMPLES, &samples_chunk(&4_u64.to_le_bytes(), &two));
             for k in 0..many {
                 let offset = [
                     &1_u32.to_le_bytes()[..],
@@ -66,14 +68,14 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
                     &1e300_f64.to_le_bytes(),
                 ]
                 .concat();
-                chunk(&mut file, OFFSET, &offset);
+                append_chunk(&mut file, OFFSET, &offset);
             }
         }
     }
     file
 }
 
-fn chunk(file: &mut Vec<u8>, tag: u16, content: &[u8]) {
+fn append_chunk(file: &mut Vec<u8>, tag: u16, content: &[u8]) {
     file.push(4);
     file.extend((content.len() as u32 + 2).to_le_bytes());
     file.extend(tag.to_le_bytes());
@@ -81,11 +83,11 @@ fn chunk(file: &mut Vec<u8>, tag: u16, content: &[u8]) {
 }
 
 /// A chunk of samples of stream 1, preceded by their number.
-fn samples(count: &[u8; 8], bytes: &[u8]) -> Vec<u8> {
+fn samples_chunk(count: &[u8; 8], bytes: &[u8]) -> Vec<u8> {
     [&1_u32.to_le_bytes()[..], &[8], count, bytes].concat()
 }
 
-fn header(id: u32, channels: u64, kind: &str, hz: &str, more: &str) -> Vec<u8> {
+fn stream_header(id: u32, channels: u64, kind: &str, hz: &str, more: &str) -> Vec<u8> {
     let text = format!(
         "<info><name>s{id}</name><channel_count>{channels}</channel_count><nominal_srate>{hz}</nominal_srate><channel_format>\
          {kind}</channel_format><desc><channels><channel><label>e</label></channel><channel><label>u</label></channel>\

@@ -5,7 +5,7 @@ use flate2::{Compress, Compression, Crc, FlushCompress};
 /// A megabyte.
 pub const MEGABYTE: usize = 1 << 20;
 /// Largest size of data, in MB, with a valid checksum; readers refuse larger data before they reach the checksum.
-const SUMMED: usize = 100;
+const MAX_CHECKSUM_MB: usize = 100;
 
 /// Returns deflated data: the given start, followed by a number of megabytes of zeros.
 pub fn deflated(beginning: &[u8], megabytes: usize) -> Vec<u8> {
@@ -45,6 +45,6 @@ pub fn crc(beginning: &[u8], megabytes: usize) -> u32 {
     let mut sum = Crc::new();
     sum.update(beginning);
     let block = vec![0; MEGABYTE];
-    (0..megabytes.min(SUMMED)).for_each(|_| sum.update(&block));
+    (0..megabytes.min(MAX_CHECKSUM_MB)).for_each(|_| sum.update(&block));
     sum.sum()
 }

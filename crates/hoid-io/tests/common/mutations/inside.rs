@@ -8,22 +8,22 @@ use zip::{CompressionMethod, ZipArchive, ZipWriter, write::SimpleFileOptions};
 
 /// The decompressed parts of a file.
 #[derive(Debug, Clone)]
-pub enum Inside {
+pub enum UnpackedParts {
     /// Name and bytes of each member.
     Zip(Vec<(String, Vec<u8>)>),
     /// The header, and each element without compression.
     Matlab(Vec<u8>, Vec<Vec<u8>>),
 }
 
-const MATLAB_HEADER: usize = 128;
+const MATLAB_HEADER_BYTES: usize = 128;
 const COMPRESSED: u32 = 15;
 
-impl Inside {
+impl UnpackedParts {
     /// Contents of a valid file; none if nothing is compressed.
     pub fn of(extension: &str, bytes: &[u8]) -> Option<Self> {
         match extension {
-            "npz" => zip(bytes),
-            "mat" if bytes.get(MATLAB_HEADER - 2..MATLAB_HEADER) == Some(b"IM") => matlab(bytes),
+            "npz" => unpack_zip(bytes),
+            "mat" if bytes.get(MATLAB_HEADER_BYTES - 2..MATLAB_HEADER_BYTES) == Some(b"IM") => unpack_matlab(bytes),
             _ => None,
         }
     }
@@ -37,7 +37,7 @@ impl Inside {
     }
 
     /// Returns the file with valid checksums.
-    pub fn packed(&self) -> Vec<u8> {
+    pub fn pack(&self) -> Vec<u8> {
         match self {
             Self::Zip(members) => {
                 let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
@@ -64,7 +64,7 @@ impl Inside {
     }
 }
 
-fn zip(bytes: &[u8]) -> Option<Inside> {
+fn unpack_zip(bytes: &[u8]) -> Option<UnpackedParts> {
     let mut archive = ZipArchive::new(Cursor::new(bytes)).ok()?;
     let mut members = Vec::new();
     for index in 0..archive.len() {
@@ -74,11 +74,11 @@ fn zip(bytes: &[u8]) -> Option<Inside> {
         member.read_to_end(&mut bytes).ok()?;
         members.push((name, bytes));
     }
-    Some(Inside::Zip(members))
+    Some(UnpackedParts::Zip(members))
 }
 
-fn matlab(bytes: &[u8]) -> Option<Inside> {
-    let (header, mut rest) = bytes.split_at_checked(MATLAB_HEADER)?;
+fn unpack_matlab(bytes: &[u8]) -> Option<UnpackedParts> {
+    let (header, mut rest) = bytes.split_at_checked(MATLAB_HEADER_BYTES)?;
     let mut elements = Vec::new();
     while let Some((tag, behind)) = rest.split_at_checked(8) {
         let number = |at: usize| Some(u32::from_le_bytes(tag[at..at + 4].try_into().ok()?));
@@ -95,5 +95,5 @@ fn matlab(bytes: &[u8]) -> Option<Inside> {
             rest = &behind[padded..];
         }
     }
-    Some(Inside::Matlab(header.to_vec(), elements))
+    Some(UnpackedParts::Matlab(header.to_vec(), elements))
 }

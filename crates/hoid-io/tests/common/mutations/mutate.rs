@@ -9,7 +9,7 @@ const MAX_FILE_BYTES: usize = 1 << 18;
 const MAX_MUTATIONS: usize = 8;
 
 /// Integers at which counts, sizes and sums overflow.
-const EDGES: [u64; 20] = [
+const EDGE_INTEGERS: [u64; 20] = [
     0,
     1,
     2,
@@ -32,7 +32,7 @@ const EDGES: [u64; 20] = [
     0xffff_ffff_ffff_ffff,
 ];
 /// Decimal numbers at which counts, sizes and sums overflow.
-const NUMBERS: [&str; 16] = [
+const EDGE_DECIMALS: [&str; 16] = [
     "",
     "0",
     "-1",
@@ -61,7 +61,10 @@ pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8
     if let Some(inside) = original.inside.as_ref().filter(|_| draw.below(3) > 0) {
         let mut inside = inside.clone();
         let mut from = other.inside.clone();
-        let mut from = from.as_mut().map(super::inside::Inside::parts).unwrap_or_default();
+        let mut from = from
+            .as_mut()
+            .map(super::inside::UnpackedParts::parts)
+            .unwrap_or_default();
         let at = draw.below(from.len());
         let foreign: &[u8] = from.get_mut(at).map_or(&other.bytes, |part| part);
         let mut parts = inside.parts();
@@ -69,7 +72,7 @@ pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8
         if let Some(part) = parts.get_mut(at) {
             (0..count).for_each(|_| mutate(part, foreign, original, draw));
         }
-        return inside.packed();
+        return inside.pack();
     }
     let mut bytes = original.bytes.clone();
     (0..count).for_each(|_| mutate(&mut bytes, &other.bytes, original, draw));
@@ -87,44 +90,44 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Dra
     };
     match kind {
         0 | 1 => {
-            let at = place(bytes.len(), draw);
+            let at = random_position(bytes.len(), draw);
             if let Some(byte) = bytes.get_mut(at) {
                 *byte ^= 1 << draw.below(8);
             }
         }
         2 => {
-            let at = place(bytes.len(), draw);
+            let at = random_position(bytes.len(), draw);
             if let Some(byte) = bytes.get_mut(at) {
                 *byte = draw.bits() as u8;
             }
         }
         3 => bytes.truncate(draw.below(bytes.len())),
         4 => {
-            let (at, length) = part(bytes.len(), draw);
+            let (at, length) = random_range(bytes.len(), draw);
             bytes.drain(at..at + length);
         }
         5 => {
-            let (at, length) = part(bytes.len(), draw);
+            let (at, length) = random_range(bytes.len(), draw);
             let copy = bytes[at..at + length].to_vec();
             let times = if draw.below(8) == 0 { 1 + draw.below(200) } else { 1 };
-            let into = place(bytes.len(), draw);
+            let into = random_position(bytes.len(), draw);
             insert(bytes, into, &copy.repeat(times));
         }
         6 => {
-            let (at, length) = part(other.len(), draw);
-            let into = place(bytes.len(), draw);
+            let (at, length) = random_range(other.len(), draw);
+            let into = random_position(bytes.len(), draw);
             insert(bytes, into, &other[at..at + length]);
         }
         7 => {
-            let (at, length) = part(other.len(), draw);
-            let into = place(bytes.len(), draw);
+            let (at, length) = random_range(other.len(), draw);
+            let into = random_position(bytes.len(), draw);
             let length = length.min(bytes.len() - into);
             bytes[into..into + length].copy_from_slice(&other[at..at + length]);
         }
         8 | 9 => {
             let edge = match draw.below(4) {
                 0 => (bytes.len() as u64).wrapping_add(*draw.one_of(&[0, 1, u64::MAX])),
-                _ => *draw.one_of(&EDGES),
+                _ => *draw.one_of(&EDGE_INTEGERS),
             };
             let size = *draw.one_of(&[1, 2, 4, 4, 8, 8]);
             let number = if draw.below(4) == 0 {
@@ -132,7 +135,7 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Dra
             } else {
                 edge.to_le_bytes()[..size].to_vec()
             };
-            let at = place(bytes.len(), draw);
+            let at = random_position(bytes.len(), draw);
             let at = if draw.below(2) == 0 { at - at % size } else { at };
             if let Some(there) = bytes.get_mut(at..at + size) {
                 there.copy_from_slice(&number);
@@ -140,22 +143,22 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Dra
         }
         10 => {
             let token = *draw.one_of(original.tokens);
-            let at = place(bytes.len(), draw);
+            let at = random_position(bytes.len(), draw);
             insert(bytes, at, token);
         }
         11 => {
             let token = *draw.one_of(original.tokens);
-            let at = place(bytes.len(), draw);
+            let at = random_position(bytes.len(), draw);
             let end = bytes.len().min(at + token.len());
             bytes[at..end].copy_from_slice(&token[..end - at]);
         }
-        _ => number(bytes, draw),
+        _ => replace_number(bytes, draw),
     }
 }
 
 /// Draws a position within a number of bytes: anywhere, or near the start or the end, which contain most of the
 /// structure.
-fn place(length: usize, draw: &mut Draw) -> usize {
+fn random_position(length: usize, draw: &mut Draw) -> usize {
     match draw.below(4) {
         0 => draw.below(length.min(256)),
         1 => length.saturating_sub(1 + draw.below(length.min(512))),
@@ -164,8 +167,8 @@ fn place(length: usize, draw: &mut Draw) -> usize {
 }
 
 /// Draws a range within a number of bytes, which is mostly short.
-fn part(length: usize, draw: &mut Draw) -> (usize, usize) {
-    let at = place(length, draw).min(length);
+fn random_range(length: usize, draw: &mut Draw) -> (usize, usize) {
+    let at = random_position(length, draw).min(length);
     let most = if draw.below(4) == 0 { length } else { 64 };
     (at, draw.below(most + 1).min(length - at))
 }
@@ -178,11 +181,11 @@ fn insert(bytes: &mut Vec<u8>, at: usize, what: &[u8]) {
 }
 
 /// Replaces a decimal number in the bytes.
-fn number(bytes: &mut Vec<u8>, draw: &mut Draw) {
-    let from = place(bytes.len(), draw);
+fn replace_number(bytes: &mut Vec<u8>, draw: &mut Draw) {
+    let from = random_position(bytes.len(), draw);
     let Some(start) = bytes.iter().skip(from).position(u8::is_ascii_digit).map(|at| at + from) else {
         return;
     };
     let length = bytes[start..].iter().take_while(|b| b.is_ascii_digit()).count();
-    bytes.splice(start..start + length, draw.one_of(&NUMBERS).bytes());
+    bytes.splice(start..start + length, draw.one_of(&EDGE_DECIMALS).bytes());
 }

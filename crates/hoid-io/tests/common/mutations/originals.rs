@@ -5,7 +5,7 @@ use std::{fs, path::Path};
 use hoid_io::write_record;
 use hoid_model::{Channel, Record, SampleTime};
 
-use super::inside::Inside;
+use super::inside::UnpackedParts;
 
 /// A valid file.
 #[derive(Debug, Clone)]
@@ -13,7 +13,7 @@ pub struct Original {
     pub extension: &'static str,
     pub name: String,
     pub bytes: Vec<u8>,
-    pub inside: Option<Inside>,
+    pub inside: Option<UnpackedParts>,
     /// Words of the format.
     pub tokens: &'static [&'static [u8]],
 }
@@ -83,7 +83,7 @@ pub fn originals() -> Vec<Original> {
 
 fn original(extension: &'static str, name: String, bytes: Vec<u8>) -> Original {
     Original {
-        inside: Inside::of(extension, &bytes),
+        inside: UnpackedParts::of(extension, &bytes),
         tokens: tokens(extension),
         extension,
         name,

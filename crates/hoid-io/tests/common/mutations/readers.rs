@@ -4,20 +4,20 @@
 use std::path::Path;
 
 use hoid_io::{
-    IoError, Preparation, QualityIssueKind, ReadOptions, ReadRecord, Repair, Sparse, read_prepared, read_segments,
-    read_table, survey,
+    IoError, Preparation, QualityIssueKind, ReadOptions, ReadRecord, Repair, SparseTreatment, read_prepared,
+    read_segments, read_table, survey,
 };
 
 use super::draw::Draw;
 
 /// Maximum length of a message, characters.
-const LONGEST_MESSAGE: usize = 4000;
+const MAX_MESSAGE_CHARS: usize = 4000;
 /// Maximum number of samples per byte of a file; `--resample` may create several samples per recorded sample.
-const SAMPLES_PER_BYTE: usize = 200;
+const MAX_SAMPLES_PER_BYTE: usize = 200;
 
 /// Numbers of successful and refused reads.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Answers {
+pub struct ReadCounts {
     pub read: u64,
     pub refused: u64,
 }
@@ -26,24 +26,24 @@ pub struct Answers {
 ///
 /// # Panics
 /// If a required property is violated.
-pub fn all(path: &Path, bytes: usize, choice: u64) -> Answers {
-    let mut answers = Answers::default();
+pub fn read_with_all(path: &Path, bytes: usize, choice: u64) -> ReadCounts {
+    let mut answers = ReadCounts::default();
     let mut draw = Draw::new(choice, 0);
     let file = path.file_name().unwrap().to_str().unwrap();
     let mut take = |failed: Option<IoError>| match failed {
         None => answers.read += 1,
         Some(error) => {
             answers.refused += 1;
-            message(&error, file);
+            check_message(&error, file);
         }
     };
     for options in [ReadOptions::default(), options(&mut draw)] {
         let read = read_prepared(path, &options, &Preparation::default());
-        take(read.map(|read| whole(&read, bytes, &options)).err());
+        take(read.map(|read| check_record(&read, bytes, &options)).err());
     }
-    let mask = [*draw.one_of(&QualityIssueKind::MASKABLE)];
+    let mask = [*draw.one_of(&QualityIssueKind::MASKABLE_KINDS)];
     let read = read_segments(path, &options(&mut draw), &Preparation::default(), &mask, 0.02);
-    take(read.map(|all| all.iter().for_each(finite)).err());
+    take(read.map(|all| all.iter().for_each(check_finite)).err());
     take(survey(path).map(|found| assert!(!found.format.is_empty())).err());
     take(
         read_table(path)
@@ -72,7 +72,7 @@ fn options(draw: &mut Draw) -> ReadOptions {
             .map(|_| {
                 (
                     draw.one_of(&["e", "u", "r", "t", "x"]).to_string(),
-                    *draw.one_of(&Sparse::ALL),
+                    *draw.one_of(&SparseTreatment::ALL),
                 )
             })
             .collect(),
@@ -85,17 +85,17 @@ fn options(draw: &mut Draw) -> ReadOptions {
     }
 }
 
-fn whole(read: &ReadRecord, bytes: usize, options: &ReadOptions) {
-    finite(read);
+fn check_record(read: &ReadRecord, bytes: usize, options: &ReadOptions) {
+    check_finite(read);
     let record = &read.record;
     assert!(record.sample_time().s() > 0.0 && record.sample_time().s().is_finite());
     // Compressed zeros take very few bytes.
-    let most = SAMPLES_PER_BYTE * bytes + (1 << 25);
+    let most = MAX_SAMPLES_PER_BYTE * bytes + (1 << 25);
     assert!(record.len() <= most, "{} samples of {bytes} bytes", record.len());
     assert!(!record.is_empty(), "an empty record by {options:?}");
 }
 
-fn finite(read: &ReadRecord) {
+fn check_finite(read: &ReadRecord) {
     let record = &read.record;
     assert!(
         record.input().iter().chain(record.output()).all(|v| v.is_finite()),
@@ -103,11 +103,11 @@ fn finite(read: &ReadRecord) {
     );
 }
 
-fn message(error: &IoError, file: &str) {
+fn check_message(error: &IoError, file: &str) {
     let message = error.to_string();
     assert!(!matches!(error, IoError::Unreadable { .. }), "{message}");
     assert!(
-        message.chars().count() <= LONGEST_MESSAGE,
+        message.chars().count() <= MAX_MESSAGE_CHARS,
         "{} characters: {message}",
         message.len()
     );

@@ -6,12 +6,12 @@ use std::{
 };
 
 /// Processor time of this thread if the system reports it, otherwise elapsed time.
-pub struct Spent {
+pub struct ProcessorTime {
     on_processor: Option<Duration>,
     by_clock: Instant,
 }
 
-impl Spent {
+impl ProcessorTime {
     pub fn now() -> Self {
         let text = fs::read_to_string("/proc/thread-self/schedstat").ok();
         let nanoseconds = text.and_then(|text| text.split(' ').next()?.parse().ok());

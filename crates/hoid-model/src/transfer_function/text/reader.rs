@@ -32,7 +32,7 @@ impl Reader {
     }
 
     /// Returns the next character that is not a blank, without consuming it.
-    fn next(&mut self) -> Option<char> {
+    fn peek(&mut self) -> Option<char> {
         while self.signs.get(self.at).is_some_and(|sign| sign.is_whitespace()) {
             self.at += 1;
         }
@@ -40,13 +40,13 @@ impl Reader {
     }
 
     fn accept(&mut self, wanted: char) -> bool {
-        let found = self.next() == Some(wanted);
+        let found = self.peek() == Some(wanted);
         self.at += usize::from(found);
         found
     }
 
     fn expected_error<T>(&mut self, expected: &str) -> Result<T, String> {
-        let found = match self.next() {
+        let found = match self.peek() {
             Some(sign) => format!("{sign:?}"),
             None => "the end".to_owned(),
         };
@@ -56,12 +56,12 @@ impl Reader {
         ))
     }
 
-    pub fn whole(mut self) -> Result<Ratio, String> {
-        if self.next().is_none() {
+    pub fn expression(mut self) -> Result<Ratio, String> {
+        if self.peek().is_none() {
             return Err(format!("it is empty; {EXAMPLES}"));
         }
         let all = self.sum()?;
-        match self.next() {
+        match self.peek() {
             None => Ok(all),
             Some(')') => self.expected_error("a '(' before this ')'"),
             Some('=' | 'z' | 'p' | 'x') => self.expected_error("an expression in s only"),
@@ -73,7 +73,7 @@ impl Reader {
         let mut sum = self.product()?;
         loop {
             let start = self.at;
-            let sign = match self.next() {
+            let sign = match self.peek() {
                 Some('+') => 1.0,
                 Some('-') => -1.0,
                 _ => return Ok(sum),
@@ -84,7 +84,7 @@ impl Reader {
                 self.at = start;
                 return self.expected_error("one delay, as a factor of the whole function: 5exp(-0.1s)/(s+1)");
             };
-            sum = self.checked(total, start)?;
+            sum = self.check_ratio(total, start)?;
         }
     }
 
@@ -93,7 +93,7 @@ impl Reader {
         let mut divided = false;
         loop {
             let start = self.at;
-            match self.next() {
+            match self.peek() {
                 Some('*') => {
                     self.at += 1;
                     divided = false;
@@ -102,7 +102,7 @@ impl Reader {
                 Some('/') => {
                     self.at += 1;
                     divided = true;
-                    self.next();
+                    self.peek();
                     let at = self.at;
                     let by = self.factor()?;
                     if by.is_zero() {
@@ -124,7 +124,7 @@ impl Reader {
                 }
                 _ => return Ok(product),
             }
-            product = self.checked(product, start)?;
+            product = self.check_ratio(product, start)?;
         }
     }
 
@@ -145,10 +145,10 @@ impl Reader {
         if !self.accept('^') {
             return Ok(base);
         }
-        self.next();
+        self.peek();
         let start = self.at;
         let negative = self.accept('-');
-        self.next();
+        self.peek();
         let from = self.at;
         while self.signs.get(self.at).is_some_and(char::is_ascii_digit) {
             self.at += 1;
@@ -167,13 +167,13 @@ impl Reader {
         let base = if negative { base.inverse() } else { base };
         let mut power = Ratio::of(&[1.0]);
         for _ in 0..n {
-            power = self.checked(power.times(&base), start)?;
+            power = self.check_ratio(power.times(&base), start)?;
         }
         Ok(power)
     }
 
     fn atom(&mut self) -> Result<Ratio, String> {
-        match self.next() {
+        match self.peek() {
             Some('s') => {
                 self.at += 1;
                 Ok(Ratio::of(&[1.0, 0.0]))
@@ -209,7 +209,7 @@ impl Reader {
         let rest = &self.signs[start..];
         let length = if rest.starts_with(&['e', 'x', 'p']) { 3 } else { 1 };
         self.at += length;
-        if (length == 1 && !self.accept('^')) || self.next() != Some('(') {
+        if (length == 1 && !self.accept('^')) || self.peek() != Some('(') {
             self.at = start;
             return self.expected_error(EXPECTED);
         }
@@ -255,7 +255,7 @@ impl Reader {
     }
 
     /// Checks that an intermediate result is finite and of a reasonable degree.
-    fn checked(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
+    fn check_ratio(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
         if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
             self.at = at;
             return self.expected_error(&format!("a degree of at most {HIGHEST_DEGREE}"));

@@ -22,7 +22,7 @@ pub struct FirstFit {
 }
 
 /// Fits Box-Jenkins models with several orders of the noise model, and the forms of the family.
-pub fn evidence(record: &Record) -> FirstFit {
+pub fn fit_first_run(record: &Record) -> FirstFit {
     let mut evidence = Vec::new();
     let mut nd = None;
     let mut ranges = default_operator_ranges(Structure::BoxJenkins, record.sample_time());

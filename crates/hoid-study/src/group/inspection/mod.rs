@@ -1,4 +1,4 @@
-//! Inspection of the files of a group before the analysis ([`Look`]). The results are written to the manifest together
+//! Inspection of the files of a group before the analysis ([`FileExamination`]). The results are written to the manifest together
 //! with their evidence, for the user to check. Settings given by the user are kept.
 //!
 //! | file | contents |
@@ -11,7 +11,7 @@ mod first_fit;
 
 use std::path::Path;
 
-use hoid_analysis::{Look, LookOptions, RecordSummary};
+use hoid_analysis::{FileExamination, LookOptions, RecordSummary};
 
 pub use evidence::Evidence;
 
@@ -25,7 +25,7 @@ use crate::StudyError;
 /// evidence.
 pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -> Result<Vec<Evidence>, StudyError> {
     let mut evidence = Vec::new();
-    let first = Look::at(&directory.join(&manifest.runs[0].file), known)?;
+    let first = FileExamination::at(&directory.join(&manifest.runs[0].file), known)?;
     let shown = manifest.runs[0].file.display().to_string();
     let names: Vec<&str> = first.survey.columns.iter().map(|column| column.path.as_str()).collect();
     evidence.push(Evidence::new(
@@ -78,7 +78,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         // The first run of the manifest is also the first run of its condition.
         let look = first
             .take()
-            .map_or_else(|| Look::at(&directory.join(&run.file), &of_all), Ok);
+            .map_or_else(|| FileExamination::at(&directory.join(&run.file), &of_all), Ok);
         let seen = match look.and_then(|look| look.seen) {
             Ok(seen) => seen,
             Err(reason) => {
@@ -86,7 +86,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
                 continue;
             }
         };
-        let table = format!("[conditions.{}]", key_of(condition));
+        let table = format!("[conditions.{}]", toml_key(condition));
         let settings = inspect_condition(&seen, condition, &table, known, &mut evidence, &mut spans);
         // A run without a condition name has no table in the manifest.
         if !condition.is_empty() && settings != ConditionSettings::default() {
@@ -114,7 +114,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         });
     }
     if let Some(record) = of_first {
-        let found = first_fit::evidence(&record);
+        let found = first_fit::fit_first_run(&record);
         if let Some(nd) = found.nd {
             manifest.analysis.nd = nd;
         }
@@ -159,7 +159,7 @@ fn inspect_condition(
 }
 
 /// Writes a name as a TOML key of a table heading.
-fn key_of(name: &str) -> String {
+fn toml_key(name: &str) -> String {
     let bare = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
     if !name.is_empty() && name.chars().all(bare) {
         name.to_owned()
@@ -170,14 +170,17 @@ fn key_of(name: &str) -> String {
 
 /// Returns the text of a manifest with the evidence as comments above the lines concerned.
 #[must_use]
-pub fn commented(text: &str, evidence: &[Evidence]) -> String {
+pub fn with_comments(text: &str, evidence: &[Evidence]) -> String {
     let mut written = String::from(
         "# Made by `hoid group init` from the names and contents of the files: review it, then run\n\
          #   hoid group . --out results\n",
     );
     let comment = |written: &mut String, table: &str, key: &str| {
         for one in evidence.iter().filter(|one| one.table == table && one.key == key) {
-            written.push_str(&format!("# {}\n", hoid_io::printable(&one.words).replace('\n', " ")));
+            written.push_str(&format!(
+                "# {}\n",
+                hoid_io::escape_control_characters(&one.words).replace('\n', " ")
+            ));
         }
     };
     let mut table = String::new();
@@ -208,7 +211,7 @@ mod tests {
             Evidence::new("[conditions.a]", "excitation", "10 lines"),
             Evidence::new("[read]", "", "columns t, e, u"),
         ];
-        let written = commented(text, &evidence);
+        let written = with_comments(text, &evidence);
         assert!(
             written.contains("# columns t, e, u\n[read]\n# by its name\ninput = \"e\"\noutput"),
             "{written}"
@@ -221,8 +224,8 @@ mod tests {
 
     #[test]
     fn names_are_quoted_as_keys_if_needed() {
-        assert_eq!(key_of("so-2"), "so-2");
-        assert_eq!(key_of("so 2"), "\"so 2\"");
-        assert_eq!(key_of(""), "\"\"");
+        assert_eq!(toml_key("so-2"), "so-2");
+        assert_eq!(toml_key("so 2"), "\"so 2\"");
+        assert_eq!(toml_key(""), "\"\"");
     }
 }

@@ -18,9 +18,9 @@
 use hoid_core::state::{State, visit_all};
 
 use super::{
-    change::{Change, ChangeDetector, delay_of},
+    change::{Change, ChangeDetector, mean_delay},
     hypothesis::{Hypothesis, visit_slot},
-    prior::{ChangePrior, OPERATOR},
+    prior::{ChangePrior, PARAMETER_COUNT},
     signal_ring::DelayedSignals,
 };
 
@@ -59,14 +59,14 @@ impl<const M: usize> State for Bank<M> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mixture {
     /// Mean of `[K_e, K_e_dot, omega_nm, zeta_nm]`.
-    pub eta: [f64; OPERATOR],
+    pub eta: [f64; PARAMETER_COUNT],
     /// Mean innovation variance.
     pub variance: f64,
 }
 
 /// Number of delays on either side of the likeliest delay that are proposed as alternatives that may have been true
 /// throughout.
-const NEIGHBOURS: usize = 3;
+const NEIGHBOUR_COUNT: usize = 3;
 /// Smallest probability of a hypothesis relative to the likeliest hypothesis, so that no hypothesis is lost
 /// permanently.
 const MIN_PROBABILITY: f64 = 1e-12;
@@ -185,7 +185,7 @@ impl<const M: usize> Bank<M> {
     }
 
     /// Counts a sample without changing the estimate.
-    pub fn skip(&mut self) {
+    pub fn skip_sample(&mut self) {
         self.samples += 1;
     }
 
@@ -219,7 +219,7 @@ impl<const M: usize> Bank<M> {
     /// Creates the hypothesis that the gains change now; if `neuromuscular` is true, omega_nm and zeta_nm change as
     /// well.
     fn spawn_changed(&mut self, probability: f64, neuromuscular: bool) {
-        if let Some((slot, parent)) = self.parent() {
+        if let Some((slot, parent)) = self.parent_hypothesis() {
             self.spawn(self.with_change(&parent, neuromuscular), probability, slot);
         }
     }
@@ -227,10 +227,12 @@ impl<const M: usize> Bank<M> {
     /// Creates hypotheses with delays close to the likeliest delay, unless a hypothesis with the same delay and the
     /// same birth exists already.
     fn spawn_neighbouring_delays(&mut self) {
-        let Some((slot, parent)) = self.parent() else { return };
+        let Some((slot, parent)) = self.parent_hypothesis() else {
+            return;
+        };
         let delay = self.prior.delay;
         let mut probability = 1.0;
-        for away in 1..=NEIGHBOURS {
+        for away in 1..=NEIGHBOUR_COUNT {
             probability *= delay.neighbour_probability;
             for extra_delay in [parent.extra_delay.checked_sub(away), Some(parent.extra_delay + away)]
                 .into_iter()
@@ -250,7 +252,9 @@ impl<const M: usize> Bank<M> {
 
     /// Creates hypotheses that the gains and the delay change now, with at most the given total probability.
     fn spawn_changed_delays(&mut self, probability: f64) {
-        let Some((slot, parent)) = self.parent() else { return };
+        let Some((slot, parent)) = self.parent_hypothesis() else {
+            return;
+        };
         let delay = self.prior.delay;
         let apart = delay.count.div_ceil(delay.proposals);
         let first = (self.births / delay.propose_every) as usize % apart;
@@ -276,7 +280,7 @@ impl<const M: usize> Bank<M> {
 
     /// Returns the likeliest hypothesis and its slot. Hypotheses of a recent change of omega_nm and zeta_nm are
     /// excluded, so that the transient effect of a change of the gains on these parameters is not inherited.
-    fn parent(&self) -> Option<(usize, Hypothesis)> {
+    fn parent_hypothesis(&self) -> Option<(usize, Hypothesis)> {
         let (mut likeliest, mut highest) = (None, 0.0);
         for (slot, h) in self.hypotheses.iter().enumerate() {
             if let Some(h) = h
@@ -324,11 +328,11 @@ impl<const M: usize> Bank<M> {
     /// Returns the mean of the mixture.
     pub fn mixture(&self) -> Mixture {
         let mut mixture = Mixture {
-            eta: [0.0; OPERATOR],
+            eta: [0.0; PARAMETER_COUNT],
             variance: 0.0,
         };
         for h in self.hypotheses.iter().flatten() {
-            for i in 0..OPERATOR {
+            for i in 0..PARAMETER_COUNT {
                 mixture.eta[i] += h.probability * h.eta[i];
             }
             mixture.variance += h.probability * h.innovation_variance.variance();
@@ -337,14 +341,14 @@ impl<const M: usize> Bank<M> {
     }
 
     /// Returns the covariance of eta in the mixture.
-    pub fn covariance(&self) -> [[f64; OPERATOR]; OPERATOR] {
+    pub fn covariance(&self) -> [[f64; PARAMETER_COUNT]; PARAMETER_COUNT] {
         let mean = self.mixture().eta;
-        let mut covariance = [[0.0; OPERATOR]; OPERATOR];
+        let mut covariance = [[0.0; PARAMETER_COUNT]; PARAMETER_COUNT];
         for h in self.hypotheses.iter().flatten() {
             let p = h.covariance.matrix();
-            for i in 0..OPERATOR {
+            for i in 0..PARAMETER_COUNT {
                 let a = h.eta[i] - mean[i];
-                for j in 0..OPERATOR {
+                for j in 0..PARAMETER_COUNT {
                     let b = h.eta[j] - mean[j];
                     covariance[i][j] += h.probability * (p[i][j] + a * b);
                 }
@@ -355,7 +359,7 @@ impl<const M: usize> Bank<M> {
 
     /// Returns T_L in s and its variance. T_L is `E[K_e K_e_dot]/E[K_e^2]`, the T that minimises
     /// `E (K_e_dot - T K_e)^2`.
-    pub fn lead_time(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
+    pub fn lead_time(&self, covariance: &[[f64; PARAMETER_COUNT]; PARAMETER_COUNT]) -> [f64; 2] {
         let [k_e, k_e_dot, ..] = self.mixture().eta;
         let square = k_e * k_e + covariance[0][0];
         let lead_time = (k_e * k_e_dot + covariance[0][1]) / square;
@@ -365,13 +369,13 @@ impl<const M: usize> Bank<M> {
     }
 
     /// Returns the number of candidate delays.
-    pub fn delays(&self) -> usize {
+    pub fn delay_count(&self) -> usize {
         self.prior.delay.count
     }
 
     /// Returns the mean and the variance of the delay, in samples beyond the shortest delay.
     pub fn delay(&self) -> [f64; 2] {
-        delay_of(self.hypotheses())
+        mean_delay(self.hypotheses())
     }
 
     /// Returns the delay of the likeliest hypothesis, in samples beyond the shortest delay.
@@ -396,7 +400,7 @@ impl<const M: usize> Bank<M> {
     }
 
     /// Returns the number of samples so far.
-    pub fn samples(&self) -> u64 {
+    pub fn sample_count(&self) -> u64 {
         self.samples
     }
 }

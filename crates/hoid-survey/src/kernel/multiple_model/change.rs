@@ -16,7 +16,7 @@
 
 use super::{
     hypothesis::{Hypothesis, Snapshot},
-    prior::{ChangePrior, OPERATOR},
+    prior::{ChangePrior, PARAMETER_COUNT},
 };
 use hoid_core::state::{State, visit_all};
 
@@ -33,7 +33,7 @@ pub struct Change {
     pub after: Snapshot,
     /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, the innovation variance and the delay, each divided by its standard
     /// error.
-    pub z: [f64; OPERATOR + 2],
+    pub z: [f64; PARAMETER_COUNT + 2],
 }
 
 /// Lambda, and the changes declared since it rose above zero.
@@ -91,21 +91,21 @@ impl ChangeDetector {
     /// Updates the detector with the hypotheses after a sample. Returns true if Lambda rises above zero, which marks
     /// the start of a change.
     pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
-        let sums = Sums::over(hypotheses, now, prior);
+        let sums = Sums::from_hypotheses(hypotheses, now, prior);
         let before = self.log_odds;
         self.log_odds = log_odds(sums.recent, sums.older);
         self.change = None;
         if self.log_odds < 0.0 {
             (self.declared, self.declared_neuromuscular, self.declared_delay) = (false, false, false);
         } else if self.log_odds > prior.log_odds_threshold {
-            self.declare(&sums, hypotheses, now, prior);
+            self.declare_change(&sums, hypotheses, now, prior);
         }
         self.log_odds > 0.0 && before <= 0.0
     }
 
     /// Declares the change of the likeliest recent hypothesis, provided that this hypothesis is old enough and that the
     /// change, or a part of it, has not been declared yet.
-    fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
+    fn declare_change(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
         let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
             return;
         };
@@ -119,8 +119,8 @@ impl ChangeDetector {
             return;
         }
         let recent = hypotheses.iter().flatten().filter(|h| is_recent(h, now, prior));
-        let change = change_of(h, delay_of(recent), now, self.log_odds);
-        let delay_changed = change.z[OPERATOR + 1].abs() > DELAY_THRESHOLD;
+        let change = change_of(h, mean_delay(recent), now, self.log_odds);
+        let delay_changed = change.z[PARAMETER_COUNT + 1].abs() > DELAY_THRESHOLD;
         let new_delay = delay_changed && !self.declared_delay;
         if !self.declared || new_neuromuscular || new_delay {
             self.change = Some(change);
@@ -151,7 +151,7 @@ struct Sums<'a> {
 }
 
 impl<'a> Sums<'a> {
-    fn over(hypotheses: &'a [Option<Hypothesis>], now: u64, prior: &ChangePrior) -> Self {
+    fn from_hypotheses(hypotheses: &'a [Option<Hypothesis>], now: u64, prior: &ChangePrior) -> Self {
         let mut sums = Self {
             recent: 0.0,
             older: 0.0,
@@ -185,7 +185,7 @@ fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
 
 /// Mean and variance of the delay over hypotheses, in samples beyond the shortest delay. The variance includes 1/12 for
 /// rounding to whole samples.
-pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> [f64; 2] {
+pub(super) fn mean_delay<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> [f64; 2] {
     let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
     for h in hypotheses {
         let delay = h.extra_delay as f64;
@@ -201,8 +201,8 @@ pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> 
 fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change {
     let (before, after) = (h.before, Snapshot { delay, ..h.snapshot() });
     let samples_ago = now - h.born;
-    let mut z = [0.0; OPERATOR + 2];
-    for i in 0..OPERATOR {
+    let mut z = [0.0; PARAMETER_COUNT + 2];
+    for i in 0..PARAMETER_COUNT {
         let variance_of = |s: &Snapshot| {
             if i < 2 {
                 s.gain_covariance[i]
@@ -216,10 +216,10 @@ fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change
         }
     }
     if samples_ago > 0 && before.innovation_variance > 0.0 && after.innovation_variance > 0.0 {
-        z[OPERATOR] =
+        z[PARAMETER_COUNT] =
             libm::log(after.innovation_variance / before.innovation_variance) / libm::sqrt(2.0 / samples_ago as f64);
     }
-    z[OPERATOR + 1] = (after.delay[0] - before.delay[0]) / libm::sqrt(before.delay[1] + after.delay[1]);
+    z[PARAMETER_COUNT + 1] = (after.delay[0] - before.delay[0]) / libm::sqrt(before.delay[1] + after.delay[1]);
     Change {
         samples_ago,
         log_odds,

@@ -3,7 +3,7 @@
 /// ln 2 as the sum of two numbers; the first has so few digits that its multiples are exact.
 const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
 /// Number of stored bits in the mantissa of an f64.
-const MANTISSA: u32 = 52;
+const MANTISSA_BITS: u32 = 52;
 
 /// Returns `ln(1 + x)` for x >= 0. For small x it uses the series `2 (z + z^3/3 + z^5/5 + ...)` with `z = x/(2 + x)`,
 /// which takes a third of the time of libm; the first omitted term is below 1e-16 of the first term.
@@ -22,7 +22,7 @@ pub(crate) fn log1p(x: f64) -> f64 {
 }
 
 /// Adding and then subtracting 3/2 2^52 rounds a number to the nearest integer.
-const ROUNDS: f64 = 6_755_399_441_055_744.0;
+const ROUNDING_OFFSET: f64 = 6_755_399_441_055_744.0;
 
 /// Returns `e^x`, between -700 and 700 inline with a relative error of 4e-16, otherwise by libm. The inline value is
 /// `2^k e^r` with `|r| <= ln(2)/2` and the Taylor series of `e^r`.
@@ -31,7 +31,7 @@ pub(crate) fn exp(x: f64) -> f64 {
     if x.abs() >= 700.0 || x.is_nan() {
         return libm::exp(x);
     }
-    let k = (x * std::f64::consts::LOG2_E + ROUNDS) - ROUNDS;
+    let k = (x * std::f64::consts::LOG2_E + ROUNDING_OFFSET) - ROUNDING_OFFSET;
     let r = (x - k * LN_2[0]) - k * LN_2[1];
     let mut sum = 1.0 / 6_227_020_800.0;
     for factorial in [
@@ -51,7 +51,7 @@ pub(crate) fn exp(x: f64) -> f64 {
     ] {
         sum = sum * r + 1.0 / factorial;
     }
-    sum * f64::from_bits(((k as i64 + 1023) as u64) << MANTISSA)
+    sum * f64::from_bits(((k as i64 + 1023) as u64) << MANTISSA_BITS)
 }
 
 #[cfg(test)]

@@ -10,12 +10,12 @@ use super::{
     response::{Response, Signals},
     signal_ring::{DelayedSignals, SignalRing},
 };
-use hoid_core::{bounds::within, recursion::Step};
+use hoid_core::{bounds::clamp, recursion::Step};
 
 /// Number of samples between two moves of the linearisation point.
-const RELINEARISE_EVERY: u64 = 64;
+const RELINEARISATION_INTERVAL: u64 = 64;
 /// Largest relative move of the linearisation point; the states of the filters are moved to first order only.
-const LARGEST_MOVE: f64 = 0.1;
+const MAX_RELATIVE_MOVE: f64 = 0.1;
 
 /// The recursion. M is the largest number of hypotheses, D the largest order of the noise model, and B the memory for
 /// the signals of all delays.
@@ -56,7 +56,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
     /// differs from [`DelayPrior::count`](super::prior::DelayPrior::count).
     pub fn with_delays(first: Hypothesis, d: &[f64], prior: ChangePrior, memory: B) -> Option<Self> {
         let ring = SignalRing::new(memory);
-        if d.len() > D || ring.count() != prior.delay.count {
+        if d.len() > D || ring.delay_count() != prior.delay.count {
             return None;
         }
         let mut padded = [0.0; D];
@@ -77,7 +77,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
     /// Processes a sample `x(t) = e(t - nk)`, `u(t)`, where nk is the shortest delay. Both values must be finite.
     pub fn step(&mut self, x: f64, u: f64) -> Step {
         let signals = self.response.step(x);
-        let (y, r) = self.whitened(u, &signals);
+        let (y, r) = self.whiten(u, &signals);
         let finite = y.abs() < OVERFLOW_LIMIT && r.iter().all(|r| r.abs() < OVERFLOW_LIMIT);
         self.ring.push(if finite { r } else { [0.0; 6] });
         let sample = finite.then_some((y, self.ring.newest()));
@@ -91,11 +91,11 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
 
     /// As [`MultipleModelFilter::step`], but only the filters are updated; the estimate stays constant.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
-        self.bank.skip();
+        self.bank.skip_sample();
         let signals = self.response.step(x);
-        let (y, r) = self.whitened(u, &signals);
+        let (y, r) = self.whiten(u, &signals);
         self.ring.push(r);
-        let innovation = y - self.predicted(self.ring.newest());
+        let innovation = y - self.prediction(self.ring.newest());
         self.store(u, signals);
         Step {
             innovation,
@@ -105,17 +105,17 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
 
     /// As [`MultipleModelFilter::step_without_update`] for a missing output, which the one-step prediction replaces.
     pub fn bridge(&mut self, x: f64) {
-        self.bank.skip();
+        self.bank.skip_sample();
         let signals = self.response.step(x);
-        let (y, r) = self.whitened(0.0, &signals);
+        let (y, r) = self.whiten(0.0, &signals);
         self.ring.push(r);
-        let u = self.predicted(self.ring.newest()) - y;
+        let u = self.prediction(self.ring.newest()) - y;
         self.store(u, signals);
     }
 
     /// Returns `D u` and the signals filtered by D.
     #[inline(always)]
-    fn whitened(&self, u: f64, signals: &Signals) -> (f64, Signals) {
+    fn whiten(&self, u: f64, signals: &Signals) -> (f64, Signals) {
         let (mut y, mut r) = (u, *signals);
         for j in 0..self.order {
             let d = self.d[j];
@@ -128,7 +128,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
     }
 
     /// Returns the prediction of `D u`, with the mean parameters of the mixture and the likeliest delay.
-    fn predicted(&self, signals: DelayedSignals<'_>) -> f64 {
+    fn prediction(&self, signals: DelayedSignals<'_>) -> f64 {
         let eta = self.bank.mixture().eta;
         let r = signals.at(self.bank.likeliest_delay());
         let psi = hypothesis::gradient(&eta, r, self.response.point());
@@ -151,10 +151,11 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
             self.u[0] = u;
             self.past[0] = signals;
         }
-        if self.bank.samples().is_multiple_of(RELINEARISE_EVERY) {
+        if self.bank.sample_count().is_multiple_of(RELINEARISATION_INTERVAL) {
             let [.., omega, zeta] = self.bank.mixture().eta;
             let point = self.response.point();
-            let toward = |to: f64, from: f64| within(to, [(1.0 - LARGEST_MOVE) * from, (1.0 + LARGEST_MOVE) * from]);
+            let toward =
+                |to: f64, from: f64| clamp(to, [(1.0 - MAX_RELATIVE_MOVE) * from, (1.0 + MAX_RELATIVE_MOVE) * from]);
             let moved = [toward(omega, point[0]), toward(zeta, point[1])];
             self.response
                 .move_to(moved, self.past.iter_mut().chain(self.ring.iter_mut()));

@@ -17,7 +17,7 @@
 
 use super::{
     elementary::{exp, log1p},
-    prior::{ChangePrior, OPERATOR},
+    prior::{ChangePrior, PARAMETER_COUNT},
     response::Signals,
 };
 use hoid_core::{innovation_variance::InnovationVariance, state::State, ud_covariance::UdCovariance};
@@ -25,19 +25,19 @@ use hoid_core::{innovation_variance::InnovationVariance, state::State, ud_covari
 /// Limit of variances and signals beyond which their products would overflow.
 pub(super) const OVERFLOW_LIMIT: f64 = 1e60;
 /// Largest ratio of a squared innovation to its variance that enters sigma^2.
-const LARGEST_SQUARE: f64 = 9.0;
+const MAX_SQUARE_RATIO: f64 = 9.0;
 /// Largest relative distance of omega_nm and zeta_nm from the linearisation point for which the linearisation is valid.
-const LARGEST_DISTANCE: f64 = 0.5;
+const MAX_RELATIVE_DISTANCE: f64 = 0.5;
 /// Smallest innovation variance relative to the initial value, for spans without any signal.
-const MIN_VARIANCE: f64 = 1e-9;
+const MIN_VARIANCE_RATIO: f64 = 1e-9;
 
 /// One hypothesis: a Kalman filter of the operator's parameters since its birth.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hypothesis {
     /// Estimate of `[K_e, K_e_dot, omega_nm, zeta_nm]`.
-    pub eta: [f64; OPERATOR],
+    pub eta: [f64; PARAMETER_COUNT],
     /// Covariance of `eta`.
-    pub covariance: UdCovariance<OPERATOR>,
+    pub covariance: UdCovariance<PARAMETER_COUNT>,
     /// Innovation variance.
     pub innovation_variance: InnovationVariance,
     /// Probability of the hypothesis.
@@ -57,7 +57,7 @@ pub struct Hypothesis {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Snapshot {
     /// Estimate of `[K_e, K_e_dot, omega_nm, zeta_nm]`.
-    pub eta: [f64; OPERATOR],
+    pub eta: [f64; PARAMETER_COUNT],
     /// Variance of K_e, variance of K_e_dot, and their covariance.
     pub gain_covariance: [f64; 3],
     /// Variances of omega_nm and zeta_nm.
@@ -86,7 +86,7 @@ pub(super) fn visit_slot(slot: &mut Option<Hypothesis>, each: &mut dyn FnMut(&mu
 /// Returns psi at eta, computed from the whitened signals of filters that are linearised about the point
 /// `[omega_nm, zeta_nm]`.
 #[inline(always)]
-pub fn gradient(eta: &[f64; OPERATOR], r: &Signals, point: [f64; 2]) -> [f64; OPERATOR] {
+pub fn gradient(eta: &[f64; PARAMETER_COUNT], r: &Signals, point: [f64; 2]) -> [f64; PARAMETER_COUNT] {
     let (omega, zeta) = (eta[2] - point[0], eta[3] - point[1]);
     [
         r[0] + omega * r[2] + zeta * r[4],
@@ -112,8 +112,8 @@ fn bounded(value: f64, low: f64, high: f64) -> f64 {
 impl Hypothesis {
     fn empty() -> Self {
         Self {
-            eta: [0.0; OPERATOR],
-            covariance: UdCovariance::diagonal([0.0; OPERATOR]),
+            eta: [0.0; PARAMETER_COUNT],
+            covariance: UdCovariance::diagonal([0.0; PARAMETER_COUNT]),
             innovation_variance: InnovationVariance::new(0.0, 1.0, 1.0),
             probability: 0.0,
             born: 0,
@@ -127,8 +127,8 @@ impl Hypothesis {
     /// Creates a hypothesis from an estimate, its covariance and the innovation variance. `None` unless the covariance
     /// is positive definite.
     pub fn new(
-        eta: [f64; OPERATOR],
-        covariance: &[[f64; OPERATOR]; OPERATOR],
+        eta: [f64; PARAMETER_COUNT],
+        covariance: &[[f64; PARAMETER_COUNT]; PARAMETER_COUNT],
         innovation_variance: InnovationVariance,
     ) -> Option<Self> {
         let covariance = UdCovariance::from_matrix(covariance)?;
@@ -141,7 +141,7 @@ impl Hypothesis {
             neuromuscular_changed: false,
             extra_delay: 0,
             before: Snapshot::default(),
-            least_variance: MIN_VARIANCE * innovation_variance.variance(),
+            least_variance: MIN_VARIANCE_RATIO * innovation_variance.variance(),
         };
         first.before = first.snapshot();
         Some(first)
@@ -167,18 +167,20 @@ impl Hypothesis {
             (eps, 1.0)
         };
         let square = used * used / total;
-        let n = self.innovation_variance.residuals();
+        let n = self.innovation_variance.residual_count();
         let density = exp(-0.5 * (n + 1.0) * log1p(square / n) - 0.25 / n) / deviation;
-        let gain = self.covariance.update_projected((f, v), variance * variance_factor);
-        for i in 0..OPERATOR {
+        let gain = self
+            .covariance
+            .update_with_projections((f, v), variance * variance_factor);
+        for i in 0..PARAMETER_COUNT {
             let [mut low, mut high] = prior.bounds[i];
             if i >= 2 {
-                low = low.max((1.0 - LARGEST_DISTANCE) * point[i - 2]);
-                high = high.min((1.0 + LARGEST_DISTANCE) * point[i - 2]);
+                low = low.max((1.0 - MAX_RELATIVE_DISTANCE) * point[i - 2]);
+                high = high.min((1.0 + MAX_RELATIVE_DISTANCE) * point[i - 2]);
             }
             self.eta[i] = bounded(self.eta[i] + gain[i] * used, low, high);
         }
-        self.innovation_variance.update(square.min(LARGEST_SQUARE) * variance);
+        self.innovation_variance.update(square.min(MAX_SQUARE_RATIO) * variance);
         (eps, density)
     }
 
@@ -231,7 +233,7 @@ impl Hypothesis {
     pub fn with_neighbouring_delay(&self, extra_delay: usize, prior: &ChangePrior) -> Self {
         let mut other = self.with_extra_delay(extra_delay);
         let (scales, away) = (self.gain_scales(prior), extra_delay.abs_diff(self.extra_delay) as f64);
-        for i in 0..OPERATOR {
+        for i in 0..PARAMETER_COUNT {
             let scale = if i < 2 { scales[i] } else { self.eta[i] * self.eta[i] };
             let error = away * prior.delay.error_per_sample[i];
             other.inflate(i, error * error * scale);
@@ -253,7 +255,9 @@ impl Hypothesis {
                 child.inflate(2 + i, deviation * deviation);
             }
         }
-        child.innovation_variance.limit_residuals(prior.residuals_after_change);
+        child
+            .innovation_variance
+            .limit_residual_count(prior.residuals_after_change);
         child.born = now;
         child.neuromuscular_changed = neuromuscular;
         child.before = self.snapshot();
@@ -262,7 +266,7 @@ impl Hypothesis {
 
     /// Adds `variance` to the variance of parameter i.
     fn inflate(&mut self, i: usize, variance: f64) {
-        let mut unit = [0.0; OPERATOR];
+        let mut unit = [0.0; PARAMETER_COUNT];
         unit[i] = 1.0;
         self.covariance.rank_one_update(variance, unit);
     }

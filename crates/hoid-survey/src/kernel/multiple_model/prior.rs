@@ -6,7 +6,7 @@
 //! zero.
 
 /// Number of the operator's parameters: K_e, K_e_dot, omega_nm, zeta_nm.
-pub const OPERATOR: usize = 4;
+pub const PARAMETER_COUNT: usize = 4;
 
 /// Prior of changes of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,7 +14,7 @@ pub struct ChangePrior {
     /// Sample time in s.
     pub sample_time: f64,
     /// Smallest and largest value of K_e, K_e_dot, omega_nm and zeta_nm.
-    pub bounds: [[f64; 2]; OPERATOR],
+    pub bounds: [[f64; 2]; PARAMETER_COUNT],
     /// Crossover frequency omega_c, which scales K_e_dot relative to K_e, rad/s.
     pub crossover: f64,
     /// Probability of a change in one sample.
@@ -27,7 +27,7 @@ pub struct ChangePrior {
     pub gain_drift: f64,
     /// Standard deviations of the drift in one sample just after a change: K_e and K_e_dot relative to g and
     /// `g/omega_c`; omega_nm and zeta_nm, if they changed, in units of [`ChangePrior::neuromuscular_jump`].
-    pub transient_drift: [f64; OPERATOR],
+    pub transient_drift: [f64; PARAMETER_COUNT],
     /// Time constant with which the drift after a change decays, samples.
     pub transient_time_constant: f64,
     /// Standard deviations of a change of omega_nm and of zeta_nm, relative to their values.
@@ -83,19 +83,19 @@ pub struct DelayPrior {
     pub neighbour_probability: f64,
     /// Standard deviations of the errors of the parameters caused by a delay error of one sample: K_e and K_e_dot
     /// relative to g and `g/omega_c`, omega_nm and zeta_nm relative to their values.
-    pub error_per_sample: [f64; OPERATOR],
+    pub error_per_sample: [f64; PARAMETER_COUNT],
 }
 
 impl DelayPrior {
     /// Prior for a delay that is known and constant.
-    pub const KNOWN: Self = Self {
+    pub const KNOWN_DELAY: Self = Self {
         count: 1,
         propose_every: u32::MAX,
         proposals: 1,
         change_odds: 0.0,
         jump: 1.0,
         neighbour_probability: 0.0,
-        error_per_sample: [0.0; OPERATOR],
+        error_per_sample: [0.0; PARAMETER_COUNT],
     };
 
     fn is_valid(&self) -> bool {

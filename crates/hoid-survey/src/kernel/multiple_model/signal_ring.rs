@@ -15,7 +15,7 @@ pub struct DelayedSignals<'a> {
 
 impl<'a> DelayedSignals<'a> {
     /// Creates the signals of a model whose delay is known.
-    pub fn known(signals: &'a Signals) -> Self {
+    pub fn from_known_delay(signals: &'a Signals) -> Self {
         Self {
             ring: std::slice::from_ref(signals),
             newest: 0,
@@ -60,7 +60,7 @@ impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
     }
 
     /// Returns the number of delays.
-    pub fn count(&self) -> usize {
+    pub fn delay_count(&self) -> usize {
         self.memory.as_ref().len()
     }
 
@@ -106,6 +106,6 @@ mod tests {
             }
         }
         let only = [4.0; 6];
-        assert_eq!(DelayedSignals::known(&only).at(0), &only);
+        assert_eq!(DelayedSignals::from_known_delay(&only).at(0), &only);
     }
 }

@@ -6,12 +6,12 @@ use hoid_model::{
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{StartAt, TrackOptions, track};
+use hoid_track::{StartSource, TrackOptions, track};
 
-fn side(eta: [f64; OPERATOR], scale: f64, weight: f64) -> Side {
+fn side(eta: [f64; PARAMETER_COUNT], scale: f64, weight: f64) -> OneSidedHypothesis {
     // The covariance is positive definite: the sum of a unit matrix and a rank-one matrix.
     let direction = [0.3, -0.5, 0.2, 0.7];
-    Side {
+    OneSidedHypothesis {
         log_weight: weight.ln(),
         eta,
         covariance: std::array::from_fn(|i| {
@@ -31,14 +31,14 @@ fn product_matches_the_information_form() {
     );
     let (_, pair) = ForwardBackward::of(&f, &b).unwrap();
     let joined = pair.product();
-    let square = |m: &[[f64; OPERATOR]; OPERATOR]| nalgebra::Matrix4::from_fn(|i, j| m[i][j]);
-    let inverse = |s: &Side| square(&s.covariance).try_inverse().unwrap();
+    let square = |m: &[[f64; PARAMETER_COUNT]; PARAMETER_COUNT]| nalgebra::Matrix4::from_fn(|i, j| m[i][j]);
+    let inverse = |s: &OneSidedHypothesis| square(&s.covariance).try_inverse().unwrap();
     let covariance = (inverse(&f) + inverse(&b)).try_inverse().unwrap();
-    let vector = |s: &Side| nalgebra::Vector4::from(s.eta);
+    let vector = |s: &OneSidedHypothesis| nalgebra::Vector4::from(s.eta);
     let mean = covariance * (inverse(&f) * vector(&f) + inverse(&b) * vector(&b));
-    for i in 0..OPERATOR {
+    for i in 0..PARAMETER_COUNT {
         assert!((joined.eta[i] - mean[i]).abs() < 1e-13);
-        for j in 0..OPERATOR {
+        for j in 0..PARAMETER_COUNT {
             assert!((joined.covariance[i][j] - covariance[(i, j)]).abs() < 1e-13);
         }
     }
@@ -46,26 +46,29 @@ fn product_matches_the_information_form() {
 
 #[test]
 fn contradictory_past_and_future_are_not_joined() {
-    let old = side([1.0; OPERATOR], 0.01, 0.9);
-    let (same, other) = (side([1.0; OPERATOR], 0.01, 0.5), side([9.0; OPERATOR], 0.01, 0.5));
-    let joined = join(&[old], &[same, other]);
+    let old = side([1.0; PARAMETER_COUNT], 0.01, 0.9);
+    let (same, other) = (
+        side([1.0; PARAMETER_COUNT], 0.01, 0.5),
+        side([9.0; PARAMETER_COUNT], 0.01, 0.5),
+    );
+    let joined = mixture_product(&[old], &[same, other]);
     assert!((joined.eta[0] - 1.0).abs() < 1e-9);
     // The order of the two hypotheses does not matter.
-    let mirrored = join(&[same, other], &[old]);
-    for i in 0..OPERATOR {
+    let mirrored = mixture_product(&[same, other], &[old]);
+    for i in 0..PARAMETER_COUNT {
         assert!((joined.eta[i] - mirrored.eta[i]).abs() < 1e-12);
     }
     // If the covariances of the future are NaN, only the past is used.
-    let broken = Side {
-        covariance: [[f64::NAN; OPERATOR]; OPERATOR],
+    let broken = OneSidedHypothesis {
+        covariance: [[f64::NAN; PARAMETER_COUNT]; PARAMETER_COUNT],
         ..old
     };
-    assert_eq!(join(&[old], &[broken]).eta, old.eta);
+    assert_eq!(mixture_product(&[old], &[broken]).eta, old.eta);
 }
 
 fn options() -> TrackOptions {
     TrackOptions {
-        start: StartAt::Span(Some((0.0, 30.72))),
+        start: StartSource::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(
             multiple_model().with("smooth", "true").unwrap(),
             multiple_model().default_structure(),
@@ -112,14 +115,14 @@ fn faults_have_little_effect_and_short_records_are_refused() {
     (e[4000], u[4001]) = (-1e9, 1e300);
     assert!(
         Record::new(
-            SampleTime::HUNDREDTH,
+            SampleTime::AT_100_HZ,
             Channel::new("e", "deg", vec![f64::NAN; 2]),
             Channel::new("u", "deg", vec![0.0; 2])
         )
         .is_err()
     );
     let faulty = Record::new(
-        SampleTime::HUNDREDTH,
+        SampleTime::AT_100_HZ,
         Channel::new("e", "deg", e),
         Channel::new("u", "deg", u),
     )
@@ -131,7 +134,7 @@ fn faults_have_little_effect_and_short_records_are_refused() {
     }
     let short = record.span(0.0, 0.5).unwrap();
     let all = TrackOptions {
-        start: StartAt::Span(None),
+        start: StartSource::Span(None),
         ..options()
     };
     assert!(track(&short, &all, 1).is_err());

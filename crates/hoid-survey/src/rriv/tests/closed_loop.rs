@@ -12,7 +12,7 @@ use hoid_sim::Simulator;
 use super::*;
 use hoid_ident::Estimator;
 
-fn closed(condition: Condition, m0: usize, level: f64, replication: u64) -> Record {
+fn closed_loop_record(condition: Condition, m0: usize, level: f64, replication: u64) -> Record {
     let mut scenario = Scenario::condition(condition);
     scenario.remnant.order = m0;
     scenario.remnant.strength = RemnantStrength::Level {
@@ -35,7 +35,7 @@ fn track(record: &Record, lambda: f64, external: bool, from: f64, mut look: impl
         .fit(&[record.span(0.0, 30.72).unwrap()])
         .unwrap();
     let warm = record.span(0.0, from).unwrap();
-    let mut recursion = from_fit(&start, &warm, &[lambda; 5], external);
+    let mut recursion = recursion_from_fit(&start, &warm, &[lambda; 5], external);
     for (t, s) in samples(record).enumerate().skip(warm.len()) {
         recursion.step(s);
         look(t, &recursion);
@@ -43,14 +43,14 @@ fn track(record: &Record, lambda: f64, external: bool, from: f64, mut look: impl
 }
 
 /// `K_e`, the gain at zero frequency.
-fn gain(theta: &[f64]) -> f64 {
+fn static_gain(theta: &[f64]) -> f64 {
     (theta[0] + theta[1]) / (1.0 + theta[3] + theta[4])
 }
 
 #[test]
 fn bias_is_small_in_a_closed_loop() {
     let held = Scenario::condition(Condition::C1).initial.operator;
-    let held = held.discretise(SampleTime::HUNDREDTH).unwrap().held;
+    let held = held.discretise(SampleTime::AT_100_HZ).unwrap().held;
     let truth = [held.b0, held.b1, held.f1, held.f2];
     let runs = 20;
     for m0 in [1, 2] {
@@ -59,7 +59,7 @@ fn bias_is_small_in_a_closed_loop() {
             for replication in 0..runs {
                 let mut last = Vec::new();
                 track(
-                    &closed(Condition::C1, m0, 0.1, replication),
+                    &closed_loop_record(Condition::C1, m0, 0.1, replication),
                     1.0,
                     external,
                     30.72,
@@ -98,11 +98,11 @@ fn change_of_the_reference_task_is_tracked() {
     for external in [true, false] {
         let mut errors = Vec::new();
         for replication in 0..10 {
-            let record = closed(Condition::C4, 1, 0.1, replication);
+            let record = closed_loop_record(Condition::C4, 1, 0.1, replication);
             let truth = record.channel("K_e").unwrap();
             let mut squares = Vec::new();
             track(&record, lambda, external, 10.0, |t, r| {
-                squares.push((gain(r.theta()) / truth[t] - 1.0).powi(2));
+                squares.push((static_gain(r.theta()) / truth[t] - 1.0).powi(2));
             });
             errors.push(100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt());
         }
@@ -138,7 +138,7 @@ fn divergence_in_the_reference_task() {
                     for replication in 0..runs {
                         let mut largest = 0.0_f64;
                         track(
-                            &closed(condition, m0, level, replication),
+                            &closed_loop_record(condition, m0, level, replication),
                             lambda,
                             external,
                             10.0,
@@ -165,7 +165,7 @@ fn divergence_in_the_reference_task() {
 #[test]
 #[ignore = "prints times"]
 fn time_of_a_step() {
-    let record = closed(Condition::C1, 1, 0.1, 0);
+    let record = closed_loop_record(Condition::C1, 1, 0.1, 0);
     for external in [false, true] {
         let clock = Instant::now();
         let mut steps = 0;

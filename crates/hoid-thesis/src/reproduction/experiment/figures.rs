@@ -17,45 +17,45 @@ use crate::{
 
 /// Quantity shown in a panel.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Shown {
+pub(super) enum PanelQuantity {
     Discrete(usize),
     Operator(usize),
     Variance(usize),
 }
 
 /// A row of panels: quantity, name, unit.
-pub(super) type Row = (Shown, &'static str, &'static str);
+pub(super) type Row = (PanelQuantity, &'static str, &'static str);
 
 pub(super) const DISCRETE: [Row; 4] = [
-    (Shown::Discrete(0), "a1", ""),
-    (Shown::Discrete(1), "a2", ""),
-    (Shown::Discrete(2), "b0", ""),
-    (Shown::Discrete(3), "b1", ""),
+    (PanelQuantity::Discrete(0), "a1", ""),
+    (PanelQuantity::Discrete(1), "a2", ""),
+    (PanelQuantity::Discrete(2), "b0", ""),
+    (PanelQuantity::Discrete(3), "b1", ""),
 ];
 pub(super) const OPERATOR: [Row; 5] = [
-    (Shown::Operator(0), "K_e", "deg/deg"),
-    (Shown::Operator(1), "T_L", "s"),
-    (Shown::Operator(2), "K_e_dot", "s"),
-    (Shown::Operator(3), "omega_nm", "rad/s"),
-    (Shown::Operator(4), "zeta_nm", ""),
+    (PanelQuantity::Operator(0), "K_e", "deg/deg"),
+    (PanelQuantity::Operator(1), "T_L", "s"),
+    (PanelQuantity::Operator(2), "K_e_dot", "s"),
+    (PanelQuantity::Operator(3), "omega_nm", "rad/s"),
+    (PanelQuantity::Operator(4), "zeta_nm", ""),
 ];
 pub(super) const VARIANCES: [Row; 5] = [
-    (Shown::Variance(0), "variance of a1", ""),
-    (Shown::Variance(1), "variance of a2", ""),
-    (Shown::Variance(2), "variance of b0", ""),
-    (Shown::Variance(3), "variance of b1", ""),
-    (Shown::Variance(4), "variance of d1", ""),
+    (PanelQuantity::Variance(0), "variance of a1", ""),
+    (PanelQuantity::Variance(1), "variance of a2", ""),
+    (PanelQuantity::Variance(2), "variance of b0", ""),
+    (PanelQuantity::Variance(3), "variance of b1", ""),
+    (PanelQuantity::Variance(4), "variance of d1", ""),
 ];
 
 const RECURSIONS: [&str; 2] = ["RLS", "RPEM"];
 const BATCH: [&str; 2] = ["OLS", "PEM"];
 
-impl Shown {
+impl PanelQuantity {
     fn is_variance(self) -> bool {
         matches!(self, Self::Variance(_))
     }
 
-    fn of_state(self, state: &State) -> f64 {
+    fn value_in_state(self, state: &State) -> f64 {
         match self {
             Self::Discrete(i) => state.discrete[i],
             Self::Operator(i) => state.operator[i],
@@ -64,10 +64,10 @@ impl Shown {
     }
 
     /// Value of the quantity in a row of a recursive estimate; NaN beyond its last row.
-    fn of_course(self, course: &RecursiveTrace, row: usize) -> f64 {
+    fn value_in_trace(self, course: &RecursiveTrace, row: usize) -> f64 {
         let found = match self {
             Self::Variance(i) => course.variances.get(row).map(|variances| variances[i]),
-            _ => course.states.get(row).map(|state| self.of_state(state)),
+            _ => course.states.get(row).map(|state| self.value_in_state(state)),
         };
         found.unwrap_or(f64::NAN)
     }
@@ -94,9 +94,9 @@ pub(super) fn draw(
                 if shown.is_variance() && method == 0 {
                     continue;
                 }
-                curves.extend(over_time(*shown, own, method, (name, subject), &mut data));
+                curves.extend(recursive_curves(*shown, own, method, (name, subject), &mut data));
                 if !shown.is_variance() {
-                    curves.extend(batch(*shown, own, method, (name, subject), &mut data));
+                    curves.extend(batch_curves(*shown, own, method, (name, subject), &mut data));
                 }
             }
             if !shown.is_variance() {
@@ -105,7 +105,7 @@ pub(super) fn draw(
             panels.push(TracePanel {
                 name: (*name).to_owned(),
                 // The gains of recorded people are in the units of their recordings.
-                unit: if simulated || !matches!(shown, Shown::Operator(0 | 2)) {
+                unit: if simulated || !matches!(shown, PanelQuantity::Operator(0 | 2)) {
                     (*unit).to_owned()
                 } else {
                     String::new()
@@ -133,12 +133,12 @@ pub(super) fn draw(
         marks_s: changes.next().into_iter().collect(),
         ..TraceGrid::default()
     };
-    item.drawn(trace_panels, &grid, data)
+    item.draw(trace_panels, &grid, data)
 }
 
 /// Curves of the median and the mean over the runs of a recursive estimate.
-fn over_time(
-    shown: Shown,
+fn recursive_curves(
+    shown: PanelQuantity,
     own: &[&EvaluatedRun],
     method: usize,
     (name, subject): (&str, &str),
@@ -147,10 +147,10 @@ fn over_time(
     let courses = || own.iter().map(|run| &run.outcome.courses[method]);
     let longest = courses().max_by_key(|course| course.times_s.len());
     let times_s = longest.map_or(Vec::new(), |course| course.times_s.clone());
-    let at = |row: usize| mean_and_median(courses().map(|course| shown.of_course(course, row)));
+    let at = |row: usize| mean_and_median(courses().map(|course| shown.value_in_trace(course, row)));
     let both: Vec<[f64; 2]> = (0..times_s.len()).map(at).collect();
     for (t, [mean, median]) in times_s.iter().zip(&both) {
-        data.row(&[name, RECURSIONS[method], subject], &[*t, *mean, *median]);
+        data.add_row(&[name, RECURSIONS[method], subject], &[*t, *mean, *median]);
     }
     // Higher levels are darker; the median is drawn first, and the mean over it.
     [1, 0]
@@ -164,8 +164,8 @@ fn over_time(
 }
 
 /// Curves of the means over the runs of the batch fits to the two spans.
-fn batch(
-    shown: Shown,
+fn batch_curves(
+    shown: PanelQuantity,
     own: &[&EvaluatedRun],
     method: usize,
     (name, subject): (&str, &str),
@@ -176,9 +176,12 @@ fn batch(
     };
     let mut curves = Vec::new();
     for (span, (from_s, to_s)) in first.outcome.spans_s.into_iter().enumerate() {
-        let fitted = mean_and_median(own.iter().map(|run| shown.of_state(&run.outcome.batch[method][span])));
+        let fitted = mean_and_median(
+            own.iter()
+                .map(|run| shown.value_in_state(&run.outcome.batch[method][span])),
+        );
         for t in [from_s, to_s] {
-            data.row(&[name, BATCH[method], subject], &[t, fitted[0], fitted[1]]);
+            data.add_row(&[name, BATCH[method], subject], &[t, fitted[0], fitted[1]]);
         }
         curves.push(curve(
             CurveKind::Batch,
@@ -204,12 +207,13 @@ fn curve(kind: CurveKind, method: usize, level: usize, times_s: Vec<f64>, values
 
 /// Curve of the mean over the simulated operators, which changes from its value at the start to its value at the end;
 /// `None` for recorded people.
-fn truth(shown: Shown, own: &[&EvaluatedRun], condition: Condition) -> Option<TraceCurve> {
+fn truth(shown: PanelQuantity, own: &[&EvaluatedRun], condition: Condition) -> Option<TraceCurve> {
     let states: Vec<[State; 2]> = (own.iter()).filter_map(|run| Some(run.outcome.truth?.states)).collect();
     if states.is_empty() {
         return None;
     }
-    let [first, last] = [0, 1].map(|end| mean_and_median(states.iter().map(|state| shown.of_state(&state[end])))[0]);
+    let [first, last] =
+        [0, 1].map(|end| mean_and_median(states.iter().map(|state| shown.value_in_state(&state[end])))[0]);
     let schedule = Scenario::condition(condition).schedule;
     let times_s: Vec<f64> = (0..=512).map(|k| 81.92 * f64::from(k) / 512.0).collect();
     let share = |t: &f64| match (schedule.change_s(), schedule.rate_per_s()) {

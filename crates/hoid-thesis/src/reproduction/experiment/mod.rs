@@ -22,7 +22,7 @@ use super::item::{Item, ItemOutput, ProgressCallbacks, SharedRuns};
 use crate::{
     ThesisError,
     experiment::{
-        EXPERIMENT, EvaluatedRun, Evaluation, Experiment, ExperimentCondition, ExperimentPlan, RecordedPeople,
+        EXPERIMENT_PLAN, EvaluatedRun, Evaluation, Experiment, ExperimentCondition, ExperimentPlan, RecordedPeople,
         experiment,
     },
 };
@@ -47,19 +47,19 @@ impl Runs {
     }
 
     fn get(&self, watch: &ProgressCallbacks<'_>) -> &Evaluation {
-        let estimates = self.people.estimates_of_run();
+        let estimates = self.people.estimate_count_per_run();
         self.made
             .get_or_init(|| experiment(self.people.as_ref(), &|| (watch.done)(estimates), watch.keep_running))
     }
 
     /// Returns the runs in the form in which items share them.
-    fn shared(&self, title: &'static str) -> SharedRuns {
+    fn to_shared_runs(&self, title: &'static str) -> SharedRuns {
         let runs = self.clone();
         SharedRuns {
             name: NAME,
             title,
-            estimates: self.people.estimates_of_run() * self.people.runs().len() as u64,
-            make: Arc::new(move |watch| notes(runs.get(watch))),
+            estimates: self.people.estimate_count_per_run() * self.people.runs().len() as u64,
+            make: Arc::new(move |watch| failure_notes(runs.get(watch))),
         }
     }
 
@@ -71,13 +71,13 @@ impl Runs {
     ) -> Item {
         let runs = self.clone();
         let made =
-            move |item: &Item, _: Option<&hoid_study::Results>| make(item, &runs.get(&ProgressCallbacks::NONE).runs);
+            move |item: &Item, _: Option<&hoid_study::Results>| make(item, &runs.get(&ProgressCallbacks::IGNORED).runs);
         Item::new(name, title, caption, None, made)
     }
 }
 
 /// Returns the reasons why runs could not be evaluated; an error if no run could be evaluated.
-fn notes(found: &Evaluation) -> Result<Vec<String>, ThesisError> {
+fn failure_notes(found: &Evaluation) -> Result<Vec<String>, ThesisError> {
     let note = |(key, reason): &(crate::experiment::RunKey, String)| {
         format!("run {} of {} in {}: {reason}", key.run, key.subject, key.condition)
     };
@@ -96,11 +96,11 @@ fn notes(found: &Evaluation) -> Result<Vec<String>, ThesisError> {
 
 /// Items for the virtual people.
 pub(super) fn items() -> Vec<Item> {
-    let Ok(plan) = ExperimentPlan::parse(EXPERIMENT) else {
+    let Ok(plan) = ExperimentPlan::parse(EXPERIMENT_PLAN) else {
         return Vec::new();
     };
     let runs = Runs::new(plan);
-    let shared = runs.shared("The experiment with virtual people");
+    let shared = runs.to_shared_runs("The experiment with virtual people");
     let mut all = vec![runs.item(
         (
             "table-3".to_owned(),
@@ -109,23 +109,23 @@ pub(super) fn items() -> Vec<Item> {
         ),
         |item, runs| tables::delays(item, runs, &["C4".to_owned()]),
     )];
-    all.extend(figures_of(
+    all.extend(condition_figures(
         &runs,
         "virtual people",
         "Three virtual subjects, mean (dark) and median (light) over the last five of seven runs at each time; the \
          thesis shows the mean. Dashed in colour: mean of the batch fits to [0, 30.72] and [51.20, 81.92] s; dashed \
          black: mean of the simulated operator over the runs.",
     ));
-    all.into_iter().map(|item| item.sharing(&shared)).collect()
+    all.into_iter().map(|item| item.with_shared_runs(&shared)).collect()
 }
 
 /// Items for recorded people.
 pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
-    const DELAYS: &str = "Mean of the values from the best fits to the first and last three eighths of a run, with \
+    const DELAYS_CAPTION: &str = "Mean of the values from the best fits to the first and last three eighths of a run, with \
                           the value from each fit.";
     let name = people.name().to_owned();
     let runs = Runs::new(people);
-    let shared = runs.shared("The experiment with recorded people");
+    let shared = runs.to_shared_runs("The experiment with recorded people");
     let conditions = runs.people.conditions();
     let names = |wanted: &dyn Fn(&ExperimentCondition) -> bool| -> Vec<String> {
         let own = conditions.iter().filter(|condition| wanted(condition));
@@ -138,13 +138,17 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
     let mut all = Vec::new();
     if !of_table_3.is_empty() {
         all.push(runs.item(
-            ("table-3".to_owned(), title("sudden change from s1 to s2"), DELAYS),
+            (
+                "table-3".to_owned(),
+                title("sudden change from s1 to s2"),
+                DELAYS_CAPTION,
+            ),
             move |item, runs| tables::delays(item, runs, &of_table_3),
         ));
     }
     let conditions = every.clone();
     all.push(runs.item(
-        ("table-3-all".to_owned(), title("all conditions"), DELAYS),
+        ("table-3-all".to_owned(), title("all conditions"), DELAYS_CAPTION),
         move |item, runs| tables::delays(item, runs, &every),
     ));
     all.push(runs.item(
@@ -157,7 +161,7 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
         ),
         move |item, runs| tables::operators(item, runs, &conditions),
     ));
-    all.extend(figures_of(
+    all.extend(condition_figures(
         &runs,
         &name,
         "Recorded people, mean (dark) and median (light) over the last five runs of each person at each time; the \
@@ -165,11 +169,11 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
          dotted vertical line: the change of the controlled element. Outliers beyond the range of a vertical axis are \
          clipped, but the data file contains them.",
     ));
-    all.into_iter().map(|item| item.sharing(&shared)).collect()
+    all.into_iter().map(|item| item.with_shared_runs(&shared)).collect()
 }
 
 /// Figs. 13, 14 and I.1 to I.18 for the available conditions.
-fn figures_of(runs: &Runs, people: &str, caption: &str) -> Vec<Item> {
+fn condition_figures(runs: &Runs, people: &str, caption: &str) -> Vec<Item> {
     let [discrete, operator, variances] = [
         (
             "Recursive ARX and Box-Jenkins (m* = 1) estimates, discrete parameters",
@@ -185,7 +189,7 @@ fn figures_of(runs: &Runs, people: &str, caption: &str) -> Vec<Item> {
     for condition in runs.people.conditions() {
         let of_text = condition.of_text;
         let mut figure = |number: String, (what, rows): (&str, &'static [Row])| {
-            let (name, title) = named(&number, what, &condition, people);
+            let (name, title) = figure_name_and_title(&number, what, &condition, people);
             let own = condition.name.clone();
             let make = move |item: &Item, runs: &[EvaluatedRun]| figures::draw(item, runs, (&own, of_text), rows);
             all.push(runs.item((name, title, caption), make));
@@ -206,7 +210,7 @@ fn figures_of(runs: &Runs, people: &str, caption: &str) -> Vec<Item> {
 }
 
 /// Name and title of a figure.
-fn named(number: &str, what: &str, condition: &ExperimentCondition, people: &str) -> (String, String) {
+fn figure_name_and_title(number: &str, what: &str, condition: &ExperimentCondition, people: &str) -> (String, String) {
     let ExperimentCondition { name, of_text } = condition;
     if *name == of_text.to_string() {
         return (number.to_owned(), format!("{what}, condition {name} ({people})"));

@@ -35,10 +35,10 @@ pub(super) fn delays(item: &Item, runs: &[EvaluatedRun], conditions: &[String]) 
                 let found = &run.outcome;
                 let [arx, bj] = found.nk.map(|nk| nk as f64);
                 match &found.truth {
-                    Some(truth) => data.row(&[subject, &run.key.run], &[truth.nk as f64, arx, bj, found.t_n_s]),
+                    Some(truth) => data.add_row(&[subject, &run.key.run], &[truth.nk as f64, arx, bj, found.t_n_s]),
                     None => {
                         let [of_arx, of_bj] = found.nk_of_span.map(|spans| spans.map(|nk| nk as f64));
-                        data.row(
+                        data.add_row(
                             &[subject, condition, &run.key.run],
                             &[arx, bj, found.t_n_s, of_arx[0], of_arx[1], of_bj[0], of_bj[1]],
                         );
@@ -47,7 +47,7 @@ pub(super) fn delays(item: &Item, runs: &[EvaluatedRun], conditions: &[String]) 
             }
         }
     }
-    data.table(&item.title).into()
+    data.build(&item.title).into()
 }
 
 /// Table of the operators of the people in each condition, by estimator and span.
@@ -70,14 +70,14 @@ pub(super) fn operators(item: &Item, runs: &[EvaluatedRun], conditions: &[String
                         .iter()
                         .map(|run| match is_batch {
                             true => run.outcome.batch[method][span].operator,
-                            false => at_the_end(&run.outcome, method, span),
+                            false => final_medians(&run.outcome, method, span),
                         })
                         .collect();
                     let determined = of_runs.iter().filter(|of| of[0].is_finite()).count();
                     let share = determined as f64 / of_runs.len() as f64;
                     let [k_e, t_l, k_e_dot, omega, zeta] =
                         [0, 1, 2, 3, 4].map(|i| mean_and_median(of_runs.iter().map(|of| of[i]))[1]);
-                    data.row(
+                    data.add_row(
                         &[condition, subject, estimator, name],
                         &[own.len() as f64, share, k_e, t_l, k_e_dot, omega, zeta],
                     );
@@ -85,11 +85,11 @@ pub(super) fn operators(item: &Item, runs: &[EvaluatedRun], conditions: &[String
             }
         }
     }
-    data.table(&item.title).into()
+    data.build(&item.title).into()
 }
 
 /// Returns the medians of a recursive estimate over the second half of a span.
-fn at_the_end(outcome: &RunOutcome, method: usize, span: usize) -> [f64; 5] {
+fn final_medians(outcome: &RunOutcome, method: usize, span: usize) -> [f64; 5] {
     let (from_s, to_s) = outcome.spans_s[span];
     let course = &outcome.courses[method];
     let within: Vec<&[f64; 5]> = (course.times_s.iter().zip(&course.states))

@@ -112,8 +112,8 @@ fn figures_are_named_by_number_and_condition() {
         name: name.to_owned(),
         of_text: Condition::C4,
     };
-    assert_eq!(named("I.10", "x", &condition("C4"), "p").0, "I.10");
-    let (name, title) = named("I.10", "x", &condition("C7 pitch"), "p");
+    assert_eq!(figure_name_and_title("I.10", "x", &condition("C4"), "p").0, "I.10");
+    let (name, title) = figure_name_and_title("I.10", "x", &condition("C7 pitch"), "p");
     assert_eq!(name, "I.10-C7-pitch");
     assert!(title.contains("C7 pitch") && title.contains("C4"), "{title}");
 }

@@ -54,7 +54,7 @@ pub(super) fn boxes(
                 let mut of_group = Vec::new();
                 for (i, of) in series.iter().enumerate() {
                     let s = BoxStatistics::of(&results.values(&query(quantity, m0, group, i)));
-                    data.row(
+                    data.add_row(
                         &[quantity, group, &of.name],
                         &[
                             m0 as f64,
@@ -90,5 +90,5 @@ pub(super) fn boxes(
         with_zero,
         least_reach: 0.0,
     };
-    item.drawn(box_plots, &grid, data)
+    item.draw(box_plots, &grid, data)
 }

@@ -12,7 +12,7 @@ use super::{
 };
 
 pub(super) fn items() -> Vec<Item> {
-    vec![Item::of_study(
+    vec![Item::from_study(
         "decimation",
         "Error of the frequency response by sample time, condition C1, P_n = 0.1",
         "Median over the runs of the relative error of the response at the lines of the forcing function; bars: \
@@ -49,9 +49,11 @@ fn decimation(item: &Item, results: &Results) -> ItemOutput {
         for (i, name) in ESTIMATORS.into_iter().enumerate() {
             let mut points = Vec::new();
             for k in 1..=8 {
-                if let Some(row) = results.one(&Query::of("response_error").remnant_order(m0).name(name).decimate(k)) {
+                if let Some(row) =
+                    results.find_one(&Query::of("response_error").remnant_order(m0).name(name).decimate(k))
+                {
                     let s = &row.statistics;
-                    data.row(
+                    data.add_row(
                         &[name],
                         &[m0 as f64, 0.01 * k as f64, s.lower_quartile, s.median, s.upper_quartile],
                     );
@@ -86,5 +88,5 @@ fn decimation(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: false,
         shared_ordinates: true,
     };
-    item.drawn(curves, &grid, data)
+    item.draw(curves, &grid, data)
 }

@@ -10,7 +10,7 @@ use super::{
 };
 
 pub(super) fn items() -> Vec<Item> {
-    vec![Item::of_study(
+    vec![Item::from_study(
         "forgetting",
         "Forgetting factor against forgetting matrix, P_n = 0.1",
         "Root mean square of the relative error of each run from 10 s on. Light: one factor for all parameters, 256 samples; dark: a matrix that forgets only b.",

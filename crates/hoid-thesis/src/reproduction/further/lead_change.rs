@@ -12,7 +12,7 @@ use super::{
 };
 
 pub(super) fn items() -> Vec<Item> {
-    vec![Item::of_study(
+    vec![Item::from_study(
         "lead-change",
         "Detectability of a 20 % change in T_L within 5 s",
         "Distance between the medians of T_L at 45.9 and 40.6 s in units of their spread (interquartile range / \
@@ -25,7 +25,7 @@ pub(super) fn items() -> Vec<Item> {
 
 /// Returns the median of T_L and its standard deviation over the runs, estimated from the quartiles, at the last stored
 /// time that is not after the given time.
-fn at_time(results: &Results, cell: u64, estimator: &str, time_s: f64) -> Option<(f64, f64)> {
+fn t_l_at_time(results: &Results, cell: u64, estimator: &str, time_s: f64) -> Option<(f64, f64)> {
     let trace = results.traces(cell, estimator)?;
     let bands = trace.parameters.get("T_L")?;
     let k = trace.times_s.iter().rposition(|t| *t <= time_s)?;
@@ -60,13 +60,13 @@ fn lead_change(item: &Item, results: &Results) -> ItemOutput {
                     continue;
                 };
                 let (Some(before), Some(after)) = (
-                    at_time(results, cell.index, &estimator.label, 40.7),
-                    at_time(results, cell.index, &estimator.label, 45.96),
+                    t_l_at_time(results, cell.index, &estimator.label, 40.7),
+                    t_l_at_time(results, cell.index, &estimator.label, 45.96),
                 ) else {
                     continue;
                 };
                 let distance = (after.0 - before.0) / (0.5 * (before.1 + after.1));
-                data.row(
+                data.add_row(
                     &[&estimator.label],
                     &[p_n, before.0, before.1, after.0, after.1, distance],
                 );
@@ -113,5 +113,5 @@ fn lead_change(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: true,
         shared_ordinates: true,
     };
-    item.drawn(curves, &grid, data)
+    item.draw(curves, &grid, data)
 }

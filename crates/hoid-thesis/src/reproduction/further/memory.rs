@@ -17,14 +17,14 @@ const MEMORIES: [(&str, f64); 5] = [("0.5s", 0.5), ("1s", 1.0), ("2.56s", 2.56),
 
 pub(super) fn items() -> Vec<Item> {
     vec![
-        Item::of_study(
+        Item::from_study(
             "memory",
             "Error of recursive estimates by memory, condition C4, P_n = 0.1",
             "Median over the runs of the root mean square of the relative error from 10 s on; bars: quartiles.",
             "memory",
             memory,
         ),
-        Item::of_study(
+        Item::from_study(
             "memory-settling",
             "Settling of recursive estimates by memory, condition C4, P_n = 0.1",
             "Time after the change at which the median trace has covered 90 % of the step of K_e_dot. A missing point did not settle within the run.",
@@ -56,9 +56,9 @@ fn memory(item: &Item, results: &Results) -> ItemOutput {
                         .remnant_order(m0)
                         .name(name)
                         .axis("memory", label);
-                    if let Some(row) = results.one(&query) {
+                    if let Some(row) = results.find_one(&query) {
                         let s = &row.statistics;
-                        data.row(
+                        data.add_row(
                             &[parameter, name],
                             &[m0 as f64, seconds, s.lower_quartile, s.median, s.upper_quartile],
                         );
@@ -84,7 +84,7 @@ fn memory(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: true,
         shared_ordinates: false,
     };
-    item.drawn(curves, &grid, data)
+    item.draw(curves, &grid, data)
 }
 
 fn settling(item: &Item, results: &Results) -> ItemOutput {
@@ -98,11 +98,11 @@ fn settling(item: &Item, results: &Results) -> ItemOutput {
                     .remnant_order(m0)
                     .name(name)
                     .axis("memory", label);
-                results.one(&query).map_or(f64::NAN, |row| row.statistics.median)
+                results.find_one(&query).map_or(f64::NAN, |row| row.statistics.median)
             };
             let y: Vec<f64> = MEMORIES.iter().map(|(label, _)| time(label)).collect();
             for ((_, seconds), settling) in MEMORIES.iter().zip(&y) {
-                data.row(&[name], &[m0 as f64, *seconds, *settling]);
+                data.add_row(&[name], &[m0 as f64, *seconds, *settling]);
             }
             drawn.push(Curve {
                 name: name.to_owned(),
@@ -130,5 +130,5 @@ fn settling(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: true,
         shared_ordinates: true,
     };
-    item.drawn(curves, &grid, data)
+    item.draw(curves, &grid, data)
 }

@@ -15,27 +15,34 @@ use super::{
 pub(super) fn items() -> Vec<Item> {
     let mut all = Vec::new();
     for condition in ["C1", "C2"] {
-        all.push(Item::of_study(
+        all.push(Item::from_study(
             format!("remnant-time-constant-{condition}"),
             format!("Bias by time constant of the remnant, condition {condition}"),
             "Relative bias with nk = 29, Box-Jenkins with m* = 1, by T_n.",
             "remnant-time-constant",
-            move |item, results| by_axis(item, results, condition, "remnant_T_n_s", &["0.06", "0.2"], "T_n (s)"),
+            move |item, results| biases_by_axis(item, results, condition, "remnant_T_n_s", &["0.06", "0.2"], "T_n (s)"),
         ));
-        all.push(Item::of_study(
+        all.push(Item::from_study(
             format!("noise-definition-{condition}"),
             format!("Bias by definition of the noise level, P_n = 0.1, condition {condition}"),
             "Relative bias with nk = 29, Box-Jenkins with m* = 1. response: P_n = var(u_n)/var(u); remnant: P_n = var(n)/var(u).",
             "noise-definition",
             move |item, results| {
-                by_axis(item, results, condition, "remnant_noise_definition", &["response", "remnant"], "definition of P_n")
+                biases_by_axis(item, results, condition, "remnant_noise_definition", &["response", "remnant"], "definition of P_n")
             },
         ));
     }
     all
 }
 
-fn by_axis(item: &Item, results: &Results, condition: &str, axis: &str, groups: &[&str], abscissa: &str) -> ItemOutput {
+fn biases_by_axis(
+    item: &Item,
+    results: &Results,
+    condition: &str,
+    axis: &str,
+    groups: &[&str],
+    abscissa: &str,
+) -> ItemOutput {
     let mut levels: Vec<f64> = results
         .plan
         .cells

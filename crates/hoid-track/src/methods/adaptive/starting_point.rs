@@ -2,7 +2,7 @@
 //!
 //! **A fit** has coordinates x of an operator Y(x) with covariance C. The recursion has gains theta of the responses
 //! h_i of a basis, which is computed for the delay, the neuromuscular system and the lag of the fit, and corrections of
-//! delay and neuromuscular system. The gains are those whose response is nearest to Y at [`FREQUENCIES`] rad/s,
+//! delay and neuromuscular system. The gains are those whose response is nearest to Y at [`FIT_FREQUENCIES_RAD_S`] rad/s,
 //!
 //! `theta = argmin sum_k |(sum_i theta_i h_i(w_k) - Y(w_k))/Y(w_k)|^2`,
 //!
@@ -14,9 +14,9 @@
 //! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
 
 use hoid_core::adaptive::{
-    DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, STATES,
-    basis::{Basis, Point, REFERENCE},
-    defaults::{DefaultOperator, GIVEN_DELAY_S, LAG_S},
+    DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_NOISE_ORDER, STATE_COUNT,
+    basis::{Basis, Point, REFERENCE_RAD_S},
+    defaults::{DefaultOperator, GIVEN_DELAY_DEVIATION_S, LAG_S},
     initial_estimate::InitialEstimate,
     noise::Lags,
 };
@@ -26,18 +26,18 @@ use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordin
 use crate::person_prior::PersonPrior;
 
 /// Standard deviations of the dynamics without prior knowledge: relative for omega and zeta, in s for tau.
-const UNINFORMATIVE_SPREAD: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
+const UNINFORMATIVE_DEVIATIONS: [f64; DYNAMICS_COUNT] = [0.45, 0.75, 0.15];
 /// Frequencies at which the gains are fitted to the response of an earlier fit: range in rad/s, and number.
-const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
+const FIT_FREQUENCIES_RAD_S: ([f64; 2], usize) = ([0.3, 8.0], 24);
 /// Range of the lag of a basis, s. A lag beyond its upper end cannot be distinguished from an integration.
-const LAGS_S: [f64; 2] = [0.05, 10.0];
+const LAG_RANGE_S: [f64; 2] = [0.05, 10.0];
 /// Root mean square of the relative misfit beyond which the basis cannot approximate a form.
 const MAX_MISFIT: f64 = 0.1;
 /// Length of data, in s, that has the same weight as the remnant of a fit.
-const REMNANT_S: f64 = 20.0;
+const REMNANT_WEIGHT_S: f64 = 20.0;
 /// Longest impulse response of the remnant that is summed, s, and the largest share of the power of an impulse response
 /// in its second half.
-const LONGEST_S: f64 = 60.0;
+const MAX_IMPULSE_RESPONSE_S: f64 = 60.0;
 const MAX_SECOND_HALF_SHARE: f64 = 1e-6;
 /// Prior standard deviation of the level of u, in standard deviations of the remnant.
 const LEVEL_DEVIATION: f64 = 3.0;
@@ -47,7 +47,7 @@ const LEVEL_DEVIATION: f64 = 3.0;
 pub(super) struct StartingPoint {
     pub point: Point,
     /// Prior standard deviations: relative for omega and zeta, in s for the delay.
-    pub spread: [f64; DYNAMICS],
+    pub spread: [f64; DYNAMICS_COUNT],
 }
 
 impl StartingPoint {
@@ -59,33 +59,33 @@ impl StartingPoint {
         } = DefaultOperator::with_delay(tau_s);
         // An error that is held between samples is half a sample later than an error that is linear between samples.
         let hold = 0.5 * sample_time.s();
-        let of_delay = |otherwise: f64| if is_given { GIVEN_DELAY_S } else { otherwise };
+        let of_delay = |otherwise: f64| if is_given { GIVEN_DELAY_DEVIATION_S } else { otherwise };
         spread[2] = of_delay(spread[2]);
         match prior {
             PersonPrior::Population => {}
             PersonPrior::Nothing => {
                 spread = [
-                    UNINFORMATIVE_SPREAD[0],
-                    UNINFORMATIVE_SPREAD[1],
-                    of_delay(UNINFORMATIVE_SPREAD[2]),
+                    UNINFORMATIVE_DEVIATIONS[0],
+                    UNINFORMATIVE_DEVIATIONS[1],
+                    of_delay(UNINFORMATIVE_DEVIATIONS[2]),
                 ]
             }
             PersonPrior::Named(_) => {
                 let places = [&mut point.omega, &mut point.zeta];
                 for ((name, place), spread) in ["omega_nm", "zeta_nm"].into_iter().zip(places).zip(&mut spread) {
-                    if let Some((centre, relative)) = prior.named(name) {
+                    if let Some((centre, relative)) = prior.named_parameter(name) {
                         (*place, *spread) = (centre, relative);
                     }
                 }
-                if let Some((centre, relative)) = prior.named("tau_e") {
+                if let Some((centre, relative)) = prior.named_parameter("tau_e") {
                     (point.tau, spread[2]) = (centre + hold, centre * relative);
                 }
-                if let Some((centre, _)) = prior.named("T_I") {
-                    point.lag = centre.clamp(LAGS_S[0], LAGS_S[1]);
+                if let Some((centre, _)) = prior.named_parameter("T_I") {
+                    point.lag = centre.clamp(LAG_RANGE_S[0], LAG_RANGE_S[1]);
                 }
             }
             PersonPrior::Fit(fit) => {
-                let Some((omega, zeta)) = fit.operator.neuromuscular() else {
+                let Some((omega, zeta)) = fit.operator.neuromuscular_parameters() else {
                     return Err(unsupported_fit(
                         fit,
                         "it has no neuromuscular system, which the basis of this method requires; identify the person \
@@ -95,17 +95,17 @@ impl StartingPoint {
                 let all = fit.operator.form().coordinates(true);
                 let rate = all.iter().position(|c| *c == Coordinate::LagRate);
                 let lag = match rate.map(|i| fit.operator.coordinates()[i]) {
-                    Some(rate) => 1.0 / rate.max(1.0 / LAGS_S[1]),
-                    None if fit.operator.form().has_pole() => LAGS_S[1],
+                    Some(rate) => 1.0 / rate.max(1.0 / LAG_RANGE_S[1]),
+                    None if fit.operator.form().has_pole() => LAG_RANGE_S[1],
                     // A form with a squared lead and without a lag is best approximated with a short lag of the basis.
-                    None if fit.operator.form().degree() == 2 => LAGS_S[0],
+                    None if fit.operator.form().degree() == 2 => LAG_RANGE_S[0],
                     None => LAG_S,
                 };
                 point = Point {
                     tau: fit.operator.tau_e_s() + hold,
                     omega,
                     zeta,
-                    lag: lag.max(LAGS_S[0]),
+                    lag: lag.max(LAG_RANGE_S[0]),
                 };
             }
         }
@@ -128,7 +128,7 @@ pub(super) fn initial_estimate(
     basis: &Basis,
     sample_time: SampleTime,
 ) -> Result<InitialEstimate, IdentError> {
-    let nearest = Nearest::new(fit, basis, sample_time);
+    let nearest = NearestGains::new(fit, basis, sample_time);
     let (value, misfit) = nearest.gains(|k| nearest.responses[k].value);
     if misfit > MAX_MISFIT {
         return Err(unsupported_fit(
@@ -141,25 +141,25 @@ pub(super) fn initial_estimate(
             ),
         ));
     }
-    let mut state = [0.0; STATES];
-    state[..GAINS].copy_from_slice(&value);
+    let mut state = [0.0; STATE_COUNT];
+    state[..GAIN_COUNT].copy_from_slice(&value);
     let coordinates = fit.operator.form().coordinates(true);
     let p = coordinates.len();
     let point = basis.point();
     // Rows of J for the coordinates, then S = J C J'.
-    let columns: Vec<[f64; STATES]> = (0..p)
+    let columns: Vec<[f64; STATE_COUNT]> = (0..p)
         .map(|j| {
-            let mut column = [0.0; STATES];
+            let mut column = [0.0; STATE_COUNT];
             match coordinates[j] {
-                Coordinate::LogOmega => column[LINEAR] = point.omega,
-                Coordinate::LogZeta => column[LINEAR + 1] = point.zeta,
-                Coordinate::Delay => column[LINEAR + 2] = 1.0,
-                _ => column[..GAINS].copy_from_slice(&nearest.gains(|k| nearest.responses[k].gradient[j]).0),
+                Coordinate::LogOmega => column[LINEAR_COUNT] = point.omega,
+                Coordinate::LogZeta => column[LINEAR_COUNT + 1] = point.zeta,
+                Coordinate::Delay => column[LINEAR_COUNT + 2] = 1.0,
+                _ => column[..GAIN_COUNT].copy_from_slice(&nearest.gains(|k| nearest.responses[k].gradient[j]).0),
             }
             column
         })
         .collect();
-    let mut covariance = [[0.0; STATES]; STATES];
+    let mut covariance = [[0.0; STATE_COUNT]; STATE_COUNT];
     for (i, a) in columns.iter().enumerate() {
         for (j, b) in columns.iter().enumerate() {
             for (row, a) in covariance.iter_mut().zip(a) {
@@ -171,27 +171,27 @@ pub(super) fn initial_estimate(
     }
     let widened = nearest.covariance_factor(fit, &coordinates, &columns);
     covariance.iter_mut().flatten().for_each(|c| *c *= widened);
-    let lags = remnant(fit, sample_time);
+    let lags = remnant_autocovariances(fit, sample_time);
     let power = lags.map_or(1.0, |lags| lags[0]) * fit.innovation_variance;
-    covariance[GAINS][GAINS] = LEVEL_DEVIATION * LEVEL_DEVIATION * power;
+    covariance[GAIN_COUNT][GAIN_COUNT] = LEVEL_DEVIATION * LEVEL_DEVIATION * power;
     Ok(InitialEstimate {
         state,
-        covariance: symmetric(&covariance),
+        covariance: symmetrise(&covariance),
         variance: fit.innovation_variance,
-        unit: fit.operator.response_and_gradient(REFERENCE).value.norm(),
-        remnant: lags.map(|lags| (lags, REMNANT_S)),
+        unit: fit.operator.response_and_gradient(REFERENCE_RAD_S).value.norm(),
+        remnant: lags.map(|lags| (lags, REMNANT_WEIGHT_S)),
     })
 }
 
 /// Makes the matrix exactly symmetric.
-fn symmetric(c: &[[f64; STATES]; STATES]) -> [[f64; STATES]; STATES] {
+fn symmetrise(c: &[[f64; STATE_COUNT]; STATE_COUNT]) -> [[f64; STATE_COUNT]; STATE_COUNT] {
     std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (c[i][j] + c[j][i])))
 }
 
 /// Autocovariances of `(C/D) eps` divided by the variance of eps; `None` if the impulse response does not decay.
-fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
+fn remnant_autocovariances(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
     let (c, d) = &fit.noise;
-    let longest = (LONGEST_S / sample_time.s()) as usize;
+    let longest = (MAX_IMPULSE_RESPONSE_S / sample_time.s()) as usize;
     let mut g = vec![0.0; longest];
     for k in 0..longest {
         let moving = if k == 0 {
@@ -209,23 +209,28 @@ fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
     }
     let of = |k: usize| g.iter().zip(&g[k.min(longest)..]).map(|(a, b)| a * b).sum();
     let lags: Lags = std::array::from_fn(of);
-    debug_assert_eq!(lags.len(), LARGEST_ORDER + 1);
+    debug_assert_eq!(lags.len(), MAX_NOISE_ORDER + 1);
     Some(lags)
 }
 
 /// The least-squares problem of the nearest gains.
-struct Nearest {
+struct NearestGains {
     /// Responses of the operator, after a zero-order hold, at each frequency.
     responses: Vec<hoid_model::operator_family::FamilyResponse>,
     /// Responses of the basis at each frequency, divided by the response of the operator.
-    basis: Vec<[Complex64; GAINS]>,
+    basis: Vec<[Complex64; GAIN_COUNT]>,
 }
 
-impl Nearest {
+impl NearestGains {
     /// Returns the factor by which the covariance of the state must be increased so that the response is at no
     /// frequency better known than from the fit. The factor exceeds one because gains with a fixed lag cannot represent
     /// the uncertainty of the response that an unknown lag causes.
-    fn covariance_factor(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
+    fn covariance_factor(
+        &self,
+        fit: &FittedOperator,
+        coordinates: &[Coordinate],
+        columns: &[[f64; STATE_COUNT]],
+    ) -> f64 {
         let p = coordinates.len();
         let sizes = |g: &[Complex64]| -> [f64; 2] {
             let of = |part: fn(&Complex64) -> f64| {
@@ -251,7 +256,7 @@ impl Nearest {
     }
 
     fn new(fit: &FittedOperator, basis: &Basis, sample_time: SampleTime) -> Self {
-        let ([low, high], count) = FREQUENCIES;
+        let ([low, high], count) = FIT_FREQUENCIES_RAD_S;
         let high = high.min(0.9 * sample_time.nyquist_rad_s());
         let at = |k: usize| low * (high / low).powf(k as f64 / (count as f64 - 1.0));
         let held = |omega: f64| {
@@ -279,19 +284,19 @@ impl Nearest {
 
     /// Returns the gains with which the response of the basis is nearest to a target, and the root mean square of the
     /// relative misfit.
-    fn gains(&self, target: impl Fn(usize) -> Complex64) -> ([f64; GAINS], f64) {
+    fn gains(&self, target: impl Fn(usize) -> Complex64) -> ([f64; GAIN_COUNT], f64) {
         let count = self.basis.len();
         let relative = |k: usize| target(k) / self.responses[k].value;
-        let (mut a, mut b) = ([[0.0; GAINS]; GAINS], [0.0; GAINS]);
+        let (mut a, mut b) = ([[0.0; GAIN_COUNT]; GAIN_COUNT], [0.0; GAIN_COUNT]);
         for (k, h) in self.basis.iter().enumerate() {
-            for i in 0..GAINS {
+            for i in 0..GAIN_COUNT {
                 b[i] += (h[i].conj() * relative(k)).re;
-                for j in 0..GAINS {
+                for j in 0..GAIN_COUNT {
                     a[i][j] += (h[i].conj() * h[j]).re;
                 }
             }
         }
-        let gains = solved(a, b);
+        let gains = solve_by_cramer(a, b);
         let left = |k: usize| {
             let sum: Complex64 = gains.iter().zip(&self.basis[k]).map(|(g, h)| h * *g).sum();
             (sum - relative(k)).norm_sqr()
@@ -302,8 +307,8 @@ impl Nearest {
 }
 
 /// Solves three equations by Cramer's rule: the responses of the basis are far from linearly dependent.
-fn solved(a: [[f64; GAINS]; GAINS], b: [f64; GAINS]) -> [f64; GAINS] {
-    let determinant = |m: &[[f64; GAINS]; GAINS]| {
+fn solve_by_cramer(a: [[f64; GAIN_COUNT]; GAIN_COUNT], b: [f64; GAIN_COUNT]) -> [f64; GAIN_COUNT] {
+    let determinant = |m: &[[f64; GAIN_COUNT]; GAIN_COUNT]| {
         m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
             + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
     };
@@ -337,7 +342,7 @@ mod tests {
                 .collect(),
             noise: (vec![0.4], vec![-1.5, 0.56]),
             innovation_variance: 0.01,
-            sample_time: SampleTime::HUNDREDTH,
+            sample_time: SampleTime::AT_100_HZ,
             units: [String::new(), String::new()],
             source: "fit.json".to_owned(),
         }
@@ -346,7 +351,7 @@ mod tests {
     fn tracker(fit: FittedOperator) -> Result<Tracker, IdentError> {
         let mut options = TrackOptions::default_for(Method::adaptive(), 21);
         options.method.start_from(fit).unwrap();
-        Tracker::new(&options, None, SampleTime::HUNDREDTH)
+        Tracker::new(&options, None, SampleTime::AT_100_HZ)
     }
 
     /// Before the first sample, gain and phase and their errors equal those of the fit.
@@ -419,7 +424,7 @@ mod tests {
             noise: (Vec::new(), vec![-0.8]),
             ..fitted(Form::Lead, &[2.0, 0.4, 2.3, -1.2, 0.18])
         };
-        let lags = remnant(&fit, SampleTime::HUNDREDTH).unwrap();
+        let lags = remnant_autocovariances(&fit, SampleTime::AT_100_HZ).unwrap();
         for (k, lag) in lags.iter().enumerate() {
             assert!((lag - 0.8_f64.powi(k as i32) / 0.36).abs() < 1e-9);
         }
@@ -427,7 +432,7 @@ mod tests {
             noise: (Vec::new(), vec![-1.0]),
             ..fit
         };
-        assert!(remnant(&endless, SampleTime::HUNDREDTH).is_none());
+        assert!(remnant_autocovariances(&endless, SampleTime::AT_100_HZ).is_none());
     }
 
     #[test]
@@ -436,14 +441,14 @@ mod tests {
             .with("prior", "omega_nm=9:0.2,tau_e=0.25:0.1")
             .unwrap();
         let prior = named.person_prior().unwrap();
-        let found = StartingPoint::of(prior, 0.205, false, SampleTime::HUNDREDTH).unwrap();
+        let found = StartingPoint::of(prior, 0.205, false, SampleTime::AT_100_HZ).unwrap();
         assert_eq!(
             (found.point.omega, found.point.zeta, found.point.lag),
             (9.0, defaults::ZETA, LAG_S)
         );
         assert!((found.point.tau - 0.255).abs() < 1e-12);
-        assert_eq!(found.spread, [0.2, defaults::SPREAD[1], 0.025]);
-        let wide = StartingPoint::of(&PersonPrior::Nothing, 0.205, false, SampleTime::HUNDREDTH).unwrap();
-        assert!(wide.spread.iter().zip(defaults::SPREAD).all(|(a, b)| *a > b));
+        assert_eq!(found.spread, [0.2, defaults::PRIOR_DEVIATIONS[1], 0.025]);
+        let wide = StartingPoint::of(&PersonPrior::Nothing, 0.205, false, SampleTime::AT_100_HZ).unwrap();
+        assert!(wide.spread.iter().zip(defaults::PRIOR_DEVIATIONS).all(|(a, b)| *a > b));
     }
 }

@@ -70,7 +70,7 @@ fn lead_after_a_change_is_unbiased() {
 
 #[test]
 fn lead_is_finite_for_zero_output() {
-    let mut tracker = Tracker::new(&options(), None, SampleTime::HUNDREDTH).unwrap();
+    let mut tracker = Tracker::new(&options(), None, SampleTime::AT_100_HZ).unwrap();
     for k in 0..400 {
         tracker.step((0.07 * f64::from(k)).sin(), 0.0);
     }
@@ -109,7 +109,7 @@ fn invalid_options_are_refused() {
     refused.orders.nd = 25;
     assert!(refused.check().unwrap_err().to_string().contains("at most 24"));
     refused = options();
-    refused.start = StartAt::Theta(vec![0.0; 20]);
+    refused.start = StartSource::Theta(vec![0.0; 20]);
     assert!(refused.check().is_err());
 }
 

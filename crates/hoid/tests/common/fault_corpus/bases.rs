@@ -53,7 +53,7 @@ pub struct Base {
 
 impl Base {
     /// Returns the index of the run into which the fault is inserted.
-    pub fn faulty(&self) -> usize {
+    pub fn faulty_run_index(&self) -> usize {
         self.runs.len() / 2
     }
 }
@@ -64,12 +64,12 @@ impl Base {
 /// The errors of the simulation.
 pub fn base(who: OperatorKind, seed: u64, case: u64) -> Result<Base, SimError> {
     match who {
-        OperatorKind::C1 | OperatorKind::C2 => of_text(who, seed, case),
-        OperatorKind::Person => of_person(seed, case),
+        OperatorKind::C1 | OperatorKind::C2 => thesis_base(who, seed, case),
+        OperatorKind::Person => person_base(seed, case),
     }
 }
 
-fn of_text(who: OperatorKind, seed: u64, case: u64) -> Result<Base, SimError> {
+fn thesis_base(who: OperatorKind, seed: u64, case: u64) -> Result<Base, SimError> {
     let run = |condition: Condition, replication: u64| -> Result<(Table, Truth), SimError> {
         let scenario = Scenario::condition(condition);
         let streams = RunSeed {
@@ -107,7 +107,7 @@ fn of_text(who: OperatorKind, seed: u64, case: u64) -> Result<Base, SimError> {
     })
 }
 
-fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
+fn person_base(seed: u64, case: u64) -> Result<Base, SimError> {
     // A tenth of the corpus, which consists of every tenth case, must also have all kinds of people.
     let i = (case + case / 10) as usize;
     let task = Task {
@@ -138,14 +138,14 @@ fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
         label: format!("person, {kind}"),
         form,
         runs,
-        truth: named(&person.state.operator),
+        truth: true_parameters(&person.state.operator),
         second: Table::of(&other.run(0)?.record, with_disturbance),
-        second_truth: named(&other.state.operator),
+        second_truth: true_parameters(&other.state.operator),
     })
 }
 
-fn named(operator: &FamilyOperator) -> Truth {
-    let all = operator.named().into_iter();
+fn true_parameters(operator: &FamilyOperator) -> Truth {
+    let all = operator.named_parameters().into_iter();
     // An infinite T_I has no standard error.
     all.filter(|p| p.value.is_finite())
         .map(|p| (p.name.to_owned(), p.value))

@@ -3,13 +3,13 @@
 use hoid::prelude::RunSeed;
 
 use super::{
-    kinds::{Change, Channels, Fault, FaultPosition, WHOLE},
-    table::{Table, spread},
+    kinds::{Change, Channels, Fault, FaultPosition, WHOLE_LENGTH_S},
+    table::{Table, standard_deviation},
 };
 
 /// A recording with its fault.
 #[derive(Debug, Clone)]
-pub struct Injected {
+pub struct FaultyRecording {
     pub table: Table,
     /// Start of the fault, s from the first sample.
     pub from_s: f64,
@@ -31,10 +31,10 @@ pub fn uniform(seed: u64, case: u64, draw: u64) -> f64 {
 }
 
 /// Inserts a fault into a recording. `second` is a recording of another person.
-pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64) -> Injected {
+pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64) -> FaultyRecording {
     let mut table = clean.clone();
     let n = clean.len();
-    let (of_e, of_u) = (spread(&clean.e), spread(&clean.u));
+    let (of_e, of_u) = (standard_deviation(&clean.e), standard_deviation(&clean.u));
     let draw = |i: u64| uniform(seed, case, i);
     let sign = |i: u64| if draw(i) < 0.5 { -1.0 } else { 1.0 };
     let near = |share: f64| ((share + 0.02 * (draw(0) - 0.5)) * n as f64) as usize;
@@ -47,7 +47,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     let samples = |seconds: f64| ((seconds / clean.h).round() as usize).max(1);
     let until = |length: usize| at.saturating_add(length).min(n);
     let (on, size) = (fault.kind.on, fault.size);
-    let seconds = if size == WHOLE { n } else { samples(size) };
+    let seconds = if size == WHOLE_LENGTH_S { n } else { samples(size) };
     // Rows that differ from the recording without the fault.
     let mut rows = (at, n);
     let mut stays = false;
@@ -105,11 +105,11 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
                     replication: 1 + i as u64,
                 }
                 .white_noise(length);
-                let sigma = spread(column);
+                let sigma = standard_deviation(column);
                 column.splice(at..at, noise.into_iter().map(|z| small * sigma * z));
             }
             table.renumber();
-            return Injected {
+            return FaultyRecording {
                 from_s: at as f64 * clean.h,
                 to_s: (at + length) as f64 * clean.h,
                 table,
@@ -171,9 +171,9 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
                 column.truncate(rows.0);
             }
             table.renumber();
-            return Injected {
+            return FaultyRecording {
                 from_s: 0.0,
-                to_s: table.seconds(),
+                to_s: table.duration_s(),
                 table,
                 rows,
             };
@@ -187,7 +187,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
         }
     }
     let last = if stays { rows.0 } else { rows.1 };
-    Injected {
+    FaultyRecording {
         from_s: rows.0 as f64 * clean.h,
         to_s: last as f64 * clean.h,
         table,

@@ -4,9 +4,9 @@
 //! only in whole samples has a standard error of one sample. A parameter that is reported as not determined, or has no
 //! standard error, is not judged.
 //!
-//! A trace is wrong if it is wrong at its last row or [`LATER_S`] after the fault. Its recovery time is the time from
-//! the end of the fault to the last row in which a parameter differs by more than [`MAX_NEAR_ERRORS`] of its standard
-//! errors and by more than [`NEAR_SHARE`] of its true value. Its lasting error is the largest error that it had for
+//! A trace is wrong if it is wrong at its last row or [`RECOVERY_CHECK_S`] after the fault. Its recovery time is the time from
+//! the end of the fault to the last row in which a parameter differs by more than [`MAX_RECOVERED_ERRORS`] of its standard
+//! errors and by more than [`MAX_RECOVERED_RELATIVE_ERROR`] of its true value. Its lasting error is the largest error that it had for
 //! [`MIN_LASTING_S`] without interruption.
 
 use serde_json::Value;
@@ -14,13 +14,13 @@ use serde_json::Value;
 use super::bases::Truth;
 
 /// Number of standard errors from which a value is wrong.
-pub const WRONG: f64 = 4.0;
+pub const WRONG_LIMIT_ERRORS: f64 = 4.0;
 /// Largest distance of a report from its fault, s.
-pub const NEAR_S: f64 = 1.0;
+pub const MAX_REPORT_DISTANCE_S: f64 = 1.0;
 /// Time after the fault at which a trace is examined again, s.
-pub const LATER_S: f64 = 20.0;
-const MAX_NEAR_ERRORS: f64 = 2.5;
-const NEAR_SHARE: f64 = 0.1;
+pub const RECOVERY_CHECK_S: f64 = 20.0;
+const MAX_RECOVERED_ERRORS: f64 = 2.5;
+const MAX_RECOVERED_RELATIVE_ERROR: f64 = 0.1;
 const MIN_LASTING_S: f64 = 5.0;
 /// Findings that only report faults of the recording.
 const FAULT_FINDINGS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
@@ -69,13 +69,13 @@ impl CaseOutcome {
     }
 
     /// True if the user is warned.
-    pub fn flagged(&self) -> bool {
+    pub fn is_flagged(&self) -> bool {
         self.level != "trustworthy" || self.placed
     }
 
     /// True for the outcome that must not occur: a wrong result that is not flagged.
-    pub fn silently_wrong(&self) -> bool {
-        self.wrong && !self.flagged()
+    pub fn is_silently_wrong(&self) -> bool {
+        self.wrong && !self.is_flagged()
     }
 }
 
@@ -90,27 +90,27 @@ pub struct Row {
 }
 
 /// Judges a fit from the output of the program.
-pub fn of_fit(json: &Value, known: &CaseTruth) -> CaseOutcome {
-    let claims = claims_of(json, known);
-    let worst = worst_of(&claims, &known.truth);
+pub fn judge_fit(json: &Value, known: &CaseTruth) -> CaseOutcome {
+    let claims = parse_claims(json, known);
+    let worst = worst_claim(&claims, &known.truth);
     CaseOutcome {
-        wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG),
+        wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG_LIMIT_ERRORS),
         worst,
-        ..reported(json, known)
+        ..verdict_outcome(json, known)
     }
 }
 
 /// Judges a trace.
-pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
+pub fn judge_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
     let truth_at = |t: f64| match (&known.then, known.span_s) {
         (Some(then), Some((from, _))) if t >= from => then,
         _ => &known.truth,
     };
-    let worst_at = |row: &Row| worst_of(&row.claims, truth_at(row.t));
+    let worst_at = |row: &Row| worst_claim(&row.claims, truth_at(row.t));
     let span_end = known.span_s.map_or(0.0, |(_, to)| to);
     let later = rows
         .iter()
-        .find(|row| known.span_s.is_some() && row.t >= span_end + LATER_S);
+        .find(|row| known.span_s.is_some() && row.t >= span_end + RECOVERY_CHECK_S);
     let looked_at = [rows.last(), later].into_iter().flatten();
     let worst = looked_at.filter_map(worst_at).max_by(|a, b| a.1.total_cmp(&b.1));
     let span_start = known.span_s.map_or(0.0, |(from, _)| from);
@@ -121,7 +121,7 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
         .collect();
     let recovery_s = known.span_s.and_then(|_| {
         let after: Vec<&Row> = rows.iter().filter(|row| row.t >= span_end).collect();
-        let far = |row: &&&Row| !is_near(&row.claims, truth_at(row.t));
+        let far = |row: &&&Row| !has_recovered(&row.claims, truth_at(row.t));
         let last = after.last()?.t;
         // A trace that ends with the fault, or soon after it, has no recovery time.
         (last - span_end > 1.0).then(|| match after.iter().rfind(far) {
@@ -131,16 +131,16 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
         })
     });
     CaseOutcome {
-        wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG),
+        wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG_LIMIT_ERRORS),
         worst,
         recovery_s,
-        lasting: lasting(&errors),
-        ..reported(json, known)
+        lasting: lasting_error(&errors),
+        ..verdict_outcome(json, known)
     }
 }
 
 /// Returns the verdict and the reported faults of any result.
-fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
+fn verdict_outcome(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let verdict = &json["verdict"];
     let findings = verdict["findings"].as_array().map_or(&[][..], Vec::as_slice);
     let graver = findings.iter().filter(|f| f["severity"] != "note");
@@ -155,7 +155,7 @@ fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
         // A fault of the whole file, such as a wrong unit of time, has no place.
         let begins = fault["from"].as_f64().unwrap_or(0.0);
         let ends = fault["to"].as_f64().unwrap_or(f64::INFINITY);
-        begins <= to + NEAR_S && ends >= from - NEAR_S
+        begins <= to + MAX_REPORT_DISTANCE_S && ends >= from - MAX_REPORT_DISTANCE_S
     };
     CaseOutcome {
         level: verdict["level"].as_str().unwrap_or("none").to_owned(),
@@ -167,7 +167,7 @@ fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
     }
 }
 
-fn claims_of(json: &Value, known: &CaseTruth) -> Vec<Claim> {
+fn parse_claims(json: &Value, known: &CaseTruth) -> Vec<Claim> {
     let named = |name: &str| {
         let listed = json["parameters"]
             .as_array()
@@ -187,7 +187,7 @@ fn claims_of(json: &Value, known: &CaseTruth) -> Vec<Claim> {
     known.truth.iter().filter_map(|(name, _)| named(name)).collect()
 }
 
-fn worst_of(claims: &[Claim], truth: &Truth) -> Option<(String, f64)> {
+fn worst_claim(claims: &[Claim], truth: &Truth) -> Option<(String, f64)> {
     let off = |(name, value, error): &Claim| {
         let (_, own) = truth.iter().find(|(known, _)| known == name)?;
         Some((name.clone(), (value - own).abs() / error))
@@ -195,18 +195,18 @@ fn worst_of(claims: &[Claim], truth: &Truth) -> Option<(String, f64)> {
     claims.iter().filter_map(off).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-fn is_near(claims: &[Claim], truth: &Truth) -> bool {
+fn has_recovered(claims: &[Claim], truth: &Truth) -> bool {
     let near = |(name, value, error): &Claim| {
         truth.iter().find(|(known, _)| known == name).is_none_or(|(_, own)| {
             let off = (value - own).abs();
-            off <= MAX_NEAR_ERRORS * error || off <= NEAR_SHARE * own.abs()
+            off <= MAX_RECOVERED_ERRORS * error || off <= MAX_RECOVERED_RELATIVE_ERROR * own.abs()
         })
     };
     !claims.is_empty() && claims.iter().all(near)
 }
 
 /// Returns the largest error that lasted for [`MIN_LASTING_S`], from pairs of time and error.
-fn lasting(errors: &[(f64, f64)]) -> Option<f64> {
+fn lasting_error(errors: &[(f64, f64)]) -> Option<f64> {
     let (first, last) = (errors.first()?.0, errors.last()?.0);
     if last - first < MIN_LASTING_S {
         return None;

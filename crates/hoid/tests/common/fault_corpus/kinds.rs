@@ -99,17 +99,17 @@ pub struct Fault {
     pub place: FaultPosition,
 }
 
-const CHANNELS: &[Channels] = &[Channels::E, Channels::U, Channels::Both];
+const EACH_CHANNEL_AND_BOTH: &[Channels] = &[Channels::E, Channels::U, Channels::Both];
 const E_OR_U: &[Channels] = &[Channels::E, Channels::U];
-const BOTH: &[Channels] = &[Channels::Both];
-const ONLY_U: &[Channels] = &[Channels::U];
-const PLACES: &[FaultPosition] = &[FaultPosition::Start, FaultPosition::Middle, FaultPosition::End];
-const FULL: &[FaultPosition] = &[FaultPosition::Whole];
+const BOTH_CHANNELS: &[Channels] = &[Channels::Both];
+const U_CHANNEL: &[Channels] = &[Channels::U];
+const POSITIONS: &[FaultPosition] = &[FaultPosition::Start, FaultPosition::Middle, FaultPosition::End];
+const WHOLE_RECORD: &[FaultPosition] = &[FaultPosition::Whole];
 /// The whole record.
-pub const WHOLE: f64 = f64::INFINITY;
+pub const WHOLE_LENGTH_S: f64 = f64::INFINITY;
 
 /// An entry for each kind: name, unit of its size, channels, sizes, places.
-type Line = (
+type KindEntry = (
     Change,
     &'static str,
     &'static str,
@@ -118,69 +118,160 @@ type Line = (
     &'static [FaultPosition],
 );
 
-const LINES: [Line; 23] = [
+const KIND_ENTRIES: [KindEntry; 23] = [
     (
         Change::Spike,
         "spike",
         "sigma",
-        CHANNELS,
+        EACH_CHANNEL_AND_BOTH,
         &[5.0, 10.0, 30.0, 100.0, 1000.0],
-        PLACES,
+        POSITIONS,
     ),
-    (Change::Burst, "burst", "samples", CHANNELS, &[2.0, 5.0, 10.0], PLACES),
+    (
+        Change::Burst,
+        "burst",
+        "samples",
+        EACH_CHANNEL_AND_BOTH,
+        &[2.0, 5.0, 10.0],
+        POSITIONS,
+    ),
     (
         Change::Missing,
         "missing",
         "samples",
-        CHANNELS,
+        EACH_CHANNEL_AND_BOTH,
         &[1.0, 10.0, 100.0],
-        PLACES,
+        POSITIONS,
     ),
-    (Change::Wrap, "wrap", "s", E_OR_U, &[0.1, 2.0, WHOLE], PLACES),
-    (Change::Step, "step", "%", E_OR_U, &[2.0, 10.0, 50.0, 200.0], PLACES),
-    (Change::Offset, "offset", "%", E_OR_U, &[3.0, 10.0, 50.0], FULL),
-    (Change::Drift, "drift", "sigma", E_OR_U, &[0.2, 1.0, 5.0], FULL),
-    (Change::Frozen, "frozen", "s", CHANNELS, &[0.1, 1.0, 10.0], PLACES),
-    (Change::Idle, "idle", "s", BOTH, &[5.0, 15.0, 30.0], PLACES),
+    (
+        Change::Wrap,
+        "wrap",
+        "s",
+        E_OR_U,
+        &[0.1, 2.0, WHOLE_LENGTH_S],
+        POSITIONS,
+    ),
+    (Change::Step, "step", "%", E_OR_U, &[2.0, 10.0, 50.0, 200.0], POSITIONS),
+    (Change::Offset, "offset", "%", E_OR_U, &[3.0, 10.0, 50.0], WHOLE_RECORD),
+    (Change::Drift, "drift", "sigma", E_OR_U, &[0.2, 1.0, 5.0], WHOLE_RECORD),
+    (
+        Change::Frozen,
+        "frozen",
+        "s",
+        EACH_CHANNEL_AND_BOTH,
+        &[0.1, 1.0, 10.0],
+        POSITIONS,
+    ),
+    (Change::Idle, "idle", "s", BOTH_CHANNELS, &[5.0, 15.0, 30.0], POSITIONS),
     (
         Change::IdleNoisy,
         "idle with noise",
         "s",
-        BOTH,
+        BOTH_CHANNELS,
         &[5.0, 15.0, 30.0],
-        PLACES,
+        POSITIONS,
     ),
-    (Change::Dropout, "dropout", "s", CHANNELS, &[0.05, 0.5, 5.0], PLACES),
-    (Change::Scaled, "scaled for 10 s", "times", BOTH, &[10.0, 1e6], PLACES),
+    (
+        Change::Dropout,
+        "dropout",
+        "s",
+        EACH_CHANNEL_AND_BOTH,
+        &[0.05, 0.5, 5.0],
+        POSITIONS,
+    ),
+    (
+        Change::Scaled,
+        "scaled for 10 s",
+        "times",
+        BOTH_CHANNELS,
+        &[10.0, 1e6],
+        POSITIONS,
+    ),
     (
         Change::ScaledLong,
         "scaled for 50 s",
         "times",
-        BOTH,
+        BOTH_CHANNELS,
         &[10.0, 1e6],
         &[FaultPosition::Start, FaultPosition::Middle],
     ),
-    (Change::Milliseconds, "t in ms", "", BOTH, &[1000.0], FULL),
-    (Change::Swapped, "swapped", "s", BOTH, &[10.0, 30.0, WHOLE], PLACES),
-    (Change::Flipped, "flipped", "s", E_OR_U, &[1.0, 10.0, WHOLE], PLACES),
-    (Change::Saturated, "saturated", "sigma", E_OR_U, &[2.0, 1.0, 0.5], FULL),
-    (Change::Quantised, "quantised", "sigma", E_OR_U, &[0.05, 0.3, 1.0], FULL),
-    (Change::Lost, "lost", "s", BOTH, &[0.1, 1.0, 4.0], PLACES),
-    (Change::Duplicated, "duplicated", "s", BOTH, &[0.1, 1.0], PLACES),
-    (Change::Late, "late", "samples", ONLY_U, &[1.0, 5.0, 20.0], PLACES),
-    (Change::Short, "short", "samples", BOTH, &[60.0, 200.0, 500.0], FULL),
-    (Change::SecondOperator, "second operator", "", BOTH, &[1.0], FULL),
+    (
+        Change::Milliseconds,
+        "t in ms",
+        "",
+        BOTH_CHANNELS,
+        &[1000.0],
+        WHOLE_RECORD,
+    ),
+    (
+        Change::Swapped,
+        "swapped",
+        "s",
+        BOTH_CHANNELS,
+        &[10.0, 30.0, WHOLE_LENGTH_S],
+        POSITIONS,
+    ),
+    (
+        Change::Flipped,
+        "flipped",
+        "s",
+        E_OR_U,
+        &[1.0, 10.0, WHOLE_LENGTH_S],
+        POSITIONS,
+    ),
+    (
+        Change::Saturated,
+        "saturated",
+        "sigma",
+        E_OR_U,
+        &[2.0, 1.0, 0.5],
+        WHOLE_RECORD,
+    ),
+    (
+        Change::Quantised,
+        "quantised",
+        "sigma",
+        E_OR_U,
+        &[0.05, 0.3, 1.0],
+        WHOLE_RECORD,
+    ),
+    (Change::Lost, "lost", "s", BOTH_CHANNELS, &[0.1, 1.0, 4.0], POSITIONS),
+    (
+        Change::Duplicated,
+        "duplicated",
+        "s",
+        BOTH_CHANNELS,
+        &[0.1, 1.0],
+        POSITIONS,
+    ),
+    (Change::Late, "late", "samples", U_CHANNEL, &[1.0, 5.0, 20.0], POSITIONS),
+    (
+        Change::Short,
+        "short",
+        "samples",
+        BOTH_CHANNELS,
+        &[60.0, 200.0, 500.0],
+        WHOLE_RECORD,
+    ),
+    (
+        Change::SecondOperator,
+        "second operator",
+        "",
+        BOTH_CHANNELS,
+        &[1.0],
+        WHOLE_RECORD,
+    ),
 ];
 
 impl Kind {
-    pub const NOTHING: Self = Self {
+    pub const NO_CHANGE: Self = Self {
         what: Change::Nothing,
         on: Channels::Both,
     };
 
     /// Name in the tables: `spike, e`.
     pub fn name(self) -> String {
-        let Some((_, name, _, channels, ..)) = LINES.iter().find(|line| line.0 == self.what) else {
+        let Some((_, name, _, channels, ..)) = KIND_ENTRIES.iter().find(|line| line.0 == self.what) else {
             return "none".to_owned();
         };
         match self.on {
@@ -193,22 +284,22 @@ impl Kind {
 }
 
 impl Fault {
-    pub const NONE: Self = Self {
-        kind: Kind::NOTHING,
+    pub const NO_FAULT: Self = Self {
+        kind: Kind::NO_CHANGE,
         size: 0.0,
         place: FaultPosition::Whole,
     };
 
     /// Size with its unit: `30 sigma`.
     pub fn size_text(&self) -> String {
-        let unit = LINES
+        let unit = KIND_ENTRIES
             .iter()
             .find(|line| line.0 == self.kind.what)
             .map_or("", |line| line.2);
         match self.size {
             _ if unit.is_empty() => String::new(),
-            WHOLE if self.kind.what == Change::Wrap => "to the end".to_owned(),
-            WHOLE => "whole".to_owned(),
+            WHOLE_LENGTH_S if self.kind.what == Change::Wrap => "to the end".to_owned(),
+            WHOLE_LENGTH_S => "whole".to_owned(),
             size => format!("{size} {unit}"),
         }
     }
@@ -217,12 +308,12 @@ impl Fault {
 /// All faults, in the order of the tables.
 pub fn faults() -> Vec<Fault> {
     let mut all = Vec::new();
-    for (what, _, _, channels, sizes, places) in LINES {
+    for (what, _, _, channels, sizes, places) in KIND_ENTRIES {
         for &on in channels {
             for &size in sizes {
                 // A fault of the whole record has no position, but a wrap has a start.
-                let places = if size == WHOLE && what != Change::Wrap {
-                    FULL
+                let places = if size == WHOLE_LENGTH_S && what != Change::Wrap {
+                    WHOLE_RECORD
                 } else {
                     places
                 };

@@ -2,9 +2,9 @@
 //! each of many virtual runs with a known operator. The runs are passed to the program `hoid` as files, and its results
 //! are judged.
 //!
-//! A result is *wrong* if a parameter that is reported as determined differs by more than [`judge::WRONG`] of its
+//! A result is *wrong* if a parameter that is reported as determined differs by more than [`judge::WRONG_LIMIT_ERRORS`] of its
 //! standard errors from the true value. It is *flagged* if the verdict is not "trustworthy", if a fault is reported at
-//! its place (within [`judge::NEAR_S`]), or if the program refuses the record. A wrong result must always be flagged; a
+//! its place (within [`judge::MAX_REPORT_DISTANCE_S`]), or if the program refuses the record. A wrong result must always be flagged; a
 //! flag on a correct result is useless.
 //!
 //! Some methods, such as `rls` with its own noise model, also give wrong estimates on clean runs; the clean runs are

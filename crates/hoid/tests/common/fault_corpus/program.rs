@@ -17,13 +17,13 @@ use super::{
 };
 
 /// Time limit of a run of the program, s.
-const LONGEST_S: u64 = 120;
+const TIMEOUT_S: u64 = 120;
 /// Number of samples per row of a trace.
 const SAMPLES_PER_ROW: &str = "10";
 
 /// Method by which a record is evaluated, with default options.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Way {
+pub enum EvaluationMethod {
     /// `identify --form` with the true form: the grey box.
     GreyBox,
     /// `identify --structure bj`.
@@ -35,7 +35,7 @@ pub enum Way {
     Rpem,
 }
 
-impl Way {
+impl EvaluationMethod {
     pub const ALL: [Self; 7] = [
         Self::GreyBox,
         Self::BoxJenkins,
@@ -58,18 +58,23 @@ impl Way {
         }
     }
 
-    pub fn tracks(self) -> bool {
+    pub fn is_tracker(self) -> bool {
         !matches!(self, Self::GreyBox | Self::BoxJenkins)
     }
 
     /// Returns the methods for a run. The grey box represents all operators, the other methods a gain with a lead; for
     /// people, only the three methods intended for people are used.
     pub fn of(base: &Base) -> &'static [Self] {
-        const LEAD: [Way; 4] = [Way::GreyBox, Way::Adaptive, Way::MultipleModel, Way::Physical];
+        const METHODS_FOR_LEAD: [EvaluationMethod; 4] = [
+            EvaluationMethod::GreyBox,
+            EvaluationMethod::Adaptive,
+            EvaluationMethod::MultipleModel,
+            EvaluationMethod::Physical,
+        ];
         match (base.who, base.form) {
             (OperatorKind::C1 | OperatorKind::C2, _) => &Self::ALL,
-            (OperatorKind::Person, hoid::model::Form::Lead) => &LEAD,
-            (OperatorKind::Person, _) => &LEAD[..1],
+            (OperatorKind::Person, hoid::model::Form::Lead) => &METHODS_FOR_LEAD,
+            (OperatorKind::Person, _) => &METHODS_FOR_LEAD[..1],
         }
     }
 }
@@ -81,7 +86,7 @@ pub struct Outcome {
     pub fault: Fault,
     pub who: OperatorKind,
     pub label: String,
-    pub way: Way,
+    pub way: EvaluationMethod,
     pub seconds: f64,
     pub judged: CaseOutcome,
     /// Message of the program if there is no result.
@@ -92,19 +97,19 @@ pub struct Outcome {
 ///
 /// # Errors
 /// Errors of the simulation or the file system.
-pub fn outcomes(
+pub fn evaluate_case(
     program: &Path,
     seed: u64,
     case: u64,
     fault: Fault,
     who: OperatorKind,
-    ways: &[Way],
+    ways: &[EvaluationMethod],
 ) -> Result<Vec<Outcome>, String> {
     let base = base(who, seed, case).map_err(|e| e.to_string())?;
     let folder = std::env::temp_dir().join(format!("hoid-faults-{}-{case}-{}", std::process::id(), who.name()));
     fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let (files, known) = write(&base, &fault, &folder, seed, case)?;
-    let evaluated = |way: &Way| {
+    let (files, known) = write_case(&base, &fault, &folder, seed, case)?;
+    let evaluated = |way: &EvaluationMethod| {
         let start_time = Instant::now();
         let found = run(program, *way, &base, &files, &known, &folder)?;
         let (judged, refusal) = match found {
@@ -122,18 +127,24 @@ pub fn outcomes(
             refusal,
         })
     };
-    let all = Way::of(&base).iter().filter(|way| ways.contains(way));
+    let all = EvaluationMethod::of(&base).iter().filter(|way| ways.contains(way));
     let all: Result<Vec<Outcome>, String> = all.map(evaluated).collect();
     fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     all
 }
 
 /// Writes the files of a case, with the faulty file last, and returns the known properties of the case.
-fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, CaseTruth), String> {
-    let injected = inject(fault, &base.runs[base.faulty()], &base.second, seed, case);
+fn write_case(
+    base: &Base,
+    fault: &Fault,
+    folder: &Path,
+    seed: u64,
+    case: u64,
+) -> Result<(Vec<PathBuf>, CaseTruth), String> {
+    let injected = inject(fault, &base.runs[base.faulty_run_index()], &base.second, seed, case);
     let mut files = Vec::new();
     for (i, run) in base.runs.iter().enumerate() {
-        if i != base.faulty() {
+        if i != base.faulty_run_index() {
             files.push((folder.join(format!("run{i}.csv")), run.to_csv()));
         }
     }
@@ -154,7 +165,7 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
 /// Returns the judgement, or the message of the program if there is no result.
 fn run(
     program: &Path,
-    way: Way,
+    way: EvaluationMethod,
     base: &Base,
     files: &[PathBuf],
     known: &CaseTruth,
@@ -164,8 +175,8 @@ fn run(
     let mut command = Command::new(program);
     command.env("RAYON_NUM_THREADS", "1");
     match way {
-        Way::GreyBox => command.arg("identify").args(files).args(["--form", base.form.name()]),
-        Way::BoxJenkins => command.arg("identify").args(files).args(["--structure", "bj"]),
+        EvaluationMethod::GreyBox => command.arg("identify").args(files).args(["--form", base.form.name()]),
+        EvaluationMethod::BoxJenkins => command.arg("identify").args(files).args(["--structure", "bj"]),
         _ => command
             .arg("track")
             .args(files.last())
@@ -173,19 +184,19 @@ fn run(
             .arg(&trace),
     };
     command.arg("--json");
-    let (message, printed) = finished(&mut command, folder)?;
+    let (message, printed) = run_to_end(&mut command, folder)?;
     let Ok(json) = serde_json::from_str::<Value>(&printed) else {
         return Ok(Err(message));
     };
-    if !way.tracks() {
-        return Ok(Ok(judge::of_fit(&json, known)));
+    if !way.is_tracker() {
+        return Ok(Ok(judge::judge_fit(&json, known)));
     }
     let text = fs::read_to_string(&trace).map_err(|e| format!("{}: {e}", trace.display()))?;
-    Ok(Ok(judge::of_trace(&json, &rows(&text), known)))
+    Ok(Ok(judge::judge_trace(&json, &parse_rows(&text), known)))
 }
 
 /// Returns the error stream and the output of a command, or the message if the command failed.
-fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), String> {
+fn run_to_end(command: &mut Command, folder: &Path) -> Result<(String, String), String> {
     let (output, errors) = (folder.join("output"), folder.join("errors"));
     let create = |path: &Path| File::create(path).map_err(|e| format!("{}: {e}", path.display()));
     command
@@ -200,10 +211,10 @@ fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), St
         if let Some(status) = child.try_wait().map_err(|e| e.to_string())? {
             break status;
         }
-        if start_time.elapsed() > Duration::from_secs(LONGEST_S) {
+        if start_time.elapsed() > Duration::from_secs(TIMEOUT_S) {
             child.kill().map_err(|e| e.to_string())?;
             child.wait().map_err(|e| e.to_string())?;
-            return Ok((format!("took longer than {LONGEST_S} s"), String::new()));
+            return Ok((format!("took longer than {TIMEOUT_S} s"), String::new()));
         }
         std::thread::sleep(Duration::from_millis(5));
     };
@@ -215,7 +226,7 @@ fn finished(command: &mut Command, folder: &Path) -> Result<(String, String), St
 }
 
 /// Returns the rows of a trace file: the time, and each column for which a column with the suffix `_se` exists.
-pub fn rows(text: &str) -> Vec<Row> {
+pub fn parse_rows(text: &str) -> Vec<Row> {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
     let place = |name: &str| names.iter().position(|n| *n == name);

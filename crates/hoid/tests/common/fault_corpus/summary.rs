@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::{
     bases::OperatorKind,
     kinds::{Change, Kind},
-    program::{Outcome, Way},
+    program::{EvaluationMethod, Outcome},
 };
 
 /// Numbers of cases by outcome.
@@ -29,8 +29,8 @@ impl Numbers {
             let j = &o.judged;
             n.all += 1;
             n.wrong += usize::from(j.wrong);
-            n.silent += usize::from(j.silently_wrong());
-            n.useless += usize::from(!j.wrong && j.flagged());
+            n.silent += usize::from(j.is_silently_wrong());
+            n.useless += usize::from(!j.wrong && j.is_flagged());
             n.refused += usize::from(o.refusal.is_some());
             n.placed += usize::from(j.placed);
         }
@@ -59,7 +59,7 @@ pub fn median(mut all: Vec<f64>) -> Option<f64> {
 }
 
 /// Returns the table by method, for the runs of the thesis and for the runs of people: the acceptance test.
-pub fn by_way(all: &[Outcome]) -> String {
+pub fn table_by_method(all: &[Outcome]) -> String {
     let mut text = "| runs | method | results | wrong | wrong and not flagged | flagged, of those right | refused | \
                     fault reported at its place |\n|---|---|---|---|---|---|---|---|\n"
         .to_owned();
@@ -78,7 +78,7 @@ pub fn by_way(all: &[Outcome]) -> String {
     };
     for (runs, of_people) in [("C1, C2", false), ("people", true)] {
         let such = |o: &&Outcome| (o.who == OperatorKind::Person) == of_people;
-        for way in Way::ALL {
+        for way in EvaluationMethod::ALL {
             let n = Numbers::of(all.iter().filter(such).filter(|o| o.way == way));
             // Not all methods are used for people.
             if !of_people || n.all > 0 {
@@ -91,16 +91,17 @@ pub fn by_way(all: &[Outcome]) -> String {
 }
 
 /// Returns the table by kind and size, with one column per method.
-pub fn by_fault(all: &[Outcome]) -> String {
+pub fn table_by_fault(all: &[Outcome]) -> String {
     let mut text = format!(
         "| fault | size | {} |\n|---|---|{}\n",
-        Way::ALL.map(Way::name).join(" | "),
-        "---|".repeat(Way::ALL.len())
+        EvaluationMethod::ALL.map(EvaluationMethod::name).join(" | "),
+        "---|".repeat(EvaluationMethod::ALL.len())
     );
     for (kind, size) in kinds_and_sizes(all) {
         let such = |o: &&Outcome| o.fault.kind == kind && o.fault.size == size;
         let first = all.iter().find(such).map(|o| o.fault.size_text()).unwrap_or_default();
-        let cells = Way::ALL.map(|way| Numbers::of(all.iter().filter(such).filter(|o| o.way == way)).cell());
+        let cells =
+            EvaluationMethod::ALL.map(|way| Numbers::of(all.iter().filter(such).filter(|o| o.way == way)).cell());
         let _ = writeln!(text, "| {} | {first} | {} |", kind.name(), cells.join(" | "));
     }
     text
@@ -108,8 +109,11 @@ pub fn by_fault(all: &[Outcome]) -> String {
 
 /// Returns the table for trackers by kind and size: the median recovery time in s, and the number of runs without
 /// recovery.
-pub fn recovery(all: &[Outcome]) -> String {
-    let trackers: Vec<Way> = Way::ALL.into_iter().filter(|way| way.tracks()).collect();
+pub fn recovery_table(all: &[Outcome]) -> String {
+    let trackers: Vec<EvaluationMethod> = EvaluationMethod::ALL
+        .into_iter()
+        .filter(|way| way.is_tracker())
+        .collect();
     let names: Vec<&str> = trackers.iter().map(|way| way.name()).collect();
     let mut text = format!(
         "| fault | size | {} |\n|---|---|{}\n",
@@ -145,17 +149,17 @@ pub fn recovery(all: &[Outcome]) -> String {
 }
 
 /// Returns the table of false flags in clean runs, by kind of run and method.
-pub fn clean(all: &[Outcome]) -> String {
+pub fn clean_run_table(all: &[Outcome]) -> String {
     let mut text = "| runs | method | number | flagged by a fault | a fault reported | not trustworthy | wrong | wrong and not flagged |\n|---|---|---|---|---|---|---|---|\n".to_owned();
     let mut labels: Vec<&str> = all.iter().map(|o| o.label.as_str()).collect();
     labels.sort_unstable();
     labels.dedup();
     for label in labels.into_iter().map(Some).chain([None]) {
-        let of = |way: Option<Way>| {
+        let of = |way: Option<EvaluationMethod>| {
             let such = |o: &&Outcome| label.is_none_or(|l| o.label == l) && way.is_none_or(|w| o.way == w);
             all.iter().filter(such).collect::<Vec<_>>()
         };
-        for way in Way::ALL.map(Some).into_iter().chain([None]) {
+        for way in EvaluationMethod::ALL.map(Some).into_iter().chain([None]) {
             let such = of(way);
             if such.is_empty() || (way.is_none() && label.is_some()) {
                 continue;
@@ -165,13 +169,13 @@ pub fn clean(all: &[Outcome]) -> String {
                 text,
                 "| {} | {} | {} | {} | {} | {} | {} | {} |",
                 label.unwrap_or("all"),
-                way.map_or("all", Way::name),
+                way.map_or("all", EvaluationMethod::name),
                 such.len(),
                 share(|o| o.judged.of_faults),
                 share(|o| o.judged.told > 0),
                 share(|o| o.judged.level != "trustworthy"),
                 share(|o| o.judged.wrong),
-                share(|o| o.judged.silently_wrong()),
+                share(|o| o.judged.is_silently_wrong()),
             );
         }
     }
@@ -212,8 +216,8 @@ pub fn to_csv(all: &[Outcome]) -> String {
             o.label.replace(", ", " "),
             o.way.name(),
             j.wrong,
-            j.flagged(),
-            j.silently_wrong(),
+            j.is_flagged(),
+            j.is_silently_wrong(),
             j.level,
             j.kinds.join(" "),
             j.of_faults,

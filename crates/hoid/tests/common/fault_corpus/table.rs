@@ -36,7 +36,7 @@ impl Table {
     }
 
     /// Returns the time from the first sample to the end of the last sample, s.
-    pub fn seconds(&self) -> f64 {
+    pub fn duration_s(&self) -> f64 {
         self.len() as f64 * self.h
     }
 
@@ -67,7 +67,7 @@ impl Table {
 }
 
 /// Standard deviation.
-pub fn spread(values: &[f64]) -> f64 {
+pub fn standard_deviation(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;
     (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n).sqrt()

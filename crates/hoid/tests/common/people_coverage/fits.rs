@@ -8,7 +8,7 @@ use hoid::{
     sim::{SimError, people::Person},
 };
 
-use super::people::{Cell, Spread, recorded};
+use super::people::{Cell, Spread, simulate_person};
 
 /// Frequencies at which the response is compared, rad/s: the band of manual control.
 const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
@@ -59,7 +59,7 @@ pub struct Quantity {
 
 impl Quantity {
     /// True if the interval contains the true value; `None` without an interval.
-    pub fn holds(&self) -> Option<bool> {
+    pub fn contains_truth(&self) -> Option<bool> {
         self.interval.map(|(low, high)| low <= self.truth && self.truth <= high)
     }
 }
@@ -93,8 +93,8 @@ pub struct Outcome {
 ///
 /// # Errors
 /// The errors of the simulation.
-pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outcome>, SimError> {
-    let (cell, person, records) = recorded(seed, number)?;
+pub fn fit_person(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outcome>, SimError> {
+    let (cell, person, records) = simulate_person(seed, number)?;
     let true_form = person.state.operator.form();
     let of = |&variant: &Variant| {
         let mut estimator = FamilyEstimator {
@@ -112,16 +112,18 @@ pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outc
             variant,
             true_form,
             seconds: start_time.elapsed().as_secs_f64(),
-            found: fit.map(|fit| found(&fit, &person, cell)).map_err(|e| e.to_string()),
+            found: fit
+                .map(|fit| fit_outcome(&fit, &person, cell))
+                .map_err(|e| e.to_string()),
         }
     };
     Ok(variants.iter().map(of).collect())
 }
 
-fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> FitOutcome {
+fn fit_outcome(fit: &FamilyFit, person: &Person, cell: Cell) -> FitOutcome {
     let truth = &person.state.operator;
     let of = fit.operator(0);
-    let named = truth.named();
+    let named = truth.named_parameters();
     // The true values are those of the person. If the runs of a person differ, the standard errors for the person are
     // used.
     let of_person = cell.spread != Spread::None;

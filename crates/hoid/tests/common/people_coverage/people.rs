@@ -10,8 +10,8 @@ use hoid::{
 };
 
 /// Spread of parameters between the runs of a person: standard deviation of the logarithm.
-pub const BETWEEN_RUNS: f64 = 0.06;
-const RUNS: [usize; 4] = [1, 2, 5, 10];
+pub const RUN_TO_RUN_SPREAD: f64 = 0.06;
+const RUN_COUNTS: [usize; 4] = [1, 2, 5, 10];
 /// Largest number of draws of the gain of a run before its loop counts as unstable.
 const MAX_DRAWS: usize = 50;
 
@@ -55,7 +55,7 @@ impl Cell {
         let i = person as usize;
         Self {
             plant: Plant::ALL[i % 3],
-            runs: RUNS[i / 3 % 4],
+            runs: RUN_COUNTS[i / 3 % 4],
             rate_hz: [60, 100][i / 12 % 2],
             spread: Spread::ALL[i / 24 % 3],
             kind: RemnantKind::ALL[i % 5],
@@ -67,11 +67,15 @@ impl Cell {
 ///
 /// # Errors
 /// As [`Person::draw`] and [`Person::run`].
-pub fn recorded(seed: u64, number: u64) -> Result<(Cell, Person, Vec<Record>), SimError> {
+pub fn simulate_person(seed: u64, number: u64) -> Result<(Cell, Person, Vec<Record>), SimError> {
     let cell = Cell::of(number);
     let task = Task {
         sample_time: SampleTime::new(1.0 / f64::from(cell.rate_hz))?,
-        between_runs: if cell.spread == Spread::All { BETWEEN_RUNS } else { 0.0 },
+        between_runs: if cell.spread == Spread::All {
+            RUN_TO_RUN_SPREAD
+        } else {
+            0.0
+        },
         ..Task::default()
     };
     let person = Person::draw(&Population::default(), &task, cell.plant, None, cell.kind, seed, number)?;
@@ -96,7 +100,7 @@ fn run_with_gain(person: &Person, run: u64) -> Result<Record, SimError> {
     for z in deviates {
         let operator = &person.state.operator;
         let mut coordinates = operator.coordinates().to_vec();
-        coordinates[0] *= (BETWEEN_RUNS * z).exp();
+        coordinates[0] *= (RUN_TO_RUN_SPREAD * z).exp();
         let state = FamilyState {
             operator: FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates)?,
             ..person.state.clone()

@@ -21,14 +21,14 @@ pub const QUANTITIES: [&str; 13] = [
 
 /// A share k of n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Share {
+pub struct Proportion {
     pub of: usize,
     pub all: usize,
 }
 
-impl Share {
+impl Proportion {
     /// Counts the share of true answers.
-    pub fn over(answers: impl IntoIterator<Item = bool>) -> Self {
+    pub fn count(answers: impl IntoIterator<Item = bool>) -> Self {
         answers.into_iter().fold(Self::default(), |share, yes| Self {
             of: share.of + usize::from(yes),
             all: share.all + 1,
@@ -41,7 +41,7 @@ impl Share {
     }
 
     /// Returns the standard error in percent.
-    pub fn error(self) -> f64 {
+    pub fn standard_error_percent(self) -> f64 {
         let n = self.all as f64 + 4.0;
         let p = (self.of as f64 + 2.0) / n;
         100.0 * (p * (1.0 - p) / n).sqrt()
@@ -52,7 +52,12 @@ impl Share {
         if self.all == 0 {
             return "–".to_owned();
         }
-        format!("{:.1} ± {:.1} ({})", self.percent(), self.error(), self.all)
+        format!(
+            "{:.1} ± {:.1} ({})",
+            self.percent(),
+            self.standard_error_percent(),
+            self.all
+        )
     }
 }
 
@@ -64,7 +69,7 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
 }
 
 /// Returns all values of one quantity.
-pub fn of_quantity<'a>(outcomes: &[&'a Outcome], name: &str) -> Vec<&'a Quantity> {
+pub fn values_of_quantity<'a>(outcomes: &[&'a Outcome], name: &str) -> Vec<&'a Quantity> {
     outcomes
         .iter()
         .filter_map(|o| o.found.as_ref().ok())
@@ -73,7 +78,7 @@ pub fn of_quantity<'a>(outcomes: &[&'a Outcome], name: &str) -> Vec<&'a Quantity
 }
 
 /// Returns the share of intervals that contain the true value, over quantities that are reported as determined.
-pub fn coverage(quantities: &[&Quantity]) -> Share {
+pub fn coverage(quantities: &[&Quantity]) -> Proportion {
     let determined = quantities.iter().filter(|q| q.determined);
-    Share::over(determined.map(|q| q.holds().unwrap_or(false)))
+    Proportion::count(determined.map(|q| q.contains_truth().unwrap_or(false)))
 }

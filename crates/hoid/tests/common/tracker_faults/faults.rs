@@ -45,7 +45,7 @@ pub enum Fault {
 
 impl Fault {
     /// Inserts the fault into e and u at sample `at`; returns the first sample after it.
-    pub fn put(&self, e: &mut Vec<f64>, u: &mut Vec<f64>, at: usize, per_second: f64, innovation: f64) -> usize {
+    pub fn insert(&self, e: &mut Vec<f64>, u: &mut Vec<f64>, at: usize, per_second: f64, innovation: f64) -> usize {
         let deviation = |x: &[f64]| {
             let mean = x.iter().sum::<f64>() / x.len() as f64;
             (x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / x.len() as f64).sqrt()

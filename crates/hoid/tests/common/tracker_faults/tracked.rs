@@ -3,13 +3,13 @@
 use hoid::{
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
     prelude::*,
-    track::{GuardEvent, Sample, StartAt, TrackOptions, Tracker},
+    track::{GuardEvent, Sample, StartSource, TrackOptions, Tracker},
 };
 
 use super::faults::Fault;
 
 /// Length of the start span, s.
-const START_S: f64 = 30.72;
+const START_SPAN_S: f64 = 30.72;
 /// Number of samples between two comparisons of the estimate.
 const COMPARISON_INTERVAL: usize = 20;
 /// Number of consecutive comparisons that span more than a second.
@@ -39,13 +39,13 @@ impl Run {
         Self {
             e: record.input().to_vec(),
             u: record.output().to_vec(),
-            start: record.span(0.0, START_S).unwrap(),
+            start: record.span(0.0, START_SPAN_S).unwrap(),
         }
     }
 
     /// Processes all samples a number of times.
     #[allow(dead_code)]
-    pub fn taken(&self, options: &TrackOptions, times: u64) {
+    pub fn process_repeatedly(&self, options: &TrackOptions, times: u64) {
         let mut tracker = Tracker::new(options, Some(&self.start), self.start.sample_time()).unwrap();
         for _ in 0..times {
             for (e, u) in self.e.iter().zip(&self.u) {
@@ -107,7 +107,7 @@ impl Reference {
     /// guard.
     pub fn new(run: &Run, options: &TrackOptions) -> Self {
         let options = TrackOptions {
-            start: StartAt::Span(Some((0.0, START_S))),
+            start: StartSource::Span(Some((0.0, START_SPAN_S))),
             ..options.clone()
         };
         let bare = options.clone().with(&[("guard", "no")]).unwrap();
@@ -121,12 +121,12 @@ impl Reference {
         };
         let mut tracker = Tracker::new(&bare, Some(&run.start), run.start.sample_time()).unwrap();
         reference.innovation = tracker.innovation_variance().sqrt();
-        let estimates = over(&mut tracker, run, &run.e, &run.u, &mut |_, _| {});
+        let estimates = sampled_estimates(&mut tracker, run, &run.e, &run.u, &mut |_, _| {});
         reference.estimates = estimates;
         // The same run is tracked with the guard, to count the actions of the guard without faults.
         let mut guarded = Tracker::new(&reference.options, Some(&run.start), run.start.sample_time()).unwrap();
         let mut events = Vec::new();
-        over(&mut guarded, run, &run.e, &run.u, &mut |_, t| events.extend(t.event()));
+        sampled_estimates(&mut guarded, run, &run.e, &run.u, &mut |_, t| events.extend(t.event()));
         reference.events = events;
         (reference.held, reference.restarts) = (guarded.counts().held, guarded.counts().restarts);
         reference
@@ -137,11 +137,11 @@ impl Reference {
         let per_second = run.per_second();
         let at = (at_s * per_second) as usize;
         let (mut e, mut u) = (run.e.clone(), run.u.clone());
-        let end = fault.put(&mut e, &mut u, at, per_second, self.innovation);
+        let end = fault.insert(&mut e, &mut u, at, per_second, self.innovation);
         let inserted = e.len() - run.e.len();
         let mut tracker = Tracker::new(&self.options, Some(&run.start), run.start.sample_time()).unwrap();
         let mut told = false;
-        let estimates = over(&mut tracker, run, &e, &u, &mut |k, t| {
+        let estimates = sampled_estimates(&mut tracker, run, &e, &u, &mut |k, t| {
             told |= t.event().is_some() && k + 1 >= at;
         });
         let (mut shift, mut last_far) = (0.0_f64, None);
@@ -189,7 +189,7 @@ impl Reference {
     }
 }
 
-fn over(
+fn sampled_estimates(
     tracker: &mut Tracker,
     run: &Run,
     e: &[f64],

@@ -2,7 +2,7 @@
 
 /// Letters and signs of Latin 1, and dashes and quotation marks of Windows, that occur in units and column names; other
 /// non-ASCII bytes count as damage.
-const LATIN: &[u8] = b"\x91\x92\x93\x94\x96\x97\xa0\xb0\xb2\xb3\xb5\xb7\xc4\xc9\xd6\xdc\xdf\xe0\xe1\xe2\xe4\xe5\xe7\xe8\xe9\xea\xed\xf1\xf3\xf4\xf6\xf8\xfa\xfc";
+const LATIN_BYTES: &[u8] = b"\x91\x92\x93\x94\x96\x97\xa0\xb0\xb2\xb3\xb5\xb7\xc4\xc9\xd6\xdc\xdf\xe0\xe1\xe2\xe4\xe5\xe7\xe8\xe9\xea\xed\xf1\xf3\xf4\xf6\xf8\xfa\xfc";
 
 /// Number of bytes at the start of a file from which UTF-16 without a byte order mark is recognised.
 const UTF16_PROBE_BYTES: usize = 256;
@@ -11,21 +11,25 @@ const UTF16_PROBE_BYTES: usize = 256;
 /// a description of another encoding.
 pub(super) fn decode(bytes: &mut Vec<u8>) -> Option<String> {
     let mut note = None;
-    if let Some(text) = utf16(bytes) {
+    if let Some(text) = decode_utf16(bytes) {
         *bytes = text.into_bytes();
         note = Some(String::from("the text is in UTF-16"));
     } else if std::str::from_utf8(bytes).is_err() && is_latin(bytes) {
-        *bytes = bytes.iter().map(|byte| latin(*byte)).collect::<String>().into_bytes();
+        *bytes = bytes
+            .iter()
+            .map(|byte| latin_character(*byte))
+            .collect::<String>()
+            .into_bytes();
         note = Some(String::from("the text is read as Latin 1"));
     }
-    let cut = without_end(bytes);
-    end_with_line_feeds(bytes);
+    let cut = trim_end_of_file(bytes);
+    normalise_line_ends(bytes);
     note.or(cut)
 }
 
 /// Removes the end-of-file character of DOS, and zero bytes that a recorder left when it lost power; returns a note on
 /// the zero bytes.
-fn without_end(bytes: &mut Vec<u8>) -> Option<String> {
+fn trim_end_of_file(bytes: &mut Vec<u8>) -> Option<String> {
     let kept = bytes
         .iter()
         .rposition(|byte| *byte != 0)
@@ -46,7 +50,7 @@ fn without_end(bytes: &mut Vec<u8>) -> Option<String> {
 
 /// Decodes UTF-16 text, which is recognised by its byte order mark, or by zeros in every second byte of its start;
 /// `None` for other text.
-fn utf16(bytes: &[u8]) -> Option<String> {
+fn decode_utf16(bytes: &[u8]) -> Option<String> {
     let start = bytes.get(..UTF16_PROBE_BYTES.min(bytes.len()))?;
     let (pairs_of_start, _) = start.as_chunks();
     let all = |test: fn(&[u8; 2]) -> bool| pairs_of_start.len() > 1 && pairs_of_start.iter().all(test);
@@ -64,11 +68,11 @@ fn utf16(bytes: &[u8]) -> Option<String> {
 
 /// True if each non-ASCII byte may occur in a name or a unit.
 fn is_latin(bytes: &[u8]) -> bool {
-    bytes.iter().all(|byte| byte.is_ascii() || LATIN.contains(byte))
+    bytes.iter().all(|byte| byte.is_ascii() || LATIN_BYTES.contains(byte))
 }
 
 /// Returns the character of a byte; Windows assigns printable characters to the control characters of Latin 1.
-fn latin(byte: u8) -> char {
+fn latin_character(byte: u8) -> char {
     match byte {
         0x91 | 0x92 => '\'',
         0x93 | 0x94 => '"',
@@ -79,7 +83,7 @@ fn latin(byte: u8) -> char {
 
 /// Replaces each carriage return that is not followed by a line feed by a line feed, because old Mac programs end lines
 /// with a carriage return. The length of the text is unchanged.
-fn end_with_line_feeds(bytes: &mut [u8]) {
+fn normalise_line_ends(bytes: &mut [u8]) {
     let mut rest = bytes;
     while let Some(at) = rest.iter().position(|byte| *byte == b'\r') {
         let (_, from) = rest.split_at_mut(at);

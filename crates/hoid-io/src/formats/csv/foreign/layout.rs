@@ -1,19 +1,19 @@
 //! Positions of the header and the first row of a table, and the separator of its cells.
 //!
-//! The first rows are the first [`ROWS`] lines with equal numbers of cells, more than half of which are numbers or
+//! The first rows are the first [`MIN_ROWS`] lines with equal numbers of cells, more than half of which are numbers or
 //! clock times. The header is the line of words above them, or a comment directly above them. It must name the cells
 //! unambiguously ([`super::names`]).
 
 use std::borrow::Cow;
 
-use super::lines::{Mark, filled, is_missing, is_number, is_row, is_value, unquoted};
-use super::names::{Extra, Names, names_of, unmarked};
+use super::lines::{Separator, is_missing, is_number, is_row, is_value, non_blank_lines, unquoted};
+use super::names::{ExtraCells, Names, names_of, without_comment_signs};
 use super::units;
 use crate::formats::csv::text::is_comment_or_blank;
-use crate::wording::shown;
+use crate::wording::abbreviate;
 
 /// Number of lines with equally many numbers that are required at the start of a table, unless it has fewer lines.
-const ROWS: usize = 3;
+const MIN_ROWS: usize = 3;
 
 /// Comments that hoid itself writes above a table, and that are not headers.
 const OWN_COMMENTS: [&str; 3] = ["units:", "roles:", "sample_time:"];
@@ -21,7 +21,7 @@ const OWN_COMMENTS: [&str; 3] = ["units:", "roles:", "sample_time:"];
 /// Structure of the start of a table. Lines are counted from 0.
 #[derive(Debug)]
 pub(super) struct Layout<'a> {
-    pub(super) mark: Mark,
+    pub(super) mark: Separator,
     pub(super) names: Names<'a>,
     /// Line of the header, which may be a comment.
     header: usize,
@@ -47,9 +47,9 @@ pub(in crate::formats::csv) struct Mismatch {
 }
 
 /// Returns the position in `filled` of the first row and the cells of the first rows, from position `from` on.
-fn first_rows<'a>(filled: &[(usize, &'a str)], from: usize, mark: Mark) -> Option<(usize, Vec<Vec<&'a str>>)> {
+fn first_rows<'a>(filled: &[(usize, &'a str)], from: usize, mark: Separator) -> Option<(usize, Vec<Vec<&'a str>>)> {
     (from..filled.len()).find_map(|at| {
-        let lines = filled.iter().skip(at).take(ROWS);
+        let lines = filled.iter().skip(at).take(MIN_ROWS);
         let rows: Vec<Vec<&str>> = lines.map(|(_, line)| mark.cells(line)).collect();
         let count = rows.first()?.len();
         let are_rows = rows.iter().all(|row| row.len() == count && is_row(row));
@@ -58,17 +58,19 @@ fn first_rows<'a>(filled: &[(usize, &'a str)], from: usize, mark: Mark) -> Optio
 }
 
 /// Returns the names in a header whose separator differs from the separator of the rows.
-fn names_of_other<'a>(header: &'a str, rows: &[Vec<&str>]) -> Option<Names<'a>> {
-    let marks = Mark::ALL.iter().filter(|mark| **mark != Mark::Blanks);
+fn names_with_other_separator<'a>(header: &'a str, rows: &[Vec<&str>]) -> Option<Names<'a>> {
+    let marks = Separator::ALL.iter().filter(|mark| **mark != Separator::Blanks);
     let mut names = marks.filter_map(|mark| names_of(header, *mark, rows));
-    names.find(|names| names.extra == Extra::None)
+    names.find(|names| names.extra == ExtraCells::None)
 }
 
 impl<'a> Layout<'a> {
     /// Finds the structure of a text; `None` if no header is certain.
     pub(super) fn of(text: &'a str) -> Option<Self> {
-        let filled = filled(text);
-        let found = Mark::ALL.iter().filter_map(|mark| Self::with(text, &filled, *mark));
+        let filled = non_blank_lines(text);
+        let found = Separator::ALL
+            .iter()
+            .filter_map(|mark| Self::with_separator(text, &filled, *mark));
         // The layout whose table starts first is used. If several separators find the same first row, one that gives
         // only numeric cells is preferred.
         found
@@ -77,7 +79,7 @@ impl<'a> Layout<'a> {
     }
 
     /// Finds the structure for a given mark; the second value is true if the first rows hold values only.
-    fn with(text: &'a str, filled: &[(usize, &'a str)], mark: Mark) -> Option<(Self, bool)> {
+    fn with_separator(text: &'a str, filled: &[(usize, &'a str)], mark: Separator) -> Option<(Self, bool)> {
         let mut from = 0;
         while let Some((at, rows)) = first_rows(filled, from, mark) {
             let row = filled.get(at)?.0;
@@ -85,7 +87,7 @@ impl<'a> Layout<'a> {
             let are_values = rows.iter().flatten().all(values);
             let (before, _) = filled.split_at_checked(at)?;
             let found = Self::with_header_before(before, mark, &rows, row)
-                .or_else(|| Self::commented(text, before, mark, &rows, row));
+                .or_else(|| Self::with_commented_header(text, before, mark, &rows, row));
             // A line of numbers above the header is a sample, which must not be omitted.
             let is_sample = |(at, line): &(usize, &str)| {
                 let cells = mark.cells(line);
@@ -105,16 +107,21 @@ impl<'a> Layout<'a> {
     }
 
     /// Returns the structure with a header among the lines `before` the first row.
-    fn with_header_before(before: &[(usize, &'a str)], mark: Mark, rows: &[Vec<&str>], row: usize) -> Option<Self> {
+    fn with_header_before(
+        before: &[(usize, &'a str)],
+        mark: Separator,
+        rows: &[Vec<&str>],
+        row: usize,
+    ) -> Option<Self> {
         let ((at, line), lines_above) = before.split_last()?;
         let of_units = || -> Option<Self> {
             let ((header, names_line), lines_above) = lines_above.split_last()?;
             let names = names_of(names_line, mark, rows)?;
-            let mut cells = mark.cells(unmarked(line, mark));
-            if names.extra == Extra::NameInHeader {
+            let mut cells = mark.cells(without_comment_signs(line, mark));
+            if names.extra == ExtraCells::NameInHeader {
                 cells.truncate(names.names.len());
             }
-            let comment = units::comment(&names.names, &cells)?;
+            let comment = units::units_comment(&names.names, &cells)?;
             Some(Self {
                 mark,
                 names,
@@ -128,13 +135,13 @@ impl<'a> Layout<'a> {
         if let Some(layout) = of_units() {
             return Some(layout);
         }
-        let names = names_of(line, mark, rows).or_else(|| names_of_other(line, rows))?;
+        let names = names_of(line, mark, rows).or_else(|| names_with_other_separator(line, rows))?;
         let filled = |names: &[&str]| names.iter().filter(|name| !unquoted(name).is_empty()).count();
         // If another line above may be the header, the line found may contain its units, or may be damaged.
         let is_rival = |(_, line): &(usize, &str)| {
             let cells = mark.cells(line);
             let same = cells.len() == names.names.len() && filled(&cells) >= filled(&names.names);
-            mark != Mark::Blanks && same && !cells.iter().any(|cell| is_value(cell))
+            mark != Separator::Blanks && same && !cells.iter().any(|cell| is_value(cell))
         };
         (!lines_above.iter().any(is_rival)).then(|| Self {
             mark,
@@ -148,10 +155,10 @@ impl<'a> Layout<'a> {
     }
 
     /// Returns the structure with a header in the comment directly above the first row, as NumPy writes it.
-    fn commented(
+    fn with_commented_header(
         text: &'a str,
         before: &[(usize, &'a str)],
-        mark: Mark,
+        mark: Separator,
         rows: &[Vec<&str>],
         row: usize,
     ) -> Option<Self> {
@@ -161,8 +168,8 @@ impl<'a> Layout<'a> {
         if OWN_COMMENTS.iter().any(|own| words.starts_with(own)) {
             return None;
         }
-        let own = names_of(words, mark, rows).or_else(|| names_of_other(words, rows));
-        let names = own.or_else(|| names_of(words, Mark::Blanks, rows))?;
+        let own = names_of(words, mark, rows).or_else(|| names_with_other_separator(words, rows));
+        let names = own.or_else(|| names_of(words, Separator::Blanks, rows))?;
         Some(Self {
             mark,
             names,
@@ -176,12 +183,12 @@ impl<'a> Layout<'a> {
 
     /// Returns the text as plain CSV with a header in one line above the rows, and notes about what was changed; `None`
     /// if the text is already plain.
-    pub(super) fn rewritten(&self, text: &str) -> Option<(String, Vec<String>)> {
+    pub(super) fn to_plain_csv(&self, text: &str) -> Option<(String, Vec<String>)> {
         let mut notes = Vec::new();
         if self.units.is_some() {
             notes.push(String::from("the line below the header is taken as the units"));
         }
-        if self.mark == Mark::Blanks {
+        if self.mark == Separator::Blanks {
             notes.push(String::from("the columns are separated by blanks"));
         }
         if !self.lines_above.is_empty() {
@@ -193,20 +200,20 @@ impl<'a> Layout<'a> {
         if self.is_comment {
             notes.push(String::from("the comment above the first row is taken as the header"));
         }
-        if self.names.extra == Extra::RowNumbers {
+        if self.names.extra == ExtraCells::RowNumbers {
             notes.push(String::from("the rows start with row numbers, which are left out"));
         }
         let header = self.header();
         let found = text.lines().nth(self.header).map(str::trim_end);
         let as_found = found == Some(header.trim_end());
-        let repeated = self.repeated(text, found.unwrap_or_default());
+        let repeated = self.repeated_header_note(text, found.unwrap_or_default());
         notes.extend(repeated);
         // Blank lines of separators above the header would be read as a header without names.
         let is_blank = |line: &str| !line.is_empty() && line.trim().is_empty();
         let padding = format!("{} \"", self.separator());
-        let mut start = text.lines().take(self.row.saturating_add(ROWS));
+        let mut start = text.lines().take(self.row.saturating_add(MIN_ROWS));
         let is_odd = |line: &str| is_blank(line) || line.contains(&padding);
-        if notes.is_empty() && self.names.extra == Extra::None && as_found && !start.any(is_odd) {
+        if notes.is_empty() && self.names.extra == ExtraCells::None && as_found && !start.any(is_odd) {
             return None;
         }
         let line = |(at, line): (usize, &str)| -> String {
@@ -231,7 +238,7 @@ impl<'a> Layout<'a> {
     }
 
     /// Returns a note if the header is repeated between the rows, as in recordings that were appended to each other.
-    fn repeated(&self, text: &str, header: &str) -> Option<String> {
+    fn repeated_header_note(&self, text: &str, header: &str) -> Option<String> {
         if self.is_comment || header.is_empty() {
             return None;
         }
@@ -248,8 +255,8 @@ impl<'a> Layout<'a> {
     /// Returns the separator in the rewritten text.
     fn separator(&self) -> char {
         match self.mark {
-            Mark::Char(mark) => mark,
-            Mark::Blanks => '\t',
+            Separator::Char(mark) => mark,
+            Separator::Blanks => '\t',
         }
     }
 
@@ -269,7 +276,7 @@ impl<'a> Layout<'a> {
         };
         let names = names.join(&separator.to_string());
         match self.names.extra {
-            Extra::RowNumbers => format!("{separator}{names}"),
+            ExtraCells::RowNumbers => format!("{separator}{names}"),
             _ => names,
         }
     }
@@ -277,11 +284,11 @@ impl<'a> Layout<'a> {
     /// Returns a row of the rewritten text.
     fn row_of<'b>(&self, line: &'b str) -> Cow<'b, str> {
         let line = match self.mark {
-            Mark::Blanks => return Cow::Owned(self.mark.cells(line).join("\t")),
-            Mark::Char(_) => line,
+            Separator::Blanks => return Cow::Owned(self.mark.cells(line).join("\t")),
+            Separator::Char(_) => line,
         };
         let line = match self.names.extra {
-            Extra::SeparatorInRows => line.strip_suffix(self.separator()).unwrap_or(line),
+            ExtraCells::SeparatorInRows => line.strip_suffix(self.separator()).unwrap_or(line),
             _ => line,
         };
         let padding = format!("{} \"", self.separator());
@@ -304,8 +311,8 @@ impl<'a> Layout<'a> {
 /// Returns the header and the cells of a table whose names are not certain; `None` for other text. If the separator is
 /// certain and the header is the first line, each row is compared with the header later.
 pub(in crate::formats::csv) fn mismatch(text: &str) -> Option<Mismatch> {
-    let filled = filled(text);
-    let found = Mark::ALL.iter().filter_map(|mark| {
+    let filled = non_blank_lines(text);
+    let found = Separator::ALL.iter().filter_map(|mark| {
         let (at, rows) = first_rows(&filled, 0, *mark)?;
         let are_values = rows.iter().flatten().all(|cell| is_value(cell) || is_missing(cell));
         Some((*mark, at, rows, are_values))
@@ -321,7 +328,7 @@ pub(in crate::formats::csv) fn mismatch(text: &str) -> Option<Mismatch> {
     let is_named = at > 0 && mark.cells(header).iter().any(|word| is_number(word));
     let is_uncertain = match (at, mark) {
         (0, _) => are_values,
-        (_, Mark::Blanks) => words != cells && !header.contains([',', ';', '\t']),
+        (_, Separator::Blanks) => words != cells && !header.contains([',', ';', '\t']),
         (1, _) => false,
         _ => words != cells,
     };
@@ -329,6 +336,6 @@ pub(in crate::formats::csv) fn mismatch(text: &str) -> Option<Mismatch> {
         line: line.saturating_add(1),
         words,
         cells,
-        first_row: shown(&numbers.join(", ")),
+        first_row: abbreviate(&numbers.join(", ")),
     })
 }

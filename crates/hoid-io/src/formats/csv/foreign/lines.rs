@@ -5,16 +5,16 @@ use crate::table::{Cell, with_decimal_point};
 use crate::time::is_clock_time;
 
 /// Number of lines at the start of a file in which the header and the first rows are searched for.
-pub(super) const LINES: usize = 250;
+pub(super) const SEARCHED_LINES: usize = 250;
 
 /// Separator of the cells of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Mark {
+pub(super) enum Separator {
     Char(char),
     Blanks,
 }
 
-impl Mark {
+impl Separator {
     /// All marks; if several fit a table equally well, the first one is used.
     pub(super) const ALL: [Self; 4] = [Self::Char('\t'), Self::Char(';'), Self::Char(','), Self::Blanks];
 
@@ -67,8 +67,8 @@ pub(super) fn is_row(cells: &[&str]) -> bool {
 }
 
 /// Returns the lines at the start of a text that are neither blank nor comments, with their indices.
-pub(super) fn filled(text: &str) -> Vec<(usize, &str)> {
-    let lines = text.lines().take(LINES).enumerate();
+pub(super) fn non_blank_lines(text: &str) -> Vec<(usize, &str)> {
+    let lines = text.lines().take(SEARCHED_LINES).enumerate();
     lines.filter(|(_, line)| !is_comment_or_blank(line)).collect()
 }
 
@@ -78,9 +78,9 @@ mod tests {
 
     #[test]
     fn lines_are_split_into_cells() {
-        assert_eq!(Mark::Char(',').cells("a,\"b,c\",,"), ["a", "\"b,c\"", "", ""]);
-        assert_eq!(Mark::Blanks.cells("  a \"b c\"\td "), ["a", "\"b c\"", "d"]);
-        assert_eq!(Mark::Blanks.cells(""), [""; 0]);
+        assert_eq!(Separator::Char(',').cells("a,\"b,c\",,"), ["a", "\"b,c\"", "", ""]);
+        assert_eq!(Separator::Blanks.cells("  a \"b c\"\td "), ["a", "\"b c\"", "d"]);
+        assert_eq!(Separator::Blanks.cells(""), [""; 0]);
         for row in [
             &["0", "\"1,5\""][..],
             &["10:11:12", "1", "go"],

@@ -25,7 +25,7 @@ pub(super) use layout::mismatch;
 use layout::Layout;
 
 /// Rewrites the bytes of a table as plain CSV; returns a description of each change.
-pub(super) fn converted_to_plain_csv(bytes: &mut Vec<u8>) -> Vec<String> {
+pub(super) fn convert_to_plain_csv(bytes: &mut Vec<u8>) -> Vec<String> {
     let mut notes = Vec::from_iter(encoding::decode(bytes));
     let Ok(text) = std::str::from_utf8(bytes) else {
         return notes;
@@ -42,7 +42,7 @@ pub(super) fn converted_to_plain_csv(bytes: &mut Vec<u8>) -> Vec<String> {
         Some((end, _)) => text.get(..*end).unwrap_or(text),
         None => text,
     };
-    let rewritten = layout.and_then(|layout| layout.rewritten(kept));
+    let rewritten = layout.and_then(|layout| layout.to_plain_csv(kept));
     let plain = match (rewritten, end.is_some() || tabs.is_some()) {
         (Some((text, changes)), _) => {
             notes.extend(changes);
@@ -73,9 +73,9 @@ pub(in crate::formats) fn is_table(start: &[u8]) -> bool {
         return false;
     };
     let tabs = pipes::with_tabs(text);
-    let lines = lines::filled(tabs.as_deref().unwrap_or(text));
-    let is_row = |mark: lines::Mark| lines.iter().any(|(_, line)| lines::is_row(&mark.cells(line)));
-    lines::Mark::ALL.into_iter().any(is_row)
+    let lines = lines::non_blank_lines(tabs.as_deref().unwrap_or(text));
+    let is_row = |mark: lines::Separator| lines.iter().any(|(_, line)| lines::is_row(&mark.cells(line)));
+    lines::Separator::ALL.into_iter().any(is_row)
 }
 
 #[cfg(test)]
@@ -84,7 +84,7 @@ mod tests {
 
     fn plain(text: &str) -> (String, usize) {
         let mut bytes = text.as_bytes().to_vec();
-        let notes = converted_to_plain_csv(&mut bytes);
+        let notes = convert_to_plain_csv(&mut bytes);
         (String::from_utf8_lossy(&bytes).into_owned(), notes.len())
     }
 

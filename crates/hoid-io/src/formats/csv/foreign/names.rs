@@ -1,17 +1,17 @@
 //! Assignment of the words of a header to the cells below it.
 
-use super::lines::{Mark, is_number, unquoted};
+use super::lines::{Separator, is_number, unquoted};
 
 /// Names of the columns of a table, and the cells of a line that have no name.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Names<'a> {
     pub(super) names: Vec<&'a str>,
-    pub(super) extra: Extra,
+    pub(super) extra: ExtraCells,
 }
 
 /// Difference between the cells of the header and the cells of the rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Extra {
+pub(super) enum ExtraCells {
     None,
     /// Each row ends with a separator that the header lacks.
     SeparatorInRows,
@@ -22,50 +22,50 @@ pub(super) enum Extra {
 }
 
 /// Signs before a header that is a comment in MATLAB, Fortran, C or a shell; they do not belong to the first name.
-const SIGNS: [char; 6] = ['%', '#', '!', '*', '/', ';'];
+const COMMENT_SIGNS: [char; 6] = ['%', '#', '!', '*', '/', ';'];
 
 /// Returns a header without comment signs before its first name. A sign directly before a name, as in `%time`, may
 /// belong to it, unless blanks separate the names.
-pub(super) fn unmarked(header: &str, mark: Mark) -> &str {
-    let inside = header.trim_start().trim_start_matches(SIGNS);
+pub(super) fn without_comment_signs(header: &str, mark: Separator) -> &str {
+    let inside = header.trim_start().trim_start_matches(COMMENT_SIGNS);
     match mark {
-        Mark::Char(_) if !inside.starts_with(' ') => header,
+        Separator::Char(_) if !inside.starts_with(' ') => header,
         _ => inside.trim_start_matches(' '),
     }
 }
 
 /// Returns the names that `header` gives to the cells of `rows`, which are the first rows and have equally many cells;
 /// `None` if the assignment is not certain.
-pub(super) fn names_of<'a>(header: &'a str, mark: Mark, rows: &[Vec<&str>]) -> Option<Names<'a>> {
-    let header = unmarked(header, mark);
+pub(super) fn names_of<'a>(header: &'a str, mark: Separator, rows: &[Vec<&str>]) -> Option<Names<'a>> {
+    let header = without_comment_signs(header, mark);
     let count = rows.first()?.len();
     let words = mark.cells(header);
-    let named = |names: Vec<&'a str>, extra: Extra| {
+    let named = |names: Vec<&'a str>, extra: ExtraCells| {
         let is_name = |name: &&str| !is_number(name);
         let any = names.iter().any(|name| !unquoted(name).is_empty());
         (any && names.iter().all(is_name)).then_some(Names { names, extra })
     };
     if words.len() == count {
-        return named(words, Extra::None);
+        return named(words, ExtraCells::None);
     }
-    if mark == Mark::Blanks
-        && let Some(names) = in_groups(header, count)
+    if mark == Separator::Blanks
+        && let Some(names) = split_into_names(header, count)
     {
-        return named(names, Extra::None);
+        return named(names, ExtraCells::None);
     }
     if words.len().saturating_add(1) == count {
         let ends_empty = |row: &Vec<&str>| row.last().is_some_and(|cell| cell.trim().is_empty());
-        if mark != Mark::Blanks && rows.iter().all(ends_empty) {
-            return named(words, Extra::SeparatorInRows);
+        if mark != Separator::Blanks && rows.iter().all(ends_empty) {
+            return named(words, ExtraCells::SeparatorInRows);
         }
         return is_row_number_column(rows)
-            .then(|| named(words, Extra::RowNumbers))
+            .then(|| named(words, ExtraCells::RowNumbers))
             .flatten();
     }
     let (last, names) = words.split_last()?;
     let is_idle = matches!(unquoted(last).to_lowercase().as_str(), "" | "comment" | "comments");
-    (mark != Mark::Blanks && names.len() == count && is_idle)
-        .then(|| named(names.to_vec(), Extra::NameInHeader))
+    (mark != Separator::Blanks && names.len() == count && is_idle)
+        .then(|| named(names.to_vec(), ExtraCells::NameInHeader))
         .flatten()
 }
 
@@ -79,7 +79,7 @@ fn is_row_number_column(rows: &[Vec<&str>]) -> bool {
 /// Divides a header whose names may consist of several words, separated by blanks, into `count` names: at tabs or gaps
 /// of several blanks, or after brackets, as in `Time (s) Roll error (deg)`; `None` if this gives another number of
 /// names.
-fn in_groups(header: &str, count: usize) -> Option<Vec<&str>> {
+fn split_into_names(header: &str, count: usize) -> Option<Vec<&str>> {
     if header.contains('"') {
         return None;
     }
@@ -112,7 +112,7 @@ fn in_groups(header: &str, count: usize) -> Option<Vec<&str>> {
 mod tests {
     use super::*;
 
-    fn found(header: &str, mark: Mark, rows: &[&str]) -> Option<(Vec<String>, Extra)> {
+    fn names_and_extra(header: &str, mark: Separator, rows: &[&str]) -> Option<(Vec<String>, ExtraCells)> {
         let rows: Vec<Vec<&str>> = rows.iter().map(|row| mark.cells(row)).collect();
         let names = names_of(header, mark, &rows)?;
         Some((names.names.iter().map(|name| (*name).to_owned()).collect(), names.extra))
@@ -138,8 +138,8 @@ mod tests {
         ] {
             let names = names.map(str::to_owned).to_vec();
             assert_eq!(
-                found(header, Mark::Blanks, &rows),
-                Some((names, Extra::None)),
+                names_and_extra(header, Separator::Blanks, &rows),
+                Some((names, ExtraCells::None)),
                 "{header}"
             );
         }
@@ -154,18 +154,18 @@ mod tests {
             "t (s) e u x",
             "\"t e",
         ] {
-            assert_eq!(found(header, Mark::Blanks, &rows), None, "{header}");
+            assert_eq!(names_and_extra(header, Separator::Blanks, &rows), None, "{header}");
         }
     }
 
     #[test]
     fn extra_cells_are_matched_to_the_header() {
-        let comma = Mark::Char(',');
+        let comma = Separator::Char(',');
         let names = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
         let rows = ["0,5,", "1,6,"];
         assert_eq!(
-            found("t,e", comma, &rows),
-            Some((names(&["t", "e"]), Extra::SeparatorInRows))
+            names_and_extra("t,e", comma, &rows),
+            Some((names(&["t", "e"]), ExtraCells::SeparatorInRows))
         );
         for rows in [
             ["0,5.1,7", "1,5.2,7"],
@@ -173,29 +173,29 @@ mod tests {
             ["\"1\",5.1,7", "\"2\",5.2,7"],
         ] {
             assert_eq!(
-                found("t,e", comma, &rows),
-                Some((names(&["t", "e"]), Extra::RowNumbers))
+                names_and_extra("t,e", comma, &rows),
+                Some((names(&["t", "e"]), ExtraCells::RowNumbers))
             );
         }
         for rows in [["0,5,7", "0.1,6,7"], ["3,5,7", "4,6,7"], ["0,5,", "0.1,6,7"]] {
-            assert_eq!(found("t,e", comma, &rows), None, "{rows:?}");
+            assert_eq!(names_and_extra("t,e", comma, &rows), None, "{rows:?}");
         }
         for header in ["t,e,", "t,e,Comment"] {
             assert_eq!(
-                found(header, comma, &["0,5", "1,6"]),
-                Some((names(&["t", "e"]), Extra::NameInHeader))
+                names_and_extra(header, comma, &["0,5", "1,6"]),
+                Some((names(&["t", "e"]), ExtraCells::NameInHeader))
             );
         }
-        assert_eq!(found("t,e,u", comma, &["0,5", "1,6"]), None);
+        assert_eq!(names_and_extra("t,e,u", comma, &["0,5", "1,6"]), None);
         assert_eq!(
-            found("%time,e", comma, &["0,5", "1,6"]),
-            Some((names(&["%time", "e"]), Extra::None))
+            names_and_extra("%time,e", comma, &["0,5", "1,6"]),
+            Some((names(&["%time", "e"]), ExtraCells::None))
         );
         assert_eq!(
-            found("% t,e", comma, &["0,5", "1,6"]),
-            Some((names(&["t", "e"]), Extra::None))
+            names_and_extra("% t,e", comma, &["0,5", "1,6"]),
+            Some((names(&["t", "e"]), ExtraCells::None))
         );
-        assert_eq!(found("t,e", comma, &[]), None);
-        assert_eq!(found(",", comma, &["0,5"]), None);
+        assert_eq!(names_and_extra("t,e", comma, &[]), None);
+        assert_eq!(names_and_extra(",", comma, &["0,5"]), None);
     }
 }

@@ -4,10 +4,10 @@
 use std::borrow::Cow;
 
 use super::super::text::is_comment_or_blank;
-use super::lines::{LINES, is_row};
+use super::lines::{SEARCHED_LINES, is_row};
 
 /// Number of lines with bars that are examined.
-const EXAMINED: usize = 4;
+const EXAMINED_LINES: usize = 4;
 
 /// Replaces the bars of a table by tabs; the rule below the header becomes a comment. `None` for other text.
 pub(super) fn with_tabs(text: &str) -> Option<String> {
@@ -17,9 +17,9 @@ pub(super) fn with_tabs(text: &str) -> Option<String> {
     };
     let first: Vec<&str> = text
         .lines()
-        .take(LINES)
+        .take(SEARCHED_LINES)
         .filter(|line| line.contains('|') && !is_comment_or_blank(line) && !is_rule(line))
-        .take(EXAMINED)
+        .take(EXAMINED_LINES)
         .collect();
     let bars = |line: &str| line.matches('|').count();
     let (header, rows) = first.split_first()?;
@@ -85,7 +85,7 @@ mod tests {
     }
 
     #[test]
-    fn other_text_with_bars_is_no_table() {
+    fn other_text_with_bars_is_not_a_table() {
         for text in [
             "",
             "|",

@@ -1,8 +1,8 @@
 //! Lines of words below a table, such as `End of recording` or `Mean,0.1,0.2`.
 
-use super::super::text::{is_comment_or_blank, open_line};
-use super::lines::{Mark, is_missing, is_value, unquoted};
-use crate::wording::shown;
+use super::super::text::{is_comment_or_blank, unterminated_line};
+use super::lines::{Separator, is_missing, is_value, unquoted};
+use crate::wording::abbreviate;
 
 /// Largest number of lines of words below a table.
 const MAX_LINES_BELOW: usize = 60;
@@ -13,7 +13,7 @@ const COMPARED_ROWS: usize = 3;
 ///
 /// A line belongs to the words if its first cell is text while the first cells of the rows above are numbers or clock
 /// times. A last line without a line end may be truncated, and is not omitted.
-pub(super) fn words_below(text: &str, mark: Mark) -> Option<(usize, String)> {
+pub(super) fn words_below(text: &str, mark: Separator) -> Option<(usize, String)> {
     let mut end = text.len();
     let mut found: Vec<&str> = Vec::new();
     let starts_with_value = |line: &str| mark.cells(line).first().is_some_and(|cell| is_value(cell));
@@ -37,12 +37,12 @@ pub(super) fn words_below(text: &str, mark: Mark) -> Option<(usize, String)> {
         .take(COMPARED_ROWS)
         .collect();
     let first = found.last()?;
-    let is_open = open_line(text).is_some() && found.len() == 1 && mark.cells(first).len() > 1;
+    let is_open = unterminated_line(text).is_some() && found.len() == 1 && mark.cells(first).len() > 1;
     (rows.len() == COMPARED_ROWS && rows.iter().all(|row| starts_with_value(row)) && !is_open).then(|| {
         let note = format!(
             "lines of text below the table are left out: {}; the first is \"{}\"",
             found.len(),
-            shown(first)
+            abbreviate(first)
         );
         (end, note)
     })
@@ -63,7 +63,7 @@ mod tests {
             "# aside\nMean,2\n",
         ] {
             let text = format!("{rows}{words}");
-            let (at, note) = words_below(&text, Mark::Char(',')).unwrap();
+            let (at, note) = words_below(&text, Separator::Char(',')).unwrap();
             assert_eq!(text[..at].trim_end(), rows.trim_end(), "{words:?}");
             let first = words.lines().find(|line| !line.is_empty() && !line.starts_with('#'));
             assert!(note.contains(first.unwrap()), "{note}");
@@ -71,7 +71,7 @@ mod tests {
     }
 
     #[test]
-    fn table_rows_are_never_taken_as_words() {
+    fn table_rows_are_not_treated_as_words() {
         for text in [
             "",
             "t,e\n",
@@ -84,9 +84,9 @@ mod tests {
             "word,e\na,1\nb,2\nc,3\nd,4\n",
             "t,e\n0,1\n1,2\n2,3\nx,4",
         ] {
-            assert_eq!(words_below(text, Mark::Char(',')), None, "{text:?}");
+            assert_eq!(words_below(text, Separator::Char(',')), None, "{text:?}");
         }
         let many = format!("t,e\n0,1\n1,2\n2,3\n{}", "word\n".repeat(MAX_LINES_BELOW + 1));
-        assert_eq!(words_below(&many, Mark::Char(',')), None);
+        assert_eq!(words_below(&many, Separator::Char(',')), None);
     }
 }

@@ -4,7 +4,7 @@ use super::super::text::is_unit;
 use super::lines::{is_number, unquoted};
 
 /// Known units. A line of units must contain at least one of them; its other entries may be any short words.
-const UNITS: [&str; 33] = [
+const KNOWN_UNITS: [&str; 33] = [
     "s", "sec", "secs", "seconds", "ms", "us", "µs", "min", "deg", "degs", "degree", "degrees", "°", "rad", "radians",
     "mrad", "deg/s", "rad/s", "m", "mm", "cm", "ft", "m/s", "v", "volt", "volts", "mv", "ma", "n", "nm", "%",
     "percent", "hz",
@@ -24,9 +24,9 @@ fn unit(cell: &str) -> Option<&str> {
 
 /// Returns the comment `units: t s, e deg` for a line of cells below the header `names`; `None` if the cells are not
 /// units.
-pub(super) fn comment(names: &[&str], cells: &[&str]) -> Option<String> {
+pub(super) fn units_comment(names: &[&str], cells: &[&str]) -> Option<String> {
     let units: Vec<&str> = cells.iter().map(|cell| unit(cell)).collect::<Option<_>>()?;
-    let is_known = |unit: &&str| UNITS.contains(&unit.to_lowercase().as_str());
+    let is_known = |unit: &&str| KNOWN_UNITS.contains(&unit.to_lowercase().as_str());
     if units.len() != names.len() || !units.iter().any(is_known) {
         return None;
     }
@@ -54,9 +54,9 @@ mod tests {
             (["s", "1", "2"], None),
             (["s", "deg", "a unit of many words"], None),
         ] {
-            assert_eq!(comment(&names, &cells).as_deref(), units, "{cells:?}");
+            assert_eq!(units_comment(&names, &cells).as_deref(), units, "{cells:?}");
         }
-        assert_eq!(comment(&names, &["s", "deg"]), None);
-        assert_eq!(comment(&[], &[]), None);
+        assert_eq!(units_comment(&names, &["s", "deg"]), None);
+        assert_eq!(units_comment(&[], &[]), None);
     }
 }
