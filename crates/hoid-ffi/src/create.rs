@@ -105,7 +105,7 @@ pub unsafe extern "C" fn hoid_tracker_save(
 ) -> HoidStatus {
     let save = |session: &mut Session| {
         // SAFETY: guaranteed by the caller of this function.
-        unsafe { write_array(&session.to_bytes(), buffer, room, length, "the buffer") }
+        unsafe { write_array(&session.save(), buffer, room, length, "the buffer") }
     };
     // SAFETY: guaranteed by the caller of this function.
     unsafe { with_tracker_mut(tracker, save) }

@@ -16,7 +16,7 @@ use crate::{
 const MAGIC: [u8; 8] = *b"hoid\x01\0\0\0";
 impl Session {
     /// Returns the tracker as bytes, without changing it.
-    pub fn to_bytes(&mut self) -> Vec<u8> {
+    pub fn save(&mut self) -> Vec<u8> {
         let (asked, live) = self.request_and_recursion();
         let (orders, numbers) = live.save();
         let orders = orders.map(|o| json!([o.na, o.nb, o.nc, o.nd, o.nf, o.nk]));
@@ -31,7 +31,7 @@ impl Session {
         pack(MAGIC, &description, &as_bytes(&numbers))
     }
 
-    /// Restores a tracker from the bytes of [`Session::to_bytes`].
+    /// Restores a tracker from the bytes of [`Session::save`].
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, Failure> {
         let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
         let damaged = || wrong("the bytes were changed or truncated since they were saved");
@@ -125,8 +125,8 @@ mod tests {
             for sample in &samples[..taken] {
                 first.take(*sample, true);
             }
-            let bytes = first.to_bytes();
-            assert_eq!(bytes, first.to_bytes(), "saving changes nothing");
+            let bytes = first.save();
+            assert_eq!(bytes, first.save(), "saving changes nothing");
             let mut second = Session::from_bytes(&bytes).unwrap();
             for sample in &samples[taken..all] {
                 let (a, b) = (first.take(*sample, true), second.take(*sample, true));
@@ -145,7 +145,7 @@ mod tests {
             (None, None)
         };
         let mut session = Session::new(method, 0.01, options, None).unwrap();
-        let bytes = session.to_bytes();
+        let bytes = session.save();
         let places = if cfg!(miri) { 9 } else { 199 };
         let refused = |bytes: &[u8]| {
             let failure = Session::from_bytes(bytes).err().unwrap();

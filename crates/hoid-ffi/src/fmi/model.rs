@@ -44,7 +44,7 @@ impl Model {
         match self {
             Self::Tracker(tracker) => {
                 let outputs = vec![tracker.innovation, f64::from(tracker.changes), tracker.change_t_s];
-                (outputs, tracker.session.to_bytes())
+                (outputs, tracker.session.save())
             }
             Self::Operator(operator) => (Vec::new(), as_bytes(&operator.save_state())),
         }

@@ -160,7 +160,7 @@ impl SigmoidFit {
     }
 
     fn estimate_of(&self, i: usize) -> Estimate {
-        let value = self.layout.to_user_value(i, self.theta[i]);
+        let value = self.layout.user_value(i, self.theta[i]);
         let has_error = self.remarks[i].is_none_or(Remark::has_standard_error);
         match self.covariance() {
             Some(c) if has_error => estimate(value, c[i * self.theta.len() + i]),

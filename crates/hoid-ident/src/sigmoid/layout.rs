@@ -210,7 +210,7 @@ impl Layout {
         }
     }
 
-    pub fn to_user_value(&self, place: usize, value: f64) -> f64 {
+    pub fn user_value(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.exp(),
             _ if Some(place) == self.lag => 1.0 / value,

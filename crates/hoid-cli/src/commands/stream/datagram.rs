@@ -87,7 +87,7 @@ impl SampleDatagram {
     }
 
     /// Converts the sample to the form read from a line; an invalid value is NaN.
-    pub fn to_sample(&self, sample_time: SampleTime, largest: f64) -> StreamSample {
+    pub fn to_sample(self, sample_time: SampleTime, largest: f64) -> StreamSample {
         let sound = |v: f64| v.abs() <= largest;
         let fault = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));
         let faults: Vec<String> = [fault("e", self.e), fault("u", self.u)].into_iter().flatten().collect();
