@@ -9,7 +9,8 @@
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
 //!
 //! where b is real. T is the share of the power of U that this regression explains, maximised over the delays
-//! [`DELAYS_S`]. Surrogate records have the same spectra, but random phases of E and therefore no relation between e
+//! [`DELAYS_S`] and the poles [`LAG_RATES`]. With one slow pole, the regression would leave much of the response of a
+//! person with a short lag, and with little remnant a few strong lines with random phases fit as well. Surrogate records have the same spectra, but random phases of E and therefore no relation between e
 //! and u (J. Theiler et al., *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATE_COUNT`] such records give the
 //! distribution of T if there is no response. If u does not depend on e, T is one more draw from this distribution: the
 //! probability that it exceeds all others is 1/([`SURROGATE_COUNT`] + 1), regardless of the spectra. Only the past of e is
@@ -31,8 +32,8 @@ use crate::{family::noise::NoiseProducts, frequency::spectrum, linalg::least_squ
 const MAX_FREQUENCY_RAD_S: f64 = 25.0;
 /// Tested delays, s.
 const DELAYS_S: [f64; 8] = [0.05, 0.1, 0.16, 0.23, 0.31, 0.4, 0.52, 0.7];
-/// Pole of the lag, 1/s.
-const LAG_RATE: f64 = 0.3;
+/// Tested poles of the lag, 1/s.
+const LAG_RATES: [f64; 3] = [0.3, 1.3, 4.0];
 /// Typical neuromuscular system: natural frequency in rad/s, and damping ratio.
 const NEUROMUSCULAR_PARAMETERS: (f64, f64) = (11.0, 0.4);
 /// Number of surrogate records without a relation between e and u.
@@ -40,7 +41,11 @@ const SURROGATE_COUNT: usize = 1999;
 /// Minimum number of frequencies for the test.
 const MIN_FREQUENCIES: usize = 12;
 const SEED: u64 = 0x686f_6964;
-const COLUMN_COUNT: usize = 3;
+/// Gain, lead, and a lag for each of [`LAG_RATES`].
+const COLUMN_COUNT: usize = 2 + LAG_RATES.len();
+/// Largest number of surrogates that may explain as much as the records: the probability that unrelated records pass is
+/// at most (1 + 2)/2000.
+const MAX_SURROGATES_ABOVE: usize = 2;
 
 /// Result of the test of whether u responds to e.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -59,15 +64,15 @@ impl Response {
         (self.surrogates_above + 1) as f64 / (self.surrogates + 1) as f64
     }
 
-    /// Returns the finding that no response can be distinguished from chance; `None` if no surrogate has as large a
-    /// share as the records.
+    /// Returns the finding that no response can be distinguished from chance; `None` if at most
+    /// [`MAX_SURROGATES_ABOVE`] surrogates have as large a share as the records.
     pub fn finding(&self) -> Option<Finding> {
-        (self.surrogates_above > 0).then(|| {
+        (self.surrogates_above > MAX_SURROGATES_ABOVE).then(|| {
             Finding::undetermined(
                 "no-response",
                 format!(
                     "the response of u to e cannot be distinguished from chance: {} of {} pairs of unrelated records \
-                     with the same spectra respond at least as strongly (p = {:.2}); check that both channels are \
+                     with the same spectra respond at least as strongly (p = {:.3}); check that both channels are \
                      from the same run and are not exchanged",
                     self.surrogates_above,
                     self.surrogates,
@@ -98,7 +103,8 @@ pub fn response_to_error(records: &[Record]) -> Option<Response> {
         return None;
     }
     let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
-    let inverse = inverse_gram(&all)?;
+    let inverses: Option<Vec<Vec<f64>>> = (0..LAG_RATES.len()).map(|lag| inverse_gram(&all, lag)).collect();
+    let inverses = inverses?;
     // Products of columns and output for each frequency and delay; a surrogate changes only the phases of these
     // products.
     let products: Vec<[[Complex64; COLUMN_COUNT]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
@@ -112,7 +118,11 @@ pub fn response_to_error(records: &[Record]) -> Option<Response> {
                 }
             }
         }
-        let explained = sums.iter().map(|right| variance_along(right, &inverse));
+        let explained = sums.iter().flat_map(|right| {
+            let with =
+                |(lag, inverse): (usize, &Vec<f64>)| variance_along(&columns_with(lag).map(|i| right[i]), inverse);
+            inverses.iter().enumerate().map(with)
+        });
         explained.fold(f64::NEG_INFINITY, f64::max) / power
     };
     let own = share(&turns);
@@ -135,24 +145,31 @@ pub fn response_to_error(records: &[Record]) -> Option<Response> {
     })
 }
 
-/// Returns the inverse of `sum Re(x_i* x_j)` by rows. This matrix depends neither on the delay nor on the phases of E.
+/// Returns the indices of the columns of the regression with this lag.
+fn columns_with(lag: usize) -> [usize; 3] {
+    [0, 1, 2 + lag]
+}
+
+/// Returns the inverse of `sum Re(x_i* x_j)` by rows, for the regression with this lag. The matrix depends neither on the delay nor on the phases of E.
 /// `None` if the columns are linearly dependent.
-fn inverse_gram(all: &[Spectra]) -> Option<Vec<f64>> {
-    let mut gram = [0.0; COLUMN_COUNT * COLUMN_COUNT];
+fn inverse_gram(all: &[Spectra], lag: usize) -> Option<Vec<f64>> {
+    const N: usize = 3;
+    let mut gram = [0.0; N * N];
     for spectra in all {
         for (columns, e) in spectra.columns.iter().zip(&spectra.e) {
-            for i in 0..COLUMN_COUNT {
-                for j in 0..COLUMN_COUNT {
-                    gram[i * COLUMN_COUNT + j] += (columns[i].conj() * columns[j]).re * e.norm_sqr();
+            let columns = columns_with(lag).map(|i| columns[i]);
+            for i in 0..N {
+                for j in 0..N {
+                    gram[i * N + j] += (columns[i].conj() * columns[j]).re * e.norm_sqr();
                 }
             }
         }
     }
     let column = |i: usize| {
-        let unit: [f64; COLUMN_COUNT] = std::array::from_fn(|j| f64::from(i == j));
+        let unit: [f64; N] = std::array::from_fn(|j| f64::from(i == j));
         solve_symmetric(&gram, &unit)
     };
-    let columns: Option<Vec<Vec<f64>>> = (0..COLUMN_COUNT).map(column).collect();
+    let columns: Option<Vec<Vec<f64>>> = (0..N).map(column).collect();
     Some(columns?.concat())
 }
 
@@ -172,7 +189,12 @@ impl Spectra {
             let s = Complex64::new(0.0, omega);
             let muscles = own * own / (s * s + 2.0 * damping * own * s + own * own);
             let whitening = filter_response(&d_u, omega * sample_time_s) / filter_response(&d_e, omega * sample_time_s);
-            [Complex64::ONE, s, 1.0 / (s + LAG_RATE)].map(|g| whitening * muscles * g)
+            let forms: [Complex64; COLUMN_COUNT] = std::array::from_fn(|i| match i {
+                0 => Complex64::ONE,
+                1 => s,
+                _ => 1.0 / (s + LAG_RATES[i - 2]),
+            });
+            forms.map(|g| whitening * muscles * g)
         };
         let delays = |tau: f64| {
             let turn = |omega: &f64| Complex64::from_polar(1.0, -omega * tau);

@@ -32,9 +32,18 @@ use spectra::{ExogenousChannels, MAX_FREQUENCIES, Spectra};
 
 /// Largest unexplained share of the power, expressed as a disturbance at u, for which the element is judged.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.02;
+/// The same without a recorded target or disturbance. If one exists, e and u are then related at its frequencies by the
+/// inverse of the person's response, which an element can imitate.
+const MAX_UNEXPLAINED_WITHOUT_EXCITATION: f64 = 1e-3;
 /// Share of the power that remains unexplained for exact data because the delay is scanned in steps; smaller
 /// differences between elements do not count.
 const EXACT_DATA_SHARE: f64 = 1e-4;
+/// Unexplained share up to which the given element is accepted: the power of a response that differs by
+/// [`MAX_RESPONSE_DIFFERENCE`].
+const MAX_UNEXPLAINED_BY_GIVEN: f64 = 0.01;
+/// Ratio of the unexplained shares of the given and of the identified element up to which the given element is accepted.
+/// Without a recorded target, for example, neither element explains the power of the target.
+const MAX_RATIO_TO_IDENTIFIED: f64 = 4.0;
 /// Frequencies at which two elements are compared, rad/s: the range in which people close their loops.
 const COMPARED_FREQUENCIES_RAD_S: [f64; 7] = [0.5, 0.75, 1.1, 1.6, 2.4, 3.6, 5.4];
 /// Largest difference between the logarithms of two responses that count as equal: 10 % of the gain or 6 deg.
@@ -124,11 +133,29 @@ pub fn recorded_element(
         .iter()
         .filter_map(|&(m, n)| ElementFit::of(&spectra, m, n, sample_time_s))
         .collect();
+    let most = match exogenous.is_empty() {
+        true => MAX_UNEXPLAINED_WITHOUT_EXCITATION,
+        false => MAX_UNEXPLAINED_SHARE,
+    };
     let least = fits.iter().map(|fit| fit.unexplained).fold(f64::INFINITY, f64::min);
     let chosen = fits
         .into_iter()
         .find(|fit| fit.unexplained <= 2.0 * least + EXACT_DATA_SHARE)
-        .filter(|fit| fit.unexplained <= MAX_UNEXPLAINED_SHARE)?;
+        .filter(|fit| fit.unexplained <= most)?;
+    let aligned_s = MAX_ALIGNED_DELAY_SAMPLES * sample_time_s;
+    // A zero with a delay, or a slow pole, can look like another element in the band of manual control. What counts is
+    // whether the given element explains the record.
+    if let Some((delay_s, unexplained)) = chosen.of_given(&spectra, given, aligned_s)
+        && unexplained <= MAX_UNEXPLAINED_BY_GIVEN.max(MAX_RATIO_TO_IDENTIFIED * chosen.unexplained)
+    {
+        return Some(RecordedElement {
+            element: given.clone(),
+            delay_s,
+            unexplained,
+            difference: (COMPARED_FREQUENCIES_RAD_S[0], Complex64::ONE),
+            aligned_s,
+        });
+    }
     let element = transfer_function(&chosen, given.delay_s())?;
     let ratio = |omega: f64| (omega, element.response(omega) / given.response(omega));
     let difference = COMPARED_FREQUENCIES_RAD_S
@@ -141,7 +168,7 @@ pub fn recorded_element(
         unexplained: chosen.unexplained,
         element,
         difference,
-        aligned_s: MAX_ALIGNED_DELAY_SAMPLES * sample_time_s,
+        aligned_s,
     })
 }
 

@@ -21,6 +21,7 @@ use super::{
     joint::{LineMeasurements, fit_with_lines},
     line_fit::LineFit,
     lines::LineData,
+    parameter::is_dc_gain,
     prediction::PredictionProblem,
     prediction_fit::PredictionFit,
     result::{FamilyFit, FreeModel, OperatorInForm, WeighedForm},
@@ -68,6 +69,8 @@ pub(super) struct ChosenForm<'p, 'a> {
     pub others: Vec<OtherForm<'a>>,
     /// Criteria of all compared forms.
     pub forms: Vec<FormFigures>,
+    /// The forms with a gain at low frequency, and this gain in the first record.
+    pub gains: Vec<(Form, f64)>,
     pub prediction: &'p PredictionProblem<'a>,
     /// Comparison of the forms of each further input.
     pub channels: Vec<ChannelFit>,
@@ -132,7 +135,7 @@ impl<'a> ChosenForm<'_, 'a> {
             }
         }
         let forms = self.normalise_weights(&mut weighed);
-        let dc_gain_share = evidence_for(&forms, |form| form.has_lag() == layout.form.has_lag());
+        let dc_gain_share = self.dc_gain_share(&forms, &weighed[0]);
         let mut operators = Vec::with_capacity(separate);
         for record in 0..separate {
             operators.push(record_operator(found, &errors, (&weighed, dc_gain_share), record)?);
@@ -225,6 +228,31 @@ impl<'a> ChosenForm<'_, 'a> {
             (None, None) => return None,
         };
         fit_with_lines(self.prediction, fit, (lines?, &data), workspace)
+    }
+
+    /// Returns the evidence for the forms in which the gain K has the same meaning or the same value as in the best form.
+    /// A form with a pure integration has no such gain. It is evidence against the K of a form with a lag, which is then
+    /// infinite, but not against the K of a form without one.
+    fn dc_gain_share(&self, forms: &[FormFigures], best: &WeighedForm) -> f64 {
+        let has_lag = best.form.has_lag();
+        let has_gain = |form: Form| has_lag || self.gains.iter().any(|(of, _)| *of == form);
+        let counted: Vec<FormFigures> = forms.iter().filter(|f| has_gain(f.form)).cloned().collect();
+        evidence_for(&counted, |form| {
+            form.has_lag() == has_lag || self.has_same_gain(form, best)
+        })
+    }
+
+    /// True if the gain of a form at low frequency is within one standard error of the gain of the best form. A form
+    /// whose lag is at the end of its search range describes the same person as a form without it.
+    fn has_same_gain(&self, form: Form, best: &WeighedForm) -> bool {
+        let other = self.gains.iter().find(|(of, _)| *of == form);
+        let own = best
+            .of(0)
+            .and_then(|found| found.parameters.iter().find(|p| is_dc_gain(&p.name)));
+        let (Some((_, other)), Some(own)) = (other, own) else {
+            return false;
+        };
+        own.standard_error.is_some_and(|s| (other - own.value).abs() <= s)
     }
 
     /// Same as [`have_separate_lines`].

@@ -26,7 +26,7 @@ use hoid_model::{Complex64, Detrend, Form, Record, SampleTime, Structure, operat
 use super::{
     arx_response::{MAX_NB, frequencies, halve_orders, initial_orders, measured_response},
     channel::{Channel, ChannelFit, ChannelResponse, SeenChannel, preview_samples},
-    channel_lines::{ChannelInForm, ChannelLineFitter, ChannelLines, own_coordinates},
+    channel_lines::{ChannelInForm, ChannelLineFitter, ChannelLines, have_separate_lines, own_coordinates},
     coordinates,
     covariances::Covariances,
     estimated::EstimateErrors,
@@ -245,18 +245,23 @@ impl<'s> FurtherInputs<'s> {
     }
 
     /// Returns the lines with their variances, starting from the responses of the ARX model.
+    ///
+    /// If the lines do not distinguish the inputs, the variances are those of a fit without the further inputs. With
+    /// them, `Y_e = -1/P` and `Y_r = 1/P` reproduce u without error, since `e = r - P u`. A fit near this solution leaves
+    /// next to nothing in the bins between the lines, so the variances would be far too small.
     pub fn weighted_lines(
         &self,
         at: &ChannelLineFitter<'_>,
         begun: &[Vec<Channel<'_>>],
         responses: &[Vec<MeasuredResponse>],
     ) -> Arc<ChannelLines> {
+        let apart = have_separate_lines(Some(at.lines), &self.all);
         let nearest = |points: &Vec<MeasuredResponse>, omega: f64| {
             let off = |p: &MeasuredResponse| (p.omega_rad_s / omega).ln().abs();
             let near = points.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
             near.map_or(Complex64::new(0.0, 0.0), |p| p.response)
         };
-        let flexible = begun.iter().enumerate().filter_map(|(k, forms)| {
+        let flexible = begun.iter().enumerate().filter(|_| apart).filter_map(|(k, forms)| {
             let form = forms.first()?.form;
             Some(self.channel_in_form(k, form, at.sampling))
         });

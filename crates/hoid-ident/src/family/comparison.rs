@@ -15,6 +15,7 @@ use super::{
     covariances::{self, Covariances},
     diagnostics::MAX_DAMPING_RATIO,
     line_fit::LineFit,
+    parameter::is_dc_gain,
     prediction::PredictionProblem,
     prediction_fit::PredictionFit,
     sensitivity::alternative_fits,
@@ -33,6 +34,16 @@ pub(super) struct TriedForm<'a> {
     pub form: Form,
     pub lines: Option<LineFit>,
     pub fit: Result<PredictionFit<'a>, IdentError>,
+}
+
+impl TriedForm<'_> {
+    /// Returns the form with its gain at low frequency in the first record; `None` without such a gain.
+    pub fn dc_gain(&self) -> Option<(Form, f64)> {
+        let fit = self.fit.as_ref().ok()?;
+        let operator = fit.layout().operator(fit.eta(), 0).ok()?;
+        let gain = operator.named_parameters().into_iter().find(|p| is_dc_gain(p.name))?;
+        Some((self.form, gain.value))
+    }
 }
 
 /// Criteria of all forms, and the best form.

@@ -5,7 +5,7 @@ use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, ope
 use super::{
     clusters::{ClusterKind, quantile},
     covariances::{self, Covariances},
-    parameter::{CoordinateEstimate, DC_GAIN_NAME, Parameter, min_weight},
+    parameter::{CoordinateEstimate, DC_GAIN_NAME, Parameter, is_dc_gain, min_weight},
     prediction_fit::PredictionFit,
     profile::profile_interval,
     result::{OperatorInForm, OperatorOfRecord, WeighedForm, title},
@@ -66,6 +66,37 @@ impl EstimateErrors {
     }
 }
 
+/// Returns the interval of the delay if the interval of the lead reaches its lower bound, zero; `None` otherwise, or for
+/// other elements.
+///
+/// Near `T_L = 0` a lead and a delay change the response in the same way, so the information matrix determines only
+/// `tau_e - k T_L`, with k = 1 for one lead. The interval of T_L from the profile likelihood therefore extends the interval
+/// of tau_e by `k T_L`. With T_L fixed, the delay has the conditional variance `c_tt - c_tL^2/c_LL`, and `k = c_tL/c_LL`.
+fn delay_interval(
+    fit: &PredictionFit<'_>,
+    errors: &EstimateErrors,
+    places: &[usize],
+    place: usize,
+) -> Option<(f64, f64)> {
+    let (elements, p) = (&fit.layout().elements, fit.parameter_count());
+    let is = |i: usize, coordinate: Coordinate| elements.get(i).is_some_and(|(c, _)| *c == coordinate);
+    let lead = places.iter().copied().find(|&i| is(i, Coordinate::Lead))?;
+    let x = fit.eta();
+    let (shortest, longest) = errors.profiles[lead].filter(|_| is(place, Coordinate::Delay))?;
+    let covariances = errors.covariances.as_ref()?;
+    let c = |i: usize, j: usize| covariances.clustered[i * p + j];
+    let per_lead = c(place, lead) / c(lead, lead);
+    let conditional = c(place, place) - per_lead * c(place, lead) + covariances.extra_variance[place];
+    let own = errors.quantile * conditional.max(0.0).sqrt();
+    let (below, above) = (per_lead * (x[lead] - shortest), per_lead * (longest - x[lead]));
+    let (low, high) = fit.criterion.limits[place];
+    let found = (
+        (x[place] - own.hypot(below)).max(low),
+        (x[place] + own.hypot(above)).min(high),
+    );
+    (found.0.is_finite() && found.1.is_finite()).then_some(found)
+}
+
 /// Returns intervals by profile likelihood for each lag rate, lead and droop whose interval reaches the lower end of
 /// the search range, where the criterion is not parabolic; `None` for other elements.
 fn profiles(
@@ -121,15 +152,20 @@ impl EstimatedOperator {
             of_all
         });
         let limits: Vec<(f64, f64)> = places.iter().map(|&i| layout.limits()[i]).collect();
+        let of_delay = |i: usize| delay_interval(fit, errors, places, i);
+        let prior_share = |&i: &usize| match of_delay(i) {
+            Some(interval) => delay_prior_share(fit, i, interval, errors.quantile),
+            None => prior_share(fit, model_based.as_deref(), places, i),
+        };
         let known = CoordinateEstimate {
             operator: &operator,
             covariance: of_parameters.as_deref(),
-            prior_share: &places
-                .iter()
-                .map(|&i| prior_share(fit, model_based.as_deref(), places, i))
-                .collect::<Vec<_>>(),
+            prior_share: &places.iter().map(prior_share).collect::<Vec<_>>(),
             limits: &limits,
-            profile: &places.iter().map(|&i| errors.profiles[i]).collect::<Vec<_>>(),
+            profile: &places
+                .iter()
+                .map(|&i| of_delay(i).or(errors.profiles[i]))
+                .collect::<Vec<_>>(),
             quantile: errors.quantile,
             run_to_run: errors.run_to_run,
         };
@@ -141,6 +177,16 @@ impl EstimatedOperator {
             parameters,
         })
     }
+}
+
+/// Like [`prior_share`], with the variance that corresponds to the interval of the delay.
+fn delay_prior_share(fit: &PredictionFit<'_>, place: usize, (low, high): (f64, f64), quantile: f64) -> f64 {
+    let s = 0.5 * (high - low) / quantile;
+    let penalty = fit.criterion.penalty.iter().find(|p| p.place == place);
+    let precision = penalty.map_or(0.0, |p| {
+        p.curvature(fit.eta()) / (fit.inflation * fit.innovation_variance)
+    });
+    (s * s * precision).min(1.0)
 }
 
 /// Returns the ratio of the posterior to the prior variance of an element of eta; zero without a prior.
@@ -221,8 +267,8 @@ pub(super) fn record_operator(
     })
 }
 
-/// Returns the average of a parameter over the forms in which it has the same name and meaning: K of a form with a lag is
-/// the gain at zero frequency, far below the band, and K of another form is the gain in the band. K is not determined if
+/// Returns the average of a parameter over the forms in which it has the same meaning: K of a form with a lag is
+/// the gain at zero frequency, far below the band, and K (in the form lead `K_e`) of another form is the gain in the band. K is not determined if
 /// forms with the other meaning are likely; `dc_gain_share` is the evidence for the forms with the meaning of the best
 /// form.
 fn averaged_parameter(
@@ -232,15 +278,16 @@ fn averaged_parameter(
     clusters: usize,
 ) -> Option<Parameter> {
     let lags = weighed.first()?.form.has_lag();
-    let is_dc_gain = own.name == DC_GAIN_NAME;
-    let alike = weighed.iter().filter(|form| !is_dc_gain || form.form.has_lag() == lags);
+    let gain = is_dc_gain(&own.name);
+    let alike = weighed.iter().filter(|form| !gain || form.form.has_lag() == lags);
     let each = alike.filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();
-        Some((form.form, form.weight, all.find(|p| p.name == own.name)?))
+        let same = |name: &str| if gain { is_dc_gain(name) } else { name == own.name };
+        Some((form.form, form.weight, all.find(|p| same(&p.name))?))
     });
     let found = Parameter::average(&each.collect::<Vec<_>>(), clusters)?;
     Some(Parameter {
-        determined: found.determined && (!is_dc_gain || dc_gain_share > min_weight(DC_GAIN_NAME)),
+        determined: found.determined && (own.name != DC_GAIN_NAME || dc_gain_share > min_weight(DC_GAIN_NAME)),
         ..found
     })
 }

@@ -119,6 +119,7 @@ impl FamilyEstimator {
                 .find_map(|t| t.fit.err())
                 .unwrap_or(IdentError::NoFiniteLoss));
         };
+        let gains = tried.iter().filter_map(TriedForm::dc_gain).collect();
         let weight = figures[best].weight;
         let TriedForm { lines, fit, .. } = tried.remove(best);
         let weights = figures.iter().enumerate().filter(|(i, _)| *i != best);
@@ -141,6 +142,7 @@ impl FamilyEstimator {
                 missing_reason: no_lines,
             },
             others: others.collect::<Result<_, IdentError>>()?,
+            gains,
             forms: figures,
             prediction: &prediction,
             channels,

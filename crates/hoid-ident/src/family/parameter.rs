@@ -28,6 +28,11 @@ const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of the logarithm of a determined parameter.
 const LARGEST_LOG_ERROR: f64 = 0.35;
 
+/// Names of the low-frequency gain. It is called `K_e` in the form with one lead, and K in the others.
+pub(super) fn is_dc_gain(name: &str) -> bool {
+    name == DC_GAIN_NAME || name == "K_e"
+}
+
 /// Returns the total weight of the forms with a parameter up to which the parameter counts as undetermined.
 pub(super) fn min_weight(name: &str) -> f64 {
     if name == DC_GAIN_NAME {
@@ -190,10 +195,16 @@ impl CoordinateEstimate<'_> {
         all.iter().position(|c| *c == wanted)
     }
 
-    /// Returns the standard error of a coordinate; `None` at a bound.
+    /// Returns the standard error of a coordinate; `None` at a bound. For a delay with an interval of its own, it is the
+    /// error to which the width of the interval corresponds.
     fn standard_error(&self, i: usize) -> Option<f64> {
         let x = self.operator.coordinates();
         let (low, high) = self.limits[i];
+        if let Some((from, to)) = self.profile[i]
+            && Some(i) == self.coordinate_index(Coordinate::Delay)
+        {
+            return Some(0.5 * (to - from) / self.quantile);
+        }
         let c = self.covariance?;
         let inside = low < x[i] && x[i] < high;
         (inside && c[i * x.len() + i] > 0.0).then(|| c[i * x.len() + i].sqrt())

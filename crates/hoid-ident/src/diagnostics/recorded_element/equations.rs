@@ -1,6 +1,6 @@
 //! Least-squares solution of the loop equations, with a scan over the delay.
 
-use hoid_model::Complex64;
+use hoid_model::{Complex64, ContinuousTransferFunction};
 
 use super::spectra::Spectra;
 use crate::linalg::least_squares::{LeastSquares, add_scaled, dot};
@@ -18,6 +18,8 @@ pub(super) struct ElementFit {
     pub(super) den: Vec<f64>,
     pub(super) delay_s: f64,
     pub(super) unexplained: f64,
+    /// Weights of each record.
+    weights: Vec<Vec<f64>>,
 }
 
 impl ElementFit {
@@ -52,8 +54,88 @@ impl ElementFit {
             num: descending(n..n + m + 1).collect(),
             delay_s: found.delay_s,
             unexplained: found.sum_of_squares / found.power,
+            weights,
         })
     }
+
+    /// Returns the delay beyond that of the given element at which this element explains most of the power, and the share
+    /// that it leaves unexplained, with the weights of this fit. Delays of up to `aligned_s` are tried. `None` without
+    /// power.
+    pub(super) fn of_given(
+        &self,
+        spectra: &[Spectra],
+        given: &ContinuousTransferFunction,
+        aligned_s: f64,
+    ) -> Option<(f64, f64)> {
+        let scale = given.den().first()?.recip();
+        let num: Vec<f64> = given.num().iter().map(|b| b * scale).collect();
+        let den: Vec<f64> = given.den().iter().map(|a| a * scale).collect();
+        let (m, n) = (num.len() - 1, den.len() - 1);
+        let rows: Vec<Rows> = (spectra.iter().zip(&self.weights))
+            .map(|(s, w)| Rows::of(s, w, &num, m, n))
+            .collect();
+        let shifts = (-3..=3).map(|k| f64::from(k) / 3.0 * aligned_s);
+        shifts
+            .filter_map(|shift| {
+                let delay_s = given.delay_s() + shift;
+                let shares = [delay_s, 0.0]
+                    .map(|of_disturbances| unexplained_share(&rows, (&num, &den), delay_s, of_disturbances));
+                let share = shares.into_iter().flatten().min_by(f64::total_cmp)?;
+                Some((shift, share))
+            })
+            .min_by(|a, b| a.1.total_cmp(&b.1))
+    }
+}
+
+/// Returns the share of the power that an element with these coefficients, in descending powers of s, does not explain;
+/// the coefficients of the targets and of the disturbances are free.
+fn unexplained_share(
+    rows: &[Rows<'_>],
+    (num, den): (&[f64], &[f64]),
+    delay_s: f64,
+    of_disturbances_s: f64,
+) -> Option<f64> {
+    let m = num.len() - 1;
+    let (mut right, mut of_u, mut free) = (Vec::new(), Vec::new(), Vec::<Vec<f64>>::new());
+    for rows in rows {
+        let mut own = rows.right.clone();
+        let ascending = den.iter().rev();
+        rows.of_e
+            .iter()
+            .zip(ascending)
+            .for_each(|(column, a)| add_scaled(&mut own, *a, column));
+        let mut inputs = rows.input_columns(delay_s, of_disturbances_s);
+        let disturbances = inputs.split_off(m + 1);
+        let mut by_u = vec![0.0; own.len()];
+        inputs
+            .iter()
+            .zip(num.iter().rev())
+            .for_each(|(column, b)| add_scaled(&mut by_u, *b, column));
+        add_scaled(&mut own, 1.0, &by_u);
+        let others = disturbances.into_iter().chain(rows.of_targets.iter().cloned());
+        for (j, column) in others.enumerate() {
+            if free.len() <= j {
+                free.push(Vec::new());
+            }
+            free[j].extend(column);
+        }
+        right.extend(own);
+        of_u.extend(by_u);
+    }
+    let mut residuals = right.clone();
+    if !free.is_empty() {
+        let solved = LeastSquares::factor(&mut free.concat(), &mut right);
+        if !solved.has_full_rank() {
+            return None;
+        }
+        let theta = solved.solution();
+        free.iter()
+            .zip(theta)
+            .for_each(|(column, x)| add_scaled(&mut residuals, -x, column));
+    }
+    add_scaled(&mut of_u, -1.0, &residuals);
+    let power = dot(&of_u, &of_u);
+    (power > 0.0).then(|| dot(&residuals, &residuals) / power)
 }
 
 /// The equations of one record: real and imaginary parts at all frequencies, made orthogonal to the columns of T.

@@ -49,6 +49,13 @@ impl ExogenousChannels {
     }
 }
 
+impl ExogenousChannels {
+    /// True if neither a target nor a disturbance was recorded.
+    pub(super) fn is_empty(&self) -> bool {
+        self.targets.is_empty() && self.disturbances.is_empty()
+    }
+}
+
 /// Fourier coefficients of one record in the band.
 pub(super) struct Spectra {
     pub(super) omega: Vec<f64>,
