@@ -18,6 +18,7 @@ use std::ops::Range;
 
 use super::foreign::mismatch;
 use super::plain::{Layout, RowStarts, read_plain_rows};
+use super::quotes::check_quotes;
 use super::text::{
     comments, has_decimal_commas, is_comment_or_blank, is_unit, place, reader, row_start, separator, text,
     unescape_formula, unterminated_line,
@@ -150,6 +151,7 @@ pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> 
     let bytes = text.as_bytes();
     let first = first_record(bytes, separator);
     let (names, first) = first.ok_or_else(|| IoError::Empty { file: file.to_owned() })?;
+    check_quotes(bytes, (first.start, first.end), &names, separator, file)?;
     let mut notes = Vec::new();
     let mut columns = header(&names, commas, file, &mut || place(bytes, first.start), &mut notes)?;
     let mut rows = RowReader {
@@ -266,6 +268,8 @@ impl RowReader<'_> {
             }
             if !is_blank_line(&record) {
                 let start = row_start(self.bytes, from.saturating_add(position(&record)));
+                let end = from.saturating_add(reader.position().byte() as usize);
+                check_quotes(self.bytes, (start, end), &record, self.separator, self.file)?;
                 self.add_row(&record, start, columns)?;
             }
         }

@@ -9,7 +9,7 @@ pub(super) const SEARCHED_LINES: usize = 250;
 
 /// Separator of the cells of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Separator {
+pub(in crate::formats::csv) enum Separator {
     Char(char),
     Blanks,
 }
@@ -26,7 +26,7 @@ impl Separator {
     }
 
     /// Splits a line into cells; separators within quotation marks do not separate cells.
-    pub(super) fn cells(self, line: &str) -> Vec<&str> {
+    pub(in crate::formats::csv) fn cells(self, line: &str) -> Vec<&str> {
         let mut quoted = false;
         let parts = line.split(|character: char| {
             quoted ^= character == '"';
@@ -60,7 +60,7 @@ pub(super) fn is_missing(cell: &str) -> bool {
 }
 
 /// True if the cells can form a row: more of them are values than other texts.
-pub(super) fn is_row(cells: &[&str]) -> bool {
+pub(in crate::formats::csv) fn is_row(cells: &[&str]) -> bool {
     let values = cells.iter().filter(|cell| is_value(cell)).count();
     let missing = cells.iter().filter(|cell| !is_value(cell) && is_missing(cell)).count();
     cells.len() > 1 && values > cells.len().saturating_sub(missing) / 2

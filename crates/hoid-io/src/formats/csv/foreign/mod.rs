@@ -21,6 +21,7 @@ mod tail;
 mod units;
 
 pub(super) use layout::mismatch;
+pub(super) use lines::{Separator, is_row};
 
 use layout::Layout;
 
