@@ -560,7 +560,7 @@ pub enum IoError {
         file: String,
     },
     /// A name that matches several arrays.
-    #[error("{file}: \"{asked}\" matches {found}; give the full path with --input and --output")]
+    #[error("{file}: \"{asked}\" matches {found}; give the full path")]
     AmbiguousColumn {
         /// Name of the file.
         file: String,
