@@ -50,8 +50,8 @@ pub(super) const TSV: Format = Format {
 };
 
 const TABLE_READER: FormatReader = FormatReader::Table {
-    record: |bytes, file| {
-        let notes = foreign::convert_to_plain_csv(bytes);
+    record: |bytes, file, options| {
+        let notes = foreign::convert_to_plain_csv(bytes, options);
         let mut table = table::parse(bytes, file)?;
         table.notes.extend(notes);
         Ok(table)

@@ -16,11 +16,11 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use super::foreign::mismatch;
+use super::foreign::{joined_lines, mismatch};
 use super::plain::{Layout, RowStarts, read_plain_rows};
 use super::quotes::check_quotes;
 use super::text::{
-    comments, has_decimal_commas, is_comment_or_blank, is_unit, place, reader, row_start, separator, text,
+    comments, has_decimal_commas, is_comment_or_blank, is_unit, place, reader, row_start, separator, single_line, text,
     unescape_formula, unterminated_line,
 };
 use crate::IoError;
@@ -123,7 +123,8 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
 
 /// Reads the columns of a text.
 pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> {
-    let mut lines = text.lines().filter(|line| !is_comment_or_blank(line));
+    let lines = joined_lines(text).map(|(_, line)| line);
+    let mut lines = lines.filter(|line| !is_comment_or_blank(line));
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };
@@ -358,7 +359,7 @@ fn header(
     check_column_count(record.len(), file)?;
     let names: Vec<String> = record
         .iter()
-        .map(|name| unescape_formula(String::from_utf8_lossy(name).trim()).to_owned())
+        .map(|name| single_line(unescape_formula(String::from_utf8_lossy(name).trim())).into_owned())
         .collect();
     let is_number = |name: &String| !matches!(Cell::parse(&with_decimal_point(name, commas)), Cell::Text);
     if names.iter().all(is_number) {
