@@ -211,6 +211,19 @@ pub enum IoError {
         /// Number of names in the header.
         expected: usize,
     },
+    /// A quotation mark without its closing mark, which would make one cell of many lines.
+    #[error(
+        "{file}, {place}: a quotation mark opens a cell in this line and {end}, expected a closing mark at the end of \
+         the cell; remove the mark, or close the cell with a second one"
+    )]
+    OpenQuote {
+        /// Name of the file.
+        file: String,
+        /// Place of the cell in the file.
+        place: String,
+        /// The end of the cell: "is never closed", or the line in which it is closed.
+        end: String,
+    },
     /// A truncated last line.
     #[error(
         "{file} is truncated in {place}, the last line: {found} of {expected} values; copy or record the file again, or \
@@ -547,7 +560,7 @@ pub enum IoError {
         file: String,
     },
     /// A name that matches several arrays.
-    #[error("{file}: \"{asked}\" matches {found}; give the full path with --input and --output")]
+    #[error("{file}: \"{asked}\" matches {found}; give the full path")]
     AmbiguousColumn {
         /// Name of the file.
         file: String,

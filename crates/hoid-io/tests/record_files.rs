@@ -487,7 +487,10 @@ fn errors_name_line_column_and_remedy() {
     says("t,e,u\n0,1,2\n1,1\n", &["line 3: 2 values, expected 3"]);
     says(
         "t,e,u\n0,1,2\n1,\"1,2\n2,1,2\n",
-        &["line 3: 2 values, expected 3", "quotation mark"],
+        &[
+            "line 3: a quotation mark opens a cell in this line and is never closed",
+            "remove the mark",
+        ],
     );
 }
 

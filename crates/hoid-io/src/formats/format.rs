@@ -29,7 +29,7 @@ pub(crate) struct Format {
 }
 
 /// Function that reads the columns of a record; it may take the bytes or borrow from them.
-type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str) -> Result<Table<'a>, IoError>;
+type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str, &ReadOptions) -> Result<Table<'a>, IoError>;
 /// Function that reads the columns of a table of results with their kinds.
 type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
 /// Function that reads all arrays of a file with their paths.
@@ -85,7 +85,9 @@ impl Format {
         options: &ReadOptions,
     ) -> Result<Table<'a>, IoError> {
         match self.reading {
-            FormatReader::Table { record, .. } => with_time_and_selection(record(bytes, file)?, false, options),
+            FormatReader::Table { record, .. } => {
+                with_time_and_selection(record(bytes, file, options)?, false, options)
+            }
             FormatReader::Arrays(read) => {
                 let contents = read(std::mem::take(bytes), file)?;
                 let (contents, is_trial) = trials::select_trial_in_contents(contents, options.trial.as_ref(), file)?;

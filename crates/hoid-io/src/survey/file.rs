@@ -83,7 +83,9 @@ fn columns_of(path: &Path, file: &str) -> Result<(&'static Format, Vec<RawColumn
     }
     let (format, mut bytes) = read_with_format(path)?;
     let (columns, notes) = match format.reading {
-        FormatReader::Table { record, .. } => columns_of_table(with_time(record(&mut bytes, file)?, None)?),
+        FormatReader::Table { record, .. } => {
+            columns_of_table(with_time(record(&mut bytes, file, &ReadOptions::default())?, None)?)
+        }
         FormatReader::Arrays(read) => columns_of_arrays(&read(bytes, file)?),
     };
     Ok((format, columns, notes))

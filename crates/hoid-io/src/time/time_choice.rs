@@ -4,6 +4,8 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::IoError;
+use crate::table::ColumnOption;
+use crate::wording::{did_you_mean, list_names};
 
 /// Unit of a time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,6 +77,34 @@ impl fmt::Display for Unit {
 pub struct TimeChoice {
     pub(super) column: String,
     pub(super) unit: Option<Unit>,
+}
+
+impl TimeChoice {
+    /// Returns the columns that the choice may name, each possibility in turn: one column, or seconds and nanoseconds.
+    pub(crate) fn columns(&self) -> [Vec<&str>; 2] {
+        let pair = self.column.split_once('+');
+        [
+            vec![&self.column],
+            pair.map_or_else(Vec::new, |(seconds, nanoseconds)| vec![seconds, nanoseconds]),
+        ]
+    }
+
+    /// True if the choice names a pair of columns by their common prefix.
+    pub(crate) fn is_pair(&self) -> bool {
+        self.unit == Some(Unit::SecondsAndNanoseconds)
+    }
+
+    /// Returns the error for a choice that is not among the columns of a file.
+    pub(crate) fn unknown_error(&self, names: &[&str], file: &str) -> IoError {
+        IoError::NoSuchColumn {
+            file: file.to_owned(),
+            missing: format!("\"{}\"", self.column),
+            meant: did_you_mean(&[&self.column], names).into_boxed_str(),
+            asked: self.to_string(),
+            available: list_names(names),
+            option: ColumnOption::Time,
+        }
+    }
 }
 
 impl FromStr for TimeChoice {

@@ -22,8 +22,8 @@ use std::ops::Range;
 use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
 use crate::IoError;
-use crate::table::{Column, ColumnOption, Precision, Table};
-use crate::wording::{abbreviate, did_you_mean, format_name, list_names};
+use crate::table::{Column, Precision, Table};
+use crate::wording::{abbreviate, format_name};
 
 /// Size above which the numbers in a time stamp column are assumed to be counted from 1970: 1e8 s is in 1973.
 const MIN_STAMP: f64 = 1e8;
@@ -154,7 +154,7 @@ fn selected_time_column(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize
     {
         return Ok((at, Some(Unit::SecondsAndNanoseconds)));
     }
-    if unit == Some(Unit::SecondsAndNanoseconds) {
+    if choice.is_pair() {
         let seconds = table.columns.iter().enumerate().find(|(at, Column { name, .. })| {
             let ours = *name == choice.column || name.strip_prefix(&choice.column).is_some_and(|end| end.len() < 9);
             ours && nanoseconds_of(table, *at).is_some()
@@ -165,15 +165,7 @@ fn selected_time_column(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize
     } else if let Some(at) = position(&choice.column) {
         return Ok((at, unit));
     }
-    let names = table.names();
-    Err(IoError::NoSuchColumn {
-        file: table.source.file().to_owned(),
-        missing: format!("\"{}\"", choice.column),
-        meant: did_you_mean(&[&choice.column], &names).into_boxed_str(),
-        asked: choice.to_string(),
-        available: list_names(&names),
-        option: ColumnOption::Time,
-    })
+    Err(choice.unknown_error(&table.names(), table.source.file()))
 }
 
 /// Returns the only column that satisfies the condition; `None` if there are none or several.

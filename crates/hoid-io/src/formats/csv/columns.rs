@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use super::quotes::check_quotes;
 use super::text::{
     comments, escape_formula, is_comment_or_blank, place, reader, row_start, separator, text, unescape_formula,
 };
@@ -140,10 +141,16 @@ fn survey_columns(text: &str, file: &str, separator: u8) -> Result<(Vec<String>,
     let mut rows = 0_usize;
     // The reader fails only on I/O errors, which cannot occur when reading from memory.
     while matches!(reader.read_byte_record(&mut record), Ok(true)) {
-        let line = || {
-            let at = record.position().map_or(0, |p| p.byte() as usize);
-            place(text.as_bytes(), row_start(text.as_bytes(), at))
-        };
+        let bytes = text.as_bytes();
+        let start = row_start(bytes, record.position().map_or(0, |p| p.byte() as usize));
+        check_quotes(
+            bytes,
+            (start, reader.position().byte() as usize),
+            &record,
+            separator,
+            file,
+        )?;
+        let line = || place(bytes, start);
         if names.is_empty() {
             names = record
                 .iter()

@@ -67,7 +67,7 @@ fn read_long_table<'a>(
         length: about.len() as usize,
         next: FIRST_BLOCK_BYTES,
     };
-    let Some(mut parsed) = text.read_head(file).map_err(unreadable)? else {
+    let Some(mut parsed) = text.read_head(file, options).map_err(unreadable)? else {
         return Ok(None);
     };
     let separator = parsed.separator;
@@ -155,7 +155,7 @@ struct LongText {
 
 impl LongText {
     /// Reads the first lines as for any other table; `None` unless the table contains only numbers with decimal points.
-    fn read_head(&mut self, file: &str) -> io::Result<Option<ParsedText>> {
+    fn read_head(&mut self, file: &str, options: &ReadOptions) -> io::Result<Option<ParsedText>> {
         let mut bytes = self.read_at(0, HEAD_BYTES)?;
         let Some(line) = bytes.iter().rposition(|byte| *byte == b'\n') else {
             return Ok(None);
@@ -169,7 +169,7 @@ impl LongText {
         }
         // If the head is rewritten, the rest of the text may need the same changes.
         let found = bytes.clone();
-        if !convert_to_plain_csv(&mut bytes).is_empty() || bytes != found {
+        if !convert_to_plain_csv(&mut bytes, options).is_empty() || bytes != found {
             return Ok(None);
         }
         self.file.seek(SeekFrom::Start(self.at as u64))?;

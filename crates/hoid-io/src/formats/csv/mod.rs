@@ -7,6 +7,7 @@
 //! | `text` | encoding, comments, separator, lines |
 //! | `table`, `plain` | the columns of a record; fast reading of rows of plain numbers |
 //! | `line_limit` | the length of a line |
+//! | `quotes` | quotation marks that are not closed |
 //! | `long` | reading of a long text of plain numbers, block by block |
 //! | `span_end` | the row at which reading stops if only a span is requested |
 //! | `record` | writing of a record |
@@ -17,6 +18,7 @@ mod foreign;
 mod line_limit;
 mod long;
 mod plain;
+mod quotes;
 mod record;
 mod span_end;
 mod table;
@@ -48,8 +50,8 @@ pub(super) const TSV: Format = Format {
 };
 
 const TABLE_READER: FormatReader = FormatReader::Table {
-    record: |bytes, file| {
-        let notes = foreign::convert_to_plain_csv(bytes);
+    record: |bytes, file, options| {
+        let notes = foreign::convert_to_plain_csv(bytes, options);
         let mut table = table::parse(bytes, file)?;
         table.notes.extend(notes);
         Ok(table)

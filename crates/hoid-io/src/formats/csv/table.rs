@@ -16,10 +16,11 @@
 use std::collections::HashSet;
 use std::ops::Range;
 
-use super::foreign::mismatch;
+use super::foreign::{joined_lines, mismatch};
 use super::plain::{Layout, RowStarts, read_plain_rows};
+use super::quotes::check_quotes;
 use super::text::{
-    comments, has_decimal_commas, is_comment_or_blank, is_unit, place, reader, row_start, separator, text,
+    comments, has_decimal_commas, is_comment_or_blank, is_unit, place, reader, row_start, separator, single_line, text,
     unescape_formula, unterminated_line,
 };
 use crate::IoError;
@@ -122,7 +123,8 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
 
 /// Reads the columns of a text.
 pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> {
-    let mut lines = text.lines().filter(|line| !is_comment_or_blank(line));
+    let lines = joined_lines(text).map(|(_, line)| line);
+    let mut lines = lines.filter(|line| !is_comment_or_blank(line));
     let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };
@@ -150,6 +152,7 @@ pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> 
     let bytes = text.as_bytes();
     let first = first_record(bytes, separator);
     let (names, first) = first.ok_or_else(|| IoError::Empty { file: file.to_owned() })?;
+    check_quotes(bytes, (first.start, first.end), &names, separator, file)?;
     let mut notes = Vec::new();
     let mut columns = header(&names, commas, file, &mut || place(bytes, first.start), &mut notes)?;
     let mut rows = RowReader {
@@ -266,6 +269,8 @@ impl RowReader<'_> {
             }
             if !is_blank_line(&record) {
                 let start = row_start(self.bytes, from.saturating_add(position(&record)));
+                let end = from.saturating_add(reader.position().byte() as usize);
+                check_quotes(self.bytes, (start, end), &record, self.separator, self.file)?;
                 self.add_row(&record, start, columns)?;
             }
         }
@@ -354,7 +359,7 @@ fn header(
     check_column_count(record.len(), file)?;
     let names: Vec<String> = record
         .iter()
-        .map(|name| unescape_formula(String::from_utf8_lossy(name).trim()).to_owned())
+        .map(|name| single_line(unescape_formula(String::from_utf8_lossy(name).trim())).into_owned())
         .collect();
     let is_number = |name: &String| !matches!(Cell::parse(&with_decimal_point(name, commas)), Cell::Text);
     if names.iter().all(is_number) {

@@ -73,6 +73,19 @@ pub(super) fn is_unit(text: &str) -> bool {
         && !text.starts_with(|c: char| c.is_ascii_digit() || c == ':')
 }
 
+/// Returns a name in which a line may end as one line.
+pub(super) fn single_line(name: &str) -> Cow<'_, str> {
+    let words = || {
+        name.split(['\n', '\r'])
+            .map(str::trim)
+            .filter(|words| !words.is_empty())
+    };
+    match name.contains(['\n', '\r']) {
+        true => Cow::Owned(words().collect::<Vec<_>>().join(" ")),
+        false => Cow::Borrowed(name),
+    }
+}
+
 /// Returns the most frequent separator in the header; separators that are equally frequent in the `row` below take
 /// precedence, because names such as `e, deg` may contain commas. Returns the comma if the header contains no
 /// separator.

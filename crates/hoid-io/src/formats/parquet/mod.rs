@@ -22,7 +22,7 @@ pub(super) const PARQUET: Format = Format {
     name: "Parquet",
     extensions: &["parquet", "pq"],
     reading: FormatReader::Table {
-        record: |bytes, file| record::parse(std::mem::take(bytes), file),
+        record: |bytes, file, _| record::parse(std::mem::take(bytes), file),
         results: results::read,
     },
     writing: FormatWriter::Rows(write::start),

@@ -1,15 +1,21 @@
 //! Positions of the header and the first row of a table, and the separator of its cells.
 //!
 //! The first rows are the first [`MIN_ROWS`] lines with equal numbers of cells, more than half of which are numbers or
-//! clock times. The header is the line of words above them, or a comment directly above them. It must name the cells
-//! unambiguously ([`super::names`]).
+//! clock times. The header is the line of words above them, or a comment directly above them; a line further up with
+//! equally many words takes precedence if it has the requested columns, or else names of error and control or of a time. The header must name the
+//! cells unambiguously ([`super::names`]).
 
 use std::borrow::Cow;
 
-use super::lines::{Separator, is_missing, is_number, is_row, is_value, non_blank_lines, unquoted};
+use super::lines::{
+    Separator, is_missing, is_number, is_row, is_value, joined_lines, non_blank_lines, split_line_end, unquoted,
+};
 use super::names::{ExtraCells, Names, names_of, without_comment_signs};
 use super::units;
 use crate::formats::csv::text::is_comment_or_blank;
+use crate::record::ReadOptions;
+use crate::table::{ColumnExpression, find_control_column, find_error_column};
+use crate::time::is_time;
 use crate::wording::abbreviate;
 
 /// Number of lines with equally many numbers that are required at the start of a table, unless it has fewer lines.
@@ -19,7 +25,7 @@ const MIN_ROWS: usize = 3;
 const OWN_COMMENTS: [&str; 3] = ["units:", "roles:", "sample_time:"];
 
 /// Structure of the start of a table. Lines are counted from 0.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Layout<'a> {
     pub(super) mark: Separator,
     pub(super) names: Names<'a>,
@@ -66,11 +72,11 @@ fn names_with_other_separator<'a>(header: &'a str, rows: &[Vec<&str>]) -> Option
 
 impl<'a> Layout<'a> {
     /// Finds the structure of a text; `None` if no header is certain.
-    pub(super) fn of(text: &'a str) -> Option<Self> {
+    pub(super) fn of(text: &'a str, options: &ReadOptions) -> Option<Self> {
         let filled = non_blank_lines(text);
         let found = Separator::ALL
             .iter()
-            .filter_map(|mark| Self::with_separator(text, &filled, *mark));
+            .filter_map(|mark| Self::with_separator(text, &filled, *mark, options));
         // The layout whose table starts first is used. If several separators find the same first row, one that gives
         // only numeric cells is preferred.
         found
@@ -79,14 +85,19 @@ impl<'a> Layout<'a> {
     }
 
     /// Finds the structure for a given mark; the second value is true if the first rows hold values only.
-    fn with_separator(text: &'a str, filled: &[(usize, &'a str)], mark: Separator) -> Option<(Self, bool)> {
+    fn with_separator(
+        text: &'a str,
+        filled: &[(usize, &'a str)],
+        mark: Separator,
+        options: &ReadOptions,
+    ) -> Option<(Self, bool)> {
         let mut from = 0;
         while let Some((at, rows)) = first_rows(filled, from, mark) {
             let row = filled.get(at)?.0;
             let values = |cell: &&str| is_value(cell) || is_missing(cell);
             let are_values = rows.iter().flatten().all(values);
             let (before, _) = filled.split_at_checked(at)?;
-            let found = Self::with_header_before(before, mark, &rows, row)
+            let found = Self::with_header_before(before, mark, &rows, row, options)
                 .or_else(|| Self::with_commented_header(text, before, mark, &rows, row));
             // A line of numbers above the header is a sample, which must not be omitted.
             let is_sample = |(at, line): &(usize, &str)| {
@@ -112,6 +123,7 @@ impl<'a> Layout<'a> {
         mark: Separator,
         rows: &[Vec<&str>],
         row: usize,
+        options: &ReadOptions,
     ) -> Option<Self> {
         let ((at, line), lines_above) = before.split_last()?;
         let of_units = || -> Option<Self> {
@@ -136,14 +148,7 @@ impl<'a> Layout<'a> {
             return Some(layout);
         }
         let names = names_of(line, mark, rows).or_else(|| names_with_other_separator(line, rows))?;
-        let filled = |names: &[&str]| names.iter().filter(|name| !unquoted(name).is_empty()).count();
-        // If another line above may be the header, the line found may contain its units, or may be damaged.
-        let is_rival = |(_, line): &(usize, &str)| {
-            let cells = mark.cells(line);
-            let same = cells.len() == names.names.len() && filled(&cells) >= filled(&names.names);
-            mark != Separator::Blanks && same && !cells.iter().any(|cell| is_value(cell))
-        };
-        (!lines_above.iter().any(is_rival)).then(|| Self {
+        let named = Self {
             mark,
             header: *at,
             is_comment: false,
@@ -151,7 +156,31 @@ impl<'a> Layout<'a> {
             row,
             lines_above: lines_above.iter().map(|(at, _)| *at).collect(),
             names,
-        })
+        };
+        let filled = |names: &[&str]| names.iter().filter(|name| !unquoted(name).is_empty()).count();
+        let rank = |names: &[&str]| {
+            let names: Vec<&str> = names.iter().map(|name| unquoted(name)).collect();
+            let is_among = |signal: &ColumnExpression| signal.is_among(&names);
+            let has_signals = options.input.iter().chain([&options.output]).all(is_among);
+            let has_common_names = find_error_column(&names).and(find_control_column(&names)).is_some();
+            (has_signals, has_common_names, names.iter().any(|name| is_time(name)))
+        };
+        // A line further up may be the header; the line found then contains its units, or is damaged.
+        let rival = |number: usize| {
+            let (at, line) = lines_above.get(number)?;
+            let names = names_of(line, mark, rows)?;
+            let same = names.extra == named.names.extra && filled(&names.names) >= filled(&named.names.names);
+            let is_better = rank(&names.names) > rank(&named.names.names);
+            let is_header = mark != Separator::Blanks && !names.names.iter().any(|name| is_value(name));
+            (is_header && same && is_better).then(|| Self {
+                header: *at,
+                names,
+                lines_above: lines_above.iter().take(number).map(|(at, _)| *at).collect(),
+                ..named.clone()
+            })
+        };
+        let rival = (0..lines_above.len()).rev().find_map(rival);
+        Some(rival.unwrap_or(named))
     }
 
     /// Returns the structure with a header in the comment directly above the first row, as NumPy writes it.
@@ -204,7 +233,8 @@ impl<'a> Layout<'a> {
             notes.push(String::from("the rows start with row numbers, which are left out"));
         }
         let header = self.header();
-        let found = text.lines().nth(self.header).map(str::trim_end);
+        let found = joined_lines(text).find(|(at, _)| *at == self.header);
+        let found = found.map(|(_, line)| line.trim_end());
         let as_found = found == Some(header.trim_end());
         let repeated = self.repeated_header_note(text, found.unwrap_or_default());
         notes.extend(repeated);
@@ -216,9 +246,9 @@ impl<'a> Layout<'a> {
         if notes.is_empty() && self.names.extra == ExtraCells::None && as_found && !start.any(is_odd) {
             return None;
         }
+        let commented = |line: &str| format!("#{}", line.replace('\n', "\n#"));
         let line = |(at, line): (usize, &str)| -> String {
-            let (line, end) = line.strip_suffix('\n').map_or((line, ""), |line| (line, "\n"));
-            let (line, end) = line.strip_suffix('\r').map_or((line, end), |line| (line, "\r\n"));
+            let (line, end) = split_line_end(line);
             let is_repeated = |line: &str| !self.is_comment && Some(line.trim_end()) == found;
             let line: Cow<'_, str> = match &self.units {
                 Some((with_header_before, comment)) if at == self.header && at < *with_header_before => {
@@ -226,15 +256,15 @@ impl<'a> Layout<'a> {
                 }
                 Some((with_header_before, _)) if at == *with_header_before => Cow::Borrowed(&*header),
                 None if at == self.header => Cow::Borrowed(&*header),
-                _ if self.lines_above.contains(&at) => Cow::Owned(format!("#{line}")),
+                _ if self.lines_above.contains(&at) => Cow::Owned(commented(line)),
                 _ if at < self.row && is_blank(line) => Cow::Borrowed(""),
                 _ if at < self.row || is_comment_or_blank(line) => Cow::Borrowed(line),
-                _ if is_repeated(line) => Cow::Owned(format!("#{line}")),
+                _ if is_repeated(line) => Cow::Owned(commented(line)),
                 _ => self.row_of(line),
             };
             line.into_owned() + end
         };
-        Some((text.split_inclusive('\n').enumerate().map(line).collect(), notes))
+        Some((joined_lines(text).map(line).collect(), notes))
     }
 
     /// Returns a note if the header is repeated between the rows, as in recordings that were appended to each other.

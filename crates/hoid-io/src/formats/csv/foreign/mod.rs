@@ -21,11 +21,13 @@ mod tail;
 mod units;
 
 pub(super) use layout::mismatch;
+pub(super) use lines::{Separator, is_row, joined_lines};
 
+use crate::record::ReadOptions;
 use layout::Layout;
 
 /// Rewrites the bytes of a table as plain CSV; returns a description of each change.
-pub(super) fn convert_to_plain_csv(bytes: &mut Vec<u8>) -> Vec<String> {
+pub(super) fn convert_to_plain_csv(bytes: &mut Vec<u8>, options: &ReadOptions) -> Vec<String> {
     let mut notes = Vec::from_iter(encoding::decode(bytes));
     let Ok(text) = std::str::from_utf8(bytes) else {
         return notes;
@@ -36,7 +38,7 @@ pub(super) fn convert_to_plain_csv(bytes: &mut Vec<u8>) -> Vec<String> {
         notes.push(String::from("the columns are separated by vertical bars"));
     }
     let text = tabs.as_deref().unwrap_or(text);
-    let layout = Layout::of(text);
+    let layout = Layout::of(text, options);
     let end = layout.as_ref().and_then(|layout| tail::words_below(text, layout.mark));
     let kept = match &end {
         Some((end, _)) => text.get(..*end).unwrap_or(text),
@@ -84,7 +86,7 @@ mod tests {
 
     fn plain(text: &str) -> (String, usize) {
         let mut bytes = text.as_bytes().to_vec();
-        let notes = convert_to_plain_csv(&mut bytes);
+        let notes = convert_to_plain_csv(&mut bytes, &ReadOptions::default());
         (String::from_utf8_lossy(&bytes).into_owned(), notes.len())
     }
 
@@ -101,6 +103,25 @@ mod tests {
         assert_eq!(plain("sep=;\r\nt;e\r\n0;1\r\n").0, "#sep=;\r\nt;e\r\n0;1\r\n");
         assert_eq!(plain("Run 1,,\nt,e,u\n0,1,2\n").0, "#Run 1,,\nt,e,u\n0,1,2\n");
         assert_eq!(plain("Rate,50,Hz\nt,e,u\n0,1,2\n").0, "#Rate,50,Hz\nt,e,u\n0,1,2\n");
+        for above in [
+            "Rate,50 Hz,",
+            "Rate,50 Hz,x",
+            "Subject,S1,pilot",
+            "\"A\nB\",S1,pilot",
+            "Calibration,x,y\ngain,1,2",
+        ] {
+            for header in ["t,e,u", "\"Time\n[s]\",e,u", "a,b,c"] {
+                let text = format!("{header}\n0,1,2\n");
+                let commented = above.replace('\n', "\n#");
+                assert_eq!(plain(&format!("{above}\n{text}")).0, format!("#{commented}\n{text}"));
+            }
+        }
+        // Of several lines of names, one with the requested columns or the name of a time is the header.
+        assert_unchanged("e,u\nleft,right\n0,1\n");
+        let text = "x\nRun,7 a\nTime,b\nleft,right\n0,1\n";
+        assert_eq!(plain(text).0, "#x\n#Run,7 a\nTime,b\nleft,right\n0,1\n");
+        let text = "Date,today\nTracking error,stick\n0,1\n";
+        assert_eq!(plain(text).0, format!("#{text}"));
         let long = "Key: value\n".repeat(100) + "t,e\n0,1\n";
         assert_eq!(plain(&long).0, "#Key: value\n".repeat(100) + "t,e\n0,1\n");
         for text in [

@@ -1,7 +1,7 @@
 //! Lines of words below a table, such as `End of recording` or `Mean,0.1,0.2`.
 
 use super::super::text::{is_comment_or_blank, unterminated_line};
-use super::lines::{Separator, is_missing, is_value, unquoted};
+use super::lines::{Separator, is_missing, is_open, is_value, unquoted};
 use crate::wording::abbreviate;
 
 /// Largest number of lines of words below a table.
@@ -37,8 +37,10 @@ pub(super) fn words_below(text: &str, mark: Separator) -> Option<(usize, String)
         .take(COMPARED_ROWS)
         .collect();
     let first = found.last()?;
-    let is_open = unterminated_line(text).is_some() && found.len() == 1 && mark.cells(first).len() > 1;
-    (rows.len() == COMPARED_ROWS && rows.iter().all(|row| starts_with_value(row)) && !is_open).then(|| {
+    let is_cut = unterminated_line(text).is_some() && found.len() == 1 && mark.cells(first).len() > 1;
+    // The text of a cell of the last row.
+    let is_cell = rows.first().is_some_and(|row| is_open(row));
+    (rows.len() == COMPARED_ROWS && rows.iter().all(|row| starts_with_value(row)) && !is_cut && !is_cell).then(|| {
         let note = format!(
             "lines of text below the table are left out: {}; the first is \"{}\"",
             found.len(),
@@ -83,6 +85,7 @@ mod tests {
             "t,e\n0,1\n1,2\n2,3\nNaN,4\n",
             "word,e\na,1\nb,2\nc,3\nd,4\n",
             "t,e\n0,1\n1,2\n2,3\nx,4",
+            "t,note\n0,1\n1,2\n2,3\n3,\"two\nlines\"\n",
         ] {
             assert_eq!(words_below(text, Separator::Char(',')), None, "{text:?}");
         }

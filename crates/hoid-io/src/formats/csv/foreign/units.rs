@@ -1,6 +1,6 @@
 //! A line of units below the header.
 
-use super::super::text::is_unit;
+use super::super::text::{is_unit, single_line};
 use super::lines::{is_number, unquoted};
 
 /// Known units. A line of units must contain at least one of them; its other entries may be any short words.
@@ -31,7 +31,9 @@ pub(super) fn units_comment(names: &[&str], cells: &[&str]) -> Option<String> {
         return None;
     }
     let named = names.iter().zip(units).filter(|(_, unit)| !matches!(*unit, "" | "-"));
-    let named: Vec<String> = named.map(|(name, unit)| format!("{} {unit}", unquoted(name))).collect();
+    let named: Vec<String> = named
+        .map(|(name, unit)| format!("{} {unit}", single_line(unquoted(name))))
+        .collect();
     Some(format!("units: {}", named.join(", ")))
 }
 
