@@ -75,7 +75,7 @@ pub(crate) fn even_sampling(t: &[f64], precision: Precision, stated_s: Option<f6
     let tolerance = |t: f64| (MAX_JITTER * mean_s).max(rounding.unit(t).max(first_unit) * (1.0 + 1e-6));
     // The largest excess of the deviation over the tolerance is decisive; NaN, which results from an overflow, counts
     // as an excess.
-    let deviation = |k: usize, t: f64| (t - (first + k as f64 * mean_s)).abs();
+    let deviation = |k: usize, t: f64| (t - (first + k as f64 * step_s)).abs();
     let excess = t
         .iter()
         .enumerate()
@@ -83,16 +83,17 @@ pub(crate) fn even_sampling(t: &[f64], precision: Precision, stated_s: Option<f6
     let (excess, row, worst) = excess
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .unwrap_or((f64::NAN, 0, first));
-    if !(excess <= 0.0 && mean_s.is_finite() && mean_s > 0.0) {
+    if !(excess <= 0.0 && step_s.is_finite() && step_s > 0.0) {
         return Err(SamplingFault::Jitter {
             row,
             deviation_s: deviation(row, worst),
             tolerance_s: tolerance(worst),
-            sample_time_s: mean_s,
+            sample_time_s: step_s,
+    let step_s = grid_step(t, mean_s, tolerance);
         });
     }
     let end_tolerance = tolerance(last);
-    let moves_end = |ts: f64| steps * (ts - mean_s).abs() > end_tolerance;
+    let moves_end = |ts: f64| steps * (ts - step_s).abs() > end_tolerance;
     if let Some(stated) = stated_s {
         if !moves_end(stated) {
             return Ok(Sampling {
@@ -100,17 +101,17 @@ pub(crate) fn even_sampling(t: &[f64], precision: Precision, stated_s: Option<f6
                 note: None,
             });
         }
-        let note = format!("the stated sample time {stated} s contradicts t, which gives {mean_s} s; t is used");
+        let note = format!("the stated sample time {stated} s contradicts t, which gives {step_s} s; t is used");
         return Ok(Sampling {
-            sample_time_s: mean_s,
+            sample_time_s: step_s,
             note: Some(note),
         });
     }
-    let sample_time_s = round_to_whole_hz(mean_s, rounding.unit(first.abs().max(last.abs())) / steps);
+    let sample_time_s = round_to_whole_hz(step_s, rounding.unit(first.abs().max(last.abs())) / steps);
     let note = moves_end(sample_time_s).then(|| {
         format!(
             "t gives a sampling frequency of {:.6} Hz, taken as {:.0} Hz",
-            1.0 / mean_s,
+            1.0 / step_s,
             1.0 / sample_time_s
         )
     });
@@ -133,6 +134,25 @@ fn check_increasing(t: &[f64]) -> Result<(), SamplingFault> {
     let standing =
         |(_, (before, next)): &(usize, (f64, f64))| next.partial_cmp(before) != Some(std::cmp::Ordering::Greater);
     match (1..).zip(pairs(t)).find(standing) {
+/// Returns the step of an even grid from the first time that agrees with all times within their tolerances, which may
+/// differ if the times have a fixed number of significant digits; without such a grid, or if the mean step is such a
+/// step, the mean step.
+fn grid_step(t: &[f64], mean_s: f64, tolerance: impl Fn(f64) -> f64) -> f64 {
+    let first = t.first().copied().unwrap_or(f64::NAN);
+    let bounds = (1..).zip(t.iter().skip(1)).map(|(k, t): (usize, _)| {
+        let (elapsed, k) = (t - first, k as f64);
+        ((elapsed - tolerance(*t)) / k, (elapsed + tolerance(*t)) / k)
+    });
+    let (low, high) = bounds.fold((f64::NEG_INFINITY, f64::INFINITY), |all, one| {
+        (one.0.max(all.0), one.1.min(all.1))
+    });
+    if low <= high && !(low..=high).contains(&mean_s) {
+        0.5 * (low + high)
+    } else {
+        mean_s
+    }
+}
+
         None => Ok(()),
         Some((row, _)) => Err(SamplingFault::NotIncreasing { row }),
     }
@@ -322,6 +342,39 @@ mod tests {
             t.remove(400);
             let found = even_sampling(&t, precision, None);
             let Err(SamplingFault::Gap {
+    #[test]
+    fn times_with_few_significant_digits_are_even() {
+        // The output of printf("%.6g") in C and of std::cout in C++, and the same with five digits.
+        let significant = |t: f64, digits: i32| {
+            let decimals = (digits - 1 - t.abs().max(1e-9).log10().floor() as i32) as usize;
+            let text = format!("{t:.decimals$}");
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        };
+        for (hz, n, digits) in [
+            (60.0, 12_000, 6),
+            (90.0, 13_500, 6),
+            (128.0, 25_600, 6),
+            (60.0, 2000, 5),
+        ] {
+            let mut precision = Precision::default();
+            let texts = (0..n).map(|k| significant(f64::from(k) / hz, digits));
+            let mut t: Vec<f64> = texts
+                .inspect(|text| precision.add(text))
+                .map(|text| text.parse().unwrap())
+                .collect();
+            assert_eq!(
+                even_sampling(&t, precision, None).unwrap().sample_time_s,
+                1.0 / hz,
+                "{hz}"
+            );
+            assert_eq!(even_times(&t), Ok(1.0 / hz), "{hz} Hz in memory");
+            // An early stamp has more decimals, and is not permitted the rounding error of the last one.
+            t[5] += 5e-4;
+            let found = even_sampling(&t, precision, None);
+            assert!(matches!(found, Err(SamplingFault::Jitter { row: 5, .. })), "{found:?}");
+        }
+    }
+
                 row,
                 missing,
                 gaps,
