@@ -456,3 +456,42 @@ fn time_unit_below_the_header_is_used() {
         .unwrap();
     assert_eq!(read.record.sample_time().s(), 0.0125);
 }
+
+/// A table of 40 rows at 50 Hz, with times given by `time`.
+fn table_of_times(time: impl Fn(usize) -> String) -> String {
+    let rows = (0..40).map(|k| format!("{};{k};{}\n", time(k), 2 * k));
+    std::iter::once(String::from("timestamp;e;u\n")).chain(rows).collect()
+}
+
+#[test]
+fn dates_of_other_programs_are_read() {
+    let desk = TestFolder::new();
+    let ms = |k: usize| 980 + 20 * k;
+    for (start, separator, end) in [
+        ("03/05/24 10:11:", ".", ""),
+        ("05.03.24 10:11:", ".", ""),
+        ("2024-03-05 10:11:", ".", " UTC"),
+        ("05 Mar 2024 10:11:", ".", ""),
+        ("Tue Mar 05 10:11:", ".", " 2024"),
+        ("10.11.", ",", ""),
+        ("20240305T1011", ".", "Z"),
+    ] {
+        let time = |k| format!("{start}{:02}{separator}{:03}{end}", ms(k) / 1000, ms(k) % 1000);
+        let read = desk.read(table_of_times(time), &default_options()).unwrap();
+        assert_eq!(read.record.sample_time().s(), 0.02, "{start}{end}");
+        assert_eq!((read.record.len(), read.record.time_s(0)), (40, 0.0), "{start}{end}");
+    }
+    // The error states formats that are read and a remedy that works.
+    let unread = table_of_times(|k| format!("5 mars 2024 10h11:{:02}.{:03}", ms(k) / 1000, ms(k) % 1000));
+    let unread = unread.replace("timestamp", "t");
+    let message = desk.error(&unread, &default_options());
+    assert!(
+        message.contains("write them as 2024-03-05 10:11:12.5") && message.contains("--fs HZ"),
+        "{message}"
+    );
+    let at_50_hz = ReadOptions {
+        sampling_hz: Some(50.0),
+        ..default_options()
+    };
+    assert_eq!(desk.read(&unread, &at_50_hz).unwrap().record.len(), 40);
+}
