@@ -389,11 +389,7 @@ pub enum IoError {
         available: String,
     },
     /// A time that is constant or runs backwards.
-    #[error(
-        "{file}, {place}: t = {found} s follows t = {previous} s, expected increasing time; drop rows that were \
-         written twice with --drop-repeated, use --trial t if the time restarts with each trial, write t with more \
-         decimals, or give --fs HZ in place of t"
-    )]
+    #[error("{file}, {place}: t = {found} s follows t = {previous} s, expected increasing time; {remedy}")]
     NotIncreasing {
         /// Name of the file.
         file: String,
@@ -423,6 +419,25 @@ pub enum IoError {
         missing: u64,
         /// Number of gaps.
         gaps: usize,
+        /// Remedy for the error.
+        remedy: &'static str,
+    },
+    /// A single wrong time in a grid that is otherwise even.
+    #[error(
+        "{file}, {place}: t = {found} s, expected {expected_s} s as the times of all other rows are evenly spaced; \
+         correct this time, or give --fs {hz} in place of t"
+    )]
+    WrongTime {
+        /// Name of the file.
+        file: String,
+        /// Place of the row.
+        place: String,
+        /// Time in the row, s.
+        found: f64,
+        /// Time on the grid, s.
+        expected_s: String,
+        /// Sampling frequency of the grid, Hz.
+        hz: f64,
         /// Sample time, s.
         sample_time_s: f64,
     },

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{TestFolder, default_options};
-use hoid_io::{IoError, ReadOptions, ReadRecord, Repair, read_record};
+use hoid_io::{IoError, Preparation, QualityIssueKind, ReadOptions, ReadRecord, Repair, read_prepared, read_record};
 
 const FILL: Repair = Repair {
     resample: false,
@@ -494,4 +494,71 @@ fn dates_of_other_programs_are_read() {
         ..default_options()
     };
     assert_eq!(desk.read(&unread, &at_50_hz).unwrap().record.len(), 40);
+}
+
+#[test]
+fn single_wrong_time_is_named_with_its_row() {
+    let desk = TestFolder::new();
+    let text = |time: &dyn Fn(usize) -> f64| {
+        let rows = (0..40).map(|k| format!("{:.2},{k},{}\n", time(k), 2 * k));
+        std::iter::once(String::from("t,e,u\n")).chain(rows).collect::<String>()
+    };
+    for wrong in [0.0, 99.0] {
+        let text = text(&|k| if k == 20 { wrong } else { 0.02 * k as f64 });
+        for trial in [None, Some("t")] {
+            let options = ReadOptions {
+                trial: trial.map(|trial| trial.parse().unwrap()),
+                ..default_options()
+            };
+            let message = desk.error(&text, &options);
+            let expected = format!("line 22: t = {wrong} s, expected 0.4 s");
+            assert!(message.contains(&expected) && message.contains("--fs 50 "), "{message}");
+        }
+        let at_50_hz = ReadOptions {
+            sampling_hz: Some(50.0),
+            ..default_options()
+        };
+        let record = desk.read(&text, &at_50_hz).unwrap().record;
+        assert_eq!((record.len(), record.output()[20]), (40, 40.0));
+    }
+    // Two rows out of order.
+    let message = desk.error(
+        text(&|k| 0.02 * if k / 2 == 10 { 41 - k } else { k } as f64),
+        &default_options(),
+    );
+    assert!(
+        message.contains("line 23") && message.contains("sort the rows by t"),
+        "{message}"
+    );
+    // The clock was set back for longer than a few rows.
+    let set_back = text(&|k| 0.02 * if k < 25 { k } else { k - 10 } as f64);
+    assert!(desk.error(&set_back, &default_options()).contains("use --trial t"));
+    let second = ReadOptions {
+        trial: Some("t=2".parse().unwrap()),
+        ..default_options()
+    };
+    assert_eq!(desk.read(&set_back, &second).unwrap().record.len(), 15);
+}
+
+#[test]
+fn blocks_written_twice_are_dropped() {
+    let desk = TestFolder::new();
+    let row = |k: usize| format!("{:.2},{k},{}\n", 0.02 * k as f64, 2 * k);
+    let text: String = std::iter::once(String::from("t,e,u\n"))
+        .chain((0..25).chain(20..40).map(row))
+        .collect();
+    assert!(desk.error(&text, &default_options()).contains("--drop-repeated"));
+    let drop_repeated = Preparation {
+        drop_repeated: true,
+        ..Preparation::default()
+    };
+    let read = read_prepared(&desk.path("run.csv"), &default_options(), &drop_repeated).unwrap();
+    assert_eq!((read.record.len(), read.record.sample_time().s()), (40, 0.02));
+    assert_eq!(read.record.output()[39], 78.0);
+    let repeated: Vec<(QualityIssueKind, usize)> = read
+        .quality_issues
+        .iter()
+        .map(|issue| (issue.kind, issue.rows))
+        .collect();
+    assert_eq!(repeated, [(QualityIssueKind::Repeated, 5)]);
 }

@@ -96,6 +96,7 @@ fn stream_times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<
             place: format!("stream {}, row {row}", abbreviate(place)),
             found,
             previous,
+            remedy: "sort the rows by t, and write t with all its digits",
         }),
     }
 }
