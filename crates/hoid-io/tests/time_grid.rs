@@ -562,3 +562,31 @@ fn blocks_written_twice_are_dropped() {
         .collect();
     assert_eq!(repeated, [(QualityIssueKind::Repeated, 5)]);
 }
+
+#[test]
+fn empty_time_and_index_of_pandas_are_recognised() {
+    let desk = TestFolder::new();
+    let rows: String = (0..40).map(|k| format!(",{k},{}\n", 2 * k)).collect();
+    let message = desk.error(format!("t,e,u\n{rows}"), &default_options());
+    assert!(message.contains("the time column is empty; give --fs HZ"), "{message}");
+    let rows: String = (0..40).map(|k| format!("{k},{},{}\n", 2 * k, 20_000_000 * k)).collect();
+    let text = format!("e,u,__index_level_0__\n{rows}");
+    assert_eq!(
+        desk.read(text, &default_options()).unwrap().record.sample_time().s(),
+        0.02
+    );
+}
+
+#[test]
+fn second_table_is_named_with_its_line() {
+    let desk = TestFolder::new();
+    let rows: String = (0..300)
+        .map(|k| format!("{:.2},{k},{}\n", 0.02 * k as f64, 2 * k))
+        .collect();
+    let rows = format!("t,e,u\n{rows}");
+    let text = format!("{rows}\nTrajectories\n50\nFrame,X,Y,Z\n,mm,mm,mm\n1,2,3,4\n2,3,4,5\n");
+    let message = desk.error(text, &default_options());
+    assert!(message.contains("line 303: a second table starts here"), "{message}");
+    let message = desk.error(format!("{rows}MSG\n7.04,1,2\n7.06,1,2\n"), &default_options());
+    assert!(message.contains("1 values, expected 3"), "{message}");
+}

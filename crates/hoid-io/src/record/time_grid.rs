@@ -98,6 +98,11 @@ impl TableReader<'_> {
     fn grid_from_time(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
         let too_few = |this: &Self| this.sampling_error(SamplingFault::TooFew, &(0..0), &[]);
         let column = self.table.columns.get(time).ok_or_else(|| too_few(self))?;
+        if column.texts.is_empty() && column.values.iter().all(|t| t.is_nan()) {
+            return Err(IoError::EmptyTime {
+                file: self.file.clone(),
+            });
+        }
         let precision = column.precision;
         let rows = self.rows_in_span(&column.values)?;
         let rows = self.rows_between_values(rows, Some(time));
@@ -189,11 +194,6 @@ impl TableReader<'_> {
                 place: place(row),
                 found: at(row),
                 previous: at(row.saturating_sub(1)),
-            },
-            SamplingFault::Gap {
-                row,
-                missing,
-                gaps,
                 remedy: backward_remedy(t, row),
             },
             SamplingFault::WrongTime {
@@ -206,6 +206,11 @@ impl TableReader<'_> {
                 found: at(row),
                 expected_s: format_decimal(expected_s),
                 hz: 1.0 / sample_time_s,
+            },
+            SamplingFault::Gap {
+                row,
+                missing,
+                gaps,
                 sample_time_s,
             } => IoError::Gap {
                 file,

@@ -282,6 +282,14 @@ impl RowReader<'_> {
                 expected: columns.len(),
             });
         }
+        let rest = self.bytes.get(start..).unwrap_or_default();
+        let is_below_rows = columns.first().is_some_and(|column| !column.values.is_empty());
+        if record.len() != columns.len() && is_below_rows && starts_table(rest, self.separator) {
+            return Err(IoError::SecondTable {
+                file: self.file.to_owned(),
+                place: line(),
+            });
+        }
         if record.len() != columns.len() {
             return Err(IoError::RowLength {
                 file: self.file.to_owned(),
@@ -409,6 +417,19 @@ fn unit_in(name: &str) -> Option<&str> {
     };
     let unit = unit.trim();
     (!before.trim().is_empty() && is_unit(unit)).then_some(unit)
+}
+
+/// Number of lines in which the header of a second table is searched for.
+const LINES_TO_HEADER: usize = 6;
+
+/// True if text starts with a header of several columns, which a title may precede.
+fn starts_table(text: &[u8], separator: u8) -> bool {
+    let is_text = |cell: &[u8]| Cell::parse(std::str::from_utf8(cell).unwrap_or_default()) == Cell::Text;
+    let mut lines = text.split(|byte| *byte == b'\n').take(LINES_TO_HEADER);
+    lines.any(|line| {
+        let cells = line.split(|byte| *byte == separator);
+        cells.clone().count() > 1 && cells.clone().all(is_text)
+    })
 }
 
 #[cfg(test)]
