@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::cell::{DECIMAL_COMMA_REMEDY, has_decimal_comma, is_moment};
+use super::cell::{Cell, DECIMAL_COMMA_REMEDY, has_decimal_comma, is_moment};
 use super::precision::Precision;
 use crate::IoError;
 use crate::wording::{abbreviate, format_name};
@@ -128,6 +128,9 @@ impl Table<'_> {
         if is_unfinished_number || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA_REMEDY
+            } else if matches!(Cell::parse(&found), Cell::Number(_)) {
+                "the point may separate thousands, as the column jumps between such numbers and whole numbers: write \
+                 the numbers without thousands separators, or all of them with decimals"
             } else if column.texts.len() == self.rows && !column.moments && (column.name == "t" || is_moment(&found)) {
                 UNREAD_MOMENT_REMEDY
             } else if is_moment(&found) && column.texts.len() == self.rows {
