@@ -224,6 +224,17 @@ pub enum IoError {
         /// The end of the cell: "is never closed", or the line in which it is closed.
         end: String,
     },
+    /// A second table below the first one.
+    #[error(
+        "{file}, {place}: a second table starts here, expected one table; save this line and all lines below it as \
+         another file, and read the table that holds the samples"
+    )]
+    SecondTable {
+        /// Name of the file.
+        file: String,
+        /// Place of the first line of the second table.
+        place: String,
+    },
     /// A truncated last line.
     #[error(
         "{file} is truncated in {place}, the last line: {found} of {expected} values; copy or record the file again, or \
@@ -363,6 +374,15 @@ pub enum IoError {
         /// Names that exist in the file.
         available: String,
     },
+    /// A time column without values.
+    #[error(
+        "{file}: the time column is empty; give --fs HZ if the samples are evenly spaced, or select another time \
+         column with --time COLUMN"
+    )]
+    EmptyTime {
+        /// Name of the file.
+        file: String,
+    },
     /// An invalid sampling frequency.
     #[error("the sampling frequency is {found} Hz, expected a positive finite number of samples per second")]
     SamplingFrequency {
@@ -402,11 +422,7 @@ pub enum IoError {
         available: String,
     },
     /// A time that is constant or runs backwards.
-    #[error(
-        "{file}, {place}: t = {found} s follows t = {previous} s, expected increasing time; drop rows that were \
-         written twice with --drop-repeated, use --trial t if the time restarts with each trial, write t with more \
-         decimals, or give --fs HZ in place of t"
-    )]
+    #[error("{file}, {place}: t = {found} s follows t = {previous} s, expected increasing time; {remedy}")]
     NotIncreasing {
         /// Name of the file.
         file: String,
@@ -416,6 +432,25 @@ pub enum IoError {
         found: f64,
         /// Time in the row before, s.
         previous: f64,
+        /// Remedy for the error.
+        remedy: &'static str,
+    },
+    /// A single wrong time in a grid that is otherwise even.
+    #[error(
+        "{file}, {place}: t = {found} s, expected {expected_s} s as the times of all other rows are evenly spaced; \
+         correct this time, or give --fs {hz} in place of t"
+    )]
+    WrongTime {
+        /// Name of the file.
+        file: String,
+        /// Place of the row.
+        place: String,
+        /// Time in the row, s.
+        found: f64,
+        /// Time on the grid, s.
+        expected_s: String,
+        /// Sampling frequency of the grid, Hz.
+        hz: f64,
     },
     /// Missing samples.
     #[error(

@@ -346,6 +346,11 @@ fn unusable_variables_are_refused_with_the_reason() {
         ("a.npy", b"t,e,u\n0,1,2\n", "is not in NPY format"),
         ("a.mat", b"t,e,u\n0,1,2\n", "is not in MATLAB format"),
         ("a.mat", b"", "is not in MATLAB format"),
+        (
+            "a.mat",
+            b"# Created by Octave 8.4.0\n# name: t\n# type: matrix\n",
+            "save -v7 run.mat",
+        ),
         ("a.mat", &[0; 64], "is damaged: variable 4"),
     ] {
         fs::write(dir.path().join(name), bytes).unwrap();

@@ -25,6 +25,7 @@ fn compressed_tables_and_sidecars_are_read() {
         (read.record.input(), read.record.output()),
         (&[1.0, 3.0][..], &[2.0, 4.0][..])
     );
+    assert_eq!(read.record.label(), "run");
     // A BIDS table contains only rows; a JSON file describes them.
     let json = r#"{"SamplingFrequency": 50.0, "StartTime": -2.0, "Columns": ["error", "stick"]}"#;
     let options = ReadOptions {

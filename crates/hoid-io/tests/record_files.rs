@@ -654,3 +654,28 @@ fn only_requested_columns_are_kept() {
     let error = read_record(&csv, &options(&["z"])).unwrap_err().to_string();
     assert!(error.contains("\"z\"") && error.contains("word"), "{error}");
 }
+
+#[test]
+fn points_between_thousands_are_refused() {
+    let desk = TestFolder::new();
+    let table = |print: &dyn Fn(i32) -> String| {
+        let rows = (0..40).map(|k| format!("{:.2};{};{}\n", 0.02 * f64::from(k), print(1200 - 30 * k), 2 * k));
+        std::iter::once(String::from("t;e;u\n")).chain(rows).collect::<String>()
+    };
+    let in_thousands = |value: i32| match value.abs() {
+        1000.. => format!("{}.{:03}", value / 1000, value.abs() % 1000),
+        _ => value.to_string(),
+    };
+    let message = desk.error(table(&in_thousands), &default_options());
+    assert!(
+        message.contains("column e: found \"1.200\"") && message.contains("may separate thousands"),
+        "{message}"
+    );
+    // Numbers with three decimals are read.
+    let decimals = |value: i32| format!("{:.3}", f64::from(value) / 100.0);
+    let read = desk.read(table(&decimals), &default_options()).unwrap();
+    assert_eq!(read.record.input()[0], 12.0);
+    let trimmed = |value: i32| format!("{}", f64::from(value) / 1000.0);
+    let read = desk.read(table(&trimmed), &default_options()).unwrap();
+    assert_eq!(read.record.input()[1], 1.17);
+}

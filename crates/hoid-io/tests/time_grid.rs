@@ -5,7 +5,7 @@
 mod common;
 
 use common::{TestFolder, default_options};
-use hoid_io::{IoError, ReadOptions, ReadRecord, Repair, read_record};
+use hoid_io::{IoError, Preparation, QualityIssueKind, ReadOptions, ReadRecord, Repair, read_prepared, read_record};
 
 const FILL: Repair = Repair {
     resample: false,
@@ -455,4 +455,138 @@ fn time_unit_below_the_header_is_used() {
         .read(format!("Time,e,u\nms,deg,V\n{rows}"), &default_options())
         .unwrap();
     assert_eq!(read.record.sample_time().s(), 0.0125);
+}
+
+/// A table of 40 rows at 50 Hz, with times given by `time`.
+fn table_of_times(time: impl Fn(usize) -> String) -> String {
+    let rows = (0..40).map(|k| format!("{};{k};{}\n", time(k), 2 * k));
+    std::iter::once(String::from("timestamp;e;u\n")).chain(rows).collect()
+}
+
+#[test]
+fn dates_of_other_programs_are_read() {
+    let desk = TestFolder::new();
+    let ms = |k: usize| 980 + 20 * k;
+    for (start, separator, end) in [
+        ("03/05/24 10:11:", ".", ""),
+        ("05.03.24 10:11:", ".", ""),
+        ("2024-03-05 10:11:", ".", " UTC"),
+        ("05 Mar 2024 10:11:", ".", ""),
+        ("Tue Mar 05 10:11:", ".", " 2024"),
+        ("10.11.", ",", ""),
+        ("20240305T1011", ".", "Z"),
+    ] {
+        let time = |k| format!("{start}{:02}{separator}{:03}{end}", ms(k) / 1000, ms(k) % 1000);
+        let read = desk.read(table_of_times(time), &default_options()).unwrap();
+        assert_eq!(read.record.sample_time().s(), 0.02, "{start}{end}");
+        assert_eq!((read.record.len(), read.record.time_s(0)), (40, 0.0), "{start}{end}");
+    }
+    // The error states formats that are read and a remedy that works.
+    let unread = table_of_times(|k| format!("5 mars 2024 10h11:{:02}.{:03}", ms(k) / 1000, ms(k) % 1000));
+    let unread = unread.replace("timestamp", "t");
+    let message = desk.error(&unread, &default_options());
+    assert!(
+        message.contains("write them as 2024-03-05 10:11:12.5") && message.contains("--fs HZ"),
+        "{message}"
+    );
+    let at_50_hz = ReadOptions {
+        sampling_hz: Some(50.0),
+        ..default_options()
+    };
+    assert_eq!(desk.read(&unread, &at_50_hz).unwrap().record.len(), 40);
+}
+
+#[test]
+fn single_wrong_time_is_named_with_its_row() {
+    let desk = TestFolder::new();
+    let text = |time: &dyn Fn(usize) -> f64| {
+        let rows = (0..40).map(|k| format!("{:.2},{k},{}\n", time(k), 2 * k));
+        std::iter::once(String::from("t,e,u\n")).chain(rows).collect::<String>()
+    };
+    for wrong in [0.0, 99.0] {
+        let text = text(&|k| if k == 20 { wrong } else { 0.02 * k as f64 });
+        for trial in [None, Some("t")] {
+            let options = ReadOptions {
+                trial: trial.map(|trial| trial.parse().unwrap()),
+                ..default_options()
+            };
+            let message = desk.error(&text, &options);
+            let expected = format!("line 22: t = {wrong} s, expected 0.4 s");
+            assert!(message.contains(&expected) && message.contains("--fs 50 "), "{message}");
+        }
+        let at_50_hz = ReadOptions {
+            sampling_hz: Some(50.0),
+            ..default_options()
+        };
+        let record = desk.read(&text, &at_50_hz).unwrap().record;
+        assert_eq!((record.len(), record.output()[20]), (40, 40.0));
+    }
+    // Two rows out of order.
+    let message = desk.error(
+        text(&|k| 0.02 * if k / 2 == 10 { 41 - k } else { k } as f64),
+        &default_options(),
+    );
+    assert!(
+        message.contains("line 23") && message.contains("sort the rows by t"),
+        "{message}"
+    );
+    // The clock was set back for longer than a few rows.
+    let set_back = text(&|k| 0.02 * if k < 25 { k } else { k - 10 } as f64);
+    assert!(desk.error(&set_back, &default_options()).contains("use --trial t"));
+    let second = ReadOptions {
+        trial: Some("t=2".parse().unwrap()),
+        ..default_options()
+    };
+    assert_eq!(desk.read(&set_back, &second).unwrap().record.len(), 15);
+}
+
+#[test]
+fn blocks_written_twice_are_dropped() {
+    let desk = TestFolder::new();
+    let row = |k: usize| format!("{:.2},{k},{}\n", 0.02 * k as f64, 2 * k);
+    let text: String = std::iter::once(String::from("t,e,u\n"))
+        .chain((0..25).chain(20..40).map(row))
+        .collect();
+    assert!(desk.error(&text, &default_options()).contains("--drop-repeated"));
+    let drop_repeated = Preparation {
+        drop_repeated: true,
+        ..Preparation::default()
+    };
+    let read = read_prepared(&desk.path("run.csv"), &default_options(), &drop_repeated).unwrap();
+    assert_eq!((read.record.len(), read.record.sample_time().s()), (40, 0.02));
+    assert_eq!(read.record.output()[39], 78.0);
+    let repeated: Vec<(QualityIssueKind, usize)> = read
+        .quality_issues
+        .iter()
+        .map(|issue| (issue.kind, issue.rows))
+        .collect();
+    assert_eq!(repeated, [(QualityIssueKind::Repeated, 5)]);
+}
+
+#[test]
+fn empty_time_and_index_of_pandas_are_recognised() {
+    let desk = TestFolder::new();
+    let rows: String = (0..40).map(|k| format!(",{k},{}\n", 2 * k)).collect();
+    let message = desk.error(format!("t,e,u\n{rows}"), &default_options());
+    assert!(message.contains("the time column is empty; give --fs HZ"), "{message}");
+    let rows: String = (0..40).map(|k| format!("{k},{},{}\n", 2 * k, 20_000_000 * k)).collect();
+    let text = format!("e,u,__index_level_0__\n{rows}");
+    assert_eq!(
+        desk.read(text, &default_options()).unwrap().record.sample_time().s(),
+        0.02
+    );
+}
+
+#[test]
+fn second_table_is_named_with_its_line() {
+    let desk = TestFolder::new();
+    let rows: String = (0..300)
+        .map(|k| format!("{:.2},{k},{}\n", 0.02 * k as f64, 2 * k))
+        .collect();
+    let rows = format!("t,e,u\n{rows}");
+    let text = format!("{rows}\nTrajectories\n50\nFrame,X,Y,Z\n,mm,mm,mm\n1,2,3,4\n2,3,4,5\n");
+    let message = desk.error(text, &default_options());
+    assert!(message.contains("line 303: a second table starts here"), "{message}");
+    let message = desk.error(format!("{rows}MSG\n7.04,1,2\n7.06,1,2\n"), &default_options());
+    assert!(message.contains("1 values, expected 3"), "{message}");
 }

@@ -1,4 +1,4 @@
-"""Files that Python reads but hoid does not: compressed text, Arrow and Feather, Excel.
+"""Files that Python reads but hoid does not: Arrow and Feather, Excel.
 
 Common Python packages read these files. Their content is passed on as a file that hoid reads, so
 that every option of `read` and every check of the data is the same. A message names the file that the
@@ -7,7 +7,6 @@ user gave.
 
 from __future__ import annotations
 
-import gzip
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator
@@ -19,28 +18,6 @@ from typing import Any
 from .errors import Error, FileError, FileMissingError, FormatError
 
 __all__ = ["readable"]
-
-#: Largest size of a decompressed file: a gigabyte of text is 10 million samples.
-_MOST_BYTES = 1 << 30
-
-
-def _unpacked(path: Path, place: Path) -> Path:
-    made = place / path.stem
-    written = 0
-    try:
-        with gzip.open(path, "rb") as packed, made.open("wb") as text:
-            while block := packed.read(1 << 20):
-                written += len(block)
-                if written > _MOST_BYTES:
-                    raise FormatError(
-                        f"{path} unpacks to more than {_MOST_BYTES >> 20} MB, too large for a"
-                        " recording; unpack it and use a part of it"
-                    )
-                text.write(block)
-    except (EOFError, gzip.BadGzipFile) as error:
-        raise FormatError(f"{path} is truncated or damaged: {error}; compress it again") from error
-    return made
-
 
 def _written(table: Any, path: Path, place: Path) -> Path:
     made = place / f"{path.stem}.parquet"
@@ -82,7 +59,6 @@ def _excel(path: Path, place: Path) -> Path:
 
 #: Reading function for each file extension.
 _READERS: dict[str, Callable[[Path, Path], Path]] = {
-    "gz": _unpacked,
     "arrow": _arrow,
     "feather": _arrow,
     "ipc": _arrow,

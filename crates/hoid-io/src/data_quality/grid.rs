@@ -35,6 +35,8 @@ pub(crate) struct Grid {
     pub(super) repeated_times: Vec<usize>,
     /// Rows whose time is earlier than the latest time of all earlier rows.
     pub(super) backward_times: Vec<usize>,
+    /// Indices of steps that are longer by one because a row near the step has a wrong time or is out of order.
+    misplaced: Vec<usize>,
 }
 
 impl Grid {
@@ -87,22 +89,39 @@ impl Grid {
                 }
             }
         }
+        let is_long = |at: &usize| steps.get(*at).is_some_and(|step| *step > 1.5);
+        let misplaced = |row: &usize| {
+            let t = t.get(*row)?;
+            let by_time = times.partition_point(|time| time < t);
+            let by_place = rows.partition_point(|other| other < row);
+            let near = |at: &usize| {
+                rows.get(*at)
+                    .is_some_and(|other| other.abs_diff(*row) <= MAX_ROW_DISTANCE)
+            };
+            [by_time, by_place].into_iter().find(|at| is_long(at) && near(at))
+        };
+        let misplaced = backward_times.iter().filter_map(misplaced).collect();
         Self {
-            rows,
             steps,
             sample_time_s,
             repeated_times,
             backward_times,
+            misplaced,
+            rows,
         }
     }
 
     /// Returns each gap: the rows before and after it, and the number of missing rows.
     pub(crate) fn gaps(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
-        let after = self.rows.iter().zip(&self.steps).skip(1);
-        let steps = self.rows.iter().zip(after);
+        let recorded = |at: usize| self.misplaced.iter().filter(|one| **one == at).count() as f64;
+        let missing = (0..).zip(&self.steps).map(move |(at, step)| match *step > 1.5 {
+            true => step - 1.0 - recorded(at),
+            false => 0.0,
+        });
+        let steps = self.rows.iter().zip(self.rows.iter().zip(missing).skip(1));
         steps
-            .filter(|(_, (_, step))| **step > 1.5)
-            .map(|(before, (after, step))| (*before, *after, step - 1.0))
+            .filter(|(_, (_, missing))| *missing > 0.5)
+            .map(|(before, (after, missing))| (*before, *after, missing))
     }
 
     /// Returns the deviation of the times from lines fitted to parts without a gap: its RMS value, the largest

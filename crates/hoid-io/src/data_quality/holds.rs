@@ -18,27 +18,31 @@ use hoid_model::numbers::count_with_noun;
 
 use crate::wording::format_short;
 
-/// Finds the rows whose time does not advance: rows that equal the row before, and rows with other values.
+/// Finds the rows whose time does not advance: rows that equal an earlier row with the same time, and rows with other
+/// values.
 pub(super) fn check_non_advancing_rows(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
+    let t = |row: usize| signals.time_s(row).unwrap_or(f64::NAN);
     let same = |row: &usize| {
-        let repeats = |signal: &Signal<'_>| {
-            let step = signal.values_around_step(*row);
-            step.is_some_and(|(before, value)| value == before || value.is_nan())
-        };
-        *row > 0 && signals.columns.iter().all(repeats)
+        let with_this_time = grid.rows.get(grid.rows.partition_point(|before| t(*before) < t(*row)));
+        let earlier = row.checked_sub(1).into_iter().chain(with_this_time.copied());
+        earlier.filter(|before| t(*before) == t(*row)).any(|before| {
+            let repeats = |signal: &Signal<'_>| {
+                let [before, value] = [before, *row].map(|row| signal.values.get(row).copied().unwrap_or(f64::NAN));
+                value == before || value.is_nan()
+            };
+            signals.columns.iter().all(repeats)
+        })
     };
-    let (repeated, others): (Vec<usize>, Vec<usize>) = grid.repeated_times.iter().copied().partition(same);
+    let mut late: Vec<usize> = [grid.repeated_times.as_slice(), &grid.backward_times].concat();
+    late.sort_unstable();
+    let (repeated, others): (Vec<usize>, Vec<usize>) = late.into_iter().partition(same);
     // After the time was set back, many rows are earlier than the latest time; only those that are not later than the
     // row before are reported.
     let falls = |row: &usize| {
         let step = signals.time.and_then(|time| time.values_around_step(*row));
         step.is_none_or(|(before, time)| time <= before)
     };
-    let mut others: Vec<usize> = others
-        .into_iter()
-        .chain(grid.backward_times.iter().copied().filter(falls))
-        .collect();
-    others.sort_unstable();
+    let others: Vec<usize> = others.into_iter().filter(falls).collect();
     for (kind, rows) in [
         (QualityIssueKind::Repeated, repeated),
         (QualityIssueKind::Unordered, others),

@@ -18,7 +18,7 @@ pub enum QualityIssueKind {
     Missing,
     /// A time that is constant or runs backwards.
     Unordered,
-    /// Rows that equal the row before, including the time.
+    /// Rows that equal an earlier row, including the time.
     Repeated,
     /// Missing rows.
     Gap,
@@ -51,7 +51,8 @@ impl QualityIssueKind {
                  or exclude the rows with --from and --to or --mask missing"
             }
             Self::Unordered => {
-                "use --trial t if the time restarts with each trial, or replace t by the sampling frequency with --fs"
+                "sort the rows by t if they are out of order, use --trial t if the time restarts with each trial, or \
+                 replace t by the sampling frequency with --fs"
             }
             Self::Repeated => "drop them with --drop-repeated",
             Self::Gap => "interpolate with --resample, or exclude the gaps with --mask gap",

@@ -35,6 +35,7 @@ pub(crate) use csv::write_record as write_record_as_csv;
 pub(crate) use format::{ColumnsWriter, Format, FormatReader, FormatWriter, RowWriter};
 pub(crate) use lookup::{format_to_write, read_long_text, read_with_format, table_of_file};
 pub use lookup::{readable_extensions, writable_extensions};
+pub(crate) use packed::path_without_gz;
 
 /// All formats, in the order in which messages list them. No two formats share an extension.
 const FORMATS: &[&Format] = &[

@@ -12,7 +12,7 @@ use crate::IoError;
 const PART_BYTES: usize = 1 << 16;
 
 /// Returns the path without `.gz`; `None` if the file has another extension.
-pub(super) fn path_without_gz(path: &Path) -> Option<PathBuf> {
+pub(crate) fn path_without_gz(path: &Path) -> Option<PathBuf> {
     let packed = path.extension()?.eq_ignore_ascii_case("gz");
     packed.then(|| path.with_extension(""))
 }

@@ -29,7 +29,7 @@ pub struct Preparation {
     pub run_in_s: f64,
     /// Trend removed from input and output, as the last step.
     pub detrend: Detrend,
-    /// True if rows that equal the row before, including the time, are dropped when the file is read.
+    /// True if rows that equal an earlier row, including the time, are dropped when the file is read.
     pub drop_repeated: bool,
 }
 

@@ -12,7 +12,7 @@ use crate::wording::{format_decimal, format_short};
 #[serde(tag = "step", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Step {
-    /// Rows that equal the row before, including the time, were dropped.
+    /// Rows that equal an earlier row, including the time, were dropped.
     DropRepeated {
         /// Number of dropped rows.
         rows: usize,

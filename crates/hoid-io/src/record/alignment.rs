@@ -14,7 +14,7 @@ use super::from_table::{ReadRecord, record_of};
 use super::read_options::ReadOptions;
 use super::sparse::close_gaps;
 use crate::IoError;
-use crate::formats::table_of_file;
+use crate::formats::{path_without_gz, table_of_file};
 use crate::preparation::{NewRate, Offset, Preparation, Step};
 
 /// Number of additional rows that are read beyond each end of the span for interpolation at a fractional offset.
@@ -67,7 +67,12 @@ pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated
     let file = path.display().to_string();
     let mut bytes = Vec::new();
     let (table, steps) = close_gaps(table_of_file(path, &file, &mut bytes, options)?, options)?;
-    let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let unpacked = path_without_gz(path);
+    let label = unpacked
+        .as_deref()
+        .unwrap_or(path)
+        .file_stem()
+        .map(|stem| stem.to_string_lossy().into_owned());
     let read = record_of(table, options, drop_repeated)?;
     Ok(ReadRecord {
         record: read.record.labelled(label.unwrap_or_default()),

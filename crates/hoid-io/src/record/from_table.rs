@@ -48,8 +48,8 @@ pub(super) fn record_of(
     let quality_issues = issues_of_signals(&table, time, input.into_iter().chain([output]), options);
     let mut steps = Vec::new();
     match (drop_repeated, time) {
-        (true, Some(_)) => {
-            let (kept, step) = repair::drop_repeated(table);
+        (true, Some(time)) => {
+            let (kept, step) = repair::drop_repeated(table, time);
             table = kept;
             steps.extend(step);
         }

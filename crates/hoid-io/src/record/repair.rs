@@ -52,9 +52,10 @@ pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<FillCounts, 
     Ok(bridged)
 }
 
-/// Drops each row that equals the row before in all columns, including the time.
-pub(super) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
-    let same = |(before, row): (usize, usize)| {
+/// Drops each row that equals an earlier row in all columns, including the time: the row before, or, if a block of rows
+/// was written twice, the row with the same time.
+pub(super) fn drop_repeated(table: Table<'_>, time: usize) -> (Table<'_>, Option<Step>) {
+    let same = |before: usize, row: usize| {
         table.columns.iter().enumerate().all(|(index, column)| {
             let [a, b] = [before, row].map(|row| table.value(index, row));
             let texts = [before, row].map(|row| column.texts.binary_search(&row).is_ok());
@@ -65,8 +66,19 @@ pub(super) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
             }
         })
     };
-    let pairs = (0..).zip(1..table.rows);
-    let repeated: Vec<usize> = pairs.filter(|pair| same(*pair)).map(|(_, row)| row).collect();
+    let t = |row: usize| table.value(time, row);
+    let (mut advancing, mut repeated) = (Vec::new(), Vec::new());
+    for row in 0..table.rows {
+        if advancing.last().is_none_or(|last| t(row) > t(*last)) {
+            advancing.push(row);
+            continue;
+        }
+        let with_this_time = advancing.get(advancing.partition_point(|before| t(*before) < t(row)));
+        let earlier = row.checked_sub(1).into_iter().chain(with_this_time.copied());
+        if earlier.into_iter().any(|before| same(before, row)) {
+            repeated.push(row);
+        }
+    }
     let Some(first) = repeated.first() else {
         return (table, None);
     };

@@ -5,11 +5,12 @@ use std::ops::Range;
 use hoid_model::SampleTime;
 
 use super::table_reader::TableReader;
+use super::trials::MIN_TRIAL_ROWS;
 use crate::IoError;
 use crate::preparation::Step;
 use crate::table::Precision;
 use crate::time::sampling::{self, SamplingFault};
-use crate::wording::list_names;
+use crate::wording::{format_decimal, list_names};
 
 /// Maximum ratio of the number of resampled samples to that of recorded samples.
 const MAX_RESAMPLING_RATIO: usize = 100;
@@ -97,6 +98,11 @@ impl TableReader<'_> {
     fn grid_from_time(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
         let too_few = |this: &Self| this.sampling_error(SamplingFault::TooFew, &(0..0), &[]);
         let column = self.table.columns.get(time).ok_or_else(|| too_few(self))?;
+        if column.texts.is_empty() && column.values.iter().all(|t| t.is_nan()) {
+            return Err(IoError::EmptyTime {
+                file: self.file.clone(),
+            });
+        }
         let precision = column.precision;
         let rows = self.rows_in_span(&column.values)?;
         let rows = self.rows_between_values(rows, Some(time));
@@ -188,6 +194,18 @@ impl TableReader<'_> {
                 place: place(row),
                 found: at(row),
                 previous: at(row.saturating_sub(1)),
+                remedy: backward_remedy(t, row),
+            },
+            SamplingFault::WrongTime {
+                row,
+                expected_s,
+                sample_time_s,
+            } => IoError::WrongTime {
+                file,
+                place: place(row),
+                found: at(row),
+                expected_s: format_decimal(expected_s),
+                hz: 1.0 / sample_time_s,
             },
             SamplingFault::Gap {
                 row,
@@ -256,5 +274,21 @@ impl TableReader<'_> {
                 })
             }
         }
+    }
+}
+
+/// Returns the remedy for a time in a row that is not later than the time before.
+fn backward_remedy(t: &[f64], row: usize) -> &'static str {
+    let previous = row.checked_sub(1).and_then(|row| t.get(row));
+    let mut next = t.iter().skip(row).take(MIN_TRIAL_ROWS);
+    if previous == t.get(row) {
+        "drop rows that were written twice with --drop-repeated, write t with more decimals, or give --fs HZ in place \
+         of t if the samples are evenly spaced"
+    } else if next.any(|t| Some(t) > previous) {
+        "drop rows that were written twice with --drop-repeated, sort the rows by t if they are out of order, or give \
+         --fs HZ in place of t if the samples are evenly spaced"
+    } else {
+        "use --trial t if the time restarts with each trial, drop rows that were written twice with --drop-repeated, \
+         sort the rows by t if they are out of order, or give --fs HZ in place of t if the samples are evenly spaced"
     }
 }

@@ -18,7 +18,7 @@ use crate::time::sampling::pairs;
 use crate::wording::{abbreviate, did_you_mean, list_names};
 
 /// Minimum number of rows of a trial that is recognised automatically.
-const MIN_TRIAL_ROWS: usize = 8;
+pub(super) const MIN_TRIAL_ROWS: usize = 8;
 
 /// Names and rows of the trials found.
 type NamedRanges = Vec<(String, Range<usize>)>;
@@ -62,14 +62,18 @@ fn several_trials_error(file: String, by: &str, names: Vec<&str>) -> IoError {
     }
 }
 
-/// Returns the rows at which t decreases.
+/// Returns the rows at which t decreases and a trial may start. A few rows with a wrong time are not a trial: t resumes
+/// within fewer than [`MIN_TRIAL_ROWS`] rows, or only the time in the row before was too late.
 fn rows_with_decreasing_time(table: &Table<'_>) -> Vec<usize> {
     let time = table.columns.iter().find(|column| column.name == "t");
-    let pairs = (1..).zip(time.into_iter().flat_map(|t| pairs(&t.values)));
-    pairs
-        .filter(|(_, (before, t))| t < before)
-        .map(|(row, _)| row)
-        .collect()
+    let values = time.map_or(&[][..], |t| &t.values);
+    let is_restart = |(row, (before, t)): &(usize, (f64, f64))| {
+        let mut next = values.iter().skip(*row).take(MIN_TRIAL_ROWS);
+        let last_but_one = row.checked_sub(2).and_then(|row| values.get(row));
+        t < before && !next.any(|next| next > before) && !last_but_one.is_some_and(|last| t > last)
+    };
+    let pairs = (1..).zip(pairs(values)).filter(is_restart);
+    pairs.map(|(row, _)| row).collect()
 }
 
 /// Returns the row range of each trial; `begins` are the first rows of all trials except the first.

@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
-use super::cell::{DECIMAL_COMMA_REMEDY, has_decimal_comma, is_moment};
+use super::cell::{Cell, DECIMAL_COMMA_REMEDY, has_decimal_comma, is_moment};
 use super::precision::Precision;
 use crate::IoError;
 use crate::wording::{abbreviate, format_name};
@@ -128,6 +128,11 @@ impl Table<'_> {
         if is_unfinished_number || column.texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA_REMEDY
+            } else if matches!(Cell::parse(&found), Cell::Number(_)) {
+                "the point may separate thousands, as the column jumps between such numbers and whole numbers: write \
+                 the numbers without thousands separators, or all of them with decimals"
+            } else if column.texts.len() == self.rows && !column.moments && (column.name == "t" || is_moment(&found)) {
+                UNREAD_MOMENT_REMEDY
             } else if is_moment(&found) && column.texts.len() == self.rows {
                 "the column holds dates or clock times: choose it with --time, or choose another column"
             } else if is_moment(&found) {
@@ -179,6 +184,11 @@ impl Table<'_> {
         }
     }
 }
+
+/// Remedy for a column of dates or clock times in a format that is not read.
+const UNREAD_MOMENT_REMEDY: &str = "if these are times, write them as 2024-03-05 10:11:12.5, 05.03.2024 10:11:12.5, \
+                                    05 Mar 2024 10:11:12.5, 10:11:12.5 or in s, or give --fs HZ if the samples are \
+                                    evenly spaced";
 
 /// Remedy for a first row of the data without numbers.
 pub(crate) const UNITS_ROW_REMEDY: &str =

@@ -1,7 +1,11 @@
 //! Precision of the printed numbers of a column.
 
+use std::ops::RangeInclusive;
+
 /// Largest number of decimals at which rounding of binary times is recognised (1 µs).
 const MAX_DECIMALS: i32 = 6;
+/// Numbers of significant digits at which rounding of binary times is recognised.
+const SIGNIFICANT_DIGITS: RangeInclusive<i32> = 5..=7;
 
 /// Precision with which a column of decimal numbers is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -22,7 +26,8 @@ impl Precision {
     }
 
     /// Determines the precision of times stored as binary numbers. If a recorder rounds its times, for example to
-    /// tenths of a ms, all times are multiples of one unit of the last decimal, which reveals the rounding. A rounded
+    /// tenths of a ms, all times are multiples of one unit of the last decimal, which reveals the rounding; with a fixed
+    /// number of significant digits, each time is a multiple of its own unit. A rounded
     /// number deviates from such a multiple by less than two units of its last binary digit; for the numbers of
     /// decimals tried here, numbers that were not rounded are not so close to a multiple by chance.
     pub(crate) fn from_times(values: &[f64], single: bool) -> Self {
@@ -34,9 +39,21 @@ impl Precision {
             (scaled - scaled.round()).abs() <= 2.0 * f64::EPSILON * scaled.abs()
         };
         let finite = || values.iter().copied().filter(|value| value.is_finite());
+        let is_rounded = |decimals: &i32| finite().all(|value| is_multiple(value, *decimals));
+        let decimals = (0..=MAX_DECIMALS).find(is_rounded);
+        let decimals_of = |value: f64, digits: i32| digits.saturating_sub(1).saturating_sub(magnitude(value));
+        let non_zero = || finite().filter(|value| *value != 0.0);
+        let digits = SIGNIFICANT_DIGITS
+            .clone()
+            .find(|digits| non_zero().all(|v| is_multiple(v, decimals_of(v, *digits))));
         Self {
-            decimals: (0..=MAX_DECIMALS).find(|decimals| finite().all(|value| is_multiple(value, *decimals))),
-            significant: 0,
+            decimals: decimals.or_else(|| {
+                non_zero()
+                    .map(|value| Some(decimals_of(value, digits?)))
+                    .max()
+                    .flatten()
+            }),
+            significant: digits.unwrap_or(0),
         }
     }
 
@@ -110,13 +127,17 @@ impl Precision {
     pub(crate) fn unit(self, value: f64) -> f64 {
         let Some(decimals) = self.decimals else { return 0.0 };
         let fixed = last_digit(decimals);
-        let magnitude = value.abs().log10().floor();
-        if self.significant == 0 || !magnitude.is_finite() {
+        if self.significant == 0 || value == 0.0 || !value.is_finite() {
             return fixed;
         }
-        let digits = (magnitude as i32).saturating_add(1);
+        let digits = magnitude(value).saturating_add(1);
         fixed.max(10_f64.powi(digits.saturating_sub(self.significant)))
     }
+}
+
+/// Returns the power of ten of the first significant digit of a value.
+fn magnitude(value: f64) -> i32 {
+    value.abs().log10().floor() as i32
 }
 
 /// Returns one unit of the last decimal.

@@ -5,6 +5,8 @@
 //! in this way, the number of days is `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant, *chrono-compatible
 //! low-level date algorithms*).
 
+use std::borrow::Cow;
+
 use super::time_choice::Unit;
 use crate::table::{Column, Precision};
 
@@ -26,31 +28,88 @@ struct ClockTime {
 
 /// Parses a cell as a clock time; `None` if the cell is not a clock time. A date without a time means midnight.
 fn parse(cell: &str) -> Option<ClockTime> {
-    let cell = cell.trim();
-    if !cell.starts_with(|c: char| c.is_ascii_digit()) || cell.len() > 40 {
+    let cell = without_zone_name(cell.trim());
+    if !cell.starts_with(|c: char| c.is_ascii_alphanumeric()) || cell.len() > 50 {
         return None;
     }
     if let Some(moment) = parse_duration(cell) {
         return Some(moment);
     }
-    let (date, time) = match cell.split_once(['T', ' ', '_']) {
-        Some((date, time)) => (Some(date), Some(time.trim())),
-        None if cell.contains(':') => (None, Some(cell)),
-        None => (Some(cell), None),
+    let named = with_named_month(cell);
+    let (date, time) = match &named {
+        Some((date, time)) => (Some(date.as_str()), Some(time.as_str())),
+        None => match cell.split_once(['T', ' ', '_']) {
+            Some((date, time)) => (Some(date), Some(time.trim())),
+            None if cell.contains(':') || cell.contains(',') => (None, Some(cell)),
+            None => (Some(cell), None),
+        },
     };
     // In a file with columns for date and clock, a cell such as `10:11:12 PM` has no date.
     let (date, time) = match (date, time) {
         (Some(clock), Some(half)) if clock.contains(':') && is_half(half) => (None, Some(cell)),
         other => other,
     };
-    let days = date.map_or(Some(0), days_of)?;
-    let (ns, decimals, cycle) = time.map_or(Some((0, 0, DAY_NS)), parse_time_of_day)?;
+    let days = date.map_or(Some(0), |date| days_of(date, time.is_some()))?;
+    let (ns, decimals, cycle) = time.map_or(Some((0, 0, DAY_NS)), |time| parse_time_of_day(&with_colons(time)))?;
     let day = days.checked_mul(DAY_NS)?;
     Some(ClockTime {
         ns: day.checked_add(ns)?,
         precision: precision_of_decimals(decimals),
         cycle: date.is_none().then_some(cycle),
     })
+}
+
+/// True for the name of a time zone, such as UTC or CET.
+fn is_zone_name(text: &str) -> bool {
+    (3..=4).contains(&text.len())
+        && text.bytes().all(|letter| letter.is_ascii_uppercase())
+        && (text == "UTC" || text.ends_with('T'))
+}
+
+/// Removes the name of a time zone, which does not change within a recording.
+fn without_zone_name(cell: &str) -> &str {
+    match cell.rsplit_once(' ') {
+        Some((rest, zone)) if is_zone_name(zone) => rest.trim_end(),
+        _ => cell,
+    }
+}
+
+/// Returns the date as `5-Mar-2024` and the time of a cell with the name of a month and a time, such as `05 Mar 2024
+/// 10:11:12`, `Tue, 05 Mar 2024 10:11:12 +0100`, `Tue Mar 05 10:11:12 2024` or `March 5, 2024 10:11:12 PM`.
+fn with_named_month(cell: &str) -> Option<(String, String)> {
+    let words = || cell.split([' ', ',']).filter(|word| !word.is_empty());
+    let month = words().find(|word| month_of(word).is_some())?;
+    let mut time = Vec::new();
+    let (mut day, mut year) = (None, None);
+    for word in words().filter(|word| *word != month) {
+        let is_number = word.bytes().all(|byte| byte.is_ascii_digit());
+        match word.len() {
+            _ if is_zone_name(word) || DAY_NAMES.iter().any(|name| is_name(word, name)) => {}
+            1 | 2 if is_number && day.is_none() => day = Some(word),
+            4 if is_number && year.is_none() => year = Some(word),
+            _ if word.starts_with(|c: char| c.is_ascii_digit()) && word.contains(':') || !time.is_empty() => {
+                time.push(word);
+            }
+            _ => return None,
+        }
+    }
+    let date = format!("{}-{month}-{}", day?, year?);
+    (!time.is_empty()).then(|| (date, time.join(" ")))
+}
+
+/// Writes a time of day without colons, such as `10.11.12,5` or `101112.5`, with colons; other text is returned
+/// unchanged.
+fn with_colons(time: &str) -> Cow<'_, str> {
+    let digits = time.bytes().take_while(u8::is_ascii_digit).count();
+    if !time.contains(':') && time.matches('.').count() > 1 {
+        Cow::Owned(time.replacen('.', ":", 2))
+    } else if let (6, Some((hour, rest))) = (digits, time.split_at_checked(2))
+        && let Some((minute, seconds)) = rest.split_at_checked(2)
+    {
+        Cow::Owned(format!("{hour}:{minute}:{seconds}"))
+    } else {
+        Cow::Borrowed(time)
+    }
 }
 
 fn is_half(text: &str) -> bool {
@@ -168,12 +227,18 @@ pub(crate) fn seconds_between(ns: i64, from: i64) -> f64 {
 }
 
 /// Returns the number of days from 1 January 1970 to a date, whose year comes first or last; `None` for other text.
-/// With points the day comes first, with slashes the month or the day.
+/// With points the day comes first, with slashes the month or the day. A date that precedes a time may have a year of
+/// two digits at its end, or no marks, as in `20240305`.
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "numbers of at most five digits, in 64 bits"
 )]
-fn days_of(date: &str) -> Option<i64> {
+fn days_of(date: &str, precedes_time: bool) -> Option<i64> {
+    if precedes_time && date.len() == 8 && date.bytes().all(|byte| byte.is_ascii_digit()) {
+        let (year, rest) = date.split_at_checked(4)?;
+        let (month, day) = rest.split_at_checked(2)?;
+        return days_of(&format!("{year}-{month}-{day}"), true);
+    }
     let mark = date.chars().find(|c| ['-', '/', '.'].contains(c))?;
     let parts: Vec<&str> = date.split(mark).collect();
     let &[a, b, c] = parts.as_slice() else { return None };
@@ -185,7 +250,12 @@ fn days_of(date: &str) -> Option<i64> {
         // Otherwise the month or the day comes first. Which of them is unknown, but has no effect within one day.
         _ => (c, a, b),
     };
-    let (year, month, day) = (year.len() == 4).then_some((number(year)?, number(month)?, number(day)?))?;
+    let century = match year.len() {
+        4 => 0,
+        2 if precedes_time && mark != '-' => 2000,
+        _ => return None,
+    };
+    let (year, month, day) = (century + number(year)?, number(month)?, number(day)?);
     // With slashes the day comes first if the month would exceed 12.
     let (month, day) = if mark == '/' && month > 12 {
         (day, month)
@@ -205,14 +275,40 @@ fn days_of(date: &str) -> Option<i64> {
     Some(of_years + (153 * month + 2) / 5 + day - 1 - 719_468)
 }
 
-/// Returns the number of a month from the start of its English name, as MATLAB writes it.
+/// English names of the months and of the days of the week.
+const MONTHS: [&str; 12] = [
+    "january",
+    "february",
+    "march",
+    "april",
+    "may",
+    "june",
+    "july",
+    "august",
+    "september",
+    "october",
+    "november",
+    "december",
+];
+const DAY_NAMES: [&str; 7] = [
+    "monday",
+    "tuesday",
+    "wednesday",
+    "thursday",
+    "friday",
+    "saturday",
+    "sunday",
+];
+
+/// True if a text is a name or the first three letters of a name.
+fn is_name(text: &str, name: &str) -> bool {
+    text.eq_ignore_ascii_case(name) || name.get(..3).is_some_and(|start| text.eq_ignore_ascii_case(start))
+}
+
+/// Returns the number of a month from its English name or the first three letters of the name.
 fn month_of(text: &str) -> Option<i64> {
-    const MONTHS: [&str; 12] = [
-        "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
-    ];
-    let months = (1..).zip(MONTHS);
-    let named = months.filter(|(_, month)| text.len() == 3 && text.eq_ignore_ascii_case(month));
-    named.map(|(number, _)| number).next()
+    let mut months = (1..).zip(MONTHS);
+    months.find(|(_, month)| is_name(text, month)).map(|(number, _)| number)
 }
 
 /// Parses a time of day such as `10:11:12.5` or `10:11:12:500`, optionally followed by `Z`, `+02:00`, AM or PM, or
@@ -313,6 +409,20 @@ mod tests {
             ("1 days 00:00:00.010000", DAY_NS + 10_000_000),
             ("2 days", 2 * DAY_NS),
             ("1 day, 0:00:01", DAY_NS + NS_PER_S),
+            ("03/05/24 10:11:12.000", s),
+            ("25/12/23 22:11:12", 1_703_542_272 * NS_PER_S),
+            ("05.03.24 10:11:12", s),
+            ("2024-03-05 10:11:12 UTC", s),
+            ("2024-03-05 10:11:12.500 CEST", s + NS_PER_S / 2),
+            ("05 Mar 2024 10:11:12.000", s),
+            ("Tue Mar 05 10:11:12.020 2024", s + 20_000_000),
+            ("Tue Mar  5 10:11:12 UTC 2024", s),
+            ("Tuesday, March 05, 2024 10:11:12 AM", s),
+            ("Tue, 05 Mar 2024 12:11:12 +0200", s),
+            ("20240305T101112.000Z", s),
+            ("20240305_101112,5", s + NS_PER_S / 2),
+            ("05.03.2024 10.11.12.020", s + 20_000_000),
+            ("10.11.12,020", 36_672 * NS_PER_S + 20_000_000),
         ] {
             assert_eq!(parse(cell).map(|moment| moment.ns), Some(ns), "{cell}");
         }
@@ -350,6 +460,14 @@ mod tests {
             "10:11:12.5x",
             "1-2-3",
             "1,234",
+            "10.11.12",
+            "24-03-05 10:11:12",
+            "May 5",
+            "May 10:11:12",
+            "Marx 5 2024 10:11:12",
+            "20240305",
+            "1.234.567,5",
+            "3/5/24",
         ] {
             assert_eq!(parse(cell), None, "{cell}");
         }

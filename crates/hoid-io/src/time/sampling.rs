@@ -10,6 +10,8 @@ use crate::table::Precision;
 
 /// Largest permitted deviation from the evenly spaced grid, in sample times.
 const MAX_JITTER: f64 = 1e-3;
+/// Number of times from which a single time off the even grid of the others counts as wrong.
+const MIN_EVEN_TIMES: usize = 8;
 /// Largest relative deviation at which a frequency is rounded to a whole number of Hz.
 const WHOLE_HZ_TOLERANCE: f64 = 1e-4;
 
@@ -19,6 +21,12 @@ pub(crate) enum SamplingFault {
     TooFew,
     NotIncreasing {
         row: usize,
+    },
+    /// A single time that is not later than the time before it, while all others are on an even grid.
+    WrongTime {
+        row: usize,
+        expected_s: f64,
+        sample_time_s: f64,
     },
     Gap {
         row: usize,
@@ -51,7 +59,11 @@ pub fn even_times(t: &[f64]) -> Result<f64, usize> {
         Ok(sampling) => Ok(sampling.sample_time_s),
         Err(SamplingFault::TooFew) => Err(0),
         Err(SamplingFault::Gap { row, .. }) => Err(row.saturating_add(1)),
-        Err(SamplingFault::NotIncreasing { row } | SamplingFault::Jitter { row, .. }) => Err(row),
+        Err(
+            SamplingFault::NotIncreasing { row }
+            | SamplingFault::WrongTime { row, .. }
+            | SamplingFault::Jitter { row, .. },
+        ) => Err(row),
     }
 }
 
@@ -66,16 +78,21 @@ pub(crate) fn even_sampling(t: &[f64], precision: Precision, stated_s: Option<f6
             _ => Err(SamplingFault::TooFew),
         };
     };
-    check_increasing(t)?;
+    if let Err(row) = check_increasing(t) {
+        let wrong = [Some(row), row.checked_sub(1)].into_iter().flatten();
+        let wrong = wrong.filter_map(|row| wrong_time(t, row, precision)).next();
+        return Err(wrong.unwrap_or(SamplingFault::NotIncreasing { row }));
+    }
     let rounding = Rounding::of(t, precision);
     let typical_s = typical_step(t, rounding);
     check_gaps(t, rounding, typical_s)?;
     let mean_s = (last - first) / steps;
     let first_unit = rounding.unit(first);
     let tolerance = |t: f64| (MAX_JITTER * mean_s).max(rounding.unit(t).max(first_unit) * (1.0 + 1e-6));
+    let step_s = grid_step(t, mean_s, tolerance);
     // The largest excess of the deviation over the tolerance is decisive; NaN, which results from an overflow, counts
     // as an excess.
-    let deviation = |k: usize, t: f64| (t - (first + k as f64 * mean_s)).abs();
+    let deviation = |k: usize, t: f64| (t - (first + k as f64 * step_s)).abs();
     let excess = t
         .iter()
         .enumerate()
@@ -83,16 +100,16 @@ pub(crate) fn even_sampling(t: &[f64], precision: Precision, stated_s: Option<f6
     let (excess, row, worst) = excess
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .unwrap_or((f64::NAN, 0, first));
-    if !(excess <= 0.0 && mean_s.is_finite() && mean_s > 0.0) {
+    if !(excess <= 0.0 && step_s.is_finite() && step_s > 0.0) {
         return Err(SamplingFault::Jitter {
             row,
             deviation_s: deviation(row, worst),
             tolerance_s: tolerance(worst),
-            sample_time_s: mean_s,
+            sample_time_s: step_s,
         });
     }
     let end_tolerance = tolerance(last);
-    let moves_end = |ts: f64| steps * (ts - mean_s).abs() > end_tolerance;
+    let moves_end = |ts: f64| steps * (ts - step_s).abs() > end_tolerance;
     if let Some(stated) = stated_s {
         if !moves_end(stated) {
             return Ok(Sampling {
@@ -100,21 +117,40 @@ pub(crate) fn even_sampling(t: &[f64], precision: Precision, stated_s: Option<f6
                 note: None,
             });
         }
-        let note = format!("the stated sample time {stated} s contradicts t, which gives {mean_s} s; t is used");
+        let note = format!("the stated sample time {stated} s contradicts t, which gives {step_s} s; t is used");
         return Ok(Sampling {
-            sample_time_s: mean_s,
+            sample_time_s: step_s,
             note: Some(note),
         });
     }
-    let sample_time_s = round_to_whole_hz(mean_s, rounding.unit(first.abs().max(last.abs())) / steps);
+    let sample_time_s = round_to_whole_hz(step_s, rounding.unit(first.abs().max(last.abs())) / steps);
     let note = moves_end(sample_time_s).then(|| {
         format!(
             "t gives a sampling frequency of {:.6} Hz, taken as {:.0} Hz",
-            1.0 / mean_s,
+            1.0 / step_s,
             1.0 / sample_time_s
         )
     });
     Ok(Sampling { sample_time_s, note })
+}
+
+/// Returns the step of an even grid from the first time that agrees with all times within their tolerances, which may
+/// differ if the times have a fixed number of significant digits; without such a grid, or if the mean step is such a
+/// step, the mean step.
+fn grid_step(t: &[f64], mean_s: f64, tolerance: impl Fn(f64) -> f64) -> f64 {
+    let first = t.first().copied().unwrap_or(f64::NAN);
+    let bounds = (1..).zip(t.iter().skip(1)).map(|(k, t): (usize, _)| {
+        let (elapsed, k) = (t - first, k as f64);
+        ((elapsed - tolerance(*t)) / k, (elapsed + tolerance(*t)) / k)
+    });
+    let (low, high) = bounds.fold((f64::NEG_INFINITY, f64::INFINITY), |all, one| {
+        (one.0.max(all.0), one.1.min(all.1))
+    });
+    if low <= high && !(low..=high).contains(&mean_s) {
+        0.5 * (low + high)
+    } else {
+        mean_s
+    }
 }
 
 /// Returns the sample time for resampling an unevenly spaced t, which is its typical step.
@@ -122,19 +158,45 @@ pub(crate) fn typical_sample_time(t: &[f64], precision: Precision) -> Result<f64
     let &[first, .., last] = t else {
         return Err(SamplingFault::TooFew);
     };
-    check_increasing(t)?;
+    check_increasing(t).map_err(|row| SamplingFault::NotIncreasing { row })?;
     let rounding = Rounding::of(t, precision);
     let slack_s = rounding.unit(first.abs().max(last.abs())) / t.len().saturating_sub(1) as f64;
     Ok(round_to_whole_hz(typical_step(t, rounding), slack_s))
 }
 
-fn check_increasing(t: &[f64]) -> Result<(), SamplingFault> {
+/// Returns the fault of a single time if the times are even with the value that its neighbours suggest in its place.
+fn wrong_time(t: &[f64], row: usize, precision: Precision) -> Option<SamplingFault> {
+    let at = |row: Option<usize>| row.and_then(|row| t.get(row)).copied();
+    let [near, far] = [1, 2].map(|steps| (at(row.checked_sub(steps)), at(row.checked_add(steps))));
+    let expected_s = match (near, far) {
+        ((Some(before), Some(after)), _) => 0.5 * (before + after),
+        // At an end, an equal time may belong to a row that was written twice.
+        ((Some(before), None), (Some(earlier), _)) if at(Some(row)) != Some(before) => 2.0 * before - earlier,
+        ((None, Some(after)), (_, Some(later))) if at(Some(row)) != Some(after) => 2.0 * after - later,
+        _ => return None,
+    };
+    if t.len() < MIN_EVEN_TIMES {
+        return None;
+    }
+    let mut corrected = t.to_vec();
+    *corrected.get_mut(row)? = expected_s;
+    check_increasing(&corrected).ok()?;
+    let even = even_sampling(&corrected, precision, None).ok()?;
+    Some(SamplingFault::WrongTime {
+        row,
+        expected_s,
+        sample_time_s: even.sample_time_s,
+    })
+}
+
+/// Checks that the times increase; the error is the first row whose time does not.
+fn check_increasing(t: &[f64]) -> Result<(), usize> {
     // The condition is formulated so that NaN also counts as not increasing.
     let standing =
         |(_, (before, next)): &(usize, (f64, f64))| next.partial_cmp(before) != Some(std::cmp::Ordering::Greater);
     match (1..).zip(pairs(t)).find(standing) {
         None => Ok(()),
-        Some((row, _)) => Err(SamplingFault::NotIncreasing { row }),
+        Some((row, _)) => Err(row),
     }
 }
 
@@ -282,6 +344,39 @@ mod tests {
     }
 
     #[test]
+    fn times_with_few_significant_digits_are_even() {
+        // The output of printf("%.6g") in C and of std::cout in C++, and the same with five digits.
+        let significant = |t: f64, digits: i32| {
+            let decimals = (digits - 1 - t.abs().max(1e-9).log10().floor() as i32) as usize;
+            let text = format!("{t:.decimals$}");
+            text.trim_end_matches('0').trim_end_matches('.').to_owned()
+        };
+        for (hz, n, digits) in [
+            (60.0, 12_000, 6),
+            (90.0, 13_500, 6),
+            (128.0, 25_600, 6),
+            (60.0, 2000, 5),
+        ] {
+            let mut precision = Precision::default();
+            let texts = (0..n).map(|k| significant(f64::from(k) / hz, digits));
+            let mut t: Vec<f64> = texts
+                .inspect(|text| precision.add(text))
+                .map(|text| text.parse().unwrap())
+                .collect();
+            assert_eq!(
+                even_sampling(&t, precision, None).unwrap().sample_time_s,
+                1.0 / hz,
+                "{hz}"
+            );
+            assert_eq!(even_times(&t), Ok(1.0 / hz), "{hz} Hz in memory");
+            // An early stamp has more decimals, and is not permitted the rounding error of the last one.
+            t[5] += 5e-4;
+            let found = even_sampling(&t, precision, None);
+            assert!(matches!(found, Err(SamplingFault::Jitter { row: 5, .. })), "{found:?}");
+        }
+    }
+
+    #[test]
     fn other_rates_are_not_rounded() {
         let (t, precision) = printed_times(grid(5000, 0.0, 0.0125 / 0.79), 12);
         let ts = even_sampling(&t, precision, None).unwrap().sample_time_s;
@@ -383,6 +478,39 @@ mod tests {
         );
         assert!(even_sampling(&[-1e308, 0.0, 1e308], p, None).is_err());
         assert!(even_sampling(&[0.0, 5e-324], p, None).is_ok_and(|s| s.sample_time_s > 0.0));
+    }
+
+    #[test]
+    fn single_wrong_time_is_found() {
+        let p = Precision::default();
+        let even: Vec<f64> = grid(40, 0.0, 0.02).collect();
+        for (row, wrong) in [(20, 0.0), (20, 99.0), (20, even[19]), (39, 0.1), (0, 5.0)] {
+            let mut t = even.clone();
+            t[row] = wrong;
+            let Err(SamplingFault::WrongTime {
+                row: found,
+                expected_s,
+                sample_time_s,
+            }) = even_sampling(&t, p, None)
+            else {
+                panic!("row {row}");
+            };
+            assert_eq!((found, sample_time_s), (row, 0.02));
+            assert!((expected_s - even[row]).abs() < 1e-12);
+            assert_eq!(even_times(&t), Err(row));
+        }
+        for (row, copy) in [(39, 38), (0, 1)] {
+            let mut t = even.clone();
+            t[row] = t[copy];
+            let row = row.max(1);
+            assert_eq!(even_sampling(&t, p, None), Err(SamplingFault::NotIncreasing { row }));
+        }
+        let mut swapped = even.clone();
+        swapped.swap(20, 21);
+        assert_eq!(
+            even_sampling(&swapped, p, None),
+            Err(SamplingFault::NotIncreasing { row: 21 })
+        );
     }
 
     #[test]

@@ -7,7 +7,7 @@
 //!    in a column such as `timestamp` or `header.stamp`, or serial days, or numbers with steps of fractions of a second;
 //! 3. whole seconds in one column and nanoseconds in another with the same prefix: `stamp.sec`, `stamp.nanosec`;
 //! 4. the only increasing column with a unit of time, such as `xAxis [s]`;
-//! 5. the first column if it has no name, or the first row or column of a matrix, if its values increase from row to
+//! 5. the first column or the index of pandas if it has no name, or the first row or column of a matrix, if its values increase from row to
 //!    row and are not row numbers.
 //!
 //! A column selected by `--time COLUMN[:unit]` takes precedence. The unit is taken from the name. Without a unit in the
@@ -32,6 +32,8 @@ const MIN_NON_SECOND_STEP: f64 = 5.0;
 /// Largest sampling frequency that is assumed when the unit is inferred from the steps, Hz.
 const MAX_HZ: f64 = 2000.0;
 
+/// Name of the index column of pandas in Parquet if the index has no name.
+const PANDAS_INDEX: &str = "__index_level_0__";
 /// Serial days of spreadsheets from 1954 to 2119, and of MATLAB from 1916 to 2190.
 const SERIAL_DAYS: [Range<f64>; 2] = [20_000.0..80_000.0, 700_000.0..800_000.0];
 /// Steps of serial days, in s.
@@ -230,12 +232,14 @@ fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
     })
 }
 
-/// Returns the first column if it has no name, or the first row or column of a matrix, if its values increase like a
+/// Returns the first column if it has no name, the index of pandas if it has no name, or the first row or column of a matrix, if its values increase like a
 /// time.
 fn first_time_line(table: &Table<'_>) -> Option<usize> {
     let is_first = |at: usize, column: &Column| {
         let line = ["(1,:)", "(:,1)", "[0,:]", "[:,0]", "[0]"];
-        (at == 0 && column.name.is_empty()) || line.iter().any(|line| column.name.ends_with(line))
+        (at == 0 && column.name.is_empty())
+            || column.name == PANDAS_INDEX
+            || line.iter().any(|line| column.name.ends_with(line))
     };
     let first = only_match(table, is_first)?;
     let values = &table.columns.get(first)?.values;

@@ -122,6 +122,7 @@ fn increasing_times(time: &ColumnPath, file: &str) -> Result<Vec<f64>, IoError> 
             place: format!("{}, row {row}", abbreviate(&time.path)),
             found,
             previous,
+            remedy: "sort the rows by t, and write t with all its digits",
         }),
     }
 }

@@ -25,7 +25,7 @@ use super::text::{
 };
 use crate::IoError;
 use crate::table::{Cell, Column, Source, Table, check_column_count, check_names, read_comments, with_decimal_point};
-use crate::time::{ClockTimes, is_time};
+use crate::time::{ClockTimes, is_time, sampling::pairs};
 use crate::wording::{abbreviate, list_names};
 
 /// The text of the file, which is parsed again if an error message needs a line or a cell.
@@ -109,16 +109,53 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         starts: parsed.starts,
         open: unterminated_line(text),
     };
+    let mut columns = parsed.columns;
+    for (at, column) in columns.iter_mut().enumerate() {
+        if parsed.separator == b';' && jumps_at_thousands(&column.values) {
+            refuse_thousands(column, |row| source.cell(row, at));
+        }
+    }
     let mut notes = parsed.notes;
     let last = parsed.rows.checked_sub(1).filter(|last| source.is_open(*last));
     notes.extend(last.and_then(|last| truncated_number_note(&source, last)));
     Ok(Table {
-        columns: parsed.columns,
+        columns,
         rows: parsed.rows,
         sample_time_s: parsed.sample_time_s,
         source: Box::new(source),
         notes,
     })
+}
+
+/// Smallest ratio of a whole number to its neighbour with decimals at which the decimals may be thousands.
+const THOUSANDS_JUMP: f64 = 100.0;
+
+/// True if values may be whole numbers with a point between thousands, as in 999, 1.051: below 1000, not below 1 if
+/// they have decimals, and with a jump between a whole number and a number with decimals.
+fn jumps_at_thousands(values: &[f64]) -> bool {
+    let is_whole = |value: f64| value.fract() == 0.0;
+    let mut finite = values.iter().filter(|value| value.is_finite());
+    finite.all(|value| value.abs() < 1000.0 && (is_whole(*value) || value.abs() > 1.0))
+        && pairs(values).any(|(a, b)| {
+            let (small, large) = if a.abs() < b.abs() { (a, b) } else { (b, a) };
+            is_whole(large) && !is_whole(small) && large.abs() >= THOUSANDS_JUMP * small.abs()
+        })
+}
+
+/// Treats the cells with a point as text if each has three digits after the point.
+fn refuse_thousands(column: &mut Column, cell: impl Fn(usize) -> String) {
+    let cells = (0..column.values.len()).map(|row| (row, cell(row)));
+    let with_point: Vec<(usize, String)> = cells.filter(|(_, cell)| cell.contains('.')).collect();
+    let in_thousands = |cell: &str| cell.trim().rsplit('.').next().is_some_and(|digits| digits.len() == 3);
+    if !column.texts.is_empty() || !with_point.iter().all(|(_, cell)| in_thousands(cell)) {
+        return;
+    }
+    column.texts = with_point.into_iter().map(|(row, _)| row).collect();
+    for row in &column.texts {
+        if let Some(value) = column.values.get_mut(*row) {
+            *value = f64::NAN;
+        }
+    }
 }
 
 /// Reads the columns of a text.
@@ -287,6 +324,14 @@ impl RowReader<'_> {
                 expected: columns.len(),
             });
         }
+        let rest = self.bytes.get(start..).unwrap_or_default();
+        let is_below_rows = columns.first().is_some_and(|column| !column.values.is_empty());
+        if record.len() != columns.len() && is_below_rows && starts_table(rest, self.separator) {
+            return Err(IoError::SecondTable {
+                file: self.file.to_owned(),
+                place: line(),
+            });
+        }
         if record.len() != columns.len() {
             return Err(IoError::RowLength {
                 file: self.file.to_owned(),
@@ -414,6 +459,19 @@ fn unit_in(name: &str) -> Option<&str> {
     };
     let unit = unit.trim();
     (!before.trim().is_empty() && is_unit(unit)).then_some(unit)
+}
+
+/// Number of lines in which the header of a second table is searched for.
+const LINES_TO_HEADER: usize = 6;
+
+/// True if text starts with a header of several columns, which a title may precede.
+fn starts_table(text: &[u8], separator: u8) -> bool {
+    let is_text = |cell: &[u8]| Cell::parse(std::str::from_utf8(cell).unwrap_or_default()) == Cell::Text;
+    let mut lines = text.split(|byte| *byte == b'\n').take(LINES_TO_HEADER);
+    lines.any(|line| {
+        let cells = line.split(|byte| *byte == separator);
+        cells.clone().count() > 1 && cells.clone().all(is_text)
+    })
 }
 
 #[cfg(test)]

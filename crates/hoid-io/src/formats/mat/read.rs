@@ -32,9 +32,15 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
         Some([.., b'M', b'I']) => version5::read(bytes, true, &mut budget, file)?,
         // A file of version 4 starts with a number below 5000, files of later versions start with text.
         _ if bytes.iter().take(4).any(|byte| *byte == 0) => version4::read(bytes, &mut budget, file)?,
-        _ => {
-            return Err(wrong(quote_start(bytes)));
+        _ if bytes.starts_with(b"# Created by Octave") || bytes.starts_with(b"# name:") => {
+            return Err(IoError::WrongFormat {
+                file: file.to_owned(),
+                format: "MATLAB",
+                found: String::from("it holds text of Octave"),
+                expected: "variables saved with save -v7 run.mat t e u",
+            });
         }
+        _ => return Err(wrong(quote_start(bytes))),
     };
     Ok(Contents::new(restore_names(entries), Indexing::Matlab))
 }
