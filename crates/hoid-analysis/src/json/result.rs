@@ -152,7 +152,12 @@ impl<F: JsonFit> IdentifiedModel<F> {
         if let Some(written) = &self.written {
             return Ok(written.clone());
         }
-        let mut map = F::object(self)?;
+        Ok(self.complete(F::object(self)?))
+    }
+
+    /// Adds to a JSON object of this result the verdict on each answer, and the state from which the result can be
+    /// restored.
+    pub fn complete(&self, mut map: Map<String, Value>) -> Map<String, Value> {
         if let Some(Value::Object(verdict)) = map.get_mut("verdict") {
             verdict.insert("of".to_owned(), Value::Object(answers(&self.answers())));
         }
