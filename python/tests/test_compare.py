@@ -28,6 +28,8 @@ def test_conditions_are_compared(group_results: Path) -> None:
     assert found.to_dataframe("left_out").empty
     assert found.to_svg().startswith("<svg ")
     again = pyhoid.Comparison.from_json(found.to_json())
+    dispatched = pyhoid.from_json(found.to_json())
+    assert isinstance(dispatched, pyhoid.Comparison) and dispatched.to_json() == found.to_json()
     assert again == found and pickle.loads(pickle.dumps(found)) == found
 
 

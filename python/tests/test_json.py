@@ -65,6 +65,15 @@ def test_what_is_no_result_is_refused(fit: pyhoid.Fit) -> None:
         pyhoid.from_json(json.dumps(changed))
 
 
+def test_a_design_comes_back_and_a_description_says_that_it_cannot(c1: pyhoid.Record) -> None:
+    design = pyhoid.design(controlled_element="4/s", runs=2)
+    back = pyhoid.from_json(design.to_json())
+    assert isinstance(back, pyhoid.ExperimentDesign) and back.to_json() == design.to_json()
+    for result, kind in ((pyhoid.describe(c1), "description"), (pyhoid.track(c1), "trace")):
+        with pytest.raises(pyhoid.DataError, match=f"its kind is {kind}, whose JSON cannot be read back"):
+            pyhoid.from_json(result.to_json())
+
+
 def test_a_part_says_whose_it_is(c1: pyhoid.Record) -> None:
     operator = pyhoid.identify(c1.span(0, 50), form="lead", nd=2)
     with pytest.raises(pyhoid.DataError, match="part of another result"):

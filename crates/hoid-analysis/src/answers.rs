@@ -7,7 +7,9 @@
 //! an undetermined crossover or margin gives a warning.
 
 use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_undetermined, family::FamilyFit};
-use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
+use hoid_model::{
+    ContinuousTransferFunction, Finding, Severity, Verdict, operator_family::PARAMETERS, uncertainty::Estimate,
+};
 
 use crate::AnalysisError;
 
@@ -66,7 +68,10 @@ pub fn requested_names(names: &[String]) -> Result<Vec<String>, AnalysisError> {
 pub fn with_answers(verdict: Verdict, answers: &[AnswerStatus], asked: &[String]) -> Verdict {
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
     let open: Vec<Finding> = if asked.is_empty() {
-        let is_told = |finding: &Finding| matches!(finding.kind, "no-crossover" | "unstable-loop");
+        // A note that the estimated loop may be unstable does not lower the level.
+        let is_told = |finding: &Finding| {
+            finding.severity > Severity::Note && matches!(finding.kind, "no-crossover" | "unstable-loop")
+        };
         let wanted = LOOP_ANSWERS.iter().filter(|_| !verdict.findings().iter().any(is_told));
         let of_loop = wanted.filter_map(|name| of(name)?.open.clone());
         of_loop
@@ -202,6 +207,26 @@ mod tests {
         let asked = with_answers(whole, &answers, &["tau_e".to_owned()]);
         assert_eq!(answer_verdict(&asked, &answers[0]).level, VerdictLevel::Doubtful);
         assert_eq!(answer_verdict(&asked, &answers[1]).level, VerdictLevel::NotDetermined);
+    }
+
+    #[test]
+    fn undetermined_crossover_is_doubtful_despite_a_note_on_the_loop() {
+        let open = answer_status(LOOP_ANSWERS[0], Some("the crossover is not determined".to_owned()));
+        let answers = [answer_status(RESPONSE_ANSWER, None), open];
+        let found = |finding: Finding| with_answers(Verdict::of(vec![finding]), &answers, &[]);
+        let noted = found(Finding::note(
+            "unstable-loop",
+            "the loop may be stable within its errors",
+        ));
+        assert_eq!(noted.level, VerdictLevel::Doubtful);
+        assert_eq!(noted.reasons().collect::<Vec<_>>(), ["the crossover is not determined"]);
+        // A reason against the loop makes a second reason redundant.
+        assert_eq!(
+            found(Finding::warning("unstable-loop", "the loop is unstable"))
+                .findings()
+                .len(),
+            1
+        );
     }
 
     #[test]

@@ -3,13 +3,15 @@
 use std::fmt;
 
 use hoid_ident::{
-    Fit,
+    Fit, IdentError,
     diagnostics::response_to_error,
     family::FamilyFit,
     frequency::{Description, check_excitation},
     validation::GoodnessOfFit,
 };
-use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Record, Verdict, uncertainty::Estimate};
+use hoid_model::{
+    ContinuousTransferFunction, Decimation, Detrend, Record, Verdict, numbers::format_plain, uncertainty::Estimate,
+};
 use serde_json::{Map, Value};
 
 use crate::{
@@ -91,7 +93,7 @@ impl<E: BatchEstimator> Identification<E> {
             taken_out,
             used,
             found,
-        } = E::fit(self, &mut data)?;
+        } = E::fit(self, &mut data).map_err(|error| with_reason(error, &data.records))?;
         let verdict = data.with_findings(verdict);
         let response = (E::OF == Of::Person)
             .then(|| response_to_error(&data.records))
@@ -122,6 +124,26 @@ impl<E: BatchEstimator> Identification<E> {
             written: None,
         })
     }
+}
+
+/// Largest deviation of an output that is a multiple of the input, relative to the largest output.
+const MULTIPLE_TOLERANCE: f64 = 1e-9;
+
+/// Replaces the error of a search that found no finite loss if the output of a record is a multiple of its input.
+fn with_reason(error: AnalysisError, records: &[Record]) -> AnalysisError {
+    let is_search = matches!(error, AnalysisError::Ident(IdentError::NoFiniteLoss));
+    let found = records.iter().filter(|_| is_search).find_map(|record| {
+        let (e, u) = (record.input(), record.output());
+        let sum = |of: &[f64]| of.iter().zip(e).map(|(a, b)| a * b).sum::<f64>();
+        let factor = sum(u) / sum(e);
+        let largest = u.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let is_multiple = |(e, u): (&f64, &f64)| (u - factor * e).abs() <= MULTIPLE_TOLERANCE * largest;
+        (factor.is_finite() && e.iter().zip(u).all(is_multiple)).then(|| IdentError::OutputIsInput {
+            label: record.label().to_owned(),
+            factor: format_plain(factor),
+        })
+    });
+    found.map_or(error, AnalysisError::Ident)
 }
 
 impl<F: Answers> IdentifiedModel<F> {

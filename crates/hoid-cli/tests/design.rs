@@ -397,6 +397,11 @@ fn mistakes_are_explained_with_a_remedy() {
         (&["--difference", "crossover=0"], 2, "other than zero"),
         (&["--difference", "speed=1"], 2, "expected one of"),
         (&["--power", ".9"], 2, "--difference"),
+        (&["--lines", "0"], 2, "number of lines is 0, expected a number above 0"),
+        (&["--max-rms-e", "0"], 2, "largest rms of the error is 0"),
+        (&["--max-u", "-1"], 2, "largest rms of the control is -1"),
+        (&["--length", "0"], 2, "length of a run in s is 0"),
+        (&["--controlled-element", "-4/s"], 1, "-4/s"),
     ] {
         let all = [&["design", "--people", "person.toml"], arguments].concat();
         let (found, message) = failure_of(at, &all);

@@ -123,6 +123,20 @@ fn virtual_experiment_is_analysed_and_reported() {
         &[&resumed[..], &["--json", "--figure", "narrow.svg", "--width", "85mm"]].concat(),
     );
     assert_eq!(found["runs"], 8);
+    assert_eq!(
+        (&found["kind"], &found["hoid"]),
+        (&"group".into(), &env!("CARGO_PKG_VERSION").into())
+    );
+    let record = &found["records"][0];
+    assert_eq!(found["records"].as_array().map(Vec::len), Some(8));
+    assert!(record["file"].is_string() && record["subject"] == "S1", "{record}");
+    assert!(found["data"]["faults"].is_array() && found["data"]["warnings"].is_array());
+    let settings = found["settings"].as_array().unwrap();
+    let given = |name: &str| &settings.iter().find(|one| one["name"] == name).unwrap()["given"];
+    assert!(
+        given("analysis.trace_every") == true && given("read.faults") == false,
+        "{settings:?}"
+    );
     assert_eq!(found["failures"].as_array().map(Vec::len), Some(0));
     let people = found["people"].as_array().unwrap();
     let of = |condition: &str| {

@@ -18,6 +18,11 @@ fn identify_prints_the_documented_json() {
         &["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--json"],
     );
     assert_eq!(found["structure"], "bj");
+    assert!(
+        found["verdict"]["of"]["response"]["level"].is_string(),
+        "{}",
+        found["verdict"]
+    );
     assert_eq!(
         found["orders"],
         serde_json::json!({"na": 0, "nb": 2, "nc": 0, "nd": 1, "nf": 2, "nk": 29})

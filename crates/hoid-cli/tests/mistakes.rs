@@ -140,6 +140,30 @@ fn bad_input_is_reported_in_plain_words() {
 }
 
 #[test]
+fn output_that_is_a_multiple_of_the_input_is_named() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    stdout_of(at, &["simulate", "--condition", "C1", "--out", "run.csv"]);
+    for (factor, text) in [(1.0, "1 times"), (-2.5, "-2.5 times")] {
+        let run = fs::read_to_string(at.join("run.csv")).unwrap();
+        let rows = run
+            .lines()
+            .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
+        let mut copy = "t,e,u\n".to_owned();
+        for row in rows {
+            let cells: Vec<f64> = row.split(',').take(3).map(|cell| cell.parse().unwrap()).collect();
+            copy.push_str(&format!("{},{},{}\n", cells[0], cells[2], factor * cells[2]));
+        }
+        fs::write(at.join("copy.csv"), copy).unwrap();
+        let (code, message) = failure_of(at, &["identify", "copy.csv"]);
+        assert!(
+            code == 1 && message.contains(text) && message.contains("--output"),
+            "{message}"
+        );
+    }
+}
+
+#[test]
 fn wrong_usage_exits_with_two() {
     let directory = simulated_run();
     let d = directory.path();

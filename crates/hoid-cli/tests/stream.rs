@@ -426,6 +426,30 @@ fn stream_without_samples_exits_with_one() {
 }
 
 #[test]
+fn stream_without_estimate_exits_with_one() {
+    let rows = |row: &dyn Fn(usize) -> String, n: usize| (0..n).map(row).collect::<String>();
+    let short = rows(&|k| format!("{},{}\n", wave(k).0, wave(k).1), 50);
+    let texts = format!("t,e,u\n{}", rows(&|k| format!("{},abc,def\n", k as f64 / 100.0), 2999));
+    let zeros = rows(&|_| "0,0\n".to_owned(), 3000);
+    let methods: [&[&str]; 2] = [&["--method", "adaptive"], &NO_WARM_UP_OPTIONS];
+    for (text, reason, methods) in [
+        ("", "contained no samples", &methods[..]),
+        ("t,e,u\n", "contained no samples", &methods[..]),
+        (&short, "after 50 samples", &methods[..1]),
+        (&texts, "2999 with a fault", &methods[..1]),
+        (&zeros, "in which e and u move", &methods[..1]),
+    ] {
+        for method in methods {
+            let mut stream = Stream::new(&[*method, &["--every", "100"]].concat());
+            stream.write(text);
+            let (status, _, said) = stream.end();
+            assert_eq!(status.code(), Some(1), "{said}");
+            assert!(said.contains("error: ") && said.contains(reason), "{reason}: {said}");
+        }
+    }
+}
+
+#[test]
 fn failed_warm_up_is_extended() {
     let directory = TempDir::new().unwrap();
     let text = simulated_run_text(directory.path(), "1");

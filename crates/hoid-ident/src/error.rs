@@ -141,6 +141,17 @@ pub enum IdentError {
     /// No start led to a finite loss.
     #[error("no start of the search gave a finite loss; check the scale of the data and the orders")]
     NoFiniteLoss,
+    /// The output is the input times a constant at each sample.
+    #[error(
+        "in record {label} the output is {factor} times the input at each sample, expected the delayed response of a \
+         person: check which columns are the input (--input) and the output (--output)"
+    )]
+    OutputIsInput {
+        /// Label of the record.
+        label: String,
+        /// The constant.
+        factor: String,
+    },
     /// The search did not converge, but the result requires a minimum.
     #[error("the search did not converge ({reason}); lower the orders, or use a longer window")]
     NotSettled {

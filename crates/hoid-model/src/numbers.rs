@@ -2,7 +2,8 @@
 //!
 //! A standard error is itself accurate to a few per cent at best. It is therefore given with two significant digits,
 //! and the value with the same number of decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers without a standard error are
-//! given with five significant digits.
+//! given with five significant digits. No value has more than eight significant digits; a standard error that needs
+//! more has its own exponent.
 
 use std::fmt;
 
@@ -17,12 +18,12 @@ const DIGITS_WITHOUT_ERROR: i32 = 5;
 
 /// Relative standard error below which the standard error is attributed to rounding.
 const ROUNDING_RELATIVE_ERROR: f64 = 16.0 * f64::EPSILON;
-/// Number of digits of a value whose standard error is only rounding.
-const MAX_DIGITS: i32 = 15;
+/// Largest number of significant digits of a value with a standard error.
+const MAX_DIGITS: i32 = 8;
 
 /// Returns value and standard error as text, with as many decimals as two significant digits of the standard error
-/// need. If the standard error is only rounding, the value has all its digits and a dash replaces the standard error. A
-/// value that is not finite gives two dashes.
+/// need, but at most eight significant digits; a smaller standard error has its own exponent. If the standard error is only
+/// rounding, a dash replaces it. A value that is not finite gives two dashes.
 pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
     if !value.is_finite() {
         return (DASH.to_owned(), DASH.to_owned());
@@ -34,6 +35,10 @@ pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, Str
         }
         Some(error) => {
             let last = last_digit(error, DIGITS_OF_ERROR);
+            if last < last_digit(value, MAX_DIGITS) && error < value.abs() {
+                let error = format!("{error:.*e}", (DIGITS_OF_ERROR - 1) as usize);
+                return (format_significant(value, MAX_DIGITS), error);
+            }
             let exponent = exponent_for(value.abs().max(error));
             (
                 format_digits(value, last, exponent),
@@ -49,9 +54,10 @@ pub fn interval(value: f64, standard_error: Option<f64>, factor: f64) -> String 
     match standard_error.filter(|s| s.is_finite() && *s > 0.0 && value.is_finite()) {
         None => DASH.to_owned(),
         Some(error) => {
-            let last = last_digit(error, DIGITS_OF_ERROR);
+            let size = value.abs().max(error);
+            let last = last_digit(error, DIGITS_OF_ERROR).max(last_digit(size, MAX_DIGITS));
             let (low, high) = (value - factor * error, value + factor * error);
-            let exponent = exponent_for(value.abs().max(error));
+            let exponent = exponent_for(size);
             format!(
                 "{} to {}",
                 format_digits(low, last, exponent),
@@ -178,9 +184,24 @@ mod tests {
     fn rounding_sized_error_is_a_dash() {
         assert_eq!(value_and_error(0.35 - 1e-16, 1e-17), pair("0.35", DASH));
         assert_eq!(value_and_error(-0.499_999_999_999_999_9, 1.2e-16), pair("-0.5", DASH));
+    }
+
+    #[test]
+    fn value_has_at_most_eight_digits() {
+        assert_eq!(value_and_error(0.5, 1e-13), pair("0.5", "1.0e-13"));
         assert_eq!(
-            value_and_error(0.5, 1e-13),
-            pair("0.50000000000000", "0.00000000000010")
+            with_uncertainty(1.563_463_998_094_07, Some(1e-16)),
+            pair("1.563464", DASH)
+        );
+        assert_eq!(
+            value_and_error(-114.573_496_389_993_49, 7.7e-13),
+            pair("-114.5735", "7.7e-13")
+        );
+        assert_eq!(value_and_error(0.0, 6e-15), pair("0.0e-15", "6.0e-15"));
+        assert_eq!(value_and_error(1.234_567_89, 1.2e-6), pair("1.2345679", "0.0000012"));
+        assert_eq!(
+            interval(1.563_463_998_094_07, Some(1e-13), 1.96),
+            "1.5634640 to 1.5634640"
         );
     }
 

@@ -40,8 +40,13 @@ pub struct DiscreteOperator {
     pub sample_time: SampleTime,
 }
 
-/// Value of `1 + f1 + f2` below which a pole counts as a pole at s = 0: four orders of magnitude above rounding.
+/// Value of `1 + f1 + f2 + ...` below which a pole counts as a pole at s = 0: four orders of magnitude above rounding.
 const ORIGIN_TOLERANCE: f64 = 1e-12;
+
+/// True if a model with the denominator `1 + f1 q^-1 + f2 q^-2 + ...` has a pole at z = 1, up to rounding errors.
+pub fn has_pole_at_origin(f: &[f64]) -> bool {
+    (1.0 + f.iter().sum::<f64>()).abs() < ORIGIN_TOLERANCE
+}
 
 /// Names of the physical parameters, in the order of the rows or columns of every Jacobian in this module.
 pub const PHYSICAL_PARAMETER_NAMES: [&str; 4] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm"];
@@ -161,8 +166,7 @@ impl DiscreteOperator {
         let c = self.held.inverse_zoh(self.sample_time)?;
         // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1. Below this value the difference
         // consists only of rounding errors.
-        let at_one = (1.0 + self.held.f1 + self.held.f2).abs();
-        if c.a2 <= 0.0 || at_one < ORIGIN_TOLERANCE {
+        if c.a2 <= 0.0 || has_pole_at_origin(&[self.held.f1, self.held.f2]) {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
         }
         let omega = c.a2.sqrt();

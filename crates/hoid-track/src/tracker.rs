@@ -210,6 +210,11 @@ impl Tracker {
         self.recursion.covariance(&mut covariance).then_some(covariance)
     }
 
+    /// True once there is an estimate. A method that starts without a fit has one only after informative samples.
+    pub fn has_estimate(&self) -> bool {
+        !self.options.method.is_self_starting() || self.covariance().is_some()
+    }
+
     /// Returns each coefficient with its standard error.
     pub fn parameters(&self) -> Vec<Estimate> {
         let theta = self.theta();

@@ -15,7 +15,9 @@ from . import _options, _pyhoid
 from ._options import Order, Progress
 from ._prior import prior_text
 from ._settings import BATCH_SETTINGS
+from .comparison import Comparison
 from .errors import OptionError
+from .experiment import ExperimentDesign
 from .fit import Fit
 from .operator_fit import OperatorFit
 from .record import Record
@@ -190,11 +192,12 @@ def identify(
 identify.__doc__ = (identify.__doc__ or "").format(settings=BATCH_SETTINGS)
 
 
-def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit:
-    """Restore a result that its `to_json` wrote or ``hoid identify --json`` printed.
+def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit | Comparison | ExperimentDesign:
+    """Restore a result that its `to_json` wrote or ``hoid identify``, ``compare`` or ``design --json`` printed.
 
     It is equal to the result that was written, and gives the same predictions, simulations and validations.
-    It does not contain the samples of its records.
+    It does not contain the samples of its records. The JSON of a trace, a description or a group does not
+    contain the whole result, so it is refused.
 
     Parameters
     ----------
@@ -211,6 +214,14 @@ def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit:
     >>> from pathlib import Path
     >>> fit = pyhoid.from_json(Path("person.json").read_text())
     """
+    try:
+        kind = json.loads(text)["kind"]
+    except (ValueError, KeyError, TypeError):
+        kind = None
+    if kind == "comparison":
+        return Comparison.from_json(text)
+    if kind == "design":
+        return ExperimentDesign.from_json(text)
     units = [record.get("units", {}) for record in _records(text)]
     first = units[0] if units else {}
     return _result(_pyhoid.from_json(text), (), (first.get("input", ""), first.get("output", "")))

@@ -51,21 +51,31 @@ pub fn envelope(
     verdict_of: &Verdict,
     settings_of: &[Setting],
 ) -> Map<String, Value> {
-    let mut map = Map::new();
-    let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
-    set("hoid", json!(env!("CARGO_PKG_VERSION")));
-    set("kind", json!(kind));
-    set("verdict", verdict(verdict_of));
-    set("records", records(files, of_records, accounts));
-    set(
-        "data",
-        json!({"faults": faults(files, accounts), "warnings": warnings(files, accounts)}),
-    );
-    // Earlier keys, kept for one release.
-    set("warnings", warnings(files, accounts));
-    set("faults", faults(files, accounts));
-    set("settings", settings(settings_of));
-    map
+    let records = records(files, of_records, accounts);
+    let data = json!({"faults": faults(files, accounts), "warnings": warnings(files, accounts)});
+    envelope_of_parts(kind, records, &data, verdict_of, settings_of)
+}
+
+/// Returns the envelope of a result whose records and their faults are already JSON.
+pub fn envelope_of_parts(
+    kind: &str,
+    records: Value,
+    data: &Value,
+    verdict_of: &Verdict,
+    settings_of: &[Setting],
+) -> Map<String, Value> {
+    let all = [
+        ("hoid", json!(env!("CARGO_PKG_VERSION"))),
+        ("kind", json!(kind)),
+        ("verdict", verdict(verdict_of)),
+        ("records", records),
+        ("data", data.clone()),
+        // Earlier keys, kept for one release.
+        ("warnings", data["warnings"].clone()),
+        ("faults", data["faults"].clone()),
+        ("settings", settings(settings_of)),
+    ];
+    all.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 /// Returns the settings, each with its value and whether the user gave it.

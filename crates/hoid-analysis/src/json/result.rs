@@ -62,7 +62,13 @@ impl BatchResult {
             registry::REMNANT => restore_result(object).map(Self::Remnant),
             registry::CHANGE => restore_result(object).map(Self::Change),
             registry::PEM => restore_result(object).map(Self::Polynomials),
-            other => Err(not_a_result_error(format!("its estimator is {other:?}"))),
+            other => Err(not_a_result_error(match object.get("kind").and_then(Value::as_str) {
+                // These objects do not contain the whole result.
+                Some(kind @ ("trace" | "description" | "group" | "axes")) => {
+                    format!("its kind is {kind}, whose JSON cannot be read back; run the analysis again")
+                }
+                _ => format!("its estimator is {other:?}"),
+            })),
         }
     }
 }
@@ -152,15 +158,15 @@ impl<F: JsonFit> IdentifiedModel<F> {
         if let Some(written) = &self.written {
             return Ok(written.clone());
         }
-        let mut map = F::object(self)?;
+        Ok(self.complete(F::object(self)?))
+    }
+
+    /// Adds to a JSON object of this result the verdict on each answer, and the state from which the result can be
+    /// restored.
+    pub fn complete(&self, mut map: Map<String, Value>) -> Map<String, Value> {
         if let Some(Value::Object(verdict)) = map.get_mut("verdict") {
             verdict.insert("of".to_owned(), Value::Object(answers(&self.answers())));
         }
-        Ok(self.with_state(map))
-    }
-
-    /// Adds to a JSON object of this result the state from which the result can be restored.
-    pub fn with_state(&self, mut map: Map<String, Value>) -> Map<String, Value> {
         map.insert("estimator".to_owned(), json!(F::ESTIMATOR));
         let state = Written {
             fit: &self.fit,

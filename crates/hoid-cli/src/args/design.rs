@@ -24,7 +24,7 @@ pub struct DesignArgs {
     #[arg(long, value_name = "FORM", value_parser = choice_parser(&Form::ERROR_FORMS))]
     pub form: Option<Form>,
     /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 [default: from the scenario or group]
-    #[arg(long, value_name = "TF")]
+    #[arg(long, value_name = "TF", allow_hyphen_values = true)]
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// Required standard errors: crossover=3%,tau_e=5%,phase_margin=2 (deg), tau_f=0.02 (s) [default: all parameters
     /// equally]
@@ -40,7 +40,7 @@ pub struct DesignArgs {
     #[arg(long, value_name = "S", default_value_t = Remnant::default().time_constant_s)]
     pub remnant_time_constant: f64,
     /// Length of a run in s (the period of the forcing function)
-    #[arg(long, value_name = "S", default_value_t = 81.92)]
+    #[arg(long, value_name = "S", default_value_t = 81.92, allow_negative_numbers = true)]
     pub length: f64,
     /// Number of runs [default: the number needed for --for, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -63,10 +63,10 @@ pub struct DesignArgs {
     #[arg(long, value_name = "PART", default_value_t = 0.2)]
     pub shelf: f64,
     /// Largest rms of the error; with neither this nor --max-u, the forcing function has rms 1
-    #[arg(long, value_name = "RMS")]
+    #[arg(long, value_name = "RMS", allow_negative_numbers = true)]
     pub max_rms_e: Option<f64>,
     /// Largest rms of the control
-    #[arg(long, value_name = "RMS")]
+    #[arg(long, value_name = "RMS", allow_negative_numbers = true)]
     pub max_u: Option<f64>,
     /// Forcing function to compare with the design: a scenario with a target or disturbance (or both), a table of lines
     /// (columns omega_rad_s, amplitude, phase_rad), or reference (the ten sines of the thesis)

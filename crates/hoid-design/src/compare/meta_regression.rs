@@ -156,7 +156,7 @@ pub fn variance_between_people(observations: &[Observation]) -> Result<f64, Comp
 
 /// Returns the model, the residual variance of y with equal weights, and whether the standard errors are known.
 fn checked_model(observations: &[Observation], x: &[Vec<f64>]) -> Result<(Model, f64, bool), CompareError> {
-    let (n, p) = (observations.len(), x.first().map_or(0, Vec::len));
+    let (n, p) = (observations.len(), x.first().map_or(1, Vec::len));
     if n <= p {
         return Err(CompareError::TooFew {
             found: n,
@@ -453,7 +453,10 @@ mod tests {
             mean(&[1.0], 0.1),
             Err(CompareError::TooFew { found: 1, expected: 2 })
         ));
-        assert!(matches!(mean(&[], 0.1), Err(CompareError::TooFew { .. })));
+        assert!(matches!(
+            mean(&[], 0.1),
+            Err(CompareError::TooFew { found: 0, expected: 2 })
+        ));
         assert!(matches!(mean(&[1.0, f64::NAN], 0.1), Err(CompareError::NotFinite)));
         assert!(matches!(mean(&[1.0, 2.0], -0.1), Err(CompareError::NotFinite)));
         assert!(matches!(mean(&[2.0, 2.0, 2.0], 0.0), Err(CompareError::NoScatter)));

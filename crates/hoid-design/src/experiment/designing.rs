@@ -84,6 +84,21 @@ impl DesignOptions {
     /// for the lines.
     pub fn run(&self, task: &Task, points: &[Enters]) -> Result<DesignedForcing, DesignError> {
         check_spread("spread from run to run", self.run_to_run)?;
+        let [rms_e, rms_u] = self.most_rms.map(|most| most.unwrap_or(1.0));
+        for (quantity, found) in [
+            ("length of a run in s", self.period_s),
+            ("largest rms of the error", rms_e),
+            ("largest rms of the control", rms_u),
+            ("number of lines", self.lines as f64),
+        ] {
+            if !(found.is_finite() && found > 0.0) {
+                return Err(DesignError::OutOfRange {
+                    quantity,
+                    found,
+                    expected: "a number above 0",
+                });
+            }
+        }
         let least = (self.band_rad_s.0 * self.period_s / TAU).ceil();
         let largest = (self.band_rad_s.1 * self.period_s / TAU).floor();
         if !(least >= 1.0 && largest > least && largest < 1e5) {

@@ -453,6 +453,26 @@ mod tests {
     }
 
     #[test]
+    fn pole_at_one_is_refused() {
+        for f in [
+            &[-1.0][..],
+            &[-1.9, 0.9],
+            &[-2.0, 1.0],
+            &[-2.9, 2.8, -0.9],
+            &[-3.0, 3.0, -1.0],
+        ] {
+            for b in [&[1.0][..], &[1.0, 1.0], &[1.0, -0.5, 0.2]] {
+                let found = family_from_polynomials(&polynomials(1, b, f), None, None);
+                assert!(found.is_err(), "{f:?} {b:?}: {found:?}");
+            }
+        }
+        let found = family_from_polynomials(&polynomials(1, &[1.0], &[-1.9, 0.9]), None, None).unwrap_err();
+        assert!(found.to_string().contains("pole at z = 1"), "{found}");
+        // A slow pole that is not at 1 remains a lag.
+        assert!(family_from_polynomials(&polynomials(1, &[1.0], &[-0.999]), None, None).is_ok());
+    }
+
+    #[test]
     fn lag_is_assigned_to_the_real_pole_that_fits() {
         let found = family_from_polynomials(&exact_polynomials(&operators()[3]), None, None).unwrap();
         assert_eq!(found.real_poles.len(), 1);

@@ -5,7 +5,10 @@
 //! poles, each of them may be the lag; callers try all three assignments and report the one that they use
 //! ([`RealPole`]).
 
-use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};
+use hoid_model::{
+    NotConvertible, SampleTime, operator::has_pole_at_origin, operator_family::Coordinate, polynomial,
+    polynomial_model::monic,
+};
 
 /// Interpretation of a real pole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,6 +75,11 @@ pub(super) fn pole_assignments(f: &[f64], sample_time: SampleTime) -> Result<Vec
             "operators of the family have one to three poles, found {}",
             f.len()
         )));
+    }
+    if has_pole_at_origin(f) {
+        return Err(other(
+            "a pole at z = 1 integrates the error, so the operator has no finite gain".to_owned(),
+        ));
     }
     let (mut rates, mut pair) = (Vec::new(), None);
     for z in roots {

@@ -156,6 +156,9 @@ impl Excitation {
         let held = bins.iter().map(|k| powers[k - 1]).sum::<f64>() / total;
         let dense = bins.windows(2).filter(|w| w[1] == w[0] + 1).count();
         if held < MIN_LINE_POWER_SHARE || 2 * dense > bins.len() {
+            if let Some(samples) = repetition(values) {
+                whole_periods(record, n, samples as f64 * record.sample_time().s())?;
+            }
             return refuse(
                 &format!("the lines of channel {channel} of record {}", record.label()),
                 format!(
@@ -198,9 +201,26 @@ impl Excitation {
     }
 }
 
+/// Returns the smallest number of samples after which the values repeat, over at least a tenth of all samples.
+fn repetition(values: &[f64]) -> Option<usize> {
+    let rms = mean_square(values).sqrt();
+    // Almost every other shift is excluded by its first samples; a signal at rest is no repetition.
+    (2..=9 * values.len() / 10).find(|&shift| {
+        let later = &values[shift..];
+        let mut pairs = values.iter().zip(later);
+        pairs.all(|(a, b)| (a - b).abs() <= MAX_REPETITION_DEVIATION * rms)
+            && mean_square(later).sqrt() > MIN_REPEATED_RMS * rms
+    })
+}
+
 pub(crate) fn greatest_common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
+
+/// Largest difference between two periods of a recorded signal, relative to its rms.
+const MAX_REPETITION_DEVIATION: f64 = 1e-3;
+/// Smallest rms of the repeated part of a signal, relative to the rms of the signal.
+const MIN_REPEATED_RMS: f64 = 0.1;
 
 /// Name of the excitation in messages.
 const EXCITATION_OPTION: &str = "the excitation (--excitation)";
@@ -299,6 +319,28 @@ mod tests {
             ..LineDetectionOptions::default()
         };
         assert!(Excitation::detect(&reference(8192, 0.0), "e", &wrong).is_err());
+    }
+
+    #[test]
+    fn refused_span_names_the_longest_span_of_whole_periods() {
+        for (samples, end_s) in [(20_000, "163.84"), (10_000, "81.92")] {
+            let refused = Excitation::detect(&reference(samples, 0.0), "e", &LineDetectionOptions::default());
+            let error = refused.unwrap_err();
+            assert!(matches!(&error, IdentError::NotWholePeriods { period_s, .. } if (period_s - 81.92).abs() < 1e-9));
+            assert!(
+                error.to_string().contains(&format!("(--from 0 --to {end_s})")),
+                "{error}"
+            );
+        }
+        // Rest at both ends is no repetition.
+        let burst = (0..1000).map(|k| {
+            if (300..500).contains(&k) {
+                (k as f64 * 0.3).sin()
+            } else {
+                0.0
+            }
+        });
+        assert_eq!(repetition(&burst.collect::<Vec<_>>()), None);
     }
 
     #[test]

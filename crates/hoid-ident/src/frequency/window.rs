@@ -32,12 +32,13 @@ pub(super) fn whole_periods(record: &Record, samples: usize, period_s: f64) -> R
     }
     let fitting = (samples as f64 / of_period + 1e-9).floor();
     let remedy = if fitting >= 1.0 {
-        let end_s = record.time_s(0) + fitting * period_s;
+        let start_s = record.time_s(0);
+        let end_s = start_s + fitting * period_s;
         let periods = if fitting == 1.0 { "period" } else { "periods" };
         format!(
-            "use {} s, the longest span of whole periods: {fitting} {periods} from {} s to {end_s} s",
+            "use {} s, the longest span of whole periods: {fitting} {periods} from {start_s} s to {end_s} s \
+             (--from {start_s} --to {end_s})",
             fitting * period_s,
-            record.time_s(0),
         )
     } else {
         format!("use a record of at least {period_s} s")

@@ -36,6 +36,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use hoid_analysis::Setting;
 use hoid_io::Preparation;
 use hoid_model::Decimation;
 use schemars::JsonSchema;
@@ -293,6 +294,33 @@ impl Manifest {
             facts.channels()?;
         }
         Ok(())
+    }
+
+    /// Returns the settings of the sections `[read]`, `[prepare]` and `[analysis]` and of the conditions, including
+    /// defaults.
+    pub fn settings(&self) -> Vec<Setting> {
+        let default = Self {
+            name: String::new(),
+            read: ReadSettings::default(),
+            prepare: PreparationSettings::default(),
+            analysis: AnalysisSettings::default(),
+            conditions: BTreeMap::new(),
+            runs: Vec::new(),
+        };
+        Setting::mark_non_defaults(self.setting_rows(), &default.setting_rows())
+    }
+
+    fn setting_rows(&self) -> Vec<Setting> {
+        let whole = toml::Table::try_from(self).unwrap_or_default();
+        let mut rows = Vec::new();
+        for section in ["read", "prepare", "analysis", "conditions"] {
+            let keys = whole.get(section).and_then(toml::Value::as_table);
+            rows.extend(keys.into_iter().flatten().map(|(key, value)| {
+                let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                Setting::new(format!("{section}.{key}"), text)
+            }));
+        }
+        rows
     }
 
     /// Returns the manifest as TOML text.

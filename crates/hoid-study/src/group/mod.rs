@@ -75,6 +75,6 @@ pub use reading::RecordedRun;
 pub use run::{has_results, run_group};
 pub use run_estimates::RunEstimates;
 pub use sampling_defects::SamplingDefect;
-pub use summary::{GroupSummary, RunFailure};
+pub use summary::{GroupSummary, RunFailure, RunFault};
 pub use virtual_people::{PeopleExperiment, simulate_people};
 pub use virtual_subjects::{VirtualExperiment, simulate_group};

@@ -23,7 +23,7 @@ use super::{
     analysis::{PEOPLE_TABLE, READ_LABEL},
     manifest::Manifest,
     person::{Person, PersonStatus, cell_name, read_people},
-    tables::texts,
+    tables::{numbers, texts},
 };
 use crate::{StudyError, directory::table_path};
 
@@ -51,6 +51,25 @@ pub struct GroupSummary {
     pub people: Vec<Person>,
     /// Verdict on the group as a whole.
     pub verdict: Verdict,
+    /// Faults of the recordings.
+    pub faults: Vec<RunFault>,
+}
+
+/// A fault or a problem of the recording of a run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunFault {
+    /// File of the run.
+    pub file: String,
+    /// Name of the kind of fault.
+    pub kind: String,
+    /// Channel; empty if the fault concerns all channels or the time.
+    pub channel: String,
+    /// Time of the first sample of the fault, s; `None` if the fault has no location in time.
+    pub from_s: Option<f64>,
+    /// Size of the fault, in the unit that belongs to its kind.
+    pub size: f64,
+    /// Description as a sentence without a full stop.
+    pub description: String,
 }
 
 impl GroupSummary {
@@ -69,8 +88,26 @@ impl GroupSummary {
             failures,
             people,
             verdict,
+            faults: run_faults(&table(FAULTS_TABLE)?),
         })
     }
+}
+
+/// Name of the table of faults.
+const FAULTS_TABLE: &str = "trouble";
+
+fn run_faults(table: &OutputTable) -> Vec<RunFault> {
+    let [file, kind, channel, what] = ["file", "kind", "channel", "what"].map(|name| texts(table, name));
+    let [from_s, size] = ["from_s", "size"].map(|name| numbers(table, name));
+    let fault = |i: usize| RunFault {
+        file: file[i].clone(),
+        kind: kind[i].clone(),
+        channel: channel[i].clone(),
+        from_s: Some(from_s[i]).filter(|t| t.is_finite()),
+        size: size[i],
+        description: what[i].clone(),
+    };
+    (0..kind.len()).map(fault).collect()
 }
 
 /// Returns the runs that could not be read, and the number of other failed estimates.

@@ -28,7 +28,7 @@ impl Tracker {
     }
 
     fn estimate_level(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
-        if self.options().method.is_self_starting() && self.covariance().is_none() {
+        if !self.has_estimate() {
             return VerdictLevel::NotDetermined;
         }
         // If no coefficient has a standard error, the estimate is doubtful.

@@ -3,14 +3,14 @@
 use hoid::ident::family::Parameter;
 use hoid::model::{Form, VerdictLevel, numbers::count_with_noun};
 use hoid::report::{PeopleTable, people_table};
-use hoid::study::group::{GroupSummary, Person, PersonChannel, RunFailure};
+use hoid::study::group::{GroupSummary, Manifest, Person, PersonChannel, RunEntry, RunFailure, RunFault};
 use serde_json::{Map, Value, json};
 
 use crate::{json, text};
 
 /// A finished group with the files written for it.
 pub struct GroupReport<'a> {
-    pub name: &'a str,
+    pub manifest: &'a Manifest,
     pub summary: &'a GroupSummary,
     pub tables: Vec<String>,
     pub pages: Vec<String>,
@@ -24,12 +24,13 @@ impl GroupReport<'_> {
             failures,
             people,
             verdict,
+            ..
         } = self.summary;
         let read = match failures.len() {
             0 => "all read".to_owned(),
             n => format!("{n} not read"),
         };
-        let mut page = format!("{verdict}\n\n{}: {runs} runs, {read}\n", self.name);
+        let mut page = format!("{verdict}\n\n{}: {runs} runs, {read}\n", self.manifest.name);
         let table = people_table(people.iter());
         if !table.rows.is_empty() {
             let last = table.headings.len() - 1;
@@ -58,20 +59,39 @@ impl GroupReport<'_> {
         page
     }
 
-    pub fn to_json(&self) -> Value {
+    pub fn json(&self) -> Map<String, Value> {
+        let summary = self.summary;
         let failure =
             |f: &RunFailure| json!({"subject": f.subject, "condition": f.condition, "run": f.run, "reason": f.reason});
-        json!({
-            "hoid": env!("CARGO_PKG_VERSION"),
-            "group": self.name,
-            "verdict": json::verdict(&self.summary.verdict),
-            "runs": self.summary.runs,
-            "failures": self.summary.failures.iter().map(failure).collect::<Vec<_>>(),
-            "people": self.summary.people.iter().map(person_json).collect::<Vec<_>>(),
-            "tables": self.tables,
-            "reports": self.pages,
-        })
+        let record = |run: &RunEntry| json!({"file": run.file, "subject": run.subject, "condition": run.condition, "run": run.run});
+        let records = self.manifest.runs.iter().filter(|run| run.counts).map(record);
+        let warning = |fault: &RunFault| json!(format!("{}: {}", fault.file, fault.description));
+        let data = json!({
+            "faults": summary.faults.iter().map(fault_json).collect::<Vec<_>>(),
+            "warnings": summary.faults.iter().map(warning).collect::<Vec<_>>(),
+        });
+        let settings = self.manifest.settings();
+        let mut map = json::envelope_of_parts("group", records.collect(), &data, &summary.verdict, &settings);
+        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        set("group", json!(self.manifest.name));
+        set("runs", json!(summary.runs));
+        set("failures", summary.failures.iter().map(failure).collect());
+        set("people", summary.people.iter().map(person_json).collect());
+        set("tables", json!(self.tables));
+        set("reports", json!(self.pages));
+        map
     }
+}
+
+fn fault_json(fault: &RunFault) -> Value {
+    json!({
+        "record": fault.file,
+        "kind": fault.kind,
+        "channel": fault.channel,
+        "from": json::optional(fault.from_s),
+        "size": json::number(fault.size),
+        "words": fault.description,
+    })
 }
 
 /// Formats some columns of the table of people, since all columns would be too wide for a screen.

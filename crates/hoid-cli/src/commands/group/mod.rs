@@ -19,6 +19,7 @@ use hoid::study::{
 };
 
 use form::GroupReport;
+use serde_json::Value;
 
 use super::{figure, output_paths, paper_table, study::with_progress};
 use crate::{
@@ -191,21 +192,18 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         false => None,
     };
     let finished = GroupReport {
-        name: &manifest.name,
+        manifest: &manifest,
         summary: &summary,
         tables: path_texts(&outcome.tables),
         pages,
     };
-    paper_table::write(&args.show, || {
-        let object = finished.to_json();
-        Ok(object.as_object().cloned().unwrap_or_default())
-    })?;
+    paper_table::write(&args.show, || Ok(finished.json()))?;
     if args.show.json {
-        let mut object = finished.to_json();
+        let mut object = finished.json();
         if let Some((populations, _)) = &pooled {
-            object["populations"] = pooled::populations_json(populations);
+            object.insert("populations".to_owned(), pooled::populations_json(populations));
         }
-        json::print(&object)?;
+        json::print(&Value::Object(object))?;
     } else {
         let of_all = pooled.map_or_else(String::new, |(populations, files)| pooled::page(&populations, &files));
         output::show(&format!("{}{of_all}", finished.page(args.show.verbose)))?;

@@ -118,7 +118,7 @@ fn show<F: JsonFit>(
     }
     paper_table::write(&args.show, || Ok(answer.object()))?;
     if args.show.json {
-        json::print(&Value::Object(found.with_state(answer.object())))?;
+        json::print(&Value::Object(found.complete(answer.object())))?;
     } else {
         output::show(&page(&answer, args.show.verbose))?;
     }

@@ -317,8 +317,19 @@ impl Session {
                 count_with_noun(c.dropped, "line")
             )));
         }
+        if c.samples == 0 {
+            return Err(CliError::NotDetermined(
+                "the stream contained no samples; send lines e,u or t,e,u".to_owned(),
+            ));
+        }
         match self.live.stage() {
-            Stage::Tracking(_) => Ok(()),
+            Stage::Tracking(tracker) if tracker.has_estimate() => Ok(()),
+            Stage::Tracking(_) => Err(CliError::NotDetermined(format!(
+                "the stream ended without an estimate after {} ({} with a fault in e or u); send more samples in which \
+                 e and u move",
+                count_with_noun(c.samples, "sample"),
+                c.skipped
+            ))),
             Stage::Collecting(_) => Err(CliError::NotDetermined(
                 "the stream ended within the warm-up, without an estimate; send more samples, or shorten --warm-up"
                     .to_owned(),
