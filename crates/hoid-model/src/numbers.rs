@@ -194,7 +194,7 @@ mod tests {
             pair("1.563464", DASH)
         );
         assert_eq!(
-            value_and_error(-114.573_496_389_993_49, 7.7e-13),
+            value_and_error(-114.573_496_389_99, 7.7e-13),
             pair("-114.5735", "7.7e-13")
         );
         assert_eq!(value_and_error(0.0, 6e-15), pair("0.0e-15", "6.0e-15"));

@@ -255,7 +255,7 @@ impl<'s> FurtherInputs<'s> {
         begun: &[Vec<Channel<'_>>],
         responses: &[Vec<MeasuredResponse>],
     ) -> Arc<ChannelLines> {
-        let apart = have_separate_lines(Some(at.lines), &self.all);
+        let apart = have_separate_lines(Some(at.lines), self.all);
         let nearest = |points: &Vec<MeasuredResponse>, omega: f64| {
             let off = |p: &MeasuredResponse| (p.omega_rad_s / omega).ln().abs();
             let near = points.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
