@@ -4,6 +4,7 @@ use hoid_ident::{Fit, IdentError};
 use hoid_model::Record;
 
 use crate::{
+    diagnostics::COMPARED_RAD_S,
     idle::idle_head,
     open_loop::OpenLoop,
     options::TrackOptions,
@@ -93,6 +94,9 @@ pub(crate) fn track_with(
             trace.changes.push((t, change));
         }
         if let Some(event) = tracker.event() {
+            if let Some(from) = event.withdrawn_from_s(t, sample_time) {
+                trace.changes.retain(|(declared, _)| *declared < from);
+            }
             event.at(t, sample_time).append_to(&mut trace.faults);
         }
         if (k + 1) % every != 0 && k + 1 != record.len() {
@@ -123,6 +127,8 @@ pub(crate) fn track_with(
         trace.change_odds.extend(tracker.change_odds());
     }
     trace.response_finding = tracker.response_finding();
+    let low = COMPARED_RAD_S.iter().filter_map(|omega| tracker.response(*omega));
+    trace.low_responses = low.collect();
     trace.loop_shape = tracker.open_loop_shape();
     trace.response_is_known = tracker.response_is_known();
     trace.counts = tracker.counts;

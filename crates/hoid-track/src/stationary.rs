@@ -361,7 +361,7 @@ impl StationaryWatch {
         self.paused = stood.max(1);
         self.moving = 0;
         self.channel = GuardChannel::ALL.iter().position(|c| *c == channel).unwrap_or(0);
-        self.report(GuardAction::Paused);
+        self.report(GuardAction::Paused, Some(stood));
         GuardDecision { outcome, held: true }
     }
 
@@ -379,7 +379,7 @@ impl StationaryWatch {
             false => self.moving.saturating_add(1),
         };
         if self.moving >= self.settle {
-            self.report(GuardAction::Resumed);
+            self.report(GuardAction::Resumed, None);
             self.paused = 0;
         }
         GuardDecision { outcome, held: true }
@@ -393,7 +393,7 @@ impl StationaryWatch {
         e.min(u) >= self.both || e >= self.one || u >= self.one
     }
 
-    fn report(&mut self, action: GuardAction) {
+    fn report(&mut self, action: GuardAction, withdrawn: Option<u64>) {
         let channel = GuardChannel::ALL
             .get(self.channel)
             .copied()
@@ -405,9 +405,10 @@ impl StationaryWatch {
             },
             channel,
             ago: self.paused.saturating_sub(1),
-            samples: self.paused,
+            samples: self.paused.saturating_sub(self.moving),
             size: 0.0,
             action,
+            withdrawn,
         });
     }
 

@@ -58,6 +58,8 @@ pub struct Trace {
     pub(crate) failures: Option<(usize, String)>,
     /// Finding that the response at the end is implausible for a person.
     pub(crate) response_finding: Option<Finding>,
+    /// Responses at the end at the frequencies at which the lag of the basis is tested.
+    pub(crate) low_responses: Vec<Response>,
     /// Every crossing of the open loop of the last row with the controlled element of the options.
     pub(crate) loop_shape: Option<LoopShape>,
     /// True if the response at the end is determined at some frequency, whether or not gain and lead are.
@@ -101,6 +103,7 @@ impl Trace {
             start: None,
             failures: None,
             response_finding: None,
+            low_responses: Vec::new(),
             loop_shape: None,
             response_is_known: false,
             every,

@@ -195,6 +195,11 @@ impl ChannelGuard {
         self.resting = difference;
     }
 
+    /// Returns the largest first difference with which the signal counts as constant.
+    pub fn constant_tolerance(&self) -> f64 {
+        self.resting
+    }
+
     /// Returns the last sample or, if it was held back, its replacement.
     pub fn last(&self) -> f64 {
         self.last

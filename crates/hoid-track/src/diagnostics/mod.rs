@@ -29,19 +29,24 @@
 //! | `last-row` | neither K_e nor K_e_dot is determined in the last row, regardless of the other rows |
 //! | `not-followed` | the last 16 or 30 s of the record disagree with the last row |
 //! | `structure` | past errors explain more of u than the operator of the last row does |
+//! | `held-lag` | a lag fitted to the last minute has another phase at low frequencies than the last row |
 //! | `sign` | without a given controlled element: the response at 0.5 rad/s would increase the error |
 //! | `unstable-loop`, `no-crossover` | with the controlled element, a person could not have kept the loop of the last row stable |
 //! | `undeclared-change`, `drifting`, `swaying` | the response varies between declared changes |
 //! | `changed-input` | for a model with two inputs, the input whose response changed (a note) |
-//! | `no-answer` | e does not respond to u |
+//! | `no-answer` | e does not respond to u beyond chance |
+//! | `no-estimate` | no row has an estimate yet |
 //! | `not-finite` | an estimate is not a finite number |
 //!
 //! `operators` examines the operators of the rows, `recording` the actions of the guard and the start and end of the
-//! record, `structure` the form of the operator, `steadiness` its constancy, and `moment` a single sample. If the
+//! record, `structure` the form of the operator, `steadiness` its constancy, `closed_loop` the response of e to u,
+//! `lag` the lag that is kept constant, and `moment` a single sample. If the
 //! response is known at the end, an undetermined gain or lead, or a negative lead, gives only a note: gain and lead are
 //! only one description of the response, which may have another form. `inputs` examines the responses to two inputs.
 
+mod closed_loop;
 mod inputs;
+mod lag;
 mod moment;
 mod operators;
 mod recording;
@@ -54,6 +59,7 @@ use hoid_ident::{Choice, IdentError};
 use hoid_model::{Finding, Record, Severity, Verdict, uncertainty::Estimate};
 use hoid_numerics::statistics::upper_median;
 
+pub(crate) use self::lag::COMPARED_RAD_S;
 use self::operators::{Operator, operator_findings};
 use crate::trace::Trace;
 
@@ -83,6 +89,17 @@ impl Trace {
             ));
             return Ok(Verdict::of(all));
         }
+        if rows.iter().all(|row| self.is_before_first_estimate(*row)) {
+            all.push(Finding::undetermined(
+                "no-estimate",
+                format!(
+                    "there is no estimate in the {:.2} s of the record (the first one comes after about 1 s); give a \
+                     longer record",
+                    record.time_s(record.len()) - record.time_s(0)
+                ),
+            ));
+            return Ok(Verdict::of(all));
+        }
         let operators: Vec<Operator> = rows.iter().map(|row| self.operator(*row)).collect();
         all.extend(operator_findings(self, &operators));
         all.extend(self.covariance_finding(&rows));
@@ -91,6 +108,7 @@ impl Trace {
         all.extend(self.update_at_rest_finding(record));
         all.extend(self.idle_finding(record));
         all.extend(self.prior_value_finding());
+        let record = &*self.with_bridged_samples(record)?;
         all.extend(self.outdated_last_row_finding(record));
         all.extend(self.changed_input_finding(&rows));
         if !all.iter().any(|finding| finding.kind == "gain") {
@@ -98,6 +116,7 @@ impl Trace {
         }
         all.extend(self.many_changes_finding());
         all.extend(self.missed_structure_finding(record));
+        all.extend(self.held_lag_finding(record));
         all.extend(self.response_finding.clone());
         all.extend(self.response_change_finding(record));
         all.extend(self.loop_response_finding(record));

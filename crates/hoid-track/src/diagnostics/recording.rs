@@ -1,11 +1,13 @@
 //! Findings about a trace that follow from the recording: the actions of the guard, an idle head, and agreement of the
-//! last row with the last few seconds.
+//! last row with the last few seconds. Samples that the guard held back are bridged.
+
+use std::borrow::Cow;
 
 use hoid_ident::diagnostics::{has_negative_lead, is_undetermined, operator_step};
-use hoid_model::{Finding, Record, numbers::count_with_noun};
+use hoid_model::{Finding, ModelError, Record, numbers::count_with_noun};
 
 use crate::{
-    guard::{GuardAction, GuardChoice, GuardKind, TrackFault},
+    guard::{GuardAction, GuardChannel, GuardChoice, GuardKind, TrackFault},
     stationary::MIN_STATIONARY_BOTH_S,
     trace::Trace,
 };
@@ -99,6 +101,35 @@ impl Trace {
                 ),
             )
         })
+    }
+
+    /// Returns the record with straight lines in the spans that did not reach the recursion: outliers, missing samples
+    /// and excessive levels. A single outlier of e would otherwise determine all that is estimated from the record.
+    ///
+    /// # Errors
+    /// Errors of the signals of a record.
+    pub(super) fn with_bridged_samples<'r>(&self, record: &'r Record) -> Result<Cow<'r, Record>, ModelError> {
+        let is_bridged = |fault: &&TrackFault| {
+            matches!(fault.kind, GuardKind::Outlier | GuardKind::Missing | GuardKind::Level)
+                && !matches!(fault.action, GuardAction::Accepted | GuardAction::Relearnt)
+        };
+        let faults: Vec<&TrackFault> = self.faults().iter().filter(is_bridged).collect();
+        if faults.is_empty() {
+            return Ok(Cow::Borrowed(record));
+        }
+        let sample = |t: f64| ((t - record.time_s(0)) / self.sample_time().s()).round().max(0.0) as usize;
+        let mut channels = [GuardChannel::Input, GuardChannel::Output]
+            .into_iter()
+            .skip(usize::from(record.input_channel().is_none()));
+        let bridged = record.clone().map_signals(|values| {
+            let channel = channels.next();
+            for fault in &faults {
+                if fault.channel == GuardChannel::Both || Some(fault.channel) == channel {
+                    bridge(values, sample(fault.from_s), sample(fault.to_s));
+                }
+            }
+        })?;
+        Ok(Cow::Owned(bridged))
     }
 
     /// Compares the last few seconds of the record with the last row: the delay may have changed, or the estimate may
@@ -199,6 +230,20 @@ impl Trace {
                 format!("{words}, which are in the start fit; start the fit after them"),
             )
         })
+    }
+}
+
+/// Replaces the samples from `from` to `to` by a straight line; at an end of the record, by the next value.
+fn bridge(values: &mut [f64], from: usize, to: usize) {
+    let before = from.checked_sub(1).and_then(|k| values.get(k)).copied();
+    let after = values.get(to).copied();
+    let Some((first, last)) = before.or(after).zip(after.or(before)) else {
+        return;
+    };
+    let to = to.min(values.len());
+    let length = (to + 1).saturating_sub(from) as f64;
+    for (k, value) in values.iter_mut().enumerate().take(to).skip(from) {
+        *value = first + (last - first) * (k + 1 - from) as f64 / length;
     }
 }
 

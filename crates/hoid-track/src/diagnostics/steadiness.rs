@@ -1,4 +1,4 @@
-//! Tests whether the response is constant where the trace reports no change, and whether e responds to u.
+//! Tests whether the response is constant where the trace reports no change.
 //!
 //! The gains of the basis and the delay are fitted to each stretch between two declared changes and are tested for
 //! steps, drifts and slow oscillations, and all stretches together for a drift that they share: the method may declare
@@ -7,9 +7,7 @@
 use std::ops::Range;
 
 use hoid_core::adaptive::{GAIN_COUNT, STATE_COUNT};
-use hoid_ident::diagnostics::{
-    LoopResponse, ResponseBasis, ResponseChange, TimeCourse, loop_response, response_changes,
-};
+use hoid_ident::diagnostics::{ResponseBasis, ResponseChange, TimeCourse, response_changes};
 use hoid_model::{Finding, Record};
 
 use super::structure::transpose;
@@ -27,10 +25,6 @@ const LONG_LAG_S: f64 = 10.0;
 /// Time excluded at the start of the record and after a faulty span, s: the fast modes of the basis start at rest. The
 /// transient of its lag is estimated.
 const SETTLING_S: f64 = 3.0;
-/// Smallest share of the innovations of e (the part of e that older e and u do not explain) that the latest u explains
-/// if e responds to u. The share is above one half in closed loops, and below 0.03 if e and u are from two runs with
-/// the same forcing function.
-const MIN_RESPONSE_SHARE: f64 = 0.05;
 /// Time excluded from the stretches before and after a declared change, s.
 const EXCLUSION_S: f64 = 5.0;
 
@@ -145,26 +139,6 @@ impl Trace {
         Some(Finding::warning(
             kind,
             format!("{words}; the bands assume a person who does not change, and are too narrow here"),
-        ))
-    }
-
-    /// Estimates how e responds to u.
-    pub(super) fn loop_response(&self, record: &Record) -> Option<LoopResponse> {
-        loop_response(record.input(), record.output(), 0, self.sample_time().s())
-    }
-
-    /// Finding that e does not respond to u.
-    pub(super) fn loop_response_finding(&self, record: &Record) -> Option<Finding> {
-        let found = self
-            .loop_response(record)
-            .filter(|found| found.share < MIN_RESPONSE_SHARE)?;
-        Some(Finding::warning(
-            "no-answer",
-            format!(
-                "e does not respond to u as it would in a closed loop (the latest u explains {:.1} % of the \
-                 innovations of e): check whether u and e are from the same run",
-                100.0 * found.share
-            ),
         ))
     }
 }

@@ -5,11 +5,16 @@
 //! more, gives a correction of the lag, in case only the lag is wrong. The test examines whether earlier errors, since
 //! the last change, carry more information about u ([`hoid_ident::diagnostics::residual_response()`]).
 
+use std::ops::Range;
+
 use hoid_core::adaptive::basis::{Basis, Point, Signals};
 use hoid_ident::diagnostics::{ResidualResponse, residual_response};
 use hoid_model::{Finding, Record};
 
-use crate::{guard::GuardKind, trace::Trace};
+use crate::{
+    guard::{GuardKind, TrackFault},
+    trace::Trace,
+};
 
 /// p-value of the test below which the operator is considered to lack part of the person's structure.
 const P_VALUE_LIMIT: f64 = 1e-3;
@@ -65,9 +70,35 @@ impl Trace {
     /// Returns the time from which the filters of the basis have settled, s: a settling time after the start of the
     /// record or after the last faulty span that is neither an outlier nor a step.
     pub(super) fn settled_from_s(&self, record: &Record, settling_s: f64) -> f64 {
+        self.hostile_spans()
+            .fold(record.time_s(0), |last, fault| last.max(fault.to_s))
+            + settling_s
+    }
+
+    /// Returns the faulty spans that are neither outliers nor steps.
+    fn hostile_spans(&self) -> impl Iterator<Item = &TrackFault> {
         let outliers = [GuardKind::Outlier, GuardKind::Step];
-        let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
-        hostile.fold(record.time_s(0), |last, fault| last.max(fault.to_s)) + settling_s
+        self.faults()
+            .iter()
+            .filter(move |fault| !outliers.contains(&fault.kind))
+    }
+
+    /// Returns the longest range of samples between two hostile spans.
+    pub(super) fn longest_span_without_faults(&self, record: &Record) -> Range<usize> {
+        let ts = self.sample_time().s();
+        let sample = |t: f64| ((t - record.time_s(0)) / ts).round().clamp(0.0, record.len() as f64) as usize;
+        let mut from = 0;
+        let mut longest = 0..0;
+        let ends = self
+            .hostile_spans()
+            .map(|fault| [sample(fault.from_s), sample(fault.to_s)]);
+        for [end, next] in ends.chain([[record.len(); 2]]) {
+            if end.saturating_sub(from) > longest.len() {
+                longest = from..end;
+            }
+            from = next;
+        }
+        longest
     }
 
     /// Returns the lag of the basis of the method, s.

@@ -5,7 +5,9 @@ use hoid_core::guard::{
     profile::{Block, CHANNEL_COUNT, CONSTANT_FRACTION, Fault},
 };
 
-use super::{Guard, MAX_LEVEL_RATIO, MIN_OUTLIER_SIZE, MIN_SNAPSHOT_AGE, SNAPSHOT_INTERVAL, event::GuardKind};
+use super::{
+    ConstantSpan, Guard, MAX_LEVEL_RATIO, MIN_OUTLIER_SIZE, MIN_SNAPSHOT_AGE, SNAPSHOT_INTERVAL, event::GuardKind,
+};
 use crate::recursion::Recursion;
 
 impl Guard {
@@ -29,6 +31,7 @@ impl Guard {
                 reference.mark_unusual();
             } else if fault.is_none() && reference.end_block(&block, self.block_length) {
                 self.start.restore(recursion);
+                self.withdrawn = Some(self.samples);
                 self.sound_at = [0; 2];
                 self.start_pause(GuardKind::Diverged, 2, 0, 0.0);
                 return;
@@ -44,6 +47,10 @@ impl Guard {
                 let blocks = self.profile.duration_blocks(fault);
                 let seen = u64::from(blocks) * u64::from(self.block_length);
                 self.restore_older_state(recursion, seen);
+                let seen = match kind {
+                    GuardKind::Frozen | GuardKind::Idle => seen.max(self.constant_samples(channel, ConstantSpan::len)),
+                    _ => seen,
+                };
                 self.start_pause(kind, channel, seen.min(self.samples), 0.0);
             }
             None if self.in_ring == 0 => {
@@ -91,15 +98,23 @@ impl Guard {
     }
 
     /// Restores a state of the recursion that is older than the last `samples` samples.
-    fn restore_older_state(&self, recursion: &mut dyn Recursion, samples: u64) {
+    fn restore_older_state(&mut self, recursion: &mut dyn Recursion, samples: u64) {
         let least = samples.max(MIN_SNAPSHOT_AGE * u64::from(self.block_length));
         let sound = (0..2)
             .filter(|i| self.sound_at[*i] > 0 && self.samples - self.sound_at[*i] >= least)
             .max_by_key(|i| self.sound_at[*i]);
-        match sound {
-            Some(i) => self.sound[i].restore(recursion),
-            None => self.start.restore(recursion),
+        let (state, at) = match sound {
+            Some(i) => (&self.sound[i], self.sound_at[i]),
+            None => (&self.start, 0),
         };
+        state.restore(recursion);
+        self.withdrawn = Some(self.samples - at);
+    }
+
+    /// Returns a number of samples of the constant span of a channel; of both channels, the smaller one.
+    pub(super) fn constant_samples(&self, channel: usize, of: impl Fn(&ConstantSpan) -> u64) -> u64 {
+        let each = self.constant.get(channel).map(&of);
+        each.unwrap_or_else(|| self.constant.iter().map(of).min().unwrap_or(0))
     }
 
     /// Sets the limits of both signals, which follow from their typical values.

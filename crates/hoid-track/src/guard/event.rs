@@ -96,6 +96,9 @@ pub struct GuardEvent {
     pub size: f64,
     /// Action of the guard.
     pub action: GuardAction,
+    /// Number of samples since the state that was restored, if one was: what was learnt and declared since then is
+    /// withdrawn.
+    pub withdrawn: Option<u64>,
 }
 
 /// A faulty span of a run, and the action taken.
@@ -116,6 +119,12 @@ pub struct TrackFault {
 }
 
 impl GuardEvent {
+    /// Returns the time after which declared changes are withdrawn, for an event that was reported at the time `now_s`;
+    /// `None` if none are.
+    pub fn withdrawn_from_s(&self, now_s: f64, sample_time: SampleTime) -> Option<f64> {
+        Some(now_s - (self.withdrawn? as f64 - 0.5) * sample_time.s())
+    }
+
     /// Converts an event that was reported at the time `now_s` to a fault with its start and end.
     pub fn at(&self, now_s: f64, sample_time: SampleTime) -> TrackFault {
         let ts = sample_time.s();

@@ -37,6 +37,7 @@
 //! | `pausing` | pauses, from their start to their end |
 //! | `blocks` | checks, learning and snapshots once a second |
 //! | `prime` | typical values from the record of the start span |
+//! | `constant` | start and end of spans in which a signal stays constant |
 //! | `compared` | comparison of the estimate with the start model |
 //! | `snapshot` | stored states of a recursion |
 //! | `event`, `options` | events for reports; the option of the guard |
@@ -44,6 +45,7 @@
 mod blocks;
 #[cfg_attr(not(test), warn(clippy::indexing_slicing, clippy::arithmetic_side_effects))]
 mod compared;
+mod constant;
 mod event;
 mod holding;
 mod options;
@@ -66,6 +68,7 @@ use hoid_model::{Record, SampleTime};
 use crate::recursion::{Recursion, Sample, StepOutcome};
 
 use compared::ReferenceComparison;
+use constant::ConstantSpan;
 pub use event::{GuardAction, GuardChannel, GuardEvent, GuardKind, TrackFault};
 pub use options::{GuardChoice, GuardOptions};
 pub(crate) use snapshot::Snapshot;
@@ -167,6 +170,10 @@ pub(crate) struct Guard {
     /// Sample number of the last restart.
     restarted_at: u64,
     event: Option<GuardEvent>,
+    /// Number of samples since the state that was restored at the last sample.
+    withdrawn: Option<u64>,
+    /// Spans in which a signal stays constant.
+    constant: [ConstantSpan; CHANNEL_COUNT],
 }
 
 impl State for Guard {
@@ -193,6 +200,7 @@ impl State for Guard {
                 &mut self.pause,
                 &mut self.restarts,
                 &mut self.restarted_at,
+                &mut self.constant,
             ],
             each,
         );
@@ -203,6 +211,7 @@ impl State for Guard {
         // be in the future.
         self.in_ring = self.in_ring.min(self.ring.len().saturating_sub(1));
         self.pause.first = self.pause.first.min(self.samples);
+        self.pause.good = self.pause.good.min(self.samples);
         self.sound_at = self.sound_at.map(|at| at.min(self.samples));
         self.restarted_at = self.restarted_at.min(self.samples);
         self.pause.kind = self.pause.kind.min(GuardKind::ALL.len());
@@ -249,6 +258,8 @@ impl Guard {
             restarts: 0,
             restarted_at: 0,
             event: None,
+            withdrawn: None,
+            constant: [ConstantSpan::default(); CHANNEL_COUNT],
         };
         if let Some(span) = span {
             guard.prime(span);
@@ -260,9 +271,17 @@ impl Guard {
     #[inline]
     pub fn process(&mut self, recursion: &mut dyn Recursion, sample: Sample, moves: bool) -> GuardDecision {
         self.samples += 1;
-        self.event = None;
+        (self.event, self.withdrawn) = (None, None);
         let x = [sample.e, sample.u];
         self.resting.update(x[1]);
+        for ((span, channel), x) in self.constant.iter_mut().zip(&self.channels).zip(x) {
+            span.update(
+                x,
+                channel.constant_tolerance(),
+                self.samples,
+                u64::from(self.block_length),
+            );
+        }
         let errors = [self.channels[0].errors(x[0]), self.channels[1].errors(x[1])];
         let outliers = [
             self.channels[0].is_outlier(&errors[0]),
@@ -310,6 +329,7 @@ impl Guard {
             samples,
             size,
             action,
+            withdrawn: self.withdrawn,
         });
     }
 

@@ -3,7 +3,7 @@
 use hoid_core::guard::profile::{Block, CHANNEL_COUNT};
 
 use super::{
-    ACCEPTANCE_TIME_S, Guard, GuardDecision, Pause,
+    ACCEPTANCE_TIME_S, ConstantSpan, Guard, GuardDecision, Pause,
     event::{GuardAction, GuardKind},
 };
 use crate::recursion::{Recursion, Sample};
@@ -92,9 +92,17 @@ impl Guard {
     /// Ends a pause.
     fn end_pause(&mut self, action: GuardAction) {
         let Pause {
-            channel, first, size, ..
+            channel,
+            first,
+            size,
+            good,
+            ..
         } = self.pause;
         let kind = self.pause.kind();
+        let mut end = self.samples - good;
+        if matches!(kind, GuardKind::Frozen | GuardKind::Idle) {
+            end = end.max(self.constant_samples(channel, ConstantSpan::end));
+        }
         self.pause = Pause::default();
         self.block = Block::default();
         (self.in_block, self.sound_blocks) = (0, 0);
@@ -102,7 +110,8 @@ impl Guard {
             self.restarts += 1;
             self.restarted_at = self.samples;
         }
-        self.report(kind, channel, self.samples - first, size, action, 0);
+        let end = end.max(first);
+        self.report(kind, channel, end - first, size, action, self.samples - end);
     }
 
     /// Restarts the recursion from its start and forgets the typical values of the signals.

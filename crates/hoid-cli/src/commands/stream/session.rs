@@ -40,6 +40,8 @@ pub struct Session {
     innovation: Option<f64>,
     /// Last change that has not been reported, with the time of its declaration, s.
     change: Option<(Option<f64>, Change)>,
+    /// Time of the last change that has been reported, s.
+    reported_change_s: Option<f64>,
     /// Last guard event that has not been reported.
     event: Option<TrackFault>,
     names: Vec<String>,
@@ -69,6 +71,7 @@ impl Session {
             t: None,
             innovation: None,
             change: None,
+            reported_change_s: None,
             event: None,
             names: Vec::new(),
             faults: VecDeque::new(),
@@ -176,7 +179,7 @@ impl Session {
     /// Returns the state of the recursion as the answer to a binary sample.
     pub fn estimate(&mut self, sequence: u32) -> EstimateDatagram {
         let answer = EstimateDatagram::new(sequence, self.t, &self.live, self.innovation, self.change.as_ref());
-        self.change = None;
+        self.take_change();
         self.faults.clear();
         self.event = None;
         answer
@@ -263,17 +266,44 @@ impl Session {
             // Time of the last sample that the recursion has processed.
             let t = self.t.map(|t| t - self.live.lag_s());
             (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
-            if let Some(event) = tracker.event() {
-                self.event = Some(event.at(t.unwrap_or(f64::NAN), self.live.plan().sample_time()));
-            }
-            if let Some(change) = tracker.change() {
+            let (event, change) = (tracker.event(), tracker.change());
+            if let Some(change) = change {
                 self.change = Some((t, change));
+            }
+            if let Some(event) = event {
+                let (now_s, ts) = (t.unwrap_or(f64::NAN), self.live.plan().sample_time());
+                self.event = Some(event.at(now_s, ts));
+                self.withdraw_changes(event.withdrawn_from_s(now_s, ts));
             }
         }
         if let Some((options, choice)) = taken.started {
             let when = format!("started after {} samples", self.counts.samples);
             self.report_start(&when, &options, choice.as_ref());
         }
+    }
+
+    /// Withdraws the changes declared from this time on: the guard has restored an earlier state.
+    fn withdraw_changes(&mut self, from_s: Option<f64>) {
+        let is_withdrawn = |declared_s: Option<f64>| declared_s.zip(from_s).is_some_and(|(at, from)| at >= from);
+        if self.change.as_ref().is_some_and(|(t, _)| is_withdrawn(*t)) {
+            self.change = None;
+        }
+        if is_withdrawn(self.reported_change_s)
+            && let Some(at) = self.reported_change_s.take()
+        {
+            self.add_fault(format!(
+                "the change declared at t = {at} s is withdrawn: the guard restored the estimate before the fault"
+            ));
+        }
+    }
+
+    /// Notes the change that a line of the output reports.
+    fn take_change(&mut self) -> Option<(Option<f64>, Change)> {
+        let change = self.change.take();
+        if let Some((t, _)) = change {
+            self.reported_change_s = t;
+        }
+        change
     }
 
     fn count_dropped_line(&mut self, reason: String) {
@@ -291,13 +321,14 @@ impl Session {
 
     /// Writes the line of the output to a buffer.
     pub fn write(&mut self, buffer: &mut Vec<u8>) -> Result<(), CliError> {
+        let change = self.take_change();
         let fault = (!self.faults.is_empty()).then(|| self.faults.drain(..).collect::<Vec<_>>().join("; "));
         let standing = StreamStatus {
             t: self.t,
             live: &self.live,
             names: &self.names,
             innovation: self.innovation,
-            change: self.change.take(),
+            change,
             event: self.event.take(),
             counts: self.counts,
             fault,
