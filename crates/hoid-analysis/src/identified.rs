@@ -129,10 +129,15 @@ impl<E: BatchEstimator> Identification<E> {
 /// Largest deviation of an output that is a multiple of the input, relative to the largest output.
 const MULTIPLE_TOLERANCE: f64 = 1e-9;
 
-/// Replaces the error of a search that found no finite loss if the output of a record is a multiple of its input.
+/// Replaces the error of a search without a finite loss, or of data that do not determine the model, if the output of a
+/// record is a multiple of its input.
 fn with_reason(error: AnalysisError, records: &[Record]) -> AnalysisError {
-    let is_search = matches!(error, AnalysisError::Ident(IdentError::NoFiniteLoss));
-    let found = records.iter().filter(|_| is_search).find_map(|record| {
+    use IdentError::{NoFiniteLoss, SingularInformation, SingularRegressors};
+    let is_explained = matches!(
+        error,
+        AnalysisError::Ident(NoFiniteLoss | SingularInformation { .. } | SingularRegressors { .. })
+    );
+    let found = records.iter().filter(|_| is_explained).find_map(|record| {
         let (e, u) = (record.input(), record.output());
         let sum = |of: &[f64]| of.iter().zip(e).map(|(a, b)| a * b).sum::<f64>();
         let factor = sum(u) / sum(e);

@@ -401,7 +401,11 @@ fn mistakes_are_explained_with_a_remedy() {
         (&["--max-rms-e", "0"], 2, "largest rms of the error is 0"),
         (&["--max-u", "-1"], 2, "largest rms of the control is -1"),
         (&["--length", "0"], 2, "length of a run in s is 0"),
-        (&["--controlled-element", "-4/s"], 1, "-4/s"),
+        (
+            &["--controlled-element", "-4/s"],
+            1,
+            "the closed loop of operator and controlled element is not stable",
+        ),
     ] {
         let all = [&["design", "--people", "person.toml"], arguments].concat();
         let (found, message) = failure_of(at, &all);

@@ -136,11 +136,13 @@ fn end_on_interrupt(session: &Arc<Mutex<Session>>) {
         loop {
             if let Ok(session) = session.try_lock() {
                 output::print_message(&session.summary());
-                process::exit(
-                    session
-                        .check_estimate()
-                        .map_or_else(|error| i32::from(error.exit_code()), |()| 0),
-                );
+                process::exit(match session.check_estimate() {
+                    Ok(()) => 0,
+                    Err(error) => {
+                        output::print_message(&format!("error: {error}"));
+                        i32::from(error.exit_code())
+                    }
+                });
             }
             // A start fit may be in progress, or the reader may be blocked. Lines are written in one piece, so no line
             // is truncated.
