@@ -16,6 +16,7 @@ use hoid_model::{Finding, Form, Record};
 use crate::{
     family::{ChannelFit, ChannelRole, FamilyEstimator, FamilyFit, SeenChannel},
     faults::Rest,
+    frequency::COMMON_EXCITATIONS,
 };
 
 /// Names of channels that may hold a displayed target.
@@ -65,7 +66,11 @@ pub fn response_to(
         return None;
     }
     let (nc, nd) = fit.noise_orders;
+    // Without a named excitation, the lines of every recorded excitation count, and a disturbance distinguishes the
+    // channel from e.
+    let is_common = |name: &String| *name == channel.name || COMMON_EXCITATIONS.contains(&name.as_str());
     let again = FamilyEstimator {
+        excitation: estimator.excitation.clone().filter(|name| !is_common(name)),
         forms: vec![fit.form],
         nc: nc..=nc,
         nd: Some(nd..=nd),
