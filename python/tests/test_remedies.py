@@ -53,7 +53,7 @@ REMEDIES = [
     ("twice", "drop_repeated=True", {"drop_repeated": True}),
     ("empty", "fill=True", {"fill": True}),
     ("sparse", 'sparse={"e": "hold"}', {"sparse": {"e": "linear"}}),
-    ("still", "sampling_frequency=HZ", {"sampling_frequency": 50.0}),
+    ("still", "sampling_frequency=50", {"sampling_frequency": 50.0}),
     ("gap", "resample=True", {"resample": True}),
     ("trials", 'trial="t=1"', {"trial": "t=1"}),
 ]

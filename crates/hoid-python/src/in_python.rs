@@ -1,7 +1,7 @@
 //! Conversion of command-line options in messages of the libraries to Python keywords.
 //!
 //! `--new-fs 50` becomes `new_sampling_frequency=50`, `--fill` becomes `fill=True`, and `--trial t=1` becomes
-//! `trial="t=1"`. A word after an option is its value if it is a placeholder (`HZ`), an assignment, or one of
+//! `trial="t=1"`. A word after an option is its value if it is a placeholder (`HZ`), a number, an assignment, or one of
 //! [`VALUE_WORDS`]; any other word continues the sentence.
 
 use pyo3::pyfunction;
@@ -79,7 +79,8 @@ fn split_value(rest: &str) -> Option<(&str, &str)> {
     let word_end = word[..end].trim_end_matches([',', ':', '.']).len();
     let (value, behind) = word.split_at(word_end);
     let placeholder = !value.is_empty() && value.chars().all(|c| c.is_ascii_uppercase());
-    (placeholder || value.contains('=') || VALUE_WORDS.contains(&value)).then_some((value, behind))
+    let is_value = placeholder || value.contains('=') || value.parse::<f64>().is_ok() || VALUE_WORDS.contains(&value);
+    is_value.then_some((value, behind))
 }
 
 fn python_argument(option: &str, value: &str) -> String {

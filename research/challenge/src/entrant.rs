@@ -85,7 +85,7 @@ pub struct ReportedResponse {
     /// Variances of the real and the imaginary part of the response and their covariance, at each line.
     pub covariance: Option<Vec<[f64; 3]>>,
     /// Parameters as name, value and standard error; the names are those of
-    /// [`Operator::named`](super::Operator::named).
+    /// [`Operator::named_parameters`](super::Operator::named_parameters).
     pub parameters: Vec<(&'static str, f64, Option<f64>)>,
 }
 

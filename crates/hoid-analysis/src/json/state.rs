@@ -29,7 +29,7 @@ pub fn serialise<T: Serialize>(value: &T) -> Option<String> {
     Some(format!("{}{text}", checksum(&text)))
 }
 
-/// Restores the value from a text written by [`written`].
+/// Restores the value from a text written by [`serialise`].
 ///
 /// # Errors
 /// A message if the text was truncated or changed, or comes from another version.

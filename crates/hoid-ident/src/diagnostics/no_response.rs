@@ -65,7 +65,7 @@ impl Response {
     }
 
     /// Returns the finding that no response can be distinguished from chance; `None` if at most
-    /// [`MAX_SURROGATES_ABOVE`] surrogates have as large a share as the records.
+    /// two surrogates have as large a share as the records.
     pub fn finding(&self) -> Option<Finding> {
         (self.surrogates_above > MAX_SURROGATES_ABOVE).then(|| {
             Finding::undetermined(

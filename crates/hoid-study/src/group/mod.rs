@@ -5,7 +5,7 @@
 //! | [`Manifest`] | assignment of files to subjects and runs, and settings for processing the runs |
 //! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | tables of the manifest: settings for reading, preparing and analysing the runs, and known properties of a condition |
 //! | [`ConditionElement`] | controlled elements of conditions in text form |
-//! | [`inspect`], [`commented`] | manifest completed from the contents of the files, with the evidence |
+//! | [`inspect`], [`with_comments`] | manifest completed from the contents of the files, with the evidence |
 //! | [`Pattern`] | subject, condition and run from file names |
 //! | [`run_group`] | analysis of a group in a directory, part by part |
 //! | `reading` | reading and preparation of runs; a single run: [`RecordedRun`] |
