@@ -31,7 +31,7 @@
 //!     fn run<R: Number>(self, zero: R) -> Vec<f64> {
 //!         let (f, mut y) = (zero.splat(self.f), zero);
 //!         let mut out = vec![0.0; self.x.len()];
-//!         for (x, out) in self.x.chunks_exact(zero.lanes()).zip(out.chunks_exact_mut(zero.lanes())) {
+//!         for (x, out) in self.x.chunks_exact(zero.lane_count()).zip(out.chunks_exact_mut(zero.lane_count())) {
 //!             y = zero.load(x) - f * y;
 //!             y.store(out);
 //!         }
@@ -39,7 +39,7 @@
 //!     }
 //! }
 //!
-//! let lanes = InstructionSet::Best.lanes().ok_or("no registers")?;
+//! let lanes = InstructionSet::Best.lane_count().ok_or("no registers")?;
 //! // An impulse in each run, larger from lane to lane.
 //! let mut x = vec![0.0; 3 * lanes];
 //! (0..lanes).for_each(|lane| x[lane] = lane as f64);
