@@ -145,15 +145,18 @@ pub fn response_to_error(records: &[Record]) -> Option<Response> {
     })
 }
 
+/// Number of columns of one regression: gain, lead and one lag.
+const REGRESSOR_COUNT: usize = 3;
+
 /// Returns the indices of the columns of the regression with this lag.
-fn columns_with(lag: usize) -> [usize; 3] {
+fn columns_with(lag: usize) -> [usize; REGRESSOR_COUNT] {
     [0, 1, 2 + lag]
 }
 
 /// Returns the inverse of `sum Re(x_i* x_j)` by rows, for the regression with this lag. The matrix depends neither on the delay nor on the phases of E.
 /// `None` if the columns are linearly dependent.
 fn inverse_gram(all: &[Spectra], lag: usize) -> Option<Vec<f64>> {
-    const N: usize = 3;
+    const N: usize = REGRESSOR_COUNT;
     let mut gram = [0.0; N * N];
     for spectra in all {
         for (columns, e) in spectra.columns.iter().zip(&spectra.e) {

@@ -236,8 +236,8 @@ impl<'a> ChosenForm<'_, 'a> {
     fn dc_gain_share(&self, forms: &[FormFigures], best: &WeighedForm) -> f64 {
         let has_lag = best.form.has_lag();
         let has_gain = |form: Form| has_lag || self.gains.iter().any(|(of, _)| *of == form);
-        let counted: Vec<FormFigures> = forms.iter().filter(|f| has_gain(f.form)).cloned().collect();
-        evidence_for(&counted, |form| {
+        let counted = forms.iter().filter(|f| has_gain(f.form));
+        evidence_for(counted, |form| {
             form.has_lag() == has_lag || self.has_same_gain(form, best)
         })
     }

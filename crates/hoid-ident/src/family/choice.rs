@@ -69,8 +69,11 @@ pub(super) fn weights(criteria: &[Option<f64>], best: usize) -> Vec<f64> {
 
 /// Returns the Akaike weight of the forms that satisfy a condition, among all forms with a criterion. Unlike the weight in
 /// averages, it includes forms that the data do not reject but whose parameters they do not determine.
-pub(super) fn evidence_for(figures: &[FormFigures], is_meant: impl Fn(Form) -> bool) -> f64 {
-    let known = || figures.iter().filter_map(|of| Some((of.form, of.criterion?)));
+pub(super) fn evidence_for<'f>(
+    figures: impl Iterator<Item = &'f FormFigures> + Clone,
+    is_meant: impl Fn(Form) -> bool,
+) -> f64 {
+    let known = || figures.clone().filter_map(|of| Some((of.form, of.criterion?)));
     let least = known().map(|(_, c)| c).fold(f64::INFINITY, f64::min);
     let weight = |(_, c): (Form, f64)| (0.5 * (least - c)).exp();
     let total: f64 = known().map(weight).sum();
@@ -124,10 +127,10 @@ mod tests {
             figures(Form::LeadLag, Some(12.0), 0.0),
             figures(Form::Gain, None, 0.0),
         ];
-        let without_lag = evidence_for(&all, |form| !form.has_lag());
+        let without_lag = evidence_for(all.iter(), |form| !form.has_lag());
         assert!((without_lag - 1.0 / (1.0 + (-1.0_f64).exp())).abs() < 1e-12);
-        assert_eq!(evidence_for(&all[..1], |form| !form.has_lag()), 1.0);
-        assert_eq!(evidence_for(&[], |_| false), 1.0);
+        assert_eq!(evidence_for(all[..1].iter(), |form| !form.has_lag()), 1.0);
+        assert_eq!(evidence_for([].iter(), |_| false), 1.0);
     }
 
     #[test]

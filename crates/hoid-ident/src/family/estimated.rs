@@ -152,19 +152,22 @@ impl EstimatedOperator {
             of_all
         });
         let limits: Vec<(f64, f64)> = places.iter().map(|&i| layout.limits()[i]).collect();
-        let of_delay = |i: usize| delay_interval(fit, errors, places, i);
-        let prior_share = |&i: &usize| match of_delay(i) {
-            Some(interval) => delay_prior_share(fit, i, interval, errors.quantile),
+        let delay_intervals: Vec<Option<(f64, f64)>> =
+            places.iter().map(|&i| delay_interval(fit, errors, places, i)).collect();
+        let prior_share = |(&i, interval): (&usize, &Option<(f64, f64)>)| match interval {
+            Some((low, high)) => {
+                let s = 0.5 * (high - low) / errors.quantile;
+                prior_precision(fit, i).map_or(0.0, |precision| (s * s * precision / fit.inflation).min(1.0))
+            }
             None => prior_share(fit, model_based.as_deref(), places, i),
         };
         let known = CoordinateEstimate {
             operator: &operator,
             covariance: of_parameters.as_deref(),
-            prior_share: &places.iter().map(prior_share).collect::<Vec<_>>(),
+            prior_share: &places.iter().zip(&delay_intervals).map(prior_share).collect::<Vec<_>>(),
             limits: &limits,
-            profile: &places
-                .iter()
-                .map(|&i| of_delay(i).or(errors.profiles[i]))
+            profile: &(places.iter().zip(&delay_intervals))
+                .map(|(&i, interval)| interval.or(errors.profiles[i]))
                 .collect::<Vec<_>>(),
             quantile: errors.quantile,
             run_to_run: errors.run_to_run,
@@ -179,19 +182,15 @@ impl EstimatedOperator {
     }
 }
 
-/// Like [`prior_share`], with the variance that corresponds to the interval of the delay.
-fn delay_prior_share(fit: &PredictionFit<'_>, place: usize, (low, high): (f64, f64), quantile: f64) -> f64 {
-    let s = 0.5 * (high - low) / quantile;
-    let penalty = fit.criterion.penalty.iter().find(|p| p.place == place);
-    let precision = penalty.map_or(0.0, |p| {
-        p.curvature(fit.eta()) / (fit.inflation * fit.innovation_variance)
-    });
-    (s * s * precision).min(1.0)
+/// Returns the curvature of the prior of an element of eta, relative to the innovation variance; `None` without a prior.
+fn prior_precision(fit: &PredictionFit<'_>, place: usize) -> Option<f64> {
+    let penalty = fit.criterion.penalty.iter().find(|p| p.place == place)?;
+    Some(penalty.curvature(fit.eta()) / fit.innovation_variance)
 }
 
 /// Returns the ratio of the posterior to the prior variance of an element of eta; zero without a prior.
 fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[usize], place: usize) -> f64 {
-    let Some(penalty) = fit.criterion.penalty.iter().find(|p| p.place == place) else {
+    let Some(precision) = prior_precision(fit, place) else {
         return 0.0;
     };
     let Some((i, c)) = places.iter().position(|&q| q == place).zip(model_based) else {
@@ -199,7 +198,6 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     };
     // The curvature of the prior is kappa sigma^2/s^2. The model-based covariance is sigma^2 H^-1; multiplied by kappa,
     // it is the posterior covariance.
-    let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
     let ((low, high), x) = (fit.criterion.limits[place], fit.eta()[place]);
     // An element at a bound has no variance; its share is set to one.

@@ -47,9 +47,7 @@ impl ExogenousChannels {
             disturbances: of(&DISTURBANCE_CHANNELS, &TARGET_CHANNELS),
         }
     }
-}
 
-impl ExogenousChannels {
     /// True if neither a target nor a disturbance was recorded.
     pub(super) fn is_empty(&self) -> bool {
         self.targets.is_empty() && self.disturbances.is_empty()
