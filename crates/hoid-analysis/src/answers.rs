@@ -69,10 +69,12 @@ pub fn with_answers(verdict: Verdict, answers: &[AnswerStatus], asked: &[String]
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
     let open: Vec<Finding> = if asked.is_empty() {
         // A note that the estimated loop may be unstable does not lower the level.
-        let is_told = |finding: &Finding| {
+        let is_reported = |finding: &Finding| {
             finding.severity > Severity::Note && matches!(finding.kind, "no-crossover" | "unstable-loop")
         };
-        let wanted = LOOP_ANSWERS.iter().filter(|_| !verdict.findings().iter().any(is_told));
+        let wanted = LOOP_ANSWERS
+            .iter()
+            .filter(|_| !verdict.findings().iter().any(is_reported));
         let of_loop = wanted.filter_map(|name| of(name)?.open.clone());
         of_loop
             .map(|finding| Finding::warning(UNDETERMINED_ANSWER_KIND, finding.message))

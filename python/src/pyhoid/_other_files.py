@@ -19,6 +19,7 @@ from .errors import Error, FileError, FileMissingError, FormatError
 
 __all__ = ["readable"]
 
+
 def _written(table: Any, path: Path, place: Path) -> Path:
     made = place / f"{path.stem}.parquet"
     table.write_parquet(made, compression="snappy")

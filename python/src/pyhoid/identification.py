@@ -193,7 +193,9 @@ identify.__doc__ = (identify.__doc__ or "").format(settings=BATCH_SETTINGS)
 
 
 def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit | Comparison | ExperimentDesign:
-    """Restore a result that its `to_json` wrote or ``hoid identify``, ``compare`` or ``design --json`` printed.
+    """Restore a result that its `to_json` wrote or ``hoid identify --json`` printed.
+
+    The results of ``hoid compare --json`` and ``hoid design --json`` are restored, too.
 
     It is equal to the result that was written, and gives the same predictions, simulations and validations.
     It does not contain the samples of its records. The JSON of a trace, a description or a group does not
@@ -214,25 +216,24 @@ def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit | Comparison | Ex
     >>> from pathlib import Path
     >>> fit = pyhoid.from_json(Path("person.json").read_text())
     """
-    try:
-        kind = json.loads(text)["kind"]
-    except (ValueError, KeyError, TypeError):
-        kind = None
-    if kind == "comparison":
+    saved = _object(text)
+    if saved.get("kind") == "comparison":
         return Comparison.from_json(text)
-    if kind == "design":
+    if saved.get("kind") == "design":
         return ExperimentDesign.from_json(text)
-    units = [record.get("units", {}) for record in _records(text)]
+    records = saved.get("records")
+    units = [record.get("units", {}) for record in records] if isinstance(records, list) else []
     first = units[0] if units else {}
     return _result(_pyhoid.from_json(text), (), (first.get("input", ""), first.get("output", "")))
 
 
-def _records(text: str) -> list[dict[str, Any]]:
+def _object(text: str) -> dict[str, Any]:
+    """Return the object of a JSON text, without a check of its content."""
     try:
-        records = json.loads(text)["records"]
-    except (ValueError, KeyError, TypeError):
-        return []
-    return records if isinstance(records, list) else []
+        found = json.loads(text)
+    except (ValueError, TypeError):
+        return {}
+    return found if isinstance(found, dict) else {}
 
 
 def _result(

@@ -92,9 +92,8 @@ impl Trace {
     /// Finding that e does not respond to u.
     pub(super) fn loop_response_finding(&self, record: &Record) -> Option<Finding> {
         let clean = self.longest_span_without_faults(record);
-        let of = |signal: &'_ [f64]| signal.get(clean.clone()).map(<[f64]>::to_vec);
-        let (e, u) = (of(record.input())?, of(record.output())?);
-        let found = missing_response(&e, &u, self.sample_time().s())?;
+        let (e, u) = (record.input().get(clean.clone())?, record.output().get(clean)?);
+        let found = missing_response(e, u, self.sample_time().s())?;
         Some(Finding::warning(
             "no-answer",
             format!(
