@@ -12,6 +12,9 @@
 //! large ones. One second between past and present is left out, since a change need not coincide with the border of a
 //! block.
 //!
+//! A third statistic, for the short present, supposes that only gain and lead change (`gain_and_lead`). It has 2 degrees
+//! of freedom.
+//!
 //! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, the level
 //! of T relative to a chi-square in the absence of a change. c is estimated from the mean of `ln T`, whose expected
 //! value for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and its prior counts as half a minute of blocks.
@@ -21,7 +24,9 @@
 //!
 //! (M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5).
 //!
-//! **Declaration.** A change is declared if one of the two statistics exceeds the threshold. The time of the change is
+//! **Declaration.** A change is declared if one of the statistics exceeds the threshold. The significance of gain and
+//! lead is first multiplied by 1.9: in recordings of pilots without a change, 8 nats of it are about as rare as 15 nats
+//! of the test of all parameters, whose covariance is less certain. The time of the change is
 //! the block border that gives the smallest residual sum of squares when all parameters are free before and after it
 //! (R. E. Quandt, *J. American Statistical Association* 53 (1958) 873-880).
 //!
@@ -32,6 +37,7 @@ use super::{
     blocks::Block,
     contrast::{Contrast, EMPIRICAL_WEIGHT, MODEL_ONLY_WEIGHT},
     difference::Difference,
+    gain_and_lead,
     last_blocks::{BLOCK_S, LastBlocks, MAX_BLOCKS},
     sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT},
 };
@@ -42,8 +48,12 @@ const MEAN_LOG_CHI_SQUARE: f64 = 0.115_931_515_658_412_45;
 const TESTED_COUNT: usize = GAIN_COUNT + DYNAMICS_COUNT;
 /// Indices of the tested parameters in the state: all states except the level.
 const TESTED_STATES: [usize; TESTED_COUNT] = [0, 1, 2, LINEAR_COUNT, LINEAR_COUNT + 1, LINEAR_COUNT + 2];
-/// Number of pairs of degrees of freedom of the statistic.
-const PAIR_COUNT: u32 = TESTED_COUNT as u32 / 2;
+/// Numbers of pairs of degrees of freedom of the statistics: all parameters, for the short and for the long present, and
+/// gain and lead.
+const PAIR_COUNTS: [u32; 3] = [TESTED_COUNT as u32 / 2, TESTED_COUNT as u32 / 2, 1];
+const GAIN_AND_LEAD: usize = 2;
+/// Factors of the log significances of the statistics.
+const SIGNIFICANCE_FACTORS: [f64; 3] = [1.0, 1.0, 1.9];
 /// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
 /// Minimum number of blocks in a present that starts after a gap.
@@ -76,6 +86,7 @@ pub struct DetectorSettings {
 /// Statistic, with its level in the absence of a change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
+    pairs: u32,
     level: f64,
     levels: f64,
     log_significance: f64,
@@ -84,9 +95,10 @@ struct Statistic {
 crate::state!([] Statistic { level, levels, log_significance });
 
 impl Statistic {
-    fn new() -> Self {
+    fn new(pairs: u32) -> Self {
         Self {
-            level: mean_log_chi_square(PAIR_COUNT),
+            pairs,
+            level: mean_log_chi_square(pairs),
             levels: PRIOR_BLOCKS,
             log_significance: 0.0,
         }
@@ -94,12 +106,12 @@ impl Statistic {
 
     /// Mean ratio of the statistic so far to a chi-square, at least one.
     fn scale(&self) -> f64 {
-        libm::exp(self.level - mean_log_chi_square(PAIR_COUNT)).max(1.0)
+        libm::exp(self.level - mean_log_chi_square(self.pairs)).max(1.0)
     }
 
     fn update(&mut self, t: f64) {
         // The test uses the level estimated before this block, so a change does not reduce its own significance.
-        self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIR_COUNT);
+        self.log_significance = log_significance(t / libm::sqrt(self.scale()), self.pairs);
         self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY_BLOCKS);
         let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);
         self.level += (log - self.level) / self.levels;
@@ -126,8 +138,8 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
     settings: DetectorSettings,
-    /// Statistics for the short and for the long present.
-    statistics: [Statistic; 2],
+    /// Statistics of all parameters, for the short and for the long present, and of gain and lead.
+    statistics: [Statistic; 3],
     /// Number of blocks since the last change was declared.
     since: u64,
     declared: bool,
@@ -149,7 +161,7 @@ impl Detector {
         let sound = settings.dynamics.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
             settings,
-            statistics: [Statistic::new(); 2],
+            statistics: PAIR_COUNTS.map(Statistic::new),
             since: u64::MAX >> 12,
             declared: false,
             declared_contrast: Contrast::default(),
@@ -160,8 +172,14 @@ impl Detector {
     }
 
     /// Tests the stored blocks; the last one is new. `dynamics` are the current corrections of natural frequency,
-    /// damping and delay, relative to the basis of the blocks.
-    pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS_COUNT]) {
+    /// damping and delay, relative to the basis of the blocks, and `gain_and_lead` contains the directions of gain and
+    /// lead in that basis.
+    pub(super) fn test(
+        &mut self,
+        last: &LastBlocks,
+        dynamics: [f64; DYNAMICS_COUNT],
+        gain_and_lead: [[f64; GAIN_COUNT]; 2],
+    ) {
         self.declared = false;
         self.since += 1;
         // Blocks recorded before the last declared change belong to another operator and are not used.
@@ -170,10 +188,24 @@ impl Detector {
             .len()
             .min(usize::try_from(self.since).unwrap_or(MAX_BLOCKS) + self.ago);
         let blocks = &last.blocks()[last.blocks().len() - known..];
-        for present in 0..self.statistics.len() {
-            match self.wald_statistic(blocks, last.fresh_block_count(), dynamics, present) {
-                Some(t) => self.statistics[present].update(t),
-                None => self.statistics[present].log_significance = 0.0,
+        let fresh = last.fresh_block_count();
+        let [short, long] = self.settings.recent.map(|recent| self.spans(blocks, fresh, recent));
+        let deviations = self.settings.dynamics;
+        let all = |sides| {
+            self.compare(sides, EMPIRICAL_WEIGHT, dynamics)?
+                .wald_statistic(TESTED_STATES)
+        };
+        let of_gain_and_lead =
+            |sides| gain_and_lead::wald_statistic(sides, gain_and_lead, |sum| sum.with_prior(dynamics, deviations));
+        let values = [
+            short.and_then(all),
+            long.and_then(all),
+            short.and_then(of_gain_and_lead),
+        ];
+        for (statistic, value) in self.statistics.iter_mut().zip(values) {
+            match value {
+                Some(t) => statistic.update(t),
+                None => statistic.log_significance = 0.0,
             }
         }
         if self.log_significance() > self.settings.threshold && self.since > self.settings.refractory {
@@ -184,26 +216,14 @@ impl Detector {
         }
     }
 
-    /// Statistic T for a given length of the present; `None` if there are too few blocks.
-    fn wald_statistic(
-        &self,
-        blocks: &[Block],
-        fresh: usize,
-        dynamics: [f64; DYNAMICS_COUNT],
-        present: usize,
-    ) -> Option<f64> {
-        let DetectorSettings {
-            recent, least, most, ..
-        } = self.settings;
-        let recent_blocks = recent[present].min(fresh);
-        let now = blocks.len().saturating_sub(recent_blocks);
+    /// Returns the blocks of the past and of a present of the given length; `None` if there are too few blocks.
+    fn spans<'b>(&self, blocks: &'b [Block], fresh: usize, recent: usize) -> Option<[&'b [Block]; 2]> {
+        let DetectorSettings { least, most, .. } = self.settings;
+        let enough = MIN_BLOCKS_AFTER_GAP.min(self.settings.recent[0]);
+        let recent = recent.min(fresh);
+        let now = blocks.len().saturating_sub(recent);
         let before = now.saturating_sub(GUARD_BLOCKS);
-        if before < least || recent_blocks < MIN_BLOCKS_AFTER_GAP.min(recent[0]) {
-            return None;
-        }
-        let sides = [&blocks[before.saturating_sub(most)..before], &blocks[now..]];
-        self.compare(sides, EMPIRICAL_WEIGHT, dynamics)?
-            .wald_statistic(TESTED_STATES)
+        (before >= least && recent >= enough).then(|| [&blocks[before.saturating_sub(most)..before], &blocks[now..]])
     }
 
     /// Locates the change at the block border with the smallest residual sum of squares. The difference is reported
@@ -244,16 +264,19 @@ impl Detector {
         self.ago as f64 * BLOCK_S
     }
 
-    /// Returns the log significance in nats at the last block: the larger of the two statistics, or zero while there
-    /// are too few blocks.
+    /// Returns the log significance in nats at the last block: the largest of the statistics, where that of gain and
+    /// lead counts 1.9 times; zero while there are too few blocks.
     pub fn log_significance(&self) -> f64 {
-        self.statistics.iter().fold(0.0, |most, s| s.log_significance.max(most))
+        let each = self.statistics.iter().zip(SIGNIFICANCE_FACTORS);
+        each.fold(0.0, |most, (s, factor)| (factor * s.log_significance).max(most))
     }
 
-    /// Returns the typical ratio of T to a chi-square in the absence of a change: the larger of the ratios for the two
-    /// statistics.
+    /// Returns the typical ratio of T of all parameters to a chi-square in the absence of a change: the larger of the
+    /// ratios for the short and for the long present.
     pub fn typical_level(&self) -> f64 {
-        self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
+        self.statistics[..GAIN_AND_LEAD]
+            .iter()
+            .fold(1.0, |most, s| s.scale().max(most))
     }
 
     /// Returns the difference between present and past at the last declared change, computed with all parameters free.

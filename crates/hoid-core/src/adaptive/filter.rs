@@ -15,7 +15,7 @@ use super::{
     detector::Detector,
     history::{History, SampleUse},
     initial_estimate::InitialEstimate,
-    mixture::{Mixture, NoiseScales},
+    mixture::{Mixture, NoiseScales, gain_and_lead_directions},
     noise::NoiseModel,
     prior::AdaptivePrior,
     saturation::Saturation,
@@ -359,7 +359,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Step 12: tests the last blocks of the live candidate for a change.
     fn test_for_change(&mut self) {
         let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR_COUNT + j]);
-        self.detector.test(&self.live.blocks, dynamics);
+        let directions = gain_and_lead_directions(self.live.basis());
+        self.detector.test(&self.live.blocks, dynamics, directions);
     }
 
     /// Restarts the recursion after an overflow of a signal.
