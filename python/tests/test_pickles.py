@@ -82,7 +82,9 @@ def test_damaged_pickles_are_refused(fit: pyhoid.Fit, c1: pyhoid.Record) -> None
     # Of a trace: sealed as it should be, but of other data.
     trace = pyhoid.track(c1.span(0, 20), "rls", nk=29, every=100)
     answers, call = trace.__getstate__()["answers"], trace.__dict__["_call"]
-    strange = _pickling.Recalled(answers, call._replace(records=(pyhoid.simulate("C1", seed=99),)))
+    strange = _pickling.RestoredNative(
+        answers, call._replace(records=(pyhoid.simulate("C1", seed=99),))
+    )
     with pytest.raises(pyhoid.DataError, match="cannot be reproduced"):
         strange._native()
     parts = dict(c1.__reduce__()[1][0])

@@ -7,10 +7,10 @@ from typing import Any
 
 from .verdict import Verdict
 
-__all__ = ["Written"]
+__all__ = ["JsonResult"]
 
 
-class Written:
+class JsonResult:
     """A result that consists of its JSON alone."""
 
     #: Verdict on the result: level, reasons and notes.
@@ -27,7 +27,7 @@ class Written:
         self.settings = {s["name"]: s["value"] for s in found["settings"]}
 
     def __eq__(self, other: object) -> bool:
-        if type(other) is not type(self) or not isinstance(other, Written):
+        if type(other) is not type(self) or not isinstance(other, JsonResult):
             return NotImplemented
         return bool(json.loads(self._text) == json.loads(other._text))
 
