@@ -15,7 +15,7 @@ use hoid_model::{Finding, Form, Record};
 
 use crate::{
     family::{ChannelFit, ChannelRole, FamilyEstimator, FamilyFit, SeenChannel},
-    faults::Rest,
+    faults::StickRest,
     frequency::COMMON_EXCITATIONS,
 };
 
@@ -86,7 +86,7 @@ pub fn response_to(
 
 /// True if u of one of the records rests like the signal of a stick with a dead zone.
 fn has_rest(records: &[Record]) -> bool {
-    records.iter().any(|record| Rest::of(record.output()).is_some())
+    records.iter().any(|record| StickRest::of(record.output()).is_some())
 }
 
 fn response_finding(name: &str, chance: f64, nonlinear: bool) -> Finding {

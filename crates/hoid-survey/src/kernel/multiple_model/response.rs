@@ -11,7 +11,7 @@
 //! states that belong to another point would have a kink there, which the whitening filter, a difference of high order,
 //! amplifies above the noise.
 
-use hoid_core::held_operator::held_operator;
+use hoid_core::zoh_operator::zoh_operator;
 
 /// The signals x1 and x2, their derivatives with respect to omega_nm, and their derivatives with respect to zeta_nm.
 pub type Signals = [f64; 6];
@@ -50,7 +50,7 @@ impl Response {
     fn set(&mut self, point: [f64; 2]) {
         self.point = point;
         for (gain, gains) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
-            let (value, by) = held_operator([gains[0], gains[1], point[0], point[1]], self.sample_time);
+            let (value, by) = zoh_operator([gains[0], gains[1], point[0], point[1]], self.sample_time);
             for lag in 0..2 {
                 self.b[gain][lag] = [value[lag], by[lag][2], by[lag][3]];
                 self.f[lag] = [value[2 + lag], by[2 + lag][2], by[2 + lag][3]];
