@@ -3,7 +3,7 @@
 //! | finding | condition | consequence |
 //! |---|---|---|
 //! | `stick-at-its-end` | u at a limit of its range in more than 5 % of the samples | the intended output beyond the limit is unknown: gain and margins are biased |
-//! | `resting-stick` | u returns to exactly the same value in at least 10 % of the samples ([`Rest`]) | a dead zone or pulsed control; only a note, since the operator is the linear part of the response |
+//! | `resting-stick` | u returns to exactly the same value in at least 10 % of the samples ([`StickRest`]) | a dead zone or pulsed control; only a note, since the operator is the linear part of the response |
 //! | `coarse` | quantisation step of e above .05, or of u above .15, of its standard deviation | rounding errors do not behave like a remnant, so intervals and bands are too narrow |
 //! | `bridged` | a gap longer than .25 s filled by a straight line | the line is treated as behaviour of the person |
 //! | `held` | a value of a sparse column held longer than .25 s | the signal between the logged values is unknown |

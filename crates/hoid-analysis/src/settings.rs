@@ -14,6 +14,7 @@ pub struct Setting {
     /// The value in use.
     pub value: String,
     /// True if the value differs from the default and was therefore given by the user.
+    #[serde(rename = "given")]
     pub is_given: bool,
 }
 

@@ -347,7 +347,7 @@ fn dot_with_recent(coefficients: &[f64], history: &[f64]) -> f64 {
 }
 
 /// Returns psi, assembled from the histories of x, u, eps, v and w.
-// Each number is moved separately, since a wide copy of numbers just stored would wait as in [`dot_of_fresh`].
+// Each number is moved separately, since a wide copy of numbers just stored would wait as in [`dot_with_recent`].
 #[allow(clippy::manual_memcpy)]
 #[inline(always)]
 fn gather<S: Shape, const N: usize>(shape: &S, x: &[f64], [u, eps, v, w]: [&[f64; N]; 4]) -> [f64; N] {

@@ -1,6 +1,6 @@
 //! The tables of a run, which the page uses and from which Rust recomputes the run.
 //!
-//! The controlled element is discretised exactly over a tick of 1 ms (zero-order hold, [`hoid_model::held_system`]). If
+//! The controlled element is discretised exactly over a tick of 1 ms (zero-order hold, [`hoid_model::zoh_system`]). If
 //! it varies, the matrices of each block of ten ticks are computed from the continuous model at the middle of the
 //! block. Target and disturbance are sampled at every tick; they are faded in linearly over the first seconds of the
 //! run-in, so that a run does not start with a jump.

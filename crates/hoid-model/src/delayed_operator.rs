@@ -2,7 +2,7 @@
 //!
 //! After a zero-order hold, the operator `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`
 //! with `tau = l Ts + delta`, `0 <= delta < Ts`, is exactly `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)`
-//! with `nk = l + 1`. The formulas are those of [`hoid_core::held_operator`]. For delta = 0, b2 is zero and the model
+//! with `nk = l + 1`. The formulas are those of [`hoid_core::zoh_operator`]. For delta = 0, b2 is zero and the model
 //! is the same as in [`crate::operator`].
 //!
 //! The model is linear in K_e and K_e_dot. Its response is a continuous function of tau with a kink wherever tau is an

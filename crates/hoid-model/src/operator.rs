@@ -4,7 +4,7 @@
 //! (eq. 2)
 //!
 //! After a zero-order hold, H is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with `nk = tau_e/Ts + 1` (eq.
-//! 11), by the formulas of [`hoid_core::held_operator`].
+//! 11), by the formulas of [`hoid_core::zoh_operator`].
 
 use hoid_core::zoh_operator::zoh_operator;
 use nalgebra::{Matrix4, Vector4};

@@ -171,10 +171,10 @@ pub fn zoh_biproper(num: [f64; 3], den: [f64; 3], sample_time: SampleTime) -> Re
     Ok(([d, d * held.f1 + held.b0, d * held.f2 + held.b1], [held.f1, held.f2]))
 }
 
-/// Inverse of [`hold_biproper`]: returns numerator and monic denominator in descending powers of s.
+/// Inverse of [`zoh_biproper`]: returns numerator and monic denominator in descending powers of s.
 ///
 /// # Errors
-/// As [`HeldSecondOrder::inverse_zoh`].
+/// As [`ZohSecondOrder::inverse_zoh`].
 pub fn inverse_zoh_biproper(
     num: [f64; 3],
     f: [f64; 2],

@@ -68,7 +68,7 @@ pub(crate) struct Matrices {
     pub delay: usize,
 }
 
-/// Held system with two states, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, bit-identical to [`HeldStates::step`]. If
+/// Held system with two states, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, bit-identical to [`ZohStates::step`]. If
 /// both rows were sums, the compiler would pack the states into one register, and each sample would also wait for the
 /// shuffles.
 #[derive(Debug, Clone, Copy)]

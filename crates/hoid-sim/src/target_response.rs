@@ -3,7 +3,7 @@
 //! The target does not depend on the loop, so its response is computed before the run and added to u like a remnant. An
 //! operator that does not change is applied as one recursion, its discrete model
 //! ([`FamilyOperator::zoh`](hoid_model::FamilyOperator::zoh)); an operator that changes is advanced sample by sample
-//! ([`HeldOperator`]), with the parameters at each sample. Both give the same response up to rounding.
+//! ([`ZohOperator`]), with the parameters at each sample. Both give the same response up to rounding.
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{

@@ -1,6 +1,6 @@
 //! Operator of the family over one sample.
 //!
-//! The operator is advanced exactly by one sample, for a held input ([`hoid_model::held_system`]); its response is
+//! The operator is advanced exactly by one sample, for a held input ([`hoid_model::zoh_system`]); its response is
 //! stored in a ring, from which it is taken after the whole samples of the delay `tau = l Ts + delta`. A delay that
 //! changes has its value at the sample at which the response arrives. An operator without a neuromuscular part may have
 //! a direct response to its input. With a held input this response would appear at one sample or at the next, so it is

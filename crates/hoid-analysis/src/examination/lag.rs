@@ -45,7 +45,7 @@ pub(super) fn control_lag(
             "e follows from u through the controlled element if the control is {} late; {:.2} % of the power is \
              unexplained",
             count_with_noun(samples, "sample"),
-            100.0 * found.unexplained
+            100.0 * found.unexplained_share
         ),
     })
 }

@@ -62,7 +62,7 @@ pub struct RecordedElement {
     /// Delay of the machine beyond that of the given element, s; negative if u was recorded late.
     pub delay_s: f64,
     /// Share of the power that the element does not explain, expressed as a disturbance at u.
-    pub unexplained: f64,
+    pub unexplained_share: f64,
     /// Frequency in rad/s at which the response of the element differs most from the given element, apart from the
     /// delay, and the ratio of the two responses at this frequency.
     pub difference: (f64, Complex64),
@@ -137,21 +137,24 @@ pub fn recorded_element(
         true => MAX_UNEXPLAINED_WITHOUT_EXCITATION,
         false => MAX_UNEXPLAINED_SHARE,
     };
-    let least = fits.iter().map(|fit| fit.unexplained).fold(f64::INFINITY, f64::min);
+    let least = fits
+        .iter()
+        .map(|fit| fit.unexplained_share)
+        .fold(f64::INFINITY, f64::min);
     let chosen = fits
         .into_iter()
-        .find(|fit| fit.unexplained <= 2.0 * least + EXACT_DATA_SHARE)
-        .filter(|fit| fit.unexplained <= most)?;
+        .find(|fit| fit.unexplained_share <= 2.0 * least + EXACT_DATA_SHARE)
+        .filter(|fit| fit.unexplained_share <= most)?;
     let aligned_s = MAX_ALIGNED_DELAY_SAMPLES * sample_time_s;
     // A zero with a delay, or a slow pole, can look like another element in the band of manual control. The test
     // therefore asks whether the given element explains the record.
     if let Some((delay_s, unexplained)) = chosen.of_given(&spectra, given, aligned_s)
-        && unexplained <= MAX_UNEXPLAINED_BY_GIVEN.max(MAX_RATIO_TO_IDENTIFIED * chosen.unexplained)
+        && unexplained <= MAX_UNEXPLAINED_BY_GIVEN.max(MAX_RATIO_TO_IDENTIFIED * chosen.unexplained_share)
     {
         return Some(RecordedElement {
             element: given.clone(),
             delay_s,
-            unexplained,
+            unexplained_share: unexplained,
             difference: (COMPARED_FREQUENCIES_RAD_S[0], Complex64::ONE),
             max_aligned_delay_s: aligned_s,
         });
@@ -165,7 +168,7 @@ pub fn recorded_element(
         .max_by(|a, b| a.1.ln().norm().total_cmp(&b.1.ln().norm()))?;
     Some(RecordedElement {
         delay_s: chosen.delay_s - given.delay_s(),
-        unexplained: chosen.unexplained,
+        unexplained_share: chosen.unexplained_share,
         element,
         difference,
         max_aligned_delay_s: aligned_s,

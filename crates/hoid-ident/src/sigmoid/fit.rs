@@ -57,6 +57,7 @@ pub struct SigmoidFit {
     remarks: Vec<Option<Remark>>,
     midpoint_interval: Option<Interval>,
     rate_interval: Option<Interval>,
+    #[serde(rename = "change_point")]
     is_change_point: bool,
     loss: f64,
     innovation_variance: f64,

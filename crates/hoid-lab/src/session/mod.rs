@@ -22,7 +22,7 @@
 //! | file | contents |
 //! |---|---|
 //! | `folder` | the names of files and folders |
-//! | `run_start` | [`RunStart`]: data known before a run; [`Ended`]: data known after it |
+//! | `run_start` | [`RunStart`]: data known before a run; [`EndRecord`]: data known after it |
 //! | `log` | [`RunLog`]: the appended data |
 //! | `log_reader` | [`LoggedRun`]: the appended data, read back |
 //! | `state` | [`Session`]: the session as a whole |

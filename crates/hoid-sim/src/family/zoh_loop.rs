@@ -6,7 +6,7 @@
 //!
 //! where r is the response of the operator after the fractional part of the delay `tau = l Ts + delta`, m likewise the
 //! response to the motion y if the person feels it, and x_p the
-//! state of the controlled element. Operator ([`HeldOperator`]) and element are then advanced exactly by one sample,
+//! state of the controlled element. Operator ([`ZohOperator`]) and element are then advanced exactly by one sample,
 //! for held inputs. If a direct response of the operator and D form a loop within a sample, both equations are solved
 //! together.
 

@@ -2,7 +2,7 @@
 //!
 //! The parameters are `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay
 //! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is the Box-Jenkins predictor with the
-//! polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::held_operator`]); its gradient is
+//! polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::zoh_operator`]); its gradient is
 //! `psi_eta = (d theta/d eta)' psi_theta`. The step is computed as in [`hoid_core::rpem`], but each forgetting factor
 //! now belongs to a quantity whose rate of change the user knows: operators adapt their gains, but hardly their
 //! neuromuscular system.
@@ -13,7 +13,7 @@
 //! If the delay is a parameter, `tau_e = l Ts + delta`, and B has three coefficients after a delay of `nk = l + 1`
 //! samples. When tau_e passes a whole sample, B is shifted along the past input that the predictor keeps, without a
 //! transient. At a delay of whole samples the model is continuous, but its derivative has a kink (see
-//! [`hoid_core::held_operator`]).
+//! [`hoid_core::zoh_operator`]).
 
 use hoid_core::{
     adaptation::Adaptation,

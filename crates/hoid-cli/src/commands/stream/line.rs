@@ -86,7 +86,9 @@ impl From<Decimated> for Rate {
 
 #[derive(Serialize)]
 struct WarmUp<'a> {
+    #[serde(rename = "collected")]
     collected_samples: usize,
+    #[serde(rename = "needed")]
     required_samples: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<&'a str>,

@@ -17,7 +17,7 @@ pub(super) struct ElementFit {
     pub(super) num: Vec<f64>,
     pub(super) den: Vec<f64>,
     pub(super) delay_s: f64,
-    pub(super) unexplained: f64,
+    pub(super) unexplained_share: f64,
     /// Weights of each record.
     weights: Vec<Vec<f64>>,
 }
@@ -53,7 +53,7 @@ impl ElementFit {
             den: [1.0].into_iter().chain(descending(0..n)).collect(),
             num: descending(n..n + m + 1).collect(),
             delay_s: found.delay_s,
-            unexplained: found.sum_of_squares / found.power,
+            unexplained_share: found.sum_of_squares / found.power,
             weights,
         })
     }
@@ -146,7 +146,7 @@ struct Rows<'a> {
     /// Orthonormal columns that span T.
     transient: Vec<Vec<f64>>,
     m: usize,
-    /// Columns that do not depend on the delay: the columns of A (`of_e`), the columns of C (`of_targets`), and the
+    /// Columns that do not depend on the delay: the columns of A (`a_columns`), the columns of C (`c_columns`), and the
     /// right-hand side `s^n E`.
     a_columns: Vec<Vec<f64>>,
     c_columns: Vec<Vec<f64>>,

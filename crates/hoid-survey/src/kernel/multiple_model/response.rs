@@ -1,7 +1,7 @@
 //! Response of the neuromuscular system to a held error and to its rate, with derivatives with respect to omega_nm and
 //! zeta_nm.
 //!
-//! With the coefficients of the exact hold of [`hoid_core::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
+//! With the coefficients of the exact hold of [`hoid_core::zoh_operator`] for the gains `[1, 0]` and `[0, 1]`,
 //!
 //! `x(t) = b0 e(t) + b1 e(t-1) - f1 x(t-1) - f2 x(t-2)`,
 //! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
