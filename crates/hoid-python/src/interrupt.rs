@@ -83,7 +83,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
         }
         py.check_signals()
     };
-    // mpsc::Receiver is not Sync, so it is moved into the wait and back.
+    // mpsc::Receiver is not Sync, so it is moved into the closure that waits, which returns it.
     let mut receive = receive;
     let mut interrupted: Option<PyErr> = None;
     loop {

@@ -45,7 +45,7 @@
 //! | [`comparison_figure`] | people by condition, with the means over people |
 //! | [`design_figure`], [`runs_figure`] | a designed experiment: lines and response, errors by number of runs |
 //! | [`PaperTable`] | a result as a table for a paper |
-//! | [`settings_table`] | the table of settings on these pages |
+//! | [`settings_pairs`] | the table of settings on these pages |
 //! | [`figures`] | the figures of these pages, each as separate SVG text |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 //! | [`render_with`], [`write_page`], [`write_report`] | additional templates in the same style, and pages written to files |

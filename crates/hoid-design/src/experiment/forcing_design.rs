@@ -80,7 +80,7 @@ impl DesignOptions {
     /// Designs a forcing function for each point of entry.
     ///
     /// # Errors
-    /// [`DesignError`] as for [`super::expected_errors`], if a requested quantity does not exist, or if the band has no
+    /// [`DesignError`] as for [`super::expected`], if a requested quantity does not exist, or if the band has no
     /// room for the lines.
     pub fn run(&self, task: &Task, points: &[EntryPoint]) -> Result<DesignedForcing, DesignError> {
         check_spread("spread from run to run", self.run_to_run)?;

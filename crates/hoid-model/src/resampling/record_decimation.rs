@@ -40,7 +40,7 @@ impl Record {
                 .map(|(_, kernel, _)| kernel.samples_per_side());
             return Err(refuse(
                 format!(
-                    "{n} samples for a filter that extends {} samples to each side",
+                    "{n} samples, but the filter extends {} samples to each side",
                     half.map_or_else(|| "too many".to_owned(), |half| half.to_string())
                 ),
                 "a longer record, or a smaller factor; use decimate off to keep the rate".to_owned(),

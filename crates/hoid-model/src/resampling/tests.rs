@@ -121,7 +121,7 @@ fn records_that_cannot_be_decimated_are_refused() {
     for n in [1, 10, half] {
         let error = Decimation::Auto.apply(short(n)).unwrap_err();
         let expected = format!(
-            "decimation of run: found {n} samples for a filter that extends {half} samples to each side, expected a longer record"
+            "decimation of run: found {n} samples, but the filter extends {half} samples to each side, expected a longer record"
         );
         assert!(error.to_string().starts_with(&expected), "{error}");
         assert!(Decimation::Off.apply(short(n)).is_ok());
