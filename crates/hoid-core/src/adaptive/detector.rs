@@ -9,7 +9,7 @@
 //!
 //! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change (G. C. Chow, *Econometrica* 28
 //! (1960) 591-605). T is computed for a short and for a long present, since small changes take more data to detect than
-//! large ones. One second between past and present is omitted, since a change need not coincide with the border of a
+//! large ones. One second between past and present is left out, since a change need not coincide with the border of a
 //! block.
 //!
 //! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, the level
@@ -44,7 +44,7 @@ const TESTED_COUNT: usize = GAIN_COUNT + DYNAMICS_COUNT;
 const TESTED_STATES: [usize; TESTED_COUNT] = [0, 1, 2, LINEAR_COUNT, LINEAR_COUNT + 1, LINEAR_COUNT + 2];
 /// Number of pairs of degrees of freedom of the statistic.
 const PAIR_COUNT: u32 = TESTED_COUNT as u32 / 2;
-/// Number of blocks omitted between past and present.
+/// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
 /// Minimum number of blocks in a present that starts after a gap.
 const MIN_BLOCKS_AFTER_GAP: usize = 4;
