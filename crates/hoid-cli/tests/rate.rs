@@ -216,7 +216,7 @@ fn common_rates_are_decimated() {
     let file = simulate(at, "gain", 1000.0, 1);
     let (code, message) = failure_of(at, &["identify", &file, "--to", "0.1"]);
     assert!(
-        code == 1 && message.contains("found 100 samples for a filter"),
+        code == 1 && message.contains("found 100 samples, but the filter"),
         "{message}"
     );
     for wrong in ["0", "on", "-3", "2.5"] {

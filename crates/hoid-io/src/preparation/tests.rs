@@ -245,7 +245,7 @@ fn invalid_preparations_are_errors() {
     let rate = |rate| preparation_with(|p| p.rate = rate);
     for (preparation, n, words) in [
         (rate(NewRate::Decimated(0)), 10, "found a factor of 0"),
-        (rate(NewRate::Decimated(4)), 1, "found 1 samples for a filter"),
+        (rate(NewRate::Decimated(4)), 1, "found 1 samples, but the filter"),
         (rate(NewRate::Decimated(4)), 50, "a longer record"),
         (rate(NewRate::Decimated(usize::MAX)), 200, "a longer record"),
         (rate(NewRate::Hz(f64::NAN)), 200, "new-fs: NaN Hz, expected a positive"),
