@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion, settings::DelayRange};
-use hoid_model::{ContinuousTransferFunction, SampleTime, Structure, theta_of};
+use hoid_model::{ContinuousTransferFunction, SampleTime, Structure, theta_from_start};
 
 use crate::{
     further_input::{TrackedInput, coefficient_names},
@@ -138,7 +138,7 @@ impl TrackRequest {
             RequestedStart::Nothing => StartSource::Nothing,
             RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(several_models_error()),
             RequestedStart::Coefficients(named) => StartSource::Theta(
-                theta_of(&coefficient_names(&largest, self.further.as_ref()), named).map_err(|reason| {
+                theta_from_start(&coefficient_names(&largest, self.further.as_ref()), named).map_err(|reason| {
                     IdentError::BadStart {
                         reason: format!("it {reason}"),
                     }

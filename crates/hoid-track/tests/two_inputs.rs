@@ -1,4 +1,4 @@
-//! Recursions with a further input: comparison with the batch fit, a change of one response, and refused options.
+//! Recursions with a further input: comparison with the batch fit, a change of one response, and rejected options.
 #![allow(clippy::unwrap_used)]
 
 use hoid_ident::{
