@@ -82,6 +82,7 @@ pub mod margins;
 pub mod numbers;
 pub mod operator;
 pub mod operator_family;
+pub mod option_names;
 pub mod polynomial;
 pub mod polynomial_model;
 pub mod record;
