@@ -419,7 +419,7 @@ def test_units_of_columns_with_other_names(tmp_path: Path, c1: pyhoid.Record) ->
 def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:
     runs = [pyhoid.simulate("C1", seed=1, replication=k) for k in range(4)]
     found = pyhoid.describe(runs, controlled_element="90/(s(s+6))")
-    assert found.verdict == "trustworthy" and not found.reasons, found
+    assert found.verdict.level == "trustworthy" and not found.reasons, found
     assert found.excitation == "f_t" and abs(found.period - 81.92) < 1e-9
     by_hand = pyhoid.describing_function(runs, averaging="reference", reference="f_t")
     # By hand the lines are those of larger amplitude.
@@ -437,7 +437,7 @@ def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:
     pair = pyhoid.describe(runs, controlled_element=([90], [1, 6, 0]))
     assert pair.open_loop == found.open_loop and "trustworthy" in repr(pair)
     alone = pyhoid.describe(c1)
-    assert alone.verdict == "doubtful" and alone.open_loop is None
+    assert alone.verdict.level == "doubtful" and alone.open_loop is None
     with pytest.raises(pyhoid.OptionError, match="at character 5"):
         pyhoid.describe(runs, controlled_element="1/(s")
     with pytest.raises(pyhoid.OptionError, match="expected text"):

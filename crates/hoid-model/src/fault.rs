@@ -212,12 +212,13 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
                 words.push(format!("and {} more of this kind", of.len() - MAX_LISTED_FAULTS));
             }
             let words = words.join("; ");
-            all.push(match (left, kind) {
+            let finding = match (left, kind) {
                 (false, _) => Finding::note("faults", words),
                 // If the unit of time is wrong, no parameter is valid.
                 (true, FaultKind::TimeUnit) => Finding::undetermined("faults", words),
                 (true, _) => Finding::warning("faults", words),
-            });
+            };
+            all.push(finding.over_spans(of.iter().map(|fault| (fault.from_s, fault.to_s))));
         }
     }
     let repaired: usize = faults

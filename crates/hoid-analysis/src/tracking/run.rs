@@ -13,6 +13,7 @@ use super::{
 };
 use crate::{
     AnalysisError,
+    answers::{trace_answers, with_answers},
     quality::{Of, findings_of_quality},
     recordings::Recordings,
 };
@@ -142,6 +143,7 @@ impl Tracking {
         let verdict = verdict.append(data.element_finding(used.controlled_element.as_ref(), None));
         let inputs: Vec<&str> = used.further.iter().map(|further| further.channel.as_str()).collect();
         let verdict = verdict.append(data.display_finding(&inputs));
+        let verdict = with_answers(verdict, &trace_answers(&trace), &[]);
         let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
         let own = OwnSettings {
             trace: &trace,
