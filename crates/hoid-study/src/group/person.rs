@@ -18,6 +18,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::{
+    manifest_names::in_manifest,
     parameter_columns,
     person_channel::{self, PersonChannel},
     tables::{join_sentences, numbers, real_columns, schema, split_sentences, text_columns, texts},
@@ -105,7 +106,7 @@ impl Person {
             run: ALL_RUNS.to_owned(),
             runs: 0,
             status,
-            reason: reason.to_owned(),
+            reason: in_manifest(reason, condition),
             form: String::new(),
             forms: Vec::new(),
             parameters: Vec::new(),
@@ -147,7 +148,11 @@ impl Person {
             chi2: fit.lines.as_ref().map(|l| (l.chi_squared, l.degrees_of_freedom)),
             kappa: Some(fit.inflation),
             noise_order: Some(fit.noise_orders.1),
-            verdict: Some(found.verdict_of_record(record)),
+            verdict: Some(
+                found
+                    .verdict_of_record(record)
+                    .map_messages(|message| in_manifest(message, key.1)),
+            ),
             ..Self::without_operator(key, PersonStatus::Fitted, "")
         }
     }
