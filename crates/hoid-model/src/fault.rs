@@ -113,7 +113,7 @@ impl Fault {
     /// Returns advice on how to remove the fault by hand.
     pub fn remedy(&self) -> &'static str {
         match self.kind {
-            FaultKind::TimeUnit => "give t in s (divide a t in ms by 1000), or give the sampling frequency with --fs",
+            FaultKind::TimeUnit => "if t is in ms, add --time COLUMN:ms; or give the sampling frequency with --fs",
             FaultKind::Exchanged => "exchange them with --input and --output",
             FaultKind::Sign => "reverse the sign of one of them: --output=-u, or --input=-e",
             FaultKind::Step => "cut the record there with --from and --to, or use --faults cut",
