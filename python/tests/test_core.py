@@ -419,7 +419,7 @@ def test_units_of_columns_with_other_names(tmp_path: Path, c1: pyhoid.Record) ->
 def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:
     runs = [pyhoid.simulate("C1", seed=1, replication=k) for k in range(4)]
     found = pyhoid.describe(runs, controlled_element="90/(s(s+6))")
-    assert found.verdict == "trustworthy" and not found.reasons, found
+    assert found.verdict.level == "trustworthy" and not found.reasons, found
     assert found.excitation == "f_t" and abs(found.period - 81.92) < 1e-9
     by_hand = pyhoid.describing_function(runs, averaging="reference", reference="f_t")
     # Selected by hand: the lines of larger amplitude.
@@ -437,7 +437,7 @@ def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:
     pair = pyhoid.describe(runs, controlled_element=([90], [1, 6, 0]))
     assert pair.open_loop == found.open_loop and "trustworthy" in repr(pair)
     alone = pyhoid.describe(c1)
-    assert alone.verdict == "doubtful" and alone.open_loop is None
+    assert alone.verdict.level == "doubtful" and alone.open_loop is None
     with pytest.raises(pyhoid.OptionError, match="at character 5"):
         pyhoid.describe(runs, controlled_element="1/(s")
     with pytest.raises(pyhoid.OptionError, match="expected text"):
@@ -504,3 +504,26 @@ except AttributeError as error:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "module 'pyhoid' has no attribute 'nothing'"
+
+
+#: Calls with a whole number out of range, by the name of the argument.
+OUT_OF_RANGE: dict[str, Any] = {
+    "seed": lambda n: pyhoid.simulate("C1", seed=n),
+    "cell": lambda n: pyhoid.simulate("C1", cell=n),
+    "replication": lambda n: pyhoid.simulate("C1", replication=n),
+    "remnant_order": lambda n: pyhoid.simulate("C1", remnant_order=n),
+    "replications": lambda n: pyhoid.plan("noise-level", replications=n),
+    "subjects": lambda n: pyhoid.simulate_group("nowhere", subjects=n),
+    "runs": lambda n: pyhoid.simulate_people("nowhere", runs=n),
+    "jobs": lambda n: pyhoid.reproduce("nowhere", jobs=n),
+    "lines": lambda n: pyhoid.design("population", lines=n),
+    "decimate": lambda n: pyhoid.read("nowhere.csv", decimate=n),
+    "nk": lambda n: pyhoid.convert(f=(-1.91, 0.92), b=(0.044, -0.043), nk=n),
+}
+
+
+@pytest.mark.parametrize("name", OUT_OF_RANGE)
+@pytest.mark.parametrize("number", [-1, 2**64, 1.5])
+def test_a_whole_number_out_of_range_is_an_error_of_its_option(name: str, number: float) -> None:
+    with pytest.raises(pyhoid.OptionError, match=f"^{name} is {number}, expected a whole number"):
+        OUT_OF_RANGE[name](number)

@@ -130,7 +130,7 @@ def test_the_command_line_gives_the_same(
     expected = cli.json("identify", *files, "--controlled-element", "1/s")
     assert found.form == expected["form"] and list(found.verdict) == [
         expected["verdict"]["level"],
-        *(expected["verdict"][name] for name in ("reasons", "notes")),
+        *([one["message"] for one in expected["verdict"][name]] for name in ("reasons", "notes")),
     ]
     for p in expected["parameters"]:
         here = found.parameters[p["name"]]

@@ -6,10 +6,12 @@
 //! the crossover is requested, and not determined if the delay is requested. By default the response is requested, and
 //! an undetermined crossover or margin gives a warning.
 
-use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_undetermined, family::FamilyFit};
+use hoid_ident::{Fit, GreyBoxFit, MarginEstimates, SigmoidFit, diagnostics::is_undetermined, family::FamilyFit};
 use hoid_model::{
-    ContinuousTransferFunction, Finding, Severity, Verdict, operator_family::PARAMETERS, uncertainty::Estimate,
+    AnswerVerdict, ContinuousTransferFunction, Finding, Severity, Verdict, margins::MANUAL_CONTROL_RANGE_RAD_S,
+    numbers::Z_95, operator_family::PARAMETERS, uncertainty::Estimate,
 };
+use hoid_track::{NoCrossover, Trace};
 
 use crate::AnalysisError;
 
@@ -19,6 +21,10 @@ pub const RESPONSE_ANSWER: &str = "response";
 pub const LOOP_ANSWERS: [&str; 2] = ["crossover", "phase_margin"];
 /// Kind of the finding that an individual answer is undetermined.
 const UNDETERMINED_ANSWER_KIND: &str = "open-answer";
+/// Kinds of the findings about an individual answer, which do not affect the other answers.
+const KINDS_OF_ONE_ANSWER: [&str; 2] = [UNDETERMINED_ANSWER_KIND, "large-error"];
+/// Reason why a loop has neither crossover nor phase margin.
+const NO_CROSSING: &str = "the loop gain does not cross 1 from above";
 /// Largest standard errors at which the crossover (relative to its value) and the phase margin (in deg) count as
 /// determined.
 const MAX_ERRORS: [f64; 2] = [0.5, 30.0];
@@ -34,8 +40,8 @@ pub struct AnswerStatus {
 
 /// A fit that assesses each of its answers separately.
 pub trait Answers {
-    /// Returns all answers, for the given controlled element.
-    fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus>;
+    /// Returns all answers about the operator of a record, for the given controlled element.
+    fn answers(&self, record: usize, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus>;
 }
 
 /// Checks the names of the requested answers and returns them in their standard form.
@@ -63,8 +69,8 @@ pub fn requested_names(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     names.iter().map(one).collect()
 }
 
-/// Adds the findings on the requested answers to the verdict on the fit. By default the response is requested, and an
-/// undetermined crossover or margin adds a warning.
+/// Adds the findings on the requested answers to the verdict on the result, and judges each answer. By default the
+/// response is requested, and an undetermined crossover or margin adds a warning.
 pub fn with_answers(verdict: Verdict, answers: &[AnswerStatus], asked: &[String]) -> Verdict {
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
     let open: Vec<Finding> = if asked.is_empty() {
@@ -77,7 +83,10 @@ pub fn with_answers(verdict: Verdict, answers: &[AnswerStatus], asked: &[String]
             .filter(|_| !verdict.findings().iter().any(is_reported));
         let of_loop = wanted.filter_map(|name| of(name)?.open.clone());
         of_loop
-            .map(|finding| Finding::warning(UNDETERMINED_ANSWER_KIND, finding.message))
+            .map(|finding| Finding {
+                severity: Severity::Doubt,
+                ..finding
+            })
             .collect()
     } else {
         let wanted = asked.iter().filter_map(|name| match of(name) {
@@ -86,17 +95,17 @@ pub fn with_answers(verdict: Verdict, answers: &[AnswerStatus], asked: &[String]
         });
         wanted.collect()
     };
-    verdict.append(open)
+    judged(verdict.append(open), answers)
 }
 
-/// Returns the verdict on one answer: the findings on the fit as a whole and, if this answer is undetermined, the
-/// reason.
-pub fn answer_verdict(verdict: &Verdict, answer: &AnswerStatus) -> Verdict {
-    let whole = verdict
-        .findings()
-        .iter()
-        .filter(|finding| finding.kind != UNDETERMINED_ANSWER_KIND);
-    Verdict::of(whole.chain(&answer.open).cloned().collect())
+/// Returns the verdict with a verdict on each answer: the findings on the result as a whole and, if the answer is
+/// undetermined, the reason.
+pub fn judged(verdict: Verdict, answers: &[AnswerStatus]) -> Verdict {
+    let is_whole = |finding: &&Finding| !KINDS_OF_ONE_ANSWER.contains(&finding.kind);
+    let whole: Vec<Finding> = verdict.findings().iter().filter(is_whole).cloned().collect();
+    let of = |answer: &AnswerStatus| AnswerVerdict::of(whole.iter().chain(&answer.open).cloned());
+    let each = answers.iter().map(|answer| (answer.name.clone(), of(answer)));
+    verdict.with_answers(each)
 }
 
 fn undetermined_finding(message: String) -> Finding {
@@ -110,20 +119,19 @@ fn answer_status(name: &str, why: Option<String>) -> AnswerStatus {
     }
 }
 
-/// An estimate with its 95 % interval.
+/// An estimate with its 95 % interval; without an interval, that of a normal distribution applies.
 type MeasureWithInterval = (Estimate, Option<(f64, f64)>);
 
-/// Assesses the crossover and the phase margin of a loop. Each is given with its interval; `None` means that it does
+/// Assesses the crossover and the phase margin of a loop. Each is given with its interval, or with the reason why it does
 /// not exist.
-fn loop_answers(measures: [Option<MeasureWithInterval>; 2]) -> impl Iterator<Item = AnswerStatus> {
+fn loop_answers(measures: [Result<MeasureWithInterval, &str>; 2]) -> impl Iterator<Item = AnswerStatus> {
     let words = ["the crossover", "the phase margin"];
     (0..2).map(move |k| {
         let why = match measures[k] {
-            None => Some(format!(
-                "{} is not determined: the loop gain does not cross 1 from above",
-                words[k]
-            )),
-            Some((value, interval)) => {
+            Err(reason) => Some(format!("{} is not determined: {reason}", words[k])),
+            Ok((value, interval)) => {
+                let normal = value.standard_error.map(|s| Z_95 * s);
+                let interval = interval.or(normal.map(|half| (value.value - half, value.value + half)));
                 let scale = if k == 0 { value.value } else { 1.0 };
                 let wide = value.standard_error.is_none_or(|s| s > MAX_ERRORS[k] * scale);
                 let zero = k == 0 && interval.is_some_and(|(low, _)| low <= 0.0);
@@ -137,17 +145,23 @@ fn loop_answers(measures: [Option<MeasureWithInterval>; 2]) -> impl Iterator<Ite
     })
 }
 
+/// Judges the crossover and the phase margin, which have normal intervals.
+fn margin_answers(margins: &MarginEstimates) -> impl Iterator<Item = AnswerStatus> {
+    let of = |estimate: Option<Estimate>| estimate.map(|e| (e, None)).ok_or(NO_CROSSING);
+    loop_answers([of(margins.crossover_rad_s), of(margins.phase_margin_deg)])
+}
+
 impl Answers for FamilyFit {
-    fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+    fn answers(&self, record: usize, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
         let mut all = vec![answer_status(RESPONSE_ANSWER, None)];
         if let Some(element) = element {
-            let found = self.loop_measures(0, element);
+            let found = self.loop_measures(record, element).ok_or(NO_CROSSING);
             all.extend(loop_answers([
                 found.map(|m| (m.crossover_rad_s, m.crossover_interval)),
                 found.map(|m| (m.phase_margin_deg, m.phase_margin_interval)),
             ]));
         }
-        all.extend(self.operator(0).parameters.iter().map(|p| {
+        all.extend(self.operator(record).parameters.iter().map(|p| {
             let why = match (p.determined, p.prior_share > 0.5) {
                 (true, _) => None,
                 (false, true) => Some(format!("{} is determined by the prior alone", p.name)),
@@ -160,20 +174,61 @@ impl Answers for FamilyFit {
 }
 
 impl Answers for GreyBoxFit {
-    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
-        operator_answers(self.polynomial_fit(0))
+    fn answers(&self, record: usize, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+        operator_answers(self.polynomial_fit(record), element)
     }
 }
 
 impl Answers for SigmoidFit {
-    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+    fn answers(&self, _record: usize, _element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
         vec![answer_status(RESPONSE_ANSWER, None)]
     }
 }
 
-/// Returns the answers of a polynomial fit: the response, and the parameters of the operator that it represents.
-pub(crate) fn operator_answers(fit: &Fit) -> Vec<AnswerStatus> {
+/// Returns the answers of a describing function: the response, and with a controlled element the loop.
+pub(crate) fn description_answers(margins: Option<&MarginEstimates>) -> Vec<AnswerStatus> {
+    let response = answer_status(RESPONSE_ANSWER, None);
+    let of_loop = margins.into_iter().flat_map(margin_answers);
+    std::iter::once(response).chain(of_loop).collect()
+}
+
+/// Returns the answers of a trace, which refer to its last row: the response, with a controlled element the loop, and
+/// the estimated parameters of the operator.
+pub(crate) fn trace_answers(trace: &Trace) -> Vec<AnswerStatus> {
     let mut all = vec![answer_status(RESPONSE_ANSWER, None)];
+    let Some(row) = trace.len().checked_sub(1) else {
+        return all;
+    };
+    if let Some(found) = trace.open_loop(row) {
+        let found = found.map_err(NoCrossover::as_text);
+        all.extend(loop_answers([
+            found.map(|f| (f.crossover_rad_s, None)),
+            found.map(|f| (f.phase_margin_deg, None)),
+        ]));
+    }
+    let judged = trace.operator(row).map(|operator| trace.determinations(&operator));
+    all.extend(judged.into_iter().flatten().map(|(name, yes)| {
+        let why = (!yes).then(|| format!("{name} at the end is not determined by the record"));
+        answer_status(name, why)
+    }));
+    all
+}
+
+/// Returns crossover and margins of a polynomial model in the frequency range of manual control, limited to half the
+/// sampling frequency: the sampled model contains no information above it.
+pub fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
+    let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
+    let high = high.min(fit.model().sample_time().nyquist_rad_s());
+    fit.margins(|omega| element.response(omega), (low, high))
+}
+
+/// Returns the answers of a polynomial fit: the response, with a controlled element the loop, and the parameters of the
+/// operator that the model represents.
+pub(crate) fn operator_answers(fit: &Fit, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+    let margins = element
+        .filter(|_| fit.model().structure().has_input())
+        .map(|element| loop_margins(fit, element));
+    let mut all = description_answers(margins.as_ref());
     if let Ok(operator) = fit.operator() {
         all.extend(operator.rows().iter().map(|(name, _, estimate)| {
             let why = is_undetermined(estimate)
@@ -207,8 +262,10 @@ mod tests {
         // A finding against the whole result affects each answer; an undetermined answer affects only itself.
         let whole = Verdict::of(vec![Finding::warning("leverage", "few samples")]);
         let asked = with_answers(whole, &answers, &["tau_e".to_owned()]);
-        assert_eq!(answer_verdict(&asked, &answers[0]).level, VerdictLevel::Doubtful);
-        assert_eq!(answer_verdict(&asked, &answers[1]).level, VerdictLevel::NotDetermined);
+        assert_eq!(asked.answers[RESPONSE_ANSWER].level, VerdictLevel::Doubtful);
+        assert_eq!(asked.answers[RESPONSE_ANSWER].reasons.len(), 1);
+        assert_eq!(asked.answers["tau_e"].level, VerdictLevel::NotDetermined);
+        assert_eq!(asked.answers["tau_e"].reasons[0].kind, UNDETERMINED_ANSWER_KIND);
     }
 
     #[test]
@@ -236,7 +293,7 @@ mod tests {
         let of = |value: f64, s: f64| {
             let one = Estimate::with_variance(value, s * s);
             let interval = Some((value - 2.0 * s, value + 2.0 * s));
-            let all: Vec<AnswerStatus> = loop_answers([Some((one, interval)), None]).collect();
+            let all: Vec<AnswerStatus> = loop_answers([Ok((one, interval)), Err("there is none")]).collect();
             (all[0].open.is_some(), all[1].open.is_some())
         };
         assert_eq!(of(3.0, 0.1), (false, true));

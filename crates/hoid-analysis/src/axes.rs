@@ -256,11 +256,7 @@ pub fn axes_json(all: &[Axis]) -> Result<Map<String, Value>, AnalysisError> {
     };
     let axis = |axis: &Axis| {
         let mut result = axis.identified.json()?;
-        result.insert("verdict".to_owned(), {
-            let mut verdict = json::verdict(&axis.verdict());
-            verdict["of"] = Value::Object(json::answers(&axis.identified.answers()));
-            verdict
-        });
+        result.insert("verdict".to_owned(), json::verdict(&axis.verdict()));
         Ok::<_, AnalysisError>(json!({
             "input": axis.pair.input,
             "output": axis.pair.output,

@@ -10,12 +10,20 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
+use hoid_ident::{
+    MarginEstimates,
+    frequency::{DescribingMargins, Description, DescriptionOptions, describe_runs},
+};
 use hoid_io::Offset;
 use hoid_model::{Decimation, FaultHandling};
 
 use crate::{
-    AnalysisError, offset::output_delay_samples, quality::SystemKind, reading::Reading, recordings::Recordings,
+    AnalysisError,
+    answers::{description_answers, judged},
+    offset::output_delay_samples,
+    quality::SystemKind,
+    reading::Reading,
+    recordings::Recordings,
     settings::Setting,
 };
 
@@ -44,6 +52,23 @@ pub struct DescribingFunctionResult {
     pub settings: Vec<Setting>,
 }
 
+/// Returns crossover and margins with the controlled element; `None` if the controlled element is unknown.
+fn described_margins(margins: Option<&DescribingMargins>) -> Option<MarginEstimates> {
+    margins.map(|m| MarginEstimates {
+        crossover_rad_s: m.crossover_rad_s,
+        phase_margin_deg: m.phase_margin_deg,
+        gain_margin_db: m.gain_margin_db,
+        phase_crossover_rad_s: m.phase_crossover_rad_s,
+    })
+}
+
+impl DescribingFunctionResult {
+    /// Returns crossover and margins with the controlled element; `None` if the controlled element is unknown.
+    pub fn margins(&self) -> Option<MarginEstimates> {
+        described_margins(self.found.margins.as_ref())
+    }
+}
+
 impl DescribingFunctionOptions {
     /// Repairs and decimates the recordings, estimates their describing function and forms the verdict.
     ///
@@ -62,9 +87,11 @@ impl DescribingFunctionOptions {
         };
         let mut found = describe_runs(&data.records, &options)?;
         let (element, channel) = (options.controlled_element.as_ref(), options.excitation.as_deref());
+        let margins = described_margins(found.margins.as_ref());
         let verdict = data.with_findings(found.verdict);
         let verdict = verdict.append(data.element_finding(element, channel));
-        found.verdict = verdict.append(data.display_finding(&[]));
+        let verdict = verdict.append(data.display_finding(&[]));
+        found.verdict = judged(verdict, &description_answers(margins.as_ref()));
         let settings = self.settings(&data, late, &found);
         Ok(DescribingFunctionResult { found, data, settings })
     }

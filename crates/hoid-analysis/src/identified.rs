@@ -16,7 +16,7 @@ use serde_json::{Map, Value};
 
 use crate::{
     AnalysisError,
-    answers::{self, AnswerStatus, Answers, answer_verdict},
+    answers::{self, Answers},
     description::Excitation,
     estimators::{BatchEstimator, FittedModel},
     identification::Identification,
@@ -100,7 +100,8 @@ impl<E: BatchEstimator> Identification<E> {
             .flatten();
         let verdict = verdict.prepend(response.and_then(|found| found.finding()));
         let verdict = verdict.append(element).append(displayed);
-        let verdict = answers::with_answers(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
+        let all = fit.answers(0, self.controlled_element.as_ref());
+        let verdict = answers::with_answers(verdict, &all, &self.answers);
         E::set_verdict(&mut fit, &verdict);
         let reading = data.source.as_ref().map(|source| &source.reading);
         let by_default = Identification::of(self.estimator.with_defaults());
@@ -152,14 +153,11 @@ fn with_reason(error: AnalysisError, records: &[Record]) -> AnalysisError {
 }
 
 impl<F: Answers> IdentifiedModel<F> {
-    /// Returns the verdict on each answer.
-    pub fn answers(&self) -> Vec<(String, Verdict)> {
-        let all = self.fit.answers(self.controlled_element.as_ref());
-        let one = |answer: AnswerStatus| (answer_verdict(&self.verdict, &answer), answer.name);
-        all.into_iter()
-            .map(one)
-            .map(|(verdict, name)| (name, verdict))
-            .collect()
+    /// Returns the verdict with the answers about the operator of a record; [`IdentifiedModel::verdict`] contains those
+    /// of the first record.
+    pub fn verdict_of_record(&self, record: usize) -> Verdict {
+        let all = self.fit.answers(record, self.controlled_element.as_ref());
+        answers::judged(self.verdict.clone(), &all)
     }
 }
 

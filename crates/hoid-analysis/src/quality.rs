@@ -38,18 +38,18 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: System
     let mut all = Vec::new();
     let issues = |kind: QualityIssueKind| account.quality_issues.iter().filter(move |issue| issue.kind == kind);
     let output = record.output_channel().name.as_str();
-    let at_ends: f64 = issues(QualityIssueKind::Saturated)
-        .filter(|issue| issue.channel == output)
-        .map(|issue| issue.share)
-        .sum();
-    if at_ends > MAX_SATURATED_SHARE {
-        all.push(Finding::warning(
+    let at_ends = || issues(QualityIssueKind::Saturated).filter(|issue| issue.channel == output);
+    let share: f64 = at_ends().map(|issue| issue.share).sum();
+    if share > MAX_SATURATED_SHARE {
+        let finding = Finding::warning(
             "stick-at-its-end",
             format!(
                 "{output} is saturated in {:.0} % of the samples: gain and margins are biased",
-                100.0 * at_ends
+                100.0 * share
             ),
-        ));
+        );
+        let spans = at_ends().flat_map(|issue| &issue.row_spans);
+        all.push(finding.over_spans(spans.filter_map(|span| span.from_s.zip(span.to_s))));
     }
     if let Some(rest) = StickRest::of(record.output()).filter(|_| of == SystemKind::Person) {
         all.push(Finding::note(

@@ -1,7 +1,7 @@
 //! Detection and repair of faults of recordings, before all other processing.
 
 use hoid_ident::faults::{MAX_SAMPLE_TIME_S, repair};
-use hoid_model::{FaultHandling, Finding, ModelError, Record};
+use hoid_model::{FaultHandling, Finding, ModelError, Record, Severity};
 
 use crate::{
     AnalysisError,
@@ -40,7 +40,10 @@ impl Recordings {
             if steps || (of == SystemKind::System && record.sample_time().s() > MAX_SAMPLE_TIME_S) {
                 // Faults found in data with step inputs, or in data of slow systems such as a furnace, are typical and
                 // become notes.
-                let note = |finding: Finding| Finding::note(finding.kind, finding.message);
+                let note = |finding: Finding| Finding {
+                    severity: Severity::Note,
+                    ..finding
+                };
                 found.findings = found.findings.into_iter().map(note).collect();
             }
             let whole = found.segments.len() == 1 && found.segments[0].len() == record.len();

@@ -208,7 +208,7 @@ fn unrelated_control_exits_with_one() {
     assert_eq!(output.status.code(), Some(1));
     assert_eq!(found["verdict"]["level"], "not determined");
     assert!(
-        found["verdict"]["reasons"][0]
+        found["verdict"]["reasons"][0]["message"]
             .as_str()
             .unwrap()
             .contains("does not follow the excitation")

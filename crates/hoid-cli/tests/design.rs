@@ -177,7 +177,7 @@ fn group_design_has_a_typical_and_a_worst_person() {
     assert_eq!(found["people"].as_array().unwrap().len(), 3);
     // D has no stable loop with this element.
     assert!(
-        found["verdict"]["reasons"][0]
+        found["verdict"]["reasons"][0]["message"]
             .as_str()
             .unwrap()
             .starts_with("D is left out"),

@@ -275,7 +275,7 @@ fn jump_of_delay_or_operator_is_reported() {
         let found = identify(d, how);
         let findings = found["verdict"]["findings"].as_array().unwrap().clone();
         let mut words = findings.iter().filter(|f| f["kind"] == "not-constant");
-        words.next().map(|f| f["words"].as_str().unwrap().to_owned())
+        words.next().map(|f| f["message"].as_str().unwrap().to_owned())
     };
     let fits: [&[&str]; 3] = [&BOX_JENKINS_OPTIONS, &["--remnant-order", "1"], &["--form", "lead"]];
     let n = run.len();

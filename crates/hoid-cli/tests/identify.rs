@@ -486,11 +486,8 @@ fn noise_free_simulation_gives_the_exact_operator() {
             let value = found["operator"][name]["value"].as_f64().unwrap();
             assert!((value / expected - 1.0).abs() < 1e-9, "{condition} {name}: {value}");
         }
-        let findings = verdict["findings"]
-            .as_array()
-            .or(verdict["reasons"].as_array())
-            .unwrap();
-        assert!(findings.iter().any(|r| r["kind"] == "no-noise"), "{verdict}");
+        let notes = verdict["notes"].as_array().unwrap();
+        assert!(notes.iter().any(|note| note["kind"] == "no-noise"), "{verdict}");
         let weights: Vec<f64> = (found["forms"].as_array().unwrap().iter())
             .filter_map(|form| form["weight"].as_f64().filter(|w| *w > 0.0))
             .collect();

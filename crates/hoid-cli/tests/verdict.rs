@@ -171,7 +171,9 @@ fn trace_includes_the_findings_of_its_start() {
     assert_eq!(rls["verdict"]["level"], "doubtful");
     let reasons = rls["verdict"]["reasons"].as_array().unwrap();
     assert!(
-        reasons.iter().any(|r| r.as_str().unwrap().starts_with("start fit: ")),
+        reasons
+            .iter()
+            .any(|r| r["message"].as_str().unwrap().starts_with("start fit: ")),
         "{reasons:?}"
     );
     assert!(rls["start"]["verdict"]["level"].is_string());
@@ -246,5 +248,92 @@ fn wrong_controlled_element_is_doubtful_in_every_command() {
             message.starts_with("the recorded element is 90/(s^2 + 6s), not 45/(s^2 + 6s)"),
             "{command:?}: {message}"
         );
+    }
+}
+
+/// Checks that a verdict has the shape of the interface: reasons as objects, and a verdict on each of these answers.
+fn check_shape(verdict: &Value, answers: &[&str], of: &str) {
+    let check = |found: &Value, lists: &[&str]| {
+        assert!(found["level"].is_string(), "{of}: {found}");
+        for one in lists.iter().flat_map(|list| found[list].as_array().unwrap()) {
+            let keys: Vec<&String> = one.as_object().unwrap().keys().collect();
+            assert_eq!(keys, ["kind", "severity", "message", "from", "to"], "{of}: {one}");
+            assert!(!one["kind"].as_str().unwrap().is_empty(), "{of}: {one}");
+            assert_eq!(one["from"].is_number(), one["to"].is_number(), "{of}: {one}");
+        }
+    };
+    check(verdict, &["reasons", "notes"]);
+    for answer in answers {
+        check(&verdict["of"][answer], &["reasons"]);
+    }
+    // A reason against the whole result is a reason against each answer.
+    let level = &verdict["of"]["response"]["level"];
+    assert!(*level == verdict["level"] || *level == "trustworthy", "{of}: {verdict}");
+}
+
+/// Writes the run with a sensor of e that freezes from 40 to 46 s.
+fn freeze_error(directory: &Path) {
+    let text = fs::read_to_string(directory.join("c.csv")).unwrap();
+    let mut column = None;
+    let mut held = String::new();
+    let line = |line: &str| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        let Some(e) = column.or_else(|| cells.iter().position(|cell| *cell == "e")) else {
+            return format!("{line}\n");
+        };
+        match cells[0].parse::<f64>() {
+            Ok(t) if (40.0..46.0).contains(&t) => cells[e] = &held,
+            _ => cells[e].clone_into(&mut held),
+        }
+        column = Some(e);
+        format!("{}\n", cells.join(","))
+    };
+    let frozen: String = text.lines().map(line).collect();
+    fs::write(directory.join("frozen.csv"), frozen).unwrap();
+}
+
+#[test]
+fn every_result_has_reasons_with_kinds_and_a_verdict_on_each_answer() {
+    let directory = simulated_run("C1");
+    let d = directory.path();
+    freeze_error(d);
+    let of_loop = ["response", "crossover", "phase_margin", "K_e", "tau_e"];
+    let commands: [(&[&str], &[&str]); 5] = [
+        (&["identify", "frozen.csv"], &of_loop),
+        (
+            &[
+                "identify",
+                "frozen.csv",
+                "--structure",
+                "bj",
+                "--nk",
+                "29",
+                "--orders",
+                "nd=1",
+            ],
+            &of_loop[..4],
+        ),
+        (
+            &["identify", "frozen.csv", "--noise", "remnant", "--remnant-order", "1"],
+            &of_loop,
+        ),
+        (&["describe", "frozen.csv", "--excitation", "f_t"], &of_loop[..3]),
+        (&["track", "frozen.csv"], &of_loop),
+    ];
+    for (command, answers) in commands {
+        let element: &[&str] = &["--controlled-element", "90/(s(s+6))", "--json"];
+        let faults: &[&str] = if command[0] == "track" {
+            &[]
+        } else {
+            &["--faults", "report"]
+        };
+        let found = json(d, &[command, element, faults].concat());
+        let verdict = &found["verdict"];
+        check_shape(verdict, answers, &command.join(" "));
+        let spans: Vec<[f64; 2]> = (verdict["reasons"].as_array().unwrap().iter())
+            .filter_map(|reason| Some([reason["from"].as_f64()?, reason["to"].as_f64()?]))
+            .collect();
+        let is_meant = |span: &[f64; 2]| (span[0] - 40.0).abs() < 1.5 && (span[1] - 46.0).abs() < 1.5;
+        assert!(spans.iter().any(is_meant), "{command:?}: {verdict}");
     }
 }

@@ -590,3 +590,23 @@ fn second_table_is_named_with_its_line() {
     let message = desk.error(format!("{rows}MSG\n7.04,1,2\n7.06,1,2\n"), &default_options());
     assert!(message.contains("1 values, expected 3"), "{message}");
 }
+
+#[test]
+fn unit_inferred_from_steps_is_reported_with_its_remedy() {
+    let whole = |k: i64| (10 * k).to_string();
+    let count = record_with("t", whole, None).unwrap();
+    assert_eq!(count.record.sample_time().s(), 0.01);
+    let note = "t is in s, from ms, since its integers advance by 10; if they are in s, add --time t:s";
+    assert_eq!(count.notes, [note]);
+    // With the named remedy, with decimals, and in steps of whole minutes, the times are in s.
+    let slow: [(&dyn Fn(i64) -> String, Option<&str>, f64); 3] = [
+        (&whole, Some("t:s"), 10.0),
+        (&|k| format!("{:.1}", 5.0 * k as f64), None, 5.0),
+        (&|k| (900 * k).to_string(), None, 900.0),
+    ];
+    for (time, choice, sample_time_s) in slow {
+        let found = record_with("t", time, choice).unwrap();
+        assert_eq!(found.record.sample_time().s(), sample_time_s);
+        assert!(found.notes.is_empty(), "{:?}", found.notes);
+    }
+}

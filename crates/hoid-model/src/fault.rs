@@ -113,7 +113,7 @@ impl Fault {
     /// Returns advice on how to remove the fault by hand.
     pub fn remedy(&self) -> &'static str {
         match self.kind {
-            FaultKind::TimeUnit => "give t in s (divide a t in ms by 1000), or give the sampling frequency with --fs",
+            FaultKind::TimeUnit => "if t is in ms, add --time COLUMN:ms; or give the sampling frequency with --fs",
             FaultKind::Exchanged => "exchange them with --input and --output",
             FaultKind::Sign => "reverse the sign of one of them: --output=-u, or --input=-e",
             FaultKind::Step => "cut the record there with --from and --to, or use --faults cut",
@@ -212,12 +212,13 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
                 words.push(format!("and {} more of this kind", of.len() - MAX_LISTED_FAULTS));
             }
             let words = words.join("; ");
-            all.push(match (left, kind) {
+            let finding = match (left, kind) {
                 (false, _) => Finding::note("faults", words),
                 // If the unit of time is wrong, no parameter is valid.
                 (true, FaultKind::TimeUnit) => Finding::undetermined("faults", words),
                 (true, _) => Finding::warning("faults", words),
-            });
+            };
+            all.push(finding.over_spans(of.iter().map(|fault| (fault.from_s, fault.to_s))));
         }
     }
     let repaired: usize = faults

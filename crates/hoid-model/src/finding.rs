@@ -12,17 +12,27 @@
 //! | [`Severity::Undetermined`] | not determined |
 //!
 //! A new test affects the verdict only through the findings that it adds.
+//!
+//! A result has several answers, such as the response or a parameter. The verdict contains the [`AnswerVerdict`] of
+//! each: a finding about the whole result affects all answers; in addition, an answer has findings of its own.
 
-use std::fmt;
+use std::{collections::BTreeMap, fmt};
+
+mod written;
 
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+// The aliases are the names in earlier files.
 pub enum Severity {
     /// The finding is information; the result remains valid.
+    #[serde(alias = "Note")]
     Note,
     /// The result may be wrong.
+    #[serde(alias = "Doubt")]
     Doubt,
     /// The data do not determine the requested quantity.
+    #[serde(alias = "Undetermined")]
     Undetermined,
 }
 
@@ -34,15 +44,20 @@ crate::named_choice!(Severity, "severity", 3, {
 
 /// One observation about a result.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(from = "written::WrittenFinding")]
 pub struct Finding {
     /// Kind of the observation, as a name for programs, such as `not-converged` or `delay-at-bound`.
-    #[serde(deserialize_with = "crate::static_names::name")]
     pub kind: crate::static_names::Name,
     /// Severity of the observation.
     pub severity: Severity,
     /// Observation as a sentence with its numbers, without a full stop.
-    #[serde(rename = "words")]
     pub message: String,
+    /// Start of the span of the record to which the observation refers, s; `None` if it refers to no span.
+    #[serde(rename = "from")]
+    pub from_s: Option<f64>,
+    /// End of this span, s.
+    #[serde(rename = "to")]
+    pub to_s: Option<f64>,
 }
 
 impl Finding {
@@ -66,7 +81,34 @@ impl Finding {
             kind,
             severity,
             message: message.into(),
+            from_s: None,
+            to_s: None,
         }
+    }
+
+    /// Returns the finding with the span of the record to which it refers, in s.
+    #[must_use]
+    pub fn over(self, from_s: f64, to_s: f64) -> Self {
+        Self {
+            from_s: Some(from_s),
+            to_s: Some(to_s),
+            ..self
+        }
+    }
+
+    /// Returns the finding with the span from the start of the first to the end of the last of these spans, in s.
+    #[must_use]
+    pub fn over_spans(self, spans: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        let hull = |(low, high): (f64, f64), (from, to): (f64, f64)| (low.min(from), high.max(to));
+        match spans.into_iter().reduce(hull) {
+            Some((from_s, to_s)) => self.over(from_s, to_s),
+            None => self,
+        }
+    }
+
+    /// True if the finding is against the result, i.e. not a note.
+    pub fn is_reason(&self) -> bool {
+        self.severity > Severity::Note
     }
 }
 
@@ -74,10 +116,13 @@ impl Finding {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum VerdictLevel {
     /// There is no evidence against the result.
+    #[serde(rename = "trustworthy", alias = "Trustworthy")]
     Trustworthy,
     /// There is evidence against the result; the findings describe it.
+    #[serde(rename = "doubtful", alias = "Doubtful")]
     Doubtful,
     /// The data do not determine the result.
+    #[serde(rename = "not determined", alias = "NotDetermined")]
     NotDetermined,
 }
 
@@ -87,12 +132,38 @@ crate::named_choice!(VerdictLevel, "verdict", 3, {
     NotDetermined => "not determined",
 });
 
-/// Reliability of a result, with the findings that determine it, in descending order of severity.
+/// Reliability of one answer of a result.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct AnswerVerdict {
+    /// Level of the answer.
+    pub level: VerdictLevel,
+    /// Findings against the answer, in descending order of severity.
+    pub reasons: Vec<Finding>,
+}
+
+impl AnswerVerdict {
+    /// Returns the verdict that follows from the findings, of which the notes are omitted.
+    pub fn of(findings: impl IntoIterator<Item = Finding>) -> Self {
+        let reasons = findings.into_iter().filter(Finding::is_reason).collect();
+        let Verdict { level, findings, .. } = Verdict::of(reasons);
+        Self {
+            level,
+            reasons: findings,
+        }
+    }
+}
+
+/// Reliability of a result, with the findings that determine it, in descending order of severity.
+///
+/// Its serialised form is the `verdict` in the JSON of results: level, reasons, notes, and the verdict on each answer.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(into = "written::WrittenVerdict", from = "written::WrittenVerdict")]
 pub struct Verdict {
     /// Level of the verdict.
     pub level: VerdictLevel,
     findings: Vec<Finding>,
+    /// Verdict on each answer, with the name of the answer as key; empty for a result without separate answers.
+    pub answers: BTreeMap<String, AnswerVerdict>,
 }
 
 impl Verdict {
@@ -104,17 +175,51 @@ impl Verdict {
             Some(Severity::Doubt) => VerdictLevel::Doubtful,
             Some(Severity::Undetermined) => VerdictLevel::NotDetermined,
         };
-        Self { level, findings }
+        Self {
+            level,
+            findings,
+            answers: BTreeMap::new(),
+        }
     }
 
-    /// Returns the verdict with further findings appended.
+    /// Returns the verdict with a verdict on each answer.
+    #[must_use]
+    pub fn with_answers(self, answers: impl IntoIterator<Item = (String, AnswerVerdict)>) -> Self {
+        Self {
+            answers: answers.into_iter().collect(),
+            ..self
+        }
+    }
+
+    /// Returns the verdict with further findings appended; they affect each answer.
     pub fn append(self, more: impl IntoIterator<Item = Finding>) -> Self {
-        Self::of(self.findings.into_iter().chain(more).collect())
+        let more: Vec<Finding> = more.into_iter().collect();
+        let with = |answer: AnswerVerdict| AnswerVerdict::of(answer.reasons.into_iter().chain(more.iter().cloned()));
+        let answers = self.answers.into_iter().map(|(name, answer)| (name, with(answer)));
+        let answers = answers.collect();
+        Self {
+            answers,
+            ..Self::of(self.findings.into_iter().chain(more).collect())
+        }
     }
 
     /// Returns the verdict with further findings, which may be the cause of the present findings, inserted before them.
+    /// The answers are judged afterwards, so they are not affected.
     pub fn prepend(self, first: impl IntoIterator<Item = Finding>) -> Self {
-        Self::of(first.into_iter().chain(self.findings).collect())
+        Self {
+            answers: self.answers,
+            ..Self::of(first.into_iter().chain(self.findings).collect())
+        }
+    }
+
+    /// Returns the verdict with other messages, such as messages for another interface.
+    #[must_use]
+    pub fn map_messages(mut self, message: impl Fn(&str) -> String) -> Self {
+        let of_answers = self.answers.values_mut().flat_map(|answer| &mut answer.reasons);
+        for finding in self.findings.iter_mut().chain(of_answers) {
+            finding.message = message(&finding.message);
+        }
+        self
     }
 
     /// Returns all findings in descending order of severity.
@@ -124,19 +229,17 @@ impl Verdict {
 
     /// Returns the findings against the result, which are all findings except notes.
     pub fn reasons(&self) -> impl Iterator<Item = &str> {
-        let weighs = |finding: &&Finding| finding.severity > Severity::Note;
         self.findings
             .iter()
-            .filter(weighs)
+            .filter(|finding| finding.is_reason())
             .map(|finding| finding.message.as_str())
     }
 
     /// Returns the notes.
     pub fn notes(&self) -> impl Iterator<Item = &str> {
-        let light = |finding: &&Finding| finding.severity == Severity::Note;
         self.findings
             .iter()
-            .filter(light)
+            .filter(|finding| !finding.is_reason())
             .map(|finding| finding.message.as_str())
     }
 }

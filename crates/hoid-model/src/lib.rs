@@ -59,7 +59,7 @@
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n for a given noise level |
 //! | [`GainUnit`] | units of gains, derived from the units of the channels |
-//! | [`Finding`], [`Verdict`] | observations about a result, and its reliability |
+//! | [`Finding`], [`Verdict`], [`AnswerVerdict`] | observations about a result, and its reliability |
 //! | [`named_choice!`], [`NamedChoice`] | the names that users type |
 
 mod error;
@@ -80,6 +80,7 @@ pub mod margins;
 pub mod numbers;
 pub mod operator;
 pub mod operator_family;
+pub mod option_names;
 pub mod polynomial;
 pub mod polynomial_model;
 pub mod record;
@@ -102,7 +103,7 @@ pub use error::{ModelError, NotConvertible};
 pub use family_scenario::{FamilyScenario, FamilyState};
 pub use fault::{Fault, FaultAction, FaultHandling, FaultKind, MAX_REPAIRED_SHARE, fault_findings};
 pub use feedforward::Feedforward;
-pub use finding::{Finding, Severity, Verdict, VerdictLevel};
+pub use finding::{AnswerVerdict, Finding, Severity, Verdict, VerdictLevel};
 pub use gain_unit::GainUnit;
 pub use named_choice::{NamedChoice, UnknownName};
 pub use num_complex::Complex64;

@@ -14,7 +14,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, ValueWithError, VerdictParts, error_or_nan, value_and_error, verdict},
+    figures::{self, ValueWithError, error_or_nan, value_and_error, verdict},
     files, names,
 };
 
@@ -134,7 +134,7 @@ impl PyDescription {
 
     /// Returns the verdict: level, reasons and notes.
     #[getter]
-    fn verdict(&self) -> VerdictParts {
+    fn verdict(&self) -> String {
         verdict(&self.0.found.verdict)
     }
 

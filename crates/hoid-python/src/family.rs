@@ -13,7 +13,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, ValueWithError, VerdictParts, response_columns, value_and_error, verdict},
+    figures::{self, ValueWithError, response_columns, value_and_error, verdict},
     fit::PyFit,
 };
 
@@ -156,7 +156,7 @@ impl PyOperatorFit {
     }
 
     #[getter]
-    fn verdict(&self) -> VerdictParts {
+    fn verdict(&self) -> String {
         verdict(&self.0.fit.verdict)
     }
 

@@ -38,12 +38,9 @@ pub fn error_or_nan(e: Estimate) -> f64 {
     e.standard_error.unwrap_or(f64::NAN)
 }
 
-/// Level, reasons and notes of a verdict.
-pub type VerdictParts = (&'static str, Vec<String>, Vec<String>);
-
-pub fn verdict(v: &Verdict) -> VerdictParts {
-    let reasons = v.reasons().map(str::to_owned).collect();
-    (v.level.name(), reasons, v.notes().map(str::to_owned).collect())
+/// Returns the verdict as in the JSON of results, from which the package builds `pyhoid.Verdict`.
+pub fn verdict(v: &Verdict) -> String {
+    hoid_analysis::json::verdict(v).to_string()
 }
 
 /// Converts the termination of a search to a dictionary.

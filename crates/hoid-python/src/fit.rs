@@ -17,7 +17,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::{DataError, Outcome},
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, ValueWithError, VerdictParts, value_and_error},
+    figures::{self, ValueWithError, value_and_error},
     names,
 };
 
@@ -324,7 +324,7 @@ impl PyFit {
 
     /// Returns the verdict on the fit; if the fit is a part of another result, the verdict is based on these records
     /// only.
-    fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
+    fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<String> {
         if let Some(whole) = &self.full_result {
             return Ok(each!(whole, found => figures::verdict(&found.verdict)));
         }

@@ -9,7 +9,7 @@ use crate::{
     arrays::{self, ChannelSelection, array, matrix},
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, ValueWithError, VerdictParts, error_or_nan, value_and_error},
+    figures::{self, ValueWithError, error_or_nan, value_and_error},
 };
 
 /// Fit of an operator whose gains change once; the package wraps it in `pyhoid.TimeVaryingFit`.
@@ -177,7 +177,7 @@ impl PyTimeVaryingFit {
     }
 
     #[getter]
-    fn verdict(&self) -> VerdictParts {
+    fn verdict(&self) -> String {
         figures::verdict(&self.0.verdict)
     }
 

@@ -185,7 +185,7 @@ impl PyTrace {
 
     /// Returns the verdict on the trace.
     #[getter]
-    fn verdict(&self) -> figures::VerdictParts {
+    fn verdict(&self) -> String {
         figures::verdict(&self.0.verdict)
     }
 

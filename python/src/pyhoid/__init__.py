@@ -50,7 +50,7 @@ from .time_varying import TimeVaryingFit
 from .trace import Trace
 from .tracker import Tracker
 from .tracking import track
-from .verdict import Verdict
+from .verdict import Reason, Verdict
 
 if TYPE_CHECKING:
     from . import dask as dask
@@ -79,6 +79,7 @@ __all__ = [
     "OperatorParameter",
     "OptionError",
     "Plan",
+    "Reason",
     "Record",
     "Remnant",
     "Reproduction",

@@ -23,7 +23,7 @@ class JsonResult:
         self._read(json.loads(text))
 
     def _read(self, found: dict[str, Any]) -> None:
-        self.verdict = Verdict(*(found["verdict"][key] for key in ("level", "reasons", "notes")))
+        self.verdict = Verdict._read(found["verdict"])
         self.settings = {s["name"]: s["value"] for s in found["settings"]}
 
     def __eq__(self, other: object) -> bool:

@@ -15,6 +15,7 @@ from ._pickling import Call, restore, state_of
 from .errors import OptionError
 from .estimates import Estimate, estimates
 from .record import Record
+from .verdict import Reason, Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -229,7 +230,7 @@ def describing_function(
     return DescribingFunction(
         _pyhoid.describing_function(
             several,
-            harmonics=None if harmonics is None else [int(h) for h in harmonics],
+            harmonics=None if harmonics is None else [_options.whole("harmonics", h, 1) for h in harmonics],
             omega=None if omega is None else [float(w) for w in omega],
             period=period,
             channel=None if given else channel,
@@ -241,7 +242,7 @@ def describing_function(
             stop=stop,
             offset_samples=offset_samples,
             detrend=detrend,
-            smoothing_bins=smoothing_bins,
+            smoothing_bins=_options.whole("smoothing_bins", smoothing_bins),
         ),
         Call("describing_function", several, settings),
     )
@@ -262,10 +263,8 @@ class Description:
     remnant_share, noise_ratio : Estimate
         Share of the power of u at non-excited frequencies, and this share including the noise at the
         lines (P_n).
-    verdict : {"trustworthy", "doubtful", "not determined"}
-        Reliability of the result.
-    reasons, notes : list of str
-        Reasons against trusting the result, and additional notes.
+    verdict : Verdict
+        Reliability of the result: `level`, `reasons`, `notes`, and `of` for each answer.
     excitation : str or None
         The channel of the excitation.
     period : float
@@ -291,8 +290,18 @@ class Description:
         share, ratio = native.remnant
         self.remnant_share = Estimate(*share)
         self.noise_ratio = Estimate(*ratio)
-        self.verdict, self.reasons, self.notes = native.verdict
+        self.verdict = Verdict._read(native.verdict)
         self.excitation, self.period = native.excitation
+
+    @property
+    def reasons(self) -> list[Reason]:
+        """The reasons of the verdict."""
+        return self.verdict.reasons
+
+    @property
+    def notes(self) -> list[Reason]:
+        """The notes of the verdict."""
+        return self.verdict.notes
 
     def to_json(self) -> str:
         """Return the object of ``hoid describe --json`` as text.
@@ -302,8 +311,7 @@ class Description:
         return self._json
 
     def __repr__(self) -> str:
-        parts = [f"Verdict: {self.verdict}", *(f"- {reason}" for reason in self.reasons)]
-        parts.append(repr(self.function))
+        parts = [repr(self.verdict), repr(self.function)]
         parts.extend(f"{name}: {value}" for name, value in (self.open_loop or {}).items())
         parts.append(f"remnant: {self.remnant_share} of the power of u at non-excited frequencies")
         return "\n".join(parts)

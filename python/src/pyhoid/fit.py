@@ -200,7 +200,7 @@ class Fit(Model, Result):
 
     @property
     def verdict(self) -> Verdict:
-        """Reliability of the fit on its records: `level`, `reasons` and `notes`.
+        """Reliability of the fit on its records: `level`, `reasons`, `notes`, and `of` for each answer.
 
         Raises
         ------
@@ -210,7 +210,7 @@ class Fit(Model, Result):
         if not self.records and self._native.state() is not None:
             raise DataError("the fit has no records to judge it on; use a fit from identify")
         if self._verdict is None:
-            self._verdict = Verdict(*self._native.verdict(list(self.records)))
+            self._verdict = Verdict._read(self._native.verdict(list(self.records)))
         return self._verdict
 
     @property

@@ -43,7 +43,7 @@ class OperatorFit(Model, Result):
         One operator for all records, or one for each record if some parameters are individual.
         `parameters` belongs to the first.
     verdict : Verdict
-        Reliability of the result: `level`, `reasons`, `notes`.
+        Reliability of the result: `level`, `reasons`, `notes`, and `of` for each answer.
     forms : list of dict
         The forms that were compared, simplest first: form, weight (with which estimates are averaged),
         loss, criterion (Akaike's), held_out, chi2, degrees_of_freedom, converged.
@@ -150,7 +150,7 @@ class OperatorFit(Model, Result):
             for of in native.parameters
         )
         self.parameters = self.operators[0]
-        self.verdict = Verdict(*native.verdict)
+        self.verdict = Verdict._read(native.verdict)
         self.forms: list[dict[str, Any]] = native.forms
         self.lines = native.lines
         if self.lines is not None:

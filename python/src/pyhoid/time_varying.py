@@ -84,8 +84,8 @@ class TimeVaryingFit(Result):
 
     @property
     def verdict(self) -> Verdict:
-        """Reliability of the fit on its records: `level`, `reasons` and `notes`."""
-        return Verdict(*self._native.verdict)
+        """Reliability of the fit on its records: `level`, `reasons`, `notes`, and `of` for each answer."""
+        return Verdict._read(self._native.verdict)
 
     @property
     def change(self) -> dict[str, Any]:

@@ -184,9 +184,9 @@ class Trace:
 
     @property
     def verdict(self) -> Verdict:
-        """Reliability of the trace: `level`, `reasons` and `notes`."""
+        """Reliability of the trace: `level`, `reasons`, `notes`, and `of` for each answer."""
         if self._verdict is None:
-            self._verdict = Verdict(*self._native.verdict)
+            self._verdict = Verdict._read(self._native.verdict)
         return self._verdict
 
     @property

@@ -38,8 +38,8 @@ pub struct PolynomialFit {
 }
 
 impl Answers for PolynomialFit {
-    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
-        operator_answers(&self.fit)
+    fn answers(&self, _record: usize, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus> {
+        operator_answers(&self.fit, element)
     }
 }
 

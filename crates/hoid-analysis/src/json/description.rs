@@ -1,22 +1,12 @@
 //! JSON form of a describing function.
 
-use hoid_ident::{MarginEstimates, frequency::Realisation};
+use hoid_ident::frequency::Realisation;
 use serde_json::{Map, Value, json};
 
 use super::{envelope, estimate, margin_estimates, number, optional};
 use crate::describing::DescribingFunctionResult;
 
 impl DescribingFunctionResult {
-    /// Returns crossover and margins with the controlled element; `None` if the controlled element is unknown.
-    pub fn margins(&self) -> Option<MarginEstimates> {
-        self.found.margins.as_ref().map(|m| MarginEstimates {
-            crossover_rad_s: m.crossover_rad_s,
-            phase_margin_deg: m.phase_margin_deg,
-            gain_margin_db: m.gain_margin_db,
-            phase_crossover_rad_s: m.phase_crossover_rad_s,
-        })
-    }
-
     /// Returns the JSON object.
     pub fn json(&self) -> Map<String, Value> {
         let (found, function, data) = (&self.found, &self.found.function, &self.data);

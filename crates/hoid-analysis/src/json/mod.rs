@@ -28,7 +28,7 @@ use hoid_ident::{
     validation::{GoodnessOfFit, LjungBox},
 };
 use hoid_model::{
-    Finding, NotConvertible, Orders, Record, Severity, Verdict,
+    NotConvertible, Orders, Record, Verdict,
     margins::{Crossing, Crossings},
     uncertainty::{Estimate, OperatorEstimate},
 };
@@ -109,29 +109,13 @@ pub fn estimate_with_interval(e: &Estimate, interval: Option<(f64, f64)>) -> Val
     })
 }
 
-/// Returns the verdict on a result: the level, the findings against the result, the notes, and all findings with names
-/// for use by programs.
+/// Returns the verdict on a result: the level, the reasons (findings against the result), the notes, and the verdict on
+/// each answer.
 pub fn verdict(v: &Verdict) -> Value {
-    json!({
-        "level": v.level.name(),
-        "reasons": v.reasons().collect::<Vec<_>>(),
-        "notes": v.notes().collect::<Vec<_>>(),
-        "findings": v.findings().iter().map(finding).collect::<Vec<_>>(),
-    })
-}
-
-/// Returns the verdict on each answer, with the name of the answer as key.
-pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
-    let one = |v: &Verdict| {
-        let reasons = v.findings().iter().filter(|finding| finding.severity > Severity::Note);
-        json!({"level": v.level.name(), "reasons": reasons.map(finding).collect::<Vec<_>>()})
-    };
-    all.iter().map(|(name, verdict)| (name.clone(), one(verdict))).collect()
-}
-
-/// Returns a finding, which is a warning or a note.
-pub fn finding(f: &Finding) -> Value {
-    json!({"kind": f.kind, "severity": f.severity.name(), "message": f.message, "words": f.message})
+    let mut found = json!(v);
+    // Earlier key, kept for one release.
+    found["findings"] = json!(v.findings());
+    found
 }
 
 /// Returns the model orders with their names.

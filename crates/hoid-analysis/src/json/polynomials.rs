@@ -7,8 +7,7 @@ use hoid_ident::{
     validation::{GoodnessOfFit, Validation},
 };
 use hoid_model::{
-    ContinuousTransferFunction, NotConvertible, Record, Verdict,
-    margins::MANUAL_CONTROL_RANGE_RAD_S,
+    NotConvertible, Record, Verdict,
     remnant::RemnantDiscretisation,
     uncertainty::{OperatorEstimate, RemnantEstimate},
 };
@@ -20,8 +19,8 @@ use super::{
     termination, validation,
 };
 use crate::{
-    AnalysisError, estimators::PolynomialFit, identified::IdentifiedModel, recordings::Account, registry,
-    settings::Setting,
+    AnalysisError, answers::loop_margins, estimators::PolynomialFit, identified::IdentifiedModel, recordings::Account,
+    registry, settings::Setting,
 };
 
 fn root(r: &Root, sample_time_s: f64) -> Value {
@@ -236,14 +235,6 @@ impl JsonFit for GreyBoxFit {
         let grey_box = Some(&found.fit);
         Ok(PolynomialResult { grey_box, ..answer }.object())
     }
-}
-
-/// Returns crossover and margins in the frequency range of manual control, limited to half the sampling frequency: the
-/// sampled model contains no information above it.
-fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
-    let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
-    let high = high.min(fit.model().sample_time().nyquist_rad_s());
-    fit.margins(|omega| element.response(omega), (low, high))
 }
 
 /// Returns the remnant orders m that the grey-box fit tried.

@@ -6,7 +6,7 @@ use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Fault, Verdict
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
 
-use super::{answers, state};
+use super::state;
 use crate::{
     AnalysisError,
     answers::Answers,
@@ -162,12 +162,8 @@ impl<F: JsonFit> IdentifiedModel<F> {
         Ok(self.complete(F::object(self)?))
     }
 
-    /// Adds to a JSON object of this result the verdict on each answer, and the state from which the result can be
-    /// restored.
+    /// Adds to a JSON object of this result the state from which the result can be restored.
     pub fn complete(&self, mut map: Map<String, Value>) -> Map<String, Value> {
-        if let Some(Value::Object(verdict)) = map.get_mut("verdict") {
-            verdict.insert("of".to_owned(), Value::Object(answers(&self.answers())));
-        }
         map.insert("estimator".to_owned(), json!(F::ESTIMATOR));
         let state = SerializedResult {
             fit: &self.fit,

@@ -1,7 +1,10 @@
 //! Execution of a recursion, from a recording to a trace and its verdict.
 
 use hoid_ident::IdentError;
-use hoid_model::{Decimation, Record, SampleTime};
+use hoid_model::{
+    Decimation, Record, SampleTime,
+    option_names::{Renamed, rename_options},
+};
 use hoid_track::{
     CovarianceUpdates, RequestedStart, StartSource, Trace, TrackOptions, TrackPlan, TrackRequest, choose_covariance,
     default_start_span, track, track_validated,
@@ -13,9 +16,23 @@ use super::{
 };
 use crate::{
     AnalysisError,
+    answers::{trace_answers, with_answers},
+    names::OPERATOR,
     quality::{SystemKind, findings_of_quality},
     recordings::Recordings,
 };
+
+/// Options of `hoid identify` that a recursion does not have.
+const FIT_OPTIONS: [&str; 8] = [
+    "change",
+    "excitation",
+    "faults",
+    "fix",
+    "form",
+    "horizon",
+    "mask",
+    "neuromuscular",
+];
 
 /// Request for a recursion over a recording.
 #[derive(Debug, Clone, PartialEq)]
@@ -142,6 +159,7 @@ impl Tracking {
         let verdict = verdict.append(data.element_finding(used.controlled_element.as_ref(), None));
         let inputs: Vec<&str> = used.further.iter().map(|further| further.channel.as_str()).collect();
         let verdict = verdict.append(data.display_finding(&inputs));
+        let verdict = with_answers(verdict, &trace_answers(&trace), &[]).map_messages(in_recursion);
         let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
         let own = OwnSettings {
             trace: &trace,
@@ -212,6 +230,14 @@ impl Tracking {
     }
 }
 
+/// Returns a message with `hoid identify` before each option that a recursion does not have.
+fn in_recursion(message: &str) -> String {
+    rename_options(message, |option| {
+        let of_fit = FIT_OPTIONS.contains(&option.name) || option.name == "structure" && option.value == Some(OPERATOR);
+        (of_fit && !option.is_in_command()).then(|| Renamed::Name(format!("hoid identify --{}", option.name)))
+    })
+}
+
 /// Returns the plan of a recursion; its errors are reported as errors of the options.
 fn recursion_plan(asked: &TrackRequest, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
     asked.plan(sample_time).map_err(recursion_options_error)
@@ -227,4 +253,30 @@ pub fn recursion_options_error(error: IdentError) -> AnalysisError {
 
 fn options_error(reason: String) -> AnalysisError {
     AnalysisError::Options { reason }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn options_of_fits_name_their_command() {
+        for (typed, expected) in [
+            (
+                "use --change sigmoid or a tracker",
+                "use hoid identify --change sigmoid or a tracker",
+            ),
+            (
+                "use --structure operator to find the form",
+                "use hoid identify --structure operator to find the form",
+            ),
+            (
+                "use --structure bj; shorten with --from",
+                "use --structure bj; shorten with --from",
+            ),
+            ("use hoid identify --form lead", "use hoid identify --form lead"),
+        ] {
+            assert_eq!(in_recursion(typed), expected);
+        }
+    }
 }

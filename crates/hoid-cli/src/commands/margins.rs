@@ -17,6 +17,10 @@ use crate::{
     json, output, text,
 };
 
+/// Loop whose margins are printed.
+const CONTINUOUS_LOOP: &str = "The loop is continuous. In hoid identify the loop includes the hold of the sampled error, \
+                               so its phase margin is smaller by half a sample (omega_c Ts/2).";
+
 /// K_n for one order and noise level, or the reason why there is none.
 struct RemnantGain {
     order: usize,
@@ -88,7 +92,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
     };
     let state_name = state_name(args.state);
     output::show(&format!(
-        "{}, {state_name} state.\n{}\nRemnant gain K_n for P_n = {share}, T_n = {} s, Ts = {} s:\n{table}\n",
+        "{}, {state_name} state.\n{}\n{CONTINUOUS_LOOP}\nRemnant gain K_n for P_n = {share}, T_n = {} s, Ts = {} s:\n{table}\n",
         scenario.name,
         text::crossings(&found),
         scenario.remnant.time_constant_s,
@@ -129,7 +133,7 @@ fn print_family_margins(scenario: &FamilyScenario, args: &MarginsArgs) -> Result
         format!("{table}\n")
     };
     output::show(&format!(
-        "{}, {} state.\n{}\n{parts}",
+        "{}, {} state.\n{}\n{CONTINUOUS_LOOP}\n{parts}",
         scenario.name,
         state_name(args.state),
         text::crossings(&found),

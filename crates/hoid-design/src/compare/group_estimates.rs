@@ -12,12 +12,13 @@ use std::{
 };
 
 use hoid_ident::family::Parameter;
-use hoid_model::{Finding, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
+use hoid_model::{Finding, Verdict, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};
 use hoid_study::{
     StudyError,
     group::{FormEvidence, GroupSummary, MANIFEST_FILE, Manifest, Person, PersonStatus, RunEstimates, has_results},
 };
+use serde::Deserialize;
 use serde_json::Value;
 
 use super::{CommonForm, CompareError, Observation, Quantity, common_form::common_form};
@@ -279,10 +280,17 @@ impl Cell {
         }
     }
 
-    fn set_verdict(&mut self, level: Option<VerdictLevel>, reason: &str) {
-        self.doubtful = level == Some(VerdictLevel::Doubtful);
-        self.missing = match level {
-            Some(VerdictLevel::NotDetermined) => Some(format!("the data do not determine its operator: {reason}")),
+    /// Sets the verdict on the operator, or the reason why there is no operator.
+    fn set_verdict(&mut self, verdict: Option<&Verdict>, reason: &str) {
+        self.doubtful = verdict.is_some_and(|verdict| verdict.level == VerdictLevel::Doubtful);
+        self.missing = match verdict {
+            Some(verdict) if verdict.level == VerdictLevel::NotDetermined => {
+                let reasons: Vec<&str> = verdict.reasons().collect();
+                Some(format!(
+                    "the data do not determine its operator: {}",
+                    reasons.join("; ")
+                ))
+            }
             Some(_) => None,
             None => Some(format!("it has no operator: {reason}")),
         };
@@ -291,11 +299,7 @@ impl Cell {
     fn from_person(person: &Person) -> Self {
         let mut cell = Self::without_estimates(&person.subject, &person.condition, person.runs);
         let fitted = person.status == PersonStatus::Fitted;
-        let reasons = person.reasons.join("; ");
-        cell.set_verdict(
-            person.verdict.filter(|_| fitted),
-            if fitted { &reasons } else { &person.reason },
-        );
+        cell.set_verdict(person.verdict.as_ref().filter(|_| fitted), &person.reason);
         cell.form.clone_from(&person.form);
         cell.forms.clone_from(&person.forms);
         let runs = if person.covers_all_runs() { person.runs } else { 1 };
@@ -333,19 +337,8 @@ impl Cell {
         let text = |key: &str| person[key].as_str().unwrap_or_default();
         let runs = person["runs"].as_u64().unwrap_or(1) as usize;
         let mut cell = Self::without_estimates(text("subject"), text("condition"), runs);
-        let verdict = &person["verdict"];
-        let reasons: Vec<&str> = verdict["reasons"]
-            .as_array()
-            .into_iter()
-            .flatten()
-            .filter_map(Value::as_str)
-            .collect();
-        let level = verdict["level"].as_str().and_then(|level| level.parse().ok());
-        let reason = match level {
-            Some(_) => reasons.join("; "),
-            None => text("reason").to_owned(),
-        };
-        cell.set_verdict(level, &reason);
+        let verdict = Verdict::deserialize(&person["verdict"]).ok();
+        cell.set_verdict(verdict.as_ref(), text("reason"));
         cell.form = text("form").to_owned();
         let runs = if text("run") == "all" { runs } else { 1 };
         let estimated = |found: &Value| EstimatedValue {

@@ -40,7 +40,7 @@ pub(super) fn from_directory(directory: &Path, given: &GivenOptions<'_>) -> Resu
     let manifest = Manifest::read(&manifest)?;
     let summary = GroupSummary::read(&manifest, directory)?;
     let determined = |p: &&hoid_study::group::Person| {
-        p.covers_all_runs() && p.verdict.is_some_and(|level| level != VerdictLevel::NotDetermined)
+        p.covers_all_runs() && p.level().is_some_and(|level| level != VerdictLevel::NotDetermined)
     };
     let row = |p: &hoid_study::group::Person| Row {
         subject: p.subject.clone(),

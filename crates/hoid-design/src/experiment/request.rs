@@ -89,6 +89,7 @@ impl DesignRequest {
         let lines = all.designed_lines(&designed.forcing, self.designing.period_s, runs)?;
         let [response, response_to_target] = all.responses(&designed.forcing, length_s)?;
         findings.extend(low_line_finding(&lines, task.feedforward.is_some()));
+        findings.push(fixed_form_note(&task));
         let people = self.expected_for_people((&others, feedforward), &designed.forcing, runs, &mut findings);
         let against = self.against.as_ref();
         let against = against
@@ -259,6 +260,19 @@ impl DesignRequest {
         }
         all
     }
+}
+
+/// Returns the note on what the predicted errors assume.
+fn fixed_form_note(task: &Task) -> Finding {
+    Finding::note(
+        "fixed-form",
+        format!(
+            "the errors are predicted for the form {}, as if it were known; identify weighs several forms, so its errors \
+             include the differences between likely forms and can be larger; the phase margin is that of the continuous \
+             loop, without the hold of a sampled error (half a sample)",
+            task.state.operator.form()
+        ),
+    )
 }
 
 /// Returns a finding about lines at which the remnant in e is not small. A displayed target contains no remnant, so its

@@ -153,11 +153,11 @@ impl Fit {
             // Instrumental variables do not require white residuals, and in a closed loop the residuals are correlated
             // with e.
             let note = |finding: Finding| {
-                let words = format!(
+                let message = format!(
                     "{}; instrumental variables do not require white residuals",
                     finding.message
                 );
-                Finding::note(finding.kind, words)
+                Finding::note(finding.kind, message)
             };
             return measures
                 .noise_model_finding()

@@ -122,7 +122,7 @@ impl GreyBoxFit {
             run_to_run: RUN_TO_RUN_DEVIATION,
             sample_time_s: layout.sample_time.s(),
         };
-        Some(constancy.findings())
+        Some(constancy.findings(records))
     }
 
     fn residual_measures(&self, records: &[Record]) -> Result<ResidualMeasures, IdentError> {

@@ -155,7 +155,7 @@ impl<'a> ChosenForm<'_, 'a> {
             prior: &self.prediction.prior,
             residuals,
             noise_free,
-            not_constant: constancy_finding(fit, self.run_to_run, workspace),
+            not_constant: constancy_finding(fit, self.records, self.run_to_run, workspace),
             lines: self.lines.fit.as_ref(),
             no_lines: self.lines.missing_reason.as_deref(),
             agreement: agreement.as_ref(),
@@ -487,7 +487,12 @@ fn residual_measures(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Resi
 }
 
 /// Returns a warning if the person changes over the records.
-fn constancy_finding(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Option<Finding> {
+fn constancy_finding(
+    fit: &PredictionFit<'_>,
+    records: &[Record],
+    run_to_run: f64,
+    workspace: &mut Workspace,
+) -> Option<Finding> {
     let (layout, eta, free) = (fit.layout(), fit.eta(), fit.free_elements());
     let blocks = physical_score_blocks(&fit.criterion, eta, &free, workspace)?;
     let direction = |(place, (coordinate, record)): (usize, &(Coordinate, Option<usize>))| {
@@ -518,7 +523,7 @@ fn constancy_finding(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut W
         run_to_run,
         sample_time_s: layout.sample_time.s(),
     }
-    .change_finding()
+    .change_finding(records)
 }
 
 /// Returns the mean of the squared coherence over the lines; `None` if the coherence is unknown.

@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use crate::preparation::Step;
-use crate::table::{Table, keep_rows};
+use crate::table::{Table, interpolate, keep_rows};
 use crate::time::sampling::pairs;
 
 /// Fraction of a step by which rounding may shift a time: a held signal changes to the value of a row this fraction of
@@ -121,11 +121,6 @@ pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: 
         interpolate(before, after, share)
     };
     (0..n).map(value).collect()
-}
-
-fn interpolate(a: f64, b: f64, share: f64) -> f64 {
-    // This form gives exactly a and b at the ends and does not overflow between them.
-    a * (1.0 - share) + b * share
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use super::read_options::ReadOptions;
 use super::repair::{self, OpenEnd};
 use crate::IoError;
 use crate::preparation::Step;
-use crate::table::{Column, Table};
+use crate::table::{Column, Table, interpolate};
 use crate::wording::{format_name, sparse_option};
 
 /// The table to be converted, and the steps applied to it.
@@ -84,7 +84,7 @@ impl TableReader<'_> {
         let x = |row: usize| time.map_or(row as f64, |time| self.table.value(time, row));
         let part = (x(at) - x(before)) / (x(after) - x(before));
         let [before, after] = [before, after].map(|row| self.table.value(column, row));
-        let value = before + part * (after - before);
+        let value = interpolate(before, after, part);
         value.is_finite().then_some(value)
     }
 

@@ -6,7 +6,8 @@
 use std::path::Path;
 
 use hoid_model::{
-    FamilyOperator, FittedOperator, Form, NamedChoice, SampleTime, family_scenario::Feedforward, uncertainty::Estimate,
+    FamilyOperator, FittedOperator, Form, NamedChoice, SampleTime, Verdict, VerdictLevel, family_scenario::Feedforward,
+    uncertainty::Estimate,
 };
 use serde::Deserialize;
 
@@ -94,7 +95,7 @@ fn no_fit_error(source: &str, reason: String) -> IoError {
 struct FitObject {
     parameters: Vec<ParameterObject>,
     #[serde(default)]
-    verdict: VerdictObject,
+    verdict: Option<Verdict>,
     #[serde(default)]
     records: Vec<RecordObject>,
     structure: Option<String>,
@@ -121,13 +122,6 @@ struct ParameterObject {
     value: Option<f64>,
     standard_error: Option<f64>,
     determined: Option<bool>,
-}
-
-#[derive(Default, Deserialize)]
-struct VerdictObject {
-    level: String,
-    #[serde(default)]
-    reasons: Vec<String>,
 }
 
 #[derive(Deserialize)]
@@ -195,11 +189,12 @@ impl FitObject {
                 self.structure.as_deref().unwrap_or("?")
             ));
         };
-        if self.verdict.level == "not determined" {
-            return Err(format!(
-                "its operator is not determined: {}",
-                self.verdict.reasons.join("; ")
-            ));
+        if let Some(verdict) = self
+            .verdict
+            .filter(|verdict| verdict.level == VerdictLevel::NotDetermined)
+        {
+            let reasons: Vec<&str> = verdict.reasons().collect();
+            return Err(format!("its operator is not determined: {}", reasons.join("; ")));
         }
         let form = Form::from_name(&form).map_err(|error| error.to_string())?;
         let covariance = self.covariance.ok_or("it has no covariance")?;
@@ -306,6 +301,11 @@ mod tests {
         for (from, to, expected) in [
             (r#""form": "gain", "#, "", "structure grey-box"),
             ("doubtful", "not determined", "few seconds"),
+            (
+                r#""doubtful", "reasons": ["few seconds"]"#,
+                r#""not determined", "reasons": [{"kind": "too-few", "severity": "undetermined", "message": "few s"}]"#,
+                "few s",
+            ),
             (
                 r#""gain", "ln omega_nm""#,
                 r#""ln omega_nm", "gain""#,

@@ -94,6 +94,11 @@ impl Precision {
         self.decimals = Some(self.decimals.unwrap_or(0).max(decimals as i32));
     }
 
+    /// True if a number was written with decimals, such as `10.0`.
+    pub(crate) fn has_decimals(self) -> bool {
+        self != Self::single() && self.decimals.is_some_and(|decimals| decimals > 0)
+    }
+
     /// Returns the precision of the same numbers multiplied by a power of ten.
     pub(crate) fn scale_by_power_of_ten(self, power: i32) -> Self {
         Self {

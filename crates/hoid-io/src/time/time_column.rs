@@ -13,12 +13,15 @@
 //!
 //! A column selected by `--time COLUMN[:unit]` takes precedence. The unit is taken from the name. Without a unit in the
 //! name, the unit follows from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the
-//! steps: integers with steps of 5 or more are not in s, but in the unit that gives a sampling frequency from 2 to 2000
-//! Hz. Numbers from 20 000 to 80 000 or from 700 000 to 800 000 with steps of 0.5 ms to 10 s in days are the serial
+//! steps: integers with steps of 5 or more are a count, in the unit that gives a sampling frequency from 2 to 2000 Hz.
+//! Times with decimals, such as `10.0`, are in s, and so are integers whose steps are all the same number of minutes
+//! (60, 300, 900 ... s). The note on a unit inferred from the steps names the option that changes it. Numbers from 20 000 to 80 000 or from 700 000 to 800 000 with steps of 0.5 ms to 10 s in days are the serial
 //! days of spreadsheets (from 1900) or the date numbers of MATLAB (from the year 0): in s, the sampling frequency would
 //! be above 8 kHz. The choice is reported.
 
 use std::ops::Range;
+
+use hoid_model::numbers::format_plain;
 
 use super::sampling::{pairs, steps};
 use super::time_choice::{TimeChoice, Unit};
@@ -30,6 +33,8 @@ use crate::wording::{abbreviate, format_name};
 const MIN_STAMP: f64 = 1e8;
 /// Median step above which integer times are assumed not to be in s.
 const MIN_NON_SECOND_STEP: f64 = 5.0;
+/// Length of an hour, s. Recorders of slow processes store a sample in each of these equal parts of an hour.
+const HOUR_S: f64 = 3600.0;
 /// Largest sampling frequency that is assumed when the unit is inferred from the steps, Hz.
 const MAX_HZ: f64 = 2000.0;
 
@@ -277,8 +282,13 @@ fn runs_in_seconds(values: &[f64]) -> bool {
         && median_step(values).is_some_and(|step| (1.0 / MAX_HZ..=1.0).contains(&step))
 }
 
-/// Infers the unit of times whose unit is not stated.
-fn infer_unit(values: &[f64]) -> Unit {
+/// True if the steps are all the same number of minutes and divide an hour.
+fn steps_in_minutes(values: &[f64], step: f64) -> bool {
+    step % 60.0 == 0.0 && HOUR_S % step == 0.0 && steps(values).all(|one| one == step)
+}
+
+/// Infers the unit of times whose unit is not stated. `decimals` is true if the times were written with decimals.
+fn infer_unit(values: &[f64], decimals: bool) -> Unit {
     let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
     match first {
         stamp if stamp >= 1e17 => return Unit::Power(-9),
@@ -287,10 +297,11 @@ fn infer_unit(values: &[f64]) -> Unit {
         _ if is_serial_days(values) => return Unit::Days,
         _ => {}
     }
-    if !values.iter().all(|value| value.fract() == 0.0) {
+    if decimals || !values.iter().all(|value| value.fract() == 0.0) {
         return Unit::Power(0);
     }
-    let Some(step) = median_step(values).filter(|step| *step >= MIN_NON_SECOND_STEP) else {
+    let is_count = |step: &f64| *step >= MIN_NON_SECOND_STEP && !steps_in_minutes(values, *step);
+    let Some(step) = median_step(values).filter(is_count) else {
         return Unit::Power(0);
     };
     // Sample times from 0.5 ms to 0.5 s are assumed; each unit then covers its own three decades of steps.
@@ -314,10 +325,11 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     }
     let Some(time) = table.columns.get_mut(at) else { return };
     let was_t = time.name == "t";
-    let unit = match unit {
+    let stated = unit.or_else(|| Unit::of(&time.unit));
+    let unit = match stated {
         _ if time.moments => Unit::Iso,
         Some(unit) => unit,
-        None => Unit::of(&time.unit).unwrap_or_else(|| infer_unit(&time.values)),
+        None => infer_unit(&time.values, time.precision.has_decimals()),
     };
     if was_t && unit == Unit::Power(0) {
         return;
@@ -326,11 +338,11 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
     if time.precision == Precision::default() && !time.moments {
         time.precision = Precision::from_times(&time.values, false);
     }
-    let name = std::mem::replace(&mut time.name, String::from("t"));
-    let name = if name.is_empty() {
+    let own = std::mem::replace(&mut time.name, String::from("t"));
+    let name = if own.is_empty() {
         String::from("the first column, which has no name,")
     } else {
-        abbreviate(&name)
+        abbreviate(&own)
     };
     let first = time
         .values
@@ -338,6 +350,7 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
         .copied()
         .find(|value| value.is_finite())
         .unwrap_or(0.0);
+    let step = median_step(&time.values);
     let scale = |time: &mut Column, factor: f64, from_s: f64, divide: bool| {
         for value in &mut time.values {
             let from_first = *value - from_s;
@@ -392,7 +405,16 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             time.precision = time.precision.scale_by_power_of_ten(power);
             let origin = if from_first { " from its first time stamp" } else { "" };
             let taken = if was_t { "" } else { "taken as t, " };
-            format!("{name} is {taken}in s{origin}, from {unit}")
+            // Numbers counted from 1970 are evidence of their unit; steps are not.
+            let doubt = match (stated, step) {
+                (None, Some(step)) if !from_first && !own.is_empty() => format!(
+                    ", since its integers advance by {}; if they are in s, add --time {}:s",
+                    format_plain(step),
+                    format_name(&own)
+                ),
+                _ => String::new(),
+            };
+            format!("{name} is {taken}in s{origin}, from {unit}{doubt}")
         }
     };
     // The unit s is the default for t and is not stored.
@@ -444,7 +466,8 @@ mod tests {
 
     #[test]
     fn time_units_are_inferred_from_values() {
-        let unit = |first: f64, step: f64| infer_unit(&(0..9).map(|k| first + step * f64::from(k)).collect::<Vec<_>>());
+        let times = |first: f64, step: f64| (0..9).map(|k| first + step * f64::from(k)).collect::<Vec<_>>();
+        let unit = |first: f64, step: f64| infer_unit(&times(first, step), false);
         for (first, step, power) in [
             (1.7e9, 1.0, 0),
             (1.7e12, 20.0, -3),
@@ -459,6 +482,10 @@ mod tests {
             (0.0, 2e7, -9),
             (0.0, 20.5, 0),
             (0.0, 1e12, 0),
+            (0.0, 60.0, 0),
+            (0.0, 900.0, 0),
+            (0.0, 1000.0, -6),
+            (0.0, 16_680.0, -6),
         ] {
             assert_eq!(unit(first, step), Unit::Power(power), "{first} {step}");
         }
@@ -475,8 +502,11 @@ mod tests {
         }
         assert!(!is_serial_days(&[]) && !is_serial_days(&[f64::NAN]) && !is_serial_days(&[45_321.5]));
         assert!(!is_serial_days(&[45_321.5, 45_321.500_000_1, 12.0]));
-        assert_eq!(infer_unit(&[f64::NAN]), Unit::Power(0));
-        assert_eq!(infer_unit(&[]), Unit::Power(0));
+        assert_eq!(infer_unit(&[f64::NAN], false), Unit::Power(0));
+        assert_eq!(infer_unit(&[], false), Unit::Power(0));
+        // Written as 0.0, 10.0, ..., and integers with steps of about a minute.
+        assert_eq!(infer_unit(&times(0.0, 10.0), true), Unit::Power(0));
+        assert_eq!(infer_unit(&[0.0, 60.0, 121.0, 180.0], false), Unit::Power(-3));
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! interval has no upper limit, `> x` gives its lower end.
 
 use hoid_ident::family::Parameter;
-use hoid_model::{Form, VerdictLevel, uncertainty::Estimate};
+use hoid_model::{Form, Verdict, VerdictLevel, uncertainty::Estimate};
 use hoid_study::group::{GroupSummary, Person};
 use minijinja::{Value, context};
 
@@ -80,7 +80,7 @@ pub fn people_table<'a>(people: impl Iterator<Item = &'a Person>) -> PeopleTable
                 .map(|(name, _)| p.parameter(name).map_or_else(dash, format_parameter)),
         );
         cells.extend(further.iter().map(|(input, name, _)| response_cell(p, input, name)));
-        cells.push(p.verdict.map_or("", VerdictLevel::name).to_owned());
+        cells.push(p.level().map_or("", VerdictLevel::name).to_owned());
         cells
     };
     PeopleTable {
@@ -206,7 +206,12 @@ impl GroupReport<'_> {
         let people = self.shown_people().filter(|p| p.verdict.is_some());
         rows.into_iter()
             .zip(people)
-            .map(|(cells, p)| context! { cells, reasons => &p.reasons, notes => &p.notes, name => p.name() })
+            .map(|(cells, p)| {
+                let verdict = p.verdict.iter();
+                let reasons: Vec<String> = verdict.clone().flat_map(Verdict::reasons).map(str::to_owned).collect();
+                let notes: Vec<String> = verdict.flat_map(Verdict::notes).map(str::to_owned).collect();
+                context! { cells, reasons, notes, name => p.name() }
+            })
             .collect()
     }
 }

@@ -71,9 +71,8 @@ pub(super) fn people_of_fit(
     found: &IdentifiedModel,
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Person> {
-    let fit = &found.fit;
-    let person = |run: &str, record| Person::from_fit(key, run, runs.len(), fit, record, element);
-    if fit.operators.len() == 1 {
+    let person = |run: &str, record| Person::from_result(key, run, runs.len(), found, record, element);
+    if found.fit.operators.len() == 1 {
         return vec![person(ALL_RUNS, 0)];
     }
     let names = found.data.names.iter().enumerate();

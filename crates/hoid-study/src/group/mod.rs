@@ -39,6 +39,7 @@ mod frequency;
 mod inspection;
 mod join;
 mod manifest;
+mod manifest_names;
 mod parameter_columns;
 mod pattern;
 mod person;

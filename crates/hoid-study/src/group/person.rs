@@ -9,11 +9,17 @@
 //! that no person has or for forms that were not tried. If some parameters are individual, a person has one row for
 //! each run.
 
+use hoid_analysis::IdentifiedModel;
 use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};
-use hoid_model::{ContinuousTransferFunction, Form, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
+use hoid_model::{
+    ContinuousTransferFunction, Form, Verdict, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate,
+};
+use serde::Deserialize;
+use serde_json::json;
 
 use super::{
+    manifest_names::in_manifest,
     parameter_columns,
     person_channel::{self, PersonChannel},
     tables::{join_sentences, numbers, real_columns, schema, split_sentences, text_columns, texts},
@@ -88,12 +94,8 @@ pub struct Person {
     pub kappa: Option<f64>,
     /// Order nd of the noise model.
     pub noise_order: Option<usize>,
-    /// Verdict on the fit.
-    pub verdict: Option<VerdictLevel>,
-    /// Findings of the verdict.
-    pub reasons: Vec<String>,
-    /// Notes of the verdict, which do not affect its level.
-    pub notes: Vec<String>,
+    /// Verdict on the fit and on each of its answers.
+    pub verdict: Option<Verdict>,
 }
 
 impl Person {
@@ -105,7 +107,7 @@ impl Person {
             run: ALL_RUNS.to_owned(),
             runs: 0,
             status,
-            reason: reason.to_owned(),
+            reason: in_manifest(reason, condition),
             form: String::new(),
             forms: Vec::new(),
             parameters: Vec::new(),
@@ -118,23 +120,21 @@ impl Person {
             kappa: None,
             noise_order: None,
             verdict: None,
-            reasons: Vec::new(),
-            notes: Vec::new(),
         }
     }
 
-    /// Creates a person from one of the operators of a fit.
-    pub(super) fn from_fit(
+    /// Creates a person from one of the operators of a result.
+    pub(super) fn from_result(
         key: (&str, &str),
         run: &str,
         runs: usize,
-        fit: &FamilyFit,
+        found: &IdentifiedModel,
         record: usize,
         element: Option<&ContinuousTransferFunction>,
     ) -> Self {
+        let fit = &found.fit;
         let OperatorOfRecord { parameters, .. } = fit.operator(record);
         let measures = element.and_then(|element| fit.loop_measures(record, element));
-        let strings = |all: &mut dyn Iterator<Item = &str>| all.map(str::to_owned).collect();
         Self {
             run: run.to_owned(),
             runs,
@@ -149,11 +149,18 @@ impl Person {
             chi2: fit.lines.as_ref().map(|l| (l.chi_squared, l.degrees_of_freedom)),
             kappa: Some(fit.inflation),
             noise_order: Some(fit.noise_orders.1),
-            verdict: Some(fit.verdict.level),
-            reasons: strings(&mut fit.verdict.reasons()),
-            notes: strings(&mut fit.verdict.notes()),
+            verdict: Some(
+                found
+                    .verdict_of_record(record)
+                    .map_messages(|message| in_manifest(message, key.1)),
+            ),
             ..Self::without_operator(key, PersonStatus::Fitted, "")
         }
+    }
+
+    /// Returns the level of the verdict on the fit, if there is a fit.
+    pub fn level(&self) -> Option<VerdictLevel> {
+        self.verdict.as_ref().map(|verdict| verdict.level)
     }
 
     /// True for a row that covers all runs. If some parameters are individual, each run has its own row instead.
@@ -190,12 +197,15 @@ impl Person {
             ("status", self.status.name()),
             ("reason", &self.reason),
             ("form", &self.form),
-            ("verdict", self.verdict.map_or("", VerdictLevel::name)),
         ] {
             rows.set_text(name, value);
         }
-        rows.set_text("reasons", &join_sentences(self.reasons.iter().map(String::as_str)));
-        rows.set_text("notes", &join_sentences(self.notes.iter().map(String::as_str)));
+        if let Some(verdict) = &self.verdict {
+            rows.set_text("verdict", verdict.level.name());
+            rows.set_text("reasons", &join_sentences(verdict.reasons()));
+            rows.set_text("notes", &join_sentences(verdict.notes()));
+            rows.set_text("verdict_json", &json!(verdict).to_string());
+        }
         rows.set_real("runs", self.runs as f64);
         for p in &self.parameters {
             parameter_columns::write(rows, &p.name, p);
@@ -262,9 +272,12 @@ impl Person {
             chi2: any("chi2").zip(any("dof").map(|dof| dof as usize)),
             kappa: any("kappa"),
             noise_order: any("noise_order").map(|nd| nd as usize),
-            verdict: cell("verdict").parse().ok(),
-            reasons: split_sentences(&cell("reasons")),
-            notes: split_sentences(&cell("notes")),
+            verdict: serde_json::from_str(&cell("verdict_json")).ok().or_else(|| {
+                // Tables of an earlier version contain only the sentences.
+                let sentences = |name: &str| split_sentences(&cell(name));
+                let (reasons, notes) = (sentences("reasons"), sentences("notes"));
+                Verdict::deserialize(json!({"level": cell("verdict"), "reasons": reasons, "notes": notes})).ok()
+            }),
         })
     }
 }
@@ -334,7 +347,7 @@ fn people_schema(parameters: &[&str], forms: &[&str], (texts, numbers): &(Vec<St
             .chain(text_columns(texts))
             .chain(real_columns(numbers))
             .chain(real_columns(&["chi2", "dof", "kappa", "noise_order"]))
-            .chain(text_columns(&["verdict", "reasons", "notes"])),
+            .chain(text_columns(&["verdict", "reasons", "notes", "verdict_json"])),
     )
 }
 
@@ -350,6 +363,7 @@ pub(super) fn read_people(table: &OutputTable) -> Vec<Person> {
 #[cfg(test)]
 mod tests {
     use hoid_ident::family::ChannelRole;
+    use hoid_model::{AnswerVerdict, Finding};
 
     use super::*;
 
@@ -415,13 +429,23 @@ mod tests {
             chi2: Some((12.5, 9)),
             kappa: Some(2.0),
             noise_order: Some(7),
-            verdict: Some(VerdictLevel::Doubtful),
-            reasons: vec!["one".to_owned(), "two; three".to_owned()],
+            verdict: Some(
+                Verdict::of(vec![
+                    Finding::warning("stretch", "one").over(2.0, 4.0),
+                    Finding::warning("slow", "two; three"),
+                    Finding::note("prior", "four"),
+                ])
+                .with_answers([("tau_e".to_owned(), AnswerVerdict::of([]))]),
+            ),
             ..Person::without_operator(("P", "c"), PersonStatus::Fitted, "")
         };
         let failed = Person::without_operator(("Q", ""), PersonStatus::Failed, "no file");
-        let table = people_table(&[person.clone(), failed.clone()]);
+        let mut table = people_table(&[person.clone(), failed.clone()]);
         assert_eq!(read_people(&table), [person.clone(), failed.clone()]);
+        // A table of an earlier version has only sentences.
+        table.columns.retain(|column| column.name != "verdict_json");
+        let earlier = read_people(&table).remove(0).verdict.unwrap();
+        assert!(earlier.reasons().eq(["one", "two; three"]) && earlier.notes().eq(["four"]));
         assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
         // No person has a lead: no columns for it.
         assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());

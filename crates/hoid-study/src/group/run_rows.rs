@@ -11,6 +11,7 @@ use hoid_track::Trace;
 use super::{
     condition_settings::ConditionSettings,
     manifest::{Manifest, RunEntry},
+    manifest_names::in_manifest,
     reading::Run,
     responses::{grid_frequencies, responses_schema, unwrapped_phases_deg},
     tables::{real_columns, schema, text_columns},
@@ -227,12 +228,14 @@ impl<'a> RunRows<'a> {
             return;
         }
         let reasons: Vec<&str> = verdict.reasons().collect();
-        self.write_row_without_value(None, estimator, verdict.level.name(), &reasons.join("; "));
+        let reasons = in_manifest(&reasons.join("; "), &self.entry.condition);
+        self.write_row_without_value(None, estimator, verdict.level.name(), &reasons);
     }
 
     /// Writes that an estimator failed, and the reason.
     pub fn write_failure(&mut self, window: Option<Window>, estimator: &str, reason: &str) {
-        self.write_row_without_value(window, estimator, "failed", reason);
+        let reason = in_manifest(reason, &self.entry.condition);
+        self.write_row_without_value(window, estimator, "failed", &reason);
     }
 
     /// Writes that an estimator does not apply, and the reason.

@@ -128,7 +128,7 @@ fn failures(estimates: &OutputTable) -> (Vec<RunFailure>, usize) {
 fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usize) -> Vec<Finding> {
     let mut all = Vec::new();
     let sought = || people.iter().filter(|p| p.status != PersonStatus::Changes);
-    let stands = |p: &Person| p.verdict.is_some_and(|level| level != VerdictLevel::NotDetermined);
+    let stands = |p: &Person| p.level().is_some_and(|level| level != VerdictLevel::NotDetermined);
     if failures.len() == runs {
         all.push(Finding::undetermined(
             "nothing-read",
@@ -149,8 +149,9 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
     }
     for p in people {
         let name = p.name();
-        let reasons = p.reasons.join("; ");
-        all.extend(match (p.status, p.verdict) {
+        let reasons: Vec<&str> = p.verdict.iter().flat_map(Verdict::reasons).collect();
+        let reasons = reasons.join("; ");
+        all.extend(match (p.status, p.level()) {
             (PersonStatus::Failed, _) => Some(Finding::warning(
                 "condition-failed",
                 format!("there is no operator for {name}: {}", p.reason),
@@ -194,10 +195,13 @@ fn findings(runs: usize, failures: &[RunFailure], people: &[Person], other: usiz
 mod tests {
     use super::*;
 
-    fn person(verdict: VerdictLevel) -> Person {
+    fn person(level: VerdictLevel) -> Person {
         Person {
-            verdict: Some(verdict),
-            reasons: vec!["it is so".to_owned()],
+            verdict: Some(Verdict::of(match level {
+                VerdictLevel::Trustworthy => Vec::new(),
+                VerdictLevel::Doubtful => vec![Finding::warning("slow", "it is so")],
+                VerdictLevel::NotDetermined => vec![Finding::undetermined("singular", "it is so")],
+            })),
             ..Person::without_operator(("P", "c"), PersonStatus::Fitted, "")
         }
     }

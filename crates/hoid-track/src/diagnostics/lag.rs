@@ -58,7 +58,7 @@ impl Trace {
         })?;
         let lag = 1.0 / fit.coordinate(0, Coordinate::LagRate)?.value.max(f64::MIN_POSITIVE);
         let lag = lag.clamp(PROPOSED_LAGS_S.0, PROPOSED_LAGS_S.1);
-        Some(Finding::warning(
+        let finding = Finding::warning(
             "held-lag",
             format!(
                 "a lag fitted to the last {:.0} s has a phase of {:.0} deg at {} rad/s, but the last row {:.0} deg: the \
@@ -68,6 +68,7 @@ impl Trace {
                 point.omega_rad_s,
                 own.phase_deg().value
             ),
-        ))
+        );
+        Some(finding.over(from, end))
     }
 }

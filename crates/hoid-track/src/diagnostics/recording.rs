@@ -43,10 +43,11 @@ impl Trace {
             let count = samples(&held);
             let sample = if count == 1.0 { "sample" } else { "samples" };
             let words = format!("{count} {sample} held back as outliers ({})", list_faults(&held));
-            all.push(match count > HELD_BACK_SHARE * self.counts().samples as f64 {
+            let finding = match count > HELD_BACK_SHARE * self.counts().samples as f64 {
                 true => Finding::warning("held-back", words),
                 false => Finding::note("held-back", words),
-            });
+            };
+            all.push(over_faults(finding, &held));
         }
         let steps = of(&|f| f.kind == GuardKind::Step);
         if !steps.is_empty() {
@@ -55,28 +56,24 @@ impl Trace {
                 count_with_noun(steps.len(), "lasting jump"),
                 list_faults(&steps)
             );
-            all.push(Finding::note("steps-in-signals", words));
+            all.push(over_faults(Finding::note("steps-in-signals", words), &steps));
         }
         let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step));
         if !spans.is_empty() {
-            all.push(Finding::warning(
-                "hostile-span",
-                format!(
-                    "the estimate stays constant in {} in which e and u show no tracking ({})",
-                    count_with_noun(spans.len(), "span"),
-                    list_faults(&spans)
-                ),
-            ));
+            let words = format!(
+                "the estimate stays constant in {} in which e and u show no tracking ({})",
+                count_with_noun(spans.len(), "span"),
+                list_faults(&spans)
+            );
+            all.push(over_faults(Finding::warning("hostile-span", words), &spans));
         }
         let again = of(&|f| matches!(f.action, GuardAction::Restarted | GuardAction::Relearnt));
         if !again.is_empty() {
-            all.push(Finding::warning(
-                "restarted",
-                format!(
-                    "the estimate was restarted after {}",
-                    count_with_noun(again.len(), "fault")
-                ),
-            ));
+            let words = format!(
+                "the estimate was restarted after {}",
+                count_with_noun(again.len(), "fault")
+            );
+            all.push(over_faults(Finding::warning("restarted", words), &again));
         }
         all
     }
@@ -100,6 +97,7 @@ impl Trace {
                      error bars shrink without information; use the default guard, which keeps the estimate constant"
                 ),
             )
+            .over(from, to)
         })
     }
 
@@ -154,7 +152,7 @@ impl Trace {
                 .find(|(known, ..)| *known == name)
                 .and_then(|(_, _, e)| e.standard_error)
         };
-        let mut worst: Option<(f64, String)> = None;
+        let mut worst: Option<(f64, Finding)> = None;
         for length in LAST_SPANS_S {
             let from = end - length;
             if from < record.time_s(0) {
@@ -179,22 +177,24 @@ impl Trace {
                          estimate does not follow a change of the person, or has not recovered; restart it there",
                         step.step
                     );
-                    worst = Some((p_value, words));
+                    worst = Some((p_value, Finding::warning("not-followed", words).over(from, end)));
                 }
             }
         }
-        worst.map(|(_, words)| Finding::warning("not-followed", words))
+        worst.map(|(_, finding)| finding)
     }
 
     /// Finding that neither gain is determined in the last row, regardless of earlier rows.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
-        let operator = self.operator(self.len().checked_sub(1)?).ok()?;
+        let last = self.len().checked_sub(1)?;
+        let operator = self.operator(last).ok()?;
         let nothing = is_undetermined(&operator.k_e) && is_undetermined(&operator.k_e_dot) && !self.response_is_known;
         nothing.then(|| {
             Finding::warning(
                 "last-row",
                 "at the end of the record no gain differs from zero by two standard errors: report an earlier row",
             )
+            .over(self.times_s()[last], self.times_s()[last])
         })
     }
 
@@ -222,14 +222,16 @@ impl Trace {
         }
         let left_out = from - record.time_s(0) >= idle_s - 0.5 * self.sample_time().s();
         let words = format!("neither e nor u moves in the first {idle_s:.1} s");
-        Some(if left_out {
+        let finding = if left_out {
             Finding::note("idle-head", format!("{words}: left out of the start fit"))
         } else {
             Finding::warning(
                 "idle-head",
                 format!("{words}, which are in the start fit; start the fit after them"),
             )
-        })
+        };
+        let start = record.time_s(0);
+        Some(finding.over(start, start + idle_s))
     }
 }
 
@@ -245,6 +247,11 @@ fn bridge(values: &mut [f64], from: usize, to: usize) {
     for (k, value) in values.iter_mut().enumerate().take(to).skip(from) {
         *value = first + (last - first) * (k + 1 - from) as f64 / length;
     }
+}
+
+/// Returns the finding with the span of the faults.
+fn over_faults(finding: Finding, faults: &[TrackFault]) -> Finding {
+    finding.over_spans(faults.iter().map(|fault| (fault.from_s, fault.to_s)))
 }
 
 /// Lists the first faulty spans as text.

@@ -136,9 +136,14 @@ impl Trace {
                 ),
             ),
         };
-        Some(Finding::warning(
+        let finding = Finding::warning(
             kind,
             format!("{words}; the bands assume a person who does not change, and are too narrow here"),
-        ))
+        );
+        let at_s = record.time_s(found.first_sample);
+        Some(match found.time_course {
+            TimeCourse::Step => finding.over(at_s, at_s),
+            TimeCourse::Drift | TimeCourse::Oscillation(_) => finding,
+        })
     }
 }

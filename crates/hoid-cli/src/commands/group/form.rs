@@ -1,7 +1,7 @@
 //! Output for a finished group, as a page of text and as a JSON object.
 
 use hoid::ident::family::Parameter;
-use hoid::model::{Form, VerdictLevel, numbers::count_with_noun};
+use hoid::model::{Form, numbers::count_with_noun};
 use hoid::report::{PeopleTable, people_table};
 use hoid::study::group::{GroupSummary, Manifest, Person, PersonChannel, RunEntry, RunFailure, RunFault};
 use serde_json::{Map, Value, json};
@@ -115,7 +115,7 @@ fn person_json(p: &Person) -> Value {
     if !p.reason.is_empty() {
         set("reason", json!(p.reason));
     }
-    let Some(level) = p.verdict else {
+    let Some(verdict) = &p.verdict else {
         return Value::Object(map);
     };
     set("form", json!(p.form));
@@ -141,10 +141,7 @@ fn person_json(p: &Person) -> Value {
     set("dof", json!(p.chi2.map(|(_, dof)| dof)));
     set("kappa", json::optional(p.kappa));
     set("noise_order", json!(p.noise_order));
-    set(
-        "verdict",
-        json!({"level": VerdictLevel::name(level), "reasons": p.reasons, "notes": p.notes}),
-    );
+    set("verdict", json::verdict(verdict));
     Value::Object(map)
 }
 

@@ -51,7 +51,7 @@ struct Line<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     decimated: Option<Rate>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    findings: Vec<Value>,
+    findings: Vec<&'a Finding>,
     #[serde(skip_serializing_if = "Option::is_none")]
     warm_up: Option<WarmUp<'a>>,
 }
@@ -181,7 +181,7 @@ impl StreamStatus<'_> {
             event: self.event.as_ref().map(json::track_fault),
             fault: self.fault.as_deref(),
             decimated: self.live.decimation().map(Rate::from),
-            findings: self.finding.map(json::finding).into_iter().collect(),
+            findings: self.finding.into_iter().collect(),
             warm_up: match self.live.stage() {
                 Stage::Collecting(warm_up) => Some(WarmUp {
                     collected_samples: warm_up.collected,

@@ -46,7 +46,7 @@ mod search;
 #[cfg(test)]
 mod tests;
 
-use hoid_model::Finding;
+use hoid_model::{Finding, Record};
 
 pub(crate) use blocks::{physical_score_blocks, score_blocks};
 use influential_block::most_influential_block;
@@ -64,23 +64,26 @@ const SIGNIFICANCE_LEVEL: f64 = 5e-4;
 pub const RUN_TO_RUN_DEVIATION: f64 = 0.13;
 
 impl Constancy<'_> {
-    /// Returns a warning if a parameter changes, and a warning if a stretch dominates the fit. The test for a stretch
-    /// assumes that the standard errors were computed from the model, not from the scatter of blocks.
-    pub fn findings(&self) -> Vec<Finding> {
-        self.change_finding()
+    /// Returns a warning if a parameter changes, and a warning if a stretch of the records dominates the fit. The test
+    /// for a stretch assumes that the standard errors were computed from the model, not from the scatter of blocks.
+    pub fn findings(&self, records: &[Record]) -> Vec<Finding> {
+        self.change_finding(records)
             .into_iter()
-            .chain(self.stretch_finding())
+            .chain(self.stretch_finding(records))
             .collect()
     }
 
-    fn stretch_finding(&self) -> Option<Finding> {
+    fn stretch_finding(&self, records: &[Record]) -> Option<Finding> {
         let found = most_influential_block(self)?;
-        let time = |sample: usize| sample as f64 * self.sample_time_s;
+        let record = records.get(found.record)?;
+        let (from_s, to_s) = (
+            record.time_s(found.first_sample),
+            record.time_s(found.next_sample.unwrap_or(record.len())),
+        );
         let to = found
             .next_sample
-            .map_or("the end".to_owned(), |to| format!("{:.0} s", time(to)));
-        let records = self.blocks.last().map_or(0, |block| block.record + 1);
-        let record = if records > 1 {
+            .map_or("the end".to_owned(), |_| format!("{to_s:.0} s"));
+        let record = if records.len() > 1 {
             format!(" of record {}", found.record + 1)
         } else {
             String::new()
@@ -90,27 +93,31 @@ impl Constancy<'_> {
             .iter()
             .map(|(name, by)| format!("{name} by {by:.1}"))
             .collect();
-        Some(Finding::warning(
+        let finding = Finding::warning(
             "stretch",
             format!(
-                "the fit depends on the interval from {:.0} s to {to}{record}: omitting it changes {} standard \
+                "the fit depends on the interval from {from_s:.0} s to {to}{record}: omitting it changes {} standard \
                  errors; inspect the recording there",
-                time(found.first_sample),
                 moves.join(", ")
             ),
-        ))
+        );
+        Some(finding.over(from_s, to_s))
     }
 
     /// Returns a warning if a parameter changes, with the name of the parameter and the approximate time.
-    pub fn change_finding(&self) -> Option<Finding> {
-        let records = self.blocks.last().map_or(0, |block| block.record + 1);
+    pub fn change_finding(&self, records: &[Record]) -> Option<Finding> {
         let of = |delay: bool| strongest_step(self, delay).filter(|change| change.p_value < SIGNIFICANCE_LEVEL);
         let mut found: Vec<Change> = [of(true), of(false)].into_iter().flatten().collect();
         found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
         let words: Vec<String> = found
             .iter()
-            .map(|change| self.change_description(change, records))
+            .map(|change| self.change_description(change, records.len()))
             .collect();
+        // A change between records has no time.
+        let at_s = |change: &Change| {
+            let record = records.get(change.record).filter(|_| change.first_sample > 0)?;
+            Some((record.time_s(change.first_sample), record.time_s(change.first_sample)))
+        };
         (!words.is_empty()).then(|| {
             Finding::warning(
                 "not-constant",
@@ -120,6 +127,7 @@ impl Constancy<'_> {
                     words.join(", and ")
                 ),
             )
+            .over_spans(found.iter().filter_map(at_s))
         })
     }
 

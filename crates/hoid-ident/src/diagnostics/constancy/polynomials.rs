@@ -75,7 +75,7 @@ impl Fit {
             run_to_run: RUN_TO_RUN_DEVIATION,
             sample_time_s: ts.s(),
         };
-        Some(constancy.findings())
+        Some(constancy.findings(records))
     }
 
     /// Returns the tested directions: the delay, and the parameters of the operator or, without an operator, the

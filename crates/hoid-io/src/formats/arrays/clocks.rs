@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::column_path::ColumnPath;
 use super::numbers::Numbers;
 use crate::IoError;
+use crate::table::interpolate;
 use crate::wording::abbreviate;
 
 /// Largest difference between equal times, as a fraction of the mean step: rounding, or single precision.
@@ -44,7 +45,7 @@ pub(super) fn align_column(
             known = later;
             known_values = known_values.get(1..).unwrap_or_default();
         }
-        interpolate(known, known_values, *t)
+        line_through(known, known_values, *t)
     };
     let numbers: Vec<f64> = to.iter().map(value).collect();
     let (from_hz, to_hz) = (1.0 / mean_step(&from), 1.0 / mean_step(&to));
@@ -97,13 +98,9 @@ pub(super) fn are_equal(one: &ColumnPath, other: &ColumnPath) -> bool {
 }
 
 /// Evaluates the line through the first two points at `at`.
-fn interpolate(t: &[f64], values: &[f64], at: f64) -> f64 {
+fn line_through(t: &[f64], values: &[f64], at: f64) -> f64 {
     match (t, values) {
-        ([t0, t1, ..], [v0, v1, ..]) => {
-            let part = (at - t0) / (t1 - t0);
-            // The result is exact at both points.
-            if part == 1.0 { *v1 } else { v0 + part * (v1 - v0) }
-        }
+        ([t0, t1, ..], [v0, v1, ..]) => interpolate(*v0, *v1, (at - t0) / (t1 - t0)),
         ([_], [v0]) => *v0,
         _ => f64::NAN,
     }
