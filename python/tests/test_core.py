@@ -504,3 +504,26 @@ except AttributeError as error:
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "module 'pyhoid' has no attribute 'nothing'"
+
+
+#: Calls with a whole number out of range, by the name of the argument.
+OUT_OF_RANGE: dict[str, Any] = {
+    "seed": lambda n: pyhoid.simulate("C1", seed=n),
+    "cell": lambda n: pyhoid.simulate("C1", cell=n),
+    "replication": lambda n: pyhoid.simulate("C1", replication=n),
+    "remnant_order": lambda n: pyhoid.simulate("C1", remnant_order=n),
+    "replications": lambda n: pyhoid.plan("noise-level", replications=n),
+    "subjects": lambda n: pyhoid.simulate_group("nowhere", subjects=n),
+    "runs": lambda n: pyhoid.simulate_people("nowhere", runs=n),
+    "jobs": lambda n: pyhoid.reproduce("nowhere", jobs=n),
+    "lines": lambda n: pyhoid.design("population", lines=n),
+    "decimate": lambda n: pyhoid.read("nowhere.csv", decimate=n),
+    "nk": lambda n: pyhoid.convert(f=(-1.91, 0.92), b=(0.044, -0.043), nk=n),
+}
+
+
+@pytest.mark.parametrize("name", OUT_OF_RANGE)
+@pytest.mark.parametrize("number", [-1, 2**64, 1.5])
+def test_a_whole_number_out_of_range_is_an_error_of_its_option(name: str, number: float) -> None:
+    with pytest.raises(pyhoid.OptionError, match=f"^{name} is {number}, expected a whole number"):
+        OUT_OF_RANGE[name](number)

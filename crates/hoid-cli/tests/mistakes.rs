@@ -208,7 +208,7 @@ fn wrong_usage_exits_with_two() {
 }
 
 #[test]
-fn invalid_simulations_exit_with_one_and_write_nothing() {
+fn values_out_of_range_exit_with_two_and_write_nothing() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     for (arguments, expected) in [
@@ -221,12 +221,22 @@ fn invalid_simulations_exit_with_one_and_write_nothing() {
         (&["--sample-time", "0.013"], "whole number of samples"),
         (&["--sample-time", "-1"], "Ts"),
         (&["--remnant-time-constant", "0"], "T_n"),
+        (&["--seed", "-1"], "--seed"),
     ] {
         let mut all = vec!["simulate", "--condition", "C1", "--out", "x.csv"];
         all.extend(arguments);
         let (code, message) = failure_of(d, &all);
-        assert_eq!(code, 1, "{arguments:?}: {message}");
+        assert_eq!(code, 2, "{arguments:?}: {message}");
         assert!(message.contains(expected), "{arguments:?}: {message}");
+    }
+    stdout_of(d, &["simulate", "--condition", "C1", "--out", "run.csv"]);
+    for option in ["--fs=-1", "--new-fs=0", "--run-in=-1", "--decimate=0"] {
+        let (code, message) = failure_of(d, &["identify", "run.csv", option]);
+        assert_eq!(code, 2, "{option}: {message}");
+    }
+    for option in ["--period=0", "--fs=nan"] {
+        let (code, message) = failure_of(d, &["describe", "run.csv", "--excitation", "f_t", option]);
+        assert_eq!(code, 2, "{option}: {message}");
     }
     let (code, _) = failure_of(d, &["simulate", "--condition", "C1", "--out", "no/such/place.csv"]);
     assert_eq!(code, 1);

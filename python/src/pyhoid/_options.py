@@ -23,6 +23,7 @@ __all__ = [
     "settings",
     "span",
     "text",
+    "whole",
 ]
 
 Order = int | tuple[int, int] | range
@@ -49,6 +50,27 @@ def order(name: str, value: Any) -> tuple[int, int]:
             f"{name} is {value!r}, expected nonnegative numbers, the smaller first"
         )
     return low, high
+
+
+#: Largest whole number that the native module takes.
+_LARGEST = 2**64 - 1
+
+
+def whole(name: str, value: Any, least: int = 0, largest: int = _LARGEST) -> Any:
+    """Return a whole number within its limits; None stays None.
+
+    >>> whole("seed", 7)
+    7
+    """
+    if value is None:
+        return None
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise OptionError(f"{name} is {value!r}, expected a whole number") from None
+    if not least <= number <= largest:
+        raise OptionError(f"{name} is {number}, expected a whole number from {least} to {largest}")
+    return number
 
 
 def roles(

@@ -224,7 +224,7 @@ def compare(
             adjust=adjust,
             weights=weights,
             directory=Path(directory or removed),
-            jobs=jobs,
+            jobs=_options.whole("jobs", jobs),
             progress=_options.reporter(progress, "runs"),
         )
     return Comparison(text)

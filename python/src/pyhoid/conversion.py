@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from . import _pyhoid
+from . import _options, _pyhoid
 from ._arrays import FloatArray
 from .errors import OptionError
 from .estimates import Operator
@@ -97,7 +97,7 @@ def convert(
             pairs = [(name, value) for name, value in pairs if name != "K_e_dot"]
         found = _pyhoid.convert_operator(pairs, sample_time)
     elif f is not None and b is not None:
-        found = _pyhoid.convert_discrete(_two(f, "F"), _two(b, "B"), nk, sample_time)
+        found = _pyhoid.convert_discrete(_two(f, "F"), _two(b, "B"), _options.whole("nk", nk), sample_time)
     else:
         raise OptionError("give either f and b, or operator")
     discrete = found["discrete"]

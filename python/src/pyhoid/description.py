@@ -230,7 +230,7 @@ def describing_function(
     return DescribingFunction(
         _pyhoid.describing_function(
             several,
-            harmonics=None if harmonics is None else [int(h) for h in harmonics],
+            harmonics=None if harmonics is None else [_options.whole("harmonics", h, 1) for h in harmonics],
             omega=None if omega is None else [float(w) for w in omega],
             period=period,
             channel=None if given else channel,
@@ -242,7 +242,7 @@ def describing_function(
             stop=stop,
             offset_samples=offset_samples,
             detrend=detrend,
-            smoothing_bins=smoothing_bins,
+            smoothing_bins=_options.whole("smoothing_bins", smoothing_bins),
         ),
         Call("describing_function", several, settings),
     )

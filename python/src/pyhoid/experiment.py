@@ -281,9 +281,9 @@ def design(
         disturbance=disturbance,
         remnant=(remnant_share, remnant_time_constant),
         length=length,
-        runs=runs,
-        lines=lines,
-        spacing=spacing,
+        runs=_options.whole("runs", runs),
+        lines=_options.whole("lines", lines),
+        spacing=_options.whole("spacing", spacing, 1, 2**32 - 1),
         band=band,
         shelf=shelf,
         limits=(max_rms_e, max_u),
@@ -292,7 +292,7 @@ def design(
         statistics=(power, alpha, None if between_people is None else str(between_people)),
         run_to_run=None if run_to_run is None else str(run_to_run),
         display=display,
-        seed=seed,
+        seed=_options.whole("seed", seed),
     )
     return ExperimentDesign(text)
 

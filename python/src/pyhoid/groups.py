@@ -54,7 +54,7 @@ def group(
     finished, estimates = _pyhoid.group(
         file,
         Path(directory),
-        jobs=jobs,
+        jobs=_options.whole("jobs", jobs),
         resume=resume,
         csv=csv,
         progress=_options.reporter(progress, "runs"),
@@ -132,14 +132,14 @@ def simulate_group(
     """
     return _pyhoid.simulate_group(
         Path(directory),
-        subjects=int(subjects),
+        subjects=_options.whole("subjects", subjects),
         conditions=list(conditions),
-        runs=int(runs),
+        runs=_options.whole("runs", runs),
         between_subjects=float(between_subjects),
         between_runs=float(between_runs),
-        remnant_order=int(remnant_order),
+        remnant_order=_options.whole("remnant_order", remnant_order),
         noise_level=float(noise_level),
-        seed=int(seed),
+        seed=_options.whole("seed", seed),
         trouble=list(trouble),
     )
 
@@ -204,14 +204,14 @@ def simulate_people(
     """
     return _pyhoid.simulate_people(
         Path(directory),
-        subjects=int(subjects),
+        subjects=_options.whole("subjects", subjects),
         plants=list(plants),
         form=form,
         remnants=list(remnants),
         remnant_share=(float(remnant_share[0]), float(remnant_share[1])),
         sample_time=float(sample_time),
-        runs=int(runs),
+        runs=_options.whole("runs", runs),
         between_runs=float(between_runs),
-        seed=int(seed),
+        seed=_options.whole("seed", seed),
         trouble=list(trouble),
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from . import _pyhoid
+from . import _options, _pyhoid
 from ._other_files import readable
 from .record import Record
 
@@ -154,7 +154,7 @@ def read(
         unit=unit,
         scale=scale,
         offset=offset,
-        decimate=decimate,
+        decimate=_options.whole("decimate", decimate),
         new_sampling_frequency=new_sampling_frequency,
         run_in=run_in,
         detrend=detrend,
@@ -273,7 +273,7 @@ def _read(
             unit=dict(unit or {}),
             scale={name: _written(value) for name, value in (scale or {}).items()},
             offset={name: _written(value) for name, value in (offset or {}).items()},
-            decimate=decimate,
+            decimate=_options.whole("decimate", decimate),
             new_sampling_frequency=new_sampling_frequency,
             run_in=float(run_in),
             mask=list(mask),

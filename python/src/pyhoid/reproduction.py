@@ -84,8 +84,8 @@ def reproduce(
     made = _pyhoid.reproduce(
         target,
         only=list(only),
-        replications=int(replications),
-        jobs=jobs,
+        replications=_options.whole("replications", replications),
+        jobs=_options.whole("jobs", jobs),
         recordings=None if recordings is None else Path(recordings),
         progress=_options.reporter(progress, "estimates"),
     )

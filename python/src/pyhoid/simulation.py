@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from os import PathLike
 from typing import Any
 
-from . import _pyhoid
+from . import _options, _pyhoid
 from .errors import OptionError
 from .record import Record
 
@@ -88,7 +88,7 @@ def simulate(
     """
     parts = _pyhoid.simulate(
         **_base(condition, scenario),
-        remnant_order=remnant_order,
+        remnant_order=_options.whole("remnant_order", remnant_order),
         noise_level=noise_level,
         noise_definition=noise_definition,
         remnant_time_constant=remnant_time_constant,
@@ -96,9 +96,9 @@ def simulate(
         realisation=realisation,
         feedforward=feedforward,
         disturbance=disturbance,
-        seed=seed,
-        cell=cell,
-        replication=replication,
+        seed=_options.whole("seed", seed),
+        cell=_options.whole("cell", cell),
+        replication=_options.whole("replication", replication),
         keep_run_in=keep_run_in,
     )
     return Record._of(parts)

@@ -178,6 +178,7 @@ def plan(source: str | PathLike[str] | Plan, *, replications: int | None = None)
     --------
     >>> pyhoid.plan("plan.toml", replications=10).estimates
     """
+    replications = _options.whole("replications", replications)
     if isinstance(source, Plan):
         return source if replications is None else Plan(text=source.text, replications=replications)
     text = os.fspath(source)
@@ -254,7 +255,7 @@ def study(
     finished, estimates, tables = found.run(
         target,
         shard=share,
-        jobs=jobs,
+        jobs=_options.whole("jobs", jobs),
         resume=resume,
         csv=csv,
         progress=_options.reporter(progress, "estimates"),

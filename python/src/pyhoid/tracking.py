@@ -172,15 +172,13 @@ def track(
         }
     else:
         options = _recursion.plain(shared, settings)
-    if every < 1:
-        raise OptionError(f"every is {every}, expected 1 or more")
     native = _pyhoid.track(
         record,
         options,
         start_span=_options.span("start_span", start_span),
         update_from=update_from,
         moving_average=None if moving_average is None else float(moving_average),
-        every=int(every),
+        every=_options.whole("every", every, 1),
         decimate=str(decimate),
         validate=validate,
         update_covariance=bool(update_covariance),

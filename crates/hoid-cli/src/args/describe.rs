@@ -10,6 +10,7 @@ use hoid::model::ContinuousTransferFunction;
 use super::{
     figure::FigureArgs,
     reading::{FaultArgs, MaskArgs, ReadArgs},
+    recursion::parse_duration,
     show::ShowArgs,
 };
 
@@ -36,7 +37,7 @@ pub struct DescribeArgs {
     #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "period")]
     pub lines: Option<Vec<f64>>,
     /// Period of the excitation in s [default: shortest common period of the lines found]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = parse_duration, allow_hyphen_values = true)]
     pub period: Option<f64>,
     /// Controlled element, such as 90/(s(s+6)) or 90/1,6,0 (NUM/DEN in descending powers of s): adds crossover
     /// frequency and margins

@@ -5,7 +5,10 @@ use hoid::analysis::LookOptions;
 use hoid::io::{TimeChoice, TrialChoice};
 use hoid::model::ContinuousTransferFunction;
 
-use super::reading::{parse_time, parse_trial};
+use super::{
+    reading::{parse_time, parse_trial},
+    recursion::parse_frequency,
+};
 
 /// Options given by the user, which are therefore not searched for.
 #[derive(Debug, Args)]
@@ -31,7 +34,7 @@ pub struct LookArgs {
     #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
     pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz; replaces the column t
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = parse_frequency, allow_hyphen_values = true)]
     pub fs: Option<f64>,
     /// Start of the span to use, s [default: whole periods of the excitation]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]

@@ -4,7 +4,10 @@ use clap::Args;
 use hoid::io::{Offset, QualityIssueKind, Scaling, SparseTreatment, TimeChoice, TrialChoice};
 use hoid::model::{Decimation, Detrend, FaultHandling};
 
-use super::choices::choice_parser;
+use super::{
+    choices::choice_parser,
+    recursion::{parse_duration, parse_frequency},
+};
 
 /// How record files are read.
 #[derive(Debug, Clone, Args)]
@@ -30,7 +33,7 @@ pub struct ReadArgs {
     #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
     pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz [default: from column t, in s]
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", value_parser = parse_frequency, allow_hyphen_values = true)]
     pub fs: Option<f64>,
     /// Start of the span to use, s
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
@@ -102,10 +105,10 @@ pub struct PrepareArgs {
     #[command(flatten)]
     pub rate: DecimateArgs,
     /// Resample evenly sampled data to this frequency in Hz, after a low-pass filter on all channels
-    #[arg(long, value_name = "HZ", conflicts_with = "decimate")]
+    #[arg(long, value_name = "HZ", conflicts_with = "decimate", value_parser = parse_frequency, allow_hyphen_values = true)]
     pub new_fs: Option<f64>,
     /// Drop the first S seconds of the data read
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = parse_duration, allow_hyphen_values = true)]
     pub run_in: Option<f64>,
 }
 

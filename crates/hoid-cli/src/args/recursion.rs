@@ -194,11 +194,20 @@ fn parse_count(text: &str) -> Result<usize, String> {
     }
 }
 
-fn parse_frequency(text: &str) -> Result<f64, String> {
+pub(super) fn parse_frequency(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(hz) if hz > 0.0 && hz.is_finite() => Ok(hz),
         _ => Err(format!(
             "{text:?} is not a frequency; write a positive number in Hz, such as 100"
+        )),
+    }
+}
+
+pub(super) fn parse_duration(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<f64>() {
+        Ok(s) if s > 0.0 && s.is_finite() => Ok(s),
+        _ => Err(format!(
+            "{text:?} is not a duration; write a positive number in s, such as 5"
         )),
     }
 }
@@ -209,7 +218,7 @@ mod tests {
 
     #[test]
     fn counts_and_frequencies_are_parsed() {
-        assert!(parse_count("0").is_err() && parse_frequency("0").is_err());
+        assert!(parse_count("0").is_err() && parse_frequency("0").is_err() && parse_duration("nan").is_err());
         assert_eq!((parse_count(" 7 "), parse_frequency("100")), (Ok(7), Ok(100.0)));
     }
 }

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use hoid::io::{AnyScenario, ScenarioChangeError, ScenarioChanges, write_record, write_record_csv};
-use hoid::model::{Record, SampleTime};
+use hoid::model::Record;
 use hoid::numerics::statistics::root_mean_square;
 use hoid::report::numbers;
-use hoid::sim::{FamilySimulator, RunSeed, Simulator};
+use hoid::sim::{FamilySimulator, RunSeed, SimError, Simulator};
 
 use super::{output_paths, scenario::chosen_scenario};
 use crate::{args::SimulateArgs, error::CliError, output};
@@ -19,15 +19,16 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         cell: args.cell,
         replication: args.replication,
     };
-    // A value out of range gives exit code 1, as in a scenario file; an option that does not apply gives exit code 2.
-    args.sample_time.map(SampleTime::new).transpose()?;
+    let base = chosen_scenario(&args.base)?;
     let scenario = changes(args)
-        .apply(chosen_scenario(&args.base)?)
+        .apply(base.clone())
         .map_err(|error| change_error(&error))?;
-    let record = match scenario {
-        AnyScenario::Reference(scenario) => Simulator::new(&scenario)?.run(run_seed, args.keep_run_in)?,
-        AnyScenario::Family(scenario) => FamilySimulator::new(&scenario)?.run_with_truth(run_seed, args.keep_run_in)?,
-    };
+    let found = run_of(&scenario, run_seed, args.keep_run_in);
+    // A scenario that can be simulated only without the options has an option with a value out of range.
+    let record = found.map_err(|error| match run_of(&base, run_seed, false) {
+        Ok(_) if scenario != base => CliError::Usage(error.to_string()),
+        _ => CliError::Sim(error),
+    })?;
     let piped = args.out.as_os_str() == "-";
     if piped {
         print_record(&record)?;
@@ -58,6 +59,13 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         output::show(&summary)?;
     }
     Ok(())
+}
+
+fn run_of(scenario: &AnyScenario, run_seed: RunSeed, keep_run_in: bool) -> Result<Record, SimError> {
+    match scenario {
+        AnyScenario::Reference(scenario) => Simulator::new(scenario)?.run(run_seed, keep_run_in),
+        AnyScenario::Family(scenario) => FamilySimulator::new(scenario)?.run_with_truth(run_seed, keep_run_in),
+    }
 }
 
 /// Writes the record to standard output.
