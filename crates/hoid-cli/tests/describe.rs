@@ -244,7 +244,7 @@ fn unusable_records_are_errors() {
             "harmonic of the period 20 s",
         ),
         (&["good.csv", "--lines", "1,x", "--period", "20"], 2, "x"),
-        (&["good.csv", "--period", "0"], 1, "period"),
+        (&["good.csv", "--period", "0"], 2, "period"),
         (&["good.csv", "--controlled-element", "1/(s"], 2, "at character 5"),
         (&["nothing.csv"], 1, "nothing.csv"),
         (&["good.csv", "--from", "50"], 1, "good"),

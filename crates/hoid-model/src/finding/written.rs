@@ -120,7 +120,7 @@ mod tests {
             verdict.findings()[0],
             Finding::warning("stretch", "it depends").over(2.0, 4.0)
         );
-        // With all findings beside the sentences, and in a saved state, which had only the findings.
+        // With all findings next to the sentences, and in a saved state, which had only the findings.
         for (level, severities, reasons) in [
             (
                 "doubtful",
