@@ -127,7 +127,7 @@ impl<'a> ChosenForm<'_, 'a> {
         if noise_free.is_none() {
             add_bias(&mut errors, found, self.lines.fit.as_ref(), separate, (&others, unseen));
         }
-        let mut weighed = vec![weighed_form(found, &errors, self.weight, separate)?];
+        let mut weighed = vec![self.weighed_form(found, &errors, self.weight, separate, self.lines.fit.as_ref())?];
         for other in &self.others {
             let form = self.weigh_form(other, separate, workspace)?;
             if form.operators.first().is_some_and(response_is_determined) {
@@ -322,7 +322,24 @@ impl<'a> ChosenForm<'_, 'a> {
             let unseen = self.prediction.little_noise.is_none();
             add_bias(&mut errors, found, of.lines.as_ref(), separate, (&others, unseen));
         }
-        weighed_form(found, &errors, of.weight, separate)
+        self.weighed_form(found, &errors, of.weight, separate, of.lines.as_ref())
+    }
+
+    /// Returns the form of a fit with its weight, its operators and the deviation of the lines from them.
+    fn weighed_form(
+        &self,
+        found: &PredictionFit<'_>,
+        errors: &EstimateErrors,
+        weight: f64,
+        separate: usize,
+        lines: Option<&LineFit>,
+    ) -> Result<WeighedForm, IdentError> {
+        let sampling = (found.layout().sample_time, found.layout().intersample);
+        weighed_form(found, errors, weight, separate, |operator| {
+            let (misfit, describing) = (lines?.misfit.as_ref()?, self.lines.describing?);
+            let is_common = separate == 1;
+            is_common.then(|| misfit.deviation(&LineData::new(describing).points, operator, sampling))?
+        })
     }
 }
 
@@ -346,6 +363,12 @@ fn add_bias(
                 .map(|share| *share > LARGEST_PRIOR_SHARE_AT_LINES)
                 .collect();
             covariances.add_bias(fit, &lines.elements());
+            if let Some(misfit) = &lines.misfit {
+                let places = fit.layout().positions(0);
+                for (variance, place) in misfit.of_coordinates.iter().zip(places) {
+                    covariances.extra_variance[*place] += variance;
+                }
+            }
             if is_from_prior.contains(&true) {
                 for other in others {
                     covariances.add_extra_variance(fit, other, 1.0, |place| is_from_prior.get(place) == Some(&true));

@@ -39,6 +39,22 @@ pub(crate) fn limits(
     form.coordinates(neuromuscular).iter().map(of).collect()
 }
 
+/// Exchanges the two zeros of a lead with a droop if the lead is slower than the droop, and returns whether it did.
+///
+/// `K (1 + T_L s)(1 + alpha/s)` does not change if K, T_L and alpha are replaced by `K T_L alpha`, `1/alpha` and
+/// `1/T_L`. The droop is the zero at the lower frequency: `T_L alpha <= 1`.
+pub(super) fn order_zeros(form: Form, coordinates: &mut [f64]) -> bool {
+    let [gain, lead, droop, ..] = coordinates else {
+        return false;
+    };
+    let product = *lead * *droop;
+    if form != Form::LeadDroop || product.is_nan() || product <= 1.0 {
+        return false;
+    }
+    (*gain, *lead, *droop) = (*gain * product, 1.0 / *droop, 1.0 / *lead);
+    true
+}
+
 /// Density of the grid of starting points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum GridDensity {
@@ -99,7 +115,24 @@ pub(super) fn start_grid(
 
 #[cfg(test)]
 mod tests {
+    use hoid_model::FamilyOperator;
+
     use super::*;
+
+    #[test]
+    fn ordered_zeros_leave_the_response_unchanged() {
+        let exchanged = [0.02, 2.5, 1.6, 2.4, -1.2, 0.2];
+        let mut ordered = exchanged;
+        assert!(order_zeros(Form::LeadDroop, &mut ordered));
+        assert!((ordered[1] - 0.625).abs() < 1e-12 && (ordered[2] - 0.4).abs() < 1e-12);
+        let operator = |x: &[f64]| FamilyOperator::new(Form::LeadDroop, true, x).unwrap();
+        for omega in [0.1, 1.0, 9.0] {
+            let (a, b) = (operator(&exchanged).response(omega), operator(&ordered).response(omega));
+            assert!((a / b - 1.0).norm() < 1e-12, "{a} {b}");
+        }
+        assert!(!order_zeros(Form::LeadDroop, &mut ordered));
+        assert!(!order_zeros(Form::Lead2Lag, &mut [0.02, 2.5, 1.6, 2.4, -1.2, 0.2]));
+    }
 
     #[test]
     fn starts_lie_within_the_limits() {

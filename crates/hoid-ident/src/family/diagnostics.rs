@@ -8,6 +8,7 @@ use hoid_model::{Finding, Form};
 use super::{
     agreement::Agreement,
     clusters::ClusterKind,
+    deviation::ResponseDeviation,
     instrumental::InstrumentalFit,
     line_fit::LineFit,
     parameter::{DC_GAIN_NAME, Parameter, min_weight},
@@ -18,6 +19,10 @@ use crate::{Termination, diagnostics::residuals::ResidualMeasures};
 
 /// chi^2 per degree of freedom at the lines above which the operator does not fit the describing function.
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
+/// Root mean square deviation of the response from the form at the lines up to which the form is a sufficient description
+/// of a person, because response and errors include the deviation. A form without a lead or lag that the person has is
+/// off by more.
+const LARGEST_DEVIATION: f64 = 0.2;
 /// Significance level of two tests: agreement between methods, and the form against a free model.
 const SIGNIFICANCE_LEVEL: f64 = 0.01;
 /// Relative excess of the loss over the loss of a free model above which a rejected form is reported.
@@ -335,10 +340,23 @@ fn add_method_findings(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     if let Some(reduced) = judged.lines.and_then(LineFit::reduced_chi_squared)
         && reduced > LARGEST_REDUCED_CHI_SQUARED
     {
-        all.push(Finding::warning(
-            "describing-function",
-            format!("the operator does not fit the describing function: chi^2 per degree of freedom is {reduced:.1}"),
-        ));
+        let kind = "describing-function";
+        let best = judged.weighed.first().and_then(|form| form.of(0)?.deviation.as_ref());
+        all.push(match best.map(ResponseDeviation::size).filter(|s| *s <= LARGEST_DEVIATION) {
+            Some(size) => Finding::note(
+                kind,
+                format!(
+                    "the person deviates from the form by {:.0} % of the response at the lines (chi^2 per degree of \
+                     freedom is {reduced:.1}): response, crossover and phase margin follow the lines, and all errors \
+                     include the deviation",
+                    100.0 * size
+                ),
+            ),
+            None => Finding::warning(
+                kind,
+                format!("the operator does not fit the describing function: chi^2 per degree of freedom is {reduced:.1}"),
+            ),
+        });
     }
     if let Some(agreement) = judged.agreement.filter(|a| a.p_value < SIGNIFICANCE_LEVEL) {
         let (who, most) = match agreement.worst_pair() {

@@ -5,6 +5,7 @@ use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, ope
 use super::{
     clusters::{ClusterKind, quantile},
     covariances::{self, Covariances},
+    deviation::ResponseDeviation,
     parameter::{CoordinateEstimate, DC_GAIN_NAME, Parameter, is_dc_gain, min_weight},
     prediction_fit::PredictionFit,
     profile::profile_interval,
@@ -296,9 +297,11 @@ pub(super) fn weighed_form(
     errors: &EstimateErrors,
     weight: f64,
     separate: usize,
+    deviation: impl Fn(&FamilyOperator) -> Option<ResponseDeviation>,
 ) -> Result<WeighedForm, IdentError> {
     let of = |record| {
         EstimatedOperator::of(fit, errors, record).map(|found| OperatorInForm {
+            deviation: deviation(&found.operator),
             operator: found.operator,
             covariance: found.covariance,
             parameters: found.parameters,

@@ -4,6 +4,7 @@ use hoid_model::{FamilyOperator, Form, uncertainty::Estimate};
 
 use super::{
     channel_lines::ChannelMinimum,
+    deviation::Misfit,
     jackknife::{add_prior_contribution, jackknife},
     lines::LineData,
     response_fit::{ResponseCriterion, ResponseMinimum},
@@ -33,6 +34,10 @@ pub struct LineFit {
     pub held_out: Option<Vec<f64>>,
     /// Termination of the search.
     pub termination: Termination,
+    /// Deviation of the lines from the form that their errors do not explain; `None` if there is none, and for several
+    /// inputs.
+    #[serde(default)]
+    pub misfit: Option<Misfit>,
     /// Covariance from the variances of the lines.
     pub(super) by_lines: Option<Vec<f64>>,
     /// Coordinates of the further inputs.
@@ -74,6 +79,7 @@ impl LineFit {
             degrees_of_freedom: found.degrees_of_freedom(),
             held_out: None,
             termination: found.minimum.termination,
+            misfit: None,
             by_lines,
             of_channels: found.coordinates[p..].to_vec(),
             operator,
@@ -136,14 +142,22 @@ pub(super) fn line_fit(
     let free = (found.coordinates.iter().zip(&criterion.limits))
         .filter(|(x, (low, high))| low < *x && *x < high)
         .count();
+    let operator = operator_of(&found.coordinates)?;
+    let degrees_of_freedom = (2 * lines.points.len()).saturating_sub(free);
+    let misfit = by_lines.as_ref().and_then(|covariance| {
+        let sampling = (criterion.sample_time, criterion.intersample);
+        let fitted = (found.chi_squared, degrees_of_freedom);
+        Misfit::of(&lines.points, &operator, sampling, fitted, covariance)
+    });
     let fit = LineFit {
-        operator: operator_of(&found.coordinates)?,
+        operator,
         covariance,
         prior_shares,
         chi_squared: found.chi_squared,
-        degrees_of_freedom: (2 * lines.points.len()).saturating_sub(free),
+        degrees_of_freedom,
         held_out: (held_out.len() == runs && runs >= 3).then_some(held_out),
         termination: found.termination,
+        misfit,
         by_lines,
         of_channels: Vec::new(),
     };

@@ -14,12 +14,16 @@
 use std::f64::consts::LN_10;
 
 use hoid_model::{
-    Complex64, ContinuousTransferFunction, Finding, SampleTime,
+    Complex64, ContinuousTransferFunction, FamilyOperator, Finding, SampleTime,
     margins::{Crossing, crossings, unstable_poles},
     uncertainty::Estimate,
 };
 
-use super::open_loop::{Crossover, unwrapped_margin_deg};
+use super::{
+    deviation::ResponseDeviation,
+    intersample::Intersample,
+    open_loop::{Crossover, unwrapped_margin_deg},
+};
 
 /// Frequency range in which crossings are searched, rad/s.
 const SEARCH_RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
@@ -38,6 +42,40 @@ pub struct KnownResponse {
     pub value: Complex64,
     /// Covariance of the real and imaginary part of `dY/Y`; `None` if unknown.
     pub relative: Option<[[f64; 2]; 2]>,
+}
+
+impl KnownResponse {
+    /// Returns the sampled response of an operator at a frequency, given the covariance of its coordinates and the
+    /// deviation of the person from the form.
+    pub fn of(
+        operator: &FamilyOperator,
+        (covariance, deviation): (Option<&[f64]>, Option<&ResponseDeviation>),
+        (sample_time, intersample): (SampleTime, Intersample),
+        omega_rad_s: f64,
+    ) -> Self {
+        let found = operator.response_and_gradient(omega_rad_s);
+        let mut relative = covariance.map(|c| found.relative_covariance(c));
+        let mut value = found.value * intersample.response(omega_rad_s, sample_time);
+        if let Some(deviation) = deviation {
+            let (delta, variance) = deviation.at(omega_rad_s);
+            let factor = delta + 1.0;
+            value *= factor;
+            if let Some(c) = &mut relative {
+                let added = variance / factor.norm_sqr();
+                c[0][0] += added;
+                c[1][1] += added;
+            }
+        }
+        Self { value, relative }
+    }
+
+    /// Returns an estimate that changes by these amounts for the real and imaginary part of `dY/Y`.
+    pub(super) fn estimate(&self, value: f64, [a, b]: [f64; 2]) -> Estimate {
+        match self.relative {
+            Some(c) => Estimate::with_variance(value, a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]),
+            None => Estimate::fixed(value),
+        }
+    }
 }
 
 /// All crossings of an open loop, and the stability of the closed loop.
@@ -67,16 +105,10 @@ impl LoopShape {
         let highest = SEARCH_RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
         let open_loop = |omega: f64| operator(omega).value * element.response(omega);
         let found = crossings(open_loop, (SEARCH_RANGE_RAD_S.0.min(0.5 * highest), highest));
-        let with_error = |value: f64, omega: f64, along: [f64; 2]| match operator(omega).relative {
-            Some(c) => {
-                let [a, b] = along;
-                Estimate::with_variance(value, a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1])
-            }
-            None => Estimate::fixed(value),
-        };
+        let with_error = |value: f64, omega: f64, along: [f64; 2]| operator(omega).estimate(value, along);
         let crossover = |c: &Crossing| {
             let there = Crossover::at(open_loop, c.omega_rad_s);
-            let [re, im] = [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| there.shift_for(d));
+            let [re, im] = [Complex64::ONE, Complex64::I].map(|d| there.shift_for(d));
             let omega = c.omega_rad_s;
             (
                 with_error(omega, omega, [re[0], im[0]]),

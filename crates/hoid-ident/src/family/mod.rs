@@ -45,6 +45,7 @@
 //! | `prediction_fit` | result of the prediction error search |
 //! | `joint` | the prediction error fit that includes the lines |
 //! | `clusters`, `covariances` | runs or blocks of runs; covariances from their scatter |
+//! | `deviation` | smooth deviation of the response from the form |
 //! | `jackknife` | covariances from estimates that omit one part of the data, and from a prior |
 //! | `sensitivity` | effect of the noise model on the estimate |
 //! | `profile` | intervals by profile likelihood |
@@ -69,6 +70,7 @@ mod clusters;
 mod comparison;
 pub(crate) mod coordinates;
 mod covariances;
+mod deviation;
 mod diagnostics;
 mod estimated;
 mod estimator;
@@ -105,6 +107,7 @@ pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
 pub use channel::{ChannelFit, ChannelForm, ChannelResponse, ChannelRole, SeenChannel};
 pub use choice::{FormFigures, MIN_WEIGHT, NEGLIGIBLE_AIC_DIFFERENCE};
 pub use clusters::ClusterKind;
+pub use deviation::{Misfit, ResponseDeviation};
 pub use instrumental::InstrumentalFit;
 pub use intersample::Intersample;
 pub use line_fit::LineFit;

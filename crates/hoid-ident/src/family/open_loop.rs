@@ -10,14 +10,12 @@
 
 use std::f64::consts::{FRAC_PI_3, TAU};
 
-use hoid_model::{
-    Complex64, ContinuousTransferFunction, FamilyOperator, SampleTime,
-    uncertainty::{Estimate, variance_along},
-};
+use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, SampleTime, uncertainty::Estimate};
 
 use super::{
     clusters::quantile,
     intersample::Intersample,
+    loop_shape::KnownResponse,
     mixture::{Component, Mixture, widen_interval},
 };
 
@@ -46,6 +44,22 @@ pub struct LoopMeasures {
 }
 
 impl LoopMeasures {
+    /// Returns crossover and phase margin of a sampled response with this controlled element; `None` if `|L|` does not
+    /// fall below one.
+    pub(super) fn of_response(
+        response: impl Fn(f64) -> KnownResponse,
+        element: &ContinuousTransferFunction,
+        sample_time: SampleTime,
+    ) -> Option<Self> {
+        let open_loop = |omega: f64| response(omega).value * element.response(omega);
+        let found = Crossover::find_lowest(open_loop, sample_time)?;
+        let at_crossover = response(found.omega_rad_s);
+        let [by_gain, by_phase] = [Complex64::ONE, Complex64::I].map(|relative| found.shift_for(relative));
+        let estimate = |value: f64, of: usize| at_crossover.estimate(value, [by_gain[of], by_phase[of]]);
+        let both = [estimate(found.omega_rad_s, 0), estimate(found.margin_deg, 1)];
+        Some(Self::of(both, by_gain))
+    }
+
     fn of(both: [Estimate; 2], by_gain: [f64; 2]) -> Self {
         let [crossover_rad_s, phase_margin_deg] = both;
         Self {
@@ -252,22 +266,8 @@ pub fn loop_measures(
     element: &ContinuousTransferFunction,
     (sample_time, intersample): (SampleTime, Intersample),
 ) -> Option<LoopMeasures> {
-    let open_loop =
-        |omega: f64| operator.response(omega) * intersample.response(omega, sample_time) * element.response(omega);
-    let found = Crossover::find_lowest(open_loop, sample_time)?;
-    let response = operator.response_and_gradient(found.omega_rad_s);
-    let moved: Vec<[f64; 2]> = (response.gradient.iter())
-        .map(|g| found.shift_for(g / response.value))
-        .collect();
-    let estimate = |value: f64, of: usize| match covariance {
-        Some(c) => {
-            let gradient: Vec<f64> = moved.iter().map(|m| m[of]).collect();
-            Estimate::with_variance(value, variance_along(&gradient, c))
-        }
-        None => Estimate::fixed(value),
-    };
-    let both = [estimate(found.omega_rad_s, 0), estimate(found.margin_deg, 1)];
-    Some(LoopMeasures::of(both, found.shift_for(Complex64::ONE)))
+    let known = |omega: f64| KnownResponse::of(operator, (covariance, None), (sample_time, intersample), omega);
+    LoopMeasures::of_response(known, element, sample_time)
 }
 
 #[cfg(test)]

@@ -199,6 +199,13 @@ impl<'a> PredictionProblem<'a> {
             let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
+            let is_common = criterion.layout.operator_element_count() == criterion.layout.coordinate_count();
+            let mut ordered = minimum.theta.clone();
+            if is_common && coordinates::order_zeros(form.0, &mut ordered) {
+                minimum = criterion
+                    .search(ordered, &self.search, None, workspace)
+                    .ok_or(IdentError::NoFiniteLoss)?;
+            }
             // Without a residual no step can decrease the loss.
             if minimum.linearisation.sum_of_squares < self.equality_threshold() {
                 minimum.termination.reason = Reason::ExactFit;

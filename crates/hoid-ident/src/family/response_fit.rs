@@ -227,10 +227,14 @@ impl<'p> ResponseCriterion<'p> {
     }
 
     fn result(&self, minimum: Minimum) -> ResponseMinimum {
+        let (mut coordinates, mut information) = (minimum.theta, minimum.linearisation.gram);
+        if coordinates::order_zeros(self.form, &mut coordinates) {
+            information = self.linearise(&coordinates, &mut Workspace::default()).gram;
+        }
         ResponseMinimum {
-            chi_squared: self.chi_squared(&minimum.theta).unwrap_or(f64::NAN),
-            coordinates: minimum.theta,
-            information: minimum.linearisation.gram,
+            chi_squared: self.chi_squared(&coordinates).unwrap_or(f64::NAN),
+            coordinates,
+            information,
             termination: minimum.termination,
         }
     }
@@ -325,6 +329,33 @@ mod tests {
             Form::DerivativeLead => &[1.5, 0.4],
         };
         FamilyOperator::new(form, true, &[head, &tail].concat()).unwrap()
+    }
+
+    #[test]
+    fn search_from_exchanged_zeros_ends_with_the_droop_at_the_lower_frequency() {
+        let ts = SampleTime::AT_100_HZ;
+        let truth = truth(Form::LeadDroop);
+        let points = points(&truth, ts);
+        let none = OperatorPrior::none();
+        let criterion = ResponseCriterion::new(
+            Form::LeadDroop,
+            true,
+            &points,
+            &none,
+            (0.02, 0.8),
+            (ts, Intersample::Auto),
+        );
+        let x = truth.coordinates();
+        let exchanged = [&[x[0] * x[1] * x[2], 1.0 / x[2], 1.0 / x[1]], &x[3..]].concat();
+        let found = criterion.fit_from(&exchanged, &SearchOptions::default()).unwrap();
+        assert!(
+            found.coordinates.iter().zip(x).all(|(a, b)| (a - b).abs() < 1e-6),
+            "{found:?}"
+        );
+        let direct = criterion.fit_from(x, &SearchOptions::default()).unwrap();
+        let pairs = found.information.iter().zip(&direct.information);
+        let mut pairs = pairs.map(|(a, b)| (a - b).abs() / (1.0 + b.abs()));
+        assert!(pairs.all(|d| d < 1e-4), "{found:?} {direct:?}");
     }
 
     #[test]

@@ -12,6 +12,7 @@ use super::{
     channel::{ChannelFit, SeenChannel},
     choice::FormFigures,
     clusters::ClusterKind,
+    deviation::ResponseDeviation,
     instrumental::InstrumentalFit,
     intersample::Intersample,
     line_fit::LineFit,
@@ -59,6 +60,9 @@ pub struct OperatorInForm {
     pub covariance: Option<Vec<f64>>,
     /// Parameters of the operator.
     pub parameters: Vec<Parameter>,
+    /// Deviation of the response from the form; `None` if the form fits the lines, or without lines.
+    #[serde(default)]
+    pub deviation: Option<ResponseDeviation>,
 }
 
 /// Test of the form against a Box-Jenkins model of the same orders.
@@ -191,8 +195,7 @@ impl FamilyFit {
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let each = self.weighed.iter().map(|form| {
             let of = form.of(record)?;
-            let found = self.measures_of_operator(&of.operator, of.covariance.as_deref(), element)?;
-            Some((form.weight, found))
+            Some((form.weight, self.measures_of_form(of, element)?))
         });
         let each: Vec<Option<(f64, LoopMeasures)>> = each.collect();
         each.first()?.as_ref()?;
@@ -205,8 +208,7 @@ impl FamilyFit {
         record: usize,
         element: &ContinuousTransferFunction,
     ) -> Option<LoopMeasures> {
-        let of = self.operator(record);
-        self.measures_of_operator(&of.operator, of.covariance.as_deref(), element)
+        self.measures_of_form(self.weighed.first()?.of(record)?, element)
     }
 
     /// Returns the delay tau_e in s of a record for an error that is linear between samples, logged from a continuous
@@ -225,15 +227,14 @@ impl FamilyFit {
     pub fn frequency_response(&self, record: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
         let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
-            let middle = front.response(omega);
+            let held = front.response(omega) * self.intersample.response(omega, self.sample_time);
             // For each form: ln of its response relative to the response of the best form, with the variances of gain
             // and phase.
             let of = |form: &WeighedForm| {
                 let of = form.of(record)?;
-                let found = of.operator.response_and_gradient(omega);
-                let relative = of.covariance.as_deref().map(|c| found.relative_covariance(c));
-                let off = (found.value / middle).ln();
-                Some((form.weight, [off.re, off.im], relative))
+                let found = self.known_response(of, omega);
+                let off = (found.value / held).ln();
+                Some((form.weight, [off.re, off.im], found.relative))
             };
             let all: Vec<_> = self.weighed.iter().filter_map(of).collect();
             let along = |part: usize| {
@@ -248,7 +249,6 @@ impl FamilyFit {
                 let mixture = Mixture::of(&all.iter().map(component).collect::<Vec<_>>(), self.clusters);
                 mixture.map_or(Estimate::fixed(0.0), |mixture| mixture.estimate)
             };
-            let held = middle * self.intersample.response(omega, self.sample_time);
             let scaled = |from: f64, unit: f64, e: Estimate| Estimate {
                 value: from + unit * e.value,
                 standard_error: e.standard_error.map(|s| unit * s),
@@ -275,12 +275,13 @@ impl FamilyFit {
     /// Returns all crossings and the stability of the loop of a record with a controlled element, for the best form.
     pub fn loop_shape(&self, record: usize, element: &ContinuousTransferFunction) -> LoopShape {
         let of = self.operator(record);
+        let deviation = self
+            .weighed
+            .first()
+            .and_then(|best| best.of(record)?.deviation.as_ref());
         let known = |omega: f64| {
-            let found = of.operator.response_and_gradient(omega);
-            KnownResponse {
-                value: found.value * self.intersample.response(omega, self.sample_time),
-                relative: of.covariance.as_deref().map(|c| found.relative_covariance(c)),
-            }
+            let sampling = (self.sample_time, self.intersample);
+            KnownResponse::of(&of.operator, (of.covariance.as_deref(), deviation), sampling, omega)
         };
         LoopShape::of(known, element, self.sample_time)
     }
@@ -306,11 +307,24 @@ impl FamilyFit {
         element: &ContinuousTransferFunction,
     ) -> Option<LoopMeasures> {
         let measures = loop_measures(operator, covariance, element, (self.sample_time, self.intersample))?;
-        Some(
-            measures
-                .with_student_intervals(self.clusters)
-                .with_run_to_run(self.run_to_run),
-        )
+        Some(self.with_errors_of_runs(measures))
+    }
+
+    fn measures_of_form(&self, of: &OperatorInForm, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
+        let measures = LoopMeasures::of_response(|omega| self.known_response(of, omega), element, self.sample_time)?;
+        Some(self.with_errors_of_runs(measures))
+    }
+
+    /// Returns the sampled response in one form, with the deviation of the person from this form.
+    fn known_response(&self, of: &OperatorInForm, omega_rad_s: f64) -> KnownResponse {
+        let known = (of.covariance.as_deref(), of.deviation.as_ref());
+        KnownResponse::of(&of.operator, known, (self.sample_time, self.intersample), omega_rad_s)
+    }
+
+    fn with_errors_of_runs(&self, measures: LoopMeasures) -> LoopMeasures {
+        measures
+            .with_student_intervals(self.clusters)
+            .with_run_to_run(self.run_to_run)
     }
 
     /// Returns a coordinate of the operator of a record, with its standard error; `None` if the form does not have the
@@ -337,12 +351,59 @@ impl WeighedForm {
 #[cfg(test)]
 mod tests {
     use hoid_model::{
-        Form,
+        ContinuousTransferFunction, FamilyOperator, Form,
         scenario::{Condition, Scenario},
     };
     use hoid_sim::{RunSeed, Simulator};
 
-    use crate::family::FamilyEstimator;
+    use crate::family::{FamilyEstimator, loop_measures};
+
+    /// A person with a lead is fitted by a gain: response, crossover and margin follow the lines, within their errors.
+    #[test]
+    fn response_follows_the_lines_if_the_form_is_wrong() {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let run = |replication| {
+            simulator
+                .run(
+                    RunSeed {
+                        replication,
+                        ..RunSeed::default()
+                    },
+                    false,
+                )
+                .unwrap()
+        };
+        let estimator = FamilyEstimator {
+            forms: vec![Form::Gain],
+            excitation: Some("f_t".to_owned()),
+            ..FamilyEstimator::default()
+        };
+        let fit = estimator.fit(&(0..6).map(run).collect::<Vec<_>>()).unwrap();
+        let truth = FamilyOperator::new(Form::Lead, true, &[0.09, 0.4, 11.25_f64.ln(), 0.35_f64.ln(), 0.28]).unwrap();
+        let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
+        let sampling = (fit.sample_time, fit.intersample);
+        let off = |measures: crate::family::LoopMeasures| {
+            let exact = loop_measures(&truth, None, &element, sampling).unwrap();
+            let errors = |own: hoid_model::uncertainty::Estimate, exact: f64| {
+                (own.value - exact).abs() / own.standard_error.unwrap()
+            };
+            errors(measures.crossover_rad_s, exact.crossover_rad_s.value)
+                .max(errors(measures.phase_margin_deg, exact.phase_margin_deg.value))
+        };
+        let own = fit.operator(0);
+        let by_form = off(loop_measures(&own.operator, own.covariance.as_deref(), &element, sampling).unwrap());
+        let found = off(fit.loop_measures(0, &element).unwrap());
+        assert!(by_form > 4.0 && found < 2.0, "{by_form} {found}");
+        let deviation = fit.weighed[0].operators[0].deviation.as_ref().unwrap();
+        assert!(deviation.size() > 0.1, "{}", deviation.size());
+        for point in fit.frequency_response(0, &[1.0, 2.5, 4.0]) {
+            let exact =
+                truth.response(point.omega_rad_s) * fit.intersample.response(point.omega_rad_s, fit.sample_time);
+            let off =
+                (point.magnitude_db.value - 20.0 * exact.norm().log10()) / point.magnitude_db.standard_error.unwrap();
+            assert!(off.abs() < 3.0, "{point:?} {off}");
+        }
+    }
 
     #[test]
     fn polynomial_fit_has_the_title_of_the_operator_fit() {
