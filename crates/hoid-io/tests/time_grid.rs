@@ -599,10 +599,10 @@ fn unit_inferred_from_steps_is_reported_with_its_remedy() {
     let note = "t is in s, from ms, since its integers advance by 10; if they are in s, add --time t:s";
     assert_eq!(count.notes, [note]);
     // With the named remedy, with decimals, and in steps of whole minutes, the times are in s.
-    let slow: [(&dyn Fn(i64) -> String, Option<&str>, f64); 3] = [
-        (&whole, Some("t:s"), 10.0),
-        (&|k| format!("{:.1}", 5.0 * k as f64), None, 5.0),
-        (&|k| (900 * k).to_string(), None, 900.0),
+    let slow = [
+        (whole as fn(i64) -> String, Some("t:s"), 10.0),
+        (|k| format!("{:.1}", 5.0 * k as f64), None, 5.0),
+        (|k| (900 * k).to_string(), None, 900.0),
     ];
     for (time, choice, sample_time_s) in slow {
         let found = record_with("t", time, choice).unwrap();

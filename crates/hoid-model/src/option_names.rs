@@ -3,7 +3,7 @@
 //! The messages of the libraries name the options of `hoid identify`: `--fill`, `--fs HZ`, `--trial t=1`. Python has
 //! keywords instead, and the manifest of a group has keys. [`rename_options`] finds each option with its value. A word
 //! after an option is its value if it is a placeholder (`HZ`), a number, an assignment, the name of a form, or one of
-//! [`VALUE_WORDS`]; after an option for a column, it is any word except `and` and `or`. Any other word continues the
+//! `VALUE_WORDS`; after an option for a column, it is any word except `and` and `or`. Any other word continues the
 //! sentence.
 
 use crate::operator_family::Form;
