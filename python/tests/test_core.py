@@ -297,7 +297,7 @@ def test_a_describing_function(c1: pyhoid.Record, fit: pyhoid.Fit) -> None:
 
 def test_fits_and_traces_say_what_they_are_worth(c1: pyhoid.Record, c4: pyhoid.Record) -> None:
     fit = pyhoid.identify(c1, "bj", nk=29, nd=1)
-    assert fit.verdict == pyhoid.Verdict("trustworthy", [], []), fit.verdict
+    assert (fit.verdict.level, fit.verdict.reasons) == ("trustworthy", []), fit.verdict
     assert repr(fit.verdict) == "Verdict: trustworthy"
     poor = pyhoid.identify(c1, "oe", nk=29).verdict
     assert poor.level == "doubtful" and any("noise model" in reason for reason in poor.reasons)

@@ -129,7 +129,7 @@ def test_options_that_have_no_meaning(
         ({"method": "rpem", "forgetting": "random-walk"}, "without drift"),
         ({"start": "somewhere"}, "expected all coefficients"),
         ({"update_from": 1e6}, "the record ends"),
-        ({"every": 0}, "expected 1 or more"),
+        ({"every": 0}, "expected a whole number from 1"),
         ({"moving_average": -1.0}, "moving_average"),
     ],
 )
