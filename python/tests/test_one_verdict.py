@@ -78,7 +78,11 @@ def printed(verdict: dict[str, Any]) -> dict[str, Any]:
 
 def same(person: pyhoid.OperatorFit, found: dict[str, Any], where: str) -> None:
     def bare(verdict: object) -> str:
-        return json.dumps(verdict).replace(where, "").replace(".csv", "")
+        # The program prints twelve digits.
+        twelve_digits = json.loads(
+            json.dumps(verdict), parse_float=lambda text: float(f"{float(text):.12g}")
+        )
+        return json.dumps(twelve_digits).replace(where, "").replace(".csv", "")
 
     assert person.form == found["form"]
     assert bare(written(person.verdict)) == bare(printed(found["verdict"]))

@@ -22,7 +22,7 @@ fn full_disk_leaves_complete_files_and_resumable_blocks() {
     let directory = tempfile::tempdir().unwrap();
     let bench = Bench::new(env!("CARGO_BIN_EXE_hoid").into(), directory.path());
     let mut draw = Draw(54);
-    for (work, count) in [(STUDY, 3), (GROUP, 16), (TRACK, 4)] {
+    for (work, count) in [(STUDY, 3), (GROUP, 6), (TRACK, 4)] {
         let Some(outcome) = run_rounds(&bench, &work, count, &mut draw) else {
             eprintln!("skipped: no disk of its own can be mounted here");
             return;
