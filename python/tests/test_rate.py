@@ -29,7 +29,7 @@ def test_a_record_is_decimated(fast: pyhoid.Record) -> None:
     for wrong in ("on", 0, -1, 2.5):
         with pytest.raises(pyhoid.OptionError, match="decimate is"):
             fast.decimated(wrong)  # type: ignore[arg-type]
-    with pytest.raises(pyhoid.DataError, match="found 100 samples for a filter"):
+    with pytest.raises(pyhoid.DataError, match="found 100 samples, but the filter"):
         fast.span(0, 0.1).decimated()
 
 
