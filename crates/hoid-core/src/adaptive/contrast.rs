@@ -21,9 +21,9 @@
 
 use hoid_numerics::{cholesky, products::dot};
 
-use super::{blocks::Block, sizes::STATE_COUNT};
+use super::blocks::Block;
 
-type Matrix = [[f64; STATE_COUNT]; STATE_COUNT];
+type Matrix<const S: usize> = [[f64; S]; S];
 
 /// Number of blocks over which each score is summed.
 const BLOCKS_PER_SCORE: usize = 2;
@@ -35,38 +35,58 @@ pub(super) const MODEL_ONLY_WEIGHT: f64 = 0.0;
 const MIN_DIVISOR: f64 = 0.3;
 
 /// Difference between present and past in gains, level, natural frequency, damping and delay.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Contrast {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contrast<const S: usize> {
     /// State of the present minus state of the past.
-    pub difference: [f64; STATE_COUNT],
+    pub difference: [f64; S],
     /// Covariance of the difference.
-    pub covariance: Matrix,
+    pub covariance: Matrix<S>,
     /// State of the past, with corrections relative to the point of the basis.
-    pub before: [f64; STATE_COUNT],
+    pub before: [f64; S],
     /// Covariance of the state of the past.
-    pub covariance_before: Matrix,
+    pub covariance_before: Matrix<S>,
     /// Residual sum of squares over both spans.
     pub residual_squares: f64,
     /// Numbers of samples in the past and in the present.
     pub samples: [f64; 2],
 }
 
-crate::state!([] Contrast { difference, covariance, before, covariance_before, residual_squares, samples });
+crate::state!([const S: usize] Contrast<S> {
+    difference,
+    covariance,
+    before,
+    covariance_before,
+    residual_squares,
+    samples,
+});
 
-impl Contrast {
+impl<const S: usize> Default for Contrast<S> {
+    fn default() -> Self {
+        Self {
+            difference: [0.0; S],
+            covariance: [[0.0; S]; S],
+            before: [0.0; S],
+            covariance_before: [[0.0; S]; S],
+            residual_squares: 0.0,
+            samples: [0.0; 2],
+        }
+    }
+}
+
+impl<const S: usize> Contrast<S> {
     /// Computes the difference between two spans of blocks. `with_prior` adds a prior to the sums of each span;
     /// `empirical_share` is w. Returns `None` if the data of a span do not determine a state.
-    pub(super) fn from_spans(
-        sides: [&[Block]; 2],
+    pub(super) fn from_spans<const P: usize>(
+        sides: [&[Block<S, P>]; 2],
         empirical_share: f64,
-        with_prior: impl Fn(Block) -> Block,
+        with_prior: impl Fn(Block<S, P>) -> Block<S, P>,
     ) -> Option<Self> {
         let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
         let [Some(before), Some(now)] = sums.each_ref().map(Block::solve) else {
             return None;
         };
         let solutions = [before, now];
-        let (mut squares, mut stretches) = ([[0.0; STATE_COUNT]; STATE_COUNT], 0.0);
+        let (mut squares, mut stretches) = ([[0.0; S]; S], 0.0);
         for (blocks, solution) in sides.iter().zip(&solutions) {
             for stretch in blocks.rchunks_exact(BLOCKS_PER_SCORE) {
                 let score = Block::of(stretch).score(&solution.state);
@@ -76,11 +96,11 @@ impl Contrast {
                 stretches += 1.0;
             }
         }
-        let free = (1.0 - (STATE_COUNT + 3) as f64 / stretches).max(MIN_DIVISOR);
+        let free = (1.0 - (S + 3) as f64 / stretches).max(MIN_DIVISOR);
         let samples = sums.map(|s| s.samples);
         let all = samples[0] + samples[1];
         let residual_squares = before.residual_squares + now.residual_squares;
-        let variance = residual_squares / (all - 2.0 * STATE_COUNT as f64).max(1.0);
+        let variance = residual_squares / (all - 2.0 * S as f64).max(1.0);
         let [covariance_before, covariance_now] = core::array::from_fn(|side| {
             let (matrix, inverse) = (sums[side].matrix(), &solutions[side].inverse);
             let share = empirical_share * samples[side] / (all * free);
@@ -102,16 +122,16 @@ impl Contrast {
     /// if the latter is not positive definite.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
-        if !cholesky::factor(&mut factor, STATE_COUNT) {
+        if !cholesky::factor(&mut factor, S) {
             return None;
         }
         let mut trace = 0.0;
-        for i in 0..STATE_COUNT {
+        for i in 0..S {
             let mut column = core::array::from_fn(|j| self.covariance[j][i]);
-            cholesky::solve(&factor, STATE_COUNT, &mut column);
+            cholesky::solve(&factor, S, &mut column);
             trace += column[i];
         }
-        Some(trace / STATE_COUNT as f64)
+        Some(trace / S as f64)
     }
 
     /// Returns this contrast with both covariances multiplied by a factor.
@@ -125,32 +145,41 @@ impl Contrast {
 
     /// Returns the Wald statistic `d' C^-1 d` of the selected components, or `None` if their covariance C is not
     /// positive definite.
-    pub(super) fn wald_statistic<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
-        let d = places.map(|i| self.difference[i]);
-        let mut factor = places.map(|i| places.map(|j| self.covariance[i][j]));
+    pub(super) fn wald_statistic(&self, is_selected: impl Fn(usize) -> bool) -> Option<f64> {
+        let (mut d, mut factor, mut n) = ([0.0; S], [[0.0; S]; S], 0);
+        for i in (0..S).filter(|i| is_selected(*i)) {
+            d[n] = self.difference[i];
+            for (j, place) in (0..S).filter(|j| is_selected(*j)).enumerate() {
+                factor[n][j] = self.covariance[i][place];
+            }
+            n += 1;
+        }
         let mut solved = d;
-        if !cholesky::factor(&mut factor, N) {
+        if !cholesky::factor(&mut factor, n) {
             return None;
         }
-        cholesky::solve(&factor, N, &mut solved);
-        let t = dot(&solved, &d);
+        cholesky::solve(&factor, n, &mut solved);
+        let t = dot(&solved[..n], &d[..n]);
         t.is_finite().then_some(t)
     }
 }
 
-fn matrix_from_fn(of: impl Fn(usize, usize) -> f64) -> Matrix {
+fn matrix_from_fn<const S: usize>(of: impl Fn(usize, usize) -> f64) -> Matrix<S> {
     core::array::from_fn(|i| core::array::from_fn(|j| of(i, j)))
 }
 
-fn matrix_product(a: &Matrix, b: &Matrix) -> Matrix {
-    matrix_from_fn(|i, j| (0..STATE_COUNT).map(|k| a[i][k] * b[k][j]).sum())
+fn matrix_product<const S: usize>(a: &Matrix<S>, b: &Matrix<S>) -> Matrix<S> {
+    matrix_from_fn(|i, j| (0..S).map(|k| a[i][k] * b[k][j]).sum())
 }
 
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::blocks::{EMPTY, Row};
+    use crate::adaptive::{
+        blocks::Row,
+        sizes::{GAIN_COUNT, PRODUCT_COUNT, STATE_COUNT},
+    };
 
     /// Returns a number of the standard normal distribution, except for its tails.
     fn random_normal(state: &mut u64) -> f64 {
@@ -164,17 +193,21 @@ mod tests {
     }
 
     const STATE: [f64; STATE_COUNT] = [1.0, -0.5, 0.3, 0.2, 0.1, -0.2, 0.4];
-    const TESTED_STATES: [usize; 6] = [0, 1, 2, 4, 5, 6];
     /// Number of samples in a block.
     const SAMPLES_PER_BLOCK: usize = 25;
 
     /// Returns blocks whose regressors and noise are first-order processes, with the pole 0.8 for the regressors and
     /// the given pole for the noise.
-    fn blocks(count: usize, state: &[f64; STATE_COUNT], noise_pole: f64, random: &mut u64) -> std::vec::Vec<Block> {
+    fn blocks(
+        count: usize,
+        state: &[f64; STATE_COUNT],
+        noise_pole: f64,
+        random: &mut u64,
+    ) -> std::vec::Vec<Block<STATE_COUNT, PRODUCT_COUNT>> {
         let (mut x, mut v) = ([0.0; STATE_COUNT], 0.0);
         let mut all = std::vec::Vec::new();
         for _ in 0..count {
-            let mut block = EMPTY;
+            let mut block = Block::EMPTY;
             for _ in 0..SAMPLES_PER_BLOCK {
                 for x in &mut x {
                     *x = 0.8 * *x + 0.6 * random_normal(random);
@@ -202,11 +235,11 @@ mod tests {
             let all = blocks(70, &STATE, noise_pole, &mut random);
             let sides = [&all[..60], &all[60..]];
             let contrast = Contrast::from_spans(sides, EMPIRICAL_WEIGHT, |sum| sum).unwrap();
-            let t = contrast.wald_statistic(TESTED_STATES).unwrap();
+            let t = contrast.wald_statistic(|i| i != GAIN_COUNT).unwrap();
             sum += t;
             square += t * t;
             let model = Contrast::from_spans(sides, MODEL_ONLY_WEIGHT, |sum| sum).unwrap();
-            by_model += model.wald_statistic(TESTED_STATES).unwrap();
+            by_model += model.wald_statistic(|i| i != GAIN_COUNT).unwrap();
         }
         let n = runs as f64;
         let mean = sum / n;
@@ -252,7 +285,7 @@ mod tests {
         let changed = core::array::from_fn(|i| STATE[i] + if i == 1 { 1.0 } else { 0.0 });
         all.extend(blocks(10, &changed, 0.0, &mut random));
         let contrast = Contrast::from_spans([&all[..60], &all[60..]], EMPIRICAL_WEIGHT, |sum| sum).unwrap();
-        assert!(contrast.wald_statistic(TESTED_STATES).unwrap() > 100.0);
+        assert!(contrast.wald_statistic(|i| i != GAIN_COUNT).unwrap() > 100.0);
         for i in 0..STATE_COUNT {
             let expected = if i == 1 { 1.0 } else { 0.0 };
             let error = libm::sqrt(contrast.covariance[i][i]);
@@ -267,9 +300,13 @@ mod tests {
         let mut random = 4;
         let all = blocks(20, &STATE, 0.0, &mut random);
         assert!(Contrast::from_spans([&[], &all], EMPIRICAL_WEIGHT, |sum| sum).is_none());
-        assert!(Contrast::from_spans([&all, &[EMPTY; 4]], EMPIRICAL_WEIGHT, |sum| sum).is_none());
-        let nothing = |sum: Block| sum;
-        assert!(Contrast::from_spans([&[EMPTY; 10], &[EMPTY; 4]], EMPIRICAL_WEIGHT, nothing).is_none());
-        assert!(Contrast::default().wald_statistic(TESTED_STATES).is_none());
+        assert!(Contrast::from_spans([&all, &[Block::EMPTY; 4]], EMPIRICAL_WEIGHT, |sum| sum).is_none());
+        let nothing = |sum: Block<STATE_COUNT, PRODUCT_COUNT>| sum;
+        assert!(Contrast::from_spans([&[Block::EMPTY; 10], &[Block::EMPTY; 4]], EMPIRICAL_WEIGHT, nothing).is_none());
+        assert!(
+            Contrast::<STATE_COUNT>::default()
+                .wald_statistic(|i| i != GAIN_COUNT)
+                .is_none()
+        );
     }
 }

@@ -7,10 +7,12 @@
 //!
 //! `T = d' C^-1 d`
 //!
-//! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change (G. C. Chow, *Econometrica* 28
-//! (1960) 591-605). T is computed for a short and for a long present, since small changes take more data to detect than
+//! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change, and four more for each further
+//! input (G. C. Chow, *Econometrica* 28 (1960) 591-605). T is computed for a short and for a long present, since small changes take more data to detect than
 //! large ones. One second between past and present is left out, since a change need not coincide with the border of a
 //! block.
+//! All responses are tested together: within a few seconds the data show that u is predicted worse, but hardly by which
+//! input, so the response to one input alone, with the others free, would be tested with little power.
 //!
 //! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, the level
 //! of T relative to a chi-square in the absence of a change. c is estimated from the mean of `ln T`, whose expected
@@ -21,7 +23,7 @@
 //!
 //! (M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5).
 //!
-//! **Declaration.** A change is declared if one of the two statistics exceeds the threshold. The time of the change is
+//! **Declaration.** A change is declared if one of the statistics exceeds the threshold. The time of the change is
 //! the block border that gives the smallest residual sum of squares when all parameters are free before and after it
 //! (R. E. Quandt, *J. American Statistical Association* 53 (1958) 873-880).
 //!
@@ -33,17 +35,11 @@ use super::{
     contrast::{Contrast, EMPIRICAL_WEIGHT, MODEL_ONLY_WEIGHT},
     difference::Difference,
     last_blocks::{BLOCK_S, LastBlocks, MAX_BLOCKS},
-    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT},
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, correction_places, input_count},
 };
 
 /// Expected value of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
 const MEAN_LOG_CHI_SQUARE: f64 = 0.115_931_515_658_412_45;
-/// Number of tested parameters: gains and dynamics.
-const TESTED_COUNT: usize = GAIN_COUNT + DYNAMICS_COUNT;
-/// Indices of the tested parameters in the state: all states except the level.
-const TESTED_STATES: [usize; TESTED_COUNT] = [0, 1, 2, LINEAR_COUNT, LINEAR_COUNT + 1, LINEAR_COUNT + 2];
-/// Number of pairs of degrees of freedom of the statistic.
-const PAIR_COUNT: u32 = TESTED_COUNT as u32 / 2;
 /// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
 /// Minimum number of blocks in a present that starts after a gap.
@@ -76,6 +72,8 @@ pub struct DetectorSettings {
 /// Statistic, with its level in the absence of a change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
+    /// Number of pairs of degrees of freedom.
+    pairs: u32,
     level: f64,
     levels: f64,
     log_significance: f64,
@@ -84,9 +82,10 @@ struct Statistic {
 crate::state!([] Statistic { level, levels, log_significance });
 
 impl Statistic {
-    fn new() -> Self {
+    fn new(pairs: u32) -> Self {
         Self {
-            level: mean_log_chi_square(PAIR_COUNT),
+            pairs,
+            level: mean_log_chi_square(pairs),
             levels: PRIOR_BLOCKS,
             log_significance: 0.0,
         }
@@ -94,12 +93,12 @@ impl Statistic {
 
     /// Mean ratio of the statistic so far to a chi-square, at least one.
     fn scale(&self) -> f64 {
-        libm::exp(self.level - mean_log_chi_square(PAIR_COUNT)).max(1.0)
+        libm::exp(self.level - mean_log_chi_square(self.pairs)).max(1.0)
     }
 
     fn update(&mut self, t: f64) {
         // The test uses the level estimated before this block, so a change does not reduce its own significance.
-        self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIR_COUNT);
+        self.log_significance = log_significance(t / libm::sqrt(self.scale()), self.pairs);
         self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY_BLOCKS);
         let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);
         self.level += (log - self.level) / self.levels;
@@ -124,22 +123,25 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
 
 /// Detector of changes of the operator.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Detector {
+pub struct Detector<const S: usize> {
     settings: DetectorSettings,
     /// Statistics for the short and for the long present.
     statistics: [Statistic; 2],
     /// Number of blocks since the last change was declared.
     since: u64,
     declared: bool,
-    declared_contrast: Contrast,
+    declared_contrast: Contrast<S>,
     innovation_variances: [f64; 2],
-    difference: Difference,
+    difference: Difference<S>,
     ago: usize,
 }
 
-crate::state!([] Detector { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
+crate::state!([const S: usize] Detector<S> { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
 
-impl Detector {
+impl<const S: usize> Detector<S> {
+    /// Number of pairs of degrees of freedom of the statistic: gains and dynamics are tested, but not the level.
+    const PAIR_COUNT: u32 = (S as u32 - 1) / 2;
+
     /// Builds the detector. Returns `None` if the settings are not valid or need more blocks than can be stored.
     pub fn new(settings: DetectorSettings) -> Option<Self> {
         let [short, long] = settings.recent;
@@ -149,7 +151,7 @@ impl Detector {
         let sound = settings.dynamics.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
             settings,
-            statistics: [Statistic::new(); 2],
+            statistics: [Statistic::new(Self::PAIR_COUNT); 2],
             since: u64::MAX >> 12,
             declared: false,
             declared_contrast: Contrast::default(),
@@ -159,9 +161,8 @@ impl Detector {
         })
     }
 
-    /// Tests the stored blocks; the last one is new. `dynamics` are the current corrections of natural frequency,
-    /// damping and delay, relative to the basis of the blocks.
-    pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS_COUNT]) {
+    /// Tests the stored blocks; the last one is new. `mean` is the current state, in the basis of the blocks.
+    pub(super) fn test<const P: usize>(&mut self, last: &LastBlocks<S, P>, mean: &[f64; S]) {
         self.declared = false;
         self.since += 1;
         // Blocks recorded before the last declared change belong to another operator and are not used.
@@ -171,7 +172,7 @@ impl Detector {
             .min(usize::try_from(self.since).unwrap_or(MAX_BLOCKS) + self.ago);
         let blocks = &last.blocks()[last.blocks().len() - known..];
         for present in 0..self.statistics.len() {
-            match self.wald_statistic(blocks, last.fresh_block_count(), dynamics, present) {
+            match self.wald_statistic(blocks, last.fresh_block_count(), mean, present) {
                 Some(t) => self.statistics[present].update(t),
                 None => self.statistics[present].log_significance = 0.0,
             }
@@ -180,16 +181,16 @@ impl Detector {
             self.declared = true;
             self.since = 0;
             let [_, long] = self.settings.recent;
-            self.locate_change(blocks, dynamics, long.min(last.fresh_block_count()));
+            self.locate_change(blocks, mean, long.min(last.fresh_block_count()));
         }
     }
 
     /// Statistic T for a given length of the present; `None` if there are too few blocks.
-    fn wald_statistic(
+    fn wald_statistic<const P: usize>(
         &self,
-        blocks: &[Block],
+        blocks: &[Block<S, P>],
         fresh: usize,
-        dynamics: [f64; DYNAMICS_COUNT],
+        mean: &[f64; S],
         present: usize,
     ) -> Option<f64> {
         let DetectorSettings {
@@ -202,8 +203,8 @@ impl Detector {
             return None;
         }
         let sides = [&blocks[before.saturating_sub(most)..before], &blocks[now..]];
-        self.compare(sides, EMPIRICAL_WEIGHT, dynamics)?
-            .wald_statistic(TESTED_STATES)
+        self.compare(sides, EMPIRICAL_WEIGHT, mean)?
+            .wald_statistic(|i| i != GAIN_COUNT)
     }
 
     /// Locates the change at the block border with the smallest residual sum of squares. The difference is reported
@@ -211,12 +212,12 @@ impl Detector {
     /// the covariance estimated from the scores to that given by the noise model, for the difference between the two
     /// halves of the past. The covariance from the scores alone is too uncertain to distinguish gains from a delay, and
     /// the scores of the present contain the change.
-    fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS_COUNT], recent: usize) {
-        let mut best: Option<Contrast> = None;
+    fn locate_change<const P: usize>(&mut self, blocks: &[Block<S, P>], mean: &[f64; S], recent: usize) {
+        let mut best: Option<Contrast<S>> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
         for after in 1..=self.ago {
             let (past, present) = blocks.split_at(blocks.len() - after);
-            let Some(contrast) = self.compare([past, present], MODEL_ONLY_WEIGHT, dynamics) else {
+            let Some(contrast) = self.compare([past, present], MODEL_ONLY_WEIGHT, mean) else {
                 continue;
             };
             if best.is_none_or(|best| contrast.residual_squares < best.residual_squares) {
@@ -226,7 +227,7 @@ impl Detector {
         let (past, present) = blocks.split_at(blocks.len() - self.ago);
         let halves = past.split_at(past.len() / 2);
         let [by_model, shown] =
-            [MODEL_ONLY_WEIGHT, EMPIRICAL_WEIGHT].map(|w| self.compare([halves.0, halves.1], w, dynamics));
+            [MODEL_ONLY_WEIGHT, EMPIRICAL_WEIGHT].map(|w| self.compare([halves.0, halves.1], w, mean));
         let dispersion = shown.zip(by_model).and_then(|(shown, model)| shown.dispersion(&model));
         self.declared_contrast = best.unwrap_or_default().scaled(dispersion.unwrap_or(1.0).max(1.0));
         self.innovation_variances = [past, present].map(|side| Block::of(side).innovation_variance());
@@ -234,9 +235,19 @@ impl Detector {
     }
 
     /// Computes the difference of all states between two spans.
-    fn compare(&self, sides: [&[Block]; 2], empirical_share: f64, dynamics: [f64; DYNAMICS_COUNT]) -> Option<Contrast> {
-        let deviations = self.settings.dynamics;
-        Contrast::from_spans(sides, empirical_share, |sum| sum.with_prior(dynamics, deviations))
+    fn compare<const P: usize>(
+        &self,
+        sides: [&[Block<S, P>]; 2],
+        empirical_share: f64,
+        mean: &[f64; S],
+    ) -> Option<Contrast<S>> {
+        let mut deviations = [0.0; S];
+        for input in 0..input_count(S) {
+            for (place, deviation) in correction_places(input).into_iter().zip(self.settings.dynamics) {
+                deviations[place] = deviation;
+            }
+        }
+        Contrast::from_spans(sides, empirical_share, |sum| sum.with_prior(mean, &deviations))
     }
 
     /// Returns the time in s between the last declared change and its declaration.
@@ -257,7 +268,7 @@ impl Detector {
     }
 
     /// Returns the difference between present and past at the last declared change, computed with all parameters free.
-    pub fn contrast(&self) -> &Contrast {
+    pub fn contrast(&self) -> &Contrast<S> {
         &self.declared_contrast
     }
 
@@ -272,7 +283,7 @@ impl Detector {
     }
 
     /// Returns the parameters that differ at the last declared change, and the sizes of their changes.
-    pub fn difference(&self) -> &Difference {
+    pub fn difference(&self) -> &Difference<S> {
         &self.difference
     }
 
