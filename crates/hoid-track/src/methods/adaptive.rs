@@ -246,15 +246,15 @@ impl AdaptiveOptions {
     /// Returns the prior of the kernel, and the point at which its basis starts.
     fn kernel_prior(&self, setup: &Setup, sample_time: SampleTime) -> Result<(AdaptivePrior, Point), IdentError> {
         let (ts, nk) = (sample_time.s(), setup.orders.nk);
-        let beginning = StartingPoint::of(
+        let start = StartingPoint::of(
             &self.prior,
             (nk as f64 - 0.5) * ts,
             is_given(nk, sample_time),
             sample_time,
         )?;
         let supposed = DefaultOperator {
-            point: beginning.point,
-            spread: beginning.spread,
+            point: start.point,
+            spread: start.spread,
             // An nd of 0 or 1 gives no information about the colour of the noise, so the default order is used.
             order: match setup.orders.nd {
                 0 | 1 => defaults::NOISE_ORDER,
@@ -263,7 +263,7 @@ impl AdaptiveOptions {
             limit: self.innovation_limit(),
             false_alarms: self.false_alarms,
         };
-        Ok((supposed.prior(ts), beginning.point))
+        Ok((supposed.prior(ts), start.point))
     }
 
     fn memory(&self, inputs: usize, sample_time: SampleTime) -> Vec<f64> {
@@ -355,7 +355,7 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> AdaptiveRec
             self.model.basis_of(input).point(),
             0.5 * self.reported[0].sample_time_s(),
         );
-        let beginning = [at.omega, at.zeta, at.tau - hold];
+        let start = [at.omega, at.zeta, at.tau - hold];
         let (first, places) = (first_gain(input), correction_places(input));
         let gain = |i: usize, state: &[f64], of: &dyn Fn(usize, usize) -> f64| {
             let value = map[i].iter().zip(&state[first..]).map(|(m, s)| m * s).sum();
@@ -370,7 +370,7 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> AdaptiveRec
             0 | 1 => gain(i, &told.before, &|a, b| told.covariance_before[a][b]),
             _ => {
                 let k = places[i - 2];
-                Estimate::with_variance(beginning[i - 2] + told.before[k], told.covariance_before[k][k])
+                Estimate::with_variance(start[i - 2] + told.before[k], told.covariance_before[k][k])
             }
         };
         let difference = |i: usize| match i {
