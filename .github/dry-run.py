@@ -27,15 +27,15 @@ from typing import Any
 import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
-#: What a runner of this platform is called in the matrices.
+#: Name of a runner of this platform in the matrices.
 HERE = ("x86_64-unknown-linux-gnu", "linux-x86_64", "ubuntu-latest", "ubuntu-22.04", "ubuntu-24.04")
-#: Actions whose work is done before: the clone, the tools of this machine, their caches.
+#: Actions that are not needed here: the clone, the tools of this machine, their caches.
 AT_HAND = ("actions/checkout", "dtolnay/rust-toolchain", "Swatinem/rust-cache", "actions/setup-python", "actions/setup-node")
-#: Commands that publish, and what is run in their place.
+#: Commands that publish, and their replacements.
 DRY = {"cargo publish ": "cargo package --allow-dirty --no-verify ", "gh release create": "echo gh release create"}
 #: The same, built faster.
 DEV = {"--profile shipped": "--profile dev", "/shipped/": "/debug/", "packages.py --install": "packages.py --profile dev --install"}
-#: What may become of a step.
+#: Possible results of a step.
 OUTCOMES = ("passed", "failed", "not here")
 
 
@@ -49,13 +49,13 @@ def matrix_of(job: dict[str, Any]) -> dict[str, str] | None:
         if key not in ("include", "exclude"):
             entries = [{**entry, key: value} for value in values for entry in entries or [{}]]
     here = [entry for entry in entries if set(map(str, entry.values())) & set(HERE)]
-    # The most particular name counts: a target before the runner that others share.
+    # The most specific name counts: a target before a shared runner.
     here.sort(key=lambda entry: min(HERE.index(str(v)) for v in entry.values() if str(v) in HERE))
     return here[0] if here else None
 
 
 def filled(text: str, matrix: dict[str, str]) -> str:
-    """With the values of the matrix; other expressions are empty, as where no event has set them."""
+    """Replaces the values of the matrix; other expressions are empty, as without an event."""
     text = re.sub(r"\$\{\{\s*matrix\.([\w-]+)\s*\}\}", lambda m: str(matrix[m[1]]), text)
     return re.sub(r"\$\{\{.*?\}\}", "", text)
 
@@ -67,7 +67,7 @@ def replaced(text: str, others: dict[str, str]) -> str:
 
 
 def command_of(step: dict[str, Any], matrix: dict[str, str], artifacts: Path, tools: Path) -> str | None:
-    """What a step runs here; none if it needs the host."""
+    """Returns the commands of a step; none if it needs the host."""
     if "run" in step:
         return replaced(filled(step["run"], matrix), DRY)
     action, given = step["uses"].split("@")[0], {k: filled(str(v), matrix) for k, v in step.get("with", {}).items()}
@@ -84,7 +84,7 @@ def command_of(step: dict[str, Any], matrix: dict[str, str], artifacts: Path, to
 
 
 def run(workflow: str, jobs: list[str], directory: Path, dev: bool) -> dict[str, int]:
-    """Runs the jobs; how many steps passed, failed, and cannot run here."""
+    """Runs the jobs; returns the numbers of steps that passed, failed, and cannot run here."""
     described = yaml.safe_load((ROOT / f".github/workflows/{workflow}.yml").read_text(encoding="utf-8"))
     unknown = set(jobs) - set(described["jobs"])
     if unknown:

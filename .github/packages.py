@@ -1,4 +1,4 @@
-"""Looks into packages before they are published, and installs what they hold where nothing of the repository is.
+"""Examines packages before they are published, and installs them outside the repository.
 
     python3 .github/packages.py target/package/*.crate python/dist/*      # both licence texts in each
     python3 .github/packages.py --install target/package/*.crate          # built of the packages alone, then tried
@@ -23,7 +23,7 @@ from pathlib import Path
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
 #: The crate of the program.
 PROGRAM = "hoid-cli"
-#: What a user does first. Its output must start with the verdict.
+#: First commands of a user. Their output must start with the verdict.
 TRIAL = "import pyhoid; print(pyhoid.identify(pyhoid.simulate('C1', seed=1)))"
 
 
@@ -37,7 +37,7 @@ def contents(package: Path) -> dict[str, int]:
 
 
 def licences_missing(package: Path) -> list[str]:
-    """Texts that do not exist, or are not whole: a link in place of a text is a few bytes."""
+    """Returns missing or incomplete texts: a link in place of a text has only a few bytes."""
     files = contents(package)
     return [name for name in LICENCES if not any(Path(file).name == name and size > 900 for file, size in files.items())]
 

@@ -1,4 +1,4 @@
-// Screens of a built book, and what is cut off in it (screens.sh says how it is called).
+// Screenshots of a built book, and the elements that are cut off (usage: screens.sh).
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
@@ -12,14 +12,14 @@ if (!path) {
   console.log("skipped: no browser is here (apt-get install chromium, or HOID_CHROMIUM=PATH)");
   process.exit(0);
 }
-// The first chapter stands twice (index.html), print.html is all of them.
+// The first chapter occurs twice (index.html); print.html contains all chapters.
 const left = /^(404|index|print|toc)\.html$/;
 const pages = readdirSync(book, { recursive: true })
   .filter((page) => page.endsWith(".html") && !left.test(page))
   .filter((page) => !wanted.length || wanted.some((part) => page.includes(part)))
   .sort();
 
-/** What is wrong with a page as it stands on the screen. */
+/** Returns the problems of a page on the screen. */
 function faults(wide) {
   const found = [];
   const screen = document.documentElement.clientWidth;
@@ -36,7 +36,7 @@ function faults(wide) {
   return found;
 }
 
-/** Links of a page to headings that are not there. */
+/** Returns the links of a page to missing headings. */
 function dead(page) {
   const html = readFileSync(join(book, page), "utf8").replace(/[^]*<main>/, "").replace(/<\/main>[^]*/, "");
   return [...html.matchAll(/href="([^"]*)"/g)].flatMap(([, link]) => {
@@ -61,7 +61,7 @@ for (const [name, width, theme] of [
     const tab = await context.newPage();
     await tab.goto(pathToFileURL(join(book, page)).href);
     await tab.waitForLoadState("load");
-    // What the colours do not change is told once.
+    // Problems that do not depend on the colours are reported once.
     const found = theme === "light" ? [...(await tab.evaluate(faults, width > 400)), ...(name === "400" ? dead(page) : [])] : [];
     for (const fault of found) console.log(`${page} (${name}): ${fault}`);
     count += found.length;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Screens of every page of the book: `bash docs/trials/screens.sh DIR [PAGE...]` builds it and writes DIR/PAGE-400.png, -1200.png and
-# -dark.png for looking at, and names what is cut off: a page wider than the screen, a block or table that must be moved sideways at 1200
+# -dark.png for inspection, and lists the elements that are cut off: a page wider than the screen, a block or table that must be moved sideways at 1200
 # pixels, a picture that is not there, a link to a heading that no page has. Needs mdbook, npm and Chromium.
 set -euo pipefail
 root="$(cd "$(dirname "$0")/../.." && pwd)"

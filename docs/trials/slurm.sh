@@ -57,7 +57,7 @@ echo "task 1 is killed: $(scancel --signal=KILL --full "${job}_1" && echo "done"
 until [ "$(state "${job}_3")" = JobState=RUNNING ]; do sleep 0.2; done
 sleep 1
 echo "task 3 goes back into the queue: $(scontrol requeue "${job}_3" && echo "done")"
-# A task that waits after a requeue may have a start time in the future; it is begun at once.
+# A task that waits after a requeue may have a start time in the future; it is started at once.
 sleep 2
 scontrol update jobid="${job}_3" StartTime=now 2>/dev/null || true
 wait "$waiting" || echo "sbatch --wait says that a task failed, as it did"

@@ -1,4 +1,4 @@
-"""What the tests share: runs that are simulated once, and the command line to compare with."""
+"""Shared fixtures: runs that are simulated once, and the command line for comparison."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ import pyhoid
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 
-#: Modules with the longest tests. They start first: at the end a processor would wait for them.
+#: Modules with the longest tests, which start first so that no processor waits for them at the end.
 LONGEST = ("test_stubs.py", "test_book.py", "test_pages.py")
 
 
@@ -63,7 +63,7 @@ def group_results(tmp_path: Path) -> Path:
 
 
 class CommandLine:
-    """The binary of the same sources; `cargo xtask test` names it in HOID_BINARY."""
+    """The binary built from the same sources; `cargo xtask test` gives its path in HOID_BINARY."""
 
     def __init__(self, binary: str) -> None:
         self.binary = binary

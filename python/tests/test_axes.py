@@ -5,7 +5,7 @@ import pytest
 
 
 def flight() -> pyhoid.Record:
-    """Two people of the thesis as the axes of one: their signals side by side."""
+    """Two simulated people as the two axes of one recording."""
     x, y = (pyhoid.simulate("C1", seed=seed) for seed in (1, 2))
     return pyhoid.Record(
         e=x.e,

@@ -15,7 +15,7 @@ import pytest
 from book.pages import ROOT, blocks, name, pages
 from book.reader import Reader
 
-#: A given number of blocks may be left out, each with its reason.
+#: Number of blocks that may be skipped, each with a reason.
 EXCEPTIONS = 2
 RUN = {"sh", "python", "toml", "text", "json"}
 PAGES = [page for page in pages() if any(block.language in RUN for block in blocks(page))]

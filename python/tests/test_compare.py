@@ -1,4 +1,4 @@
-"""Conditions and people compared."""
+"""Comparison of conditions and people."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_recordings_are_analysed_first(tmp_path: Path) -> None:
     )
     assert [d["quantity"] for d in found.differences] == ["crossover", "T_L"]
     assert any("of all people" in note for note in found.verdict.notes) and seen[-1][0] == seen[-1][1]
-    # What was analysed is compared again without the recordings.
+    # A finished analysis is compared again without the recordings.
     again = pyhoid.compare(kept / "group", of="crossover")
     assert again.differences[0]["value"] == found.differences[0]["value"]
     assert sorted(place.name for place in kept.iterdir()) == ["group", "group-lead-lag"]

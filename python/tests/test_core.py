@@ -24,7 +24,7 @@ def test_a_fit_and_its_parts(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), errors, rtol=1e-12)
     operator = fit.operator
     assert operator is not None and operator.convertible and operator.stable
-    # Three standard errors around the truth of the simulation.
+    # Three standard errors around the true value.
     for name, truth in {"K_e": 0.09, "T_L": 0.4, "omega_nm": 11.25, "zeta_nm": 0.35}.items():
         value, error = operator[name]
         assert error is not None and abs(value - truth) < 3 * error, name
@@ -168,7 +168,7 @@ def test_tables_with_instants_and_durations(c1: pyhoid.Record, tmp_path: Path) -
         pyhoid.Record.from_pandas(
             uneven.set_index(pd.to_datetime(np.asarray(uneven.index), unit="s"))
         )
-    # What a recorder rounds is the same record from the file and from the table.
+    # Rounded numbers give the same record from the file and from the table.
     rounded = pd.DataFrame({"t": np.arange(3000) / 60, "e": 0.5, "u": np.arange(3000.0)}).round(4)
     rounded["e"] = np.sin(rounded.u)
     rounded.to_csv(tmp_path / "run.csv", index=False)
@@ -227,7 +227,7 @@ def test_a_tracker_goes_on_out_of_a_pickle(c4: pyhoid.Record) -> None:
         {"method": "rpem", "nd": (1, 2)},
     ):
         tracker = pyhoid.Tracker(sample_time=0.01, nk=29, **keywords)
-        # In the warm-up as well as after it.
+        # During and after the warm-up.
         for first, last in ((0, 1500), (1500, 4000), (4000, 5000)):
             copy = pickle.loads(pickle.dumps(tracker))
             expected = tracker.update(c4.e[first:last], c4.u[first:last])
@@ -353,7 +353,7 @@ def test_an_earlier_name_of_a_method_is_read_with_a_warning(c4: pyhoid.Record) -
         tracker = pyhoid.Tracker(earlier, sample_time=0.01)
     assert [warning.filename for warning in warned] == [__file__]
     assert tracker.settings["method"] == "adaptive"
-    # What was pickled under it is read silently.
+    # A pickle with the earlier name is read without a warning.
     tracker._options["method"] = earlier
     tracker.update(c4.e[:300], c4.u[:300])
     again = pickle.loads(pickle.dumps(tracker))
@@ -369,7 +369,7 @@ def test_a_person_is_tracked_from_an_earlier_fit(c1: pyhoid.Record, tmp_path: Pa
     by_file = pyhoid.track(later, prior=file, at=[2.5], every=50)
     usual = pyhoid.track(later, at=[2.5], every=50)
     np.testing.assert_array_equal(by_fit["gain_db@2.5"], by_file["gain_db@2.5"])
-    # Before the first sample it is the fit.
+    # Before the first sample the estimate is the fit.
     tracker = pyhoid.Tracker(prior=str(file), at=[2.5], sample_time=0.01)
     gain, _ = tracker.responses[2.5]
     assert gain.value == pytest.approx(
@@ -422,7 +422,7 @@ def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:
     assert found.verdict == "trustworthy" and not found.reasons, found
     assert found.excitation == "f_t" and abs(found.period - 81.92) < 1e-9
     by_hand = pyhoid.describing_function(runs, averaging="reference", reference="f_t")
-    # By hand the lines are those of larger amplitude.
+    # Selected by hand: the lines of larger amplitude.
     shared = np.isin(found.function.omega.round(9), by_hand.omega.round(9))
     assert np.array_equal(found.function.response[shared], by_hand.response)
     # No jumps, and each phase a whole number of turns from its principal value.
@@ -459,7 +459,7 @@ def test_progress_and_interrupt(c1: pyhoid.Record) -> None:
 
 
 def test_fits_run_side_by_side() -> None:
-    """The interpreter is free while a fit runs: another thread counts meanwhile."""
+    """A fit releases the interpreter lock: another thread counts during the fit."""
     record = pyhoid.simulate("C1", seed=2)
     counted, done = 0, threading.Event()
 

@@ -17,9 +17,9 @@ import pyhoid
 import pyhoid.dask
 
 pytestmark = [
-    # One cluster for all, also where tests are spread over processes.
+    # One cluster for all tests, also if they run in several processes.
     pytest.mark.xdist_group("dask"),
-    # The cluster itself causes these as it starts and stops.
+    # Warnings of the cluster when it starts and stops.
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
@@ -66,7 +66,7 @@ def test_a_lost_worker_costs_its_shard(client: Any, tmp_path: Path) -> None:
 
     plan = PLAN.replace("replications = 12", "replications = 200")
     result = pyhoid.dask.study(plan, tmp_path / "cluster", client, shards=6, progress=lose_one)
-    # What was done was not done again.
+    # Finished shards were not repeated.
     assert done == [1, 2, 3, 4, 5, 6]
     local = pyhoid.study(plan, tmp_path / "local")
     assert digests(result.directory) == digests(local.directory)

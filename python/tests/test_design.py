@@ -1,4 +1,4 @@
-"""Experiments before they are done."""
+"""Design of experiments."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_a_design_is_read_again() -> None:
 
 def test_a_group_is_designed_for(group_results: Path) -> None:
     wanted: dict[str, Any] = {"condition": "fo", "controlled_element": "1/s", "disturbance": True}
-    # The delay alone is not an operator.
+    # A delay without other parameters is not an operator.
     with pytest.raises(pyhoid.FormatError, match="K_e of the form lead is not known"):
         pyhoid.design(group_results, **wanted)
     results = json.loads(group_results.read_text())

@@ -80,7 +80,7 @@ def columns(path: Path) -> dict[str, list[float]]:
 
 
 class Unit:
-    """A unit that is at work."""
+    """A unit in simulation mode."""
 
     def __init__(self, path: Path, start: float = 0.0, **parameters: Any) -> None:
         self.said: list[str] = []
@@ -231,7 +231,7 @@ def test_a_unit_goes_back_and_goes_on_elsewhere(
     assert went(unit, 300, 500) == expected
     data = unit.unit.serializeFMUState(state)
     unit.unit.freeFMUState(state)
-    # In an instance of its own, which was elsewhere before.
+    # In a separate instance with a different previous state.
     other = Unit(path)
     went(other, 0, 7)
     other.unit.setFMUState(other.unit.deserializeFMUState(data))
@@ -239,7 +239,7 @@ def test_a_unit_goes_back_and_goes_on_elsewhere(
     for damaged in (data[:-1], data[:100] + bytes([data[100] ^ 1]) + data[101:], b""):
         with pytest.raises(Exception, match="FMU[sS]tate"):
             other.unit.deserializeFMUState(damaged)
-    # That of another unit is none of this one.
+    # The state of another unit is rejected.
     cli.run(
         *("fmu", "--out", path, "--library", library, "--fmi", fmi),
         *(() if operator else ("--operator", "C4")),

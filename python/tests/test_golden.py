@@ -27,23 +27,23 @@ import tomllib
 pytestmark = [
     # The inputs are made once.
     pytest.mark.xdist_group("golden"),
-    # What is wrong with an input is reported as a warning when it is read.
+    # Problems of an input are reported as warnings when it is read.
     pytest.mark.filterwarnings("ignore::UserWarning"),
 ]
 
 GOLDEN = Path(__file__).parents[2] / "fixtures" / "golden"
 MANIFEST = tomllib.loads((GOLDEN / "calls.toml").read_text(encoding="utf-8"))
 CALLS = [call for call in MANIFEST["call"] if "python" in call]
-#: Lists that are longer are kept in part.
+#: Longer lists are truncated.
 LONG = 24
-#: Numbers below are nothing: rests of rounding.
+#: Smaller numbers are rounding errors and count as zero.
 NOTHING = 1e-15
 
 Rows = list[list[float | None]]
 
 
 def changed(text: str, made: Mapping[str, Any]) -> str:
-    """Columns and rows of a table, changed one change after the other, as the tests of the command line do."""
+    """Applies changes to the columns and rows of a table, as in the tests of the command line."""
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     names = lines[0].split(",")
     places = [names.index(name) for name in made["columns"]]
@@ -127,7 +127,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory, cli: Any) -> Path:
 
 
 def plain(value: Any) -> Any:
-    """A result as JSON can hold it: numbers to twelve digits, of long lists eight entries."""
+    """A result as JSON: numbers with twelve digits, and eight entries of long lists."""
     if value is None or isinstance(value, (str, bool, int)):
         return value
     if isinstance(value, float):
@@ -152,7 +152,7 @@ def plain(value: Any) -> Any:
     return repr(value)
 
 
-#: What is kept of a result, next to its type.
+#: Attributes of a result that are recorded in addition to its type.
 KEPT = (
     "structure",
     "form",
@@ -204,7 +204,7 @@ def answer(result: Any) -> dict[str, Any]:
 
 
 def changes(key: str, was: Any, now: Any, tolerance: float) -> list[str]:
-    """What moved, from what to what."""
+    """The differences, with old and new values."""
     if isinstance(was, dict) and isinstance(now, dict):
         return [
             line
@@ -229,7 +229,7 @@ def test_answer_is_what_it_was(call: dict[str, Any], folder: Path) -> None:
     keywords = {
         name: tuple(value) if isinstance(value, list) else value for name, value in keywords.items()
     }
-    # One record is one record, several are a list.
+    # A single record is passed as such, several records as a list.
     given = [records[0] if len(records) == 1 else records] if records else []
     now = json.loads(json.dumps(answer(function(*given, **keywords))))
     file = GOLDEN / "python" / f"{call['name']}.json"

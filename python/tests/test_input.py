@@ -1,4 +1,4 @@
-"""What people hand over: each works, or the message reports what is wrong."""
+"""Arguments of users: each is accepted, or the message states the problem."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_options_that_have_no_meaning(
     with pytest.raises(pyhoid.OptionError, match=message) as caught:
         pyhoid.identify(c1, **keywords)
     assert isinstance(caught.value, ValueError)
-    # No word of the command line.
+    # The message contains no option of the command line.
     assert "--" not in str(caught.value)
 
 
@@ -194,8 +194,8 @@ def test_arrays_that_nobody_can_change_are_not_copied() -> None:
         updated = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    # The interpreter does not see what the module itself allocates. The largest resident size of a
-    # separate process reports.
+    # The interpreter does not count the memory of the module, so the largest resident size of a
+    # separate process is measured.
     program = (
         "import resource, numpy, pyhoid\n"
         "e, u = (numpy.random.default_rng(k).normal(size=4_000_000) for k in (0, 1))\n"
@@ -216,7 +216,7 @@ def test_arrays_that_nobody_can_change_are_not_copied() -> None:
     assert np.shares_memory(record.e, e) and np.shares_memory(part.u, u)
     assert not record.u.flags.writeable
     assert made < 1e6
-    # The innovations alone, which are new.
+    # Only the innovations are newly allocated.
     assert updated < 1.2 * e.nbytes
 
 

@@ -1,4 +1,4 @@
-"""Several inputs: what a person sees besides the error."""
+"""Several inputs: signals that a person sees in addition to the error."""
 
 from __future__ import annotations
 

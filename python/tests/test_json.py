@@ -1,4 +1,4 @@
-"""Results as JSON: the same for all, as the command line writes it, and back."""
+"""Results as JSON: the format of the command line, and reading it back."""
 
 from __future__ import annotations
 

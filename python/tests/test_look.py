@@ -1,4 +1,4 @@
-"""One look at a file: what it looks like, and the keywords by which it is read."""
+"""Examination of a file: its summary, and the keywords for reading it."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_what_a_file_looks_like_is_how_it_is_read(path: Path) -> None:
     assert look["excitation"]["period_s"] == pytest.approx(20)
     with pytest.warns(UserWarning, match="time is taken as t, in s"):
         assert len(pyhoid.read(path, **look["read"])) == 2400
-    # Whole periods are kept under an offset.
+    # The span still contains whole periods after an offset.
     with pytest.warns(UserWarning, match="time is taken as t, in s"):
         assert len(pyhoid.read(path, **look["read"], offset={"u": 1})) == 2400
     known = pyhoid.info(path, excitation="none", controlled_element="1/s")["look"]

@@ -17,7 +17,7 @@ import pyhoid.lsl
 import xdf
 
 pylsl = pytest.importorskip("pylsl")
-# One at a time: each finds its streams by asking the caller that is there.
+# Run one at a time, because each test resolves the streams that exist.
 pytestmark = pytest.mark.xdist_group("lsl")
 
 ELEMENT = "90/(s(s+6))"
@@ -70,7 +70,7 @@ def test_the_digits_are_those_of_the_tracker(c4: pyhoid.Record) -> None:
     made = lambda: pyhoid.Tracker(sample_time=STEP, controlled_element=ELEMENT)  # noqa: E731
     running = Running("hoid-test-person", outlet, made())
     start = pylsl.local_clock()
-    # A second's worth of samples is lost, and one comes late.
+    # The samples of one second are lost, and one sample arrives late.
     kept = [k for k in range(3000) if not 1000 <= k < 1100]
     for k in [*kept, 2999]:
         outlet.push_sample([c4.u[k], 0.0, c4.e[k]], start + k * STEP)
@@ -123,10 +123,10 @@ def test_a_recording_of_both_streams_is_read_back(c4: pyhoid.Record, tmp_path: P
         found = theirs[stream.name]["time_series"]
         assert np.array_equal(found, np.array(stream.rows), equal_nan=True)
     with warnings.catch_warnings():
-        # How the clocks were brought together.
+        # Alignment of the clocks.
         warnings.simplefilter("ignore")
         run = pyhoid.read(path, input=f"{name}.e", output=f"{name}.u")
-        # Of the estimate from where there is one.
+        # The estimate, from its first value on.
         of = f"{name}-estimate"
         estimate = pyhoid.read(path, input=f"{of}.K_e", output=f"{of}.tau_e_se", start=2.0)
     assert np.array_equal(np.array([run.e, run.u]).T, theirs[name]["time_series"])

@@ -1,4 +1,4 @@
-"""The notebooks run from top to bottom and print what they are kept with.
+"""The notebooks run from top to bottom and print their stored output.
 
 They are kept with their output, so that they can be read where nothing runs. After a change
 `HOID_UPDATE_DOCS=1 cargo xtask python tests/test_notebooks.py` renews it.
@@ -15,12 +15,12 @@ import pytest
 from nbclient import NotebookClient
 
 NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.ipynb"))
-#: What a notebook may weigh with its pictures, bytes.
+#: Largest size of a notebook with its pictures, bytes.
 MOST = 250_000
 
 
 def texts(notebook: Any) -> list[str]:
-    """What the cells print, without their pictures: a text for each, however it came in parts."""
+    """The output of each cell as one text, without pictures."""
     found = []
     for cell in notebook.cells:
         parts = []
@@ -33,7 +33,7 @@ def texts(notebook: Any) -> list[str]:
 
 
 def as_kept(notebook: Any) -> Any:
-    """Without what changes from one machine or run to the next."""
+    """The text without parts that differ between machines or runs."""
     notebook.metadata.pop("language_info", None)
     for number, cell in enumerate(notebook.cells):
         cell["id"] = f"cell-{number}"
@@ -44,7 +44,7 @@ def as_kept(notebook: Any) -> Any:
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda file: file.stem)
 def test_a_notebook_runs(file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Pictures are in the notebook, as where a person runs it.
+    # The notebook contains its pictures, as in an interactive run.
     monkeypatch.setenv("MPLBACKEND", "module://matplotlib_inline.backend_inline")
     kept = nbformat.read(file, as_version=4)
     notebook = nbformat.read(file, as_version=4)

@@ -31,7 +31,7 @@ def _spikes(e: npt.NDArray[np.float64], u: npt.NDArray[np.float64]) -> Signals:
     return e, u
 
 
-#: What is wrong with a recording; the last number is that of a stick with an offset and another unit.
+#: Problems of a recording; the last is a stick with an offset and another unit.
 RECORDED: dict[str, Callable[..., Signals]] = {
     "as recorded": lambda e, u: (e, 12.5 * (u + 0.05)),
     "clipped": lambda e, u: (e, np.clip(u, -0.086, 0.086)),
@@ -167,7 +167,7 @@ def test_two_runs_with_a_stick_at_its_end_are_doubtful(
     assert person.verdict.level == "doubtful"
     assert "run1: u is saturated in" in person.verdict.reasons[0]
     same(person, cli.json("identify", *paths), f"{tmp_path}/")
-    # Polynomials are of the same recordings.
+    # The polynomials are fitted to the same recordings.
     fit = pyhoid.identify([pyhoid.read(path) for path in paths], "bj", nk=29, nd=1)
     assert "is saturated in" in fit.verdict.reasons[0]
 

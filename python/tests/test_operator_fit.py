@@ -14,7 +14,7 @@ import pytest
 
 import pyhoid
 
-#: A single form and few noise orders, where the choice is not what is tested.
+#: A single form and few noise orders, for tests that do not concern their selection.
 FEW: dict[str, Any] = {"form": "lead-lag", "nd": (0, 6)}
 
 
@@ -63,7 +63,7 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     p = len(found.coordinates)
     assert found.covariance is not None and found.covariance.shape == (p, p)
     assert np.allclose(found.covariance, found.covariance.T, rtol=1e-9, atol=0)
-    # The error of tau_e is at least that of its coordinate: what the forms differ by comes to it.
+    # The error of tau_e includes the differences between forms, in addition to its coordinate.
     place = list(found.coordinates).index("tau_e")
     tau = found.parameters["tau_e"]
     own = math.sqrt(found.covariance[place, place])
@@ -81,13 +81,13 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     shape = found.loop_shape
     assert shape is not None and shape["stable"] is True
     lowest = shape["crossovers"][0]
-    # The shape is that of the best form, the crossover the mean over forms.
+    # The shape is from the best form, the crossover is the mean over forms.
     assert abs(lowest[0].value - crossover.value) < 2 * (crossover.standard_error or 0.0)
     assert lowest[1].standard_error > 0
     assert shape["gain_margin_db"].value > 0 and shape["gain_margin_db"].standard_error > 0
     assert found.open_loop_intervals is not None
     ends = found.open_loop_intervals["phase_margin_deg"]
-    # Of a mixture over forms, by Student's quantiles: wider than the normal one.
+    # The interval of a mixture with Student's quantiles is wider than the normal interval.
     assert ends is not None and ends[0] < margin.value < ends[1]
     assert ends[1] - ends[0] > 2 * 1.96 * margin.standard_error
     at_lines = found.lines["open_loop"]["crossover_rad_s"]
@@ -107,15 +107,15 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
 
 
 def test_the_polynomials_are_the_same_model(found: pyhoid.OperatorFit) -> None:
-    """The residuals of the polynomials leave the loss, and their response the crossover."""
+    """The polynomials reproduce the loss and the crossover."""
     residuals = np.concatenate([found.fit.residuals(r).values for r in found.records])
-    # The loss leaves out the samples that the longest delay and noise order of all forms need.
+    # The loss omits the samples that the longest delay and noise order of all forms need.
     assert np.mean(residuals**2) == pytest.approx(found.loss, rel=5e-3)
     assert np.array_equal(found.noise["d"], found.fit.polynomials["D"][1:])
     crossover = found.open_loop and found.open_loop["crossover_rad_s"]
     assert crossover
     response = found.fit.frequency_response([crossover.value]).response[0]
-    # The crossover is the mean over forms, the polynomials are of the best form.
+    # The crossover is the mean over forms; the polynomials describe the best form.
     front = next(row["weight"] for row in found.forms if row["form"] == found.form)
     off = 1e-3 if front == 1.0 else 2 * (crossover.standard_error or 0.0) / crossover.value
     assert abs(response) / crossover.value == pytest.approx(1.0, rel=off)
@@ -227,7 +227,7 @@ def test_the_delay_depends_on_what_the_error_does_between_its_samples(c1: pyhoid
     assert found.intersample["used"] == "auto"
     assert found.intersample["tau_e_if_straight"] == pytest.approx(tau + half, rel=1e-9)
     assert straight.intersample == {"used": "foh", "tau_e_if_straight": None}
-    # One model: what is left is the prior's centre.
+    # With one model, the remaining value is the centre of the prior.
     assert straight.parameters["tau_e"].value == pytest.approx(tau + half, abs=1e-4)
     with pytest.raises(pyhoid.OptionError):
         pyhoid.identify(c1, intersample="cubic")

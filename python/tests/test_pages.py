@@ -1,4 +1,4 @@
-"""What the command line writes, from Python: pages, groups, the reproduction, what is in a file."""
+"""Outputs of the command line from Python: pages, groups, reproduction, contents of a file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def test_the_page_of_a_fit(fit: pyhoid.Fit, tmp_path: Path) -> None:
     page = fit.report(tmp_path / "fit", controlled_element=([10.0], [1.0, 0.2, 0.0]))
     text = page.read_text()
     assert page.name == "report.html" and "<svg" in text and "phase margin" in text
-    # The settings that were used, and the truth of a simulated run.
+    # The settings in use, and the true values of a simulated run.
     assert "largest number of steps" in text and "true" in text.lower()
     assert (
         fit.report(tmp_path / "again", controlled_element=([10.0], [1.0, 0.2, 0.0])).read_bytes()
@@ -131,7 +131,7 @@ def test_segments_between_faults(stalled: Path, cli: Any) -> None:
 def test_track_and_tracker_have_the_same_keywords() -> None:
     track = inspect.signature(pyhoid.track).parameters
     tracker = inspect.signature(pyhoid.Tracker.__new__).parameters
-    # The rate is a setting of the samples, not of the recursion.
+    # The rate belongs to the samples, not to the recursion.
     same = [*KEYWORDS, "decimate"]
     for name in same:
         usual = "adaptive" if name == "method" else track[name].default

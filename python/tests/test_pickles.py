@@ -33,7 +33,7 @@ def test_a_fit_comes_back_with_its_digits(fit: pyhoid.Fit, c1: pyhoid.Record) ->
 
 
 def test_a_fit_of_a_recording_with_a_level_comes_back(c1: pyhoid.Record) -> None:
-    """A recording has a level of u; taken out twice it leaves another rest of rounding."""
+    """A recording has a level of u; removing it twice would change the rounding errors."""
     recorded = pyhoid.Record(e=c1.e + 0.02, u=c1.u + 0.7, sample_time=c1.sample_time)
     for structure in ("bj", "arx"):
         fit = pyhoid.identify(recorded, structure, nk=29)
@@ -79,10 +79,12 @@ def test_damaged_pickles_are_refused(fit: pyhoid.Fit, c1: pyhoid.Record) -> None
         empty.__setstate__(less)
     with pytest.raises(pyhoid.DataError, match="not a pickle of a Fit"):
         empty.__setstate__({"parameters": 1})
-    # Of a trace: sealed as it should be, but of other data.
+    # A trace with a correct seal, but from other data.
     trace = pyhoid.track(c1.span(0, 20), "rls", nk=29, every=100)
     answers, call = trace.__getstate__()["answers"], trace.__dict__["_call"]
-    strange = _pickling.Recalled(answers, call._replace(records=(pyhoid.simulate("C1", seed=99),)))
+    strange = _pickling.RestoredNative(
+        answers, call._replace(records=(pyhoid.simulate("C1", seed=99),))
+    )
     with pytest.raises(pyhoid.DataError, match="cannot be reproduced"):
         strange._native()
     parts = dict(c1.__reduce__()[1][0])

@@ -1,4 +1,4 @@
-"""One run of 82 s through every place that is here: the digits of `hoid track`, every one."""
+"""One run of 82 s through every available interface gives the digits of `hoid track`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def traces(tools: Tools, run: Run) -> dict[tuple[str, ...], dict[str, list[float
 
 
 def parameter(place: Place) -> Any:
-    """A place as a test of its name; with its streams not next to those of ``test_lsl.py``."""
+    """An interface as a named test; its streams do not run in parallel with ``test_lsl.py``."""
     group = [pytest.mark.xdist_group("lsl")] if "LabStreamingLayer" in place.name else []
     return pytest.param(place, id=place.name, marks=group)
 
@@ -44,6 +44,6 @@ def test_the_digits_are_those_of_track(place: Place, tools: Tools, run: Run, tra
         pytest.skip(str(reason))
     off = told.compared(traces[place.options]).off
     assert set(off) <= set(place.other_functions) and all(by <= place.off for by in off.values())
-    # A row each sample, and not only unknown quantities yet.
+    # One row per sample, with at least some known quantities.
     assert len(told.rows) == len(run.e) or told.at is not None
     assert len(told.rows) >= 3 and not np.isnan(told.rows[-1]).any()

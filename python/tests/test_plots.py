@@ -1,4 +1,4 @@
-"""Figures: on new and on given axes, with what belongs in them."""
+"""Figures on new and on given axes, and their contents."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_the_curves_set_the_scale_of_a_bode_plot(fit: pyhoid.Fit) -> None:
     magnitude, _ = plots.bode(fit, np.geomspace(0.1, 300, 60))
     values = magnitude.get_lines()[0].get_ydata()
     low, high = magnitude.get_ylim()
-    # Bands of hundreds of dB beyond pi/Ts do not.
+    # Bands of hundreds of dB above pi/Ts are not drawn.
     assert high - low < 1.6 * np.ptp(values) + 1e-9
 
 
@@ -99,7 +99,7 @@ def test_a_trace_of_a_person(c4: pyhoid.Record, tmp_path: Path) -> None:
     labels = [ax.get_ylabel() for ax in axes]
     assert len(axes) == len(trace.response_names) == 4
     assert "at 2.5 rad/s (dB)" in labels[0] and "rad/s" in labels[2] and "deg" in labels[3]
-    # A line for each change that was declared, next to those of the trace.
+    # One line for each declared change, in addition to those of the trace.
     assert len(trace.changes) >= 1 and all(
         len(ax.lines) == 1 + len(trace.changes) for ax in axes
     )

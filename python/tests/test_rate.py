@@ -64,7 +64,7 @@ def test_a_tracker_has_the_digits_of_a_track(fast: pyhoid.Record) -> None:
     tracker.update(part.e[:9_003], part.u[:9_003])
     tracker = pickle.loads(pickle.dumps(tracker))
     innovations = tracker.update(part.e[9_003:], part.u[9_003:])
-    # One in ten samples is one of the tracker.
+    # The tracker receives every tenth sample.
     assert np.isfinite(innovations).sum() in (1099, 1100)
     last = innovations[np.isfinite(innovations)]
     behind = len(trace) - np.flatnonzero(trace["innovation"] == last[-1])[0]

@@ -1,4 +1,4 @@
-"""Remedies in messages are in the words of Python, and help."""
+"""Remedies in messages use Python keywords, and work."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ import pyhoid
 from pyhoid import _pyhoid, _settings
 
 CRATES = Path(__file__).parents[2] / "crates"
-# Libraries whose messages come through Python.
+# Libraries whose messages appear in Python.
 LIBRARIES = ("hoid-io", "hoid-model", "hoid-ident", "hoid-track", "hoid-analysis")
-# What is only of the program: files of its own, pages, how it prints; and examples for its developers.
-# The help of `change` lists what the command refuses.
+# Options of the program only: its files, pages and output; and examples for developers.
+# The help of `change` lists the options that the command rejects.
 OF_THE_PROGRAM = {"figure", "horizon", "json", "report", "scenario", "validate"}
 
 
@@ -103,7 +103,7 @@ def test_every_option_that_a_library_names_is_a_keyword() -> None:
     named: dict[str, Path] = {}
     for library in LIBRARIES:
         for path in (CRATES / library / "src").rglob("*.rs"):
-            # Without documentation and tests.
+            # Documentation and tests are excluded.
             code = path.read_text().split("#[cfg(test)]")[0]
             lines = [line for line in code.splitlines() if not line.strip().startswith("//")]
             for option in re.findall(r"--([a-z][a-z-]*)", "\n".join(lines)):

@@ -1,4 +1,4 @@
-"""What a type checker is to accept; it is checked, not run."""
+"""Code that a type checker must accept; it is checked, not run."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def use(e: npt.NDArray[np.float64], u: list[float]) -> float:
 
 
 def script(folder: str) -> list[str]:
-    """What a user's script of an evening does."""
+    """A typical script of a user."""
     runs = [pyhoid.read(f"{folder}/run{n}.csv", input="r-y", output="u", start=5) for n in (1, 2)]
     person = pyhoid.identify_operator(runs, form="lead", controlled_element="1/s")
     lines = [f"{person.form}: {person.verdict.level}", *person.verdict.reasons]

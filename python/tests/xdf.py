@@ -16,7 +16,7 @@ class Stream:
     labels: Sequence[str]
     stamps: Sequence[float]
     rows: Sequence[Sequence[float]]
-    #: Times on the clock of the stream, and what is to be added there for that of the recorder, s.
+    #: Times on the clock of the stream, and the offsets to the clock of the recorder, s.
     offsets: Sequence[tuple[float, float]] = ()
 
 

@@ -124,14 +124,14 @@ fn shorten(file: &Path) -> Result<(), String> {
 fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
     let mut lines = table.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-    let places = names.iter().map(|name| {
+    let indices = names.iter().map(|name| {
         let place = header.iter().position(|column| column == name);
         place.ok_or_else(|| format!("there is no column {name}"))
     });
-    let places: Vec<usize> = places.collect::<Result<_, String>>()?;
+    let indices: Vec<usize> = indices.collect::<Result<_, String>>()?;
     let row = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
-        places
+        indices
             .iter()
             .map(|place| cells.get(*place).copied().unwrap_or_default().to_owned())
             .collect()

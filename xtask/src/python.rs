@@ -18,8 +18,8 @@ use crate::{
     processors::{BUILT_VARIABLE, build_for_other_processors},
 };
 
-/// Name of the task that creates the environment; `BUILD_TASK` is the name of the task that builds the wheel. `cargo xtask
-/// test` runs both in parallel with the tests of Rust.
+/// Name of the task that creates the environment; `BUILD_TASK` is the name of the task that builds the wheel. `cargo
+/// xtask test` runs both in parallel with the tests of Rust.
 pub const REQUIRE_TASK: &str = "python-require";
 pub const BUILD_TASK: &str = "python-build";
 

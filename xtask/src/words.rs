@@ -1,9 +1,9 @@
 //! Words that comments, help texts, messages and the book must not use.
 //!
-//! The readers are control engineers. The words in [`BANNED_WORDS`] occurred in sentences that such readers would rewrite:
-//! metaphors of speaking, standing and believing, nouns made from questions, and archaic words. The table contains a
-//! replacement for each word, which the check prints with file and line. Code spans (in backticks) and format arguments
-//! are not prose.
+//! The readers are control engineers. The words in [`BANNED_WORDS`] occurred in sentences that such readers would
+//! rewrite: metaphors of speaking, standing and believing, nouns made from questions, and archaic words. The table
+//! contains a replacement for each word, which the check prints with file and line. Code spans (in backticks) and
+//! format arguments are not prose.
 //!
 //! `cargo xtask check` applies the list to comments and string literals of Rust and Python sources, `cargo xtask words
 //! --book` to the pages of the book, the README and ARCHITECTURE.md.

@@ -32,7 +32,7 @@ pub struct AnswerStatus {
     pub open: Option<Finding>,
 }
 
-/// A fit that judges each of its answers separately.
+/// A fit that assesses each of its answers separately.
 pub trait Answers {
     /// Returns all answers, for the given controlled element.
     fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<AnswerStatus>;
@@ -113,8 +113,8 @@ fn answer_status(name: &str, why: Option<String>) -> AnswerStatus {
 /// An estimate with its 95 % interval.
 type MeasureWithInterval = (Estimate, Option<(f64, f64)>);
 
-/// Judges the crossover and the phase margin of a loop. Each is given with its interval; `None` means that it does not
-/// exist.
+/// Assesses the crossover and the phase margin of a loop. Each is given with its interval; `None` means that it does
+/// not exist.
 fn loop_answers(measures: [Option<MeasureWithInterval>; 2]) -> impl Iterator<Item = AnswerStatus> {
     let words = ["the crossover", "the phase margin"];
     (0..2).map(move |k| {

@@ -15,7 +15,8 @@ use hoid_io::Offset;
 use hoid_model::{Decimation, FaultHandling};
 
 use crate::{
-    AnalysisError, offset::late_samples, quality::Of, reading::Reading, recordings::Recordings, settings::Setting,
+    AnalysisError, offset::output_delay_samples, quality::SystemKind, reading::Reading, recordings::Recordings,
+    settings::Setting,
 };
 
 /// Options for the estimation of a describing function from recordings.
@@ -50,9 +51,9 @@ impl DescribingFunctionOptions {
     /// [`AnalysisError`] if there is no result, for example because there are no lines, there is no whole period, or a
     /// channel does not exist.
     pub fn run(&self, recordings: Recordings) -> Result<DescribingFunctionResult, AnalysisError> {
-        let read = recordings.repaired(self.faults, Of::Person)?;
+        let read = recordings.repaired(self.faults, SystemKind::Person)?;
         let first = read.records.first().ok_or(AnalysisError::NoRecordings)?;
-        let late = self.options.offset_samples + late_samples(first, &self.offsets)?;
+        let late = self.options.offset_samples + output_delay_samples(first, &self.offsets)?;
         let late_s = late * first.sample_time().s();
         let data = read.at_rate(self.rate, false)?;
         let options = DescriptionOptions {
@@ -68,7 +69,7 @@ impl DescribingFunctionOptions {
         Ok(DescribingFunctionResult { found, data, settings })
     }
 
-    fn settings(&self, data: &Recordings, late_samples: f64, found: &Description) -> Vec<Setting> {
+    fn settings(&self, data: &Recordings, delay_samples: f64, found: &Description) -> Vec<Setting> {
         let reading = data.source.as_ref().map(|source| &source.reading);
         let mut list = match reading {
             Some(reading) => reading.settings(self.rate),
@@ -76,8 +77,8 @@ impl DescribingFunctionOptions {
                 vec![Setting::new("decimate", self.rate.to_string()).with_given(self.rate != Decimation::default())]
             }
         };
-        if late_samples != 0.0 {
-            let words = format!("{late_samples} samples, corrected as a phase shift");
+        if delay_samples != 0.0 {
+            let words = format!("{delay_samples} samples, corrected as a phase shift");
             list.push(Setting::new("offset of the output", words).with_given(true));
         }
         let is_default = self.faults == FaultHandling::default();

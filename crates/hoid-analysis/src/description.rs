@@ -9,7 +9,7 @@ use hoid_model::{Detrend, FaultHandling};
 
 use crate::{
     AnalysisError,
-    offset::{late_samples, without_offsets},
+    offset::{output_delay_samples, without_offsets},
     recordings::Recordings,
     repair::repair_records,
 };
@@ -83,7 +83,7 @@ impl Recordings {
         };
         let again = reading.read_files(&source.paths, |_, _| ())?;
         let again = repair_records(again.records, handling)?;
-        let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
+        let late = again.first().map_or(Ok(0.0), |r| output_delay_samples(r, &offsets))?;
         let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
         // The records that were read again are decimated to the sampling rate of the fit.
         let used_s = self.records.first().map_or(ts_s, |r| r.sample_time().s());

@@ -7,7 +7,7 @@ use hoid_io::{IoError, ReadOptions};
 use hoid_model::ModelError;
 use thiserror::Error;
 
-use crate::look::{OtherColumns, other_columns};
+use crate::examination::{OtherColumns, other_columns};
 
 /// Reason why an analysis has no result.
 #[derive(Debug, Error)]
@@ -44,13 +44,13 @@ pub enum AnalysisError {
     },
     /// An offset for a channel that does not exist.
     #[error(
-        "--offset: there is no channel {name:?}; the record has {known}; e and u can also be used for the input and output"
+        "--offset: there is no channel {name:?}; the record has {available}; e and u can also be used for the input and output"
     )]
     NoSuchChannel {
         /// The requested name.
         name: String,
         /// Names of the existing channels.
-        known: String,
+        available: String,
     },
     /// Options that contradict each other or the model.
     #[error("{reason}")]
@@ -75,14 +75,14 @@ pub enum AnalysisError {
         reason: String,
     },
     /// An option that belongs to other estimators.
-    #[error("{name} applies only to {}{instead}", .of.join(", "))]
+    #[error("{name} applies only to {}{alternative}", .estimators.join(", "))]
     Misplaced {
         /// Name of the option in the registry.
         name: &'static str,
         /// Names of the estimators that have the option.
-        of: Vec<&'static str>,
+        estimators: Vec<&'static str>,
         /// The option to use instead.
-        instead: &'static str,
+        alternative: &'static str,
     },
     /// There is no recording.
     #[error("no recording was given; name at least one run")]

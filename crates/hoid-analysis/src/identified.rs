@@ -20,7 +20,7 @@ use crate::{
     description::Excitation,
     estimators::{BatchEstimator, FittedModel},
     identification::Identification,
-    quality::Of,
+    quality::SystemKind,
     reading::Reading,
     recordings::Recordings,
     settings::Setting,
@@ -45,9 +45,9 @@ pub struct IdentifiedModel<F = FamilyFit> {
     pub excitation: Option<String>,
     pub(crate) rate: Decimation,
     pub(crate) counts_samples: bool,
-    pub(crate) taken_out: Detrend,
+    pub(crate) removed_trend: Detrend,
     /// JSON object from which the result was read; `None` for a new result.
-    pub(crate) written: Option<Map<String, Value>>,
+    pub(crate) source_json: Option<Map<String, Value>>,
 }
 
 /// Goodness of fit of a model on a recording that was not used in the estimation.
@@ -90,12 +90,12 @@ impl<E: BatchEstimator> Identification<E> {
             mut fit,
             verdict,
             described,
-            taken_out,
-            used,
+            removed_trend: taken_out,
+            settings: used,
             found,
         } = E::fit(self, &mut data).map_err(|error| with_reason(error, &data.records))?;
         let verdict = data.with_findings(verdict);
-        let response = (E::OF == Of::Person)
+        let response = (E::OF == SystemKind::Person)
             .then(|| response_to_error(&data.records))
             .flatten();
         let verdict = verdict.prepend(response.and_then(|found| found.finding()));
@@ -120,8 +120,8 @@ impl<E: BatchEstimator> Identification<E> {
             settings,
             rate: self.rate,
             counts_samples,
-            taken_out,
-            written: None,
+            removed_trend: taken_out,
+            source_json: None,
         })
     }
 }
@@ -228,13 +228,13 @@ impl<F> IdentifiedModel<F> {
     pub fn validated(&self, model: &Fit, other: Recordings) -> Result<ValidationResult, AnalysisError> {
         let name = other.names.first().cloned().ok_or(AnalysisError::NoRecordings)?;
         let other = other.at_rate(self.rate, self.counts_samples)?.records.into_iter();
-        let prepared: Vec<Record> = other.map(|record| record.detrended(self.taken_out)).collect();
+        let prepared: Vec<Record> = other.map(|record| record.detrended(self.removed_trend)).collect();
         let quality = model.quality(&prepared)?;
         Ok(ValidationResult { name, quality })
     }
 
     /// True if the means of e and u were removed before the fit; each record then has a separate level.
     pub fn is_without_means(&self) -> bool {
-        self.taken_out == Detrend::Mean
+        self.removed_trend == Detrend::Mean
     }
 }

@@ -32,7 +32,7 @@ pub(crate) fn write_levels(
 /// The level of the records, for a time-invariant model that is fitted after the level has been removed.
 pub(crate) struct Level {
     /// The records including their level; `None` if the level was not removed.
-    as_read: Option<Vec<Record>>,
+    records_with_level: Option<Vec<Record>>,
     /// Part of the level of each record that was removed in addition to its mean.
     separate_means: Vec<f64>,
 }
@@ -45,14 +45,14 @@ impl Level {
             std::mem::replace(&mut data.records, without)
         });
         Self {
-            as_read,
+            records_with_level: as_read,
             separate_means: Vec::new(),
         }
     }
 
     /// True if the level is still in the records.
     pub(crate) fn is_kept(&self) -> bool {
-        self.as_read.is_none()
+        self.records_with_level.is_none()
     }
 
     /// Returns the trend that was removed.
@@ -66,7 +66,7 @@ impl Level {
         data: &mut Recordings,
         of: impl Fn(&Record) -> Result<Option<f64>, IdentError>,
     ) -> Result<(), AnalysisError> {
-        for record in data.records.iter_mut().filter(|_| self.as_read.is_some()) {
+        for record in data.records.iter_mut().filter(|_| self.records_with_level.is_some()) {
             let left = of(record)?.unwrap_or(0.0);
             self.separate_means.push(left);
             let mut is_output = false;
@@ -85,7 +85,7 @@ impl Level {
         data: &mut Recordings,
         of: impl Fn(usize, &Record) -> Option<Estimate>,
     ) -> Option<Setting> {
-        write_levels(&mut data.accounts, self.as_read.as_ref()?, |k, record| {
+        write_levels(&mut data.accounts, self.records_with_level.as_ref()?, |k, record| {
             let separate_mean = self.separate_means.get(k).copied().unwrap_or(0.0);
             of(k, record).map(|level| Estimate {
                 value: level.value + separate_mean,

@@ -11,19 +11,19 @@
 //!
 //! | step of [`Identification::run`] | rules |
 //! |---|---|
-//! | a file is examined before any option is chosen | `look` |
+//! | a file is examined before any option is chosen | `examination` |
 //! | files are read (before `run` is called) | `files`, `reading`; the data and the account of their processing are in `recordings` |
-//! | runs that were given twice are refused | `copies` |
-//! | faults are searched for and repaired, the quality of the channels is judged | `repair`, `quality` |
+//! | runs that were given twice are rejected | `duplicate_runs` |
+//! | faults are searched for and repaired, the quality of the channels is assessed | `repair`, `quality` |
 //! | a high sampling rate is reduced | `rate` |
 //! | the describing function is estimated, if the excitation was recorded | `description`, `offset` |
 //! | the model is fitted and checked by a second fit; the loop and the settings are added | `estimators`: one file per estimator |
 //! | the findings on the recordings are added | `identified`, `recordings` |
-//! | each answer is judged, and the verdict on the requested answers is formed | `answers` |
+//! | each answer is assessed, and the verdict on the requested answers is formed | `answers` |
 //! | polynomials with several inputs | `several_inputs` |
 //! | the operators of several axes, and their coupling | `axes` |
-//! | a describing function is estimated from recordings and judged | `describing` |
-//! | a recursion processes a recording, and its trace is judged | `tracking` |
+//! | a describing function is estimated from recordings and assessed | `describing` |
+//! | a recursion processes a recording, and its trace is assessed | `tracking` |
 //! | the level of u; the settings common to all estimators | `level`, `settings` |
 //!
 //! Options are set as fields, or as text by their names: `options`. [`registry`] lists all options.
@@ -43,18 +43,18 @@
 
 mod answers;
 mod axes;
-mod copies;
 mod describing;
 mod description;
+mod duplicate_runs;
 mod error;
 mod estimators;
+mod examination;
+mod fault_findings;
 mod files;
-mod found;
 mod identification;
 mod identified;
 pub mod json;
 mod level;
-mod look;
 mod names;
 mod offset;
 mod options;
@@ -76,15 +76,15 @@ pub use describing::{DescribingFunctionOptions, DescribingFunctionResult};
 pub use description::Excitation;
 pub use error::AnalysisError;
 pub use estimators::{BatchEstimator, FittedModel, PolynomialFit, Polynomials};
-pub use found::FoundFault;
+pub use examination::{
+    Advice, ExaminationOptions, FileExamination, Lag, OtherColumns, Periods, RecordSummary, Role, Roles, shell_command,
+};
+pub use fault_findings::FoundFault;
 pub use identification::Identification;
 pub use identified::{IdentifiedModel, ValidationResult, identify};
-pub use look::{
-    Advice, FileExamination, Lag, LookOptions, OtherColumns, Periods, RecordSummary, Role, Roles, shell_command,
-};
-pub use offset::{late_samples, without_offsets};
+pub use offset::{output_delay_samples, without_offsets};
 pub use prior::parse_prior;
-pub use quality::Of;
+pub use quality::SystemKind;
 pub use rate::kept_rate_message;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};

@@ -24,7 +24,7 @@ pub fn without_offsets(reading: &Reading) -> (Reading, BTreeMap<String, Offset>)
 ///
 /// # Errors
 /// [`AnalysisError::NoSuchChannel`].
-pub fn late_samples(record: &Record, offsets: &BTreeMap<String, Offset>) -> Result<f64, AnalysisError> {
+pub fn output_delay_samples(record: &Record, offsets: &BTreeMap<String, Offset>) -> Result<f64, AnalysisError> {
     let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
     let mut late = 0.0;
     for (name, offset) in offsets {
@@ -36,7 +36,7 @@ pub fn late_samples(record: &Record, offsets: &BTreeMap<String, Offset>) -> Resu
         let Some(channel) = names.iter().position(|known| known == name).or(role) else {
             return Err(AnalysisError::NoSuchChannel {
                 name: name.clone(),
-                known: names.join(", "),
+                available: names.join(", "),
             });
         };
         let samples = match offset {

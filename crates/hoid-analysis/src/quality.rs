@@ -3,14 +3,14 @@
 //! | finding | condition | consequence |
 //! |---|---|---|
 //! | `stick-at-its-end` | u at a limit of its range in more than 5 % of the samples | the intended output beyond the limit is unknown: gain and margins are biased |
-//! | `resting-stick` | u returns to exactly the same value in at least 10 % of the samples ([`Rest`]) | a dead zone or pulsed control; only a note, since the operator is the linear part of the response |
+//! | `resting-stick` | u returns to exactly the same value in at least 10 % of the samples ([`StickRest`]) | a dead zone or pulsed control; only a note, since the operator is the linear part of the response |
 //! | `coarse` | quantisation step of e above .05, or of u above .15, of its standard deviation | rounding errors do not behave like a remnant, so intervals and bands are too narrow |
 //! | `bridged` | a gap longer than .25 s filled by a straight line | the line is treated as behaviour of the person |
 //! | `held` | a value of a sparse column held longer than .25 s | the signal between the logged values is unknown |
 //!
 //! Standard errors do not account for these problems.
 
-use hoid_ident::faults::Rest;
+use hoid_ident::faults::StickRest;
 use hoid_io::{QualityIssueKind, Step};
 use hoid_model::{Finding, Record};
 use hoid_numerics::statistics::standard_deviation;
@@ -24,9 +24,9 @@ const MAX_QUANTUM_RATIOS: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be filled by a straight line, s.
 const MAX_BRIDGED_S: f64 = 0.25;
 
-/// Kind of system whose records are judged.
+/// Kind of system whose records are assessed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Of {
+pub enum SystemKind {
     /// A person who responds to a displayed error.
     Person,
     /// Any system, whose input may for example have only two levels.
@@ -34,7 +34,7 @@ pub enum Of {
 }
 
 /// Returns the findings on the quality of the channels.
-pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) -> Vec<Finding> {
+pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: SystemKind) -> Vec<Finding> {
     let mut all = Vec::new();
     let issues = |kind: QualityIssueKind| account.quality_issues.iter().filter(move |issue| issue.kind == kind);
     let output = record.output_channel().name.as_str();
@@ -51,7 +51,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
             ),
         ));
     }
-    if let Some(rest) = Rest::of(record.output()).filter(|_| of == Of::Person) {
+    if let Some(rest) = StickRest::of(record.output()).filter(|_| of == SystemKind::Person) {
         all.push(Finding::note(
             RESTING_STICK,
             format!(
@@ -68,7 +68,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         (input, record.input(), MAX_QUANTUM_RATIOS[0]),
         (output, record.output(), MAX_QUANTUM_RATIOS[1]),
     ] {
-        if of == Of::System && channel == input {
+        if of == SystemKind::System && channel == input {
             continue;
         }
         let deviation = standard_deviation(values);

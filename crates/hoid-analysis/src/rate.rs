@@ -23,7 +23,7 @@ impl Recordings {
             decimation
         };
         for (record, account) in self.records.iter_mut().zip(&mut self.accounts) {
-            let (lower, done) = decimation.of(record.clone())?;
+            let (lower, done) = decimation.apply(record.clone())?;
             *record = lower;
             account.steps.extend(done.map(Step::from));
         }

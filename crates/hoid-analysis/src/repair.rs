@@ -5,8 +5,8 @@ use hoid_model::{FaultHandling, Finding, ModelError, Record};
 
 use crate::{
     AnalysisError,
-    copies::refuse_copies,
-    quality::{Of, findings_of_quality},
+    duplicate_runs::reject_duplicate_runs,
+    quality::{SystemKind, findings_of_quality},
     recordings::{Account, Recordings},
 };
 
@@ -22,22 +22,22 @@ impl Recordings {
     ///
     /// # Errors
     /// [`AnalysisError::SameSamples`] if a run is given twice.
-    pub fn repaired(self, handling: FaultHandling, of: Of) -> Result<Self, AnalysisError> {
-        refuse_copies(&self)?;
+    pub fn repaired(self, handling: FaultHandling, of: SystemKind) -> Result<Self, AnalysisError> {
+        reject_duplicate_runs(&self)?;
         let mut all = Self {
             source: self.source,
             ..Self::default()
         };
         let one = self.names.into_iter().zip(self.records).zip(self.accounts);
         for (((name, record), account), origin) in one.zip(self.origins) {
-            let steps = of == Of::System && is_multilevel_input(&record);
+            let steps = of == SystemKind::System && is_multilevel_input(&record);
             let handling = match handling {
                 // Settling after a step is not a sensor fault, so it is reported and the recording is not cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
             let mut found = repair(&record, handling)?;
-            if steps || (of == Of::System && record.sample_time().s() > MAX_SAMPLE_TIME_S) {
+            if steps || (of == SystemKind::System && record.sample_time().s() > MAX_SAMPLE_TIME_S) {
                 // Faults found in data with step inputs, or in data of slow systems such as a furnace, are typical and
                 // become notes.
                 let note = |finding: Finding| Finding::note(finding.kind, finding.message);
@@ -49,7 +49,7 @@ impl Recordings {
             let ts_s = record.sample_time().s();
             let longest = found.segments.iter().map(Record::len).max().unwrap_or(0);
             let is_short = |piece: &Record| piece.len() < longest && (piece.len() as f64) * ts_s < MIN_SEGMENT_S;
-            if of == Of::Person && found.segments.iter().any(is_short) {
+            if of == SystemKind::Person && found.segments.iter().any(is_short) {
                 let left: f64 = found
                     .segments
                     .iter()

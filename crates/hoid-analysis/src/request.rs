@@ -281,8 +281,8 @@ fn misplaced_option_error(name: &str, all: &[MethodSpec]) -> AnalysisError {
     };
     AnalysisError::Misplaced {
         name: setting.name,
-        of,
-        instead: match name {
+        estimators: of,
+        alternative: match name {
             "nk" => "; for other estimators, give delay in s",
             _ => "",
         },

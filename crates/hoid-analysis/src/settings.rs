@@ -14,7 +14,8 @@ pub struct Setting {
     /// The value in use.
     pub value: String,
     /// True if the value differs from the default and was therefore given by the user.
-    pub given: bool,
+    #[serde(rename = "given")]
+    pub is_given: bool,
 }
 
 impl Setting {
@@ -23,14 +24,17 @@ impl Setting {
         Self {
             name: name.into(),
             value: value.into(),
-            given: false,
+            is_given: false,
         }
     }
 
     /// Sets the flag that the user gave the value.
     #[must_use]
     pub fn with_given(self, given: bool) -> Self {
-        Self { given, ..self }
+        Self {
+            is_given: given,
+            ..self
+        }
     }
 
     /// Marks as given the settings whose values differ from the defaults.
@@ -42,7 +46,7 @@ impl Setting {
         };
         all.into_iter()
             .map(|one| {
-                let given = one.given || !is_default(&one);
+                let given = one.is_given || !is_default(&one);
                 one.with_given(given)
             })
             .collect()

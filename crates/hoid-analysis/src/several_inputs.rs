@@ -12,7 +12,7 @@ use serde_json::{Map, Value, json};
 use crate::{
     AnalysisError,
     json::{envelope, number, optional, termination},
-    quality::Of,
+    quality::SystemKind,
     recordings::Recordings,
     settings::Setting,
 };
@@ -166,14 +166,14 @@ pub(crate) fn parse_seen_channels(further: &[String], text: &str) -> Result<Vec<
         let named: SeenChannel = part
             .parse()
             .map_err(|why| options(format!("role: found {part:?}; expected {why}")))?;
-        let Some(place) = further.iter().position(|name| *name == named.name) else {
+        let Some(index) = further.iter().position(|name| *name == named.name) else {
             return Err(options(format!(
                 "role: {} is not one of the further inputs {}; add it as an input first",
                 named.name,
                 further.join(", ")
             )));
         };
-        all[place] = named;
+        all[index] = named;
     }
     Ok(all)
 }
@@ -193,7 +193,7 @@ impl SeveralInputsResult {
         if recordings.is_empty() {
             return Err(AnalysisError::NoRecordings);
         }
-        let data = recordings.repaired(faults, Of::System)?.at_rate(rate, true)?;
+        let data = recordings.repaired(faults, SystemKind::System)?.at_rate(rate, true)?;
         let fit = model.fit(&data.records)?;
         let mut findings = Vec::new();
         if !fit.termination.converged() {

@@ -5,7 +5,7 @@
 use std::{collections::BTreeMap, fs, path::Path};
 
 use hoid_analysis::{
-    AnalysisError, BatchEstimator, Excitation, Identification, Polynomials, Reading, Recordings, late_samples,
+    AnalysisError, BatchEstimator, Excitation, Identification, Polynomials, Reading, Recordings, output_delay_samples,
     parse_prior, without_offsets,
 };
 use hoid_ident::{GreyBox, SigmoidChange, family::FamilyEstimator};
@@ -215,9 +215,15 @@ fn rate_given_in_hz_is_not_reduced_again() {
 fn offsets_are_converted_to_lag_samples() {
     let record = recorded_run(1, |e, u| (e, u));
     let of = |name: &str, offset| BTreeMap::from([(name.to_owned(), offset)]);
-    assert_eq!(late_samples(&record, &of("u", Offset::Samples(2.0))).unwrap(), 2.0);
-    assert_eq!(late_samples(&record, &of("e", Offset::Seconds(0.01))).unwrap(), -1.0);
-    let wrong = late_samples(&record, &of("y", Offset::Samples(1.0))).unwrap_err();
+    assert_eq!(
+        output_delay_samples(&record, &of("u", Offset::Samples(2.0))).unwrap(),
+        2.0
+    );
+    assert_eq!(
+        output_delay_samples(&record, &of("e", Offset::Seconds(0.01))).unwrap(),
+        -1.0
+    );
+    let wrong = output_delay_samples(&record, &of("y", Offset::Samples(1.0))).unwrap_err();
     assert_eq!(
         wrong.to_string(),
         "--offset: there is no channel \"y\"; the record has e, u; e and u can also be used for the input and output"

@@ -104,7 +104,7 @@ fn non_default_settings_are_marked_as_given() {
     let found = with.run(Recordings::from_records([run(1)])).unwrap();
     let given = |name: &str| {
         let one = found.settings.iter().find(|one| one.name == name);
-        one.unwrap().given
+        one.unwrap().is_given
     };
     for (name, expected) in [
         ("structure", false),

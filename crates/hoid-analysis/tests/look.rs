@@ -3,7 +3,7 @@
 
 use std::{f64::consts::TAU, fs, path::PathBuf};
 
-use hoid_analysis::{AnalysisError, FileExamination, LookOptions, Reading};
+use hoid_analysis::{AnalysisError, ExaminationOptions, FileExamination, Reading};
 use tempfile::TempDir;
 
 /// A record of 25 s with a target of period 10 s from 2 s to 22 s, and the output y = u/s of a control that is recorded
@@ -39,13 +39,13 @@ fn record_row(t: f64, r: f64, y: f64, u: f64) -> String {
 #[test]
 fn columns_periods_and_lag_are_found() {
     let (_directory, path) = write_record("Time (s),Target,y,Stick [V]", record_row);
-    let known = LookOptions {
+    let known = ExaminationOptions {
         controlled_element: Some(("1/s".to_owned(), "1/s".parse().unwrap())),
-        ..LookOptions::default()
+        ..ExaminationOptions::default()
     };
     let look = FileExamination::at(&path, &known).unwrap();
     assert_eq!(look.units(), [("Stick [V]", "V")]);
-    let seen = look.seen.as_ref().unwrap();
+    let seen = look.summary.as_ref().unwrap();
     assert_eq!(seen.periods.as_ref().unwrap().span_s, (2.0, 22.0));
     let lag = seen.lag.as_ref().unwrap().as_ref().unwrap();
     assert_eq!((lag.samples, lag.seconds), (1.0, 0.02));
@@ -56,7 +56,7 @@ fn columns_periods_and_lag_are_found() {
          --excitation Target --controlled-element 1/s"
     );
     // Values given by the user are not searched for.
-    let known = LookOptions {
+    let known = ExaminationOptions {
         excitation: Some("none".to_owned()),
         from_s: Some(5.0),
         offset_samples: Some(0.0),
@@ -68,7 +68,7 @@ fn columns_periods_and_lag_are_found() {
         (advice.from_s, advice.to_s, advice.late_samples),
         (Some(5.0), None, None)
     );
-    assert!(look.seen.unwrap().lag.is_none());
+    assert!(look.summary.unwrap().lag.is_none());
 }
 
 #[test]
@@ -80,18 +80,18 @@ fn unreadable_record_still_gives_column_advice() {
             record_row(t, r, y, u)
         }
     });
-    let look = FileExamination::at(&path, &LookOptions::default()).unwrap();
-    assert!(look.seen.as_ref().unwrap_err().to_string().contains("--fill"));
+    let look = FileExamination::at(&path, &ExaminationOptions::default()).unwrap();
+    assert!(look.summary.as_ref().unwrap_err().to_string().contains("--fill"));
     assert_eq!(look.advice().unwrap().arguments(), ["--input", "r-y", "--output", "u"]);
     fs::write(&path, "a,b\n1,2\n").unwrap();
     assert!(
-        FileExamination::at(&path, &LookOptions::default())
+        FileExamination::at(&path, &ExaminationOptions::default())
             .unwrap()
             .advice()
             .is_none()
     );
     fs::write(&path, "").unwrap();
-    assert!(FileExamination::at(&path, &LookOptions::default()).is_err());
+    assert!(FileExamination::at(&path, &ExaminationOptions::default()).is_err());
 }
 
 #[test]

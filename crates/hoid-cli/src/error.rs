@@ -83,7 +83,11 @@ impl From<AnalysisError> for CliError {
             | AnalysisError::NotAResult { .. }
             | AnalysisError::NoRecordings => Self::Usage(error.to_string()),
             AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", option_text(name))),
-            AnalysisError::Misplaced { name, of, instead } => {
+            AnalysisError::Misplaced {
+                name,
+                estimators: of,
+                alternative: instead,
+            } => {
                 let instead = instead.replace("delay", "--delay");
                 Self::Usage(format!(
                     "{} applies only to {}{instead}",

@@ -60,8 +60,8 @@ fn coloured(page: &str) -> String {
 /// Minimum and maximum width of a page: narrower lines would split words, wider lines are hard to read.
 const WIDTH_RANGE: (usize, usize) = (60, 110);
 
-/// Returns the width for wrapping in columns, limited to [`WIDTH_RANGE`]: the value of `COLUMNS`, otherwise the width of the
-/// terminal. Returns `None` if neither is known, as for output to a file; lines are then not wrapped.
+/// Returns the width for wrapping in columns, limited to [`WIDTH_RANGE`]: the value of `COLUMNS`, otherwise the width
+/// of the terminal. Returns `None` if neither is known, as for output to a file; lines are then not wrapped.
 pub fn width() -> Option<usize> {
     let columns = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
     let asked = || {
@@ -196,13 +196,13 @@ pub fn run_with_spinner<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
             if bar_handle.length() != Some(step.total as u64)
                 && let Ok(style) = ProgressStyle::with_template(&format!(
                     "{{bar:30}} {{pos}}/{{len}} {}, {{elapsed}}, {{eta}} left",
-                    step.what
+                    step.item_name
                 ))
             {
                 bar_handle.set_style(style);
                 bar_handle.set_length(step.total as u64);
             }
-            bar_handle.set_position(step.done as u64);
+            bar_handle.set_position(step.finished as u64);
         },
         work,
     );

@@ -112,7 +112,7 @@ pub fn output_levels(files: &[String], accounts: &[Account]) -> String {
 /// Lists every setting that affects the result.
 pub fn settings(settings: &[Setting]) -> String {
     let of = |given: bool| {
-        let list = settings.iter().filter(|one| one.given == given);
+        let list = settings.iter().filter(|one| one.is_given == given);
         let list: Vec<String> = list.map(|one| format!("{}: {}", one.name, one.value)).collect();
         if list.is_empty() {
             "none".to_owned()

@@ -54,8 +54,8 @@ fn simulated_columns(at: &Path, lines: &str, seed: &str) -> Vec<[f64; 4]> {
     let text = fs::read_to_string(at.join("run.csv")).unwrap();
     let mut rows = text.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = rows.next().unwrap().split(',').collect();
-    let place = |name: &str| header.iter().position(|column| *column == name).unwrap();
-    let places = ["t", "e", "u", "f_t"].map(place);
+    let index = |name: &str| header.iter().position(|column| *column == name).unwrap();
+    let places = ["t", "e", "u", "f_t"].map(index);
     let row = |line: &str| {
         let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
         places.map(|k| cells[k])

@@ -1,4 +1,4 @@
-//! `hoid describe` from the command line: simulated runs, signals known in closed form, and refused input.
+//! `hoid describe` from the command line: simulated runs, signals known in closed form, and rejected input.
 #![allow(clippy::unwrap_used)]
 
 mod common;

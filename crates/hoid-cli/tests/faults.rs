@@ -22,8 +22,8 @@ fn simulated_rows(d: &Path, condition: &str, seed: &str) -> Rows {
     let text = fs::read_to_string(d.join("run.csv")).unwrap();
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let place = |name: &str| names.iter().position(|n| *n == name).unwrap();
-    let columns = ["t", "e", "u"].map(place);
+    let index = |name: &str| names.iter().position(|n| *n == name).unwrap();
+    let columns = ["t", "e", "u"].map(index);
     lines
         .map(|line| {
             let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
@@ -99,9 +99,9 @@ fn single_outlier_is_repaired() {
     write_rows(d, &clean);
     let before = identify(d, &BOX_JENKINS_OPTIONS);
     assert!(fault_kinds(&before).is_empty(), "{before}");
-    for place in [1234, 4000] {
+    for index in [1234, 4000] {
         let mut rows = clean.clone();
-        rows[place][1] = 30.0;
+        rows[index][1] = 30.0;
         write_rows(d, &rows);
         let found = identify(d, &BOX_JENKINS_OPTIONS);
         assert_eq!(fault_kinds(&found), ["spike"]);
@@ -111,7 +111,7 @@ fn single_outlier_is_repaired() {
             (Some("e"), Some("bridged"))
         );
         assert!(
-            (fault["from"].as_f64().unwrap() - rows[place][0]).abs() < 1e-9,
+            (fault["from"].as_f64().unwrap() - rows[index][0]).abs() < 1e-9,
             "{fault}"
         );
         assert_correct_or_flagged(&found, "bridged");

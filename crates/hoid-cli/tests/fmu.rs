@@ -1,4 +1,4 @@
-//! `hoid fmu`: contents of a unit, and refused input. The run in a simulator is tested with the Python package.
+//! `hoid fmu`: contents of a unit, and rejected input. The run in a simulator is tested with the Python package.
 #![allow(clippy::unwrap_used)]
 
 mod common;

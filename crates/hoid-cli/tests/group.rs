@@ -114,7 +114,7 @@ fn virtual_experiment_is_analysed_and_reported() {
             .count()
     };
     assert!(of("C3") > 0 && of("C1") == 0, "{settling}");
-    // A second run is refused, and with --resume nothing is computed twice.
+    // A second run is rejected, and with --resume nothing is computed twice.
     let (code, message) = failure_of(at, &["group", "people", "--out", "out"]);
     assert!(code == 1 && message.contains("--resume"), "{message}");
     let resumed = ["group", "people", "--out", "out", "--csv", "--resume"];

@@ -216,7 +216,7 @@ fn common_rates_are_decimated() {
     let file = simulate(at, "gain", 1000.0, 1);
     let (code, message) = failure_of(at, &["identify", &file, "--to", "0.1"]);
     assert!(
-        code == 1 && message.contains("found 100 samples for a filter"),
+        code == 1 && message.contains("found 100 samples, but the filter"),
         "{message}"
     );
     for wrong in ["0", "on", "-3", "2.5"] {
@@ -291,7 +291,7 @@ fn stream_at_1000_hz_matches_track() {
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     let mut table = trace.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = table.next().unwrap().split(',').collect();
-    let place = names.iter().position(|name| *name == "b0").unwrap();
+    let index = names.iter().position(|name| *name == "b0").unwrap();
     let value = last["parameters"]["b0"]["value"].as_f64().unwrap();
     // The gains are constant within a block, so the row is found by its time and not by its value.
     let at = last["t"].as_f64().unwrap() - behind_s;
@@ -304,5 +304,5 @@ fn stream_at_1000_hz_matches_track() {
         .min_by(|a, b| (a[0] - at).abs().total_cmp(&(b[0] - at).abs()))
         .unwrap();
     assert!((row[0] - at).abs() < 0.0101, "{} {at}", row[0]);
-    assert_eq!(row[place], value);
+    assert_eq!(row[index], value);
 }

@@ -54,8 +54,8 @@ fn both_responses_are_found_within_their_errors() {
     let at = TempDir::new().unwrap();
     let mut squares = [0.0; 4];
     let runs = [(0, "1"), (0, "2"), (0, "3"), (1, "1"), (1, "2")];
-    for (place, seed) in runs {
-        let (condition, element) = ELEMENTS[place];
+    for (index, seed) in runs {
+        let (condition, element) = ELEMENTS[index];
         simulate(at.path(), condition, seed, &[]);
         let found = identify(at.path(), element, &[]);
         assert_eq!(found["channels"][0]["form"], "lead", "{condition} {seed}");
@@ -64,8 +64,8 @@ fn both_responses_are_found_within_their_errors() {
         let crossover = &found["open_loop"]["crossover_rad_s"];
         let margin = &found["open_loop"]["phase_margin_deg"];
         for (k, (estimate, truth)) in [
-            (crossover, [1.5635, 2.7480][place]),
-            (margin, [76.67, 22.90][place]),
+            (crossover, [1.5635, 2.7480][index]),
+            (margin, [76.67, 22.90][index]),
             (parameter(&found, 1, "K_d"), 0.05),
             (parameter(&found, 1, "tau_f"), 0.1),
         ]
@@ -179,12 +179,12 @@ fn plan_with_displays_is_simulated_and_analysed() {
     let fits = fs::read_to_string(at.path().join("out/fits.csv")).unwrap();
     let mut rows = fits.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = rows.next().unwrap().split(',').collect();
-    let place = |name: &str| header.iter().position(|column| *column == name).unwrap();
+    let index = |name: &str| header.iter().position(|column| *column == name).unwrap();
     let mut count = 0;
     for row in rows {
         let row: Vec<&str> = row.split(',').collect();
-        assert_eq!(row[place("status")], "ok", "{row:?}");
-        let number = |name: &str| row[place(name)].parse::<f64>().unwrap();
+        assert_eq!(row[index("status")], "ok", "{row:?}");
+        let number = |name: &str| row[index(name)].parse::<f64>().unwrap();
         let off = (number("K_e") - 0.09) / number("K_e_se");
         assert!(off.abs() < 3.5, "{off}");
         count += 1;

@@ -42,8 +42,8 @@ fn trace(directory: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
 }
 
 fn column(trace: &(Vec<String>, Vec<Vec<f64>>), name: &str) -> Vec<f64> {
-    let place = trace.0.iter().position(|n| n == name).unwrap();
-    trace.1.iter().map(|row| row[place]).collect()
+    let index = trace.0.iter().position(|n| n == name).unwrap();
+    trace.1.iter().map(|row| row[index]).collect()
 }
 
 /// The result is printed in any case; its rows are written only if a file is given.

@@ -7,7 +7,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use hoid_core::held_operator::{held_operator, held_operator_delayed};
+use hoid_core::zoh_operator::{zoh_operator, zoh_operator_delayed};
 
 fn bench_held_operator(c: &mut Criterion) {
     for (name, omega, zeta, ts) in [
@@ -19,10 +19,10 @@ fn bench_held_operator(c: &mut Criterion) {
     ] {
         let p = [0.09, 0.036, omega, zeta];
         c.bench_function(&format!("whole samples: {name}"), |b| {
-            b.iter(|| held_operator(black_box(p), black_box(ts)))
+            b.iter(|| zoh_operator(black_box(p), black_box(ts)))
         });
         c.bench_function(&format!("any delay: {name}"), |b| {
-            b.iter(|| held_operator_delayed(black_box(p), black_box(0.37 * ts), black_box(ts)))
+            b.iter(|| zoh_operator_delayed(black_box(p), black_box(0.37 * ts), black_box(ts)))
         });
     }
 }

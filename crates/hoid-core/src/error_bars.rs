@@ -277,8 +277,8 @@ impl<const N: usize, const K: usize> ErrorBars<N, K> {
         }
     }
 
-    /// Limits the variances to [`MAX_VARIANCE_GROWTH`] times their initial values, since the first-order equations can be
-    /// unstable for large gains for which the recursion itself is stable. After an overflow all variances are set to
+    /// Limits the variances to [`MAX_VARIANCE_GROWTH`] times their initial values, since the first-order equations can
+    /// be unstable for large gains for which the recursion itself is stable. After an overflow all variances are set to
     /// this limit.
     #[cold]
     fn bound_variances(&mut self) {

@@ -25,7 +25,8 @@ pub struct NoiseFilters<'a> {
     pub filtered: bool,
 }
 
-/// The further inputs of a predictor with capacity for N coefficients. `own` is the part of theta after `[a, b, c, d, f]`.
+/// The further inputs of a predictor with capacity for N coefficients. `own` is the part of theta after `[a, b, c, d,
+/// f]`.
 pub trait FurtherInputs<const N: usize>: State {
     /// Number of coefficients.
     fn parameter_count(&self) -> usize;

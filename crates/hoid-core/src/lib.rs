@@ -74,7 +74,7 @@
 //! | [`error_bars`], [`sensitivities`], [`innovation_variance`] | covariance of the estimate for any gain; errors in the filters; sigma^2 |
 //! | [`recursion`] | result of a step; polynomials that are kept stable |
 //! | [`guard`] | detection of samples and spans that cannot come from tracking, before they reach a recursion |
-//! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with an arbitrary delay, and its Jacobian; the functions used for both |
+//! | [`zoh_operator`], [`divided_differences`] | exact zero-order hold of the operator with an arbitrary delay, and its Jacobian; the functions used for both |
 //! | [`filter`], [`delay`], [`stability`] | rational filters over slices, a delay line, the Schur-Cohn test |
 //! | [`mod@state`] | saving a recursion, to continue it elsewhere |
 #![no_std]
@@ -95,7 +95,6 @@ pub mod error_bars;
 pub mod filter;
 pub mod further_input;
 pub mod guard;
-pub mod held_operator;
 pub mod innovation_variance;
 pub mod predictor;
 pub mod recursion;
@@ -106,3 +105,4 @@ pub mod shape;
 pub mod stability;
 pub mod ud_covariance;
 pub mod window;
+pub mod zoh_operator;

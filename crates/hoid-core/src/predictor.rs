@@ -87,8 +87,8 @@ crate::state!([S, const N: usize, const L: usize, I: crate::state::State] Predic
 });
 
 impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
-    /// Builds the predictor of a model with one input, with all filters at rest. Returns `None` if the shape exceeds the
-    /// capacities N or L, or has no parameter.
+    /// Builds the predictor of a model with one input, with all filters at rest. Returns `None` if the shape exceeds
+    /// the capacities N or L, or has no parameter.
     pub fn new(shape: S, regressor: Regressor) -> Option<Self> {
         Self::with_further_inputs(shape, regressor, NoFurtherInputs)
     }
@@ -188,12 +188,12 @@ impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S,
             match self.regressor {
                 Regressor::Gradient => {
                     let g: [f64; N] = product(c, f);
-                    let poles = dot_of_fresh(&g[..c.len() + f.len()], &self.filtered_x);
+                    let poles = dot_with_recent(&g[..c.len() + f.len()], &self.filtered_x);
                     let filtered = x + dot(d, &self.x) - poles;
                     push(&mut self.filtered_x, output, filtered);
                 }
                 Regressor::Cascade => {
-                    let over_f = x - dot_of_fresh(f, &self.x_over_f);
+                    let over_f = x - dot_with_recent(f, &self.x_over_f);
                     let filtered = over_f + dot(d, &self.x_over_f) - dot(c, &self.filtered_x);
                     self.pending[1] = over_f;
                     push(&mut self.filtered_x, output, filtered);
@@ -334,7 +334,7 @@ impl<S: Shape, const N: usize, const L: usize, I: FurtherInputs<N>> Predictor<S,
 /// Each number is read separately. A wide load right after several narrow stores would wait until all stores have
 /// reached the memory, so successive samples could not overlap. The compiler tends to generate such loads.
 #[inline(always)]
-fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
+fn dot_with_recent(coefficients: &[f64], history: &[f64]) -> f64 {
     let mut pairs = coefficients.iter().zip(history);
     let Some((c, h)) = pairs.next() else {
         return 0.0;
@@ -347,7 +347,7 @@ fn dot_of_fresh(coefficients: &[f64], history: &[f64]) -> f64 {
 }
 
 /// Returns psi, assembled from the histories of x, u, eps, v and w.
-// Each number is moved separately, since a wide copy of numbers just stored would wait as in [`dot_of_fresh`].
+// Each number is moved separately, since a wide copy of numbers just stored would wait as in [`dot_with_recent`].
 #[allow(clippy::manual_memcpy)]
 #[inline(always)]
 fn gather<S: Shape, const N: usize>(shape: &S, x: &[f64], [u, eps, v, w]: [&[f64; N]; 4]) -> [f64; N] {

@@ -16,8 +16,8 @@ use crate::{
     shape::Shape,
 };
 
-/// Recursive prediction-error method, with further inputs I. N is the capacity for parameters and K the capacity for filter errors
-/// ([`ErrorLayout::filter_error_count`]). K is 0 for the default error bars and for B =
+/// Recursive prediction-error method, with further inputs I. N is the capacity for parameters and K the capacity for
+/// filter errors ([`ErrorLayout::filter_error_count`]). K is 0 for the default error bars and for B =
 /// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]
@@ -53,8 +53,8 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
 impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropagation<N, K>, I: FurtherInputs<N>>
     Rpem<S, N, K, A, B, I>
 {
-    /// As [`Rpem::new`], with further inputs, whose coefficients follow those of `[a.. b.. c.. d.. f..]`. The error bars
-    /// of a model with further inputs have no filter errors: also `None` if K is not zero.
+    /// As [`Rpem::new`], with further inputs, whose coefficients follow those of `[a.. b.. c.. d.. f..]`. The error
+    /// bars of a model with further inputs have no filter errors: also `None` if K is not zero.
     pub fn with_further_inputs(
         shape: S,
         further: I,

@@ -162,7 +162,7 @@ fn estimate_without_error_bars_is_bit_identical() {
             let (regressor, stable) = (Regressor::Gradient, StablePolynomials::Predictor);
             Rpem::<_, 5, 0, _, _>::new(bj, regressor, stable, start_coefficients(&bj), adaptation, NoErrorBars)
         };
-        // A rule that needs the innovation variance is refused if it is not estimated.
+        // A rule that needs the innovation variance is rejected if it is not estimated.
         assert_eq!(rpem(adaptation()).is_none(), needs_innovation_variance);
         assert_eq!(
             Rls::new(arx, start_coefficients(&arx), adaptation(), NoErrorBars).is_none(),

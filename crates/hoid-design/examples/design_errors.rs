@@ -4,8 +4,8 @@
 //! cargo xtask slow design-errors [EXPERIMENTS] [SEED] [IDENTIFIED]
 //! ```
 //!
-//! Where people see the target, so many experiments (none by default) are also identified as `hoid identify` does it: both
-//! responses by prediction error and at the lines, with the forms of the design and without a prior.
+//! Where people see the target, so many experiments (none by default) are also identified as `hoid identify` does it:
+//! both responses by prediction error and at the lines, with the forms of the design and without a prior.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/simulated.rs"]

@@ -6,8 +6,8 @@
 //! interval of the same people, moved by delta, does not hold zero: 5 +- 1 % false findings are 94 to 96 % of the
 //! intervals.
 //!
-//! Where people do not differ beyond errors of so different size, intervals of few of them hold the difference too often, up to
-//! 98 % (so do those of the t test without weights): there they are bounded from below.
+//! Where people do not differ beyond errors of so different size, intervals of few of them hold the difference too
+//! often, up to 98 % (so do those of the t test without weights): there they are bounded from below.
 #![allow(clippy::unwrap_used)]
 
 use hoid_design::compare::{Observation, Weights, meta_mean, meta_regression};

@@ -1,4 +1,5 @@
-//! Errors that were predicted against the scatter of simulated experiments: a sample of `cargo xtask slow design-errors`.
+//! Errors that were predicted against the scatter of simulated experiments: a sample of `cargo xtask slow
+//! design-errors`.
 //!
 //! Of 200 experiments the standard deviation of a parameter has an error of 5 %: 15 % are three of them.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

@@ -73,7 +73,7 @@ pub fn run(
 struct LineReader<R> {
     read: R,
     chunk: [u8; 256],
-    at: usize,
+    position: usize,
     end: usize,
 }
 
@@ -82,7 +82,7 @@ impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> LineReader<R> {
         Self {
             read,
             chunk: [0; 256],
-            at: 0,
+            position: 0,
             end: 0,
         }
     }
@@ -113,11 +113,11 @@ impl<R: FnMut(&mut [u8]) -> Result<usize, &'static str>> LineReader<R> {
     }
 
     fn next_byte(&mut self) -> Result<Option<u8>, &'static str> {
-        if self.at == self.end {
-            (self.at, self.end) = (0, (self.read)(&mut self.chunk)?);
+        if self.position == self.end {
+            (self.position, self.end) = (0, (self.read)(&mut self.chunk)?);
         }
-        let byte = (self.at < self.end).then(|| self.chunk[self.at]);
-        self.at += usize::from(byte.is_some());
+        let byte = (self.position < self.end).then(|| self.chunk[self.position]);
+        self.position += usize::from(byte.is_some());
         Ok(byte)
     }
 }

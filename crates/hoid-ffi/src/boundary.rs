@@ -254,7 +254,7 @@ mod tests {
         // SAFETY: the string is null-terminated.
         let refused = unsafe { text(c"\xff".as_ptr(), "a") }.unwrap_err();
         assert_eq!(refused.status, HOID_BAD_TEXT);
-        // SAFETY: the length is refused, so no bytes are read.
+        // SAFETY: the length is rejected, so no bytes are read.
         let refused = unsafe { bytes(room.as_ptr().cast(), usize::MAX, "bytes") }.unwrap_err();
         assert_eq!(refused.status, HOID_TOO_SMALL);
     }

@@ -19,20 +19,20 @@
 //! |---|---|
 //! | `session` | tracker built from its options, with its prior knowledge |
 //! | `options` | options in JSON, with the keywords of Python |
-//! | `saved`, `packed` | serialisation of a tracker as bytes |
+//! | `saved_tracker`, `binary_format` | serialisation of a tracker as bytes |
 //! | `status`, `boundary` | status codes and error messages; pointers |
 //! | `types` | types of the interface |
 //! | `create`, `update`, `results` | functions of the interface |
 //! | [`fmi`] | functions of the Functional Mock-up Interface |
 
+mod binary_format;
 mod boundary;
 mod create;
 /// cbindgen:ignore
 pub mod fmi;
 mod options;
-mod packed;
 mod results;
-mod saved;
+mod saved_tracker;
 mod session;
 mod status;
 mod types;

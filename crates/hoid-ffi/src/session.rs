@@ -26,7 +26,7 @@ const SHIFT_NAMES: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"ze
 
 /// Tracker with the request from which it was built.
 pub(crate) struct Session {
-    asked: TrackerRequest,
+    request: TrackerRequest,
     live: Live,
     /// Names of the coefficients; empty until the structure is known.
     names: Vec<CString>,
@@ -53,7 +53,7 @@ impl Session {
     pub fn of(asked: TrackerRequest) -> Result<Self, Failure> {
         let mut session = Self {
             live: asked.live()?,
-            asked,
+            request: asked,
             names: Vec::new(),
         };
         session.update_parameter_names();
@@ -69,7 +69,7 @@ impl Session {
 
     /// Returns the request and the recursion, for saving.
     pub fn request_and_recursion(&mut self) -> (&TrackerRequest, &mut Live) {
-        (&self.asked, &mut self.live)
+        (&self.request, &mut self.live)
     }
 
     fn update_parameter_names(&mut self) {

@@ -332,7 +332,7 @@ macro_rules! life_of_a_unit {
                 assert!(one.is_null());
             }
         }
-        // SAFETY: null is refused.
+        // SAFETY: null is rejected.
         assert_eq!(unsafe { $set_state(component, ptr::null_mut()) }, 3);
 
         // SAFETY: the component is valid.
@@ -345,7 +345,7 @@ macro_rules! life_of_a_unit {
             // SAFETY: the handle was created above and is freed once; null is allowed.
             unsafe { $free(one) };
         }
-        // SAFETY: null is refused.
+        // SAFETY: null is rejected.
         assert_eq!(unsafe { $reset(ptr::null_mut()) }, 3);
     }};
 }

@@ -293,7 +293,7 @@ proptest! {
         }
     }
 
-    /// Arbitrary bytes are refused.
+    /// Arbitrary bytes are rejected.
     #[test]
     fn arbitrary_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
         let bytes = if magic { [b"hoid\x01\0\0\0".as_slice(), &bytes].concat() } else { bytes };

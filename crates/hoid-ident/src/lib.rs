@@ -81,7 +81,7 @@
 mod assembled_fit;
 mod constraint;
 mod criterion;
-mod derived;
+mod derived_quantities;
 pub mod diagnostics;
 mod error;
 mod estimator;
@@ -112,7 +112,7 @@ pub mod validation;
 
 pub use constraint::{Constraint, Prior};
 pub use criterion::{InitialState, first_residual};
-pub use derived::{MarginEstimates, Root};
+pub use derived_quantities::{MarginEstimates, Root};
 pub use error::IdentError;
 pub use estimator::{Estimator, Focus};
 pub use fit::{Fit, ResponsePoint, Series};

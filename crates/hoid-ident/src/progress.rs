@@ -15,9 +15,9 @@ use std::{
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
     /// Name of the counted items, in the plural.
-    pub what: &'static str,
+    pub item_name: &'static str,
     /// Number of finished items.
-    pub done: usize,
+    pub finished: usize,
     /// Total number of items.
     pub total: usize,
 }
@@ -46,7 +46,11 @@ pub(crate) fn report_step(what: &'static str, done: usize, total: usize) {
     // The watcher is cloned out of the cell first, because it may itself run a fit.
     let watcher = WATCHER.with_borrow(Clone::clone);
     if let Some(watcher) = watcher {
-        watcher(Step { what, done, total });
+        watcher(Step {
+            item_name: what,
+            finished: done,
+            total,
+        });
     }
 }
 
@@ -58,7 +62,11 @@ pub fn counter(what: &'static str, total: usize) -> impl Fn() + Send + Sync {
     move || {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         if let Some(watcher) = &watcher {
-            watcher(Step { what, done, total });
+            watcher(Step {
+                item_name: what,
+                finished: done,
+                total,
+            });
         }
     }
 }
@@ -75,11 +83,11 @@ mod tests {
         let (outer, inner) = (notified.clone(), notified.clone());
         report_step("nobody", 0, 1);
         with_watcher(
-            move |step| outer.lock().unwrap().push(("outer", step.done)),
+            move |step| outer.lock().unwrap().push(("outer", step.finished)),
             || {
                 report_step("forms", 0, 2);
                 with_watcher(
-                    move |step| inner.lock().unwrap().push(("inner", step.done)),
+                    move |step| inner.lock().unwrap().push(("inner", step.finished)),
                     || {
                         report_step("orders", 7, 9);
                     },
@@ -96,7 +104,7 @@ mod tests {
         let notified = Arc::new(Mutex::new(Vec::new()));
         let seen = notified.clone();
         with_watcher(
-            move |step| seen.lock().unwrap().push(step.done),
+            move |step| seen.lock().unwrap().push(step.finished),
             || {
                 let one = counter("candidates", 3);
                 std::thread::scope(|all| {

@@ -1,9 +1,9 @@
 //! Contribution of a searched delay to the error bars of a fit.
 //!
-//! An nk that is searched for is estimated from the data, as theta is, and theta depends on it. The residual also has a derivative
-//! with respect to the delay tau. With the filtered response of the model `x = (D/C) w = sum_j b_j psi_bj`, this
-//! derivative is computed by central differences, `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`. With `G = psi' psi`
-//! the estimate of theta depends on the delay with the slope
+//! An nk that is searched for is estimated from the data, as theta is, and theta depends on it. The residual also has a
+//! derivative with respect to the delay tau. With the filtered response of the model `x = (D/C) w = sum_j b_j psi_bj`,
+//! this derivative is computed by central differences, `d(t) = -d eps/d tau = (x(t-1) - x(t+1))/(2 Ts)`. With `G = psi'
+//! psi` the estimate of theta depends on the delay with the slope
 //!
 //! `s = d theta/d tau = -G^-1 psi' d`
 //!
@@ -183,7 +183,7 @@ mod tests {
         let omega = 12.0;
         let response = {
             let held = truth.discretise(run(0).sample_time()).unwrap();
-            let theta = vec![held.held.b0, held.held.b1, held.held.f1, held.held.f2];
+            let theta = vec![held.zoh.b0, held.zoh.b1, held.zoh.f1, held.zoh.f2];
             let orders = Structure::OutputError.operator_orders(held.nk);
             let model = PolynomialModel::new(Structure::OutputError, orders, held.sample_time, theta);
             model.unwrap().response(omega)

@@ -199,7 +199,7 @@ impl SeveralInputs {
                 if let Some(found) = minimise(&criterion, start, &self.search, None, &mut workspace)
                     && best
                         .as_ref()
-                        .is_none_or(|known| found.at.sum_of_squares < known.at.sum_of_squares)
+                        .is_none_or(|known| found.linearisation.sum_of_squares < known.linearisation.sum_of_squares)
                 {
                     best = Some(found);
                 }

@@ -215,7 +215,7 @@ fn study(runs: u64) -> Vec<(String, Vec<f64>)> {
             let Some(error) = parameter.estimate.standard_error else {
                 panic!("{name}: {:?} from {}", parameter.remark, fit.start());
             };
-            // The lag is judged in 1/T_I, whose errors are normal.
+            // The lag is assessed in 1/T_I, whose errors are normal.
             let z = if name == "T_I" {
                 (1.0 / parameter.estimate.value - 1.0 / expected) * parameter.estimate.value.powi(2) / error
             } else {

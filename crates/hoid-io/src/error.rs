@@ -99,12 +99,12 @@ pub enum IoError {
         remedy: String,
     },
     /// Contents that are not text.
-    #[error("{file}, {place}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]
+    #[error("{file}, {location}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]
     NotText {
         /// Name of the file.
         file: String,
-        /// Place in the file.
-        place: String,
+        /// Location in the file.
+        location: String,
         /// The first invalid byte.
         found: String,
     },
@@ -122,13 +122,13 @@ pub enum IoError {
     },
     /// Numbers in the line where the column names are expected.
     #[error(
-        "{file}, {place}: the first line holds numbers ({found}), expected the names of the columns; insert a header such as t,e,u above this line, without a leading #"
+        "{file}, {location}: the first line holds numbers ({found}), expected the names of the columns; insert a header such as t,e,u above this line, without a leading #"
     )]
     NoHeader {
         /// Name of the file.
         file: String,
-        /// Place in the file.
-        place: String,
+        /// Location in the file.
+        location: String,
         /// The first cells of the line.
         found: String,
     },
@@ -143,7 +143,7 @@ pub enum IoError {
     },
     /// A text in which a line has no end.
     #[error(
-        "{file}: no line ends within {most_mb} MB after byte {byte}, expected one line per sample; copy or record the \
+        "{file}: no line ends within {max_mb} MB after byte {byte}, expected one line per sample; copy or record the \
          file again, or remove everything after this byte"
     )]
     LongLine {
@@ -152,11 +152,11 @@ pub enum IoError {
         /// Start of the line, counted from 0.
         byte: usize,
         /// Maximum length of a line in MB.
-        most_mb: usize,
+        max_mb: usize,
     },
     /// A header whose words cannot be assigned to the cells below it.
     #[error(
-        "{file}, {place}: the header has {}, expected {} as in the rows below it; write one name for each column in \
+        "{file}, {location}: the header has {}, expected {} as in the rows below it; write one name for each column in \
          this line, and put names of several words in quotation marks or join them (Roll_error)",
         count_with_noun(*words, "word"),
         count_with_noun(*cells, "name")
@@ -164,8 +164,8 @@ pub enum IoError {
     Words {
         /// Name of the file.
         file: String,
-        /// Place of the header in the file.
-        place: String,
+        /// Location of the header in the file.
+        location: String,
         /// Number of words in the header.
         words: usize,
         /// Number of cells in the rows below the header.
@@ -173,7 +173,7 @@ pub enum IoError {
     },
     /// A table with too many columns.
     #[error(
-        "{file} has {found} columns, expected at most {most}; save only the columns that are needed, or look for \
+        "{file} has {found} columns, expected at most {max_columns}; save only the columns that are needed, or look for \
          missing line endings"
     )]
     TooManyColumns {
@@ -182,7 +182,7 @@ pub enum IoError {
         /// Number of columns in the file.
         found: usize,
         /// Maximum number of columns.
-        most: usize,
+        max_columns: usize,
     },
     /// Two columns with the same name.
     #[error("{file}: columns {first} and {second} are both named \"{name}\"; give each column its own name")]
@@ -198,14 +198,14 @@ pub enum IoError {
     },
     /// A row that is shorter or longer than the header.
     #[error(
-        "{file}, {place}: {found} values, expected {expected} as in the header; {}",
+        "{file}, {location}: {found} values, expected {expected} as in the header; {}",
         row_length_remedy(*found, *expected)
     )]
     RowLength {
         /// Name of the file.
         file: String,
-        /// Place in the file.
-        place: String,
+        /// Location in the file.
+        location: String,
         /// Number of values in the row.
         found: usize,
         /// Number of names in the header.
@@ -213,54 +213,54 @@ pub enum IoError {
     },
     /// A quotation mark without its closing mark, which would make one cell of many lines.
     #[error(
-        "{file}, {place}: a quotation mark opens a cell in this line and {end}, expected a closing mark at the end of \
+        "{file}, {location}: a quotation mark opens a cell in this line and {end}, expected a closing mark at the end of \
          the cell; remove the mark, or close the cell with a second one"
     )]
     OpenQuote {
         /// Name of the file.
         file: String,
-        /// Place of the cell in the file.
-        place: String,
+        /// Location of the cell in the file.
+        location: String,
         /// The end of the cell: "is never closed", or the line in which it is closed.
         end: String,
     },
     /// A second table below the first one.
     #[error(
-        "{file}, {place}: a second table starts here, expected one table; save this line and all lines below it as \
+        "{file}, {location}: a second table starts here, expected one table; save this line and all lines below it as \
          another file, and read the table that holds the samples"
     )]
     SecondTable {
         /// Name of the file.
         file: String,
-        /// Place of the first line of the second table.
-        place: String,
+        /// Location of the first line of the second table.
+        location: String,
     },
     /// A truncated last line.
     #[error(
-        "{file} is truncated in {place}, the last line: {found} of {expected} values; copy or record the file again, or \
+        "{file} is truncated in {location}, the last line: {found} of {expected} values; copy or record the file again, or \
          remove that line"
     )]
     CutRow {
         /// Name of the file.
         file: String,
-        /// Place in the file.
-        place: String,
+        /// Location in the file.
+        location: String,
         /// Number of values in the row.
         found: usize,
         /// Number of names in the header.
         expected: usize,
     },
     /// A column that does not exist in the file.
-    #[error("{file} has no column {missing} (requested: {asked}{meant}); it has {available}; {}", option.remedy())]
+    #[error("{file} has no column {missing} (requested: {requested}{suggestion}); it has {available}; {}", option.remedy())]
     NoSuchColumn {
         /// Name of the file.
         file: String,
         /// The names that were not found.
         missing: String,
         /// The complete requested expression.
-        asked: String,
+        requested: String,
         /// Suggestion such as "; did you mean "u"?"; empty if no name is similar.
-        meant: Box<str>,
+        suggestion: Box<str>,
         /// Names that exist in the file.
         available: String,
         /// The option with which the column was requested.
@@ -275,20 +275,20 @@ pub enum IoError {
         expected: String,
     },
     /// The same column requested as input and output.
-    #[error("{file}: input and output are both {asked}; choose two columns with --input and --output")]
+    #[error("{file}: input and output are both {requested}; choose two columns with --input and --output")]
     SameColumn {
         /// Name of the file.
         file: String,
         /// The requested expression.
-        asked: String,
+        requested: String,
     },
     /// Text where a number is expected.
-    #[error("{file}, {place}, column {column}: found \"{found}\", expected a number; {remedy}")]
+    #[error("{file}, {location}, column {column}: found \"{found}\", expected a number; {remedy}")]
     NotANumber {
         /// Name of the file.
         file: String,
-        /// Place in the file.
-        place: String,
+        /// Location in the file.
+        location: String,
         /// Name of the column.
         column: String,
         /// The text found, shortened to a readable length.
@@ -298,13 +298,13 @@ pub enum IoError {
     },
     /// An infinite value.
     #[error(
-        "{file}, {place}, column {column}: found {found}, expected a finite number; correct the value, or empty the cell and bridge it with --fill"
+        "{file}, {location}, column {column}: found {found}, expected a finite number; correct the value, or empty the cell and bridge it with --fill"
     )]
     Infinite {
         /// Name of the file.
         file: String,
-        /// Place in the file.
-        place: String,
+        /// Location in the file.
+        location: String,
         /// Name of the column.
         column: String,
         /// Text of the cell.
@@ -312,13 +312,13 @@ pub enum IoError {
     },
     /// Missing values in a column.
     #[error(
-        "{file}, {place}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); bridge missing values linearly with --fill, or exclude the rows with --from and --to"
+        "{file}, {location}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); bridge missing values linearly with --fill, or exclude the rows with --from and --to"
     )]
     Missing {
         /// Name of the file.
         file: String,
-        /// Place of the first missing value.
-        place: String,
+        /// Location of the first missing value.
+        location: String,
         /// Name of the column.
         column: String,
         /// Text of the cell.
@@ -330,7 +330,7 @@ pub enum IoError {
     },
     /// Values missing in many places, as in a topic that was logged at another rate.
     #[error(
-        "{file}, {place}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); \
+        "{file}, {location}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); \
          if the column was logged at its own times, read it with {} (or linear or drop); otherwise bridge missing \
          values linearly with --fill, or exclude the rows with --from and --to",
         sparse_option(column)
@@ -338,8 +338,8 @@ pub enum IoError {
     Sparse {
         /// Name of the file.
         file: String,
-        /// Place of the first missing value.
-        place: String,
+        /// Location of the first missing value.
+        location: String,
         /// Name of the column.
         column: String,
         /// Text of the cell.
@@ -351,13 +351,13 @@ pub enum IoError {
     },
     /// Missing values at the start or the end of the record.
     #[error(
-        "{file}, {place}, column {column}: the values at the {end} of the record are missing, so --fill has no value to bridge to; exclude these rows with --from and --to"
+        "{file}, {location}, column {column}: the values at the {end} of the record are missing, so --fill has no value to bridge to; exclude these rows with --from and --to"
     )]
     NothingToBridgeTo {
         /// Name of the file.
         file: String,
-        /// Place of the first or the last missing value.
-        place: String,
+        /// Location of the first or the last missing value.
+        location: String,
         /// Name of the column.
         column: String,
         /// End of the record: "start" or "end".
@@ -402,32 +402,32 @@ pub enum IoError {
         found: usize,
     },
     /// Several trials where a single trial is expected.
-    #[error("{file} holds {} trials by {by}: {}; read one of them with --trial {by}={}", .trials.len(), list_of_names(.trials), .trials.first().map_or("", |name| name.as_str()))]
+    #[error("{file} holds {} trials by {trial_column}: {}; read one of them with --trial {trial_column}={}", .trials.len(), list_of_names(.trials), .trials.first().map_or("", |name| name.as_str()))]
     SeveralTrials {
         /// Name of the file.
         file: String,
         /// Column that numbers the trials, or t.
-        by: String,
+        trial_column: String,
         /// Names of the trials, at least two.
         trials: Vec<String>,
     },
     /// A trial that does not exist.
-    #[error("{file}: there is no trial {asked}; it has {available}")]
+    #[error("{file}: there is no trial {requested}; it has {available}")]
     NoSuchTrial {
         /// Name of the file.
         file: String,
         /// The requested trial.
-        asked: String,
+        requested: String,
         /// Names that exist in the file.
         available: String,
     },
     /// A time that is constant or runs backwards.
-    #[error("{file}, {place}: t = {found} s follows t = {previous} s, expected increasing time; {remedy}")]
+    #[error("{file}, {location}: t = {found} s follows t = {previous} s, expected increasing time; {remedy}")]
     NotIncreasing {
         /// Name of the file.
         file: String,
-        /// Place of the later row.
-        place: String,
+        /// Location of the later row.
+        location: String,
         /// Time in the later row, s.
         found: f64,
         /// Time in the row before, s.
@@ -437,14 +437,14 @@ pub enum IoError {
     },
     /// A single wrong time in a grid that is otherwise even.
     #[error(
-        "{file}, {place}: t = {found} s, expected {expected_s} s as the times of all other rows are evenly spaced; \
+        "{file}, {location}: t = {found} s, expected {expected_s} s as the times of all other rows are evenly spaced; \
          correct this time, or give --fs {hz} in place of t"
     )]
     WrongTime {
         /// Name of the file.
         file: String,
-        /// Place of the row.
-        place: String,
+        /// Location of the row.
+        location: String,
         /// Time in the row, s.
         found: f64,
         /// Time on the grid, s.
@@ -454,15 +454,15 @@ pub enum IoError {
     },
     /// Missing samples.
     #[error(
-        "{file}: gap after {place}, t = {after_s} s (missing samples: {missing}; next sample at {next_s} s; sample time \
+        "{file}: gap after {location}, t = {after_s} s (missing samples: {missing}; next sample at {next_s} s; sample time \
          {sample_time_s:.6} s; total number of gaps: {gaps}); interpolate with --resample, or use the part before or \
          after the gap with --from and --to"
     )]
     Gap {
         /// Name of the file.
         file: String,
-        /// Place of the row before the first gap.
-        place: String,
+        /// Location of the row before the first gap.
+        location: String,
         /// Time in the row before the first gap, s.
         after_s: f64,
         /// Time in the row after the first gap, s.
@@ -476,13 +476,13 @@ pub enum IoError {
     },
     /// Samples that deviate from the evenly spaced grid.
     #[error(
-        "{file}: t is unevenly spaced: t = {found} s at {place} is {deviation_s:.3e} s off the even grid with sample time {sample_time_s:.6} s, expected at most {tolerance_s:.3e} s; interpolate onto the grid with --resample, or give --fs HZ if the samples were taken evenly and only t is wrong"
+        "{file}: t is unevenly spaced: t = {found} s at {location} is {deviation_s:.3e} s off the even grid with sample time {sample_time_s:.6} s, expected at most {tolerance_s:.3e} s; interpolate onto the grid with --resample, or give --fs HZ if the samples were taken evenly and only t is wrong"
     )]
     Jitter {
         /// Name of the file.
         file: String,
-        /// Place of the row with the largest deviation.
-        place: String,
+        /// Location of the row with the largest deviation.
+        location: String,
         /// Time in the row with the largest deviation, s.
         found: f64,
         /// Deviation of this time from the grid, s.
@@ -595,12 +595,12 @@ pub enum IoError {
         file: String,
     },
     /// A name that matches several arrays.
-    #[error("{file}: \"{asked}\" matches {found}; give the full path")]
+    #[error("{file}: \"{requested}\" matches {found}; give the full path")]
     AmbiguousColumn {
         /// Name of the file.
         file: String,
         /// The ambiguous name.
-        asked: String,
+        requested: String,
         /// The paths that end in the name.
         found: String,
     },

@@ -1,4 +1,4 @@
-//! Small files that unpack to any size: refused with a message, in bounded memory. A sample of the
+//! Small files that unpack to any size: rejected with a message, in bounded memory. A sample of the
 //! bombs of `cargo xtask slow bombs`.
 //!
 //! A single test, so that the peak memory of the process is that of the readers.

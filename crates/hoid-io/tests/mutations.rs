@@ -29,7 +29,7 @@ fn damaged_files_are_read_or_refused() {
         refused += answers.refused;
         fs::remove_file(&path).unwrap();
     }
-    // Both valid and refused files occur.
+    // Both valid and rejected files occur.
     assert!(
         read > CASE_COUNT / 2 && refused > CASE_COUNT,
         "{read} read, {refused} refused"

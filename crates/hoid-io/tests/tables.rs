@@ -212,7 +212,7 @@ fn invalid_tables_are_not_written() {
             "{differ}"
         );
         assert!(matches!(writer.append(&uneven), Err(IoError::ColumnLength { .. })));
-        // Refused rows have no effect on the file.
+        // Rejected rows have no effect on the file.
         writer.append(&table(2)).unwrap();
         writer.finish().unwrap();
         assert_same(&read_table(&path).unwrap(), &table(2));
@@ -481,7 +481,7 @@ fn invalid_parquet_files_are_errors() {
         zstd.contains("column t, row group 1 is compressed with Zstandard") && zstd.contains("Snappy"),
         "{zstd}"
     );
-    // A file that is truncated at any position is refused.
+    // A file that is truncated at any position is rejected.
     for cut in (0..whole.len()).step_by(97) {
         message(&whole[..cut]);
     }

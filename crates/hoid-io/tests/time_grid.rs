@@ -341,7 +341,7 @@ fn resampling_bridges_gaps_and_jitter() {
     assert!((coarse.record.input()[1] - 2.5).abs() < 1e-14);
     let slow = desk.read(&text, &ask(RESAMPLE, Some(2.0))).unwrap();
     assert!(slow.notes[0].contains("no low-pass filter"), "{:?}", slow.notes);
-    // A file with evenly spaced times is unchanged; a file with a jump in time is refused.
+    // A file with evenly spaced times is unchanged; a file with a jump in time is rejected.
     let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
     assert_eq!(
         desk.read(even, &ask(RESAMPLE, None)).unwrap(),

@@ -23,8 +23,8 @@ use hoid_lab::{
     task::{TICK_S, Task},
 };
 use hoid_model::{
-    Channel, ContinuousTransferFunction, FamilyOperator, Form, Record, SampleTime, held_system::HeldSystem,
-    operator_family::Coordinate, scenario::OperatingState,
+    Channel, ContinuousTransferFunction, FamilyOperator, Form, Record, SampleTime, operator_family::Coordinate,
+    scenario::OperatingState, zoh_system::ZohSystem,
 };
 use hoid_sim::RunSeed;
 use serde_json::{Value, json};
@@ -101,7 +101,7 @@ fn simulate_run(engine: &mut page::Engine, person: &Person, seed: u64, remnant: 
     let task = Task::new(&condition, 0, seed).unwrap();
     let operator = FamilyOperator::new(person.form, person.neuromuscular, &person.coordinates).unwrap();
     let transfer: ContinuousTransferFunction = operator.transfer_function().unwrap();
-    let held = HeldSystem::new(transfer.num(), transfer.den(), 0.0, SampleTime::new(TICK_S).unwrap()).unwrap();
+    let held = ZohSystem::new(transfer.num(), transfer.den(), 0.0, SampleTime::new(TICK_S).unwrap()).unwrap();
     let plant = Plant {
         a: held.transition_matrix().to_vec(),
         b: held.input_vector().to_vec(),
@@ -167,12 +167,12 @@ fn main() -> ExitCode {
                 ..FamilyEstimator::default()
             };
             let Ok(fit) = estimator.fit(&[record]) else { continue };
-            for (place, kind) in found.iter_mut().zip(&kinds) {
+            for (index, kind) in found.iter_mut().zip(&kinds) {
                 let estimate = fit.coordinate(0, *kind);
                 if let Some(estimate) = estimate
                     && let Some(error) = estimate.standard_error
                 {
-                    place.push((estimate.value, error));
+                    index.push((estimate.value, error));
                 }
             }
         }
@@ -205,7 +205,7 @@ fn main() -> ExitCode {
             wrong |= all.len() < seeds as usize;
         }
         let truth = kinds.iter().position(|kind| *kind == Coordinate::LagRate);
-        let truth = truth.map(|place| 1.0 / person.coordinates[place]);
+        let truth = truth.map(|index| 1.0 / person.coordinates[index]);
         let holds = |(value, error): &&(f64, f64)| truth.is_some_and(|t| (value - t).abs() <= 1.96 * error);
         println!(
             "{}\ta lag is reported in {} of {seeds} runs, {} of them within 1.96 standard errors of the truth",

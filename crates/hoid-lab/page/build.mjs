@@ -1,8 +1,8 @@
-// Builds the page into one file, dist/lab.html, and what of it needs no browser into dist/engine.mjs.
-// With the argument --check nothing is written: it fails where the files are not what is built.
+// Builds the page into one file, dist/lab.html, and the part that needs no browser into dist/engine.mjs.
+// With the argument --check nothing is written; the command fails if the files differ from the build.
 //
-// With --alone KERNEL EXPERIMENT OUT it builds the page that needs no program behind it: the C ABI of hoid in
-// WebAssembly and the tables of an experiment are packed into it.
+// With --alone KERNEL EXPERIMENT OUT it builds the page that runs without the program: it contains the C ABI of
+// hoid in WebAssembly and the tables of an experiment.
 import { build } from "esbuild";
 import { createHash } from "node:crypto";
 import { readFileSync, writeFileSync, mkdirSync, existsSync } from "node:fs";
@@ -25,7 +25,7 @@ const bundled = async (entry, format) => {
   return result.outputFiles[0].text;
 };
 
-/** The page of a script; `head` and `data` stand before style and script. */
+/** Returns the page of a script; `head` and `data` precede style and script. */
 async function page(entry, head = () => "", data = "") {
   const script = await bundled(entry, "iife");
   if (script.includes("</script")) throw new Error("the script ends its own element");
@@ -37,7 +37,7 @@ async function page(entry, head = () => "", data = "") {
     .replace("/*script*/", () => script);
 }
 
-/** The page alone: its own script and style by their hashes, WebAssembly, and nothing from anywhere. */
+/** Policy of the page without the program: its own script and style by their hashes, and WebAssembly. */
 async function alone(kernel, experiment) {
   const hash = (text) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
   const policy = (script, style) =>

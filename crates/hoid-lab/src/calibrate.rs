@@ -9,7 +9,7 @@
 use std::path::Path;
 
 use hoid_ident::family::{FamilyEstimator, OperatorPrior};
-use hoid_model::{Form, Record, SampleTime, held_system::HeldSystem, operator_family::Coordinate};
+use hoid_model::{Form, Record, SampleTime, operator_family::Coordinate, zoh_system::ZohSystem};
 use hoid_numerics::statistics::standard_deviation;
 use hoid_sim::RunSeed;
 use serde::{Deserialize, Serialize};
@@ -72,7 +72,7 @@ impl Calibration {
 }
 
 #[derive(Default, Serialize, Deserialize)]
-struct Kept {
+struct SavedCalibrations {
     #[serde(default)]
     calibration: Vec<Calibration>,
 }
@@ -103,7 +103,7 @@ mouse alone."
 pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>), LabError> {
     let square = OMEGA_RAD_S * OMEGA_RAD_S;
     let tick = SampleTime::new(TICK_S)?;
-    let system = HeldSystem::new(&[GAIN * square], &[1.0, 2.0 * ZETA * OMEGA_RAD_S, square], 0.0, tick)?;
+    let system = ZohSystem::new(&[GAIN * square], &[1.0, 2.0 * ZETA * OMEGA_RAD_S, square], 0.0, tick)?;
     let plant = Plant {
         a: system.transition_matrix().to_vec(),
         b: system.input_vector().to_vec(),
@@ -167,9 +167,9 @@ pub fn evaluate(out: &Path, record: &Record, logged: &LoggedRun) -> Result<Calib
         frame_jitter_ms: standard_deviation(&frames),
     };
     let path = out.join("calibration.toml");
-    let mut kept: Kept = match hoid_io::read_settings(&path) {
+    let mut kept: SavedCalibrations = match hoid_io::read_settings(&path) {
         Ok(text) => toml::from_str(&text).map_err(|error| LabError::damaged_file(&path, error.message()))?,
-        Err(_) => Kept::default(),
+        Err(_) => SavedCalibrations::default(),
     };
     kept.calibration.push(found.clone());
     let text = toml::to_string(&kept).map_err(|error| LabError::damaged_file(&path, error.to_string()))?;

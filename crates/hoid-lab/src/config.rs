@@ -251,7 +251,7 @@ impl Config {
                 .and_then(|span| text.get(..span.start))
                 .map_or(1, |before| before.split('\n').count());
             LabError::Config {
-                place: format!("{place}, line {line}"),
+                location: format!("{place}, line {line}"),
                 reason: hoid_io::escape_control_characters(error.message().trim_end()),
             }
         })?;
@@ -270,7 +270,7 @@ impl Config {
     pub fn check(&self, place: &str) -> Result<(), LabError> {
         let wrong = |reason: String| {
             Err(LabError::Config {
-                place: place.to_owned(),
+                location: place.to_owned(),
                 reason,
             })
         };
@@ -299,7 +299,7 @@ impl Config {
                 ));
             }
             condition.check().map_err(|error| LabError::Config {
-                place: format!("{place}, condition {:?}", condition.name),
+                location: format!("{place}, condition {:?}", condition.name),
                 reason: error.to_string(),
             })?;
         }
@@ -312,7 +312,7 @@ impl Config {
     /// [`LabError::Config`], which cannot occur for a configuration that was read.
     pub fn text(&self) -> Result<String, LabError> {
         toml::to_string(self).map_err(|error| LabError::Config {
-            place: "the configuration".to_owned(),
+            location: "the configuration".to_owned(),
             reason: error.to_string(),
         })
     }

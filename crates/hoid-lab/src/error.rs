@@ -13,10 +13,10 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum LabError {
     /// A configuration that contradicts itself or cannot be read.
-    #[error("{place}: {reason}")]
+    #[error("{location}: {reason}")]
     Config {
-        /// Name of the file and the place in it.
-        place: String,
+        /// Name of the file and the location in it.
+        location: String,
         /// Description of the problem, the expected value and the remedy.
         reason: String,
     },

@@ -87,7 +87,7 @@ fn write(path: &Path, text: &str) -> Result<(), LabError> {
 pub fn write_participants(out: &Path) -> Result<(), LabError> {
     let mut people: BTreeMap<String, (usize, String)> = BTreeMap::new();
     for folder in Session::folders(out)? {
-        let facts = Session::read(&folder)?.facts;
+        let facts = Session::read(&folder)?.plan;
         let entry = people.entry(facts.subject).or_default();
         entry.0 = entry.0.saturating_add(1);
         entry.1 = facts.licence;
@@ -110,8 +110,8 @@ pub fn write_manifest(out: &Path) -> Result<(), LabError> {
     let mut conditions: BTreeMap<String, Condition> = BTreeMap::new();
     for folder in Session::folders(out)? {
         let session = Session::read(&folder)?;
-        let facts = &session.facts;
-        for done in session.done.iter().filter(|done| done.how == RunEnd::Finished) {
+        let facts = &session.plan;
+        for done in session.finished_runs.iter().filter(|done| done.how == RunEnd::Finished) {
             let path = session.stem(&done.condition, done.number).file("beh.parquet");
             if !path.exists() {
                 continue;

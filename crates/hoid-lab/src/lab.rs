@@ -88,7 +88,7 @@ struct LabState {
     /// Number of the page used for tracking.
     person: Option<u64>,
     /// A run that was sent to the page but not started.
-    ready: Option<PreparedRun>,
+    prepared_run: Option<PreparedRun>,
     run: Option<ActiveRun>,
     /// Number of the last run that ended; its page may still send batches.
     last_ended_run: Option<usize>,
@@ -98,7 +98,7 @@ struct LabState {
 }
 
 struct PreparedRun {
-    planned: usize,
+    plan_index: usize,
     number: usize,
     task: Task,
 }
@@ -121,7 +121,7 @@ impl LabState {
     /// Makes a session the current one; a run that was sent for another session cannot be started in it.
     fn set_session(&mut self, session: Session) {
         self.session = Some(session);
-        self.ready = None;
+        self.prepared_run = None;
         self.pages = Pages::default();
     }
 }
@@ -137,7 +137,7 @@ impl Lab {
             Mode::Replay(folder) => {
                 let session = Session::read(folder)?;
                 current.pages = reports::existing_pages(&session.folder);
-                let config = session.facts.config.clone();
+                let config = session.plan.config.clone();
                 current.session = Some(session);
                 config
             }
@@ -193,7 +193,7 @@ impl Lab {
         let mut state = self.shared.state();
         if state.person == Some(id) {
             state.person = None;
-            state.ready = None;
+            state.prepared_run = None;
             // If the files of the run cannot be completed now, the run is closed when the session is next opened.
             let _ = self.shared.end_run(&mut state, RunEnd::Interrupted, BTreeMap::new());
             let left = self.shared.newest_person();
@@ -333,7 +333,7 @@ impl SharedState {
     /// Continues the session in the window `id`.
     fn transfer_session_to(&self, state: &mut LabState, id: u64) -> Result<(), LabError> {
         state.person = Some(id);
-        state.ready = None;
+        state.prepared_run = None;
         let browser = self
             .pages()
             .get(&id)
@@ -341,7 +341,7 @@ impl SharedState {
             .unwrap_or_default();
         match state.session.as_mut().filter(|_| self.mode == Mode::Sessions) {
             Some(session) => {
-                session.facts.browser = browser;
+                session.plan.browser = browser;
                 session.save()
             }
             None => Ok(()),

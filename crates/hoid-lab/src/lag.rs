@@ -57,14 +57,14 @@ impl Lag {
 }
 
 /// Samples to fit, and the time of the first sample, s.
-struct Span {
+struct FitSamples {
     from_s: f64,
     record: Record,
 }
 
 /// Repeated fits of the lag during one run.
 pub struct LagFits {
-    spans: Sender<Span>,
+    spans: Sender<FitSamples>,
     found: Receiver<(f64, Lag)>,
     e: Vec<f64>,
     u: Vec<f64>,
@@ -72,7 +72,7 @@ pub struct LagFits {
     /// Time of the first sample in memory, s.
     from_s: f64,
     /// Number of samples at the last fit.
-    fitted: usize,
+    samples_at_fit: usize,
     /// True while a fit is in progress.
     busy: bool,
     last: Lag,
@@ -81,7 +81,7 @@ pub struct LagFits {
 impl LagFits {
     /// Starts the thread, which ends when this value is dropped.
     pub fn new(ts: SampleTime) -> Self {
-        let (spans, waiting) = channel::<Span>();
+        let (spans, waiting) = channel::<FitSamples>();
         let (tell, found) = channel();
         thread::spawn(move || {
             while let Ok(span) = waiting.recv() {
@@ -97,7 +97,7 @@ impl LagFits {
             u: Vec::new(),
             ts,
             from_s: 0.0,
-            fitted: 0,
+            samples_at_fit: 0,
             busy: false,
             last: Lag::Waiting,
         }
@@ -117,7 +117,7 @@ impl LagFits {
         self.e.drain(..past);
         self.u.drain(..past);
         self.from_s += past as f64 * self.ts.s();
-        (self.fitted, self.last) = (0, Lag::Waiting);
+        (self.samples_at_fit, self.last) = (0, Lag::Waiting);
     }
 
     /// Returns the lag from the last completed fit, and starts the next fit if it is due.
@@ -130,7 +130,7 @@ impl LagFits {
             }
         }
         let samples = |seconds: f64| (seconds / self.ts.s()).round() as usize;
-        let due = samples(MIN_SPAN_S).max(self.fitted.saturating_add(samples(FIT_INTERVAL_S)));
+        let due = samples(MIN_SPAN_S).max(self.samples_at_fit.saturating_add(samples(FIT_INTERVAL_S)));
         if !self.busy
             && self.e.len() >= due
             && let Ok(record) = Record::new(
@@ -139,9 +139,9 @@ impl LagFits {
                 Channel::new("u", "", self.u.clone()),
             )
         {
-            self.fitted = self.e.len();
+            self.samples_at_fit = self.e.len();
             let from_s = self.from_s;
-            self.busy = self.spans.send(Span { from_s, record }).is_ok();
+            self.busy = self.spans.send(FitSamples { from_s, record }).is_ok();
         }
         self.last
     }
@@ -150,7 +150,7 @@ impl LagFits {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use hoid_model::{FamilyOperator, Form, forcing::ForcingFunction, held_system::HeldSystem};
+    use hoid_model::{FamilyOperator, Form, forcing::ForcingFunction, zoh_system::ZohSystem};
     use hoid_sim::RunSeed;
 
     use super::*;
@@ -172,7 +172,7 @@ mod tests {
         let n = (seconds / TS.s()) as usize;
         let operator = FamilyOperator::new(Form::Lag, false, &[0.4 / LAG_S, 1.0 / LAG_S, 0.18]).unwrap();
         let transfer = operator.transfer_function().unwrap();
-        let held = HeldSystem::new(transfer.num(), transfer.den(), 0.0, TS).unwrap();
+        let held = ZohSystem::new(transfer.num(), transfer.den(), 0.0, TS).unwrap();
         let (a, b, c) = (
             held.transition_matrix()[0],
             held.input_vector()[0],

@@ -7,7 +7,7 @@
 //! | module | contents |
 //! |---|---|
 //! | [`config`] | [`Config`]: the experiment, `lab.toml` |
-//! | [`course`] | [`TaskDefinition`](course::TaskDefinition): the controlled element as a function of time |
+//! | [`task_definition`] | [`TaskDefinition`](task_definition::TaskDefinition): the controlled element as a function of time |
 //! | [`order`] | the order of the runs, from Latin squares |
 //! | [`task`] | [`Task`](task::Task): the tables of a run, and its recomputation |
 //! | [`plant`] | the arithmetic of a tick, identical to that of the page |
@@ -26,7 +26,6 @@
 
 pub mod calibrate;
 pub mod config;
-pub mod course;
 mod error;
 mod experiment;
 mod export;
@@ -41,6 +40,7 @@ mod reports;
 pub mod server;
 pub mod session;
 pub mod task;
+pub mod task_definition;
 mod utc;
 pub mod verify;
 pub mod wire;

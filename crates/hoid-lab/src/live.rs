@@ -26,10 +26,10 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    course::TaskDefinition,
     lag::{Lag, LagFits},
     session::Stem,
     task::{TICK_S, TICKS_PER_SAMPLE},
+    task_definition::TaskDefinition,
 };
 
 /// Dead time n_k with which a method starts, in samples of 10 ms.
@@ -76,7 +76,7 @@ pub type Samples = Vec<Sample>;
 pub struct LiveRun {
     live: Live,
     lags: LagFits,
-    course: TaskDefinition,
+    task_definition: TaskDefinition,
     t_s: f64,
     ts: SampleTime,
 }
@@ -96,7 +96,7 @@ impl LiveRun {
             live: Live::from_plan(plan, DEFAULT_WARM_UP_S)?,
             lags: LagFits::new(ts),
             t_s: -course.durations_s().0,
-            course,
+            task_definition: course,
             ts,
         })
     }
@@ -147,7 +147,7 @@ impl LiveRun {
             }
             Err(reason) => line.waiting = Some(reason.to_string()),
         }
-        if let Ok(element) = self.course.element_at(self.t_s)
+        if let Ok(element) = self.task_definition.element_at(self.t_s)
             && let Some((crossover, margin)) = crossover(&|omega| tracker.response(omega), &element)
         {
             (line.crossover_rad_s, line.phase_margin_deg) = (reported_value(crossover), reported_value(margin));

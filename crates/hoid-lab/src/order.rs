@@ -11,7 +11,7 @@ use crate::config::{Config, Order};
 
 /// A planned run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Planned {
+pub struct PlannedRun {
     /// Index of the condition in the configuration.
     pub condition: usize,
     /// True for a training run, which is excluded from the analysis.
@@ -23,15 +23,15 @@ pub struct Planned {
 /// Returns the conditions in row `row` of a balanced square for `n` conditions.
 #[expect(
     clippy::arithmetic_side_effects,
-    reason = "2 n of a list fits into usize; without conditions there is no place, and no remainder by zero"
+    reason = "2 n of a list fits into usize; without conditions the loop is empty, so there is no remainder by zero"
 )]
 pub fn latin_row(n: usize, row: usize) -> Vec<usize> {
     let rows = if n.is_multiple_of(2) { n } else { 2 * n };
     let row = row % rows.max(1);
     let mut order: Vec<usize> = (0..n)
-        .map(|place| {
-            let step = place.div_ceil(2);
-            let shift = if place.is_multiple_of(2) { n - step } else { step };
+        .map(|index| {
+            let step = index.div_ceil(2);
+            let shift = if index.is_multiple_of(2) { n - step } else { step };
             (row + shift) % n
         })
         .collect();
@@ -42,7 +42,7 @@ pub fn latin_row(n: usize, row: usize) -> Vec<usize> {
 }
 
 /// Returns all runs of a session, one condition after the other; in each condition the training runs are first.
-pub fn plan(config: &Config, row: usize) -> Vec<Planned> {
+pub fn plan(config: &Config, row: usize) -> Vec<PlannedRun> {
     let n = config.condition.len();
     let order = match config.order {
         Order::Given => (0..n).collect(),
@@ -51,7 +51,7 @@ pub fn plan(config: &Config, row: usize) -> Vec<Planned> {
     let runs = |condition: usize| {
         let own = config.condition.get(condition)?;
         let all = 1..=own.training.saturating_add(own.runs);
-        Some(all.map(move |run| Planned {
+        Some(all.map(move |run| PlannedRun {
             condition,
             training: run <= own.training,
             run,
@@ -71,8 +71,8 @@ mod tests {
             let (mut places, mut pairs) = (vec![0; n * n], vec![0; n * n]);
             for row in 0..rows {
                 let order = latin_row(n, row);
-                for (place, condition) in order.iter().enumerate() {
-                    places[place * n + condition] += 1;
+                for (index, condition) in order.iter().enumerate() {
+                    places[index * n + condition] += 1;
                 }
                 for pair in order.windows(2) {
                     pairs[pair[0] * n + pair[1]] += 1;

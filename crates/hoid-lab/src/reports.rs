@@ -40,7 +40,7 @@ pub fn make_pages(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Page
         return Pages::default();
     };
     let runs = session
-        .done
+        .finished_runs
         .iter()
         .filter(|done| done.how == RunEnd::Finished && !done.training);
     for done in runs {
@@ -48,20 +48,20 @@ pub fn make_pages(program: &Path, out: &Path, folder: &Path, each: &dyn Fn(&Page
         for name in COMMANDS {
             let page = stem.report_folder().join(name).join("report.html");
             if !page.exists() && stem.file("beh.parquet").exists() {
-                make_run_page(program, &session.facts.config, &stem, name);
+                make_run_page(program, &session.plan.config, &stem, name);
                 each(&existing_pages(folder));
             }
         }
     }
     if out.join(MANIFEST_FILE).exists() {
-        let place = out.join(GROUP_FOLDER);
+        let location = out.join(GROUP_FOLDER);
         let mut command = hoid_command(program);
         command
             .arg("group")
             .arg(out.join(MANIFEST_FILE))
             .arg("--out")
-            .arg(&place);
-        run_command(&mut command, &place, "group");
+            .arg(&location);
+        run_command(&mut command, &location, "group");
     }
     existing_pages(folder)
 }
@@ -74,7 +74,7 @@ fn hoid_command(program: &Path) -> Command {
 
 /// Creates one page for a run.
 fn make_run_page(program: &Path, config: &Config, stem: &Stem, name: &str) {
-    let place = stem.report_folder().join(name);
+    let location = stem.report_folder().join(name);
     let mut command = hoid_command(program);
     command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
     let run_start = crate::session::RunStart::read(stem).ok();
@@ -91,34 +91,36 @@ fn make_run_page(program: &Path, config: &Config, stem: &Stem, name: &str) {
             command.args(["--method", &config.method, "--every", "5"]);
             command
                 .arg("--out")
-                .arg(place.join("trace.parquet"))
+                .arg(location.join("trace.parquet"))
                 .arg("--report")
-                .arg(&place);
+                .arg(&location);
         }
         "identify" => {
             if let Some(role) = role_of_target {
                 command.args(["--input", "e", "--input", TARGET_CHANNEL]);
                 command.arg(format!("--role={TARGET_CHANNEL}={role}"));
             }
-            command.arg("--report").arg(&place);
+            command.arg("--report").arg(&location);
         }
         _ => {
-            command.arg("--figure").arg(place.join("figure.svg"));
+            command.arg("--figure").arg(location.join("figure.svg"));
         }
     }
     if let Some(element) = element.filter(|_| name != "track") {
         command.arg(format!("--controlled-element={element}"));
     }
-    run_command(&mut command, &place, name);
+    run_command(&mut command, &location, name);
 }
 
 /// Runs a command; if it creates no page, a page is created from its output.
-fn run_command(command: &mut Command, place: &Path, name: &str) {
-    let made = hoid_io::make_directory(place).map_err(LabError::from).and_then(|()| {
-        command
-            .output()
-            .map_err(|error| LabError::Report(format!("hoid {name} cannot be run: {error}")))
-    });
+fn run_command(command: &mut Command, location: &Path, name: &str) {
+    let made = hoid_io::make_directory(location)
+        .map_err(LabError::from)
+        .and_then(|()| {
+            command
+                .output()
+                .map_err(|error| LabError::Report(format!("hoid {name} cannot be run: {error}")))
+        });
     let (out, wrong) = match made {
         Ok(output) => (
             String::from_utf8_lossy(&output.stdout).into_owned(),
@@ -126,11 +128,11 @@ fn run_command(command: &mut Command, place: &Path, name: &str) {
         ),
         Err(error) => (String::new(), error.to_string()),
     };
-    let page = place.join("report.html");
+    let page = location.join("report.html");
     if page.exists() {
         return;
     }
-    let figure = if place.join("figure.svg").exists() {
+    let figure = if location.join("figure.svg").exists() {
         "<p><img src=\"figure.svg\" alt=\"Figure\"></p>\n"
     } else {
         ""

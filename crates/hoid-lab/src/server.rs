@@ -5,7 +5,7 @@
 //! `Origin`, when present, is also that address, and if it is a GET request of limited length. A request for a socket
 //! must have an origin. No message from a page contains a file name.
 //!
-//! | refused request | status |
+//! | rejected request | status |
 //! |---|---|
 //! | wrong host or origin, missing or wrong token | 403 |
 //! | an invalid path | 404 |
@@ -65,7 +65,7 @@ struct AuthorisedConnection(Arc<Server>);
 
 impl AuthorisedConnection {
     /// Admits another connection if the limit allows it.
-    fn admit(server: &Arc<Server>) -> Option<Self> {
+    fn accept(server: &Arc<Server>) -> Option<Self> {
         let before = server.connection_count.fetch_add(1, Ordering::Relaxed);
         let known = Self(Arc::clone(server));
         (before < MAX_CONNECTIONS).then_some(known)
@@ -138,7 +138,7 @@ impl Server {
             if let Err(reply) = server.check_origin(&request) {
                 return Err((reply, stream));
             }
-            let Some(known) = AuthorisedConnection::admit(&server) else {
+            let Some(known) = AuthorisedConnection::accept(&server) else {
                 return Err((busy("too many connections"), stream));
             };
             // The stream moves into the thread; if the thread cannot be created, the copy is used for the reply.

@@ -1,6 +1,6 @@
 //! The tables of a run, which the page uses and from which Rust recomputes the run.
 //!
-//! The controlled element is discretised exactly over a tick of 1 ms (zero-order hold, [`hoid_model::held_system`]). If
+//! The controlled element is discretised exactly over a tick of 1 ms (zero-order hold, [`hoid_model::zoh_system`]). If
 //! it varies, the matrices of each block of ten ticks are computed from the continuous model at the middle of the
 //! block. Target and disturbance are sampled at every tick; they are faded in linearly over the first seconds of the
 //! run-in, so that a run does not start with a jump.
@@ -11,8 +11,8 @@ use hoid_model::{
     SampleTime,
     family_scenario::Excitation,
     forcing::{ForcingFunction, Sinusoid},
-    held_system::HeldSystem,
     scenario::Realisation,
+    zoh_system::ZohSystem,
 };
 use hoid_sim::RunSeed;
 use serde::{Deserialize, Serialize};
@@ -158,7 +158,7 @@ fn discretise_with_hold(
 ) -> Result<Plant, LabError> {
     let gain = num.first().copied().unwrap_or(0.0);
     let shape: Vec<f64> = num.iter().map(|c| if gain == 0.0 { *c } else { c / gain }).collect();
-    let system = HeldSystem::new(&shape, den, 0.0, tick)?;
+    let system = ZohSystem::new(&shape, den, 0.0, tick)?;
     let scaled = |values: &[f64], by: f64| values.iter().map(|v| v * by).collect::<Vec<_>>();
     let (at_input, at_output) = match realisation {
         Realisation::Input => (gain, 1.0),

@@ -12,7 +12,7 @@ pub fn now() -> String {
 /// with eras of 400 years.
 #[expect(
     clippy::arithmetic_side_effects,
-    reason = "the first step divides, so that no u64 overflows; what is subtracted is part of what it is subtracted from"
+    reason = "the first operation is a division, so no u64 overflows; no subtrahend exceeds its minuend"
 )]
 fn format_utc(seconds: u64) -> String {
     let (days, of_day) = (seconds / 86_400 + 719_468, seconds % 86_400);

@@ -25,7 +25,7 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    session::{Ended, LoggedRun, RunEnd, RunStart, Stem},
+    session::{EndRecord, LoggedRun, RunEnd, RunStart, Stem},
     task::{Task, held_inputs},
 };
 
@@ -93,7 +93,7 @@ impl Verification {
 pub fn check(stem: &Stem) -> Result<Verification, LabError> {
     let run_start = RunStart::read(stem)?;
     let logged = LoggedRun::read(stem)?;
-    let ended = Ended::read(stem).unwrap_or_default();
+    let ended = EndRecord::read(stem).unwrap_or_default();
     let mut findings: Vec<Finding> = (logged.faults.iter())
         .map(|words| Finding::warning("lab-log", words.clone()))
         .collect();
@@ -129,7 +129,7 @@ pub fn check(stem: &Stem) -> Result<Verification, LabError> {
     })
 }
 
-fn check_end(run_start: &RunStart, ended: Option<&Ended>, logged: &LoggedRun) -> Option<Finding> {
+fn check_end(run_start: &RunStart, ended: Option<&EndRecord>, logged: &LoggedRun) -> Option<Finding> {
     let finished = ended.is_some_and(|ended| ended.how == RunEnd::Finished);
     let ticks = logged.numbers.len();
     (!finished || ticks != run_start.ticks).then(|| {
@@ -222,11 +222,11 @@ fn check_errors(task: &Task, logged: &LoggedRun) -> Option<Finding> {
 fn find_differences(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     // Adding zero converts minus zero to zero.
     let differ = |(a, b): (&f64, &f64)| (a + 0.0).to_bits() != (b + 0.0).to_bits();
-    let places: Vec<usize> = (logged.iter().enumerate())
+    let indices: Vec<usize> = (logged.iter().enumerate())
         .filter(|(k, logged)| made.get(*k).is_none_or(|made| differ((made, logged))))
         .map(|(k, _)| k)
         .collect();
-    Some((*places.first()?, places.len()))
+    Some((*indices.first()?, indices.len()))
 }
 
 fn check_frames(run_start: &RunStart, logged: &LoggedRun) -> Option<Finding> {
@@ -273,9 +273,9 @@ fn check_frames(run_start: &RunStart, logged: &LoggedRun) -> Option<Finding> {
     None
 }
 
-fn check_files(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
+fn check_files(stem: &Stem, ended: &EndRecord) -> Result<Option<Finding>, LabError> {
     let names = ["ticks", "events", "frames"];
-    let changed: Vec<&str> = (Ended::hashes(stem)?.iter().zip(names).enumerate())
+    let changed: Vec<&str> = (EndRecord::hashes(stem)?.iter().zip(names).enumerate())
         .filter(|(k, (hash, _))| ended.sha256.get(*k) != Some(hash))
         .map(|(_, (_, name))| name)
         .collect();
@@ -287,7 +287,7 @@ fn check_files(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> 
 
 /// Returns notes if a program made input events or the time did not come from the browser; such runs may nevertheless
 /// be verified.
-fn input_findings(run_start: &RunStart, ended: &Ended) -> Vec<Finding> {
+fn input_findings(run_start: &RunStart, ended: &EndRecord) -> Vec<Finding> {
     let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
     let mut notes = Vec::new();
     if made > 0.0 {

@@ -27,7 +27,7 @@ pub enum Role {
     Experimenter,
 }
 
-/// Message from a page. Variants without fields have braces, so that unknown fields are refused.
+/// Message from a page. Variants without fields have braces, so that unknown fields are rejected.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -93,7 +93,7 @@ pub enum ToPage<'a> {
     },
     /// Live estimate during a run.
     Live { number: usize, line: &'a LiveLine },
-    /// A request is refused; `elsewhere` is true if the session continues in another window.
+    /// A request is rejected; `elsewhere` is true if the session continues in another window.
     Refused { words: String, elsewhere: bool },
     /// The session continues in this window, because its other window was closed.
     Yours {},

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use hoid_design::experiment::{DesignRequest, Enters};
+use hoid_design::experiment::{DesignRequest, EntryPoint};
 use hoid_lab::Config;
 use hoid_model::{NamedChoice, family_scenario::Display};
 use tempfile::TempDir;
@@ -12,7 +12,7 @@ use tempfile::TempDir;
 fn designed_experiments_are_read() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    let points = [Enters::Disturbance, Enters::Target];
+    let points = [EntryPoint::Disturbance, EntryPoint::Target];
     let all = points
         .iter()
         .flat_map(|enters| Display::CHOICES.iter().map(move |display| (*enters, *display)));
@@ -33,11 +33,11 @@ fn designed_experiments_are_read() {
         let course = condition.task_definition().unwrap();
         let [target, disturbance] = course.excitations();
         let lines = |of| design.lines.iter().filter(|line| line.enters == of).count();
-        assert_eq!(target.function.sinusoids().len(), lines(Enters::Target));
-        assert_eq!(disturbance.function.sinusoids().len(), lines(Enters::Disturbance));
-        let (seen, of_error) = (enters == Enters::Target, display == Display::Compensatory);
-        assert_eq!(lines(Enters::Target) > 0, seen);
-        assert_eq!(lines(Enters::Disturbance) > 0, !seen || !of_error);
+        assert_eq!(target.function.sinusoids().len(), lines(EntryPoint::Target));
+        assert_eq!(disturbance.function.sinusoids().len(), lines(EntryPoint::Disturbance));
+        let (seen, of_error) = (enters == EntryPoint::Target, display == Display::Compensatory);
+        assert_eq!(lines(EntryPoint::Target) > 0, seen);
+        assert_eq!(lines(EntryPoint::Disturbance) > 0, !seen || !of_error);
         assert_eq!(
             course.element_at(0.0).unwrap().to_string(),
             design.task.state.controlled_element.to_string()

@@ -185,7 +185,7 @@ fn full_disk_loses_no_confirmed_data() {
                 assert!(check(&stem).unwrap().is_verified(), "{round}, run {number}");
                 assert!(
                     again
-                        .done
+                        .finished_runs
                         .iter()
                         .any(|done| done.number == number && done.verdict == "verified")
                 );
@@ -252,7 +252,7 @@ fn full_disk_ends_the_run_and_notifies_the_page() {
     drop(person);
     let session = Session::open(&folder).unwrap();
     let verdict = |number: usize| {
-        let done = session.done.iter().find(|done| done.number == number);
+        let done = session.finished_runs.iter().find(|done| done.number == number);
         done.map(|done| done.verdict.as_str())
     };
     for number in [1, number] {

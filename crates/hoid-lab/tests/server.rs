@@ -64,7 +64,7 @@ impl ServedLab {
     fn send_raw(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();
-        // The server may refuse the request before it has been written completely.
+        // The server may reject the request before it has been written completely.
         let _ = stream.write_all(request);
         let mut reply = Vec::new();
         let _ = stream.read_to_end(&mut reply);
@@ -270,7 +270,7 @@ fn closing_the_window_interrupts_the_run() {
     assert_eq!(second.start_run(), 2);
     let folder = dir.path().join("sub-P01/ses-01");
     assert!(
-        Session::read(&folder).unwrap().done[0]
+        Session::read(&folder).unwrap().finished_runs[0]
             .reasons
             .contains("50 of 1500 ticks")
     );
@@ -291,7 +291,7 @@ fn invalid_messages_end_the_connection() {
         } else {
             message
         };
-        // A message that is too large may be refused while it is sent.
+        // A message that is too large may be rejected while it is sent.
         let _ = page.0.send(message);
         loop {
             match page.0.read() {
@@ -422,7 +422,7 @@ fn hostile_connections_do_not_block_the_page() {
         })
         .collect();
     thread::sleep(Duration::from_millis(300));
-    // The page receives replies throughout, until strangers have been refused and have reconnected.
+    // The page receives replies throughout, until strangers have been rejected and have reconnected.
     let start = Instant::now();
     let (mut asked, mut slowest) = (0, Duration::ZERO);
     while asked < 20

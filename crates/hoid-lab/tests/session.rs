@@ -103,7 +103,7 @@ fn complete_run_is_verified_and_readable() {
     let dir = tempfile::tempdir().unwrap();
     let (session, stem, checked) = finished_run(dir.path());
     assert!(checked.is_verified(), "{}", checked.reasons());
-    assert_eq!(session.done.len(), 1);
+    assert_eq!(session.finished_runs.len(), 1);
     assert_eq!(session.next_run(), Some(1));
     assert_eq!(checked.measures.ticks, 4000);
     assert!((checked.measures.input_hz - 125.0).abs() < 1.0);
@@ -227,8 +227,8 @@ fn session_continues_after_the_server_was_killed() {
     fs::write(&path, &text[..text.len() - 7]).unwrap();
     let folder = Session::folders(dir.path()).unwrap();
     let mut session = Session::open(&folder[0]).unwrap();
-    assert_eq!((session.done.len(), session.next_run()), (1, Some(0)));
-    let lost = &session.done[0];
+    assert_eq!((session.finished_runs.len(), session.next_run()), (1, Some(0)));
+    let lost = &session.finished_runs[0];
     assert_eq!((lost.how, lost.verdict.as_str()), (RunEnd::Interrupted, "unverified"));
     assert!(
         lost.reasons.contains("ended after 1233 of 4000 ticks"),
@@ -246,10 +246,10 @@ fn session_continues_after_the_server_was_killed() {
                 .is_verified()
         );
     }
-    assert!(session.facts.finished && session.next_run().is_none());
-    assert_eq!(Session::read(&folder[0]).unwrap().done, session.done);
+    assert!(session.plan.finished && session.next_run().is_none());
+    assert_eq!(Session::read(&folder[0]).unwrap().finished_runs, session.finished_runs);
     assert_eq!(
-        session.done.iter().map(|done| done.number).collect::<Vec<_>>(),
+        session.finished_runs.iter().map(|done| done.number).collect::<Vec<_>>(),
         [1, 2, 3]
     );
 }
@@ -280,12 +280,7 @@ fn non_contiguous_batches_are_refused() {
 #[test]
 fn subjects_are_numbered_and_pseudonyms_checked() {
     let dir = tempfile::tempdir().unwrap();
-    let row = |subject: &str| {
-        Session::create(dir.path(), &config(), subject, false)
-            .unwrap()
-            .facts
-            .row
-    };
+    let row = |subject: &str| Session::create(dir.path(), &config(), subject, false).unwrap().plan.row;
     assert_eq!(["A", "B", "A", "C"].map(row), [0, 1, 0, 2]);
     for bad in ["", "../x", "P 1", "ü", &"x".repeat(21)] {
         assert!(Session::create(dir.path(), &config(), bad, false).is_err(), "{bad}");
@@ -390,7 +385,7 @@ fn inconsistent_files_give_findings_or_errors() {
     assert_ne!(facts, other);
     fs::write(&toml, &other).unwrap();
     // The session opens if the copy contains the plan.
-    assert_eq!(Session::open(&session.folder).unwrap().facts, session.facts);
+    assert_eq!(Session::open(&session.folder).unwrap().plan, session.plan);
     fs::write(session.folder.join("lab.copy.toml"), other).unwrap();
     let message = Session::open(&session.folder).unwrap_err().to_string();
     assert!(message.contains("condition index 9, expected below 1"), "{message}");
@@ -404,7 +399,7 @@ fn reading_a_session_changes_no_file() {
     let runs = session.folder.join("runs.csv");
     let cut = fs::read_to_string(&runs).unwrap() + "2,1,half a li";
     fs::write(&runs, &cut).unwrap();
-    assert_eq!(Session::read(&session.folder).unwrap().done.len(), 1);
+    assert_eq!(Session::read(&session.folder).unwrap().finished_runs.len(), 1);
     assert_eq!(fs::read_to_string(&runs).unwrap(), cut);
     // The next line is written after the last complete line.
     let mut session = Session::open(&session.folder).unwrap();

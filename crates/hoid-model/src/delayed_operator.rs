@@ -2,14 +2,14 @@
 //!
 //! After a zero-order hold, the operator `H(s) = (K_e + K_e_dot s) omega^2/(s^2 + 2 zeta omega s + omega^2) e^{-tau s}`
 //! with `tau = l Ts + delta`, `0 <= delta < Ts`, is exactly `q^-nk (b0 + b1 q^-1 + b2 q^-2)/(1 + f1 q^-1 + f2 q^-2)`
-//! with `nk = l + 1`. The formulas are those of [`hoid_core::held_operator`]. For delta = 0, b2 is zero and the model
+//! with `nk = l + 1`. The formulas are those of [`hoid_core::zoh_operator`]. For delta = 0, b2 is zero and the model
 //! is the same as in [`crate::operator`].
 //!
 //! The model is linear in K_e and K_e_dot. Its response is a continuous function of tau with a kink wherever tau is an
 //! integer number of samples, because the step response starts with the slope `omega^2 K_e_dot`. If tau is an integer
 //! number of samples, the derivatives are those for increasing tau.
 
-use hoid_core::held_operator::held_operator_delayed;
+use hoid_core::zoh_operator::zoh_operator_delayed;
 
 use crate::{ModelError, OperatorParameters, SampleTime};
 
@@ -102,7 +102,7 @@ pub fn delayed_operator_and_jacobian_with_delay_samples(
 ) -> Result<(DelayedOperator, [[f64; 5]; 5]), ModelError> {
     let delta = fractional_delay_s(whole_samples, parameters, sample_time)?;
     let [k_e, k_e_dot, omega, zeta, _] = parameters;
-    let (coefficients, jacobian) = held_operator_delayed([k_e, k_e_dot, omega, zeta], delta, sample_time.s());
+    let (coefficients, jacobian) = zoh_operator_delayed([k_e, k_e_dot, omega, zeta], delta, sample_time.s());
     let quantities = ["b0", "b1", "b2", "f1", "f2"];
     for (quantity, found) in quantities.into_iter().zip(coefficients) {
         if !found.is_finite() {
@@ -286,8 +286,8 @@ mod tests {
             let known = operator.discretise(ts()).unwrap();
             assert_eq!((ours.nk, ours.b[2]), (known.nk, 0.0));
             // The same formulas, but the factors are multiplied in another order.
-            assert!((ours.b[0] - known.held.b0).abs() < 1e-16 && (ours.b[1] - known.held.b1).abs() < 1e-16);
-            assert_eq!(ours.f, [known.held.f1, known.held.f2]);
+            assert!((ours.b[0] - known.zoh.b0).abs() < 1e-16 && (ours.b[1] - known.zoh.b1).abs() < 1e-16);
+            assert_eq!(ours.f, [known.zoh.f1, known.zoh.f2]);
             let jacobian = delayed_operator_jacobian(delayed_operator_parameters(&operator), ts()).unwrap();
             let expected = discretisation_jacobian(&operator, ts());
             for (row, known) in [0, 1, 3, 4].into_iter().zip(expected) {

@@ -125,12 +125,12 @@ pub enum ModelError {
     NotConvertible(#[from] NotConvertible),
     /// A noise level that cannot be reached with any remnant gain.
     #[error(
-        "the noise level P_n = var(n)/var(u) = {demanded} cannot be reached with remnant order {order}: the largest \
+        "the noise level P_n = var(n)/var(u) = {requested_level} cannot be reached with remnant order {order}: the largest \
          reachable level is {largest:.4}; request a lower level or use the definition var(u_n)/var(u)"
     )]
     UnreachableNoiseLevel {
         /// Requested noise level P_n.
-        demanded: f64,
+        requested_level: f64,
         /// Order of the remnant filter.
         order: usize,
         /// Noise level in the limit of an infinite gain, which cannot be exceeded.

@@ -117,7 +117,7 @@ impl Fault {
             FaultKind::Exchanged => "exchange them with --input and --output",
             FaultKind::Sign => "reverse the sign of one of them: --output=-u, or --input=-e",
             FaultKind::Step => "cut the record there with --from and --to, or use --faults cut",
-            _ => "look at the recording there; cut the fault out with --from and --to or --faults cut",
+            _ => "inspect the recording there; cut the fault out with --from and --to or --faults cut",
         }
     }
 }
@@ -190,8 +190,8 @@ const MAX_LISTED_FAULTS: usize = 3;
 pub const MAX_REPAIRED_SHARE: f64 = 0.2;
 
 /// Returns the findings about faults: a note for repaired faults of a kind, a warning for faults that remain in the
-/// data ([`Finding::undetermined`] for a wrong unit of time), and a warning if more than [`MAX_REPAIRED_SHARE`] of the samples
-/// were interpolated or cut out.
+/// data ([`Finding::undetermined`] for a wrong unit of time), and a warning if more than [`MAX_REPAIRED_SHARE`] of the
+/// samples were interpolated or cut out.
 pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
     let mut all = Vec::new();
     for kind in FaultKind::ALL {
@@ -235,7 +235,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
         all.push(Finding::warning(
             "faults",
             format!(
-                "{:.0} % of the samples are faulty; look at the recording",
+                "{:.0} % of the samples are faulty; inspect the recording",
                 100.0 * share
             ),
         ));

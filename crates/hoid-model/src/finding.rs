@@ -36,8 +36,8 @@ crate::named_choice!(Severity, "severity", 3, {
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Finding {
     /// Kind of the observation, as a name for programs, such as `not-converged` or `delay-at-bound`.
-    #[serde(deserialize_with = "crate::interned::name")]
-    pub kind: crate::interned::Name,
+    #[serde(deserialize_with = "crate::static_names::name")]
+    pub kind: crate::static_names::Name,
     /// Severity of the observation.
     pub severity: Severity,
     /// Observation as a sentence with its numbers, without a full stop.

@@ -55,7 +55,7 @@
 //! | [`controlled_element`], [`forcing`], [`schedule`], [`scenario`] | the task: plant, target signal, change over time, conditions C1-C6 |
 //! | [`family_scenario`] | tasks of people: any operator of the family, any controlled element, a remnant of several parts |
 //! | [`feedforward`] | response of a person to a displayed target, also as text |
-//! | [`held_system`] | exact zero-order hold of any rational transfer function |
+//! | [`zoh_system`] | exact zero-order hold of any rational transfer function |
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n for a given noise level |
 //! | [`GainUnit`] | units of gains, derived from the units of the channels |
@@ -76,8 +76,6 @@ pub mod estimate_table;
 pub mod family_scenario;
 pub mod feedforward;
 pub mod forcing;
-pub mod held_system;
-pub mod interned;
 pub mod margins;
 pub mod numbers;
 pub mod operator;
@@ -93,9 +91,11 @@ pub mod sample_time;
 pub mod scenario;
 pub mod schedule;
 pub mod second_order;
+pub mod static_names;
 pub mod structure;
 pub mod transfer_function;
 pub mod uncertainty;
+pub mod zoh_system;
 
 pub use delayed_operator::{DelayedOperator, delayed_operator, delayed_operator_jacobian};
 pub use error::{ModelError, NotConvertible};
@@ -112,5 +112,5 @@ pub use polynomial_model::PolynomialModel;
 pub use record::{Channel, Detrend, Record};
 pub use resampling::{Decimated, Decimation, Decimator};
 pub use sample_time::SampleTime;
-pub use structure::{MAX_DELAY, MAX_ORDER, Orders, Structure, theta_of};
+pub use structure::{MAX_DELAY, MAX_ORDER, Orders, Structure, theta_from_start};
 pub use transfer_function::{ContinuousTransferFunction, DiscreteTransferFunction};

@@ -4,14 +4,13 @@
 //! (eq. 2)
 //!
 //! After a zero-order hold, H is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with `nk = tau_e/Ts + 1` (eq.
-//! 11), by the formulas of [`hoid_core::held_operator`].
+//! 11), by the formulas of [`hoid_core::zoh_operator`].
 
-use hoid_core::held_operator::held_operator;
+use hoid_core::zoh_operator::zoh_operator;
 use nalgebra::{Matrix4, Vector4};
 
 use crate::{
-    ModelError, NotConvertible, SampleTime, second_order::HeldSecondOrder,
-    transfer_function::ContinuousTransferFunction,
+    ModelError, NotConvertible, SampleTime, second_order::ZohSecondOrder, transfer_function::ContinuousTransferFunction,
 };
 
 /// Parameters of the operator's response to the error.
@@ -33,7 +32,7 @@ pub struct OperatorParameters {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DiscreteOperator {
     /// Discrete model without the delay, `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`.
-    pub held: HeldSecondOrder,
+    pub zoh: ZohSecondOrder,
     /// Delay of b0 in samples.
     pub nk: usize,
     /// Time between two samples.
@@ -145,9 +144,9 @@ impl OperatorParameters {
                 expected: "zero or more, and a whole number of samples: round it or change the sample time",
             });
         };
-        let ([b0, b1, f1, f2], _) = held_operator(self.parameters_without_delay(), sample_time.s());
+        let ([b0, b1, f1, f2], _) = zoh_operator(self.parameters_without_delay(), sample_time.s());
         Ok(DiscreteOperator {
-            held: HeldSecondOrder { b0, b1, f1, f2 }.check_finite()?,
+            zoh: ZohSecondOrder { b0, b1, f1, f2 }.check_finite()?,
             nk: delay + 1,
             sample_time,
         })
@@ -163,10 +162,10 @@ impl DiscreteOperator {
         if self.nk == 0 {
             return Err(NotConvertible::NoDelay);
         }
-        let c = self.held.inverse_zoh(self.sample_time)?;
+        let c = self.zoh.inverse_zoh(self.sample_time)?;
         // K_e and omega_nm depend on 1 + f1 + f2, a difference of numbers of order 1. Below this value the difference
         // consists only of rounding errors.
-        if c.a2 <= 0.0 || has_pole_at_origin(&[self.held.f1, self.held.f2]) {
+        if c.a2 <= 0.0 || has_pole_at_origin(&[self.zoh.f1, self.zoh.f2]) {
             return Err(NotConvertible::NoNaturalFrequency { a1: c.a1, a2: c.a2 });
         }
         let omega = c.a2.sqrt();
@@ -186,7 +185,7 @@ impl DiscreteOperator {
 
 /// Returns the Jacobian of `[b0, b1, f1, f2]` (rows) with respect to `[K_e, K_e_dot, omega_nm, zeta_nm]` (columns).
 pub fn discretisation_jacobian(operator: &OperatorParameters, sample_time: SampleTime) -> [[f64; 4]; 4] {
-    held_operator(operator.parameters_without_delay(), sample_time.s()).1
+    zoh_operator(operator.parameters_without_delay(), sample_time.s()).1
 }
 
 /// Returns the Jacobian of `[K_e, K_e_dot, omega_nm, zeta_nm]` (rows) with respect to `[b0, b1, f1, f2]` (columns): the
@@ -250,10 +249,10 @@ mod tests {
         let expected = [(s1(), 0.0442765923, -0.0431823806), (s2(), 0.1024498216, -0.1015987680)];
         for (operator, b0, b1) in expected {
             let d = operator.discretise(ts()).unwrap();
-            assert!((d.held.f1 + 1.9121130548).abs() < 5e-11);
-            assert!((d.held.f2 - 0.9242709633).abs() < 5e-11);
-            assert!((d.held.b0 - b0).abs() < 5e-11);
-            assert!((d.held.b1 - b1).abs() < 5e-11);
+            assert!((d.zoh.f1 + 1.9121130548).abs() < 5e-11);
+            assert!((d.zoh.f2 - 0.9242709633).abs() < 5e-11);
+            assert!((d.zoh.b0 - b0).abs() < 5e-11);
+            assert!((d.zoh.b1 - b1).abs() < 5e-11);
             assert_eq!(d.nk, 29);
         }
     }
@@ -290,7 +289,7 @@ mod tests {
                 }
                 .discretise(ts())
                 .unwrap();
-                [d.held.b0, d.held.b1, d.held.f1, d.held.f2]
+                [d.zoh.b0, d.zoh.b1, d.zoh.f1, d.zoh.f2]
             };
             let p = [
                 operator.k_e,
@@ -338,7 +337,7 @@ mod tests {
     #[test]
     fn non_convertible_models_give_the_reason() {
         let model = |b: [f64; 2], f: [f64; 2], nk| DiscreteOperator {
-            held: HeldSecondOrder {
+            zoh: ZohSecondOrder {
                 b0: b[0],
                 b1: b[1],
                 f1: f[0],

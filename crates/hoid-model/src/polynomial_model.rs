@@ -8,12 +8,12 @@ use num_complex::Complex64;
 
 use crate::{
     ModelError, NotConvertible, Orders, SampleTime, Structure, operator::DiscreteOperator, polynomial,
-    second_order::HeldSecondOrder, transfer_function::DiscreteTransferFunction,
+    second_order::ZohSecondOrder, transfer_function::DiscreteTransferFunction,
 };
 
 /// A polynomial model with its coefficients.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(try_from = "Written")]
+#[serde(try_from = "SerializedModel")]
 pub struct PolynomialModel {
     structure: Structure,
     orders: Orders,
@@ -23,17 +23,17 @@ pub struct PolynomialModel {
 
 /// A polynomial model as read from a file, before it is checked.
 #[derive(serde::Deserialize)]
-struct Written {
+struct SerializedModel {
     structure: Structure,
     orders: Orders,
     sample_time: SampleTime,
     theta: Vec<f64>,
 }
 
-impl TryFrom<Written> for PolynomialModel {
+impl TryFrom<SerializedModel> for PolynomialModel {
     type Error = ModelError;
 
-    fn try_from(written: Written) -> Result<Self, ModelError> {
+    fn try_from(written: SerializedModel) -> Result<Self, ModelError> {
         Self::new(written.structure, written.orders, written.sample_time, written.theta)
     }
 }
@@ -184,7 +184,7 @@ impl PolynomialModel {
         let (b, poles) = (self.b(), self.operator_poles());
         match (b, poles) {
             (&[b0, b1], &[f1, f2]) => Ok(DiscreteOperator {
-                held: HeldSecondOrder { b0, b1, f1, f2 },
+                zoh: ZohSecondOrder { b0, b1, f1, f2 },
                 nk: self.orders.nk,
                 sample_time: self.sample_time,
             }),
@@ -252,7 +252,7 @@ mod tests {
         assert_eq!(m.f(), &[-1.91, 0.924]);
         assert!(m.a().is_empty());
         let positions = m.operator_positions();
-        let h = m.discrete_operator().unwrap().held;
+        let h = m.discrete_operator().unwrap().zoh;
         assert_eq!(positions.map(|i| m.theta()[i]), [h.b0, h.b1, h.f1, h.f2]);
     }
 

@@ -113,7 +113,7 @@ pub fn remnant_gain(
                 .to_owned(),
         });
     }
-    let closed = Loop {
+    let closed = ClosedLoop {
         operator,
         controlled_element,
     };
@@ -138,7 +138,7 @@ pub fn remnant_gain(
             let largest = own / by_noise;
             if level >= largest {
                 return Err(ModelError::UnreachableNoiseLevel {
-                    demanded: level,
+                    requested_level: level,
                     order,
                     largest,
                 });
@@ -158,12 +158,12 @@ pub fn remnant_gain(
 }
 
 /// Closed loop, for the computation of the magnitudes of its responses from polynomials.
-struct Loop<'a> {
+struct ClosedLoop<'a> {
     operator: &'a ContinuousTransferFunction,
     controlled_element: &'a ContinuousTransferFunction,
 }
 
-impl Loop<'_> {
+impl ClosedLoop<'_> {
     /// Returns `|1/(1 + H_HO H_CE)|`.
     fn sensitivity(&self, omega: f64) -> f64 {
         let [_, den_operator, den_element, characteristic] = self.at(omega);

@@ -37,7 +37,7 @@ pub struct SecondOrder {
 
 /// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`: a second-order system after a zero-order hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeldSecondOrder {
+pub struct ZohSecondOrder {
     /// First coefficient of B.
     pub b0: f64,
     /// Second coefficient of B.
@@ -54,11 +54,11 @@ impl SecondOrder {
     /// # Errors
     /// [`ModelError::OutOfRange`] if the result is not finite (an unstable pole so fast that its exponential overflows,
     /// or a coefficient that is not finite).
-    pub fn zoh(self, sample_time: SampleTime) -> Result<HeldSecondOrder, ModelError> {
+    pub fn zoh(self, sample_time: SampleTime) -> Result<ZohSecondOrder, ModelError> {
         let ts = sample_time.s();
         let poles = DividedDifferences::at(-self.a1 * ts, self.a2 * ts * ts);
         let b0 = self.b0 * ts * poles.phi1 + self.b1 * ts * ts * poles.phi2;
-        HeldSecondOrder {
+        ZohSecondOrder {
             b0,
             b1: self.b1 * ts * ts * poles.chi() - b0,
             f1: -2.0 * poles.mean,
@@ -68,7 +68,7 @@ impl SecondOrder {
     }
 }
 
-impl HeldSecondOrder {
+impl ZohSecondOrder {
     /// Returns the model if its coefficients are finite, that is, if no exponential has overflowed; otherwise an error.
     pub(crate) fn check_finite(self) -> Result<Self, ModelError> {
         for (quantity, found) in [("b0", self.b0), ("b1", self.b1), ("f1", self.f1), ("f2", self.f2)] {
@@ -113,14 +113,14 @@ impl HeldSecondOrder {
 /// State space of `1/(s^2 + a1 s + a2)` in controllable canonical form (the states are the output and its rate) over
 /// one sample with a held input: `x(t + Ts) = transition x(t) + input u(t)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HeldStates {
+pub struct ZohStates {
     /// Transition matrix `e^{A Ts}` by rows.
     pub transition: [[f64; 2]; 2],
     /// Input vector `integral of e^{A s} B ds` over one sample.
     pub input: [f64; 2],
 }
 
-impl HeldStates {
+impl ZohStates {
     /// Computes, with `h = Ts phi1` and `g = Ts^2 phi2`, the transition `[[1 - a2 g, h], [-a2 h, 1 - a2 g - a1 h]]` and
     /// the input `[g, h]`.
     pub fn new(a1: f64, a2: f64, sample_time: SampleTime) -> Self {
@@ -152,11 +152,7 @@ impl HeldStates {
 ///
 /// # Errors
 /// As [`SecondOrder::zoh`]; [`ModelError::TransferFunction`] if the leading coefficient of `den` is zero.
-pub fn hold_biproper(
-    num: [f64; 3],
-    den: [f64; 3],
-    sample_time: SampleTime,
-) -> Result<([f64; 3], [f64; 2]), ModelError> {
+pub fn zoh_biproper(num: [f64; 3], den: [f64; 3], sample_time: SampleTime) -> Result<([f64; 3], [f64; 2]), ModelError> {
     if den[0] == 0.0 {
         return Err(ModelError::TransferFunction {
             found: format!("{num:?} / {den:?}"),
@@ -175,17 +171,17 @@ pub fn hold_biproper(
     Ok(([d, d * held.f1 + held.b0, d * held.f2 + held.b1], [held.f1, held.f2]))
 }
 
-/// Inverse of [`hold_biproper`]: returns numerator and monic denominator in descending powers of s.
+/// Inverse of [`zoh_biproper`]: returns numerator and monic denominator in descending powers of s.
 ///
 /// # Errors
-/// As [`HeldSecondOrder::inverse_zoh`].
-pub fn inverse_hold_biproper(
+/// As [`ZohSecondOrder::inverse_zoh`].
+pub fn inverse_zoh_biproper(
     num: [f64; 3],
     f: [f64; 2],
     sample_time: SampleTime,
 ) -> Result<([f64; 3], [f64; 3]), NotConvertible> {
     let d = num[0];
-    let held = HeldSecondOrder {
+    let held = ZohSecondOrder {
         b0: num[1] - d * f[0],
         b1: num[2] - d * f[1],
         f1: f[0],
@@ -284,7 +280,7 @@ mod tests {
     }
 
     /// The zero-order hold by the extended-matrix exponential of eq. B.7.
-    fn zoh_by_matrix_exponential(c: SecondOrder, ts: f64) -> HeldSecondOrder {
+    fn zoh_by_matrix_exponential(c: SecondOrder, ts: f64) -> ZohSecondOrder {
         let m = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, -c.a2, -c.a1, 1.0, 0.0, 0.0, 0.0]) * ts;
         let e = m.exp();
         let (a, b) = (e.view((0, 0), (2, 2)).into_owned(), e.view((0, 2), (2, 1)).into_owned());
@@ -292,7 +288,7 @@ mod tests {
         let f1 = -a.trace();
         let first = (&row * &b)[(0, 0)];
         let second = (&row * &a * &b)[(0, 0)];
-        HeldSecondOrder {
+        ZohSecondOrder {
             b0: first,
             b1: second + f1 * first,
             f1,
@@ -358,7 +354,7 @@ mod tests {
     #[test]
     fn held_states_match_the_matrix_exponential() {
         for case in cases() {
-            let ours = HeldStates::new(case.a1, case.a2, ts());
+            let ours = ZohStates::new(case.a1, case.a2, ts());
             let m = DMatrix::from_row_slice(3, 3, &[0.0, 1.0, 0.0, -case.a2, -case.a1, 1.0, 0.0, 0.0, 0.0]) * 0.01;
             let e = m.exp();
             for i in 0..2 {
@@ -384,7 +380,7 @@ mod tests {
 
     #[test]
     fn poles_on_the_closed_negative_axis_are_refused() {
-        let held = |f1, f2| HeldSecondOrder {
+        let held = |f1, f2| ZohSecondOrder {
             b0: 1.0,
             b1: 0.0,
             f1,
@@ -407,13 +403,13 @@ mod tests {
 
     #[test]
     fn feedthrough_round_trip() {
-        let (num, f) = hold_biproper([0.7, 3.0, 11.0], [2.0, 4.0, 30.0], ts()).unwrap();
-        let (back, den) = inverse_hold_biproper(num, f, ts()).unwrap();
+        let (num, f) = zoh_biproper([0.7, 3.0, 11.0], [2.0, 4.0, 30.0], ts()).unwrap();
+        let (back, den) = inverse_zoh_biproper(num, f, ts()).unwrap();
         for (a, b) in back.iter().zip([0.35, 1.5, 5.5]) {
             assert!((a - b).abs() < 1e-10);
         }
         assert!((den[1] - 2.0).abs() < 1e-10 && (den[2] - 15.0).abs() < 1e-9);
-        assert!(hold_biproper([0.0, 1.0, 1.0], [0.0, 1.0, 1.0], ts()).is_err());
+        assert!(zoh_biproper([0.0, 1.0, 1.0], [0.0, 1.0, 1.0], ts()).is_err());
     }
 
     #[test]

@@ -272,7 +272,7 @@ impl fmt::Display for Orders {
 ///
 /// # Errors
 /// A description of the problem, as the end of a sentence that starts with the name of the option.
-pub fn theta_of(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f64>, String> {
+pub fn theta_from_start(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f64>, String> {
     if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
         return Err(format!(
             "contains {unknown}, which is not a parameter of the model; expected {}",
@@ -366,7 +366,9 @@ mod tests {
     #[test]
     fn incomplete_theta_is_refused() {
         let names: Vec<String> = ["b0", "f1"].map(str::to_owned).to_vec();
-        let of = |start: &[(&str, f64)]| theta_of(&names, &start.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect());
+        let of = |start: &[(&str, f64)]| {
+            theta_from_start(&names, &start.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect())
+        };
         assert_eq!(of(&[("f1", -1.9), ("b0", 0.04)]), Ok(vec![0.04, -1.9]));
         for (start, reason) in [
             (&[("f1", 1.0)][..], "lacks b0"),

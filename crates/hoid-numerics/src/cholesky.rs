@@ -3,8 +3,9 @@
 //! 2013, section 4.2).
 //!
 //! Matrices are N by N; only the first n rows and columns are used. [`solve`] subtracts each known term as soon as it
-//! is known, whereas [`substitute_forward`] and [`substitute_backward`] sum the known terms and subtract the sum. Applied one after the
-//! other, [`substitute_forward`] and [`substitute_backward`] give the result of [`solve`] except for rounding.
+//! is known, whereas [`substitute_forward`] and [`substitute_backward`] sum the known terms and subtract the sum.
+//! Applied one after the other, [`substitute_forward`] and [`substitute_backward`] give the result of [`solve`] except
+//! for rounding.
 
 /// Replaces the lower triangle of A by L. Returns false if A is not positive definite.
 pub fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {

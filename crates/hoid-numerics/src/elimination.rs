@@ -6,7 +6,8 @@
 //! equations as soon as the unknown is known, so no step waits for a complete sum. If the factor itself is needed, use
 //! [`crate::cholesky`].
 //!
-//! **General matrices**, several right-hand sides ([`solve_general`]), with row pivoting (G. H. Golub and C. F. Van Loan,
+//! **General matrices**, several right-hand sides ([`solve_general`]), with row pivoting (G. H. Golub and C. F. Van
+//! Loan,
 //! *Matrix Computations*, 2013, section 3.4).
 
 /// Number of columns that are computed at a time.

@@ -89,9 +89,9 @@ pub fn upper_median(values: &mut [f64]) -> Option<f64> {
 }
 
 /// Returns the value with this index in ascending order, or the largest value if the index is too large.
-fn order_statistic(values: &mut [f64], place: usize) -> Option<f64> {
+fn order_statistic(values: &mut [f64], index: usize) -> Option<f64> {
     let last = values.len().checked_sub(1)?;
-    Some(*values.select_nth_unstable_by(place.min(last), f64::total_cmp).1)
+    Some(*values.select_nth_unstable_by(index.min(last), f64::total_cmp).1)
 }
 
 /// Returns the finite values in ascending order.

@@ -174,7 +174,7 @@ pub fn describing_function<'py>(
         (None, None, Some(channel), period_s) => {
             let search = LineDetectionOptions {
                 period_s,
-                least_amplitude,
+                min_amplitude: least_amplitude,
             };
             Excitation::detect(&records[0], &channel, &search)?
         }
@@ -231,8 +231,9 @@ impl PyDescribingFunction {
         all.set_item("response", PyArray1::from_iter(py, lines.iter().map(|l| l.response)))?;
         all.set_item("response_se", column(&|l| l.standard_error.unwrap_or(f64::NAN)))?;
         all.set_item("coherence", column(&|l| l.coherence.unwrap_or(f64::NAN)))?;
-        type Of = fn(&hoid_ident::frequency::Line) -> Estimate;
-        let both: [(&str, Of); 2] = [("magnitude_db", |l| l.magnitude_db()), ("phase_deg", |l| l.phase_deg())];
+        type LineQuantity = fn(&hoid_ident::frequency::Line) -> Estimate;
+        let both: [(&str, LineQuantity); 2] =
+            [("magnitude_db", |l| l.magnitude_db()), ("phase_deg", |l| l.phase_deg())];
         for (name, of) in both {
             all.set_item(name, column(&|l| of(l).value))?;
             all.set_item(format!("{name}_se"), column(&|l| error_or_nan(of(l))))?;

@@ -1,7 +1,7 @@
 //! `pyhoid.design`: a forcing function and the expected errors; the package reads the JSON of the result.
 
 use hoid_design::experiment::{
-    DesignOptions, DesignRequest, DifferenceRequest, Enters, ExperimentDesign, OtherForcing, People, Remnant,
+    DesignOptions, DesignRequest, DifferenceRequest, EntryPoint, ExperimentDesign, OtherForcing, People, Remnant,
     SpreadSource,
 };
 use hoid_model::{Form, family_scenario::Display};
@@ -54,9 +54,9 @@ pub fn design(
             .transpose()?,
         form: form.map(|name| names::choice::<Form>("form", name)).transpose()?,
         enters: if disturbance {
-            Enters::Disturbance
+            EntryPoint::Disturbance
         } else {
-            Enters::Target
+            EntryPoint::Target
         },
         remnant: Remnant {
             share: remnant.0,
@@ -64,13 +64,13 @@ pub fn design(
             ..Remnant::default()
         },
         designing: DesignOptions {
-            wanted: wanted.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
+            requested_quantities: wanted.iter().map(|text| text.parse()).collect::<Result<_, _>>()?,
             period_s: length,
             lines,
             spacing,
             band_rad_s: band,
             shelf,
-            most_rms: [limits.0, limits.1],
+            max_rms: [limits.0, limits.1],
             seed,
             ..DesignOptions::default()
         },

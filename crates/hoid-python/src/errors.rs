@@ -16,7 +16,7 @@ use hoid_study::StudyError;
 use hoid_thesis::ThesisError;
 use pyo3::{PyErr, import_exception};
 
-use crate::in_python::in_python;
+use crate::keyword_messages::in_python;
 
 import_exception!(pyhoid.errors, Error);
 import_exception!(pyhoid.errors, DataError);
@@ -112,7 +112,11 @@ impl From<AnalysisError> for Failure {
                 others.description(),
                 others.as_keys()
             ))),
-            AnalysisError::Misplaced { name, of, instead } => {
+            AnalysisError::Misplaced {
+                name,
+                estimators: of,
+                alternative: instead,
+            } => {
                 let of: Vec<String> = of.into_iter().map(estimator).collect();
                 bad_option(format!("{name} applies only to {}{instead}", of.join(", ")))
             }

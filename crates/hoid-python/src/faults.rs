@@ -7,10 +7,10 @@ use pyo3::{prelude::*, types::PyDict};
 use crate::arrays::record_to_dict;
 
 /// Index of the given record, and the properties of the fault as a dictionary.
-type Of<'py> = (usize, Bound<'py, PyDict>);
+type IndexedFault<'py> = (usize, Bound<'py, PyDict>);
 
 /// Returns the faults in recordings, each with the index of the given record.
-pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Of<'py>>> {
+pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<IndexedFault<'py>>> {
     let all = data.origins.iter().zip(&data.accounts);
     all.flat_map(|(origin, account)| account.found_faults().into_iter().map(|found| (*origin, found)))
         .map(|(origin, found)| Ok((origin, fault_to_dict(py, found)?)))

@@ -129,7 +129,7 @@ pub fn plain_margins<'py>(py: Python<'py>, m: &Margins) -> PyResult<Bound<'py, P
 
 /// Returns the settings: displayed name, value, and whether the user gave it.
 pub fn settings(all: &[hoid_analysis::Setting]) -> Vec<(String, String, bool)> {
-    let parts = |one: &hoid_analysis::Setting| (one.name.clone(), one.value.clone(), one.given);
+    let parts = |one: &hoid_analysis::Setting| (one.name.clone(), one.value.clone(), one.is_given);
     all.iter().map(parts).collect()
 }
 

@@ -175,7 +175,7 @@ pub fn decimated<'py>(
         return Ok(None);
     }
     let record = arrays::record(record, ChannelSelection::All)?;
-    let (record, done) = py.detach(|| decimation.of(record))?;
+    let (record, done) = py.detach(|| decimation.apply(record))?;
     let Some(done) = done else { return Ok(None) };
     let parts = record_to_dict(py, record)?;
     parts.set_item("input_lead", done.lead_s)?;

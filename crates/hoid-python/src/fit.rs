@@ -29,12 +29,12 @@ pub struct PyFit {
     /// Number of records to which the model was fitted.
     records: usize,
     /// The complete result to which the model belongs; `None` if the model is a part of a result of another class.
-    whole: Option<FullResult>,
+    full_result: Option<FullResult>,
 }
 
 /// A model that is a part of another result, as serialised.
 #[derive(serde::Serialize)]
-struct Part<'a> {
+struct SerializedPart<'a> {
     fit: &'a Fit,
     choice: &'a Option<Choice>,
     records: usize,
@@ -77,7 +77,7 @@ impl PyFit {
             fit,
             choice,
             records,
-            whole: None,
+            full_result: None,
         }
     }
 
@@ -87,7 +87,7 @@ impl PyFit {
             fit: found.fit.fit.clone(),
             choice: found.fit.choice.clone(),
             records: found.data.names.len(),
-            whole: Some(FullResult::Polynomials(Box::new(found))),
+            full_result: Some(FullResult::Polynomials(Box::new(found))),
         }
     }
 
@@ -97,19 +97,21 @@ impl PyFit {
             fit: found.fit.polynomial_fit(0).clone(),
             choice: None,
             records: found.data.names.len(),
-            whole: Some(FullResult::Remnant(Box::new(found))),
+            full_result: Some(FullResult::Remnant(Box::new(found))),
         }
     }
 
     fn grey_box(&self) -> Option<&GreyBoxFit> {
-        match &self.whole {
+        match &self.full_result {
             Some(FullResult::Remnant(found)) => Some(&found.fit),
             _ => None,
         }
     }
 
     fn data(&self) -> Option<&Recordings> {
-        self.whole.as_ref().map(|whole| each!(whole, found => &found.data))
+        self.full_result
+            .as_ref()
+            .map(|whole| each!(whole, found => &found.data))
     }
 
     fn margins_with(&self, element: &ControlledElement) -> Outcome<MarginEstimates> {
@@ -145,12 +147,12 @@ impl PyFit {
     #[getter]
     fn settings(&self) -> Vec<(String, String, bool)> {
         let of = |whole: &FullResult| each!(whole, found => figures::settings(&found.settings));
-        self.whole.as_ref().map(of).unwrap_or_default()
+        self.full_result.as_ref().map(of).unwrap_or_default()
     }
 
     /// Returns the result as JSON, from which it can be restored.
     fn to_json(&self) -> Outcome<String> {
-        match &self.whole {
+        match &self.full_result {
             Some(whole) => Ok(each!(whole, found => found.to_json())?),
             None => Err(DataError::new_err(
                 "this model is part of another result: write that result instead (fit.to_json() of the operator or the \
@@ -163,10 +165,10 @@ impl PyFit {
     /// Returns the serialised model if it is a part of another result; `None` for a separate result, which is restored
     /// from JSON.
     fn state(&self) -> Option<String> {
-        if self.whole.is_some() {
+        if self.full_result.is_some() {
             return None;
         }
-        state::serialise(&Part {
+        state::serialise(&SerializedPart {
             fit: &self.fit,
             choice: &self.choice,
             records: self.records,
@@ -286,7 +288,7 @@ impl PyFit {
     #[getter]
     fn levels(&self) -> Vec<Option<ValueWithError>> {
         let without = |whole: &&FullResult| each!(whole, found => found.is_without_means());
-        let data = self.whole.as_ref().filter(without).and_then(|_| self.data());
+        let data = self.full_result.as_ref().filter(without).and_then(|_| self.data());
         let accounts = data.into_iter().flat_map(|data| &data.accounts);
         accounts.map(|account| account.level.map(value_and_error)).collect()
     }
@@ -323,7 +325,7 @@ impl PyFit {
     /// Returns the verdict on the fit; if the fit is a part of another result, the verdict is based on these records
     /// only.
     fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
-        if let Some(whole) = &self.whole {
+        if let Some(whole) = &self.full_result {
             return Ok(each!(whole, found => figures::verdict(&found.verdict)));
         }
         let records = arrays::records(&records, ChannelSelection::Only(&[]))?;
@@ -430,7 +432,7 @@ impl PyFit {
                     margins,
                 }],
                 notes: Vec::new(),
-                answer: None,
+                fit_summary: None,
                 pictures: Vec::new(),
             };
             write_report(&directory, &report.to_html()?)

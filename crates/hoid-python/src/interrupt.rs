@@ -48,7 +48,7 @@ impl RunStatus {
 /// Runs a computation that reports its progress to the waiting thread.
 pub fn with_progress<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T {
     let status = Arc::clone(status);
-    progress::with_watcher(move |step| status.set(step.done as u64, step.total as u64), work)
+    progress::with_watcher(move |step| status.set(step.finished as u64, step.total as u64), work)
 }
 
 /// Runs a computation without the interpreter lock and returns its result.
@@ -83,7 +83,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
         }
         py.check_signals()
     };
-    // mpsc::Receiver is not Sync, so it is moved into the wait and back.
+    // mpsc::Receiver is not Sync, so it is moved into the closure that waits, which returns it.
     let mut receive = receive;
     let mut interrupted: Option<PyErr> = None;
     loop {
@@ -111,7 +111,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
             }
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(bad_option(
-                    "the work ended without a result because of an error in hoid; please report it",
+                    "the computation ended without a result because of an error in hoid; please report it",
                 ));
             }
         }

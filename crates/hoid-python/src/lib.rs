@@ -38,8 +38,8 @@ mod files;
 mod fit;
 mod group;
 mod identify;
-mod in_python;
 mod interrupt;
+mod keyword_messages;
 mod names;
 mod recursion;
 mod simulate;
@@ -73,7 +73,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(files::check_record, module)?,
         wrap_pyfunction!(files::decimated, module)?,
         wrap_pyfunction!(files::signal_of, module)?,
-        wrap_pyfunction!(in_python::in_python, module)?,
+        wrap_pyfunction!(keyword_messages::in_python, module)?,
         wrap_pyfunction!(files::detrended, module)?,
         wrap_pyfunction!(files::even_times, module)?,
         wrap_pyfunction!(files::read, module)?,

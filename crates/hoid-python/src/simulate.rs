@@ -9,7 +9,7 @@ use hoid_model::{
     margins::{MANUAL_CONTROL_RANGE_RAD_S, margins as margins_of},
     remnant::HIGHEST_ORDER,
     scenario::{Condition, Scenario},
-    second_order::HeldSecondOrder,
+    second_order::ZohSecondOrder,
     uncertainty::OperatorEstimate,
 };
 use hoid_sim::{FamilySimulator, RunSeed, Simulator};
@@ -160,7 +160,7 @@ fn conversion<'py>(
     operator: Result<OperatorParameters, hoid_model::NotConvertible>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (all, coefficients) = (PyDict::new(py), PyDict::new(py));
-    let held = discrete.held;
+    let held = discrete.zoh;
     coefficients.set_item("f", [held.f1, held.f2])?;
     coefficients.set_item("b", [held.b0, held.b1])?;
     coefficients.set_item("nk", discrete.nk)?;
@@ -184,7 +184,7 @@ pub fn convert_discrete<'py>(
     sample_time: f64,
 ) -> Outcome<Bound<'py, PyDict>> {
     let discrete = DiscreteOperator {
-        held: HeldSecondOrder {
+        zoh: ZohSecondOrder {
             b0: b[0],
             b1: b[1],
             f1: f[0],

@@ -215,5 +215,5 @@ pub fn reproduce(
         };
         reproduce_into(&wanted, &directory, &on_event, &|| standing.should_continue())
     })?;
-    Ok(found.map(|made| (made.index, made.items, made.tally)))
+    Ok(found.map(|made| (made.index, made.items, made.verdict_counts)))
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hoid_analysis::{Advice, FileExamination, LookOptions, Role};
+use hoid_analysis::{Advice, ExaminationOptions, FileExamination, Role};
 use hoid_io::{ColumnSurvey, QualityIssue, SamplingSurvey, ValueSurvey};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -29,7 +29,7 @@ pub fn info<'py>(
         }
         None => None,
     };
-    let known = LookOptions {
+    let known = ExaminationOptions {
         input,
         output,
         excitation,
@@ -37,7 +37,7 @@ pub fn info<'py>(
         time: time.map(str::parse).transpose()?,
         trial: trial.map(str::parse).transpose()?,
         sampling_hz: sampling_frequency,
-        ..LookOptions::default()
+        ..ExaminationOptions::default()
     };
     let look = py.detach(|| FileExamination::at(&path, &known))?;
     let found = &look.survey;
@@ -59,8 +59,8 @@ fn layout_to_dict<'py>(py: Python<'py>, look: &FileExamination) -> PyResult<Boun
     let role = |role: &Role| -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);
         all.set_item("column", &role.column)?;
-        all.set_item("why", &role.why)?;
-        all.set_item("certain", role.certain)?;
+        all.set_item("why", &role.reason)?;
+        all.set_item("certain", role.is_certain)?;
         Ok(all)
     };
     let all = PyDict::new(py);
@@ -71,13 +71,13 @@ fn layout_to_dict<'py>(py: Python<'py>, look: &FileExamination) -> PyResult<Boun
         units.set_item(column, unit)?;
     }
     all.set_item("units", units)?;
-    let seen = look.seen.as_ref().ok();
+    let seen = look.summary.as_ref().ok();
     let excitation = seen.map(|seen| -> PyResult<_> {
         let all = PyDict::new(py);
         match &seen.periods {
             Ok(found) => {
                 all.set_item("column", &found.channel)?;
-                all.set_item("why", &found.words)?;
+                all.set_item("why", &found.description)?;
                 all.set_item("period_s", found.period_s)?;
                 all.set_item("from_s", found.span_s.0)?;
                 all.set_item("to_s", found.span_s.1)?;
@@ -96,11 +96,11 @@ fn layout_to_dict<'py>(py: Python<'py>, look: &FileExamination) -> PyResult<Boun
         let lag = lag.as_ref();
         all.set_item("samples", lag.ok().map(|lag| lag.samples))?;
         all.set_item("seconds", lag.ok().map(|lag| lag.seconds))?;
-        all.set_item("why", lag.map_or_else(String::as_str, |lag| lag.words.as_str()))?;
+        all.set_item("why", lag.map_or_else(String::as_str, |lag| lag.evidence.as_str()))?;
         Ok(all)
     });
     all.set_item("lateness", lateness.transpose()?)?;
-    all.set_item("no_record", look.seen.as_ref().err().map(ToString::to_string))?;
+    all.set_item("no_record", look.summary.as_ref().err().map(ToString::to_string))?;
     let advice = look.advice().map(|advice| keywords(py, &advice));
     all.set_item("read", advice.transpose()?)?;
     Ok(all)
@@ -199,7 +199,7 @@ fn quality_issue<'py>(py: Python<'py>, t: &QualityIssue) -> PyResult<Bound<'py, 
     all.set_item("unit", &t.unit)?;
     all.set_item("text", &t.text)?;
     all.set_item("remedy", t.kind.remedy())?;
-    let places = t.places.iter().map(|p| (p.row, p.rows, p.from_s, p.to_s));
+    let places = t.row_spans.iter().map(|p| (p.row, p.rows, p.from_s, p.to_s));
     all.set_item("places", places.collect::<Vec<_>>())?;
     Ok(all)
 }

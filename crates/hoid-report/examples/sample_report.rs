@@ -70,7 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             section("BJ", &choice.fit, Some(&choice), loop_margins.map(Into::into)),
         ],
         notes: Vec::new(),
-        answer: None,
+        fit_summary: None,
         pictures: Vec::new(),
     };
     std::fs::write(path, report.to_html()?)?;

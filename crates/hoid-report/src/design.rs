@@ -1,7 +1,9 @@
 //! Figures of a designed experiment: the forcing function with the response of the person, and the expected errors as
 //! functions of the number of runs.
 
-use hoid_design::experiment::{DesignedLine, Enters, Expected, ExpectedResponse, ExperimentDesign, has_absolute_error};
+use hoid_design::experiment::{
+    DesignedLine, EntryPoint, Expected, ExpectedResponse, ExperimentDesign, has_absolute_error,
+};
 use hoid_model::{numbers::count_with_noun, uncertainty::Estimate};
 
 use crate::{
@@ -14,7 +16,7 @@ use crate::{
 /// displayed, the response to it is drawn in the same way.
 pub fn design_figure(design: &ExperimentDesign) -> String {
     let is_seen = design.task.feedforward.is_some();
-    let amplitude = |(shade, enters): (usize, Enters)| {
+    let amplitude = |(shade, enters): (usize, EntryPoint)| {
         let own: Vec<&DesignedLine> = design.lines.iter().filter(|l| l.enters == enters).collect();
         let name = if is_seen { enters.name() } else { "" };
         Curve {
@@ -27,13 +29,13 @@ pub fn design_figure(design: &ExperimentDesign) -> String {
             )
         }
     };
-    let points = [(0, Enters::Target), (1, Enters::Disturbance)].into_iter();
+    let points = [(0, EntryPoint::Target), (1, EntryPoint::Disturbance)].into_iter();
     let there = points.filter(|(_, enters)| design.lines.iter().any(|l| l.enters == *enters));
     let amplitudes = match is_seen {
         true => there.map(amplitude).collect(),
         false => there.map(|(_, enters)| amplitude((0, enters))).collect(),
     };
-    let of_target = |l: &&DesignedLine| is_seen && l.enters == Enters::Target;
+    let of_target = |l: &&DesignedLine| is_seen && l.enters == EntryPoint::Target;
     let (target, error): (Vec<&DesignedLine>, Vec<&DesignedLine>) = design.lines.iter().partition(of_target);
     let of_error = if is_seen { "of B " } else { "" };
     let mut panels = vec![panel("amplitude", "", amplitudes)];
@@ -149,7 +151,7 @@ pub fn runs_figure(design: &ExperimentDesign) -> String {
             ..curve("", 0, x, y)
         };
         panels.push(CurvePanel {
-            within: Some((0.0, most)),
+            ordinate_range: Some((0.0, most)),
             ..panel("people", "", vec![people])
         });
     }

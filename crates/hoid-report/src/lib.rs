@@ -45,7 +45,7 @@
 //! | [`comparison_figure`] | people by condition, with the means over people |
 //! | [`design_figure`], [`runs_figure`] | a designed experiment: lines and response, errors by number of runs |
 //! | [`PaperTable`] | a result as a table for a paper |
-//! | [`facts`] | the table of settings on these pages |
+//! | [`settings_pairs`] | the table of settings on these pages |
 //! | [`figures`] | the figures of these pages, each as separate SVG text |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 //! | [`render_with`], [`write_page`], [`write_report`] | additional templates in the same style, and pages written to files |
@@ -56,7 +56,6 @@ mod cells;
 mod comparison;
 mod design;
 mod error;
-mod facts;
 pub mod figures;
 mod fit_summary;
 mod group;
@@ -66,13 +65,13 @@ mod operator;
 mod page;
 mod paper_table;
 mod report;
+mod settings_table;
 mod tables;
 mod track;
 
 pub use comparison::comparison_figure;
 pub use design::{design_figure, runs_figure};
 pub use error::ReportError;
-pub use facts::facts;
 pub use fit_summary::{FitSummary, ParameterRow, sentence};
 pub use group::{
     FrequencyTables, GroupReport, GroupTables, PeopleTable, group_figures, people_table, write_group_pages,
@@ -84,4 +83,5 @@ pub use operator::{operator_figure, operator_sentence, undetermined_remark};
 pub use page::{render_with, write_page, write_report};
 pub use paper_table::PaperTable;
 pub use report::{Picture, Report};
+pub use settings_table::settings_pairs;
 pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits};

@@ -9,9 +9,9 @@ use hoid_ident::{
 use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, GainUnit, uncertainty::Estimate};
 
 use crate::{
-    FitSummary, ModelSection, ParameterRow, Picture, Report, facts,
+    FitSummary, ModelSection, ParameterRow, Picture, Report,
     figures::{ModelCurve, describing, log_spaced, responses},
-    model_figure, sentence,
+    model_figure, sentence, settings_pairs,
 };
 
 impl<'a> Report<'a> {
@@ -28,7 +28,7 @@ impl<'a> Report<'a> {
                 truth: None,
                 margins: element.and_then(|element| margins(fit, element)),
             }],
-            answer: Some(operator_summary(found)),
+            fit_summary: Some(operator_summary(found)),
             pictures: (found.described.as_ref())
                 .map(|described| describing_function_picture(fit, described))
                 .into_iter()
@@ -49,10 +49,10 @@ impl<'a> Report<'a> {
                 [only] => format!("Identification of {}", only.label()),
                 all => format!("Identification of {} records", all.len()),
             },
-            settings: facts(&data.names, &found.settings, &data.accounts),
+            settings: settings_pairs(&data.names, &found.settings, &data.accounts),
             models: Vec::new(),
             notes: Vec::new(),
-            answer: None,
+            fit_summary: None,
             pictures: Vec::new(),
         }
     }

@@ -45,7 +45,7 @@ pub fn render_with(own: &[(&str, &str)], name: &str, values: Value) -> Result<St
 }
 
 /// Converts pairs of name and value for the table of settings.
-pub(crate) fn facts(pairs: &[(String, String)]) -> Vec<Value> {
+pub(crate) fn settings_rows(pairs: &[(String, String)]) -> Vec<Value> {
     pairs.iter().map(|(label, text)| context! { label, text }).collect()
 }
 

@@ -102,7 +102,7 @@ impl PaperTable {
                     values,
                 });
             };
-            let first = |pairs: &[[f64; 2]], place: usize| pairs.iter().map(|pair| pair[place]).collect();
+            let first = |pairs: &[[f64; 2]], index: usize| pairs.iter().map(|pair| pair[index]).collect();
             match cells {
                 Cells::Text(all) => add(name, ColumnValues::Text(all.clone())),
                 Cells::Number(all) => add(name, ColumnValues::Real(all.clone())),
@@ -319,10 +319,10 @@ fn people_columns(people: &[Value]) -> Vec<Column> {
 fn difference_columns(all: &[Value]) -> Vec<Column> {
     let text = |of: &dyn Fn(&Value) -> String| Cells::Text(all.iter().map(of).collect());
     let word = |d: &Value, key: &str| d[key].as_str().unwrap_or_default().to_owned();
-    let ends = |place: usize| {
+    let ends = |index: usize| {
         Cells::End(
             all.iter()
-                .map(|d| [number(&d["interval"][place]), number(&d["standard_error"])])
+                .map(|d| [number(&d["interval"][index]), number(&d["standard_error"])])
                 .collect(),
         )
     };

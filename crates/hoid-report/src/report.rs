@@ -29,7 +29,7 @@ pub struct Report<'a> {
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
     /// Summary of the fit at the top of the page.
-    pub answer: Option<FitSummary>,
+    pub fit_summary: Option<FitSummary>,
     /// Figures of the main result, placed before all other figures.
     pub pictures: Vec<Picture>,
 }
@@ -61,7 +61,7 @@ impl<'a> Report<'a> {
                 margins: None,
             }],
             notes: Vec::new(),
-            answer: None,
+            fit_summary: None,
             pictures: Vec::new(),
         }
     }
@@ -94,9 +94,9 @@ impl Report<'_> {
             .collect();
         let values = context! {
             title => self.title.clone(),
-            settings => page::facts(&self.settings),
+            settings => page::settings_rows(&self.settings),
             notes => self.notes.clone(),
-            answer => self.answer.as_ref().map(FitSummary::to_value),
+            answer => self.fit_summary.as_ref().map(FitSummary::to_value),
             pictures => self.pictures.iter().map(Picture::to_value).collect::<Vec<Value>>(),
             comparison => tables::comparison(&self.models, &qualities),
             bode => Value::from_safe_string(self.bode()),

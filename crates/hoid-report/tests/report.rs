@@ -59,7 +59,7 @@ fn page<'a>(models: Vec<ModelSection<'a>>) -> String {
         settings: vec![("seed".to_owned(), "5".to_owned())],
         models,
         notes: Vec::new(),
-        answer: None,
+        fit_summary: None,
         pictures: Vec::new(),
     };
     report.to_html().unwrap()
@@ -167,7 +167,7 @@ fn user_text_is_escaped() {
         settings: vec![(hostile.to_owned(), hostile.to_owned())],
         models: vec![section(hostile, &fit, &records)],
         notes: vec![hostile.to_owned()],
-        answer: None,
+        fit_summary: None,
         pictures: Vec::new(),
     };
     let html = report.to_html().unwrap();
@@ -302,7 +302,7 @@ fn a_report_without_models_is_an_error() {
         settings: Vec::new(),
         models: Vec::new(),
         notes: Vec::new(),
-        answer: None,
+        fit_summary: None,
         pictures: Vec::new(),
     };
     assert!(matches!(report.to_html(), Err(ReportError::NoModels)));

@@ -85,7 +85,7 @@ fn boxes(range: BoxRange, method: usize) -> BoxGrid {
         series: noise_levels(method),
         range,
         with_zero: true,
-        least_reach: 0.0,
+        min_half_range: 0.0,
         shared_ordinates: false,
     }
 }
@@ -129,7 +129,7 @@ fn map_grid(colours: MapColours, columns: usize, bar_per_row: bool) -> MapGrid {
         colours,
         limits: None,
         bar_per_row,
-        mark: "simulated orders".to_owned(),
+        cross_label: "simulated orders".to_owned(),
     }
 }
 

@@ -26,7 +26,7 @@
 //! | `run_seed` | [`RunSeed`]: identifier of the random numbers of one run |
 //! | `normal_deviates` | standard normal deviates by the ziggurat method |
 //! | `cascade` | exact zero-order hold of the remnant filter |
-//! | `held_operator` | operator of the family over one sample |
+//! | `zoh_operator` | operator of the family over one sample |
 //! | `target_response` | response to a displayed target |
 //! | [`family`] | loop of any operator of the family: [`FamilySimulator`]; the operator alone |
 //! | [`people`] | virtual people drawn from the family |
@@ -35,13 +35,13 @@
 mod cascade;
 mod error;
 pub mod family;
-mod held_operator;
 mod normal_deviates;
 mod operator_run;
 pub mod people;
 mod run_seed;
 mod simulator;
 mod target_response;
+mod zoh_operator;
 
 pub use error::SimError;
 pub use family::{FamilyOperatorRun, FamilySignals, FamilySimulator};

@@ -91,7 +91,7 @@ const BUFFER_BYTES: usize = 2048;
 struct BufferedGenerator {
     generator: ChaCha8Rng,
     bytes: [u8; BUFFER_BYTES],
-    at: usize,
+    position: usize,
 }
 
 impl BufferedGenerator {
@@ -99,29 +99,29 @@ impl BufferedGenerator {
         Self {
             generator,
             bytes: [0; BUFFER_BYTES],
-            at: BUFFER_BYTES,
+            position: BUFFER_BYTES,
         }
     }
 
     /// Returns the drawn numbers that have not been used.
     #[inline(always)]
     fn unused_numbers(&self) -> &[[u8; 8]] {
-        self.bytes[self.at..].as_chunks().0
+        self.bytes[self.position..].as_chunks().0
     }
 
     /// Marks the next drawn numbers as used, as many as given.
     #[inline(always)]
     fn advance(&mut self, numbers: usize) {
-        self.at += 8 * numbers;
+        self.position += 8 * numbers;
     }
 
     #[inline(always)]
     fn next<const N: usize>(&mut self) -> [u8; N] {
         let mut next = [0; N];
-        match self.bytes.get(self.at..self.at + N) {
+        match self.bytes.get(self.position..self.position + N) {
             Some(bytes) => {
                 next.copy_from_slice(bytes);
-                self.at += N;
+                self.position += N;
             }
             None => self.fill_across_end(&mut next),
         }
@@ -132,12 +132,12 @@ impl BufferedGenerator {
     #[inline(never)]
     fn fill_across_end(&mut self, next: &mut [u8]) {
         for byte in next {
-            if self.at == BUFFER_BYTES {
+            if self.position == BUFFER_BYTES {
                 self.generator.fill_bytes(&mut self.bytes);
-                self.at = 0;
+                self.position = 0;
             }
-            *byte = self.bytes[self.at];
-            self.at += 1;
+            *byte = self.bytes[self.position];
+            self.position += 1;
         }
     }
 }

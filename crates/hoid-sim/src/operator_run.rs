@@ -86,8 +86,8 @@ impl OperatorRun {
         numbers
     }
 
-    /// Restores the state that [`OperatorRun::saved_state`] returned for an operator with the same scenario and run, so it
-    /// continues with bit-identical results. Returns false, without any change, if the numbers belong to another
+    /// Restores the state that [`OperatorRun::saved_state`] returned for an operator with the same scenario and run, so
+    /// it continues with bit-identical results. Returns false, without any change, if the numbers belong to another
     /// operator.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {

@@ -25,7 +25,7 @@ use hoid_model::{
     Channel, Record,
     scenario::{Realisation, ResolvedScenario, Scenario, TrueParameters},
     schedule::Schedule,
-    second_order::HeldStates,
+    second_order::ZohStates,
 };
 
 use crate::{
@@ -41,9 +41,9 @@ pub struct Simulator {
     forcing_deg: Vec<f64>,
     /// Response to the target, and disturbance of the controlled element: signals of all runs that do not depend on the
     /// loop; `None` if there is neither.
-    given: Option<ExternalSignals>,
+    external_signals: Option<ExternalSignals>,
     /// Response to the target as an operator; `None` if the person does not see the target.
-    seen: Option<TargetResponse>,
+    target_response: Option<TargetResponse>,
     /// True parameters: one entry if nothing changes, otherwise one entry per sample.
     parameters: Vec<TrueParameters>,
     pub(crate) matrices: Vec<Matrices>,
@@ -68,28 +68,28 @@ pub(crate) struct Matrices {
     pub delay: usize,
 }
 
-/// Held system with two states, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, bit-identical to [`HeldStates::step`]. If
+/// Held system with two states, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`, bit-identical to [`ZohStates::step`]. If
 /// both rows were sums, the compiler would pack the states into one register, and each sample would also wait for the
 /// shuffles.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TwoStateSystem {
-    plus: [f64; 3],
-    minus: [f64; 3],
+    position_row: [f64; 3],
+    velocity_row: [f64; 3],
 }
 
 impl TwoStateSystem {
-    fn of(system: &HeldStates) -> Self {
+    fn of(system: &ZohStates) -> Self {
         let ([[a, b], [c, d]], [g, h]) = (system.transition, system.input);
         Self {
-            plus: [a, b, g],
-            minus: [d, -c, -h],
+            position_row: [a, b, g],
+            velocity_row: [d, -c, -h],
         }
     }
 
     /// Advances the states by one sample.
     #[inline(always)]
     pub fn step<R: Number>(&self, x: [R; 2], u: R) -> [R; 2] {
-        let ([a, b, g], [d, c, h]) = (self.plus, self.minus);
+        let ([a, b, g], [d, c, h]) = (self.position_row, self.velocity_row);
         [
             u.splat(a) * x[0] + u.splat(b) * x[1] + u.splat(g) * u,
             u.splat(d) * x[1] - u.splat(c) * x[0] - u.splat(h) * u,
@@ -138,7 +138,7 @@ impl Simulator {
         let seen = seen.transpose()?;
         let response = seen.as_ref().map(|seen| {
             let shown = scenario.forcing.samples(start_s + seen.preview_s(), ts, samples);
-            seen.of(&shown)
+            seen.respond(&shown)
         });
         let response = response.transpose()?;
         let is_given = response.is_some() || !scenario.disturbance.sinusoids().is_empty();
@@ -147,8 +147,8 @@ impl Simulator {
             disturbance: scenario.disturbance.samples(start_s, ts, samples),
         });
         Ok(Self {
-            given,
-            seen,
+            external_signals: given,
+            target_response: seen,
             forcing_deg: scenario.forcing.samples(start_s, ts, samples),
             cascade: Cascade::new(scenario.remnant.order, ts.s() / scenario.remnant.time_constant_s),
             parameters,
@@ -197,7 +197,7 @@ impl Simulator {
         let one = SingleRun {
             simulator: self,
             noise,
-            into: signals,
+            signals,
         };
         if with_one_lane(one) {
             Ok(())
@@ -238,7 +238,7 @@ impl Simulator {
         let many = BatchedRuns {
             simulator: self,
             noises,
-            into,
+            signals: into,
         };
         let finite = instructions.with_lanes(many).ok_or(SimError::NoSuchInstructionSet)?;
         if finite {
@@ -288,7 +288,7 @@ impl Simulator {
         noise: &[f64],
         out: [&mut [f64]; 4],
     ) {
-        match (self.matrices.len() == 1, &self.given) {
+        match (self.matrices.len() == 1, &self.external_signals) {
             (true, None) => self.simulate_range_generic::<R, M, false, false>(state, range, noise, out),
             (false, None) => self.simulate_range_generic::<R, M, true, false>(state, range, noise, out),
             // The matrices are read at every sample; one entry is the same for all samples.
@@ -296,8 +296,8 @@ impl Simulator {
         }
     }
 
-    /// As [`Simulator::simulate_range`], compiled separately for constant and for changing parameters, so constant matrices stay
-    /// in registers, and for loops with and without given signals.
+    /// As [`Simulator::simulate_range`], compiled separately for constant and for changing parameters, so constant
+    /// matrices stay in registers, and for loops with and without given signals.
     #[inline(always)]
     fn simulate_range_generic<R: Number, const M: usize, const CHANGES: bool, const GIVEN: bool>(
         &self,
@@ -314,7 +314,7 @@ impl Simulator {
             response: Vec::new(),
             disturbance: Vec::new(),
         };
-        let given = self.given.as_ref().unwrap_or(&none);
+        let given = self.external_signals.as_ref().unwrap_or(&none);
         let (mut operator, mut element) = (state.operator, state.element);
         let mut remnant: [R; M] = [zero; M];
         remnant.copy_from_slice(&state.remnant[..M]);
@@ -381,7 +381,7 @@ impl Simulator {
         )?
         .labelled(self.scenario.scenario().name.clone())
         .starting_at((first as f64 - run_in as f64) * ts.s())
-        .with_channel(match &self.seen {
+        .with_channel(match &self.target_response {
             Some(seen) => seen.target(target),
             None => target,
         })?
@@ -402,11 +402,11 @@ impl Simulator {
             record = record.with_channel(Channel::new(name, unit, values))?;
         }
         let disturbed = !self.scenario.scenario().disturbance.sinusoids().is_empty();
-        if let Some(given) = self.given.as_ref().filter(|_| disturbed) {
+        if let Some(given) = self.external_signals.as_ref().filter(|_| disturbed) {
             record = record.with_channel(Channel::new("d", "deg", given.disturbance[first..].to_vec()))?;
         }
         for channel in self
-            .seen
+            .target_response
             .iter()
             .flat_map(|seen| seen.true_parameters(first, self.sample_count()))
         {
@@ -488,7 +488,7 @@ struct SingleRun<'a> {
     simulator: &'a Simulator,
     noise: &'a [f64],
     /// Buffers for the signals, as long as the run.
-    into: &'a mut Signals,
+    signals: &'a mut Signals,
 }
 
 impl LaneTask for SingleRun<'_> {
@@ -498,7 +498,7 @@ impl LaneTask for SingleRun<'_> {
     #[inline(always)]
     fn run<R: Number>(self, zero: R) -> bool {
         let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
-        let Signals { e, u, x, n } = self.into;
+        let Signals { e, u, x, n } = self.signals;
         let all = 0..self.simulator.sample_count();
         self.simulator.simulate_range(&mut state, all, self.noise, [e, u, x, n]);
         state.is_finite(0)
@@ -510,7 +510,7 @@ struct BatchedRuns<'a> {
     simulator: &'a Simulator,
     noises: &'a [Vec<f64>],
     /// Buffers for the signals of each run, as long as the run.
-    into: &'a mut [Signals],
+    signals: &'a mut [Signals],
 }
 
 impl LaneTask for BatchedRuns<'_> {
@@ -523,7 +523,7 @@ impl LaneTask for BatchedRuns<'_> {
         let mut noise = vec![0.0; width * BLOCK_SAMPLES];
         let mut out: [Vec<f64>; 4] = std::array::from_fn(|_| vec![0.0; width * BLOCK_SAMPLES]);
         let mut finite = true;
-        for (noises, into) in self.noises.chunks(width).zip(self.into.chunks_mut(width)) {
+        for (noises, into) in self.noises.chunks(width).zip(self.signals.chunks_mut(width)) {
             let mut state = LoopState::at_rest(zero, self.simulator.longest_delay());
             // The noise is set to zero, so unused lanes run without remnant.
             noise.fill(0.0);
@@ -564,9 +564,9 @@ impl Matrices {
             Realisation::Output => (1.0, c.k_c),
         };
         Self {
-            operator: TwoStateSystem::of(&HeldStates::new(2.0 * o.zeta_nm * o.omega_nm_rad_s, w2, ts)),
+            operator: TwoStateSystem::of(&ZohStates::new(2.0 * o.zeta_nm * o.omega_nm_rad_s, w2, ts)),
             operator_output: [w2 * o.k_e, w2 * o.k_e_dot()],
-            element: TwoStateSystem::of(&HeldStates::new(c.omega_b_rad_s, 0.0, ts)),
+            element: TwoStateSystem::of(&ZohStates::new(c.omega_b_rad_s, 0.0, ts)),
             element_input,
             element_output,
             k_n: p.k_n,

@@ -3,7 +3,7 @@
 //! The target does not depend on the loop, so its response is computed before the run and added to u like a remnant. An
 //! operator that does not change is applied as one recursion, its discrete model
 //! ([`FamilyOperator::zoh`](hoid_model::FamilyOperator::zoh)); an operator that changes is advanced sample by sample
-//! ([`HeldOperator`]), with the parameters at each sample. Both give the same response up to rounding.
+//! ([`ZohOperator`]), with the parameters at each sample. Both give the same response up to rounding.
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
@@ -11,7 +11,7 @@ use hoid_model::{
     feedforward::{OperatorWithDelay, response_parameters},
 };
 
-use crate::held_operator::{HeldOperator, OperatorState};
+use crate::zoh_operator::{OperatorState, ZohOperator};
 
 /// Prepared response to a target.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ impl TargetResponse {
     }
 
     /// Returns the response to the displayed values of the target, from rest.
-    pub fn of(&self, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
+    pub fn respond(&self, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
         match self.instants.as_slice() {
             [(operator, _)] => self.constant_response(operator, shown),
             _ => self.changing_response(shown),
@@ -63,13 +63,13 @@ impl TargetResponse {
 
     fn changing_response(&self, shown: &[f64]) -> Result<Vec<f64>, ModelError> {
         let longest = self.instants.iter().map(|(_, (whole, _))| *whole).max().unwrap_or(0);
-        let mut current: Option<(&OperatorWithDelay, HeldOperator, OperatorState)> = None;
+        let mut current: Option<(&OperatorWithDelay, ZohOperator, OperatorState)> = None;
         let mut response = Vec::with_capacity(shown.len());
         for (instant, f) in self.instants.iter().zip(shown) {
             let (_, held, mut state) = match current.take() {
                 Some(same) if same.0 == instant => same,
                 before => {
-                    let held = HeldOperator::new(&instant.0, instant.1, self.sample_time)?;
+                    let held = ZohOperator::new(&instant.0, instant.1, self.sample_time)?;
                     let state = match before {
                         Some((_, _, state)) => state,
                         None => OperatorState::at_rest(&held, longest),
@@ -78,7 +78,7 @@ impl TargetResponse {
                 }
             };
             let output = held.output(&state);
-            response.push(output.known + output.tap * f);
+            response.push(output.delayed_response + output.feedthrough * f);
             held.advance(&mut state, output, *f);
             current = Some((instant, held, state));
         }
@@ -146,7 +146,12 @@ mod tests {
                 (x[n - 3], x[n - 2], x[n - 1]) = (11.0_f64.ln(), 0.3_f64.ln(), tau);
                 let seen = Feedforward::new(FamilyOperator::new(form, true, &x).unwrap(), 0.0);
                 let at = |_| Ok(Some(seen.at(0.0, &Schedule::Constant, ts, None)?));
-                let of = |instants| TargetResponse::new(&seen, instants, at, ts).unwrap().of(&f).unwrap();
+                let of = |instants| {
+                    TargetResponse::new(&seen, instants, at, ts)
+                        .unwrap()
+                        .respond(&f)
+                        .unwrap()
+                };
                 let (batch, recursion) = (of(1), of(900));
                 let largest = batch.iter().fold(0.0, |a: f64, v| a.max(v.abs()));
                 assert!(largest > 0.05, "{form}");
@@ -174,10 +179,10 @@ mod tests {
             Ok(Some(seen.at(t_s, &schedule, ts, Some(muscles))?))
         };
         let response = TargetResponse::new(&seen, 4000, at, ts).unwrap();
-        let all = response.of(&f).unwrap();
+        let all = response.respond(&f).unwrap();
         let constant = |operator: FamilyOperator| {
             let one = |_| Ok(Some((operator.clone(), (0, 0.0))));
-            TargetResponse::new(&seen, 1, one, ts).unwrap().of(&f).unwrap()
+            TargetResponse::new(&seen, 1, one, ts).unwrap().respond(&f).unwrap()
         };
         let (before, after) = (
             constant(seen.operator.clone()),
@@ -195,6 +200,6 @@ mod tests {
         let names: Vec<&str> = truth.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["f_t_K_d", "f_t_tau_f"]);
         assert_eq!((truth[0].values[0], truth[0].values[2999]), (0.3, 0.6));
-        assert!(response.of(&[]).unwrap().is_empty());
+        assert!(response.respond(&[]).unwrap().is_empty());
     }
 }

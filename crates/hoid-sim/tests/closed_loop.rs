@@ -385,7 +385,7 @@ fn diverging_loop_is_an_error() {
         simulator.run(RunSeed::default(), false),
         Err(SimError::Diverged { .. })
     ));
-    // For an unstable loop a noise level has no meaning, and it is refused before any run.
+    // For an unstable loop a noise level has no meaning, and it is rejected before any run.
     scenario.remnant.strength = RemnantStrength::Level {
         level: 0.1,
         definition: NoiseDefinition::Response,

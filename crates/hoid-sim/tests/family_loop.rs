@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 use hoid_model::{
     Complex64, ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, SampleTime,
     family_scenario::{
-        Excitation, Feedforward, Followed, Interleaved, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart,
-        RemnantShape, SignalDependence, Stick,
+        DependenceSignal, Excitation, Feedforward, Interleaved, Intermittence, MultiSine, PartStrength, Pulses,
+        RemnantPart, RemnantShape, SignalDependence, Stick,
     },
     operator_family::Coordinate,
     polynomial,
@@ -346,10 +346,10 @@ fn parts() -> Vec<Vec<RemnantPart>> {
         coefficients: vec![-1.5, 0.7],
     };
     let one = |shape: &RemnantShape| RemnantPart::new(shape.clone(), 0.2);
-    let follows = |follows, part| RemnantPart {
+    let follows = |signal, share| RemnantPart {
         signal_dependence: Some(SignalDependence {
-            follows,
-            part,
+            signal,
+            share,
             memory_s: 1.0,
         }),
         ..one(&lag)
@@ -363,11 +363,11 @@ fn parts() -> Vec<Vec<RemnantPart>> {
             RemnantPart::new(peak, 0.05),
             RemnantPart::new(drift, 0.03),
         ],
-        vec![follows(Followed::Control, 0.8)],
-        vec![follows(Followed::Rate, 0.8)],
+        vec![follows(DependenceSignal::Control, 0.8)],
+        vec![follows(DependenceSignal::Rate, 0.8)],
         vec![RemnantPart {
             pulses: Some(Pulses {
-                part: 0.9,
+                share: 0.9,
                 rate_per_s: 1.5,
             }),
             ..one(&lag)

@@ -59,7 +59,7 @@ fn both_responses_are_exact_at_every_line() {
                 let f = [&[1.0][..], f].concat();
                 polynomial::value(b, back) / polynomial::value(&f, back) * back.powi(nk as i32)
             };
-            let h = operator.held;
+            let h = operator.zoh;
             let y = ratio(&[h.b0, h.b1], &[h.f1, h.f2], operator.nk);
             let held = of_target.zoh(ts).unwrap();
             let f = ratio(&held.b, &held.f, held.nk) * Complex64::from_polar(1.0, 0.25 * omega);

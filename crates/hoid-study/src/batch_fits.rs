@@ -11,7 +11,7 @@ use hoid_model::Record;
 
 use crate::{
     plan::{EstimatorCell, Task},
-    prepared::Preparation,
+    prepared_record::Preparation,
 };
 
 /// A requested fit: the estimator and the preparation of the record.

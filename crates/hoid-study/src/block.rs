@@ -11,7 +11,7 @@ use crate::{
     columns::Schemas,
     estimate_rows::{BlockTables, EstimateRows},
     plan::{EstimatorCell, Plan, Task},
-    prepared::Preparation,
+    prepared_record::Preparation,
 };
 
 /// Maximum number of samples between two points of a trace at which its errors are evaluated; it is much shorter than
@@ -69,14 +69,14 @@ pub(crate) fn run_block(
             .estimators_of(cell)
             .map(|(_, estimator)| (estimator, estimator.task_for(&cell.resolved)))
             .collect(),
-        without_remnant: None,
+        noise_free_output: None,
         rows: EstimateRows::new(plan, cell, schemas),
     };
     let simulator = match Simulator::new(cell.resolved.scenario()) {
         Ok(simulator) => simulator,
         Err(error) => {
             for replication in block.first..block.first + block.count {
-                cell_run.fail_all(replication, &error.to_string(), done);
+                cell_run.record_failures(replication, &error.to_string(), done);
             }
             return Some(cell_run.rows.into_tables(schemas));
         }
@@ -106,7 +106,7 @@ struct CellRun<'a> {
     plan: &'a Plan,
     estimators: Vec<(&'a EstimatorCell, Task)>,
     /// Output of the run without remnant, simulated when an estimator first needs it.
-    without_remnant: Option<Vec<f64>>,
+    noise_free_output: Option<Vec<f64>>,
     rows: EstimateRows<'a>,
 }
 
@@ -126,7 +126,7 @@ impl<'a> CellRun<'a> {
         let mut records = records.into_iter().enumerate();
         for (replication, run) in runs {
             if let Err(reason) = run {
-                self.fail_all(*replication, reason, done);
+                self.record_failures(*replication, reason, done);
                 continue;
             }
             let (index, record) = records.next()?;
@@ -234,7 +234,7 @@ impl<'a> CellRun<'a> {
         self.rows.write_fit_row(estimator, fit, record, operator)
     }
 
-    fn fail_all(&mut self, replication: u64, reason: &str, done: &(dyn Fn(u64) + Sync)) {
+    fn record_failures(&mut self, replication: u64, reason: &str, done: &(dyn Fn(u64) + Sync)) {
         for (estimator, _) in self.estimators.clone() {
             self.rows.start_row(estimator, replication);
             self.rows.write_failure(reason);
@@ -244,7 +244,7 @@ impl<'a> CellRun<'a> {
 
     /// Computes the noise levels of a run by comparison with the same run without remnant.
     fn write_noise_levels(&mut self, simulator: &Simulator, record: &Record) -> Result<(), String> {
-        let u0 = match self.without_remnant.take() {
+        let u0 = match self.noise_free_output.take() {
             Some(known) => known,
             None => {
                 let silent = vec![0.0; simulator.sample_count()];
@@ -253,7 +253,7 @@ impl<'a> CellRun<'a> {
             }
         };
         self.rows.write_noise_row(record, &u0);
-        self.without_remnant = Some(u0);
+        self.noise_free_output = Some(u0);
         Ok(())
     }
 }

@@ -26,7 +26,7 @@ pub(crate) const TRACED_QUANTITIES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega
 #[derive(Debug, Clone)]
 pub(crate) struct Rows {
     columns: Vec<OutputColumn>,
-    at: BTreeMap<String, usize>,
+    column_indices: BTreeMap<String, usize>,
     rows: usize,
 }
 
@@ -42,7 +42,7 @@ impl Rows {
         };
         Self {
             columns: schema.columns.iter().map(empty).collect(),
-            at: schema
+            column_indices: schema
                 .columns
                 .iter()
                 .enumerate()
@@ -91,12 +91,12 @@ impl Rows {
     }
 
     fn column(&mut self, name: &str) -> Option<&mut ColumnValues> {
-        self.at.get(name).map(|i| &mut self.columns[*i].values)
+        self.column_indices.get(name).map(|i| &mut self.columns[*i].values)
     }
 
     /// Returns the position of a column, for faster access in tables with many rows.
     pub fn position(&self, name: &str) -> Option<usize> {
-        self.at.get(name).copied()
+        self.column_indices.get(name).copied()
     }
 
     /// Sets a real number of the current row, with the column given by position.

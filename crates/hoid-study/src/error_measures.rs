@@ -49,7 +49,7 @@ impl TrueResponse {
             nk: operator.nk,
             ..Orders::default()
         };
-        let held = operator.held;
+        let held = operator.zoh;
         let theta = vec![held.b0, held.b1, held.f1, held.f2];
         let model = PolynomialModel::new(Structure::OutputError, orders, scenario.sample_time, theta).ok()?;
         let omega_rad_s: Vec<f64> = scenario.forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect();
@@ -71,7 +71,7 @@ impl TrueResponse {
 pub(crate) struct TraceErrors {
     pub rms_percent: [f64; TRACED_QUANTITIES.len()],
     /// Times from the change until 50 and 90 % of the step are covered, s.
-    pub settled_s: [[f64; TRACED_QUANTITIES.len()]; 2],
+    pub settling_times_s: [[f64; TRACED_QUANTITIES.len()]; 2],
     pub diverged: bool,
     pub share_not_convertible: f64,
 }
@@ -117,7 +117,7 @@ impl TraceErrors {
         }
         Self {
             rms_percent: sums.map(|s| 100.0 * (s / converted as f64).sqrt()),
-            settled_s,
+            settling_times_s: settled_s,
             diverged,
             share_not_convertible: 1.0 - converted as f64 / counted.max(1) as f64,
         }

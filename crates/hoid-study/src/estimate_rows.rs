@@ -30,7 +30,7 @@ pub(crate) struct EstimateRows<'a> {
     plan: &'a Plan,
     cell: &'a Cell,
     /// Axes that have a column of their own name.
-    extra: Vec<String>,
+    axis_columns: Vec<String>,
     true_response: Option<TrueResponse>,
     /// VAF of the estimators applied so far to the current replication, by name and nk.
     vafs: Vec<(&'a str, usize, f64)>,
@@ -43,7 +43,7 @@ impl<'a> EstimateRows<'a> {
         Self {
             plan,
             cell,
-            extra: extra_axes(plan),
+            axis_columns: extra_axes(plan),
             true_response: TrueResponse::of(cell),
             vafs: Vec::new(),
             fits: Rows::new(&schemas.fits),
@@ -87,7 +87,7 @@ impl<'a> EstimateRows<'a> {
         }
         rows.set_real("T_n_true", scenario.remnant.time_constant_s);
         rows.set_real("sample_time_s", scenario.sample_time.s());
-        for name in &self.extra {
+        for name in &self.axis_columns {
             let axis = cell.axes.iter().chain(&estimator.axes).find(|axis| axis.key == *name);
             rows.set_text(name, axis.map_or("", |axis| axis.value.as_str()));
         }
@@ -262,8 +262,8 @@ impl<'a> EstimateRows<'a> {
         let rows = &mut self.fits;
         for (i, name) in TRACED_QUANTITIES.iter().enumerate() {
             rows.set_real(&format!("rms_{name}"), errors.rms_percent[i]);
-            rows.set_real(&format!("settle50_{name}"), errors.settled_s[0][i]);
-            rows.set_real(&format!("settle90_{name}"), errors.settled_s[1][i]);
+            rows.set_real(&format!("settle50_{name}"), errors.settling_times_s[0][i]);
+            rows.set_real(&format!("settle90_{name}"), errors.settling_times_s[1][i]);
         }
         if self.plan.changes {
             let measures = ChangeMeasures::of(trace, record, self.cell);
@@ -303,9 +303,9 @@ impl<'a> EstimateRows<'a> {
     pub fn write_trace_rows(&mut self, trace: &Trace, step: usize, estimator: &EstimatorCell, replication: u64) {
         let Some(rows) = &mut self.traces else { return };
         let with_errors = self.plan.standard_errors;
-        let place = |rows: &Rows, name: &str| (rows.position(name), rows.position(&format!("{name}_se")));
-        let theta: Vec<_> = trace.parameter_names().iter().map(|name| place(rows, name)).collect();
-        let operator = OPERATOR_PARAMETERS.map(|name| place(rows, name));
+        let slot = |rows: &Rows, name: &str| (rows.position(name), rows.position(&format!("{name}_se")));
+        let theta: Vec<_> = trace.parameter_names().iter().map(|name| slot(rows, name)).collect();
+        let operator = OPERATOR_PARAMETERS.map(|name| slot(rows, name));
         let put = |rows: &mut Rows, (value, error): (Option<usize>, Option<usize>), estimate: Estimate| {
             if let Some(position) = value {
                 rows.set_real_at(position, estimate.value);

@@ -51,7 +51,7 @@
 //! | `run`, `merge`, `join` | [`run`]: distribution of the blocks over threads, parts on disk; [`merge`]: merging of shards; `join`: joining of the parts into tables |
 //! | `directory`, `run_record`, `shard` | layout of the directory of a study, `study.json`, [`Shard`] |
 //! | `seal` | checksums of the blocks, and detection of damaged blocks |
-//! | `block`, `batch_fits`, `prepared` | application of the estimators of a cell to its replications |
+//! | `block`, `batch_fits`, `prepared_record` | application of the estimators of a cell to its replications |
 //! | `estimate_rows`, `error_measures` | table rows of an estimate, and its errors relative to the true values |
 //! | `columns`, `truth`, `true_value` | columns of the tables fits, traces and cells; true value of each column |
 //! | `summary`, [`statistics`] | statistics over the replications of a cell, with Monte Carlo errors |
@@ -70,7 +70,7 @@ mod join;
 mod merge;
 pub mod plan;
 pub mod plans;
-mod prepared;
+mod prepared_record;
 mod query;
 mod results;
 mod run;

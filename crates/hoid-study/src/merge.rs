@@ -15,7 +15,7 @@ use crate::{
     join::join,
     run::{Outcome, write_tables},
     run_record::RunRecord,
-    seal::{OnDisk, block_state, damage_notes},
+    seal::{BlockState, block_state, damage_notes},
 };
 
 /// Merges the shards of a study.
@@ -57,9 +57,9 @@ pub fn merge(shards: &[PathBuf], directory: &Path, csv: bool) -> Result<Outcome,
         }
         for block in 0..manifest.blocks {
             match block_state(shard, &manifest.plan_sha256, block) {
-                OnDisk::Missing => continue,
-                OnDisk::Whole => {}
-                OnDisk::Damaged(why) => damaged.push((block, why)),
+                BlockState::Missing => continue,
+                BlockState::Whole => {}
+                BlockState::Damaged(why) => damaged.push((block, why)),
             }
             if let Some(other) = owners.insert(block, shard) {
                 return Err(StudyError::DuplicateBlock {

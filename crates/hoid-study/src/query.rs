@@ -24,24 +24,24 @@ pub struct Query {
 
 impl std::fmt::Display for Query {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        fn shown<T: ToString>(name: &str, asked: Option<&T>) -> Option<String> {
+        fn display_term<T: ToString>(name: &str, asked: Option<&T>) -> Option<String> {
             asked.map(|asked| format!("{name} {}", asked.to_string()))
         }
         let mut all: Vec<String> = [
             self.quantity.clone(),
-            shown("cell", self.cell.as_ref()),
-            shown("scenario", self.scenario.as_ref()),
-            shown("condition", self.condition.as_ref()),
-            shown("m0 =", self.remnant_order.as_ref()),
-            shown("P_n =", self.noise_level.as_ref()),
-            shown("T_n =", self.t_n_s.as_ref()),
-            shown("estimator", self.estimator.as_ref()),
-            shown("name", self.name.as_ref()),
-            shown("method", self.method.as_ref()),
-            shown("m* =", self.nd.as_ref()),
-            shown("n_k* =", self.nk.as_ref()),
-            shown("start", self.start.as_ref()),
-            shown("decimate", self.decimate.as_ref()),
+            display_term("cell", self.cell.as_ref()),
+            display_term("scenario", self.scenario.as_ref()),
+            display_term("condition", self.condition.as_ref()),
+            display_term("m0 =", self.remnant_order.as_ref()),
+            display_term("P_n =", self.noise_level.as_ref()),
+            display_term("T_n =", self.t_n_s.as_ref()),
+            display_term("estimator", self.estimator.as_ref()),
+            display_term("name", self.name.as_ref()),
+            display_term("method", self.method.as_ref()),
+            display_term("m* =", self.nd.as_ref()),
+            display_term("n_k* =", self.nk.as_ref()),
+            display_term("start", self.start.as_ref()),
+            display_term("decimate", self.decimate.as_ref()),
         ]
         .into_iter()
         .flatten()

@@ -22,7 +22,7 @@ use crate::{
     estimate_rows::BlockTables,
     join::join,
     run_record::RunRecord,
-    seal::{OnDisk, block_state, damage_notes, write_block},
+    seal::{BlockState, block_state, damage_notes, write_block},
     shard::Shard,
 };
 
@@ -47,7 +47,7 @@ pub struct Progress {
     /// Total number of estimates.
     pub total: u64,
     /// Estimates completed by an earlier run.
-    pub known: u64,
+    pub done_earlier: u64,
 }
 
 /// Result of running a study.
@@ -97,7 +97,7 @@ pub fn run(
         .copied()
         .filter(|block| options.shard.is_none_or(|shard| shard.contains(block.index)))
         .collect();
-    let mut notes: Vec<String> = known.note_on_seals().into_iter().collect();
+    let mut notes: Vec<String> = known.missing_seals_note().into_iter().collect();
     let (there, open, damaged) = classify_blocks(directory, &manifest.plan_sha256, &mine);
     notes.extend(damage_notes(&damaged));
     let known: u64 = there.iter().map(estimates).sum();
@@ -105,7 +105,11 @@ pub fn run(
     let done = AtomicU64::new(known);
     let report_progress = |n: u64| {
         let done = done.fetch_add(n, Ordering::Relaxed) + n;
-        progress(Progress { done, total, known });
+        progress(Progress {
+            done,
+            total,
+            done_earlier: known,
+        });
     };
     // Once a block has been stopped, no further block is started.
     let stopped = AtomicBool::new(false);
@@ -168,9 +172,9 @@ fn classify_blocks(
     let (mut there, mut open, mut damaged) = (Vec::new(), Vec::new(), Vec::new());
     for block in mine {
         match block_state(directory, plan_sha256, block.index) {
-            OnDisk::Whole => there.push(*block),
-            OnDisk::Missing => open.push(*block),
-            OnDisk::Damaged(why) => {
+            BlockState::Whole => there.push(*block),
+            BlockState::Missing => open.push(*block),
+            BlockState::Damaged(why) => {
                 damaged.push((block.index, why));
                 open.push(*block);
             }

@@ -46,7 +46,7 @@ impl RunRecord {
     }
 
     /// Returns a note if the blocks in the directory have no seals.
-    pub fn note_on_seals(&self) -> Option<String> {
+    pub fn missing_seals_note(&self) -> Option<String> {
         let unsealed = !self.sealed && !self.complete;
         unsealed.then(|| {
             "the blocks had no checksums because an earlier version of hoid wrote them: all were recomputed".to_owned()

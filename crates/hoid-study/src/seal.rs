@@ -26,7 +26,7 @@ struct Seal {
 
 /// State of a block on disk.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum OnDisk {
+pub(crate) enum BlockState {
     Whole,
     Missing,
     /// The content does not match the seal, for this reason.
@@ -58,29 +58,29 @@ pub(crate) fn write_block(
 }
 
 /// Returns the state of a block on disk.
-pub(crate) fn block_state(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
+pub(crate) fn block_state(directory: &Path, plan_sha256: &str, block: u64) -> BlockState {
     let path = seal_path(directory, block);
     if !path.exists() {
-        return OnDisk::Missing;
+        return BlockState::Missing;
     }
     let read = hoid_io::read_text(&path).ok();
     let Some(seal) = read.and_then(|text| serde_json::from_str::<Seal>(&text).ok()) else {
-        return OnDisk::Damaged("its seal cannot be read".to_owned());
+        return BlockState::Damaged("its seal cannot be read".to_owned());
     };
     if seal.block != block {
-        return OnDisk::Damaged(format!("it is block {}", seal.block));
+        return BlockState::Damaged(format!("it is block {}", seal.block));
     }
     if seal.plan_sha256 != plan_sha256 {
-        return OnDisk::Damaged("it is from another plan".to_owned());
+        return BlockState::Damaged("it is from another plan".to_owned());
     }
     for (table, sum) in &seal.tables {
         match hoid_io::read_bytes(&part_path(directory, block, table)) {
             Ok(bytes) if sha256(&bytes) == *sum => {}
-            Ok(_) => return OnDisk::Damaged(format!("its table {table} was changed after it was written")),
-            Err(_) => return OnDisk::Damaged(format!("its table {table} cannot be read")),
+            Ok(_) => return BlockState::Damaged(format!("its table {table} was changed after it was written")),
+            Err(_) => return BlockState::Damaged(format!("its table {table} cannot be read")),
         }
     }
-    OnDisk::Whole
+    BlockState::Whole
 }
 
 /// Returns the SHA-256 of some bytes in hexadecimal digits.
@@ -127,14 +127,14 @@ mod tests {
                 values: ColumnValues::Real(vec![value; 3]),
             }],
         };
-        assert_eq!(block_state(d, "plan", 0), OnDisk::Missing);
+        assert_eq!(block_state(d, "plan", 0), BlockState::Missing);
         write_block(d, "plan", 0, &[("fits", &table(1.0)), ("traces", &table(2.0))]).unwrap();
         write_block(d, "plan", 1, &[("fits", &table(3.0))]).unwrap();
-        assert_eq!(block_state(d, "plan", 0), OnDisk::Whole);
-        assert_eq!(block_state(d, "plan", 1), OnDisk::Whole);
+        assert_eq!(block_state(d, "plan", 0), BlockState::Whole);
+        assert_eq!(block_state(d, "plan", 1), BlockState::Whole);
         assert_eq!(
             block_state(d, "other", 1),
-            OnDisk::Damaged("it is from another plan".into())
+            BlockState::Damaged("it is from another plan".into())
         );
         let path = part_path(d, 0, "fits");
         let good = fs::read(&path).unwrap();
@@ -142,14 +142,14 @@ mod tests {
             let mut bad = good.clone();
             bad[at] ^= 1;
             fs::write(&path, bad).unwrap();
-            assert!(matches!(block_state(d, "plan", 0), OnDisk::Damaged(_)), "{at}");
+            assert!(matches!(block_state(d, "plan", 0), BlockState::Damaged(_)), "{at}");
         }
         fs::write(&path, &good[..good.len() - 1]).unwrap();
-        assert!(matches!(block_state(d, "plan", 0), OnDisk::Damaged(_)));
+        assert!(matches!(block_state(d, "plan", 0), BlockState::Damaged(_)));
         fs::remove_file(&path).unwrap();
-        assert!(matches!(block_state(d, "plan", 0), OnDisk::Damaged(_)));
+        assert!(matches!(block_state(d, "plan", 0), BlockState::Damaged(_)));
         fs::write(&path, good).unwrap();
-        assert_eq!(block_state(d, "plan", 0), OnDisk::Whole);
+        assert_eq!(block_state(d, "plan", 0), BlockState::Whole);
         // Block 1 is replaced by block 0, including its seal.
         for (from, to) in [
             (part_path(d, 0, "fits"), part_path(d, 1, "fits")),
@@ -157,7 +157,7 @@ mod tests {
         ] {
             fs::copy(from, to).unwrap();
         }
-        assert_eq!(block_state(d, "plan", 1), OnDisk::Damaged("it is block 0".into()));
+        assert_eq!(block_state(d, "plan", 1), BlockState::Damaged("it is block 0".into()));
     }
 
     #[test]

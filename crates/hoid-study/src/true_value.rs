@@ -64,15 +64,15 @@ fn true_change_value(cell: &Cell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let ends = cell.true_states();
     let constant = |of: [f64; 2]| if is_close(of[0], of[1]) { of[0] } else { f64::NAN };
-    let place = |parameter: &str| OPERATOR_PARAMETERS.iter().position(|p| *p == parameter);
-    let end = |digit| name.strip_suffix(digit).and_then(place);
+    let index = |parameter: &str| OPERATOR_PARAMETERS.iter().position(|p| *p == parameter);
+    let end = |digit| name.strip_suffix(digit).and_then(index);
     match (name, &scenario.schedule) {
         // An operator who changes back and forth does not match the model.
         (_, Schedule::Alternating { .. }) => f64::NAN,
         ("t_M", schedule) => schedule.change_s().unwrap_or(f64::NAN),
         ("G", schedule) => schedule.rate_per_s().unwrap_or(f64::NAN),
         ("tau_e", _) => constant([scenario.initial.operator.tau_e_s, scenario.last.operator.tau_e_s]),
-        _ => match (end('1'), end('2'), place(name)) {
+        _ => match (end('1'), end('2'), index(name)) {
             (Some(i), _, _) => ends[0].operator[i],
             (_, Some(i), _) => ends[1].operator[i],
             (_, _, Some(i)) => constant(ends.map(|end| end.operator[i])),

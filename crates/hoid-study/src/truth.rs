@@ -49,7 +49,7 @@ fn true_state(of: &OperatingState, k_n: f64, sample_time: hoid_model::SampleTime
     let held = of.operator.discretise(sample_time).ok();
     TrueState {
         operator: [0, 1, 2, 3, 4].map(|i| rows[i].2.value),
-        discrete: held.map_or([f64::NAN; 4], |h| [h.held.f1, h.held.f2, h.held.b0, h.held.b1]),
+        discrete: held.map_or([f64::NAN; 4], |h| [h.zoh.f1, h.zoh.f2, h.zoh.b0, h.zoh.b1]),
         k_n,
     }
 }

@@ -1,4 +1,4 @@
-//! Modified texts of study plans, group manifests and scenarios are read, or refused with a message that names the
+//! Modified texts of study plans, group manifests and scenarios are read, or rejected with a message that names the
 //! file, without a panic. Accepted data can be read again.
 #![allow(clippy::unwrap_used)]
 
@@ -145,8 +145,8 @@ fn apply_changes(text: &str, by: &[Change]) -> String {
             Change::Swap(a, b) => lines.swap(a.index(n), b.index(n)),
             Change::Insert(at, character) => {
                 let line = &mut lines[at.index(n)];
-                let places: Vec<usize> = line.char_indices().map(|(place, _)| place).collect();
-                let place = if places.is_empty() { 0 } else { *at.get(&places) };
+                let indices: Vec<usize> = line.char_indices().map(|(place, _)| place).collect();
+                let place = if indices.is_empty() { 0 } else { *at.get(&indices) };
                 line.insert(place, *character);
             }
             Change::Cut(at) => lines.truncate(at.index(n)),

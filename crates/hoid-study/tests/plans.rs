@@ -1,4 +1,4 @@
-//! Invalid plans are refused before anything runs, with file, line and remedy.
+//! Invalid plans are rejected before anything runs, with file, line and remedy.
 #![allow(clippy::unwrap_used)]
 
 use hoid_study::{Plan, plan_schema};

@@ -82,11 +82,11 @@ fn group_at_1000_hz_matches_100_hz() {
                 .record
         })
         .collect();
-    let (_, facts) = manifest.conditions.iter().next().unwrap();
+    let (_, condition_settings) = manifest.conditions.iter().next().unwrap();
     let options = DescriptionOptions {
-        excitation: facts.excitation.clone(),
-        period_s: facts.period_s,
-        offset_samples: facts.offset_samples,
+        excitation: condition_settings.excitation.clone(),
+        period_s: condition_settings.period_s,
+        offset_samples: condition_settings.offset_samples,
         ..DescriptionOptions::default()
     };
     let expected = describe_runs(&whole, &options).unwrap();

@@ -80,9 +80,9 @@ fn missing_and_repeated_rows_are_counted_individually() {
         for (found, record) in sampling_issues(&trouble, &resampling_options()) {
             let gap = found.iter().find(|one| one.kind == QualityIssueKind::Gap).unwrap();
             // One in two hundred of 8192 rows is missing: 41 on average, with a standard deviation of 6.4.
-            assert!((15..70).contains(&gap.rows) && gap.places.len() <= gap.rows, "{gap}");
+            assert!((15..70).contains(&gap.rows) && gap.row_spans.len() <= gap.rows, "{gap}");
             let (first, last) = (record.time_s(0), record.time_s(record.len() - 1));
-            for place in &gap.places {
+            for place in &gap.row_spans {
                 let length = place.to_s.unwrap() - place.from_s.unwrap();
                 let jitter = if trouble.len() > 1 { 0.9 } else { 1e-6 };
                 assert!((length / 0.01 - place.rows as f64 - 1.0).abs() <= jitter, "{place:?}");
@@ -113,7 +113,7 @@ fn saturation_quantisation_and_stalls_are_located() {
     }
     for (found, record) in sampling_issues(&[SamplingDefect::Stalled], &ReadOptions::default()) {
         assert_only(&found, &[QualityIssueKind::Stalled]);
-        let place = found[0].places[0];
+        let place = found[0].row_spans[0];
         // Rows are counted from 1; the first row of a stall still has a new value.
         assert_eq!((place.row, place.rows), (record.len() / 3 + 2, 49));
     }

@@ -1,5 +1,5 @@
 //! Studies as a whole: they give the same bytes for any division of the work, can be resumed after any interruption,
-//! and are refused if parts do not belong together.
+//! and are rejected if parts do not belong together.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -183,7 +183,7 @@ fn stopped_study_resumes_without_repetition() {
             &plan,
             directory.path(),
             &options,
-            &|p| known.store(p.known, Ordering::Relaxed),
+            &|p| known.store(p.done_earlier, Ordering::Relaxed),
             &should_continue,
         )
         .unwrap();

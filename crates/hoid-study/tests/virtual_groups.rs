@@ -69,7 +69,7 @@ fn virtual_experiment_is_reported_with_its_true_values() {
     assert!(z.iter().all(|z| z.abs() < 5.0), "{z:?}");
     assert!((z.iter().sum::<f64>() / 16.0).abs() < 1.0, "{z:?}");
 
-    // With sampling defects, an uneven t is refused, but is read if it is to be resampled.
+    // With sampling defects, an uneven t is rejected, but is read if it is to be resampled.
     let troubled = VirtualExperiment {
         subjects: 1,
         runs: 1,

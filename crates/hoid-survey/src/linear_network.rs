@@ -20,7 +20,7 @@ use hoid_core::{
 use hoid_ident::{IdentError, settings, settings::Bounds};
 use hoid_model::{
     SampleTime, Structure,
-    second_order::HeldStates,
+    second_order::ZohStates,
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_track::{
@@ -91,7 +91,7 @@ impl RecursiveMethod for LinearNetworkOptions {
             },
             first: gains,
             nms: [omega, zeta],
-            held: HeldStates::new(2.0 * zeta * omega, omega * omega, sample_time),
+            zoh: ZohStates::new(2.0 * zeta * omega, omega * omega, sample_time),
             state: [0.0; 2],
             delay: DelayLine::new(vec![0.0; setup.orders.nk]),
             reported: ReportedModel::new(from, setup.orders.nk, sample_time),
@@ -156,7 +156,7 @@ struct LinearNetwork {
     neuron: Neuron,
     first: [f64; 2],
     nms: [f64; 2],
-    held: HeldStates,
+    zoh: ZohStates,
     /// y_0 and y_1 divided by omega^2.
     state: [f64; 2],
     delay: DelayLine<Vec<f64>>,
@@ -182,7 +182,7 @@ impl LinearNetwork {
     /// Processes a sample of the error. Returns y_0 and y_1.
     fn responses(&mut self, e: f64) -> [f64; 2] {
         let square = self.nms[0] * self.nms[0];
-        self.state = self.held.step(self.state, self.delay.step(e));
+        self.state = self.zoh.step(self.state, self.delay.step(e));
         let y = self.state.map(|x| limit_magnitude(square * x));
         self.neuron.update_squares(y);
         y
@@ -292,12 +292,12 @@ mod tests {
             tau_e_s: 0.28,
         };
         let discrete = operator.discretise(SampleTime::AT_100_HZ).unwrap();
-        let (held, nk) = (discrete.held, discrete.nk);
+        let (held, nk) = (discrete.zoh, discrete.nk);
         let e: Vec<f64> = (0..300)
             .map(|k| (0.07 * f64::from(k)).sin() + f64::from(k % 7))
             .collect();
         let mut u = vec![0.0; e.len()];
-        let states = HeldStates::new(2.0 * 0.35 * 11.25, 11.25 * 11.25, SampleTime::AT_100_HZ);
+        let states = ZohStates::new(2.0 * 0.35 * 11.25, 11.25 * 11.25, SampleTime::AT_100_HZ);
         let mut state = [0.0; 2];
         for k in 0..e.len() {
             let at = |signal: &[f64], lag: usize| if k >= lag { signal[k - lag] } else { 0.0 };

@@ -6,8 +6,8 @@
 //!
 //! **Wrong minima.** A search from the last theta may stay in a local minimum. The estimator therefore also searches
 //! from its own starts if there is no last theta, if the search from the last theta does not converge, if the loss has
-//! risen by a fraction [`LOSS_RISE_LIMIT`] since the last comparison, and otherwise at every [`COMPARISON_INTERVAL`]-th fit.
-//! The lower of the two minima is used.
+//! risen by a fraction [`LOSS_RISE_LIMIT`] since the last comparison, and otherwise at every [`COMPARISON_INTERVAL`]-th
+//! fit. The lower of the two minima is used.
 //!
 //! **Failures.** If a fit fails, for example for a window without excitation, theta and its covariance are unchanged.
 
@@ -121,13 +121,13 @@ pub(crate) struct WindowRecursion {
     predictor: Predictor,
     theta: Vec<f64>,
     /// True if theta was estimated or given.
-    known: bool,
+    has_theta: bool,
     covariance: Option<Vec<f64>>,
     variance: f64,
     /// Number of innovations so far, counted until the first successful fit.
     innovations: f64,
-    since_fit: usize,
-    since_comparison: usize,
+    samples_since_fit: usize,
+    fits_since_comparison: usize,
     compared_loss: f64,
     fits: usize,
     failures: usize,
@@ -155,11 +155,11 @@ impl State for WindowRecursion {
         let parts: &mut [&mut dyn State] = &mut [
             &mut self.predictor,
             &mut self.theta.as_mut_slice(),
-            &mut self.known,
+            &mut self.has_theta,
             &mut self.variance,
             &mut self.innovations,
-            &mut self.since_fit,
-            &mut self.since_comparison,
+            &mut self.samples_since_fit,
+            &mut self.fits_since_comparison,
             &mut self.compared_loss,
             &mut self.fits,
             &mut self.failures,
@@ -236,12 +236,12 @@ impl WindowRecursion {
             u: VecDeque::with_capacity(window),
             predictor,
             theta: given.map_or_else(|| vec![0.0; p], <[f64]>::to_vec),
-            known: given.is_some(),
+            has_theta: given.is_some(),
             covariance: covariance.map(<[f64]>::to_vec),
             variance: 0.0,
             innovations: 0.0,
-            since_fit: if given.is_some() { 0 } else { every },
-            since_comparison: COMPARISON_INTERVAL,
+            samples_since_fit: if given.is_some() { 0 } else { every },
+            fits_since_comparison: COMPARISON_INTERVAL,
             compared_loss: f64::INFINITY,
             fits: 0,
             failures: 0,
@@ -275,12 +275,12 @@ impl WindowRecursion {
     }
 
     fn refit(&mut self) {
-        self.since_fit = 0;
+        self.samples_since_fit = 0;
         let found = self.window_record().and_then(|record| self.fit(&record));
         match found {
             Ok(fit) => {
                 self.fits += 1;
-                self.known = true;
+                self.has_theta = true;
                 self.theta.copy_from_slice(fit.model().theta());
                 self.covariance = fit.covariance().map(<[f64]>::to_vec);
                 self.variance = fit.innovation_variance();
@@ -294,7 +294,7 @@ impl WindowRecursion {
             Err(failure) => {
                 self.failures += 1;
                 // After a failure the next fit also searches from the estimator's own starts.
-                self.since_comparison = COMPARISON_INTERVAL;
+                self.fits_since_comparison = COMPARISON_INTERVAL;
                 self.last_failure = Some(failure);
             }
         }
@@ -316,7 +316,7 @@ impl WindowRecursion {
     fn fit(&mut self, record: &Record) -> Result<Fit, IdentError> {
         let records = std::slice::from_ref(record);
         let own = |estimator: &Estimator| estimator.fit(records).and_then(require_convergence);
-        if !self.known {
+        if !self.has_theta {
             let fit = own(&self.estimator)?;
             self.mark_compared(&fit);
             return Ok(fit);
@@ -324,9 +324,9 @@ impl WindowRecursion {
         self.estimator.start = Some(self.theta.clone());
         let warm = own(&self.estimator);
         self.estimator.start = None;
-        self.since_comparison += 1;
+        self.fits_since_comparison += 1;
         if let Ok(fit) = &warm
-            && self.since_comparison < COMPARISON_INTERVAL
+            && self.fits_since_comparison < COMPARISON_INTERVAL
             && fit.loss() <= (1.0 + LOSS_RISE_LIMIT) * self.compared_loss
         {
             return warm;
@@ -348,7 +348,7 @@ impl WindowRecursion {
     }
 
     fn mark_compared(&mut self, fit: &Fit) {
-        self.since_comparison = 0;
+        self.fits_since_comparison = 0;
         self.compared_loss = fit.loss();
     }
 }
@@ -368,13 +368,13 @@ fn require_convergence(fit: Fit) -> Result<Fit, IdentError> {
 impl Recursion for WindowRecursion {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let innovation = self.take(sample);
-        self.since_fit = self.since_fit.saturating_add(1);
+        self.samples_since_fit = self.samples_since_fit.saturating_add(1);
         if self.fits == 0 {
             self.innovations += 1.0;
             self.variance =
                 limit_magnitude(self.variance + (innovation * innovation - self.variance) / self.innovations);
         }
-        if self.u.len() >= self.min_samples && self.since_fit >= self.every {
+        if self.u.len() >= self.min_samples && self.samples_since_fit >= self.every {
             self.refit();
         }
         StepOutcome {

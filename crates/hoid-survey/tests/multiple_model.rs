@@ -7,7 +7,7 @@ mod common;
 mod operator;
 
 use common::Noise;
-use hoid_core::{held_operator::held_operator, innovation_variance::InnovationVariance};
+use hoid_core::{innovation_variance::InnovationVariance, zoh_operator::zoh_operator};
 use hoid_survey::kernel::multiple_model::{
     MultipleModelFilter,
     hypothesis::Hypothesis,
@@ -83,7 +83,7 @@ fn responses_and_derivatives_match_the_held_operator() {
     let at = |eta: [f64; 4]| {
         let mut noise = Noise(5);
         let mut response = Response::new([eta[2], eta[3]], TS);
-        let ([b0, b1, f1, f2], _) = held_operator(eta, TS);
+        let ([b0, b1, f1, f2], _) = zoh_operator(eta, TS);
         let (mut w, mut before) = ([0.0; 2], 0.0);
         let mut largest: f64 = 0.0;
         let mut last = [0.0; 6];
@@ -262,7 +262,11 @@ fn a_steady_operator_raises_no_alarm_and_memory_grows() {
         bank.step(x, u);
         assert!(bank.bank().change().is_none());
     }
-    assert!(bank.bank().hypotheses().any(|h| h.born == 0 && h.probability > 0.5));
+    assert!(
+        bank.bank()
+            .hypotheses()
+            .any(|h| h.birth_sample == 0 && h.probability > 0.5)
+    );
 }
 
 #[test]
@@ -431,7 +435,7 @@ fn change_of_the_neuromuscular_system_is_tracked() {
     let mut bank: MultipleModelFilter<16, 4> = MultipleModelFilter::new(first, &[-0.85], known_delay_prior()).unwrap();
     let mut changes = Vec::new();
     for k in 0..9000 {
-        let ([b0, b1, f1, f2], _) = held_operator(if k < at { S1 } else { slower }, TS);
+        let ([b0, b1, f1, f2], _) = zoh_operator(if k < at { S1 } else { slower }, TS);
         slow = 0.98 * slow + 0.3 * noise.next();
         fast = 0.9 * fast + 0.3 * noise.next();
         let x = slow + fast;

@@ -158,7 +158,7 @@ fn a_steady_operator_raises_no_alarm() {
     assert!(
         bank.bank()
             .hypotheses()
-            .any(|h| h.born == 0 && h.extra_delay == 8 && h.probability > 0.5)
+            .any(|h| h.birth_sample == 0 && h.extra_delay == 8 && h.probability > 0.5)
     );
 }
 

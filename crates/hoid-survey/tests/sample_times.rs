@@ -1,4 +1,4 @@
-//! Trackers at sample times from a microsecond to days: each either accepts its samples, or is refused with a message
+//! Trackers at sample times from a microsecond to days: each either accepts its samples, or is rejected with a message
 //! that contains the sample time and the remedy.
 #![allow(clippy::unwrap_used)]
 

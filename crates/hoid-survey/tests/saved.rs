@@ -93,7 +93,7 @@ fn restored_tracker_is_bit_identical() {
     }
 }
 
-/// Numbers are changed and given a valid checksum, which does not happen by accident: the tracker is refused or
+/// Numbers are changed and given a valid checksum, which does not happen by accident: the tracker is rejected or
 /// continues, and no index, length or bound causes a panic.
 #[test]
 fn resealed_changed_state_never_panics() {

@@ -1,4 +1,4 @@
-//! Trackers and warm-ups are not restored from numbers that were changed, truncated or never saved: these are refused
+//! Trackers and warm-ups are not restored from numbers that were changed, truncated or never saved: these are rejected
 //! without a panic.
 #![allow(clippy::unwrap_used)]
 

@@ -13,21 +13,21 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum ThesisError {
     /// A name that belongs to no table, figure, appendix or study of the reproduction.
-    #[error("{name}: there is no table, figure or study with this name; expected {CLAIMS}, or a name, study or appendix from: {known}", CLAIMS = crate::CLAIMS_NAME)]
+    #[error("{name}: there is no table, figure or study with this name; expected {CLAIMS}, or a name, study or appendix from: {available}", CLAIMS = crate::CLAIMS_NAME)]
     UnknownItem {
         /// The unknown name.
         name: String,
         /// All known names, separated by commas.
-        known: String,
+        available: String,
     },
     /// Recordings were given, but something other than the experiment was requested.
     #[error("recordings apply only to the experiment; request only \"experiment\" with them")]
     NotTheExperiment,
-    /// Recordings to which the procedure of the text cannot be applied.
-    #[error("{place}: {reason}")]
+    /// Recordings to which the procedure of the thesis cannot be applied.
+    #[error("{subject}: {reason}")]
     Recordings {
         /// Manifest, group or experiment concerned.
-        place: String,
+        subject: String,
         /// The problem and its remedy.
         reason: String,
     },

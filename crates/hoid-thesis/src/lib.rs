@@ -3,8 +3,8 @@
 //! University of Technology, 2023).
 //!
 //! The text compares ARX and Box-Jenkins models of the human operator by simulation, in batch fits and recursive
-//! estimates. [`reproduce`] runs the studies of the text, draws its tables and figures, tests its claims, and writes a
-//! page with the results:
+//! estimates. [`reproduce`] runs the studies of the thesis, draws its tables and figures, tests its claims, and writes
+//! a page with the results:
 //!
 //! ```no_run
 //! use hoid_thesis::{Reproduction, ReproductionEvent, reproduce};
@@ -27,12 +27,12 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`plans`] | the studies of the text as named plans |
+//! | [`plans`] | the studies of the thesis as named plans |
 //! | [`reproduction`] | tables, figures and claims in a directory, from the results of the studies |
 //! | [`comparators`] | the other methods of the survey, for comparison |
 //! | [`survey`] | all methods of the survey on the same runs |
-//! | [`experiment`] | the experiment of the text with virtual or recorded people |
-//! | [`claims`] | statements of the text, tested with the results of the named plans |
+//! | [`experiment`] | the experiment of the thesis with virtual or recorded people |
+//! | [`claims`] | statements of the thesis, tested with the results of the named plans |
 //!
 //! The crates for studies and reports do not depend on this crate.
 

@@ -118,7 +118,7 @@ impl ForgettingRule {
     }
 }
 
-/// `forgetting` must be set first, because the options of one rule are refused by the others.
+/// `forgetting` must be set first, because the options of one rule are rejected by the others.
 impl Settings for ForgettingRule {
     fn list(&self) -> Vec<Setting> {
         vec![Self::rule_setting(), Self::drift_setting(), Self::rate_setting()]

@@ -2,8 +2,8 @@
 //! and the operator.
 
 use hoid_core::{
-    held_operator::held_operator,
     state::{State, visit_all},
+    zoh_operator::zoh_operator,
 };
 use hoid_model::{
     SampleTime,
@@ -55,7 +55,7 @@ impl ReportedModel {
 
     /// Sets K_e, K_e_dot, omega_nm and zeta_nm, from which the coefficients and the Jacobian follow.
     pub fn set_operator(&mut self, eta: [f64; OPERATOR_PARAMETER_COUNT]) {
-        let (values, by) = held_operator(eta, self.sample_time_s);
+        let (values, by) = zoh_operator(eta, self.sample_time_s);
         let p = self.theta.len();
         self.theta[..2].copy_from_slice(&values[..2]);
         self.theta[p - 2..].copy_from_slice(&values[2..]);

@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion, settings::DelayRange};
-use hoid_model::{ContinuousTransferFunction, SampleTime, Structure, theta_of};
+use hoid_model::{ContinuousTransferFunction, SampleTime, Structure, theta_from_start};
 
 use crate::{
     further_input::{RequestedInput, coefficient_names},
@@ -125,13 +125,13 @@ impl TrackRequest {
             RequestedStart::Default => StartSource::Span(None),
             RequestedStart::Nothing => StartSource::Nothing,
             RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(several_models_error()),
-            RequestedStart::Coefficients(named) => {
-                StartSource::Theta(theta_of(&coefficient_names(&largest, further.as_ref()), named).map_err(
-                    |reason| IdentError::BadStart {
+            RequestedStart::Coefficients(named) => StartSource::Theta(
+                theta_from_start(&coefficient_names(&largest, further.as_ref()), named).map_err(|reason| {
+                    IdentError::BadStart {
                         reason: format!("it {reason}"),
-                    },
-                )?)
-            }
+                    }
+                })?,
+            ),
         };
         let options = TrackOptions {
             start,

@@ -1,5 +1,5 @@
 //! The seal of saved numbers: a checksum that is appended to the numbers. Numbers that were altered, truncated or
-//! reordered are refused.
+//! reordered are rejected.
 //!
 //! A slightly wrong state is worse than none: an index outside a ring aborts the process, and an invalid covariance
 //! matrix gives error bars that are too small. The checksum is FNV-1a (Fowler, Noll, Vo, 1991; offset basis and prime

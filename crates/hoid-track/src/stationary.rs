@@ -44,7 +44,7 @@ const MIN_BLOCKS: u32 = 10;
 const MAX_AVERAGED_BLOCKS: u32 = 60;
 /// Largest number of samples between two stored states.
 const MAX_STATE_AGE_SAMPLES: u64 = 1 << 17;
-/// e and u.
+/// Number of channels: e and u.
 const CHANNEL_COUNT: usize = 2;
 
 /// Way in which a recursion uses a sample.

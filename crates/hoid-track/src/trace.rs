@@ -380,7 +380,7 @@ impl Trace {
         self.guarded
     }
 
-    /// Returns the length of the idle head of the record, which the default start span leaves out, s.
+    /// Returns the length of the idle head of the record, which the default start span omits, s.
     pub fn idle_s(&self) -> f64 {
         self.idle_s
     }

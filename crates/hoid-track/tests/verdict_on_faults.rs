@@ -1,4 +1,4 @@
-//! The verdict of the default method on clean loops that are hard to judge, and on recordings with faults.
+//! The verdict of the default method on clean loops that are hard to assess, and on recordings with faults.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{

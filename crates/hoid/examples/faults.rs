@@ -4,8 +4,8 @@
 //! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE] [--seed N]`:
 //! evaluates all faults in runs of C1, of C2 and of a virtual person, and then clean runs (by default 1000 in total,
 //! each evaluated in batch and by one tracker). `--part` uses only every N-th case and clean run, `--rows` writes a CSV
-//! row for each result, and `--program` is the program that is judged (by default the program built in the same folder
-//! as this example).
+//! row for each result, and `--program` is the program that is assessed (by default the program built in the same
+//! folder as this example).
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[allow(dead_code)]

@@ -43,7 +43,7 @@ fn truth(condition: Condition) -> [f64; 4] {
         .operator
         .discretise(SampleTime::AT_100_HZ)
         .unwrap()
-        .held;
+        .zoh;
     [d.f1, d.f2, d.b0, d.b1]
 }
 

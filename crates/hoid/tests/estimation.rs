@@ -1,5 +1,5 @@
 //! Properties of the estimators that require simulated records: coverage of the error bars, several records, other
-//! orders, and refused input.
+//! orders, and rejected input.
 #![allow(clippy::unwrap_used)]
 
 use hoid::{
@@ -42,7 +42,7 @@ fn error_bars_cover_the_truth() {
             .operator
             .discretise(SampleTime::AT_100_HZ)
             .unwrap()
-            .held;
+            .zoh;
         let fit = bj().fit(std::slice::from_ref(&record)).unwrap();
         let mut pairs: Vec<(Estimate, f64)> = fit
             .parameters()

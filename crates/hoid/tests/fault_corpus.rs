@@ -195,7 +195,7 @@ fn wrong_fits_are_detected() {
     let flagged = judged(&fit(1.5, Some(0.1), "doubtful"));
     assert!(flagged.wrong && flagged.is_flagged() && !flagged.is_silently_wrong());
     assert!(!judged(&fit(1.39, Some(0.1), "trustworthy")).wrong);
-    // A value without a standard error is not judged, except for a delay in whole samples.
+    // A value without a standard error is not assessed, except for a delay in whole samples.
     let open = judged(&fit(9.0, None, "trustworthy"));
     assert!(!open.wrong && matches!(&open.worst, Some((name, z)) if name == "tau_e" && (z - 1.0).abs() < 1e-9));
     let mut late = fit(1.0, Some(0.1), "trustworthy");

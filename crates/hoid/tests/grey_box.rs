@@ -1,11 +1,11 @@
 //! The grey box on simulated runs: bias, spread compared with the Cramér-Rao bound, coverage, choice of m, fractional
-//! delays, constraints, several records, and refused input.
+//! delays, constraints, several records, and rejected input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
     ident::{Constraint, GreyBox, GreyBoxFit, IdentError, Reason},
     model::{
-        Complex64, remnant_gain::NoiseDefinition, scenario::RemnantStrength, second_order::HeldStates,
+        Complex64, remnant_gain::NoiseDefinition, scenario::RemnantStrength, second_order::ZohStates,
         uncertainty::Estimate,
     },
     prelude::*,
@@ -158,7 +158,7 @@ fn simulate_operator([k_e, k_e_dot, omega, zeta, tau]: [f64; 5], n: usize, noise
     let l = (tau / 0.01 + 1e-9).floor() as usize;
     let delta = tau - 0.01 * l as f64;
     let over =
-        |t: f64| (t > 1e-12).then(|| HeldStates::new(2.0 * zeta * omega, omega * omega, SampleTime::new(t).unwrap()));
+        |t: f64| (t > 1e-12).then(|| ZohStates::new(2.0 * zeta * omega, omega * omega, SampleTime::new(t).unwrap()));
     let (old, new) = (over(delta), over(0.01 - delta));
     let e: Vec<f64> = (0..n)
         .map(|k| {
@@ -266,7 +266,7 @@ fn every_operator_is_found_from_default_starts() {
         }
     }
     // An overdamped operator whose zero nearly cancels a pole may fit best in the limit of one
-    // pole, and is refused.
+    // pole, and is rejected.
     assert!(singular <= 2, "{singular}");
     assert!(lost.is_empty(), "{} of 200: {lost:#?}", lost.len());
 }

@@ -1,6 +1,6 @@
 //! Instrumental variables: the open loop, compared with the true values and with the prediction error method; the
 //! closed loops of the reference task, and a faster loop in which the input is strongly correlated with the noise; and
-//! refused input.
+//! rejected input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{
@@ -222,7 +222,7 @@ const PARAMETER_NAMES: [&str; 6] = ["b0", "f1", "K_e", "T_L", "omega_nm", "zeta_
 
 fn truth() -> [f64; 6] {
     let operator = Scenario::condition(Condition::C1).initial.operator;
-    let held = operator.discretise(SampleTime::AT_100_HZ).unwrap().held;
+    let held = operator.discretise(SampleTime::AT_100_HZ).unwrap().zoh;
     [held.b0, held.f1, 0.09, 0.4, 11.25, 0.35]
 }
 

@@ -54,7 +54,8 @@ fn units_change_only_the_gains() {
     let fit = |record: Record| Estimator::new(Structure::BoxJenkins, orders).fit(&[record]).unwrap();
     let plain = fit(delayed_record(&run(1), 0)).operator().unwrap();
     let volts = fit(prepare(delayed_record(&run(1), 0), |p| {
-        p.scale.insert("u".into(), Scaling::by(0.25, Some("V")).unwrap());
+        p.scale
+            .insert("u".into(), Scaling::from_factor(0.25, Some("V")).unwrap());
     }))
     .operator()
     .unwrap();

@@ -30,7 +30,7 @@ fn decimation_keeps_the_delay() {
     // With a small remnant, a change of the delay of a millisecond is visible; the longer hold alone would change it by
     // 2.7 to 4.8 ms.
     for (hz, factor) in [(250.0, 3), (1000.0, 10), (2000.0, 20)] {
-        let (record, done) = Decimation::Auto.of(run(hz, 0.001, 0)).unwrap();
+        let (record, done) = Decimation::Auto.apply(run(hz, 0.001, 0)).unwrap();
         let done = done.unwrap();
         assert!(done.factor == factor && done.lead_s > 0.0026);
         let fit = GreyBox::new(1..=4).fit(&[record]).unwrap();

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from .record import Record
 
-__all__ = ["said"]
+__all__ = ["rate_note"]
 
 
-def said(records: Sequence[Record]) -> str:
+def rate_note(records: Sequence[Record]) -> str:
     """Describe in one line how the rate of the records was reduced; empty if it was kept."""
     steps = [
         step.partition(":")[0] for one in records for step in one.steps if "decimated by" in step

@@ -10,10 +10,10 @@ import numpy as np
 from . import _pyhoid
 from .record import Record
 
-__all__ = ["faults_of", "used"]
+__all__ = ["faults_of", "fitted_records"]
 
 
-def used(
+def fitted_records(
     native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Trace,
     given: Sequence[Record],
 ) -> tuple[Record, ...]:
@@ -38,4 +38,4 @@ def faults_of(
     native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Description,
 ) -> list[dict[str, Any]]:
     """Return the faults that were found in the records, each with the index of its record."""
-    return [{"record": place, **fault} for place, fault in native.faults]
+    return [{"record": index, **fault} for index, fault in native.faults]

@@ -20,13 +20,13 @@ from .errors import Error, FileError, FileMissingError, FormatError
 __all__ = ["readable"]
 
 
-def _written(table: Any, path: Path, place: Path) -> Path:
-    made = place / f"{path.stem}.parquet"
+def _write_parquet(table: Any, path: Path, directory: Path) -> Path:
+    made = directory / f"{path.stem}.parquet"
     table.write_parquet(made, compression="snappy")
     return made
 
 
-def _arrow(path: Path, place: Path) -> Path:
+def _arrow(path: Path, directory: Path) -> Path:
     try:
         import polars
     except ModuleNotFoundError:
@@ -38,10 +38,10 @@ def _arrow(path: Path, place: Path) -> Path:
         table = polars.read_ipc(path)
     except Exception as error:
         raise FormatError(f"{path} cannot be read as Arrow: {error}") from error
-    return _written(table, path, place)
+    return _write_parquet(table, path, directory)
 
 
-def _excel(path: Path, place: Path) -> Path:
+def _excel(path: Path, directory: Path) -> Path:
     try:
         import pandas
 
@@ -53,7 +53,7 @@ def _excel(path: Path, place: Path) -> Path:
         ) from None
     except Exception as error:
         raise FormatError(f"{path} cannot be read as Excel: {error}") from error
-    made = place / f"{path.stem}.csv"
+    made = directory / f"{path.stem}.csv"
     table.to_csv(made, index=False)
     return made
 
@@ -80,10 +80,10 @@ def readable(path: str | PathLike[str]) -> Iterator[str | PathLike[str]]:
     given = Path(fspath(path))
     if not given.exists():
         raise FileMissingError(f"{path} cannot be read: there is no such file; check the name")
-    place = Path(tempfile.mkdtemp(prefix="hoid-"))
+    directory = Path(tempfile.mkdtemp(prefix="hoid-"))
     try:
         try:
-            made = reader(given, place)
+            made = reader(given, directory)
         except OSError as error:
             if isinstance(error, Error):
                 raise
@@ -94,4 +94,4 @@ def readable(path: str | PathLike[str]) -> Iterator[str | PathLike[str]]:
             # The message names the file that the user gave.
             raise type(error)(str(error).replace(str(made), str(path))) from None
     finally:
-        shutil.rmtree(place, ignore_errors=True)
+        shutil.rmtree(directory, ignore_errors=True)

@@ -19,7 +19,7 @@ import numpy as np
 from . import _pyhoid
 from .errors import DataError
 
-__all__ = ["Call", "Recalled", "recalled", "same", "state_of"]
+__all__ = ["Call", "RestoredNative", "restore", "same", "state_of"]
 
 
 class Call(NamedTuple):
@@ -50,7 +50,7 @@ class Call(NamedTuple):
         return self._replace(path=(*self.path, *path))
 
 
-class Recalled:
+class RestoredNative:
     """A native result restored from a pickle."""
 
     def __init__(self, answers: Mapping[str, Any], call: Call | None) -> None:
@@ -96,16 +96,16 @@ def _answer(native: Any, name: str) -> Any:
 def _seal(answers: Mapping[str, Any]) -> str:
     """Return a digest of the answers, by which a truncated or changed pickle is detected."""
 
-    def told(value: Any) -> Any:
+    def plain(value: Any) -> Any:
         if isinstance(value, np.ndarray):
             return (str(value.dtype), value.shape, value.tobytes())
         if isinstance(value, Mapping):
-            return [(str(key), told(inner)) for key, inner in value.items()]
+            return [(str(key), plain(inner)) for key, inner in value.items()]
         if isinstance(value, (list, tuple)):
-            return [told(inner) for inner in value]
+            return [plain(inner) for inner in value]
         return repr(value)
 
-    return hashlib.sha256(pickle.dumps(told(answers), protocol=4)).hexdigest()
+    return hashlib.sha256(pickle.dumps(plain(answers), protocol=4)).hexdigest()
 
 
 def same(one: Any, other: Any) -> bool:
@@ -138,7 +138,7 @@ def state_of(result: Any, names: Sequence[str]) -> dict[str, Any]:
     }
 
 
-def recalled(result: Any, state: Any, names: Sequence[str]) -> None:
+def restore(result: Any, state: Any, names: Sequence[str]) -> None:
     """Restore a result from the state in its pickle.
 
     Raises
@@ -162,4 +162,4 @@ def recalled(result: Any, state: Any, names: Sequence[str]) -> None:
         )
     result.__dict__.update(state["own"])
     result._call = state["call"]
-    result._native = Recalled(answers, state["call"])
+    result._native = RestoredNative(answers, state["call"])

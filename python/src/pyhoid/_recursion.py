@@ -20,7 +20,7 @@ from .operator_fit import OperatorFit
 if TYPE_CHECKING:
     from ._settings import RecursiveMethod
 
-__all__ = ["KEYWORDS", "name_of_now", "plain"]
+__all__ = ["KEYWORDS", "current_name", "native_arguments"]
 
 #: Keywords that all methods share, in the order of the signatures.
 KEYWORDS = (
@@ -39,7 +39,7 @@ KEYWORDS = (
 _OF_METHODS = {name for *_, keywords in _pyhoid.recursive_methods() for name in keywords}
 
 
-def name_of_now(method: RecursiveMethod) -> RecursiveMethod:
+def current_name(method: RecursiveMethod) -> RecursiveMethod:
     """Return the current name of a method; for an earlier name, warn the caller."""
     renamed = _pyhoid.renamed_method(method) if isinstance(method, str) else None
     if renamed is None:
@@ -49,7 +49,7 @@ def name_of_now(method: RecursiveMethod) -> RecursiveMethod:
     return cast("RecursiveMethod", name)
 
 
-def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
+def native_arguments(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keywords of a call in plain form: those common to all methods, and those of the method."""
     given = {name: arguments[name] for name in KEYWORDS}
     for name in settings:

@@ -224,13 +224,13 @@ def _boxes(columns: Columns) -> Figure:
                     }
                     for k in mask
                 ]
-                places = [
+                x_positions = [
                     delays.index(columns["nk"][k]) + (at - (len(levels) - 1) / 2) * width
                     for k in mask
                 ]
                 boxes = ax.bxp(
                     found,
-                    positions=places,
+                    positions=x_positions,
                     widths=0.85 * width,
                     patch_artist=True,
                     showfliers=False,

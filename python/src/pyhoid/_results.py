@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from . import _pyhoid
-from ._faults import faults_of, used
+from ._faults import faults_of, fitted_records
 from .errors import DataError
 from .estimates import channel_units
 from .record import Record
@@ -45,7 +45,7 @@ class Result:
     ) -> None:
         self._native = native
         # A part of another result, or a result from a pickle, gets its records from that result.
-        self.records = used(native, records) or tuple(records)
+        self.records = fitted_records(native, records) or tuple(records)
         self.units = units or channel_units(self.records)
         own = native.settings
         self.settings = dict(settings or {name: value for name, value, _ in own})

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _options, _pyhoid
+from ._json_result import JsonResult
 from ._options import Progress
-from ._written import Written
 from .errors import OptionError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ __all__ = ["Comparison", "compare"]
 Factor = str | Mapping[str, Mapping[str, Sequence[str]]]
 
 
-class Comparison(Written):
+class Comparison(JsonResult):
     """Differences between conditions and between people. `compare` creates it.
 
     Examples

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from ._faults import faults_of
-from ._pickling import Call, recalled, state_of
+from ._pickling import Call, restore, state_of
 from .errors import OptionError
 from .estimates import Estimate, estimates
 from .record import Record
@@ -50,7 +50,7 @@ class DescribingFunction:
         return state_of(self, _ANSWERS)
 
     def __setstate__(self, state: Any) -> None:
-        recalled(self, state, _ANSWERS)
+        restore(self, state, _ANSWERS)
 
     def __getitem__(self, name: str) -> npt.NDArray[Any]:
         return self.columns[name]

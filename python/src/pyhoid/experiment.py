@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _options, _pyhoid
-from ._written import Written
+from ._json_result import JsonResult
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["ExperimentDesign", "design"]
 
 
-class ExperimentDesign(Written):
+class ExperimentDesign(JsonResult):
     """A forcing function and the expected errors. `design` creates it.
 
     Examples
@@ -110,8 +110,8 @@ class ExperimentDesign(Written):
         >>> designed.write("design")
         """
         scenario, lab, forcing = _pyhoid.design_files_of(self._text, "scenario.toml")
-        place = Path(directory)
-        place.mkdir(parents=True, exist_ok=True)
+        path = Path(directory)
+        path.mkdir(parents=True, exist_ok=True)
         files = {
             "scenario.toml": scenario,
             "lab.toml": lab,
@@ -120,7 +120,7 @@ class ExperimentDesign(Written):
         }
         for name, text in files.items():
             if text:
-                (place / name).write_text(text)
+                (path / name).write_text(text)
 
     def to_json(self) -> str:
         """Return the object of ``hoid design --json``, which `from_json` reads.

@@ -79,7 +79,7 @@ def stream(
     inlet = pylsl.StreamInlet(found[0], processing_flags=pylsl.proc_clocksync)
     try:
         info = inlet.info(timeout=patience)
-        places = _places(info.get_channel_labels() or [], info.channel_count(), (e, u))
+        indices = _channel_indices(info.get_channel_labels() or [], info.channel_count(), (e, u))
         rate = info.nominal_srate()
         if rate > 0 and abs(rate * tracker.sample_time - 1) > 0.05:
             raise OptionError(
@@ -87,7 +87,7 @@ def stream(
                 f" {1 / tracker.sample_time} Hz; create the tracker with the sample time of the stream"
             )
         outlet = _outlet(pylsl, lsl_out, 1 / tracker.sample_time)
-        return _run(inlet, outlet, tracker, places, patience)
+        return _run(inlet, outlet, tracker, indices, patience)
     finally:
         inlet.close_stream()
 
@@ -100,10 +100,12 @@ def _pylsl() -> Any:
     return pylsl
 
 
-def _places(labels: Sequence[str | None], count: int, names: tuple[str, str]) -> tuple[int, int]:
+def _channel_indices(
+    labels: Sequence[str | None], count: int, names: tuple[str, str]
+) -> tuple[int, int]:
     """Return the positions of e and u among the channels.
 
-    >>> _places(["u", "e"], 2, ("e", "u")), _places([], 3, ("e", "u"))
+    >>> _channel_indices(["u", "e"], 2, ("e", "u")), _channel_indices([], 3, ("e", "u"))
     ((1, 0), (0, 1))
     """
     known = [label for label in labels if label]
@@ -128,7 +130,7 @@ def _outlet(pylsl: Any, name: str, rate: float) -> Any:
 
 
 def _run(
-    inlet: Any, outlet: Any, tracker: Tracker, places: tuple[int, int], patience: float
+    inlet: Any, outlet: Any, tracker: Tracker, indices: tuple[int, int], patience: float
 ) -> dict[str, int]:
     counts = {"samples": 0, "lost": 0, "late": 0}
     last: float | None = None
@@ -146,7 +148,7 @@ def _run(
         counts["lost"] += min(steps - 1, longest)
         counts["samples"] += 1
         last = stamp
-        innovation = tracker.step(float(values[places[0]]), float(values[places[1]]))
+        innovation = tracker.step(float(values[indices[0]]), float(values[indices[1]]))
         estimate = [*_numbers(tracker), innovation, float(counts["lost"])]
         outlet.push_sample(estimate, stamp)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
-from ._decimation import said
+from ._decimation import rate_note
 from ._model import QUALITY, Model
 from ._results import Result
 from .errors import DataError
@@ -289,8 +289,8 @@ class OperatorFit(Model, Result):
         names = list(self.coordinates)
         if self.covariance is not None:
             variables["covariance"] = (("coordinate", "coordinate_"), self.covariance)
-        places = {"parameter": list(self.parameters), "coordinate": names, "coordinate_": names}
-        return xr.Dataset(variables, coords=places, attrs={"form": self.form})
+        coordinates = {"parameter": list(self.parameters), "coordinate": names, "coordinate_": names}
+        return xr.Dataset(variables, coords=coordinates, attrs={"form": self.form})
 
     def plot(self, record: Record | None = None, ax: Axes | None = None) -> Axes:
         """Plot the time response on a record, by default the first record; see `pyhoid.plots`.
@@ -417,7 +417,7 @@ class OperatorFit(Model, Result):
 
     def _closing(self) -> str:
         prior = ", ".join(f"{name} = {c:g}:{s:g}" for name, (c, s) in self.prior.items())
-        rate = said(self.records)
+        rate = rate_note(self.records)
         return (f"{rate}\n" if rate else "") + (
             f"Standard errors from the scatter of {self.errors['clusters']} {self.errors['kind']}: variances"
             f" {self.errors['inflation']:.2f} times as large as for white residuals\n"

@@ -271,8 +271,8 @@ def _read(
             detrend=detrend,
             drop_repeated=drop_repeated,
             unit=dict(unit or {}),
-            scale={name: _written(value) for name, value in (scale or {}).items()},
-            offset={name: _written(value) for name, value in (offset or {}).items()},
+            scale={name: _plain_text(value) for name, value in (scale or {}).items()},
+            offset={name: _plain_text(value) for name, value in (offset or {}).items()},
             decimate=decimate,
             new_sampling_frequency=new_sampling_frequency,
             run_in=float(run_in),
@@ -289,7 +289,7 @@ def _read(
     return records
 
 
-def _written(value: float | str) -> str:
+def _plain_text(value: float | str) -> str:
     return value if isinstance(value, str) else repr(float(value))
 
 

@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
-from ._decimation import said
-from ._faults import used
+from ._decimation import rate_note
+from ._faults import fitted_records
 from .estimates import Estimate, Operator, channel_units, unit_of
-from ._pickling import Call, recalled, state_of
+from ._pickling import Call, restore, state_of
 from .fit import Fit
 from .record import Record
 from .verdict import Verdict
@@ -80,7 +80,7 @@ class Trace:
         self._native = native
         self._call = call
         # For an unchanged record, the given object itself is returned.
-        (self.record,) = used(native, [record])
+        (self.record,) = fitted_records(native, [record])
         self.settings: dict[str, Any] = dict(settings or {})
         self._columns: dict[str, npt.NDArray[Any]] | None = None
         self._verdict: Verdict | None = None
@@ -91,7 +91,7 @@ class Trace:
         return state_of(self, _ANSWERS)
 
     def __setstate__(self, state: Any) -> None:
-        recalled(self, state, _ANSWERS)
+        restore(self, state, _ANSWERS)
 
     @property
     def columns(self) -> dict[str, npt.NDArray[Any]]:
@@ -334,7 +334,7 @@ class Trace:
             return f"Trace by {self.method}: no rows"
         header, *rows = self._rows()
         title = f"Trace by {self.method}, {self.structure}: {len(self)} rows"
-        rate = said([self.record])
+        rate = rate_note([self.record])
         title = f"{title}\n{rate}" if rate else title
         return f"{title}\n{_text.plain_table(header, rows)}"
 

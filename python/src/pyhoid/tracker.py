@@ -81,8 +81,8 @@ class Tracker(_pyhoid.Tracker):
         **settings: Unpack[MethodSettings],
     ) -> Tracker:
         """See the class."""
-        method = _recursion.name_of_now(method)
-        options = _recursion.plain(locals(), settings) | {"decimate": str(decimate)}
+        method = _recursion.current_name(method)
+        options = _recursion.native_arguments(locals(), settings) | {"decimate": str(decimate)}
         return cls._made(options, float(sample_time), float(warm_up), record)
 
     @classmethod

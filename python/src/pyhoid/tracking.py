@@ -148,7 +148,7 @@ def track(
     >>> trace = pyhoid.track(record, "rpem", inputs=["e", "f_t"], nd=1, nk=(14, 1), at=[2])
     >>> trace["gain_db[f_t]@2"]
     """
-    method = _recursion.name_of_now(method)
+    method = _recursion.current_name(method)
     shared = {
         name: value
         for name, value in locals().items()
@@ -162,7 +162,7 @@ def track(
         raise OptionError("update_covariance applies only with validate, a second run")
     further = _options.roles(record, inputs, roles) if inputs is not None or roles is not None else []
     if further:
-        options = _recursion.plain(shared | dict.fromkeys(_ORDERS), settings)
+        options = _recursion.native_arguments(shared | dict.fromkeys(_ORDERS), settings)
         options |= {
             "inputs": [record.input_name, *(role.partition("=")[0] for role in further)],
             "role": ",".join(further),
@@ -173,7 +173,7 @@ def track(
             ),
         }
     else:
-        options = _recursion.plain(shared, settings)
+        options = _recursion.native_arguments(shared, settings)
     if every < 1:
         raise OptionError(f"every is {every}, expected 1 or more")
     native = _pyhoid.track(

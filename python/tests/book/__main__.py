@@ -1,4 +1,4 @@
-"""Lists the code blocks of README and book, and what is done with each."""
+"""Lists the code blocks of README and book, and how each is tested."""
 
 from __future__ import annotations
 

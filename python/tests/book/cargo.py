@@ -1,4 +1,4 @@
-"""`cargo` for the blocks of the book: what they would compile for release is there for the tests.
+"""`cargo` for the blocks of the book: the tests provide the release builds.
 
 | block | runs |
 |---|---|
@@ -41,9 +41,9 @@ def command(arguments: list[str]) -> list[str]:
             crate = words.index("-p")
             words[crate : crate + 2] = ["--workspace"]
         if "--test" not in words:
-            # Not `--lib`, which means the module of Python too.
+            # Not `--lib`, which includes the Python module.
             words.insert(2, "--tests")
-        # Where the configuration of cargo is.
+        # The directory with the configuration of cargo.
         os.chdir(ROOT)
         target = ["--target-dir", target_folder(program)]
         return [real_cargo(), words[0], *target, *words[1:]]
@@ -62,7 +62,7 @@ def example(program: Path, name: str) -> str:
 
 
 def real_cargo() -> str:
-    """The cargo after this one."""
+    """The next cargo in the path."""
     behind = os.environ["PATH"].split(os.pathsep)[1:]
     return next(
         str(Path(folder) / "cargo") for folder in behind if (Path(folder) / "cargo").exists()

@@ -1,4 +1,4 @@
-"""Pages, their code blocks, and the marks that are before them.
+"""Pages, their code blocks, and the marks before them.
 
 A mark is a comment of HTML, which readers do not see:
 
@@ -36,7 +36,7 @@ MARK = re.compile(r"<!--\s*(file|given|then|picture|smaller|ends with|not run):\
 
 @dataclass
 class Block:
-    """One code block, with the marks that are before it."""
+    """One code block, with the marks before it."""
 
     line: int
     language: str
@@ -47,7 +47,7 @@ class Block:
         return next((value for kind, value in self.marks if kind == name), None)
 
     def as_run(self) -> str:
-        """The text, smaller where a mark reports it."""
+        """The text, shortened if a mark specifies it."""
         text = self.text
         for kind, value in self.marks:
             if kind == "smaller":

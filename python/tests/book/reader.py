@@ -32,7 +32,7 @@ class Reader:
         programs = folder.with_name(folder.name + "-bin")
         for directory in (folder, programs):
             directory.mkdir()
-        # What blocks name of the repository.
+        # Files of the repository that blocks refer to.
         for part in ("fixtures", "crates", "python"):
             (folder / part).symlink_to(ROOT / part)
         (programs / "hoid").symlink_to(program)
@@ -41,7 +41,7 @@ class Reader:
         cargo.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} {script} "$@"\n')
         cargo.chmod(0o755)
         beside = Path(sys.executable).parent
-        # The pages are as wide as they are: pytest-xdist reports its workers a width.
+        # The pages keep their width: pytest-xdist sets a width for its workers.
         self.environment = {
             **{name: value for name, value in os.environ.items() if name != "COLUMNS"},
             "PATH": os.pathsep.join([str(programs), str(beside), os.environ["PATH"]]),
@@ -62,7 +62,7 @@ class Reader:
         self.output.close()
 
     def take(self, block: Block) -> None:
-        """Does with a block what a reader does."""
+        """Executes a block as a reader would."""
         given, file = block.mark("given") or "", block.mark("file")
         if file:
             self.shell(given)
@@ -96,7 +96,7 @@ class Reader:
                 self.picture(*(side.strip() for side in value.split("=>")))
 
     def picture(self, file: str, picture: str) -> None:
-        """What a block has drawn is what the book shows; elsewhere its last digits may be others."""
+        """Checks that a block drew the picture of the book; elsewhere the last digits may differ."""
         drawn, shown = self.folder / file, BOOK / "images" / picture
         assert drawn.exists(), f"no picture {file}"
         if os.environ.get("HOID_UPDATE_DOCS"):
@@ -156,7 +156,7 @@ def lines_are_in(shown: str, printed: str) -> None:
 
 
 def agree(shown: Any, found: Any) -> bool:
-    """What a page shows of a line of JSON: to its digits, with `"...": {}` for the rest."""
+    """A line of JSON as a page shows it: with its digits, and `"...": {}` for the rest."""
     if isinstance(shown, dict):
         keys = [key for key in shown if key != "..."]
         same = isinstance(found, dict) and (len(keys) < len(shown) or set(found) == set(keys))

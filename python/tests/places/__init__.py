@@ -1,4 +1,4 @@
-"""The places in which hoid runs: one run through each, its estimates, and the time of a sample.
+"""The interfaces of hoid: one run through each, its estimates, and the time per sample.
 
 A place takes e and u of 82 s of C4, a sample at a time, and reports the operator after each.
 ``test_places.py`` compares all of them with `hoid track`, to the last digit; ``python -m places``

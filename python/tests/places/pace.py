@@ -1,5 +1,5 @@
-"""`python -m places.pace RATE SECONDS`: samples over LabStreamingLayer at a rate, and how long
-their answers take. A row of the table of `cargo xtask slow latency`, then the samples lost."""
+"""`python -m places.pace RATE SECONDS`: samples over LabStreamingLayer at a rate, and the times of
+their answers. Prints a row of the table of `cargo xtask slow latency`, then the lost samples."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-// The C ABI in WebAssembly: what place.c does. `node place.mjs hoid_ffi.wasm < samples`.
+// The C ABI in WebAssembly, with the calls of place.c. `node place.mjs hoid_ffi.wasm < samples`.
 import { readFileSync } from "node:fs";
 
 const module = await WebAssembly.compile(readFileSync(process.argv[2]));
-// A library of random numbers asks for some functions of its own making, and nobody calls it.
+// A library for random numbers imports functions that are never called.
 const imports = {};
 for (const { module: of, name } of WebAssembly.Module.imports(module)) {
   (imports[of] ??= {})[name] = () => {
@@ -10,10 +10,10 @@ for (const { module: of, name } of WebAssembly.Module.imports(module)) {
   };
 }
 const hoid = (await WebAssembly.instantiate(module, imports)).exports;
-// Room for what is handed over: a page of its own, which the library does not know of.
+// Memory for the arguments: a separate page that the library does not use.
 const room = hoid.memory.grow(1) * 65536;
 const [place, count, options, list] = [room, room + 8, room + 16, room + 128];
-// Of hoid_estimate: two pointers, then value and standard error.
+// Layout of hoid_estimate: two pointers, then value and standard error.
 const [size, value, error] = [32, 8, 16];
 
 const text = new TextEncoder().encode('{"controlled_element": "90/(s(s+6))"}\0');

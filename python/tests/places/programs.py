@@ -18,12 +18,12 @@ from .tools import HERE, ROOT, Tools, output, program
 
 CORTEX = "thumbv7em-none-eabihf"
 WASM = "wasm32-unknown-unknown"
-#: Samples of the run that QEMU is given where not all is asked for.
+#: Number of samples for QEMU unless the whole run is requested.
 SHORT = 400
 
 
 def track(run: Run, tools: Tools) -> Told:
-    """The file as a whole; it takes no samples one by one."""
+    """The file as a whole, not sample by sample."""
     trace = tools.folder / "place.csv"
     tools.hoid("track", run.path, "--out", trace, "--controlled-element", ELEMENT)
     found = told.table(trace)

@@ -21,7 +21,7 @@ from .programs import of_line
 from .told import COLUMNS, ELEMENT, STEP, Missing, Place, Run, Told
 from .tools import Tools
 
-#: Far beyond what an answer takes, s.
+#: Timeout, far above the time of an answer, s.
 PATIENCE = 30.0
 SAMPLE = struct.Struct("<4sI4d")
 ESTIMATE = struct.Struct("<4sI19diI")
@@ -99,7 +99,7 @@ def udp(
     return Told(np.array(rows), seconds=np.array(seconds), size=size)
 
 
-#: The other side of LabStreamingLayer, a process of its own.
+#: The other side of LabStreamingLayer, in a separate process.
 TRACKING = """
 import sys
 import pyhoid.lsl

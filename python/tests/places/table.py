@@ -19,7 +19,7 @@ HEAD = """\
 
 
 def tables(tools: Tools) -> str:
-    """A row a place; what is not here is a row that reports it."""
+    """One row per interface; a missing interface has a row that states it."""
     run = Run.made(tools, tools.folder)
     traces = {
         options: expected(tools, run, tools.folder, options)

@@ -1,4 +1,4 @@
-"""The output of a place, and its comparison."""
+"""The output of an interface, and its comparison."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 STEP = 0.01
 #: Parameters of the operator, and their columns in a trace.
 OPERATOR = ("K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e")
-#: What the person controls, and what is reported of the loop.
+#: Controlled element, and the reported quantities of the loop.
 ELEMENT = "90/(s(s+6))"
 LOOP = ("crossover_rad_s", "phase_margin_deg")
 OF_LOOP = tuple(f"{name}{end}" for name in LOOP for end in ("", "_se"))
@@ -28,7 +28,7 @@ COLUMNS = tuple(f"{name}{end}" for name in (*OPERATOR, *LOOP) for end in ("", "_
 
 
 class Missing(Exception):
-    """A place that is not here, and why."""
+    """A missing interface, with the reason."""
 
 
 @dataclass(frozen=True)
@@ -52,18 +52,18 @@ class Run:
 
 @dataclass(frozen=True)
 class Told:
-    """The estimate after each sample, or after those at `at`; NaN is not known."""
+    """The estimate after each sample, or after the samples `at`; NaN if unknown."""
 
     rows: Floats
     columns: tuple[str, ...] = COLUMNS
     at: range | None = None
     #: Time of each sample, s.
     seconds: Floats | None = None
-    #: What is shipped: bytes, and what of.
+    #: Size of the distributed file in bytes, and its kind.
     size: tuple[int, str] | None = None
 
     def compared(self, expected: dict[str, list[float]]) -> Compared:
-        """With the columns of a trace, bit by bit."""
+        """Compares with the columns of a trace, bit by bit."""
         wanted = np.array([expected[name] for name in self.columns]).T
         if self.at is not None:
             wanted = wanted[list(self.at)]
@@ -87,13 +87,13 @@ class Compared:
 @dataclass(frozen=True)
 class Place:
     name: str
-    #: What a sample is there, of which the time is reported.
+    #: Unit of work whose time is reported.
     sample: str
     run: Callable[[Run, Tools], Told]
-    #: Options of `hoid track` that it is compared with.
+    #: Options of `hoid track` for the comparison.
     options: tuple[str, ...] = ("--controlled-element", ELEMENT)
-    #: Columns that other elementary functions make (sine, arctangent), and by how much they may be
-    #: off there, relatively: rounding, and its magnification in the error bars.
+    #: Columns that depend on other elementary functions (sine, arctangent), and their largest
+    #: relative difference: rounding errors, which are larger in the error bars.
     other_functions: tuple[str, ...] = ()
     off: float = 1e-9
 

@@ -1,4 +1,4 @@
-"""What is built and installed."""
+"""Built and installed programs and libraries."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Tools:
-    #: The program hoid; what is built with it lies next to it.
+    #: The program hoid; the other results of the build are next to it.
     binary: Path
-    #: Where work may be done.
+    #: Working directory.
     folder: Path
-    #: For the table: all of the run is taken under QEMU, which takes a minute; else its first
-    #: seconds.
+    #: True for the table: QEMU processes the whole run, which takes a minute; otherwise only its
+    #: first seconds.
     whole: bool = False
-    #: Whether the chore that runs this has just built all of it.
+    #: True if the calling task has just built everything.
     built: bool = os.environ.get("HOID_PLACES_BUILT") is not None
 
     def hoid(self, *arguments: Any) -> str:
@@ -41,23 +41,23 @@ class Tools:
         return newest([path], f"no example {name}: cargo build -p hoid --example {name}")
 
     def of_target(self, target: str, name: str) -> Path:
-        """What was built for another processor: as this program, or of release."""
+        """The build for another processor: in the profile of this program, or in release."""
         folder = self.binary.parents[1] / target
         profiles = (self.binary.parent.name, "release")
         places = [folder / profile / name for profile in profiles]
         found = newest(places, f"not built for {target}: cargo xtask python")
-        # What lies about from another day is none of these sources.
+        # Older builds are not from these sources.
         if not self.built and found.stat().st_mtime < self.binary.stat().st_mtime:
             raise Missing(f"built for {target} before the program was: cargo xtask python")
         return found
 
     def shipped(self, path: Path) -> int:
-        """Bytes of a file as it is shipped."""
+        """Size of a file as distributed, in bytes."""
         return stripped(path, self.folder).stat().st_size
 
 
 def stripped(path: Path, folder: Path) -> Path:
-    """A program or library without its symbols, where `strip` is here."""
+    """A program or library without its symbols, if `strip` is available."""
     strip = shutil.which("strip")
     if strip is None:
         return path
@@ -74,7 +74,7 @@ def newest(places: list[Path], reason: str) -> Path:
 
 
 def program(*names: str) -> str:
-    """The first of these programs that is here."""
+    """The first of these programs that is installed."""
     for name in names:
         if (found := shutil.which(name)) is not None:
             return found
@@ -82,7 +82,7 @@ def program(*names: str) -> str:
 
 
 def output(command: list[Any], **options: Any) -> str:
-    """What a program prints; what it reports where it fails."""
+    """The output of a program; its error message if it fails."""
     words = [str(word) for word in command]
     done = subprocess.run(words, capture_output=True, text=True, check=False, **options)
     assert done.returncode == 0, f"{words}: {done.stderr}"

@@ -1,4 +1,4 @@
-"""What runs within this process: Python, functional mock-up units."""
+"""Interfaces within this process: Python, functional mock-up units."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def unit(version: int, run: Run, tools: Tools) -> Told:
     get = slave.getReal if version == 2 else slave.getFloat64
     inputs = [references["e"], references["u"]]
     outputs = [references[name] for name in COLUMNS]
-    # Nothing but the unit: it reads no file of this folder, and leaves none.
+    # The unit reads no files of this folder and leaves none.
     empty = tools.folder / f"empty{version}"
     empty.mkdir(exist_ok=True)
     before = Path.cwd()

@@ -32,8 +32,8 @@ const LONG_CASE_TIMES_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
 /// Largest error, to which larger errors are limited.
 const MAX_ERROR: f64 = 10.0;
 const CRITICAL_VALUE: f64 = 1.96;
-/// Time after a change within which an alarm is not counted as false, s. An alarm within [`DETECTION_LIMITS_S`] has found the
-/// change.
+/// Time after a change within which an alarm is not counted as false, s. An alarm within [`DETECTION_LIMITS_S`] has
+/// found the change.
 const ALARM_WINDOW_S: f64 = 12.0;
 /// Times after a change within which it should be found, s.
 pub const DETECTION_LIMITS_S: [f64; 2] = [5.0, 8.0];
@@ -214,8 +214,8 @@ impl EvaluationRun {
     }
 }
 
-/// Converts parameter values to errors and coverage. [`evaluate_result`] stores a value as `(value, None)` and its standard
-/// error under the name with ` se` appended.
+/// Converts parameter values to errors and coverage. [`evaluate_result`] stores a value as `(value, None)` and its
+/// standard error under the name with ` se` appended.
 fn compare_parameters(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Truth, t_s: f64) {
     let said = std::mem::take(parameters);
     for (name, value) in truth.operator(t_s).named_parameters() {

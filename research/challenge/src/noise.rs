@@ -165,8 +165,8 @@ pub(super) fn levinson(covariance: &[f64]) -> (Vec<f64>, f64) {
     (a, variance)
 }
 
-/// Number of pulses per second; `PULSE_VARIANCE_SHARE` is their share of the variance, and `IMPULSES` the probability and the
-/// size of impulses.
+/// Number of pulses per second; `PULSE_VARIANCE_SHARE` is their share of the variance, and `IMPULSES` the probability
+/// and the size of impulses.
 const PULSES_PER_S: f64 = 2.0;
 const PULSE_VARIANCE_SHARE: f64 = 0.8;
 const IMPULSES: (f64, f64) = (0.02, 7.0);

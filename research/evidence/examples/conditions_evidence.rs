@@ -1,7 +1,8 @@
 //! The default tracker compared with earlier methods in the conditions of the thesis: errors, coverage and changes of
 //! each cell, and the ratio of its errors to those of the best other method.
 //!
-//! `cargo run --release -p hoid-evidence --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..] [CONDITION,..]`
+//! `cargo run --release -p hoid-evidence --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..]
+//! [CONDITION,..]`
 //!
 //! Methods: `adaptive` gets no prior information; `multiple-model`, `rls` and `rpem` are given the delay and start from
 //! a fit of the first 30.72 s (RLS and RPEM with the settings of the thesis). Their first rows are therefore not

@@ -42,7 +42,7 @@ fn main() {
         CurvePanel {
             name: "found".to_owned(),
             unit: "%".to_owned(),
-            within: Some((70.0, 101.0)),
+            ordinate_range: Some((70.0, 101.0)),
             curves: vec![
                 curve(
                     "log odds of multiple-model",

@@ -145,7 +145,7 @@ fn print_closed_loop_coverage(runs: u64) {
         (Condition::C2, OperatingState::s2()),
     ] {
         let simulator = simulator(condition, 1, 0.1);
-        let held = state.operator.discretise(SampleTime::AT_100_HZ).unwrap().held;
+        let held = state.operator.discretise(SampleTime::AT_100_HZ).unwrap().zoh;
         let theta = [held.b0, held.b1, -(-0.01_f64 / 0.06).exp(), held.f1, held.f2];
         let o = state.operator;
         let bj = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(NK));

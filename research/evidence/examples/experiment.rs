@@ -132,7 +132,7 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
 
 /// Returns the values of an operator parameter within a span.
 fn values_within(run: &EvaluatedRun, method: usize, i: usize, (from_s, to_s): (f64, f64)) -> Vec<f64> {
-    let course = &run.outcome.courses[method];
+    let course = &run.outcome.traces[method];
     let all = course.times_s.iter().zip(&course.states);
     all.filter(|(t, _)| (from_s..to_s).contains(*t))
         .map(|(_, state)| state.operator[i])
@@ -152,7 +152,7 @@ fn fluctuation(run: &EvaluatedRun, method: usize, i: usize) -> f64 {
 }
 
 fn variance_growth(run: &EvaluatedRun) -> f64 {
-    let course = &run.outcome.courses[1];
+    let course = &run.outcome.traces[1];
     let of = |(from_s, to_s): (f64, f64)| {
         let all = course.times_s.iter().zip(&course.variances);
         mean(

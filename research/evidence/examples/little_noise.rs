@@ -23,7 +23,7 @@ use std::{env, error::Error, f64::consts::TAU};
 use hoid_ident::family::{FamilyEstimator, Intersample};
 use hoid_model::{
     Channel, Complex64, FamilyOperator, Form, Record, SampleTime,
-    operator_family::{Coordinate, HeldFamily},
+    operator_family::{Coordinate, ZohFamilyOperator},
 };
 use simulated_operator::{Uniform, response_to};
 
@@ -49,7 +49,11 @@ fn operator(form: Form, random: &mut Uniform) -> Result<FamilyOperator, Box<dyn 
 }
 
 /// Returns the discrete model for a held or a linear error.
-fn discretise(operator: &FamilyOperator, course: Intersample, ts: SampleTime) -> Result<HeldFamily, Box<dyn Error>> {
+fn discretise(
+    operator: &FamilyOperator,
+    course: Intersample,
+    ts: SampleTime,
+) -> Result<ZohFamilyOperator, Box<dyn Error>> {
     if course == Intersample::Zoh {
         return Ok(operator.zoh(ts)?);
     }
@@ -60,7 +64,12 @@ fn discretise(operator: &FamilyOperator, course: Intersample, ts: SampleTime) ->
     Ok(earlier.interpolate(ts)?)
 }
 
-fn record(model: &HeldFamily, ts: SampleTime, share: f64, random: &mut Uniform) -> Result<Record, Box<dyn Error>> {
+fn record(
+    model: &ZohFamilyOperator,
+    ts: SampleTime,
+    share: f64,
+    random: &mut Uniform,
+) -> Result<Record, Box<dyn Error>> {
     let n = (60.0 / ts.s()) as usize;
     let lines: Vec<(f64, f64, f64)> = (0..12)
         .map(|i| {

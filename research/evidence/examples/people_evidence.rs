@@ -49,8 +49,8 @@ fn read(folder: &PathBuf, person: &str, element: &str) -> Vec<Trial> {
         let text = fs::read_to_string(path).unwrap();
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next().unwrap().split(',').collect();
-        let place = |name: &str| header.iter().position(|h| *h == name).unwrap();
-        let places = ["r", "y", "u", "d"].map(place);
+        let index = |name: &str| header.iter().position(|h| *h == name).unwrap();
+        let places = ["r", "y", "u", "d"].map(index);
         let mut all: [Vec<f64>; 3] = Default::default();
         for line in lines {
             let cells: Vec<&str> = line.split(',').collect();
@@ -180,9 +180,9 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
         if k + 1 == ROW_COUNT {
             run.before = error(&tracker, truths[0]);
         }
-        for (place, at) in run.after.iter_mut().zip(EVALUATION_TIMES_S) {
+        for (index, at) in run.after.iter_mut().zip(EVALUATION_TIMES_S) {
             if k == ROW_COUNT + at * RATE_HZ as usize {
-                *place = error(&tracker, truths[1]);
+                *index = error(&tracker, truths[1]);
             }
         }
     }

@@ -35,9 +35,9 @@ fn references(folder: &Path) -> References {
     for line in text.lines().skip(1) {
         let cells: Vec<&str> = line.split(',').collect();
         let omega: f64 = cells[4].parse().unwrap();
-        let place = EVALUATION_OMEGA_RAD_S.iter().position(|w| *w == omega).unwrap();
+        let index = EVALUATION_OMEGA_RAD_S.iter().position(|w| *w == omega).unwrap();
         let key = [0, 1, 2, 3].map(|i| cells[i].to_owned()).into();
-        all.entry(key).or_insert([[0.0; 2]; 3])[place] = [5, 6].map(|i| cells[i].parse().unwrap());
+        all.entry(key).or_insert([[0.0; 2]; 3])[index] = [5, 6].map(|i| cells[i].parse().unwrap());
     }
     all
 }

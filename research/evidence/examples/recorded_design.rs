@@ -7,16 +7,16 @@
 //! A cell is a person with an element (and an axis). Each run is identified alone, with one form for each element and
 //! without a prior. One run provides the person, the lines (Fourier coefficients of the recorded disturbance or target)
 //! and the share of the remnant in the variance of u, which is the share at non-excited frequencies; `hoid design`
-//! predicts the errors of a run of this length. The scatter is the standard deviation of the estimates of the other runs,
-//! divided by `c_4 = 1 - 1/(4 (n - 1))`. It contains the person's variation from run to run, so it is also compared with
-//! the error for the person, which includes the default variation [`RUN_TO_RUN_DEVIATION`]. This default is the median over the
-//! people with a disturbance of the variation of the crossover, `sqrt(scatter^2 - error^2)`; the pilots are an independent
-//! test. Quantities with an error above half of their value are excluded.
+//! predicts the errors of a run of this length. The scatter is the standard deviation of the estimates of the other
+//! runs, divided by `c_4 = 1 - 1/(4 (n - 1))`. It contains the person's variation from run to run, so it is also
+//! compared with the error for the person, which includes the default variation [`RUN_TO_RUN_DEVIATION`]. This default
+//! is the median over the people with a disturbance of the variation of the crossover, `sqrt(scatter^2 - error^2)`; the
+//! pilots are an independent test. Quantities with an error above half of their value are excluded.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::{env, fs, path::Path};
 
-use hoid::design::experiment::{Enters, Forcing, RUN_TO_RUN_DEVIATION, Remnant, Task, expected};
+use hoid::design::experiment::{EntryPoint, Forcing, RUN_TO_RUN_DEVIATION, Remnant, Task, expected};
 use hoid_evidence::{
     pilots::{self, MEASUREMENT_START_S},
     task::median,
@@ -42,7 +42,7 @@ struct Cell {
     name: String,
     element: &'static str,
     form: Form,
-    enters: Enters,
+    enters: EntryPoint,
     runs: Vec<Run>,
 }
 
@@ -97,8 +97,8 @@ impl Cell {
         }
     }
 
-    /// Prints the medians for each quantity, and returns the ratios of scatter to both predictions and the variation from
-    /// run to run: for each quantity, a value for each run.
+    /// Prints the medians for each quantity, and returns the ratios of scatter to both predictions and the variation
+    /// from run to run: for each quantity, a value for each run.
     fn ratios(&self) -> Vec<Vec<[f64; 3]>> {
         let fitted: Vec<Option<FamilyOperator>> = self.runs.iter().map(|run| run.operator(self.form)).collect();
         let values: Vec<Option<[f64; 4]>> = fitted
@@ -193,9 +193,9 @@ fn people_cells(folder: &Path) -> Vec<Cell> {
                 let text = fs::read_to_string(path).unwrap();
                 let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
                 let column = |name: &str, from: usize| -> Vec<f64> {
-                    let place = header.iter().position(|h| *h == name).unwrap();
+                    let index = header.iter().position(|h| *h == name).unwrap();
                     let rows = text.lines().skip(1 + from).take(2400);
-                    rows.map(|row| row.split(',').nth(place).unwrap().parse().unwrap())
+                    rows.map(|row| row.split(',').nth(index).unwrap().parse().unwrap())
                         .collect()
                 };
                 let e: Vec<f64> = column("r", 300)
@@ -212,7 +212,7 @@ fn people_cells(folder: &Path) -> Vec<Cell> {
                 name: format!("{person} {kind}"),
                 element,
                 form,
-                enters: Enters::Disturbance,
+                enters: EntryPoint::Disturbance,
                 runs: runs.collect(),
             });
         }
@@ -239,7 +239,7 @@ fn pilot_cells(folder: &Path) -> Vec<Cell> {
                     name: format!("{pilot} {condition} {axis}"),
                     element,
                     form: Form::Lead,
-                    enters: Enters::Target,
+                    enters: EntryPoint::Target,
                     runs: runs.collect(),
                 });
             }

@@ -12,8 +12,8 @@ use hoid_thesis::{
 };
 
 fn main() {
-    let text = |place: usize, default: &str| {
-        let path = std::env::args().nth(place);
+    let text = |index: usize, default: &str| {
+        let path = std::env::args().nth(index);
         path.map_or_else(|| default.to_owned(), |path| std::fs::read_to_string(path).unwrap())
     };
     let path = std::env::args().nth(1);

@@ -405,9 +405,9 @@ fn recordings(folder: &str) -> Vec<(String, Record)> {
         let text = fs::read_to_string(path).unwrap();
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next()?.split(',').collect();
-        let place = |name: &str| header.iter().position(|h| *h == name);
-        let (t, u) = (place("t")?, place("u")?);
-        let (e, r, y) = (place("e"), place("r"), place("y"));
+        let index = |name: &str| header.iter().position(|h| *h == name);
+        let (t, u) = (index("t")?, index("u")?);
+        let (e, r, y) = (index("e"), index("r"), index("y"));
         let rows: Vec<Vec<f64>> = lines
             .map(|line| line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect())
             .collect();

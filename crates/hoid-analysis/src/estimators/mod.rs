@@ -1,4 +1,5 @@
-//! Batch estimators for recordings: each fits a model, removes the trend of the data if necessary, and judges its fit.
+//! Batch estimators for recordings: each fits a model, removes the trend of the data if necessary, and assesses its
+//! fit.
 //!
 //! | file | estimator |
 //! |---|---|
@@ -21,16 +22,16 @@ pub use polynomials::PolynomialFit;
 
 use crate::{
     AnalysisError, answers::Answers, identification::Identification, names::OPERATOR, options::AnalysisOption,
-    quality::Of, recordings::Recordings, settings::Setting,
+    quality::SystemKind, recordings::Recordings, settings::Setting,
 };
 
 /// A batch estimator that [`Identification`] can run.
 pub trait BatchEstimator: Sized + 'static {
     /// Type of the fit.
     type Fit: Answers;
-    /// Kind of system whose records are judged. For a person, who responds to an error within a second, a missing
+    /// Kind of system whose records are assessed. For a person, who responds to an error within a second, a missing
     /// response is reported.
-    const OF: Of = Of::Person;
+    const OF: SystemKind = SystemKind::Person;
 
     /// Returns the entries of the estimator in the registry: one entry, or one per method.
     fn specs() -> Vec<MethodSpec>;
@@ -89,9 +90,9 @@ pub struct FittedModel<F> {
     /// The describing function that accompanies the fit, if there is one.
     pub described: Option<Description>,
     /// Trend that was removed from e and u.
-    pub taken_out: Detrend,
+    pub removed_trend: Detrend,
     /// Settings of the estimator used in the fit.
-    pub used: Vec<Setting>,
+    pub settings: Vec<Setting>,
     /// Values determined for settings that were left open.
     pub found: Vec<Setting>,
 }

@@ -132,8 +132,8 @@ impl BatchEstimator for FamilyEstimator {
             fit,
             verdict,
             described,
-            taken_out: estimator.detrend,
-            used,
+            removed_trend: estimator.detrend,
+            settings: used,
             found: found.into_iter().collect(),
         })
     }

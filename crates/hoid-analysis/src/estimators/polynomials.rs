@@ -8,7 +8,7 @@ use hoid_ident::{
     progress,
     settings::MethodSpec,
 };
-use hoid_model::{ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, Verdict, theta_of};
+use hoid_model::{ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, Verdict, theta_from_start};
 
 use super::{
     BatchEstimator, FittedModel,
@@ -22,7 +22,7 @@ use crate::{
     level::Level,
     names::PEM,
     options::{self, AnalysisOption},
-    quality::Of,
+    quality::SystemKind,
     recordings::Recordings,
     repair::is_multilevel_input,
     settings::Setting,
@@ -76,9 +76,10 @@ impl Polynomials {
         let refuse = |reason: String| AnalysisError::Options { reason };
         let start = match (&self.start, combinations) {
             (None, _) => None,
-            (Some(start), [orders]) => {
-                Some(theta_of(&orders.parameter_names(), start).map_err(|reason| refuse(format!("--start {reason}")))?)
-            }
+            (Some(start), [orders]) => Some(
+                theta_from_start(&orders.parameter_names(), start)
+                    .map_err(|reason| refuse(format!("--start {reason}")))?,
+            ),
             (Some(_), _) => {
                 return Err(refuse(
                     "--start applies to a single model, but a range of orders or delays is searched; give --nk and \
@@ -97,7 +98,7 @@ impl Polynomials {
 
 impl BatchEstimator for Polynomials {
     type Fit = PolynomialFit;
-    const OF: Of = Of::System;
+    const OF: SystemKind = SystemKind::System;
 
     fn specs() -> Vec<MethodSpec> {
         let [of_prediction, of_instruments] = polynomial_options::method_option_names();
@@ -220,8 +221,8 @@ impl BatchEstimator for Polynomials {
             fit: PolynomialFit { fit, choice },
             verdict,
             described: None,
-            taken_out: level.detrend(),
-            used,
+            removed_trend: level.detrend(),
+            settings: used,
             found,
         })
     }

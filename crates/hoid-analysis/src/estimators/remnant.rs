@@ -63,8 +63,8 @@ impl BatchEstimator for GreyBox {
             fit,
             verdict,
             described: None,
-            taken_out: level.detrend(),
-            used: with.settings(data.records[0].sample_time()),
+            removed_trend: level.detrend(),
+            settings: with.settings(data.records[0].sample_time()),
             found: found.into_iter().collect(),
         })
     }

@@ -65,8 +65,8 @@ impl BatchEstimator for SigmoidChange {
             fit,
             verdict,
             described: None,
-            taken_out: Detrend::None,
-            used: with.settings(data.records[0].sample_time()),
+            removed_trend: Detrend::None,
+            settings: with.settings(data.records[0].sample_time()),
             found: estimator.level.then(Setting::level).into_iter().collect(),
         })
     }

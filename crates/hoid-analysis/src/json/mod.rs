@@ -40,7 +40,7 @@ pub use polynomials::{PolynomialResult, family_json};
 pub use result::{BatchResult, JsonFit};
 pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
-use crate::{found::FoundFault, recordings::Account, settings::Setting};
+use crate::{fault_findings::FoundFault, recordings::Account, settings::Setting};
 
 /// Returns the envelope of a result: version, kind, verdict, records, their faults and warnings, settings.
 pub fn envelope(
@@ -81,7 +81,7 @@ pub fn envelope_of_parts(
 /// Returns the settings, each with its value and whether the user gave it.
 pub fn settings(all: &[Setting]) -> Value {
     all.iter()
-        .map(|one| json!({"name": one.name, "value": one.value, "given": one.given}))
+        .map(|one| json!({"name": one.name, "value": one.value, "given": one.is_given}))
         .collect()
 }
 

@@ -75,7 +75,7 @@ impl BatchResult {
 
 /// Serialised form of the findings in an account.
 #[derive(Serialize, Deserialize)]
-struct FoundIn {
+struct RecordFindings {
     faults: Vec<Fault>,
     #[serde(default)]
     quality_issues: Vec<Issue>,
@@ -95,18 +95,19 @@ struct IssueFields {
     share: f64,
     size: f64,
     unit: String,
-    places: Vec<RowSpan>,
+    #[serde(rename = "places")]
+    row_spans: Vec<RowSpan>,
     text: String,
 }
 
 /// Serialised form of a result.
 #[derive(Serialize)]
-struct Written<'a, F> {
+struct SerializedResult<'a, F> {
     fit: &'a F,
     verdict: &'a Verdict,
     names: &'a [String],
     origins: &'a [usize],
-    found_in: Vec<FoundIn>,
+    found_in: Vec<RecordFindings>,
     settings: &'a [Setting],
     controlled_element: &'a Option<ContinuousTransferFunction>,
     excitation: &'a Option<String>,
@@ -121,7 +122,7 @@ struct SavedResult<F> {
     verdict: Verdict,
     names: Vec<String>,
     origins: Vec<usize>,
-    found_in: Vec<FoundIn>,
+    found_in: Vec<RecordFindings>,
     settings: Vec<Setting>,
     controlled_element: Option<ContinuousTransferFunction>,
     excitation: Option<String>,
@@ -130,7 +131,7 @@ struct SavedResult<F> {
     counts_samples: bool,
 }
 
-impl FoundIn {
+impl RecordFindings {
     fn of(account: &Account) -> Self {
         Self {
             faults: account.faults.clone(),
@@ -155,7 +156,7 @@ impl<F: JsonFit> IdentifiedModel<F> {
     /// # Errors
     /// The errors of predicting the records.
     pub fn json(&self) -> Result<Map<String, Value>, AnalysisError> {
-        if let Some(written) = &self.written {
+        if let Some(written) = &self.source_json {
             return Ok(written.clone());
         }
         Ok(self.complete(F::object(self)?))
@@ -168,16 +169,16 @@ impl<F: JsonFit> IdentifiedModel<F> {
             verdict.insert("of".to_owned(), Value::Object(answers(&self.answers())));
         }
         map.insert("estimator".to_owned(), json!(F::ESTIMATOR));
-        let state = Written {
+        let state = SerializedResult {
             fit: &self.fit,
             verdict: &self.verdict,
             names: &self.data.names,
             origins: &self.data.origins,
-            found_in: self.data.accounts.iter().map(FoundIn::of).collect(),
+            found_in: self.data.accounts.iter().map(RecordFindings::of).collect(),
             settings: &self.settings,
             controlled_element: &self.controlled_element,
             excitation: &self.excitation,
-            taken_out: self.taken_out,
+            taken_out: self.removed_trend,
             rate: self.rate,
             counts_samples: self.counts_samples,
         };
@@ -240,7 +241,7 @@ fn restore_result<F: JsonFit>(object: Map<String, Value>) -> Result<IdentifiedMo
         data: Recordings {
             names: read.names,
             origins: read.origins,
-            accounts: read.found_in.into_iter().map(FoundIn::account).collect(),
+            accounts: read.found_in.into_iter().map(RecordFindings::account).collect(),
             ..Recordings::default()
         },
         described: None,
@@ -249,7 +250,7 @@ fn restore_result<F: JsonFit>(object: Map<String, Value>) -> Result<IdentifiedMo
         excitation: read.excitation,
         rate: read.rate,
         counts_samples: read.counts_samples,
-        taken_out: read.taken_out,
-        written: Some(object),
+        removed_trend: read.taken_out,
+        source_json: Some(object),
     })
 }

@@ -4,7 +4,7 @@
 //! (covariances of quantities that are not printed, states, fixed parameters). The complete state is written as TOML,
 //! which can represent infinity and NaN, whereas JSON cannot, and is stored as one text in the JSON object;
 //! floating-point numbers are written with enough digits to restore every bit. The first eight bytes of its SHA-256
-//! hash precede the text, so a text that was truncated or edited by hand is refused. The hash protects against damage,
+//! hash precede the text, so a text that was truncated or edited by hand is rejected. The hash protects against damage,
 //! not against deliberate forgery.
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     AnalysisError,
-    quality::{Of, findings_of_quality},
+    quality::{SystemKind, findings_of_quality},
     recordings::Recordings,
 };
 
@@ -138,7 +138,7 @@ impl Tracking {
         let rows = self.averaged_rows(every, record)?;
         let trace: Trace = trace.moving_average(rows);
         let verdict = trace.verdict(record, choice.as_ref())?;
-        let verdict = verdict.prepend(findings_of_quality(account, record, Of::Person));
+        let verdict = verdict.prepend(findings_of_quality(account, record, SystemKind::Person));
         let verdict = verdict.append(data.element_finding(used.controlled_element.as_ref(), None));
         let inputs: Vec<&str> = used.further.iter().map(|further| further.channel.as_str()).collect();
         let verdict = verdict.append(data.display_finding(&inputs));

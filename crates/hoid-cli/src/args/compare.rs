@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use hoid::design::compare::{Adjustment, Covariate, Factor, Quantity, Weights};
 
-use super::{choices::choice_parser, figure::FigureArgs, show::ShowArgs};
+use super::{choices::choice_parser, figure::FigureArgs, output_options::ShowArgs};
 
 #[derive(Debug, Args)]
 pub struct CompareArgs {

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use hoid::io::readable_extensions;
 use hoid::model::{ContinuousTransferFunction, discretise};
 
-use super::look::LookArgs;
+use super::examination::ExaminationArgs;
 use crate::orders::parse_numbers;
 
 #[derive(Debug, Args)]
@@ -14,7 +14,7 @@ pub struct InfoArgs {
     #[arg(value_name = "FILE", help = format!("File to inspect: {}", readable_extensions()))]
     pub file: PathBuf,
     #[command(flatten)]
-    pub look: LookArgs,
+    pub examination: ExaminationArgs,
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,

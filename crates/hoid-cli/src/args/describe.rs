@@ -9,8 +9,8 @@ use hoid::model::ContinuousTransferFunction;
 
 use super::{
     figure::FigureArgs,
+    output_options::ShowArgs,
     reading::{FaultArgs, MaskArgs, ReadArgs},
-    show::ShowArgs,
 };
 
 #[derive(Debug, Args)]

@@ -8,7 +8,7 @@ use hoid::design::experiment::{
 };
 use hoid::model::{ContinuousTransferFunction, Form, family_scenario::Display};
 
-use super::{choices::choice_parser, figure::FigureArgs, parse::parse_span, show::ShowArgs};
+use super::{choices::choice_parser, figure::FigureArgs, output_options::ShowArgs, parse::parse_span};
 
 #[derive(Debug, Args)]
 pub struct DesignArgs {

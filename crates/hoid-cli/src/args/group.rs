@@ -7,7 +7,10 @@ use hoid::model::{Form, scenario::Condition};
 use hoid::sim::people::{Plant, RemnantKind};
 use hoid::study::group::{ConditionElement, SamplingDefect};
 
-use super::{choices::choice_parser, figure::FigureArgs, look::LookArgs, parse::parse_span, show::ShowArgs};
+use super::{
+    choices::choice_parser, examination::ExaminationArgs, figure::FigureArgs, output_options::ShowArgs,
+    parse::parse_span,
+};
 
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -61,7 +64,7 @@ pub struct GroupInitArgs {
     #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
     pub pattern: String,
     #[command(flatten)]
-    pub look: LookArgs,
+    pub examination: ExaminationArgs,
     /// Controlled element of the named conditions (* matches all); if it changes, also the new element, the time in s
     /// and the rate G in 1/s (without G: sudden). May be repeated
     #[arg(

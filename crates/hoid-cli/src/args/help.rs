@@ -1,8 +1,8 @@
-//! Help pages: `hoid -h` lists the commands by what they are for; `hoid COMMAND -h` shows the
+//! Help pages: `hoid -h` lists the commands by purpose; `hoid COMMAND -h` shows the
 //! options that most people need, under headings, and two examples; `--help` shows everything.
 //!
-//! The tables here hold names of commands and options alone: what an option does is reported where
-//! it is defined. A test holds them to the definitions, and parses every example.
+//! The tables here contain only names of commands and options; the help text of an option is in its
+//! definition. A test compares the tables with the definitions and parses every example.
 
 use clap::{Arg, Command, CommandFactory};
 
@@ -280,7 +280,7 @@ const COMMAND_HELP: [Help; 19] = [
     },
 ];
 
-/// The headings of options that several commands share; what is left is under the model.
+/// Headings of options that several commands share; other options are under the model.
 const OPTION_HEADINGS: [(&str, &[&str]); 2] = [
     (
         "Data",

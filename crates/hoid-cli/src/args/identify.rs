@@ -17,10 +17,10 @@ use hoid::model::{Structure, remnant::RemnantDiscretisation};
 use super::{
     choices::choice_parser,
     figure::FigureArgs,
+    output_options::ShowArgs,
     parse::parse_horizon,
     reading::{FaultArgs, MaskArgs, ReadArgs},
     settings::{BatchEstimators, SettingArgs},
-    show::ShowArgs,
 };
 
 #[derive(Debug, Args)]

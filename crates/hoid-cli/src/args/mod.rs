@@ -8,14 +8,14 @@
 //! | `describe` | `hoid describe` |
 //! | `recursion`, `settings`, `udp` | `hoid track`, `hoid stream`; the options of the methods, from the registry |
 //! | `reading` | all commands that read records |
-//! | `look` | what `hoid info` and `hoid group init` look for in files |
+//! | `examination` | what `hoid info` and `hoid group init` look for in files |
 //! | `convert` | `hoid convert`, `hoid info` |
 //! | `fmu` | `hoid fmu` |
 //! | `figure` | figures as files |
-//! | `show` | how results are shown |
+//! | `output_options` | how results are shown |
 //! | `lab` | `hoid lab` |
 //! | `shell` | `hoid completions`, `hoid man` |
-//! | `help` | all commands: what `-h` shows, headings, examples |
+//! | `help` | all commands: contents of `-h`, headings, examples |
 //! | `compare`, `design` | `hoid compare`, `hoid design` |
 //! | `group`, `study` | `hoid group`, `hoid simulate-group`; `hoid study`, `hoid reproduce` |
 
@@ -25,19 +25,19 @@ mod compare;
 mod convert;
 mod describe;
 mod design;
+mod examination;
 mod figure;
 mod fmu;
 mod group;
 mod help;
 mod identify;
 mod lab;
-mod look;
+mod output_options;
 mod parse;
 mod reading;
 mod recursion;
 mod settings;
 mod shell;
-mod show;
 mod simulate;
 mod study;
 mod udp;
@@ -52,6 +52,7 @@ pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGr
 pub use help::command;
 pub use identify::IdentifyArgs;
 pub use lab::LabArgs;
+pub use output_options::ShowArgs;
 pub use parse::parse_span;
 pub use reading::{MaskArgs, ReadArgs};
 pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};
@@ -59,7 +60,6 @@ pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};
 pub use settings::with_settings;
 pub use settings::{as_text, flag, methods_with};
 pub use shell::{CompletionsArgs, ManArgs};
-pub use show::ShowArgs;
 pub use simulate::{DemoArgs, MarginsArgs, ScenarioChoice, SimulateArgs, StateName};
 pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};
 pub use udp::UdpAddresses;

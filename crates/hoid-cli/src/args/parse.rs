@@ -27,14 +27,14 @@ pub fn parse_width(text: &str) -> Result<f64, String> {
         })
 }
 
-/// Most samples ahead of a prediction that is judged.
+/// Longest prediction horizon, samples.
 const MAX_HORIZON: usize = 1_000_000;
 
-/// A number of samples ahead.
+/// Parses a prediction horizon in samples.
 pub fn parse_horizon(text: &str) -> Result<usize, String> {
     let samples = text.trim().parse().ok().filter(|k| (1..=MAX_HORIZON).contains(k));
     samples.ok_or_else(|| {
-        format!("{text:?} is not a number of samples ahead; write a whole number from 1 to {MAX_HORIZON}")
+        format!("{text:?} is not a prediction horizon; write a number of samples from 1 to {MAX_HORIZON}")
     })
 }
 

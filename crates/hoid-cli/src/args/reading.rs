@@ -21,7 +21,8 @@ pub struct ReadArgs {
     /// Output column (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
-    /// Time column, and its unit if it is not recognised: s, ms, us, ns, min, h, days, iso (dates and times), sec+nanosec
+    /// Time column, and its unit if it is not recognised: s, ms, us, ns, min, h, days, iso (dates and times),
+    /// sec+nanosec
     /// [default: t, or a column recognised as time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
@@ -119,8 +120,8 @@ pub struct DecimateArgs {
 }
 
 impl DecimateArgs {
-    /// Processing for an estimator; what counts samples is not decimated automatically.
-    pub fn of(self, counts_samples: bool) -> Decimation {
+    /// Returns the decimation for an estimator. Estimators whose orders count samples are not decimated automatically.
+    pub fn decimation(self, counts_samples: bool) -> Decimation {
         if counts_samples {
             self.decimate.explicit_only()
         } else {
@@ -129,7 +130,7 @@ impl DecimateArgs {
     }
 }
 
-/// Parts that are left out of a record.
+/// Parts that are omitted from a record.
 #[derive(Debug, Args)]
 pub struct MaskArgs {
     /// Cut these sampling problems out of the record (see `hoid info`); each segment has its own initial states
@@ -149,7 +150,7 @@ pub struct FaultArgs {
     pub faults: FaultHandling,
 }
 
-/// `NAME=VALUE`; the name may hold `=` no more than a column may.
+/// `NAME=VALUE`; neither a name nor a column may contain `=`.
 fn parse_pair(text: &str) -> Result<(String, &str), String> {
     let (name, value) = text
         .rsplit_once('=')

@@ -17,8 +17,8 @@ use hoid::thesis::comparators;
 use hoid::track::Method;
 
 use super::{
-    ReadArgs, choices::choice_parser, figure::FigureArgs, parse_span, reading::DecimateArgs, settings::SettingArgs,
-    show::ShowArgs, udp::UdpAddresses,
+    ReadArgs, choices::choice_parser, figure::FigureArgs, output_options::ShowArgs, parse_span, reading::DecimateArgs,
+    settings::SettingArgs, udp::UdpAddresses,
 };
 
 /// The tracked signal, and how.

@@ -1,5 +1,5 @@
-//! `hoid compare`: differences between conditions and people, from recordings with their manifest or from the results of
-//! a group.
+//! `hoid compare`: differences between conditions and people, from recordings with their manifest or from the results
+//! of a group.
 
 use std::path::Path;
 

@@ -4,7 +4,7 @@
 use hoid::ident::family::family_from_polynomials;
 use hoid::model::{
     ContinuousTransferFunction, DiscreteOperator, GainUnit, OperatorParameters, Orders, PolynomialModel, SampleTime,
-    Structure, discretise::discretise, second_order::HeldSecondOrder, uncertainty::OperatorEstimate,
+    Structure, discretise::discretise, second_order::ZohSecondOrder, uncertainty::OperatorEstimate,
 };
 use hoid::report::numbers;
 use serde_json::{Map, Value, json};
@@ -24,7 +24,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
     let (discrete, operator) = match (&args.f, &args.b, &args.operator) {
         (Some(f), Some(b), _) => {
             let discrete = DiscreteOperator {
-                held: HeldSecondOrder {
+                zoh: ZohSecondOrder {
                     b0: b[0],
                     b1: b[1],
                     f1: f[0],
@@ -46,7 +46,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
             ));
         }
     };
-    let held = discrete.held;
+    let held = discrete.zoh;
     if args.json {
         let operator = match operator {
             Ok(o) => {

@@ -254,7 +254,7 @@ fn write_stage_report(args: &DemoArgs, stages: &[Stage]) -> Result<PathBuf, CliE
             setting("hoid", env!("CARGO_PKG_VERSION").to_owned()),
         ],
         models,
-        answer: None,
+        fit_summary: None,
         pictures: Vec::new(),
         notes: vec![
             "Before: 0 to 30.72 s. After: 51.20 to 81.92 s. Delay and order of the noise model are searched for \

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use hoid::design::experiment::{
-    DesignOptions, DesignRequest, DifferencePlan, DifferenceRequest, Enters, Expected, ExpectedQuantity,
+    DesignOptions, DesignRequest, DifferencePlan, DifferenceRequest, EntryPoint, Expected, ExpectedQuantity,
     ExperimentDesign, Remnant, SpreadSource,
 };
 use hoid::model::numbers::{DASH, count_with_noun};
@@ -55,9 +55,9 @@ fn request(args: &DesignArgs) -> DesignRequest {
         controlled_element: args.controlled_element.clone(),
         form: args.form,
         enters: if args.disturbance {
-            Enters::Disturbance
+            EntryPoint::Disturbance
         } else {
-            Enters::Target
+            EntryPoint::Target
         },
         remnant: Remnant {
             share: args.remnant_share,
@@ -65,13 +65,13 @@ fn request(args: &DesignArgs) -> DesignRequest {
             ..Remnant::default()
         },
         designing: DesignOptions {
-            wanted: args.wanted.clone(),
+            requested_quantities: args.wanted.clone(),
             period_s: args.length,
             lines: args.lines,
             spacing: args.spacing,
             band_rad_s: args.band,
             shelf: args.shelf,
-            most_rms: [args.max_rms_e, args.max_u],
+            max_rms: [args.max_rms_e, args.max_u],
             seed: args.seed,
             ..DesignOptions::default()
         },
@@ -126,7 +126,7 @@ fn page(found: &ExperimentDesign, verbose: bool) -> String {
         error_table(found),
         signal_sizes(found)
     );
-    page.push_str(&needed_runs(found));
+    page.push_str(&required_runs(found));
     if let Some(plan) = &found.difference {
         page.push_str(&difference_text(plan));
     }
@@ -216,7 +216,7 @@ fn signal_sizes(found: &ExperimentDesign) -> String {
 }
 
 /// Returns a sentence with the number of runs needed to reach the accepted errors of the requested quantities.
-fn needed_runs(found: &ExperimentDesign) -> String {
+fn required_runs(found: &ExperimentDesign) -> String {
     if found.wanted.is_empty() {
         return String::new();
     }

@@ -126,7 +126,7 @@ fn library_path() -> Result<PathBuf, CliError> {
     let folder = program.parent().unwrap_or(Path::new("."));
     let (prefix, suffix) = (env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX);
     let places = ["hoid", "hoid_ffi"].map(|name| folder.join(format!("{prefix}{name}{suffix}")));
-    let found = places.iter().find(|place| place.is_file()).cloned();
+    let found = places.iter().find(|location| location.is_file()).cloned();
     found.ok_or_else(|| {
         CliError::Usage(format!(
             "there is no {prefix}hoid{suffix} in {}; build it with cargo xtask ffi, and name it with --library",

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use crate::{args::InfoArgs, error::CliError, json, output, text};
 
 pub fn run(args: &InfoArgs) -> Result<(), CliError> {
-    let look = FileExamination::at(&args.file, &args.look.to_options())?;
+    let look = FileExamination::at(&args.file, &args.examination.to_options())?;
     let file = args.file.display().to_string();
     let faults = find_faults(&look);
     if args.json {
@@ -37,14 +37,14 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
 
 /// Returns the faults of e and u; empty if the file does not contain a valid record of both.
 fn find_faults(look: &FileExamination) -> Vec<Fault> {
-    let seen = look.seen.as_ref().ok();
+    let seen = look.summary.as_ref().ok();
     let repaired = seen.and_then(|seen| repair(&seen.record, FaultHandling::Report).ok());
     repaired.map_or_else(Vec::new, |repaired| repaired.faults)
 }
 
 /// Returns the layout of the file and the next command to use.
 fn layout_and_next_command(look: &FileExamination, file: &str) -> String {
-    let role = |role: &Role| format!("{} ({})", role.column, role.why);
+    let role = |role: &Role| format!("{} ({})", role.column, role.reason);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
     // The printed table of columns already gives the units that it found.
     let has_unit = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
@@ -57,25 +57,25 @@ fn layout_and_next_command(look: &FileExamination, file: &str) -> String {
     if !units.is_empty() {
         rows.push(("units", units.join(", ")));
     }
-    match &look.seen {
+    match &look.summary {
         Ok(seen) => {
             let periods = seen.periods.as_ref();
             rows.push((
                 "excitation",
-                periods.map_or_else(String::clone, |found| found.words.clone()),
+                periods.map_or_else(String::clone, |found| found.description.clone()),
             ));
             let lag = seen.lag.as_ref().map(|lag| lag.as_ref());
-            rows.extend(lag.map(|lag| ("lateness", lag.map_or_else(String::clone, |lag| lag.words.clone()))));
+            rows.extend(lag.map(|lag| ("lateness", lag.map_or_else(String::clone, |lag| lag.evidence.clone()))));
         }
         Err(reason) => rows.push(("no record", reason.to_string())),
     }
-    let mut text = "\nWhat the record looks like:\n".to_owned();
+    let mut text = "\nRecord summary:\n".to_owned();
     for (name, words) in rows {
         text.push_str(&format!("  {name:10}  {words}\n"));
     }
     text.push_str(&match look.advice() {
         Some(advice) => {
-            let repaired = if look.seen.is_ok() {
+            let repaired = if look.summary.is_ok() {
                 ""
             } else {
                 ", with the remedy above"
@@ -91,12 +91,12 @@ fn layout_and_next_command(look: &FileExamination, file: &str) -> String {
 
 /// Returns the survey as a JSON object.
 fn survey_json(look: &FileExamination, file: &str) -> Value {
-    let role = |role: &Role| json!({"column": role.column, "why": role.why, "certain": role.certain});
-    let seen = look.seen.as_ref().ok();
+    let role = |role: &Role| json!({"column": role.column, "why": role.reason, "certain": role.is_certain});
+    let seen = look.summary.as_ref().ok();
     let excitation = match seen.map(|seen| &seen.periods) {
         Some(Ok(found)) => json!({
             "column": found.channel,
-            "why": found.words,
+            "why": found.description,
             "period_s": json::number(found.period_s),
             "from_s": json::number(found.span_s.0),
             "to_s": json::number(found.span_s.1),
@@ -106,7 +106,7 @@ fn survey_json(look: &FileExamination, file: &str) -> Value {
         None => Value::Null,
     };
     let lateness = match seen.and_then(|seen| seen.lag.as_ref()) {
-        Some(Ok(lag)) => json!({"samples": lag.samples, "seconds": json::number(lag.seconds), "why": lag.words}),
+        Some(Ok(lag)) => json!({"samples": lag.samples, "seconds": json::number(lag.seconds), "why": lag.evidence}),
         Some(Err(reason)) => json!({"samples": null, "seconds": null, "why": reason}),
         None => Value::Null,
     };
@@ -116,7 +116,7 @@ fn survey_json(look: &FileExamination, file: &str) -> Value {
         "units": look.units().into_iter().collect::<BTreeMap<_, _>>(),
         "excitation": excitation,
         "lateness": lateness,
-        "no_record": look.seen.as_ref().err().map(ToString::to_string),
+        "no_record": look.summary.as_ref().err().map(ToString::to_string),
         "next": look.advice().map(|advice| advice.command("identify", file)),
     })
 }

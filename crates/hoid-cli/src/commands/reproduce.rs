@@ -64,14 +64,14 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
             args.out.display()
         )));
     };
-    if let Some([hold, more_so, in_part, not, untestable]) = found.tally {
+    if let Some([hold, more_so, in_part, not, untestable]) = found.verdict_counts {
         output::print(&format!(
-            "{} claims: {hold} hold, {more_so} hold and more so, {in_part} hold in part, {not} do not hold, \
+            "{} claims: {hold} hold, {more_so} hold more strongly, {in_part} hold in part, {not} do not hold, \
              {untestable} cannot be tested\n",
             hold + more_so + in_part + not + untestable
         ))?;
     }
-    let (simulated_s, drawn_s) = (found.simulated_s, found.drawn_s);
+    let (simulated_s, drawn_s) = (found.simulation_time_s, found.drawing_time_s);
     output::print(&format!(
         "{} tables and figures in {:.1} s: {simulated_s:.1} s for the studies, {drawn_s:.1} s for drawing\n  {}\n",
         found.items,

@@ -181,7 +181,7 @@ fn description(plan: &Plan) -> String {
         text.push_str(&format!("{}\n", plan.description.trim()));
     }
     text.push_str(&format!(
-        "seed {}, {} replications, {} cells, {} estimators, {} estimates in all\n",
+        "seed {}, {} replications, {} cells, {} estimators, {} estimates in total\n",
         plan.seed,
         plan.replications,
         plan.cells.len(),

@@ -45,7 +45,7 @@ struct Row {
     cell: String,
     estimator: String,
     /// Number of estimates.
-    all: f64,
+    estimate_count: f64,
     /// Share of estimates that failed; `not_convertible` is the share that could not be converted to an operator.
     failed: f64,
     not_convertible: f64,
@@ -74,7 +74,7 @@ fn summary_text(summary: &OutputTable) -> String {
         let known = rows
             .iter()
             .position(|row| row.cell == cell[i] && row.estimator == estimator[i]);
-        let place = known.unwrap_or_else(|| {
+        let index = known.unwrap_or_else(|| {
             rows.push(Row {
                 cell: cell[i].clone(),
                 estimator: estimator[i].clone(),
@@ -83,9 +83,9 @@ fn summary_text(summary: &OutputTable) -> String {
             });
             rows.len() - 1
         });
-        let row = &mut rows[place];
+        let row = &mut rows[index];
         match quantity[i].as_str() {
-            "failed" => (row.all, row.failed) = (count[i], mean[i]),
+            "failed" => (row.estimate_count, row.failed) = (count[i], mean[i]),
             "not_convertible" => row.not_convertible = mean[i],
             "trustworthy" => row.trustworthy = Some(mean[i]),
             quantity => {
@@ -106,7 +106,7 @@ fn summary_text(summary: &OutputTable) -> String {
     headings.extend(&shown);
     let mut table = text::table(&headings);
     for row in rows.iter().take(MAX_ROWS) {
-        let of_all = |rate: f64| format!("{}/{}", (rate * row.all).round(), row.all);
+        let of_all = |rate: f64| format!("{}/{}", (rate * row.estimate_count).round(), row.estimate_count);
         let mut cells = vec![row.cell.clone(), row.estimator.clone()];
         cells.push(of_all(1.0 - row.failed - row.not_convertible));
         if verdicts {

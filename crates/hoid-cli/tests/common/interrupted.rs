@@ -113,13 +113,13 @@ impl Bench {
     }
 
     /// Returns the command whose results are written to a place.
-    pub fn command(&self, work: &Work, place: &Path) -> Command {
+    pub fn command(&self, work: &Work, location: &Path) -> Command {
         let mut command = Command::new(&self.program);
         command.args(work.arguments).args(work.resume).arg("--out");
         command.arg(if work.out.is_empty() {
-            place.to_owned()
+            location.to_owned()
         } else {
-            place.join(work.out)
+            location.join(work.out)
         });
         command.current_dir(&self.at);
         command

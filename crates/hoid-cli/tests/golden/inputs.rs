@@ -37,7 +37,7 @@ fn run_successfully(at: &Path, command: &str) -> Vec<u8> {
 fn modify_table(text: &str, input: &Input) -> String {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let places: Vec<usize> = input
+    let indices: Vec<usize> = input
         .columns
         .iter()
         .map(|name| names.iter().position(|n| n == name).unwrap())
@@ -45,7 +45,7 @@ fn modify_table(text: &str, input: &Input) -> String {
     let mut rows: Vec<Vec<Option<f64>>> = lines
         .map(|line| {
             let cells: Vec<&str> = line.split(',').collect();
-            places.iter().map(|c| cells[*c].parse().ok()).collect()
+            indices.iter().map(|c| cells[*c].parse().ok()).collect()
         })
         .collect();
     if let Some([from, to]) = input.rows {

@@ -23,7 +23,7 @@ use hoid_numerics::{cholesky, products::dot};
 
 use super::blocks::Block;
 
-type Matrix<const S: usize> = [[f64; S]; S];
+pub(super) type Matrix<const S: usize> = [[f64; S]; S];
 
 /// Number of blocks over which each score is summed.
 const BLOCKS_PER_SCORE: usize = 2;
@@ -86,26 +86,17 @@ impl<const S: usize> Contrast<S> {
             return None;
         };
         let solutions = [before, now];
-        let (mut squares, mut stretches) = ([[0.0; S]; S], 0.0);
+        let mut scores = Scores::default();
         for (blocks, solution) in sides.iter().zip(&solutions) {
-            for stretch in blocks.rchunks_exact(BLOCKS_PER_SCORE) {
-                let score = Block::of(stretch).score(&solution.state);
-                for (row, a) in squares.iter_mut().zip(score) {
-                    row.iter_mut().zip(score).for_each(|(s, b)| *s += a * b);
-                }
-                stretches += 1.0;
-            }
+            scores.add(blocks, &solution.state);
         }
-        let free = (1.0 - (S + 3) as f64 / stretches).max(MIN_DIVISOR);
         let samples = sums.map(|s| s.samples);
         let all = samples[0] + samples[1];
         let residual_squares = before.residual_squares + now.residual_squares;
         let variance = residual_squares / (all - 2.0 * S as f64).max(1.0);
         let [covariance_before, covariance_now] = core::array::from_fn(|side| {
-            let (matrix, inverse) = (sums[side].matrix(), &solutions[side].inverse);
-            let share = empirical_share * samples[side] / (all * free);
-            let model = (1.0 - empirical_share) * variance;
-            let of_score = matrix_from_fn(|i, j| share * squares[i][j] + model * matrix[i][j]);
+            let inverse = &solutions[side].inverse;
+            let of_score = scores.covariance(&sums[side], all, empirical_share, variance);
             matrix_product(&matrix_product(inverse, &of_score), inverse)
         });
         Some(Self {
@@ -164,16 +155,60 @@ impl<const S: usize> Contrast<S> {
     }
 }
 
+/// Sum of the squares `g_k g_k'` of the scores of stretches of one second, and the number of stretches.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scores<const S: usize> {
+    squares: Matrix<S>,
+    stretches: f64,
+}
+
+impl<const S: usize> Default for Scores<S> {
+    fn default() -> Self {
+        Self {
+            squares: [[0.0; S]; S],
+            stretches: 0.0,
+        }
+    }
+}
+
+impl<const S: usize> Scores<S> {
+    /// Adds the scores of a span at its least-squares solution.
+    pub fn add<const P: usize>(&mut self, blocks: &[Block<S, P>], state: &[f64; S]) {
+        for stretch in blocks.rchunks_exact(BLOCKS_PER_SCORE) {
+            let score = Block::of(stretch).score(state);
+            for (row, a) in self.squares.iter_mut().zip(score) {
+                row.iter_mut().zip(score).for_each(|(s, b)| *s += a * b);
+            }
+            self.stretches += 1.0;
+        }
+    }
+
+    /// Covariance W of the score of a span with the given sums. `samples` is the number n of samples that the scores
+    /// come from, `empirical_share` is w, and `variance` is sigma^2.
+    pub fn covariance<const P: usize>(
+        &self,
+        sums: &Block<S, P>,
+        samples: f64,
+        empirical_share: f64,
+        variance: f64,
+    ) -> Matrix<S> {
+        let free = (1.0 - (S + 3) as f64 / self.stretches).max(MIN_DIVISOR);
+        let share = empirical_share * sums.samples / (samples * free);
+        let (model, matrix) = ((1.0 - empirical_share) * variance, sums.matrix());
+        matrix_from_fn(|i, j| share * self.squares[i][j] + model * matrix[i][j])
+    }
+}
+
 fn matrix_from_fn<const S: usize>(of: impl Fn(usize, usize) -> f64) -> Matrix<S> {
     core::array::from_fn(|i| core::array::from_fn(|j| of(i, j)))
 }
 
-fn matrix_product<const S: usize>(a: &Matrix<S>, b: &Matrix<S>) -> Matrix<S> {
+pub(super) fn matrix_product<const S: usize>(a: &Matrix<S>, b: &Matrix<S>) -> Matrix<S> {
     matrix_from_fn(|i, j| (0..S).map(|k| a[i][k] * b[k][j]).sum())
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
     use crate::adaptive::{
@@ -198,7 +233,7 @@ mod tests {
 
     /// Returns blocks whose regressors and noise are first-order processes, with the pole 0.8 for the regressors and
     /// the given pole for the noise.
-    fn blocks(
+    pub fn blocks(
         count: usize,
         state: &[f64; STATE_COUNT],
         noise_pole: f64,

@@ -8,11 +8,14 @@
 //! `T = d' C^-1 d`
 //!
 //! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change, and four more for each further
-//! input (G. C. Chow, *Econometrica* 28 (1960) 591-605). T is computed for a short and for a long present, since small changes take more data to detect than
-//! large ones. One second between past and present is left out, since a change need not coincide with the border of a
+//! input (G. C. Chow, *Econometrica* 28 (1960) 591-605). T is computed for a short and for a long present, since small
+//! changes take more data to detect than large ones. One second between past and present is left out, since a change need not coincide with the border of a
 //! block.
-//! All responses are tested together: within a few seconds the data show that u is predicted worse, but hardly by which
-//! input, so the response to one input alone, with the others free, would be tested with little power.
+//!
+//! A third statistic, for the short present, supposes that only gain and lead change (`gain_and_lead`). It has 2 degrees
+//! of freedom. With further inputs there is such a statistic for each response. A statistic of all parameters of one
+//! response, with those of the others free, would have little power: a few seconds of data show that u is predicted
+//! worse, but hardly which response changed.
 //!
 //! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, the level
 //! of T relative to a chi-square in the absence of a change. c is estimated from the mean of `ln T`, whose expected
@@ -23,7 +26,9 @@
 //!
 //! (M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5).
 //!
-//! **Declaration.** A change is declared if one of the statistics exceeds the threshold. The time of the change is
+//! **Declaration.** A change is declared if one of the statistics exceeds the threshold. The significance of gain and
+//! lead is first multiplied by 1.9: in recordings of pilots without a change, 8 nats of it are about as rare as 15 nats
+//! of the test of all parameters, whose covariance is less certain. The time of the change is
 //! the block border that gives the smallest residual sum of squares when all parameters are free before and after it
 //! (R. E. Quandt, *J. American Statistical Association* 53 (1958) 873-880).
 //!
@@ -34,12 +39,15 @@ use super::{
     blocks::Block,
     contrast::{Contrast, EMPIRICAL_WEIGHT, MODEL_ONLY_WEIGHT},
     difference::Difference,
+    gain_and_lead,
     last_blocks::{BLOCK_S, LastBlocks, MAX_BLOCKS},
-    sizes::{DYNAMICS_COUNT, GAIN_COUNT, correction_places, input_count},
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, correction_places},
 };
 
 /// Expected value of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
 const MEAN_LOG_CHI_SQUARE: f64 = 0.115_931_515_658_412_45;
+/// Factor of the log significance of the statistics of gain and lead.
+const GAIN_AND_LEAD_FACTOR: f64 = 1.9;
 /// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
 /// Minimum number of blocks in a present that starts after a gap.
@@ -123,10 +131,12 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
 
 /// Detector of changes of the operator.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Detector<const S: usize> {
+pub struct Detector<const I: usize, const S: usize> {
     settings: DetectorSettings,
-    /// Statistics for the short and for the long present.
+    /// Statistics of all parameters, for the short and for the long present.
     statistics: [Statistic; 2],
+    /// Statistics of gain and lead of each input.
+    gain_and_lead: [Statistic; I],
     /// Number of blocks since the last change was declared.
     since: u64,
     declared: bool,
@@ -136,9 +146,9 @@ pub struct Detector<const S: usize> {
     ago: usize,
 }
 
-crate::state!([const S: usize] Detector<S> { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
+crate::state!([const I: usize, const S: usize] Detector<I, S> { statistics, gain_and_lead, since, declared, declared_contrast, innovation_variances, difference, ago });
 
-impl<const S: usize> Detector<S> {
+impl<const I: usize, const S: usize> Detector<I, S> {
     /// Number of pairs of degrees of freedom of the statistic: gains and dynamics are tested, but not the level.
     const PAIR_COUNT: u32 = (S as u32 - 1) / 2;
 
@@ -152,6 +162,7 @@ impl<const S: usize> Detector<S> {
         (room && sound).then_some(Self {
             settings,
             statistics: [Statistic::new(Self::PAIR_COUNT); 2],
+            gain_and_lead: [Statistic::new(1); I],
             since: u64::MAX >> 12,
             declared: false,
             declared_contrast: Contrast::default(),
@@ -161,8 +172,14 @@ impl<const S: usize> Detector<S> {
         })
     }
 
-    /// Tests the stored blocks; the last one is new. `mean` is the current state, in the basis of the blocks.
-    pub(super) fn test<const P: usize>(&mut self, last: &LastBlocks<S, P>, mean: &[f64; S]) {
+    /// Tests the stored blocks; the last one is new. `mean` is the current state, in the basis of the blocks, and
+    /// `gain_and_lead` contains the directions of gain and lead of each input in that basis.
+    pub(super) fn test<const P: usize>(
+        &mut self,
+        last: &LastBlocks<S, P>,
+        mean: &[f64; S],
+        gain_and_lead: &[[[f64; GAIN_COUNT]; 2]; I],
+    ) {
         self.declared = false;
         self.since += 1;
         // Blocks recorded before the last declared change belong to another operator and are not used.
@@ -171,10 +188,25 @@ impl<const S: usize> Detector<S> {
             .len()
             .min(usize::try_from(self.since).unwrap_or(MAX_BLOCKS) + self.ago);
         let blocks = &last.blocks()[last.blocks().len() - known..];
-        for present in 0..self.statistics.len() {
-            match self.wald_statistic(blocks, last.fresh_block_count(), mean, present) {
-                Some(t) => self.statistics[present].update(t),
-                None => self.statistics[present].log_significance = 0.0,
+        let fresh = last.fresh_block_count();
+        let [short, long] = self.settings.recent.map(|recent| self.spans(blocks, fresh, recent));
+        let deviations = self.deviations();
+        let all = |sides| {
+            self.compare(sides, EMPIRICAL_WEIGHT, mean)?
+                .wald_statistic(|i| i != GAIN_COUNT)
+        };
+        let of_gain_and_lead = |input: usize| {
+            gain_and_lead::wald_statistic(short?, input, gain_and_lead[input], |sum| {
+                sum.with_prior(mean, &deviations)
+            })
+        };
+        let values = [short.and_then(all), long.and_then(all)];
+        let of_inputs: [Option<f64>; I] = core::array::from_fn(of_gain_and_lead);
+        let statistics = self.statistics.iter_mut().chain(&mut self.gain_and_lead);
+        for (statistic, value) in statistics.zip(values.into_iter().chain(of_inputs)) {
+            match value {
+                Some(t) => statistic.update(t),
+                None => statistic.log_significance = 0.0,
             }
         }
         if self.log_significance() > self.settings.threshold && self.since > self.settings.refractory {
@@ -185,26 +217,19 @@ impl<const S: usize> Detector<S> {
         }
     }
 
-    /// Statistic T for a given length of the present; `None` if there are too few blocks.
-    fn wald_statistic<const P: usize>(
+    /// Returns the blocks of the past and of a present of the given length; `None` if there are too few blocks.
+    fn spans<'b, const P: usize>(
         &self,
-        blocks: &[Block<S, P>],
+        blocks: &'b [Block<S, P>],
         fresh: usize,
-        mean: &[f64; S],
-        present: usize,
-    ) -> Option<f64> {
-        let DetectorSettings {
-            recent, least, most, ..
-        } = self.settings;
-        let recent_blocks = recent[present].min(fresh);
-        let now = blocks.len().saturating_sub(recent_blocks);
+        recent: usize,
+    ) -> Option<[&'b [Block<S, P>]; 2]> {
+        let DetectorSettings { least, most, .. } = self.settings;
+        let enough = MIN_BLOCKS_AFTER_GAP.min(self.settings.recent[0]);
+        let recent = recent.min(fresh);
+        let now = blocks.len().saturating_sub(recent);
         let before = now.saturating_sub(GUARD_BLOCKS);
-        if before < least || recent_blocks < MIN_BLOCKS_AFTER_GAP.min(recent[0]) {
-            return None;
-        }
-        let sides = [&blocks[before.saturating_sub(most)..before], &blocks[now..]];
-        self.compare(sides, EMPIRICAL_WEIGHT, mean)?
-            .wald_statistic(|i| i != GAIN_COUNT)
+        (before >= least && recent >= enough).then(|| [&blocks[before.saturating_sub(most)..before], &blocks[now..]])
     }
 
     /// Locates the change at the block border with the smallest residual sum of squares. The difference is reported
@@ -234,6 +259,17 @@ impl<const S: usize> Detector<S> {
         self.difference = Difference::of(&self.declared_contrast).unwrap_or_default();
     }
 
+    /// Returns the prior standard deviations of the corrections, in their places in the state.
+    fn deviations(&self) -> [f64; S] {
+        let mut deviations = [0.0; S];
+        for input in 0..I {
+            for (place, deviation) in correction_places(input).into_iter().zip(self.settings.dynamics) {
+                deviations[place] = deviation;
+            }
+        }
+        deviations
+    }
+
     /// Computes the difference of all states between two spans.
     fn compare<const P: usize>(
         &self,
@@ -241,12 +277,7 @@ impl<const S: usize> Detector<S> {
         empirical_share: f64,
         mean: &[f64; S],
     ) -> Option<Contrast<S>> {
-        let mut deviations = [0.0; S];
-        for input in 0..input_count(S) {
-            for (place, deviation) in correction_places(input).into_iter().zip(self.settings.dynamics) {
-                deviations[place] = deviation;
-            }
-        }
+        let deviations = self.deviations();
         Contrast::from_spans(sides, empirical_share, |sum| sum.with_prior(mean, &deviations))
     }
 
@@ -255,14 +286,19 @@ impl<const S: usize> Detector<S> {
         self.ago as f64 * BLOCK_S
     }
 
-    /// Returns the log significance in nats at the last block: the larger of the two statistics, or zero while there
-    /// are too few blocks.
+    /// Returns the log significance in nats at the last block: the largest of the statistics, where that of gain and
+    /// lead counts 1.9 times; zero while there are too few blocks.
     pub fn log_significance(&self) -> f64 {
-        self.statistics.iter().fold(0.0, |most, s| s.log_significance.max(most))
+        let all = self.statistics.iter().map(|s| s.log_significance);
+        let of_gain_and_lead = self
+            .gain_and_lead
+            .iter()
+            .map(|s| GAIN_AND_LEAD_FACTOR * s.log_significance);
+        all.chain(of_gain_and_lead).fold(0.0, |most, s| s.max(most))
     }
 
-    /// Returns the typical ratio of T to a chi-square in the absence of a change: the larger of the ratios for the two
-    /// statistics.
+    /// Returns the typical ratio of T of all parameters to a chi-square in the absence of a change: the larger of the
+    /// ratios for the short and for the long present.
     pub fn typical_level(&self) -> f64 {
         self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }

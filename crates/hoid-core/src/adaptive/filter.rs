@@ -16,7 +16,7 @@ use super::{
     detector::Detector,
     history::{History, SampleUse, ring_count},
     initial_estimate::InitialEstimate,
-    mixture::{Mixture, NoiseScales},
+    mixture::{Mixture, NoiseScales, gain_and_lead_directions},
     noise::NoiseModel,
     prior::{AdaptivePrior, DelayPrior},
     saturation::Saturation,
@@ -66,7 +66,7 @@ pub struct AdaptiveFilter<
     next_sample: u64,
     replays: u64,
     alternatives: Alternatives<I>,
-    detector: Detector<S>,
+    detector: Detector<I, S>,
     history: History<E, I>,
     saturation: Saturation,
     /// Sums of the squares of each input.
@@ -438,7 +438,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: us
 
     /// Step 12: tests the last blocks of the live candidate for a change.
     fn test_for_change(&mut self) {
-        self.detector.test(&self.live.blocks, self.live.mixture.mean());
+        let directions = core::array::from_fn(|input| gain_and_lead_directions(self.basis_of(input)));
+        self.detector
+            .test(&self.live.blocks, self.live.mixture.mean(), &directions);
     }
 
     /// Restarts the recursion after an overflow of a signal.
@@ -529,7 +531,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: us
     }
 
     /// Returns the change detector.
-    pub fn detector(&self) -> &Detector<S> {
+    pub fn detector(&self) -> &Detector<I, S> {
         &self.detector
     }
 

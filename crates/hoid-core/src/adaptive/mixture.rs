@@ -498,7 +498,7 @@ impl<const S: usize> Segments<S> {
 
 /// Directions of a gain K and of a lead K_dot in the space of the gains: `n_0 = K a`, `n_1 = K + K_dot a`,
 /// `n_2 = K_dot`, each divided by the scale of its response. K_dot is in units of K at 2 rad/s.
-fn gain_and_lead_directions(basis: &Basis) -> [[f64; GAIN_COUNT]; 2] {
+pub(super) fn gain_and_lead_directions(basis: &Basis) -> [[f64; GAIN_COUNT]; 2] {
     let (a, [s0, s1, s2]) = (1.0 / basis.point().lag, basis.scale_factors());
     [
         [a / s0, 1.0 / s1, 0.0],

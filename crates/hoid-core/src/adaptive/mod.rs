@@ -34,7 +34,7 @@
 //!     bounded cost per sample.
 //! 12. **Change test** ([`detector`], [`contrast`], [`difference`]). Least-squares fits before and after a possible
 //!     change give `T = d' C^-1 d` (Wald; G. C. Chow, *Econometrica* 28 (1960) 591-605; H. White, *Econometrica* 48
-//!     (1980) 817-838).
+//!     (1980) 817-838). The test of `gain_and_lead` supposes that nothing else changes, and needs fewer data.
 //!
 //! | this module | BLK | filterpy `IMMEstimator` | difference |
 //! |---|---|---|---|
@@ -100,6 +100,7 @@ mod blocks;
 mod candidate;
 mod f64x2;
 mod filter;
+mod gain_and_lead;
 mod history;
 mod hypothesis;
 mod last_blocks;

@@ -29,17 +29,17 @@
 //! floor is a fraction of the mean magnitude of the signal; a smaller outlier has no effect.
 //!
 //! **Held-back samples.** While samples are held back, the signal is continued with its last slope, damped with the
-//! time constant [`SLOPE_TIME_CONSTANT_S`], if the order is 2 or more, and otherwise with its last value. After h samples, the signal
-//! has returned if its distance from the continued value is at most `max(m q_j, floor) + h q_1` with a slope, and
-//! `max(m q_1, floor) sqrt(h + 1)` without a slope.
+//! time constant [`SLOPE_TIME_CONSTANT_S`], if the order is 2 or more, and otherwise with its last value. After h
+//! samples, the signal has returned if its distance from the continued value is at most `max(m q_j, floor) + h q_1`
+//! with a slope, and `max(m q_1, floor) sqrt(h + 1)` without a slope.
 
 /// Number of orders of the backward differences.
 pub const ORDER_COUNT: usize = 4;
 /// Probability that an error exceeds the quantile; `QUANTILE_GAIN` is the gain of the approximation of the quantile.
 const TAIL_PROBABILITY: f64 = 0.01;
 const QUANTILE_GAIN: f64 = 0.05;
-/// Probability that an error exceeds the inner quantile; `INNER_QUANTILE_GAIN` is the gain of the approximation of the inner
-/// quantile.
+/// Probability that an error exceeds the inner quantile; `INNER_QUANTILE_GAIN` is the gain of the approximation of the
+/// inner quantile.
 const INNER_TAIL_PROBABILITY: f64 = 0.1;
 const INNER_QUANTILE_GAIN: f64 = 0.02;
 /// Smallest limit of an error, relative to the quantile; `LARGEST_TAIL_RATIO` is the largest.

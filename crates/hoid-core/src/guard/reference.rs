@@ -10,9 +10,9 @@
 //! distribution, and gives little weight to a few outliers. The innovations of a sound recursion exceed those of a
 //! fixed model by half the effective number of parameters divided by the memory: .2 % for memories of 2 to 5 s and
 //! white innovations. They are larger by several per cent for a few seconds at a time if the order of the noise model
-//! is too low for the remnant, and by more for an unsteady person. Only the part of the logarithm beyond [`TOLERATED_DRIFT`]
-//! counts. The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a diverged estimate when
-//! it reaches [`DIVERGENCE_LIMIT`].
+//! is too low for the remnant, and by more for an unsteady person. Only the part of the logarithm beyond
+//! [`TOLERATED_DRIFT`] counts. The one-sided cumulative sum (E. S. Page, *Biometrika* 41 (1954) 100-115) reports a
+//! diverged estimate when it reaches [`DIVERGENCE_LIMIT`].
 //!
 //! After a change of the person, an estimate that has followed the change predicts u better than the initial model, and
 //! the sum stays at zero.

@@ -2,9 +2,9 @@
 //! channel is a fault.
 //!
 //! A stick with a dead zone rests at its centre, and a stick that is pushed to its end rests there. Such values are
-//! atoms of the distribution of u: u often returns to them and stays there. The last [`MAX_ATOMS`] values at which u stayed
-//! for `MIN_REST_S` or longer are stored, each with the number n of its rests, their total duration S and the duration
-//! l of the longest rest. A constant span of length T is a **rest**, and no fault, if
+//! atoms of the distribution of u: u often returns to them and stays there. The last [`MAX_ATOMS`] values at which u
+//! stayed for `MIN_REST_S` or longer are stored, each with the number n of its rests, their total duration S and the
+//! duration l of the longest rest. A constant span of length T is a **rest**, and no fault, if
 //!
 //! `n >= 3`, `S >= .05 t`, `T < max(8 s, 2 l)`,
 //!
@@ -103,7 +103,7 @@ impl RestDetector {
     /// Learns the constant span that has just ended. If the list of atoms is full and does not contain the value of the
     /// span, this value replaces the atom with the shortest total duration.
     fn record_rest(&mut self) {
-        let place = self.atom_index().unwrap_or_else(|| {
+        let index = self.atom_index().unwrap_or_else(|| {
             let least = (0..MAX_ATOMS).min_by_key(|i| self.atoms[*i].samples).unwrap_or(0);
             self.atoms[least] = Atom {
                 value: self.value,
@@ -111,7 +111,7 @@ impl RestDetector {
             };
             least
         });
-        let (atom, constant_samples) = (&mut self.atoms[place], self.constant_samples);
+        let (atom, constant_samples) = (&mut self.atoms[index], self.constant_samples);
         atom.rests = atom.rests.saturating_add(1);
         atom.samples += constant_samples;
         atom.longest = atom.longest.max(constant_samples);
@@ -125,7 +125,7 @@ impl RestDetector {
 
     /// True while u is constant because the person is resting at an atom.
     pub fn is_rest(&self) -> bool {
-        let Some(place) = self.atom_index() else {
+        let Some(index) = self.atom_index() else {
             return false;
         };
         let Atom {
@@ -133,7 +133,7 @@ impl RestDetector {
             samples,
             longest,
             ..
-        } = self.atoms[place];
+        } = self.atoms[index];
         let duration_s = self.constant_samples as f64 * self.sample_time;
         let believed = (LONGEST_REST_FACTOR * longest as f64 * self.sample_time).max(ACCEPTED_REST_S);
         // Number of samples before this constant span.

@@ -11,8 +11,8 @@ pub fn holm(probabilities: &[f64]) -> Vec<f64> {
     order.sort_by(|a, b| probabilities[*a].total_cmp(&probabilities[*b]));
     let mut adjusted = vec![0.0; m];
     let mut least = 0.0_f64;
-    for (place, i) in order.into_iter().enumerate() {
-        least = least.max(((m - place) as f64 * probabilities[i]).min(1.0));
+    for (index, i) in order.into_iter().enumerate() {
+        least = least.max(((m - index) as f64 * probabilities[i]).min(1.0));
         adjusted[i] = least;
     }
     adjusted

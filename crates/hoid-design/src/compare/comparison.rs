@@ -102,7 +102,7 @@ pub struct Learning {
 
 /// A missing estimate, with the reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct LeftOut {
+pub struct MissingEstimate {
     /// The quantity that was compared without this estimate.
     pub quantity: Quantity,
     /// Name of the person.
@@ -127,7 +127,7 @@ pub struct Comparison {
     /// Changes from run to run, if requested.
     pub learning: Vec<Learning>,
     /// Missing estimates.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<MissingEstimate>,
     /// Settings of the comparison.
     pub settings: Vec<Setting>,
     /// The verdict on the comparison.

@@ -19,7 +19,7 @@ use super::{
 
 /// A level and its members.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Members {
+pub(super) struct LevelMembers {
     pub name: String,
     pub members: Vec<String>,
 }
@@ -29,9 +29,9 @@ pub(super) struct Members {
 pub(super) struct ResolvedFactor {
     pub name: String,
     pub variation: Variation,
-    pub levels: Vec<Members>,
+    pub levels: Vec<LevelMembers>,
     /// True if the members are people, false if they are conditions.
-    pub of_people: bool,
+    pub is_between_people: bool,
 }
 
 /// One comparison: weights of the conditions and, for a comparison between people, the two groups.
@@ -54,14 +54,14 @@ impl ResolvedFactor {
             reason,
         };
         let (conditions, subjects) = (group.conditions(), group.subjects());
-        let levels: Vec<Members> = if !factor.levels.is_empty() {
-            let of = factor.levels.iter().map(|level| Members {
+        let levels: Vec<LevelMembers> = if !factor.levels.is_empty() {
+            let of = factor.levels.iter().map(|level| LevelMembers {
                 name: level.name.clone(),
                 members: level.members.clone(),
             });
             of.collect()
         } else if factor.name == CONDITION_FACTOR {
-            let own = |name: &String| Members {
+            let own = |name: &String| LevelMembers {
                 name: name.clone(),
                 members: vec![name.clone()],
             };
@@ -95,7 +95,7 @@ impl ResolvedFactor {
             name: factor.name.clone(),
             variation: Variation::Between,
             levels,
-            of_people,
+            is_between_people: of_people,
         };
         let in_two = subjects
             .iter()
@@ -121,8 +121,8 @@ impl ResolvedFactor {
 
     /// Returns the names of the levels to which a person belongs.
     pub fn levels_of(&self, subject: &str, group: &GroupEstimates) -> Vec<&str> {
-        let is_in = |level: &&Members| {
-            if self.of_people {
+        let is_in = |level: &&LevelMembers| {
+            if self.is_between_people {
                 level.members.iter().any(|member| member == subject)
             } else {
                 level
@@ -138,7 +138,7 @@ impl ResolvedFactor {
             .collect()
     }
 
-    fn pairs(&self) -> impl Iterator<Item = (&Members, &Members)> {
+    fn pairs(&self) -> impl Iterator<Item = (&LevelMembers, &LevelMembers)> {
         let levels = &self.levels;
         (0..levels.len()).flat_map(move |a| (a + 1..levels.len()).map(move |b| (&levels[a], &levels[b])))
     }
@@ -147,7 +147,7 @@ impl ResolvedFactor {
 /// Returns the conditions that are compared: those that are members of a level of every factor over conditions.
 pub(super) fn conditions_of(factors: &[ResolvedFactor], group: &GroupEstimates) -> Vec<String> {
     let counts = |condition: &String| {
-        let mut over = factors.iter().filter(|factor| !factor.of_people);
+        let mut over = factors.iter().filter(|factor| !factor.is_between_people);
         over.all(|factor| factor.levels.iter().any(|level| level.members.contains(condition)))
     };
     group.conditions().into_iter().filter(counts).collect()
@@ -160,7 +160,7 @@ pub(super) fn contrasts(factors: &[ResolvedFactor], group: &GroupEstimates) -> R
     if let [_, second, ..] = between[..] {
         return Err(CompareError::Factor {
             name: second.name.clone(),
-            reason: "it is a second factor between people: compare one factor at a time".to_owned(),
+            reason: "only one factor can vary between people: compare one factor at a time".to_owned(),
         });
     }
     let within: Vec<&ResolvedFactor> = factors.iter().filter(|f| f.variation == Variation::Within).collect();
@@ -187,7 +187,7 @@ pub(super) fn contrasts(factors: &[ResolvedFactor], group: &GroupEstimates) -> R
         for second in &within[k + 1..] {
             for (a, b) in first.pairs() {
                 for (c, d) in second.pairs() {
-                    let inside = |level: &Members| -> Vec<String> {
+                    let inside = |level: &LevelMembers| -> Vec<String> {
                         conditions
                             .iter()
                             .filter(|name| level.members.contains(name))
@@ -212,15 +212,16 @@ pub(super) fn contrasts(factors: &[ResolvedFactor], group: &GroupEstimates) -> R
     }
     for factor in between {
         for (a, b) in factor.pairs() {
-            let side = |level: &Members, place: usize, weights: &dyn Fn(&str) -> BTreeMap<String, f64>| -> Vec<_> {
-                let is = |subject: &String| factor.levels_of(subject, group).contains(&level.name.as_str());
-                let subjects = group.subjects().into_iter().filter(is);
-                subjects
-                    .map(|subject| (subject.clone(), weights(&subject), place))
-                    .collect()
-            };
-            let mean = |level: &Members| {
-                let of_level: Vec<String> = match factor.of_people {
+            let side =
+                |level: &LevelMembers, index: usize, weights: &dyn Fn(&str) -> BTreeMap<String, f64>| -> Vec<_> {
+                    let is = |subject: &String| factor.levels_of(subject, group).contains(&level.name.as_str());
+                    let subjects = group.subjects().into_iter().filter(is);
+                    subjects
+                        .map(|subject| (subject.clone(), weights(&subject), index))
+                        .collect()
+                };
+            let mean = |level: &LevelMembers| {
+                let of_level: Vec<String> = match factor.is_between_people {
                     true => conditions.clone(),
                     false => conditions
                         .iter()
@@ -245,7 +246,7 @@ pub(super) fn contrasts(factors: &[ResolvedFactor], group: &GroupEstimates) -> R
             };
             let people = [side(a, 0, &mean(a)), side(b, 1, &mean(b))].concat();
             all.push(contrast(factor.name.clone(), None, people));
-            if !factor.of_people {
+            if !factor.is_between_people {
                 continue;
             }
             for other in &within {
@@ -265,7 +266,7 @@ pub(super) fn contrasts(factors: &[ResolvedFactor], group: &GroupEstimates) -> R
 
 /// Returns the weight of each condition in the difference: the mean over the conditions of b minus the mean over the
 /// conditions of a.
-fn difference_weights(conditions: &[String], a: &Members, b: &Members) -> BTreeMap<String, f64> {
+fn difference_weights(conditions: &[String], a: &LevelMembers, b: &LevelMembers) -> BTreeMap<String, f64> {
     let mut weights = BTreeMap::new();
     for (level, sign) in [(a, -1.0), (b, 1.0)] {
         let of: Vec<&String> = conditions.iter().filter(|c| level.members.contains(c)).collect();

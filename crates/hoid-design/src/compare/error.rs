@@ -46,19 +46,19 @@ pub enum CompareError {
     },
     /// The path does not hold the result of a group.
     #[error(
-        "{place} does not contain the result of a group ({reason}); expected recordings with their manifest group.toml, a directory that `hoid group DIR --out` wrote, or the output of `hoid group --json`"
+        "{path} does not contain the result of a group ({reason}); expected recordings with their manifest group.toml, a directory that `hoid group DIR --out` wrote, or the output of `hoid group --json`"
     )]
     NoGroup {
         /// Path that was given.
-        place: String,
+        path: String,
         /// The problem with the path.
         reason: String,
     },
     /// The JSON of a group does not contain a quantity.
-    #[error("the JSON of a group does not contain {what}: give the directory that `hoid group DIR --out` wrote")]
+    #[error("the JSON of a group does not contain {quantity}: give the directory that `hoid group DIR --out` wrote")]
     NotInJson {
         /// The requested quantity.
-        what: String,
+        quantity: String,
     },
     /// The tables of a group cannot be read.
     #[error(transparent)]

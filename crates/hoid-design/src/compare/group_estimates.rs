@@ -46,7 +46,7 @@ pub(super) struct Cell {
     /// Form of the response to each further input; `None` if no response was found.
     inputs: BTreeMap<String, Option<String>>,
     runs: usize,
-    known: BTreeMap<String, EstimatedValue>,
+    estimates: BTreeMap<String, EstimatedValue>,
 }
 
 /// The estimates of a group.
@@ -56,58 +56,58 @@ pub struct GroupEstimates {
     pub(super) cells: Vec<Cell>,
     runs: Option<RunEstimates>,
     /// Estimates of the runs in the common form; `None` if the runs were not analysed again in that form.
-    runs_in_form: Option<RunEstimates>,
+    common_form_runs: Option<RunEstimates>,
     /// Note about the common form of the parameters.
     pub(super) common: Option<Finding>,
 }
 
 impl GroupEstimates {
-    /// Returns the path of a manifest whose recordings have not been analysed yet: `place` itself, or the manifest in a
-    /// directory without results.
-    pub fn recordings_path(place: &Path) -> Option<PathBuf> {
-        if place.is_file() {
-            return place
+    /// Returns the path of a manifest whose recordings have not been analysed yet: `location` itself, or the manifest
+    /// in a directory without results.
+    pub fn recordings_path(location: &Path) -> Option<PathBuf> {
+        if location.is_file() {
+            return location
                 .extension()
                 .is_some_and(|ending| ending == "toml")
-                .then(|| place.to_owned());
+                .then(|| location.to_owned());
         }
-        let manifest = place.join(MANIFEST_FILE);
-        (manifest.is_file() && !has_results(place)).then_some(manifest)
+        let manifest = location.join(MANIFEST_FILE);
+        (manifest.is_file() && !has_results(location)).then_some(manifest)
     }
 
     /// Reads the results of a group from their directory or from JSON.
     ///
     /// # Errors
     /// [`CompareError::NoGroup`] with the reason, or [`CompareError::Study`] if a table cannot be read.
-    pub fn read(place: &Path) -> Result<Self, CompareError> {
+    pub fn read(location: &Path) -> Result<Self, CompareError> {
         let none = |reason: String| CompareError::NoGroup {
-            place: place.display().to_string(),
+            path: location.display().to_string(),
             reason,
         };
-        if !place.is_dir() {
-            let bytes = hoid_io::read_bytes(place).map_err(StudyError::Io)?;
+        if !location.is_dir() {
+            let bytes = hoid_io::read_bytes(location).map_err(StudyError::Io)?;
             let object = serde_json::from_slice(&bytes).map_err(|error| none(format!("it is not JSON: {error}")))?;
             return Self::from_json(&object).map_err(none);
         }
-        let path = place.join(MANIFEST_FILE);
+        let path = location.join(MANIFEST_FILE);
         if !path.exists() {
             return Err(none(format!(
                 "there is no {MANIFEST_FILE} in it; for recordings, write one with `hoid group init {}`",
-                place.display()
+                location.display()
             )));
         }
         let manifest = Manifest::read(&path)?;
-        if !place.join("people.parquet").exists() {
+        if !location.join("people.parquet").exists() {
             return Err(none(
                 "the table people is missing: the group is unfinished; continue with `hoid group --resume`".to_owned(),
             ));
         }
-        let summary = GroupSummary::read(&manifest, place)?;
+        let summary = GroupSummary::read(&manifest, location)?;
         Ok(Self {
             name: manifest.name.clone(),
             cells: merge_runs(summary.people.iter().map(Cell::from_person).collect()),
-            runs: Some(RunEstimates::read(place)?),
-            runs_in_form: None,
+            runs: Some(RunEstimates::read(location)?),
+            common_form_runs: None,
             common: None,
         })
     }
@@ -123,7 +123,7 @@ impl GroupEstimates {
             name: object["group"].as_str().unwrap_or("group").to_owned(),
             cells: merge_runs(cells),
             runs: None,
-            runs_in_form: None,
+            common_form_runs: None,
             common: None,
         })
     }
@@ -153,14 +153,14 @@ impl GroupEstimates {
             let of = other.cell(&cell.subject, &cell.condition);
             let of_form = |name: &String| !Quantity::Parameter(name.clone()).is_form_independent();
             let is_parameter = |name: &String| of_form(name) && PARAMETERS.iter().any(|(known, _)| known == name);
-            cell.known.retain(|name, _| !is_parameter(name));
+            cell.estimates.retain(|name, _| !is_parameter(name));
             let Some(of) = of else { continue };
             cell.form.clone_from(&of.form);
-            let parameters = of.known.iter().filter(|(name, _)| is_parameter(name));
-            cell.known
+            let parameters = of.estimates.iter().filter(|(name, _)| is_parameter(name));
+            cell.estimates
                 .extend(parameters.map(|(name, value)| (name.clone(), *value)));
         }
-        self.runs_in_form = other.runs;
+        self.common_form_runs = other.runs;
         self.common = Some(common.finding(&best));
         self
     }
@@ -199,7 +199,7 @@ impl GroupEstimates {
                 ..mean_over_runs(&vec![value; cell.runs.max(1)])
             });
         };
-        let known = cell.known.get(&name).copied();
+        let known = cell.estimates.get(&name).copied();
         let known = known
             .filter(|k| k.value.is_finite() || !k.determined)
             .ok_or_else(|| match quantity {
@@ -223,7 +223,10 @@ impl GroupEstimates {
 
     /// Returns a quantity in each run of a cell, with the names of the runs; empty if the runs are not known.
     pub(super) fn run_estimates(&self, cell: &Cell, quantity: &Quantity) -> Vec<(&str, Observation)> {
-        let in_form = self.runs_in_form.as_ref().filter(|_| !quantity.is_form_independent());
+        let in_form = self
+            .common_form_runs
+            .as_ref()
+            .filter(|_| !quantity.is_form_independent());
         let Some(runs) = in_form.or(self.runs.as_ref()) else {
             return Vec::new();
         };
@@ -272,7 +275,7 @@ impl Cell {
             forms: Vec::new(),
             inputs: BTreeMap::new(),
             runs,
-            known: BTreeMap::new(),
+            estimates: BTreeMap::new(),
         }
     }
 
@@ -304,13 +307,13 @@ impl Cell {
             runs,
         };
         for p in &person.parameters {
-            cell.known.insert(p.name.clone(), of_parameter(p));
+            cell.estimates.insert(p.name.clone(), of_parameter(p));
         }
         for channel in &person.channels {
             let form = channel.form.map(|form| form.name().to_owned());
             cell.inputs.insert(channel.name.clone(), form);
             for p in &channel.parameters {
-                cell.known
+                cell.estimates
                     .insert(format!("{}[{}]", p.name, channel.name), of_parameter(p));
             }
         }
@@ -319,7 +322,7 @@ impl Cell {
             (Quantity::PhaseMargin, person.phase_margin_deg),
         ] {
             if let (Some(e), Some(name)) = (estimate, quantity.key()) {
-                cell.known
+                cell.estimates
                     .insert(name, estimated_value(e.value, e.standard_error, runs));
             }
         }
@@ -356,14 +359,14 @@ impl Cell {
         };
         let parts = [&person["parameters"], &person["open_loop"]];
         for (name, found) in parts.into_iter().filter_map(Value::as_object).flatten() {
-            cell.known.insert(name.clone(), estimated(found));
+            cell.estimates.insert(name.clone(), estimated(found));
         }
         for channel in person["channels"].as_array().into_iter().flatten() {
             let input = channel["input"].as_str().unwrap_or_default();
             let form = channel["form"].as_str().map(str::to_owned);
             cell.inputs.insert(input.to_owned(), form);
             for (name, found) in channel["parameters"].as_object().into_iter().flatten() {
-                cell.known.insert(format!("{name}[{input}]"), estimated(found));
+                cell.estimates.insert(format!("{name}[{input}]"), estimated(found));
             }
         }
         cell
@@ -425,9 +428,12 @@ fn merge_runs(cells: Vec<Cell>) -> Vec<Cell> {
     }
     let one = |mut of: Vec<Cell>| {
         if of.len() > 1 {
-            let names: Vec<String> = of[0].known.keys().cloned().collect();
+            let names: Vec<String> = of[0].estimates.keys().cloned().collect();
             let means = names.into_iter().map(|name| {
-                let each: Vec<EstimatedValue> = of.iter().filter_map(|cell| cell.known.get(&name).copied()).collect();
+                let each: Vec<EstimatedValue> = of
+                    .iter()
+                    .filter_map(|cell| cell.estimates.get(&name).copied())
+                    .collect();
                 let values: Vec<f64> = each.iter().map(|k| k.value).collect();
                 let merged = EstimatedValue {
                     determined: each.iter().all(|k| k.determined),
@@ -436,7 +442,7 @@ fn merge_runs(cells: Vec<Cell>) -> Vec<Cell> {
                 };
                 (name, merged)
             });
-            of[0].known = means.collect();
+            of[0].estimates = means.collect();
             of[0].doubtful = of.iter().any(|cell| cell.doubtful);
         }
         of.swap_remove(0)

@@ -13,13 +13,13 @@ use super::{
 
 /// Numbering of the runs: by their names if all names are numbers, otherwise by position.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Practice {
-    by_name: bool,
+pub(super) struct RunNumbering {
+    uses_names: bool,
     /// Mean number of all runs.
     pub middle: f64,
 }
 
-impl Practice {
+impl RunNumbering {
     pub fn of(group: &GroupEstimates, quantity: &Quantity) -> Self {
         let runs: Vec<Vec<&str>> = group
             .cells
@@ -33,24 +33,27 @@ impl Practice {
             })
             .collect();
         let by_name = runs.iter().flatten().all(|run| run_number(run).is_some());
-        let mut practice = Self { by_name, middle: 0.0 };
+        let mut practice = Self {
+            uses_names: by_name,
+            middle: 0.0,
+        };
         let numbers: Vec<f64> = runs
             .iter()
             .flat_map(|of_cell| {
                 of_cell
                     .iter()
                     .enumerate()
-                    .map(|(place, run)| practice.number(run, place))
+                    .map(|(index, run)| practice.number(run, index))
             })
             .collect();
         practice.middle = if numbers.is_empty() { 0.0 } else { mean(&numbers) };
         practice
     }
 
-    fn number(&self, run: &str, place: usize) -> f64 {
+    fn number(&self, run: &str, index: usize) -> f64 {
         match run_number(run) {
-            Some(number) if self.by_name => number,
-            _ => place as f64 + 1.0,
+            Some(number) if self.uses_names => number,
+            _ => index as f64 + 1.0,
         }
     }
 
@@ -66,7 +69,7 @@ impl Practice {
         let x: Vec<Vec<f64>> = runs
             .iter()
             .enumerate()
-            .map(|(place, (run, _))| vec![1.0, self.number(run, place) - self.middle])
+            .map(|(index, (run, _))| vec![1.0, self.number(run, index) - self.middle])
             .collect();
         // If one run lacks a standard error, the standard errors of all runs are ignored.
         let all_known = runs.iter().all(|(_, o)| o.variance > 0.0);

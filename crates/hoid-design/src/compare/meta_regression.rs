@@ -216,7 +216,7 @@ struct Model {
 }
 
 /// The model evaluated at one tau^2.
-struct At {
+struct FitAtTau {
     beta: DVector<f64>,
     /// `(X'W X)^-1`.
     inverse: DMatrix<f64>,
@@ -235,7 +235,7 @@ const DECADE_RANGE: (i32, i32) = (-8, 6);
 const STEPS_PER_DECADE: i32 = 3;
 
 impl Model {
-    fn at(&self, tau_squared: f64) -> Option<At> {
+    fn at(&self, tau_squared: f64) -> Option<FitAtTau> {
         let (n, p) = self.x.shape();
         let w: Vec<f64> = self.v.iter().map(|v| 1.0 / (v + tau_squared)).collect();
         let weighted = |power: i32| {
@@ -253,7 +253,7 @@ impl Model {
         let trace = w.iter().sum::<f64>() - (&inverse * weighted(2)).trace();
         let log_determinant: f64 = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
         let squares: f64 = (0..n).map(|i| (w[i] * residuals[i]).powi(2)).sum();
-        Some(At {
+        Some(FitAtTau {
             beta,
             q,
             trace,

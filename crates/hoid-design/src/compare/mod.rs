@@ -20,12 +20,12 @@
 mod adjust;
 mod bayes_factor;
 mod common_form;
-mod comparing;
 mod comparison;
 mod contrast;
 mod effect_size;
 mod error;
 mod factor;
+mod group_comparison;
 mod group_estimates;
 mod learning;
 mod meta_regression;
@@ -37,11 +37,11 @@ mod sentence;
 pub use adjust::holm;
 pub use bayes_factor::bayes_factor;
 pub use common_form::CommonForm;
-pub use comparing::{Adjustment, ComparisonOptions, Covariate};
-pub use comparison::{Comparison, Difference, Learning, LeftOut, Mean, PersonEstimate};
+pub use comparison::{Comparison, Difference, Learning, Mean, MissingEstimate, PersonEstimate};
 pub use effect_size::{EffectSize, d_z, hedges_g};
 pub use error::CompareError;
 pub use factor::{Factor, Level, Variation};
+pub use group_comparison::{Adjustment, ComparisonOptions, Covariate};
 pub use group_estimates::GroupEstimates;
 pub use meta_regression::{
     Coefficient, MetaRegression, Observation, Weights, meta_mean, meta_regression, variance_between_people,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::{
-    DesignedLine, DifferencePlan, Enters, Expected, ExpectedQuantity, ExpectedResponse, RequestedQuantity, Task,
+    DesignedLine, DifferencePlan, EntryPoint, Expected, ExpectedQuantity, ExpectedResponse, RequestedQuantity, Task,
 };
 
 /// Expected errors for another person, or for another forcing function of the same duration.
@@ -29,7 +29,7 @@ pub struct ExperimentDesign {
     /// The typical person, with controlled element and remnant.
     pub task: Task,
     /// Point of entry of the forcing function. If the display shows the target, a disturbance is added.
-    pub enters: Enters,
+    pub enters: EntryPoint,
     /// Name of the typical person.
     pub person: String,
     /// Length of a run in s, the period of the forcing function.

@@ -25,8 +25,8 @@ use serde_json::{Map, Value, json};
 use super::{
     DesignError, Expected, People, SpreadSource,
     power::{MAX_PEOPLE, people_needed, power},
+    requested_quantities::parse_named_number,
     spread::between_people_spread,
-    wanted::parse_named_number,
 };
 
 /// The difference to be found.
@@ -237,12 +237,12 @@ pub(super) fn check_spread(quantity: &'static str, found: f64) -> Result<(), Des
 
 /// Returns the index of the row with the given number of runs or, if there is none, of the row with the lowest cost.
 fn chosen_row(rows: &[RunsAndPeople], runs: Option<usize>) -> usize {
-    if let Some(place) = rows.iter().position(|row| Some(row.runs) == runs) {
-        return place;
+    if let Some(index) = rows.iter().position(|row| Some(row.runs) == runs) {
+        return index;
     }
     let cost = |row: &RunsAndPeople| row.people.unwrap_or(MAX_PEOPLE) * (2 * row.runs + PERSON_COST_RUNS);
     let least = rows.iter().enumerate().min_by_key(|(_, row)| cost(row));
-    least.map_or(0, |(place, _)| place)
+    least.map_or(0, |(index, _)| index)
 }
 
 impl DifferencePlan {
@@ -301,7 +301,7 @@ mod tests {
     fn plan(text: &str, runs: Option<usize>) -> Result<DifferencePlan, DesignError> {
         let task = task(0.2);
         let designed = DesignOptions::default()
-            .run(&task, &[crate::experiment::Enters::Target])
+            .run(&task, &[crate::experiment::EntryPoint::Target])
             .unwrap();
         DifferenceRequest::new(text.parse()?).plan(
             &People::Population,

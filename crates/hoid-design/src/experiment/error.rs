@@ -6,7 +6,7 @@ use hoid_model::{Form, ModelError};
 use hoid_study::StudyError;
 use thiserror::Error;
 
-use super::Enters;
+use super::EntryPoint;
 
 /// Reason why an experiment cannot be designed.
 #[derive(Debug, Error)]
@@ -39,13 +39,13 @@ pub enum DesignError {
     },
     /// The band has no room for the lines.
     #[error(
-        "the band has room for only {found} of the {asked} lines, which must be {spacing} multiples of the \
+        "the band has room for only {found} of the {requested_lines} lines, which must be {spacing} multiples of the \
          fundamental apart and not harmonics of each other: give fewer lines (--lines), a wider band (--band), a \
          longer run (--length), or a smaller spacing (--spacing)"
     )]
     NoRoom {
         /// Number of lines requested.
-        asked: usize,
+        requested_lines: usize,
         /// Number of lines that fit into the band.
         found: usize,
         /// Smallest distance between two lines, in multiples of the fundamental.
@@ -89,7 +89,7 @@ pub enum DesignError {
         /// Name of the forcing function.
         name: String,
         /// Point of entry at which lines are missing.
-        missing: Enters,
+        missing: EntryPoint,
     },
     /// A form is given although the people already have a form.
     #[error("the form {form} was given, but {people} has its own; omit the form, or design for the population")]
@@ -119,11 +119,11 @@ pub enum DesignError {
     },
     /// The source does not contain people.
     #[error(
-        "{place} does not contain people to design for ({reason}); expected population, a scenario, a fit (identify --json), a directory that `hoid group DIR --out` wrote, or its population.json"
+        "{people_source} does not contain people to design for ({reason}); expected population, a scenario, a fit (identify --json), a directory that `hoid group DIR --out` wrote, or its population.json"
     )]
     NoPeople {
         /// Source of the people.
-        place: String,
+        people_source: String,
         /// The problem with the source.
         reason: String,
     },

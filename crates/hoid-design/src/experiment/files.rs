@@ -8,7 +8,7 @@ use hoid_model::{
     operator_family::{Coordinate, NamedParameter},
 };
 
-use super::{DesignedLine, Enters, ExperimentDesign, task::SAMPLE_TIME_S};
+use super::{DesignedLine, EntryPoint, ExperimentDesign, task::SAMPLE_TIME_S};
 
 /// Time before the measurement, s.
 const RUN_IN_S: f64 = 10.0;
@@ -17,7 +17,7 @@ impl ExperimentDesign {
     /// Returns the text of a scenario file with the designed forcing function.
     pub fn scenario(&self) -> String {
         let operator = &self.task.state.operator;
-        let forcing = |enters: Enters| {
+        let forcing = |enters: EntryPoint| {
             let own = self.lines.iter().filter(|l| l.enters == enters);
             let lines: Vec<String> = own.map(|l| line_toml(&l.line)).collect();
             match lines.as_slice() {
@@ -40,12 +40,12 @@ impl ExperimentDesign {
             sample_s * (RUN_IN_S / sample_s).round(),
             operator_keys(operator),
             self.task.state.controlled_element,
-            forcing(Enters::Target),
+            forcing(EntryPoint::Target),
             self.task
                 .feedforward
                 .as_ref()
                 .map_or_else(String::new, |seen| feedforward_keys(seen, sample_s)),
-            forcing(Enters::Disturbance),
+            forcing(EntryPoint::Disturbance),
             self.task.remnant.share,
         )
     }

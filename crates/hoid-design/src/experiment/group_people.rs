@@ -14,7 +14,7 @@ use serde_json::Value;
 
 use super::{
     DesignError,
-    chosen::{ChosenPeople, GivenOptions, NamedState, exclusion_finding},
+    design_people::{ChosenPeople, GivenOptions, NamedState, exclusion_finding},
 };
 
 /// A person in a condition, with parameters by name.
@@ -107,7 +107,7 @@ pub(super) fn from_population(
 
 fn no_people_error(place: &Path, reason: impl Into<String>) -> DesignError {
     DesignError::NoPeople {
-        place: place.display().to_string(),
+        people_source: place.display().to_string(),
         reason: reason.into(),
     }
 }
@@ -140,7 +140,7 @@ fn element_of(
     directory: &Path,
 ) -> Result<ContinuousTransferFunction, DesignError> {
     let known = manifest.conditions.get(condition);
-    let text = known.and_then(|facts| facts.controlled_element.as_deref());
+    let text = known.and_then(|settings| settings.controlled_element.as_deref());
     let missing = || DesignError::NoElement {
         people: format!("the condition {condition:?} in {}", directory.display()),
     };

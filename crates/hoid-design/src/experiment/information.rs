@@ -7,7 +7,7 @@
 //! and `E|N|^2 = 4 S_n/T`, with the two-sided power density `S_n(f)` of the remnant, `var n = int S_n df`. Half of this
 //! variance is in the real part and half in the imaginary part, so the information of the lines on theta is
 //!
-//! `I = sum over lines of T/(2 S_n) Re[g* g']`, `g = dB/dtheta E + dF/dtheta X` (`joint`),
+//! `I = sum over lines of T/(2 S_n) Re[g* g']`, `g = dB/dtheta E + dF/dtheta X` (`joint_coordinates`),
 //!
 //! whose inverse is the smallest covariance that an unbiased estimate can have (H. Cramér, *Mathematical Methods of
 //! Statistics*, 1946, section 32.6). The part of the loop signals that the remnant itself excites is not included,
@@ -30,8 +30,8 @@ use hoid_model::{Complex64, FamilyOperator, forcing::Sinusoid, uncertainty::Esti
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    DesignError, Enters, Expected, ExpectedQuantity, Forcing, Remnant, Task,
-    joint::{Joint, Quantity},
+    DesignError, EntryPoint, Expected, ExpectedQuantity, Forcing, Remnant, Task,
+    joint_coordinates::{JointCoordinates, Quantity},
     task::SAMPLE_TIME_S,
 };
 
@@ -46,9 +46,9 @@ struct LineInformation {
 }
 
 /// Quantities of a task that do not depend on the forcing function.
-pub(super) struct Loop<'a> {
+pub(super) struct LoopQuantities<'a> {
     pub task: &'a Task,
-    pub joint: Joint,
+    pub joint: JointCoordinates,
     /// Variances of u and of e due to a remnant of unit gain: `int |S|^2 density df` and `int |S P|^2 density df`.
     noise: [f64; 2],
     pub crossover_rad_s: f64,
@@ -58,7 +58,7 @@ pub(super) struct Loop<'a> {
 const FREQUENCY_RANGE_RAD_S: (f64, f64) = (1e-3, std::f64::consts::PI / SAMPLE_TIME_S);
 const POINT_COUNT: usize = 6000;
 
-impl<'a> Loop<'a> {
+impl<'a> LoopQuantities<'a> {
     pub fn of(task: &'a Task) -> Result<Self, DesignError> {
         let share = task.remnant.share;
         if !(share > 0.0 && share < 1.0) {
@@ -71,7 +71,7 @@ impl<'a> Loop<'a> {
         let margins = task.state.margins()?;
         let crossover_rad_s = margins.crossover_rad_s.ok_or(DesignError::NoCrossover)?;
         let mut all = Self {
-            joint: Joint::of(task),
+            joint: JointCoordinates::of(task),
             task,
             noise: [0.0; 2],
             crossover_rad_s,
@@ -115,15 +115,15 @@ impl<'a> Loop<'a> {
     }
 
     /// Returns the Fourier coefficients of e and of the target for a line of unit amplitude.
-    pub fn line_coefficients(&self, (enters, omega): (Enters, f64)) -> [Complex64; 2] {
+    pub fn line_coefficients(&self, (enters, omega): (EntryPoint, f64)) -> [Complex64; 2] {
         let (s, p) = self.sensitivity(omega);
         match enters {
-            Enters::Target => [s * (1.0 - p * self.feedforward(omega)), Complex64::new(1.0, 0.0)],
-            Enters::Disturbance => [-s * p, Complex64::default()],
+            EntryPoint::Target => [s * (1.0 - p * self.feedforward(omega)), Complex64::new(1.0, 0.0)],
+            EntryPoint::Disturbance => [-s * p, Complex64::default()],
         }
     }
 
-    fn line_information(&self, (enters, omega): (Enters, f64)) -> LineInformation {
+    fn line_information(&self, (enters, omega): (EntryPoint, f64)) -> LineInformation {
         let [error, target] = self.line_coefficients((enters, omega));
         let feedback = self.task.state.operator.response_and_gradient(omega);
         let seen = self.task.feedforward.as_ref();
@@ -201,7 +201,7 @@ impl<'a> Loop<'a> {
 
     /// Returns power and information of each line for unit amplitude, with the square of its amplitude.
     fn lines(&self, forcing: &Forcing) -> Vec<(LineInformation, f64)> {
-        let of = |(enters, line): &(Enters, Sinusoid)| {
+        let of = |(enters, line): &(EntryPoint, Sinusoid)| {
             (
                 self.line_information((*enters, line.omega_rad_s)),
                 line.amplitude_deg.powi(2),
@@ -232,7 +232,7 @@ impl<'a> Loop<'a> {
     }
 
     /// Returns the information per second of a line that alone excites u, with the given share of the remnant.
-    pub fn information_by_share(&self, line: (Enters, f64)) -> DMatrix<f64> {
+    pub fn information_by_share(&self, line: (EntryPoint, f64)) -> DMatrix<f64> {
         let worth = self.line_information(line);
         let share = self.task.remnant.share;
         // K^2 = p/(1 - p) U/noise: A^2/(2 K^2) = (A^2/2/U) (1 - p)/p noise.
@@ -240,7 +240,7 @@ impl<'a> Loop<'a> {
     }
 
     /// Returns the variance of u due to a line, divided by the variance of the line itself.
-    pub fn control_by_power(&self, line: (Enters, f64)) -> f64 {
+    pub fn control_by_power(&self, line: (EntryPoint, f64)) -> f64 {
         self.line_information(line).control
     }
 
@@ -306,7 +306,7 @@ impl<'a> Loop<'a> {
 /// [`DesignError`] if a number is out of range, the loop is unstable or has no crossover, or the lines do not determine
 /// the parameters.
 pub fn expected(task: &Task, forcing: &Forcing, length_s: f64) -> Result<Expected, DesignError> {
-    Loop::of(task)?.expected(forcing, length_s)
+    LoopQuantities::of(task)?.expected(forcing, length_s)
 }
 
 /// Returns the phase advance of a preview.
@@ -337,7 +337,7 @@ pub(super) mod tests {
     use super::*;
 
     pub fn reference() -> Forcing {
-        Forcing::of(Enters::Target, &ForcingFunction::reference())
+        Forcing::of(EntryPoint::Target, &ForcingFunction::reference())
     }
 
     pub fn task(share: f64) -> Task {
@@ -375,7 +375,7 @@ pub(super) mod tests {
                 a.name
             );
         }
-        let smaller = |(enters, line): &(Enters, Sinusoid)| {
+        let smaller = |(enters, line): &(EntryPoint, Sinusoid)| {
             let amplitude_deg = 0.1 * line.amplitude_deg;
             (*enters, Sinusoid { amplitude_deg, ..*line })
         };
@@ -393,7 +393,7 @@ pub(super) mod tests {
     fn crossover_and_margin_gradients_match_finite_differences() {
         // Finite differences of the margins of an operator with another gain: d omega/d ln K.
         let task = task(0.2);
-        let all = Loop::of(&task).unwrap();
+        let all = LoopQuantities::of(&task).unwrap();
         let [crossover, margin] = all.margins();
         let with = |k: f64| {
             let mut coordinates = task.state.operator.coordinates().to_vec();
@@ -420,7 +420,7 @@ pub(super) mod tests {
             omega_rad_s: 1.0,
             phase_rad: 0.0,
         };
-        let few = Forcing::new(vec![(Enters::Target, one)]).unwrap();
+        let few = Forcing::new(vec![(EntryPoint::Target, one)]).unwrap();
         assert!(matches!(
             expected(&task(0.2), &few, 80.0),
             Err(DesignError::NotIdentifiable { lines: 1, .. })

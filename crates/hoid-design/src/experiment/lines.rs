@@ -80,7 +80,7 @@ fn sum(table: &[Vec<(f64, f64)>], lines: &[Sinusoid]) -> Vec<f64> {
     values
 }
 
-/// Steps by which phases are changed, in turns.
+/// Steps by which phases are changed, alternately.
 const PHASE_STEPS: [f64; 6] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
 /// Largest number of rounds per step.
 const MAX_ROUNDS: usize = 12;

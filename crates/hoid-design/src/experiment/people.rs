@@ -2,7 +2,7 @@
 //!
 //! | source | typical person | others |
 //! |---|---|---|
-//! | `population` | person predicted by the crossover model (`adapted`) | for each parameter of the prior, two people one spread above and below its median |
+//! | `population` | person predicted by the crossover model (`typical_operator`) | for each parameter of the prior, two people one spread above and below its median |
 //! | scenario, fit (including the response to a target) | the person of the file | none |
 //! | result of a group, `population.json` | medians over people (`group_people`) | each person |
 
@@ -16,10 +16,11 @@ use hoid_model::{FamilyState, family_scenario::Feedforward};
 use serde_json::Value;
 
 use super::{
-    DesignError, adapted,
-    against::family,
-    chosen::{ChosenPeople, GivenOptions, NamedState},
+    DesignError,
+    design_people::{ChosenPeople, GivenOptions, NamedState},
     group_people,
+    other_forcing::family,
+    typical_operator,
 };
 
 /// The people for whom an experiment is designed.
@@ -74,7 +75,7 @@ impl People {
 
     pub(super) fn choose(&self, given: &GivenOptions<'_>) -> Result<ChosenPeople, DesignError> {
         let Self::File(path) = self else {
-            let (typical, others) = adapted::population(&given.element(POPULATION_NAME)?, given.form)?;
+            let (typical, others) = typical_operator::population(&given.element(POPULATION_NAME)?, given.form)?;
             return Ok(ChosenPeople {
                 typical,
                 others,

@@ -7,11 +7,11 @@ use hoid_model::{
 };
 
 use super::{
-    DEFAULT_BETWEEN_PEOPLE, DesignError, DesignOptions, DesignedLine, DifferenceRequest, Enters, Expected,
+    DEFAULT_BETWEEN_PEOPLE, DesignError, DesignOptions, DesignedLine, DifferenceRequest, EntryPoint, Expected,
     ExperimentDesign, Forcing, NamedExpected, OtherForcing, People, Remnant, RequestedQuantity, SpreadSource, Task,
-    chosen::{ChosenPeople, GivenOptions, NamedState, exclusion_finding},
+    design_people::{ChosenPeople, GivenOptions, NamedState, exclusion_finding},
     expected, feedforward, has_absolute_error,
-    information::Loop,
+    information::LoopQuantities,
     period_count,
     spread::run_to_run_spread,
 };
@@ -28,15 +28,15 @@ pub struct DesignRequest {
     /// Form of the operators of the population; if `None`, the form that people typically adopt with the element.
     pub form: Option<Form>,
     /// Point at which the forcing function enters. If the display shows the target, a disturbance is added.
-    pub enters: Enters,
+    pub enters: EntryPoint,
     /// Display of the task.
     pub display: Display,
     /// Remnant of the people.
     pub remnant: Remnant,
     /// Options of the forcing function.
     pub designing: DesignOptions,
-    /// Standard deviation of one person from run to run, relative to the quantity. If `None`, it comes from the people of
-    /// the design if they provide it; otherwise it is that of `designing`.
+    /// Standard deviation of one person from run to run, relative to the quantity. If `None`, it comes from the people
+    /// of the design if they provide it; otherwise it is that of `designing`.
     pub run_to_run: Option<SpreadSource>,
     /// Number of runs; if `None`, the number needed for the accepted errors of the requested quantities.
     pub runs: Option<usize>,
@@ -85,7 +85,7 @@ impl DesignRequest {
         }
         let length_s = self.designing.period_s * runs as f64;
         let all_runs = self.expected(&task, &designed.forcing, runs)?;
-        let all = Loop::of(&task)?;
+        let all = LoopQuantities::of(&task)?;
         let lines = all.designed_lines(&designed.forcing, self.designing.period_s, runs)?;
         let [response, response_to_target] = all.responses(&designed.forcing, length_s)?;
         findings.extend(low_line_finding(&lines, task.feedforward.is_some()));
@@ -99,7 +99,7 @@ impl DesignRequest {
             .map(|sought| sought.plan(&self.people, (&designed.expected, self.designing.run_to_run), self.runs))
             .transpose()?;
         Ok(ExperimentDesign {
-            worst: worst_person(&people, &self.designing.wanted).cloned(),
+            worst: worst_person(&people, &self.designing.requested_quantities).cloned(),
             settings: self.settings(&task),
             person: typical.name,
             enters: self.enters,
@@ -109,7 +109,7 @@ impl DesignRequest {
             runs_needed: designed.periods,
             run_to_run: self.designing.run_to_run,
             run_to_run_source: source,
-            wanted: self.designing.wanted.clone(),
+            wanted: self.designing.requested_quantities.clone(),
             display: self.display,
             lines,
             response,
@@ -124,11 +124,11 @@ impl DesignRequest {
     }
 
     /// Returns the points at which forcing functions enter.
-    fn points(&self) -> &'static [Enters] {
+    fn points(&self) -> &'static [EntryPoint] {
         match (self.enters, self.display) {
-            (Enters::Target, Display::Compensatory) => &[Enters::Target],
-            (Enters::Target, _) => &[Enters::Target, Enters::Disturbance],
-            (Enters::Disturbance, _) => &[Enters::Disturbance],
+            (EntryPoint::Target, Display::Compensatory) => &[EntryPoint::Target],
+            (EntryPoint::Target, _) => &[EntryPoint::Target, EntryPoint::Disturbance],
+            (EntryPoint::Disturbance, _) => &[EntryPoint::Disturbance],
         }
     }
 
@@ -187,7 +187,10 @@ impl DesignRequest {
     }
 
     fn runs_needed(&self, all_runs: &Expected, runs: usize) -> usize {
-        period_count(&all_runs.clone().scaled((runs as f64).sqrt()), &self.designing.wanted)
+        period_count(
+            &all_runs.clone().scaled((runs as f64).sqrt()),
+            &self.designing.requested_quantities,
+        )
     }
 
     fn settings(&self, task: &Task) -> Vec<Setting> {
@@ -200,7 +203,7 @@ impl DesignRequest {
         };
         let wanted: Vec<String> = self
             .designing
-            .wanted
+            .requested_quantities
             .iter()
             .map(|w| format!("{}={}", w.name, w.error))
             .collect();
@@ -215,7 +218,7 @@ impl DesignRequest {
             Setting::new("controlled_element", task.state.controlled_element.to_string())
                 .with_given(self.controlled_element.is_some()),
             Setting::new("form", task.state.operator.form().name()).with_given(self.form.is_some()),
-            Setting::new("for", wanted).with_given(!d.wanted.is_empty()),
+            Setting::new("for", wanted).with_given(!d.requested_quantities.is_empty()),
             Setting::new("display", self.display.name()).with_given(self.display != by_default.display),
             Setting::new("enters", self.enters.name()).with_given(self.enters != by_default.enters),
             number("remnant_share", self.remnant.share, by_default.remnant.share),
@@ -232,8 +235,8 @@ impl DesignRequest {
             number("shelf", d.shelf, of.shelf),
             Setting::new("run_to_run", d.run_to_run.to_string()).with_given(self.run_to_run.is_some()),
             Setting::new("seed", d.seed.to_string()).with_given(d.seed != of.seed),
-            limit("max_rms_e", d.most_rms[0]),
-            limit("max_u", d.most_rms[1]),
+            limit("max_rms_e", d.max_rms[0]),
+            limit("max_u", d.max_rms[1]),
         ];
         if let Some(of) = &self.difference {
             let default = DifferenceRequest::new(of.sought.clone());
@@ -261,7 +264,7 @@ impl DesignRequest {
 /// Returns a finding about lines at which the remnant in e is not small. A displayed target contains no remnant, so its
 /// lines are not checked.
 fn low_line_finding(lines: &[DesignedLine], is_seen: bool) -> Option<Finding> {
-    let of_error = lines.iter().filter(|l| !(is_seen && l.enters == Enters::Target));
+    let of_error = lines.iter().filter(|l| !(is_seen && l.enters == EntryPoint::Target));
     let weak = of_error.filter(|l| l.to_remnant < MIN_LINE_TO_REMNANT_RATIO);
     let weak: Vec<String> = weak.map(|l| format!("{:.2}", l.line.omega_rad_s)).collect();
     let message = format!(
@@ -303,7 +306,7 @@ mod tests {
         DesignRequest {
             controlled_element: Some("4/s".parse().unwrap()),
             designing: DesignOptions {
-                wanted: vec!["tau_e=3%".parse().unwrap(), "crossover=1%".parse().unwrap()],
+                requested_quantities: vec!["tau_e=3%".parse().unwrap(), "crossover=1%".parse().unwrap()],
                 ..DesignOptions::default()
             },
             ..DesignRequest::default()
@@ -321,7 +324,7 @@ mod tests {
         .unwrap();
         assert_eq!(ExperimentDesign::from_json(&design.to_json()).unwrap(), design);
         assert!(ExperimentDesign::from_json("{\"kind\": \"comparison\"}").is_err());
-        let given = |name: &str| design.settings.iter().find(|s| s.name == name).unwrap().given;
+        let given = |name: &str| design.settings.iter().find(|s| s.name == name).unwrap().is_given;
         assert!(given("for") && given("difference") && !given("people") && !given("power"));
     }
 
@@ -342,7 +345,7 @@ mod tests {
         let design = DesignRequest {
             display: Display::Pursuit,
             designing: DesignOptions {
-                wanted: vec!["tau_f=0.02".parse().unwrap()],
+                requested_quantities: vec!["tau_f=0.02".parse().unwrap()],
                 ..DesignOptions::default()
             },
             ..request()
@@ -361,8 +364,8 @@ mod tests {
             ..request()
         };
         let both = pursuit.run().unwrap();
-        let of = |enters: Enters| both.lines.iter().filter(move |l| l.enters == enters).count();
-        assert_eq!((of(Enters::Target), of(Enters::Disturbance)), (10, 10));
+        let of = |enters: EntryPoint| both.lines.iter().filter(move |l| l.enters == enters).count();
+        assert_eq!((of(EntryPoint::Target), of(EntryPoint::Disturbance)), (10, 10));
         let multiple = |l: &DesignedLine| (l.line.omega_rad_s * both.length_s / std::f64::consts::TAU).round() as u32;
         let multiples: Vec<u32> = both.lines.iter().map(multiple).collect();
         for (k, m) in multiples.iter().enumerate() {
@@ -392,11 +395,11 @@ mod tests {
             (10, 10)
         );
         let design = DesignRequest {
-            enters: Enters::Disturbance,
+            enters: EntryPoint::Disturbance,
             ..pursuit
         };
         let alone = design.run().unwrap();
-        assert!(alone.lines.iter().all(|l| l.enters == Enters::Disturbance) && alone.response_to_target.is_empty());
+        assert!(alone.lines.iter().all(|l| l.enters == EntryPoint::Disturbance) && alone.response_to_target.is_empty());
         assert!(
             alone
                 .lab_config("scenario.toml")

@@ -16,8 +16,8 @@ use hoid_model::{Complex64, FamilyOperator, forcing::Sinusoid, uncertainty::Esti
 use serde::{Deserialize, Serialize};
 
 use super::{
-    DesignError, Enters, Forcing,
-    information::{Loop, preview_response},
+    DesignError, EntryPoint, Forcing,
+    information::{LoopQuantities, preview_response},
 };
 
 /// Response of a person at one frequency, with its expected errors.
@@ -35,7 +35,7 @@ pub struct ExpectedResponse {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct DesignedLine {
     /// Point at which the line enters the loop.
-    pub enters: Enters,
+    pub enters: EntryPoint,
     /// Amplitude, frequency and phase of the line.
     pub line: Sinusoid,
     /// The response that the line determines, with the errors from this line alone: the response to the error or, for a
@@ -51,7 +51,7 @@ const POINT_COUNT: usize = 120;
 /// Factor from the natural logarithm of a gain to dB.
 const DB: f64 = 20.0 / std::f64::consts::LN_10;
 
-impl Loop<'_> {
+impl LoopQuantities<'_> {
     /// Returns the lines with the expected errors from `runs` runs of length `period_s`.
     ///
     /// # Errors
@@ -67,12 +67,12 @@ impl Loop<'_> {
         let feedback = &self.task.state.operator;
         let covariance = self.covariance(forcing, length_s)?;
         let of_feedback = self.joint.feedback_covariance(&covariance, feedback);
-        let line = |(enters, line): &(Enters, Sinusoid)| {
+        let line = |(enters, line): &(EntryPoint, Sinusoid)| {
             let omega = line.omega_rad_s;
             let noise = gain * self.remnant_density(omega);
             let [error, target] = self.line_coefficients((*enters, omega)).map(|x| x * line.amplitude_deg);
             let (response, [gain, phase], to_remnant) =
-                match self.task.feedforward.is_some() && *enters == Enters::Target {
+                match self.task.feedforward.is_some() && *enters == EntryPoint::Target {
                     false => {
                         let response = feedback.response(omega);
                         let own = 2.0 * noise / (length_s * error.norm_sqr() * response.norm_sqr());
@@ -97,7 +97,7 @@ impl Loop<'_> {
             }
         };
         let (mut all, of_target): (Vec<_>, Vec<_>) = (forcing.lines().iter().map(line))
-            .partition(|l| l.enters == Enters::Disturbance || self.task.feedforward.is_none());
+            .partition(|l| l.enters == EntryPoint::Disturbance || self.task.feedforward.is_none());
         all = unwrapped(all, feedback.tau_e_s());
         all.extend(unwrapped(of_target, self.delay_of_target_s()));
         all.sort_by(|a, b| a.line.omega_rad_s.total_cmp(&b.line.omega_rad_s));
@@ -116,7 +116,7 @@ impl Loop<'_> {
     /// [`DesignError::NotIdentifiable`] if the lines do not determine the parameters.
     pub fn responses(&self, forcing: &Forcing, length_s: f64) -> Result<[Vec<ExpectedResponse>; 2], DesignError> {
         let covariance = self.covariance(forcing, length_s)?;
-        let of_line = |(_, line): &(Enters, Sinusoid)| line.omega_rad_s;
+        let of_line = |(_, line): &(EntryPoint, Sinusoid)| line.omega_rad_s;
         let all = forcing.lines().iter().map(of_line);
         let (low, high) = all.fold((f64::INFINITY, 0.0_f64), |(a, b), w| (a.min(w), b.max(w)));
         let curve = |operator: &FamilyOperator, preview_s: f64, covariance: &[f64]| {
@@ -197,9 +197,9 @@ mod tests {
     #[test]
     fn all_lines_together_reduce_the_error_of_one_line() {
         let task = task(0.2);
-        let all = Loop::of(&task).unwrap();
+        let all = LoopQuantities::of(&task).unwrap();
         let designing = DesignOptions::default();
-        let lines = designing.run(&task, &[Enters::Target]).unwrap().forcing;
+        let lines = designing.run(&task, &[EntryPoint::Target]).unwrap().forcing;
         let of = |runs| all.designed_lines(&lines, designing.period_s, runs).unwrap();
         let (one, four) = (of(1), of(4));
         let [curve, none] = all.responses(&lines, designing.period_s).unwrap();

@@ -1,5 +1,5 @@
 //! Search for the frequencies and amplitudes of the lines. It minimises `J = sum over wanted g' I^-1 g/s^2`,
-//! `I = sum q_k M_k`, over the shares q of the lines in the response of u (`designing`).
+//! `I = sum q_k M_k`, over the shares q of the lines in the response of u (`forcing_design`).
 //!
 //! - **Amplitudes.** J is convex in q. Starting from equal shares, `q_k <- q_k sqrt(d_k/sum q d)` with
 //!   `d_k = sum g' I^-1 M_k I^-1 g/s^2` decreases J in every step (D. M. Titterington, *Applied Statistics* 27 (1978)
@@ -8,8 +8,8 @@
 //! - **Frequencies.** Each line in turn is moved to nearby multiples, and the multiple with the smallest J is kept (V.
 //!   V. Fedorov, *Theory of Optimal Experiments*, 1972), provided that no line is a harmonic of another.
 //! - **Two forcing functions.** If the target is displayed, a person responds to both the target and the error. Lines
-//!   of a target and of a disturbance, alternating in frequency, separate the two responses (`joint`). Their shares are
-//!   searched together, and the limits apply to each forcing function.
+//!   of a target and of a disturbance, alternating in frequency, separate the two responses (`joint_coordinates`).
+//!   Their shares are searched together, and the limits apply to each forcing function.
 //! - **Limits.** If a target has much power above the crossover frequency, people lower their crossover frequency (D.
 //!   T. McRuer and H. R. Jex, *IEEE Trans. Human Factors in Electronics* 8 (1967) 231-249). The lines above it
 //!   therefore form a shelf: their amplitudes are at most a given fraction of the geometric mean of the amplitudes
@@ -25,8 +25,8 @@ use hoid_numerics::statistics::mean;
 use nalgebra::{DMatrix, DVector};
 
 use super::{
-    DesignError, Enters,
-    information::{Loop, inverse},
+    DesignError, EntryPoint,
+    information::{LoopQuantities, inverse},
 };
 
 /// Largest ratio of an amplitude below the crossover frequency to the geometric mean of these amplitudes; the inverse
@@ -44,10 +44,10 @@ const ROUND_COUNT: usize = 3;
 const MIN_IMPROVEMENT: f64 = 1e-3;
 
 /// A line, given by its multiple of the fundamental and its point of entry.
-pub(super) type Place = (u32, Enters);
+pub(super) type CandidateLine = (u32, EntryPoint);
 
 pub(super) struct Search<'a> {
-    pub all: &'a Loop<'a>,
+    pub quantities: &'a LoopQuantities<'a>,
     pub gradients: Vec<DVector<f64>>,
     pub period_s: f64,
     pub shelf: f64,
@@ -58,17 +58,17 @@ impl Search<'_> {
         f64::from(multiple) * TAU / self.period_s
     }
 
-    fn line(&self, (multiple, enters): Place) -> (Enters, f64) {
+    fn line(&self, (multiple, enters): CandidateLine) -> (EntryPoint, f64) {
         (enters, self.omega(multiple))
     }
 
     /// Moves one line at a time to an admissible multiple, as long as J decreases, and returns the lines with their
     /// shares.
-    pub fn optimise_places(
+    pub fn optimise_lines(
         &self,
-        mut places: Vec<Place>,
-        admissible: impl Fn(&[Place], usize, u32) -> bool,
-    ) -> Result<(Vec<Place>, Vec<f64>), DesignError> {
+        mut places: Vec<CandidateLine>,
+        admissible: impl Fn(&[CandidateLine], usize, u32) -> bool,
+    ) -> Result<(Vec<CandidateLine>, Vec<f64>), DesignError> {
         let (mut shares, mut best) = self.shares(&places, ITERATIONS)?;
         for _ in 0..ROUND_COUNT {
             let before = best;
@@ -98,10 +98,10 @@ impl Search<'_> {
     }
 
     /// Returns the optimal shares of lines at these frequencies, and J.
-    fn shares(&self, places: &[Place], steps: usize) -> Result<(Vec<f64>, f64), DesignError> {
+    fn shares(&self, places: &[CandidateLine], steps: usize) -> Result<(Vec<f64>, f64), DesignError> {
         let by_share: Vec<DMatrix<f64>> = places
             .iter()
-            .map(|place| self.all.information_by_share(self.line(*place)))
+            .map(|place| self.quantities.information_by_share(self.line(*place)))
             .collect();
         let n = places.len();
         let mut shares = vec![1.0 / n as f64; n];
@@ -136,13 +136,17 @@ impl Search<'_> {
     }
 
     /// Limits the amplitudes of the lines of each forcing function and normalises the sum of the shares to one.
-    fn limit_amplitudes(&self, places: &[Place], shares: &mut [f64]) {
-        for enters in [Enters::Target, Enters::Disturbance] {
+    fn limit_amplitudes(&self, places: &[CandidateLine], shares: &mut [f64]) {
+        for enters in [EntryPoint::Target, EntryPoint::Disturbance] {
             let mut lines: Vec<(f64, bool, &mut f64)> = (places.iter().zip(shares.iter_mut()))
                 .filter(|((_, at), _)| *at == enters)
                 .map(|(place, q)| {
                     let line = self.line(*place);
-                    (self.all.control_by_power(line), line.1 > self.all.crossover_rad_s, q)
+                    (
+                        self.quantities.control_by_power(line),
+                        line.1 > self.quantities.crossover_rad_s,
+                        q,
+                    )
                 })
                 .collect();
             let below = lines.iter().filter(|(_, beyond, _)| !beyond);
@@ -168,13 +172,13 @@ impl Search<'_> {
     }
 
     /// Returns lines with these shares, scaled so that the first forcing function has an rms of one.
-    pub fn lines(&self, places: &[Place], shares: &[f64]) -> Vec<(Enters, Sinusoid)> {
-        let power = |(place, q): (&Place, &f64)| q / self.all.control_by_power(self.line(*place));
+    pub fn lines(&self, places: &[CandidateLine], shares: &[f64]) -> Vec<(EntryPoint, Sinusoid)> {
+        let power = |(place, q): (&CandidateLine, &f64)| q / self.quantities.control_by_power(self.line(*place));
         let powers: Vec<f64> = places.iter().zip(shares).map(power).collect();
         let first = places.first().map(|(_, enters)| *enters);
         let own = places.iter().zip(&powers).filter(|((_, at), _)| Some(*at) == first);
         let whole: f64 = own.map(|(_, p)| p).sum();
-        let line = |((m, enters), p): (&Place, &f64)| {
+        let line = |((m, enters), p): (&CandidateLine, &f64)| {
             let line = Sinusoid {
                 amplitude_deg: (2.0 * p / whole).sqrt(),
                 omega_rad_s: self.omega(*m),

@@ -12,8 +12,8 @@
 //! rho is one half or more. A population of one condition does not determine rho.
 //!
 //! The variation from run to run comes from a number, or from the crossover frequencies of the runs in the result of a
-//! group ([`GroupEstimates::run_to_run_variation`]), as an upper bound. It applies to all quantities: the prior of a fit reduces the scatter of other
-//! parameters.
+//! group ([`GroupEstimates::run_to_run_variation`]), as an upper bound. It applies to all quantities: the prior of a
+//! fit reduces the scatter of other parameters.
 
 use std::{
     convert::Infallible,
@@ -71,8 +71,8 @@ pub(super) struct Spread {
     pub source: String,
 }
 
-/// Returns a given fraction of `unit`, or what `read` finds in the given file. If nothing is given, `read` is tried on the
-/// people of the design, and otherwise the result is the default fraction.
+/// Returns a given fraction of `unit`, or the value that `read` finds in the given file. If nothing is given, `read` is
+/// tried on the people of the design, and otherwise the result is the default fraction.
 fn resolve_spread(
     given: Option<&SpreadSource>,
     people: &People,

@@ -16,7 +16,7 @@ pub(super) const SAMPLE_TIME_S: f64 = 0.01;
 
 /// Point at which a forcing function enters the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Enters {
+pub enum EntryPoint {
     /// The forcing function is the target signal.
     #[default]
     Target,
@@ -24,7 +24,7 @@ pub enum Enters {
     Disturbance,
 }
 
-hoid_model::named_choice!(Enters, "point of entry of the forcing function", 2, {
+hoid_model::named_choice!(EntryPoint, "point of entry of the forcing function", 2, {
     Target => "target",
     Disturbance => "disturbance",
 });
@@ -82,20 +82,20 @@ mod written {
 /// The forcing functions of an experiment: a target, a disturbance, or both.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Forcing {
-    lines: Vec<(Enters, Sinusoid)>,
+    lines: Vec<(EntryPoint, Sinusoid)>,
 }
 
 impl Forcing {
     /// Creates a single forcing function that enters at the given point.
-    pub fn of(enters: Enters, function: &ForcingFunction) -> Self {
+    pub fn of(enters: EntryPoint, function: &ForcingFunction) -> Self {
         let lines = function.sinusoids().iter().map(|line| (enters, *line)).collect();
         Self { lines }
     }
 
     /// Creates a target and a disturbance.
     pub fn with_target_and_disturbance(target: &ForcingFunction, disturbance: &ForcingFunction) -> Self {
-        let mut all = Self::of(Enters::Target, target);
-        all.lines.extend(Self::of(Enters::Disturbance, disturbance).lines);
+        let mut all = Self::of(EntryPoint::Target, target);
+        all.lines.extend(Self::of(EntryPoint::Disturbance, disturbance).lines);
         all
     }
 
@@ -104,21 +104,21 @@ impl Forcing {
     /// # Errors
     /// [`ModelError::OutOfRange`] as for [`ForcingFunction::new`], which is applied to the lines of each point of
     /// entry.
-    pub fn new(lines: Vec<(Enters, Sinusoid)>) -> Result<Self, ModelError> {
+    pub fn new(lines: Vec<(EntryPoint, Sinusoid)>) -> Result<Self, ModelError> {
         let all = Self { lines };
-        for enters in [Enters::Target, Enters::Disturbance] {
+        for enters in [EntryPoint::Target, EntryPoint::Disturbance] {
             all.function(enters)?;
         }
         Ok(all)
     }
 
     /// Returns all lines, each with its point of entry.
-    pub fn lines(&self) -> &[(Enters, Sinusoid)] {
+    pub fn lines(&self) -> &[(EntryPoint, Sinusoid)] {
         &self.lines
     }
 
     /// Returns the lines that enter at a point.
-    pub fn sinusoids(&self, enters: Enters) -> Vec<Sinusoid> {
+    pub fn sinusoids(&self, enters: EntryPoint) -> Vec<Sinusoid> {
         let here = self.lines.iter().filter(|(at, _)| *at == enters);
         here.map(|(_, line)| *line).collect()
     }
@@ -127,7 +127,7 @@ impl Forcing {
     ///
     /// # Errors
     /// As [`ForcingFunction::new`].
-    pub fn function(&self, enters: Enters) -> Result<ForcingFunction, ModelError> {
+    pub fn function(&self, enters: EntryPoint) -> Result<ForcingFunction, ModelError> {
         ForcingFunction::new(self.sinusoids(enters))
     }
 }

@@ -1,11 +1,11 @@
 //! Errors that a design predicts against the scatter of simulated experiments.
 //!
-//! Each experiment is the scenario that the design writes, simulated run by run. The responses are fitted to the Fourier
-//! coefficients at its lines, `U = B E + F X + N`, by Gauss-Newton with the weights `1/S_n`: the estimate of which the
-//! information of the lines is that of the least covariance. Of n experiments the standard deviation has an error of
-//! `1/sqrt(2 n)`.
+//! Each experiment is the scenario that the design writes, simulated run by run. The responses are fitted to the
+//! Fourier coefficients at its lines, `U = B E + F X + N`, by Gauss-Newton with the weights `1/S_n`: the estimate of
+//! which the information of the lines is that of the least covariance. Of n experiments the standard deviation has an
+//! error of `1/sqrt(2 n)`.
 
-use hoid_design::experiment::{DesignOptions, DesignRequest, Enters, ExperimentDesign, Remnant};
+use hoid_design::experiment::{DesignOptions, DesignRequest, EntryPoint, ExperimentDesign, Remnant};
 use hoid_io::{AnyScenario, parse_any_scenario};
 use hoid_model::{
     Complex64, FamilyOperator, FamilyScenario, FamilyState, Form, Record,
@@ -21,7 +21,7 @@ pub struct Case {
     pub element: &'static str,
     /// That of the population if `None`.
     pub form: Option<Form>,
-    pub enters: Enters,
+    pub enters: EntryPoint,
     pub display: Display,
     /// Share of the remnant and its time constant.
     pub remnant: (f64, f64),
@@ -35,7 +35,7 @@ const TARGET_CASE: Case = Case {
     name: "",
     element: "4/s",
     form: None,
-    enters: Enters::Target,
+    enters: EntryPoint::Target,
     display: Display::Compensatory,
     remnant: (0.2, 0.06),
     length_s: 81.92,
@@ -71,7 +71,7 @@ pub const CASES: [Case; 12] = [
     Case {
         name: "integrator, disturbance, four runs",
         element: "1/s",
-        enters: Enters::Disturbance,
+        enters: EntryPoint::Disturbance,
         remnant: (0.1, 0.06),
         runs: 4,
         ..TARGET_CASE
@@ -79,7 +79,7 @@ pub const CASES: [Case; 12] = [
     Case {
         name: "lag and integrator, disturbance, eight runs",
         element: "1/(s(s+1))",
-        enters: Enters::Disturbance,
+        enters: EntryPoint::Disturbance,
         runs: 8,
         ..TARGET_CASE
     },
@@ -94,7 +94,7 @@ pub const CASES: [Case; 12] = [
     Case {
         name: "gain, lag, disturbance, four runs",
         element: "2",
-        enters: Enters::Disturbance,
+        enters: EntryPoint::Disturbance,
         remnant: (0.1, 0.06),
         runs: 4,
         ..TARGET_CASE
@@ -195,7 +195,7 @@ impl Case {
     }
 
     /// Scatter of the estimates that a method has of the runs of an experiment; those without a result or a
-    /// crossover are left out.
+    /// crossover are omitted.
     pub fn check_errors_with(
         &self,
         experiments: u64,
@@ -321,8 +321,8 @@ fn fit_lines(truth: &Responses, lines: &[Coefficients], time_constant_s: f64) ->
             if let Some(target) = &found.target {
                 let of_target = target.response_and_gradient(line.omega);
                 residual -= of_target.value * line.target;
-                for (place, d) in own.iter().zip(&of_target.gradient) {
-                    gradient[*place] += d * line.target;
+                for (index, d) in own.iter().zip(&of_target.gradient) {
+                    gradient[*index] += d * line.target;
                 }
             }
             let weight = 1.0 + (time_constant_s * line.omega).powi(2);

@@ -9,7 +9,7 @@ use super::{
     values::{FmiResult, VariableValues},
 };
 use crate::{
-    packed::{as_bytes, as_numbers},
+    binary_format::{as_bytes, as_numbers},
     results::level_number,
     session::Session,
 };

@@ -1,10 +1,10 @@
 //! Saved state of an instance. The instance can return to an earlier time, or another instance can continue, with
 //! bit-identical results (FMI 2.0.4, section 2.1.8; FMI 3.0.1, section 2.2.10).
 //!
-//! The importer holds a state in its serialised form (`packed`). The description contains the token of the unit, the
-//! phase and times of the experiment, and the values of all variables. The data are the bytes of the tracker, or the
-//! numbers of the operator. 64-bit floating-point numbers are stored in the description as their bit patterns, since
-//! JSON has no NaN.
+//! The importer holds a state in its serialised form (`binary_format`). The description contains the token of the unit,
+//! the phase and times of the experiment, and the values of all variables. The data are the bytes of the tracker, or
+//! the numbers of the operator. 64-bit floating-point numbers are stored in the description as their bit patterns,
+//! since JSON has no NaN.
 
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
@@ -19,7 +19,7 @@ use super::{
     model::Model,
     values::{FmiResult, VariableValues},
 };
-use crate::packed::{pack, unpack};
+use crate::binary_format::{pack, unpack};
 
 const MAGIC: [u8; 8] = *b"hoidfmu\x01";
 
@@ -123,7 +123,7 @@ fn to_value(of: &FmuStart, value: &Value) -> Option<FmuStart> {
 ///
 /// # Safety
 /// `place` is null, or points to null or to a state that came from [`into_handle`] and has not been freed.
-unsafe fn handle_place<'a>(place: *mut *mut State) -> FmiResult<&'a mut *mut State> {
+unsafe fn handle_memory<'a>(place: *mut *mut State) -> FmiResult<&'a mut *mut State> {
     // SAFETY: guaranteed by the caller of this function.
     let place = unsafe { slice_from_raw_mut(place, 1) }?;
     place
@@ -137,7 +137,7 @@ unsafe fn handle_place<'a>(place: *mut *mut State) -> FmiResult<&'a mut *mut Sta
 /// As for [`held`].
 unsafe fn into_handle(bytes: Vec<u8>, place: *mut *mut State) -> FmiResult {
     // SAFETY: guaranteed by the caller of this function.
-    let place = unsafe { handle_place(place) }?;
+    let place = unsafe { handle_memory(place) }?;
     if place.is_null() {
         *place = Box::into_raw(Box::new(State(bytes)));
         return Ok(());
@@ -189,7 +189,7 @@ macro_rules! states {
         pub unsafe extern "C" fn $free(component: *mut Component, state: *mut *mut State) -> c_int {
             let free = |_: &mut Instance| {
                 // SAFETY: guaranteed by the FMI standard.
-                let place = unsafe { handle_place(state) }?;
+                let place = unsafe { handle_memory(state) }?;
                 if !place.is_null() {
                     // SAFETY: the pointer came from `into_handle`, and is replaced by null.
                     drop(unsafe { Box::from_raw(std::mem::replace(place, std::ptr::null_mut())) });

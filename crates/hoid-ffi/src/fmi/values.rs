@@ -13,8 +13,8 @@ pub(super) struct VariableValues<'a> {
 
 impl VariableValues<'_> {
     fn value(&self, name: &str) -> Option<&FmuStart> {
-        let place = self.variables.iter().position(|variable| variable.name == name)?;
-        self.values.get(place)
+        let index = self.variables.iter().position(|variable| variable.name == name)?;
+        self.values.get(index)
     }
 
     pub fn real(&self, name: &str) -> f64 {

@@ -30,6 +30,6 @@ pub(crate) struct FurtherInput<'a> {
 pub(super) struct FurtherSignals {
     pub s: Vec<f64>,
     pub w: Vec<f64>,
-    pub of_b: Vec<f64>,
-    pub of_f: Vec<f64>,
+    pub b_columns: Vec<f64>,
+    pub f_columns: Vec<f64>,
 }

@@ -32,12 +32,12 @@ pub(crate) struct InitialStateResponses {
     q: Vec<Vec<f64>>,
     /// Coefficients of the retained columns of G in this basis: `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
     r: Vec<Vec<f64>>,
-    kept: Vec<usize>,
+    kept_columns: Vec<usize>,
     /// Impulse response of 1/F for each input.
     h: Vec<Vec<f64>>,
     /// For each state of a filter `1/F`: the index of the input, and the index of the state within the filter. In G
     /// these states come first, before those of the noise model.
-    of_inputs: Vec<(usize, usize)>,
+    input_states: Vec<(usize, usize)>,
     /// Index of the level among the columns of G, and its response `(1/F) 1`.
     level: Option<(usize, Vec<f64>)>,
     prior_rows: usize,
@@ -126,7 +126,7 @@ impl InitialStateResponses {
         }
         let mut free = Self {
             h: responses_of_inputs,
-            of_inputs,
+            input_states: of_inputs,
             level,
             prior_rows,
             ..Self::default()
@@ -135,7 +135,7 @@ impl InitialStateResponses {
             let mut whole = vec![0.0; prior_rows];
             // With a stationary past, the column of each noise state starts with a column of the identity matrix.
             if let Some(z) = index
-                .checked_sub(free.of_inputs.len())
+                .checked_sub(free.input_states.len())
                 .and_then(|state| whole.get_mut(state))
             {
                 *z = 1.0;
@@ -170,7 +170,7 @@ impl InitialStateResponses {
         r.push(rest);
         self.q.push(column);
         self.r.push(r);
-        self.kept.push(index);
+        self.kept_columns.push(index);
     }
 
     /// Adds the contribution of the least squares initial states to the signals: to w of each input and to v, from the
@@ -193,13 +193,13 @@ impl InitialStateResponses {
             }
         }
         // The states of the noise model change neither w nor v.
-        for (&index, &x) in self.kept.iter().zip(&states) {
+        for (&index, &x) in self.kept_columns.iter().zip(&states) {
             if let Some((_, response)) = self.level.as_ref().filter(|(place, _)| *place == index) {
                 if let Some(w) = w.first_mut() {
                     add_scaled(w, x, response);
                 }
                 add_scaled(v, -x, response);
-            } else if let Some(&(input, late)) = self.of_inputs.get(index)
+            } else if let Some(&(input, late)) = self.input_states.get(index)
                 && late < v.len()
             {
                 add_scaled(&mut w[input][late..], x, &self.h[input]);
@@ -213,7 +213,7 @@ impl InitialStateResponses {
     pub fn have_decayed(&self, rows: usize) -> bool {
         /// Relative magnitude below which a response counts as decayed.
         const DECAY_THRESHOLD: f64 = 1e-15;
-        /// Number of samples over which the amplitude of an oscillating response is judged.
+        /// Number of samples over which the amplitude of an oscillating response is assessed.
         const OSCILLATION_WINDOW_SAMPLES: usize = 128;
         let dead = |response: &[f64]| {
             response.len() < rows

@@ -32,7 +32,7 @@
 //!
 //! **Several inputs.** `A u = sum_i (B_i/F_i) q^-nk_i e_i + (C/D) eps`: each input has its own w, B and F. Its columns
 //! of psi follow from its own signals by the formulas for `b_j` and `f_j` above, and the past values of each w are
-//! unknown ([`further`]). Ljung, 1999, section 4.2 (eq. 4.35).
+//! unknown ([`further_inputs`]). Ljung, 1999, section 4.2 (eq. 4.35).
 //!
 //! **Weights** multiply the squared residuals; the robust loss uses them.
 //!
@@ -45,7 +45,7 @@
 //! | `initial_state` | assumptions about the time before a record |
 //! | `polynomials` | division of theta into A, B, C, D and F |
 //! | `further_input` | a further input: orders, values, signals |
-//! | `further` | responses to inputs in addition to e, and their columns of psi |
+//! | `further_inputs` | responses to inputs in addition to e, and their columns of psi |
 //! | `signals`, `whitening` | the signals of a record for one theta |
 //! | `initial_state_responses` | exact elimination of the unknown past of a record |
 //! | `stationary_noise` | stationary noise before the record |
@@ -54,8 +54,8 @@
 //! | `linearisation` | evaluation of the criterion for a search |
 //! | `workspace` | memory for the signals |
 
-mod further;
 pub(crate) mod further_input;
+mod further_inputs;
 mod initial_state;
 pub mod initial_state_responses;
 mod linearisation;

@@ -94,13 +94,13 @@ impl GreyBoxFit {
         let first = first_residual(&layout::orders(layout.order, layout.longest_nk().ok()?), initial);
         let criterion = PhysicalCriterion::new(layout.clone(), Data::of(records), initial, first);
         let blocks = physical_score_blocks(&criterion, &self.eta, &self.free, &mut Workspace::borrow_from_thread())?;
-        let direction = |place: &usize| {
-            let (slot, p) = (layout.slots[*place], self.eta.len());
-            let individual = layout.names[*place].contains('[');
+        let direction = |index: &usize| {
+            let (slot, p) = (layout.slots[*index], self.eta.len());
+            let individual = layout.names[*index].contains('[');
             let mut vector = vec![0.0; p];
-            vector[*place] = 1.0;
+            vector[*index] = 1.0;
             Direction {
-                name: layout.names[*place].clone(),
+                name: layout.names[*index].clone(),
                 unit: match slot {
                     LEAD_SLOT | DELAY_SLOT => " s",
                     2 => " rad/s",
@@ -108,13 +108,13 @@ impl GreyBoxFit {
                 },
                 vector,
                 delay: slot == DELAY_SLOT,
-                size: if individual { 0.0 } else { self.eta[*place].abs() },
+                size: if individual { 0.0 } else { self.eta[*index].abs() },
             }
         };
         let of_operator = self
             .free
             .iter()
-            .filter(|place| layout.slots[**place] != TIME_CONSTANT_SLOT);
+            .filter(|index| layout.slots[**index] != TIME_CONSTANT_SLOT);
         let constancy = Constancy {
             blocks: &blocks,
             directions: &of_operator.map(direction).collect::<Vec<_>>(),

@@ -3,18 +3,19 @@
 //! A search over forms, delays and orders finds a response in any pair of signals, so its result is only weak evidence
 //! of a response. This test is therefore done before the search, for all forms at once. Each channel is whitened by an
 //! autoregression, so a slow component does not count as many independent samples. At the frequencies `omega_k` of the
-//! record up to [`MAX_FREQUENCY_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e, followed by a
-//! typical neuromuscular system and a delay,
+//! record up to [`MAX_FREQUENCY_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e, followed by
+//! a typical neuromuscular system and a delay,
 //!
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
 //!
 //! where b is real. T is the share of the power of U that this regression explains, maximised over the delays
 //! [`DELAYS_S`] and the poles [`LAG_RATES`]. With one slow pole, the regression would leave much of the response of a
-//! person with a short lag, and with little remnant a few strong lines with random phases fit as well. Surrogate records have the same spectra, but random phases of E and therefore no relation between e
-//! and u (J. Theiler et al., *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATE_COUNT`] such records give the
-//! distribution of T if there is no response. If u does not depend on e, T is one more draw from this distribution: the
-//! probability that it exceeds all others is 1/([`SURROGATE_COUNT`] + 1), regardless of the spectra. Only the past of e is
-//! used, so a response of e to u does not count as a response of u. Several records have the same b.
+//! person with a short lag, and with little remnant a few strong lines with random phases fit as well. Surrogate
+//! records have the same spectra, but random phases of E and therefore no relation between e and u (J. Theiler et al.,
+//! *Physica D* 58 (1992) 77-94). The values of T for [`SURROGATE_COUNT`] such records give the distribution of T if
+//! there is no response. If u does not depend on e, T is one more draw from this distribution: the probability that it
+//! exceeds all others is 1/([`SURROGATE_COUNT`] + 1), regardless of the spectra. Only the past of e is used, so a
+//! response of e to u does not count as a response of u. Several records have the same b.
 
 use std::f64::consts::{PI, TAU};
 
@@ -53,7 +54,7 @@ pub struct Response {
     /// T: share of the power of the whitened output that the response explains.
     pub share: f64,
     /// Number of surrogates whose share is at least as large as the share of the records.
-    pub surrogates_above: usize,
+    pub exceeding_surrogates: usize,
     /// Number of surrogates.
     pub surrogates: usize,
 }
@@ -61,20 +62,20 @@ pub struct Response {
 impl Response {
     /// Returns the probability of a share at least this large if u does not respond to e.
     pub fn p_value(&self) -> f64 {
-        (self.surrogates_above + 1) as f64 / (self.surrogates + 1) as f64
+        (self.exceeding_surrogates + 1) as f64 / (self.surrogates + 1) as f64
     }
 
     /// Returns the finding that no response can be distinguished from chance; `None` if at most
     /// two surrogates have as large a share as the records.
     pub fn finding(&self) -> Option<Finding> {
-        (self.surrogates_above > MAX_SURROGATES_ABOVE).then(|| {
+        (self.exceeding_surrogates > MAX_SURROGATES_ABOVE).then(|| {
             Finding::undetermined(
                 "no-response",
                 format!(
                     "the response of u to e cannot be distinguished from chance: {} of {} pairs of unrelated records \
                      with the same spectra respond at least as strongly (p = {:.3}); check that both channels are \
                      from the same run and are not exchanged",
-                    self.surrogates_above,
+                    self.exceeding_surrogates,
                     self.surrogates,
                     self.p_value()
                 ),
@@ -140,7 +141,7 @@ pub fn response_to_error(records: &[Record]) -> Option<Response> {
     }
     Some(Response {
         share: own,
-        surrogates_above,
+        exceeding_surrogates: surrogates_above,
         surrogates: SURROGATE_COUNT,
     })
 }
@@ -153,8 +154,8 @@ fn columns_with(lag: usize) -> [usize; REGRESSOR_COUNT] {
     [0, 1, 2 + lag]
 }
 
-/// Returns the inverse of `sum Re(x_i* x_j)` by rows, for the regression with this lag. The matrix depends neither on the delay nor on the phases of E.
-/// `None` if the columns are linearly dependent.
+/// Returns the inverse of `sum Re(x_i* x_j)` by rows, for the regression with this lag. The matrix depends neither on
+/// the delay nor on the phases of E. `None` if the columns are linearly dependent.
 fn inverse_gram(all: &[Spectra], lag: usize) -> Option<Vec<f64>> {
     const N: usize = REGRESSOR_COUNT;
     let mut gram = [0.0; N * N];
@@ -317,7 +318,7 @@ mod tests {
             let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
             let run = simulator.run(RunSeed::default(), false).unwrap();
             let found = response_to_error(&[run]).unwrap();
-            assert_eq!(found.surrogates_above, 0, "{found:?}");
+            assert_eq!(found.exceeding_surrogates, 0, "{found:?}");
             assert!(found.p_value() < 1e-3 && found.finding().is_none());
         }
     }

@@ -1,8 +1,8 @@
 //! Evidence in a stretch of data against an operator that was estimated from other data: one step towards a fit to this
 //! stretch.
 //!
-//! The operator is held constant, and a noise model `D v = eps` of order [`NOISE_ORDER`] is fitted to the part of u that the
-//! operator does not explain. With `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`,
+//! The operator is held constant, and a noise model `D v = eps` of order [`NOISE_ORDER`] is fitted to the part of u
+//! that the operator does not explain. With `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`,
 //!
 //! `delta = (psi' psi)^-1 psi' eps`
 //!
@@ -42,7 +42,7 @@ pub struct OperatorStep {
     /// Name of the parameter.
     pub name: &'static str,
     /// The step and its standard error, in the unit of the parameter.
-    pub by: Estimate,
+    pub step: Estimate,
     /// Number of blocks from which the standard error is computed.
     pub blocks: usize,
 }
@@ -52,8 +52,10 @@ impl OperatorStep {
     /// distribution. `error_of_operator` is the standard error of the parameter in the operator itself; steps up to
     /// `grid` count as zero.
     pub fn p_value(&self, error_of_operator: f64, grid: f64) -> f64 {
-        let Some(own) = self.by.standard_error else { return 1.0 };
-        let t = (self.by.value.abs() - grid).max(0.0) / own.hypot(error_of_operator);
+        let Some(own) = self.step.standard_error else {
+            return 1.0;
+        };
+        let t = (self.step.value.abs() - grid).max(0.0) / own.hypot(error_of_operator);
         let freedom = self.blocks.saturating_sub(1).max(1) as f64;
         StudentsT::new(0.0, 1.0, freedom).map_or(1.0, |d| 2.0 * d.sf(t))
     }
@@ -90,8 +92,8 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
         let psi = criterion.jacobian(theta, 0, &mut workspace);
         let column = |k: usize| {
             let mut column = vec![0.0; eps.len()];
-            for (place, row) in places.iter().zip(&slopes) {
-                add_scaled(&mut column, row[k], &psi[*place]);
+            for (index, row) in places.iter().zip(&slopes) {
+                add_scaled(&mut column, row[k], &psi[*index]);
             }
             (k, column)
         };
@@ -143,12 +145,12 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
         let variance = clustered[(k, k)].max(fit.innovation_variance() * inverse[(k, k)]);
         OperatorStep {
             name: DELAYED_PARAMETER_NAMES[k],
-            by: Estimate::with_variance(delta[k], variance),
+            step: Estimate::with_variance(delta[k], variance),
             blocks: n,
         }
     };
     let steps: [OperatorStep; PARAMETER_COUNT] = std::array::from_fn(step);
-    steps.iter().all(|step| step.by.value.is_finite()).then_some(steps)
+    steps.iter().all(|step| step.step.value.is_finite()).then_some(steps)
 }
 
 #[cfg(test)]
@@ -177,7 +179,7 @@ mod tests {
     }
 
     fn of(steps: &[OperatorStep], name: &str) -> Estimate {
-        steps.iter().find(|step| step.name == name).unwrap().by
+        steps.iter().find(|step| step.name == name).unwrap().step
     }
 
     #[test]

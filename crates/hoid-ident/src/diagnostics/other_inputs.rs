@@ -8,14 +8,14 @@
 //! **Sticks with a dead zone.** If only the target excites the loop, the part of e that follows the target is larger
 //! than the rest of e. A dead zone has different gains for small and for large signals (the describing function of A.
 //! Gelb and W. E. Vander Velde, *Multiple-Input Describing Functions*, 1968), so u follows the target with another gain
-//! than e as a whole, which looks like a response to the target. If u [rests](Rest) like the signal of such a stick,
+//! than e as a whole, which looks like a response to the target. If u [rests](StickRest) like the signal of such a stick,
 //! the finding is a note with both explanations.
 
 use hoid_model::{Finding, Form, Record};
 
 use crate::{
     family::{ChannelFit, ChannelRole, FamilyEstimator, FamilyFit, SeenChannel},
-    faults::Rest,
+    faults::StickRest,
     frequency::COMMON_EXCITATIONS,
 };
 
@@ -86,7 +86,7 @@ pub fn response_to(
 
 /// True if u of one of the records rests like the signal of a stick with a dead zone.
 fn has_rest(records: &[Record]) -> bool {
-    records.iter().any(|record| Rest::of(record.output()).is_some())
+    records.iter().any(|record| StickRest::of(record.output()).is_some())
 }
 
 fn response_finding(name: &str, chance: f64, nonlinear: bool) -> Finding {

@@ -19,8 +19,8 @@
 //! | `equations` | the least-squares fit of an element |
 //!
 //! If a disturbance was not recorded, the person responds to it, so u is not independent of it. The element is
-//! therefore judged only if the recorded signals explain all but [`MAX_UNEXPLAINED_SHARE`] of the power, as they do if
-//! all signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
+//! therefore assessed only if the recorded signals explain all but [`MAX_UNEXPLAINED_SHARE`] of the power, as they do
+//! if all signals of the loop were recorded. C is free, since it equals A only if e is not scaled.
 
 mod equations;
 mod spectra;
@@ -30,7 +30,7 @@ use hoid_model::{Complex64, ContinuousTransferFunction, Finding, Record};
 use equations::ElementFit;
 use spectra::{ExogenousChannels, MAX_FREQUENCIES, Spectra};
 
-/// Largest unexplained share of the power, expressed as a disturbance at u, for which the element is judged.
+/// Largest unexplained share of the power, expressed as a disturbance at u, for which the element is assessed.
 const MAX_UNEXPLAINED_SHARE: f64 = 0.02;
 /// The same without a recorded target or disturbance. If one exists, e and u are then related at its frequencies by the
 /// inverse of the person's response, which an element can imitate.
@@ -41,8 +41,8 @@ const EXACT_DATA_SHARE: f64 = 1e-4;
 /// Unexplained share up to which the given element is accepted: the power of a response that differs by
 /// [`MAX_RESPONSE_DIFFERENCE`].
 const MAX_UNEXPLAINED_BY_GIVEN: f64 = 0.01;
-/// Ratio of the unexplained shares of the given and of the identified element up to which the given element is accepted.
-/// Without a recorded target, for example, neither element explains the power of the target.
+/// Ratio of the unexplained shares of the given and of the identified element up to which the given element is
+/// accepted. Without a recorded target, for example, neither element explains the power of the target.
 const MAX_RATIO_TO_IDENTIFIED: f64 = 4.0;
 /// Frequencies at which two elements are compared, rad/s: the range in which people close their loops.
 const COMPARED_FREQUENCIES_RAD_S: [f64; 7] = [0.5, 0.75, 1.1, 1.6, 2.4, 3.6, 5.4];
@@ -62,12 +62,12 @@ pub struct RecordedElement {
     /// Delay of the machine beyond that of the given element, s; negative if u was recorded late.
     pub delay_s: f64,
     /// Share of the power that the element does not explain, expressed as a disturbance at u.
-    pub unexplained: f64,
+    pub unexplained_share: f64,
     /// Frequency in rad/s at which the response of the element differs most from the given element, apart from the
     /// delay, and the ratio of the two responses at this frequency.
     pub difference: (f64, Complex64),
     /// Largest delay for which e and u count as aligned, s.
-    aligned_s: f64,
+    max_aligned_delay_s: f64,
 }
 
 impl RecordedElement {
@@ -80,7 +80,7 @@ impl RecordedElement {
     pub fn finding(&self, given: &ContinuousTransferFunction) -> Option<Finding> {
         let (omega, ratio) = self.difference;
         let late = 1e3 * self.delay_s;
-        let beyond = match self.delay_s.abs() > self.aligned_s {
+        let beyond = match self.delay_s.abs() > self.max_aligned_delay_s {
             true if late > 0.0 => format!(" with an additional delay of {late:.0} ms"),
             true => format!(" with u recorded {:.0} ms late", -late),
             false => String::new(),
@@ -137,23 +137,26 @@ pub fn recorded_element(
         true => MAX_UNEXPLAINED_WITHOUT_EXCITATION,
         false => MAX_UNEXPLAINED_SHARE,
     };
-    let least = fits.iter().map(|fit| fit.unexplained).fold(f64::INFINITY, f64::min);
+    let least = fits
+        .iter()
+        .map(|fit| fit.unexplained_share)
+        .fold(f64::INFINITY, f64::min);
     let chosen = fits
         .into_iter()
-        .find(|fit| fit.unexplained <= 2.0 * least + EXACT_DATA_SHARE)
-        .filter(|fit| fit.unexplained <= most)?;
+        .find(|fit| fit.unexplained_share <= 2.0 * least + EXACT_DATA_SHARE)
+        .filter(|fit| fit.unexplained_share <= most)?;
     let aligned_s = MAX_ALIGNED_DELAY_SAMPLES * sample_time_s;
-    // A zero with a delay, or a slow pole, can look like another element in the band of manual control. What counts is
-    // whether the given element explains the record.
+    // A zero with a delay, or a slow pole, can look like another element in the band of manual control. The test
+    // therefore asks whether the given element explains the record.
     if let Some((delay_s, unexplained)) = chosen.of_given(&spectra, given, aligned_s)
-        && unexplained <= MAX_UNEXPLAINED_BY_GIVEN.max(MAX_RATIO_TO_IDENTIFIED * chosen.unexplained)
+        && unexplained <= MAX_UNEXPLAINED_BY_GIVEN.max(MAX_RATIO_TO_IDENTIFIED * chosen.unexplained_share)
     {
         return Some(RecordedElement {
             element: given.clone(),
             delay_s,
-            unexplained,
+            unexplained_share: unexplained,
             difference: (COMPARED_FREQUENCIES_RAD_S[0], Complex64::ONE),
-            aligned_s,
+            max_aligned_delay_s: aligned_s,
         });
     }
     let element = transfer_function(&chosen, given.delay_s())?;
@@ -165,10 +168,10 @@ pub fn recorded_element(
         .max_by(|a, b| a.1.ln().norm().total_cmp(&b.1.ln().norm()))?;
     Some(RecordedElement {
         delay_s: chosen.delay_s - given.delay_s(),
-        unexplained: chosen.unexplained,
+        unexplained_share: chosen.unexplained_share,
         element,
         difference,
-        aligned_s,
+        max_aligned_delay_s: aligned_s,
     })
 }
 

@@ -1,19 +1,20 @@
 //! Test for a response to the error that the model does not contain.
 //!
 //! For a model that is linear in its unknowns, `u = X b + v`, the columns X are known: responses of a basis, their
-//! derivatives with respect to the fixed dynamics, and a level. With an autoregression `D v = eps` of order [`NOISE_ORDER`]
-//! the test asks whether further taps Z on e explain part of eps. The taps are means of e over [`TAP_COUNT`] consecutive
-//! spans of [`TAP_S`]; they approximate an impulse response that X cannot represent. The test uses the Lagrange
-//! multiplier statistic (T. S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung,
+//! derivatives with respect to the fixed dynamics, and a level. With an autoregression `D v = eps` of order
+//! [`NOISE_ORDER`] the test asks whether further taps Z on e explain part of eps. The taps are means of e over
+//! [`TAP_COUNT`] consecutive spans of [`TAP_S`]; they approximate an impulse response that X cannot represent. The test
+//! uses the Lagrange multiplier statistic (T. S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980)
+//! 239-253; L. Ljung,
 //! *System Identification*, 1999, section 16.6, for the residuals of a model)
 //!
 //! `s(t) = z(t) eps(t)`, where z is the remainder of D Z after the projection on D X and the lags of v,
 //!
 //! so that the effect of estimating b and D is removed: in a closed loop past e and past v are correlated. Two
 //! variances are used. The variance of the model gives `T = (sum s)' (sigma^2 sum z z')^-1 (sum s)`, chi-square with
-//! [`TAP_COUNT`] degrees of freedom. The scatter of the sums over blocks of 2 s gives Hotelling's `T^2`, which is valid even
-//! if the size of the remnant changes (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). The larger
-//! p-value is used.
+//! [`TAP_COUNT`] degrees of freedom. The scatter of the sums over blocks of 2 s gives Hotelling's `T^2`, which is valid
+//! even if the size of the remnant changes (H. Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). The
+//! larger p-value is used.
 //!
 //! Signals are decimated to the lowest possible rate that is not below [`MIN_RATE_HZ`]. Residuals are not limited: if a
 //! person moves the stick in pulses, these pulses are the response to e, and the part removed by a limit would look
@@ -37,7 +38,7 @@ pub struct ResidualResponse {
     /// Larger of the two p-values: probability of a statistic at least this large if no response is missing.
     pub p_value: f64,
     /// The two p-values: from the variance of the model and from the scatter of blocks.
-    pub each: [f64; 2],
+    pub p_values: [f64; 2],
     /// Share of the variance of eps that the taps explain.
     pub share: f64,
 }
@@ -112,7 +113,7 @@ fn response_from_scores(z: &DMatrix<f64>, eps: &DVector<f64>, block: usize, know
     let p_value = of_model.max(of_blocks);
     p_value.is_finite().then_some(ResidualResponse {
         p_value,
-        each: [of_model, of_blocks],
+        p_values: [of_model, of_blocks],
         share: explained / eps.norm_squared(),
     })
 }

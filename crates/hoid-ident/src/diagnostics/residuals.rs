@@ -44,7 +44,7 @@ pub(crate) struct ResidualMeasures {
     /// Largest share of one sample in the sum of squares.
     pub leverage: f64,
     /// Record and sample of the residual with the largest share in the sum of squares.
-    pub at: (usize, usize),
+    pub largest_residual: (usize, usize),
 }
 
 impl ResidualMeasures {
@@ -92,7 +92,7 @@ impl ResidualMeasures {
             for (t, x) in eps.iter().enumerate() {
                 if x * x / total > measures.leverage {
                     measures.leverage = x * x / total;
-                    measures.at = (record, t);
+                    measures.largest_residual = (record, t);
                 }
             }
         }
@@ -134,8 +134,8 @@ impl ResidualMeasures {
                 format!(
                     "one sample (record {}, residual {}) contributes {:.0} % of the sum of squares: inspect this \
                      sample, or exclude it",
-                    self.at.0 + 1,
-                    self.at.1,
+                    self.largest_residual.0 + 1,
+                    self.largest_residual.1,
                     100.0 * self.leverage
                 ),
             )
@@ -206,7 +206,10 @@ mod tests {
         blow[1234] = 10.0;
         let records = [(eps.as_slice(), e.as_slice()), (blow.as_slice(), e.as_slice())];
         let measures = ResidualMeasures::of(&records, 0.01);
-        assert_eq!((finding_kinds(&measures), measures.at), (vec!["leverage"], (1, 1234)));
+        assert_eq!(
+            (finding_kinds(&measures), measures.largest_residual),
+            (vec!["leverage"], (1, 1234))
+        );
     }
 
     #[test]

@@ -71,14 +71,14 @@ impl RemovedComponent {
                 "leverage",
                 format!(
                     "the fit depends on a few samples: limiting each sample by its neighbours changes {differ} \
-                     standard errors; look at the recording"
+                     standard errors; inspect the recording"
                 ),
             ),
             Self::SlowComponents(period_s) => Finding::warning(
                 "slow",
                 format!(
                     "the fit depends on a drift or a step that the person does not follow: removing components slower \
-                     than {period_s:.0} s changes {differ} standard errors; look at the recording, or choose a span \
+                     than {period_s:.0} s changes {differ} standard errors; inspect the recording, or choose a span \
                      without this drift or step"
                 ),
             ),
@@ -117,8 +117,8 @@ pub fn polynomial_findings(
     })
 }
 
-/// Returns the period above which a component is slow: [`SLOW_PERIOD_S`], or ten periods of the slowest pole of the system
-/// if that is longer.
+/// Returns the period above which a component is slow: [`SLOW_PERIOD_S`], or ten periods of the slowest pole of the
+/// system if that is longer.
 fn slow_period_s(fit: &Fit) -> f64 {
     let poles = fit.roots();
     let poles = poles.iter().filter(|root| matches!(root.polynomial, 'a' | 'f'));
@@ -208,8 +208,8 @@ pub fn sigmoid_finding(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[R
     if fit.has_change() != other.has_change() {
         return Some(Finding::warning(
             "leverage",
-            "the fit depends on a few samples: limiting each sample by its neighbours determines whether a change is \
-             found; look at the recording",
+            "the fit depends on a few samples: whether a change is found depends on whether outliers are limited; \
+             inspect the recording",
         ));
     }
     if fit.has_change() {
@@ -228,8 +228,8 @@ pub fn sigmoid_finding(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[R
     without.finding(pair_estimates(constant(fit), constant(&other)))
 }
 
-/// Returns a warning if a level of e and u affects a polynomial fit: a parameter differs by more than `MAX_LEVEL_EFFECT` standard
-/// errors if the means are removed.
+/// Returns a warning if a level of e and u affects a polynomial fit: a parameter differs by more than
+/// `MAX_LEVEL_EFFECT` standard errors if the means are removed.
 pub fn level_finding(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
     let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
     let other = refit(estimator, fit, &without)?;

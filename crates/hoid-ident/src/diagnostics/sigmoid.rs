@@ -13,7 +13,7 @@ use crate::{
 
 impl SigmoidFit {
     /// Returns the verdict on the fit. `records` are the records of the fit. If they show no change, the operator
-    /// without a change is judged.
+    /// without a change is assessed.
     ///
     /// # Errors
     /// The errors of [`SigmoidFit::residuals`].

@@ -456,7 +456,7 @@ fn fit_free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<
     };
     let found = minimise(&criterion, mapped.theta.clone(), &search, None, workspace)?;
     let n = fit.residuals as f64;
-    let loss = found.at.sum_of_squares / n;
+    let loss = found.linearisation.sum_of_squares / n;
     let freedom = mapped
         .theta
         .len()

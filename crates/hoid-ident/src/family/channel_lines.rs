@@ -401,9 +401,9 @@ impl ChannelLineFitter<'_> {
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<Minimum> = None;
         for (_, start) in starts.into_iter().take(SEARCH_COUNT) {
-            let known = best.as_ref().map(|b| b.at.sum_of_squares);
+            let known = best.as_ref().map(|b| b.linearisation.sum_of_squares);
             if let Some(found) = minimise(&criterion, start, self.search, None, &mut Workspace::default())
-                && known.is_none_or(|known| found.at.sum_of_squares < known)
+                && known.is_none_or(|known| found.linearisation.sum_of_squares < known)
             {
                 best = Some(found);
             }
@@ -521,7 +521,7 @@ impl ChannelCriterion {
             .collect();
         let part: Vec<f64> = (free.iter())
             .flat_map(|&i| free.iter().map(move |&j| (i, j)))
-            .map(|(i, j)| minimum.at.gram[i * p + j])
+            .map(|(i, j)| minimum.linearisation.gram[i * p + j])
             .collect();
         let covariance = || {
             let mut covariance = vec![0.0; p * p];

@@ -184,7 +184,7 @@ impl EstimatedOperator {
 
 /// Returns the curvature of the prior of an element of eta, relative to the innovation variance; `None` without a prior.
 fn prior_precision(fit: &PredictionFit<'_>, place: usize) -> Option<f64> {
-    let penalty = fit.criterion.penalty.iter().find(|p| p.place == place)?;
+    let penalty = fit.criterion.penalty.iter().find(|p| p.index == place)?;
     Some(penalty.curvature(fit.eta()) / fit.innovation_variance)
 }
 

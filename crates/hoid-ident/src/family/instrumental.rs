@@ -377,7 +377,7 @@ impl<'p, 'a> InstrumentalSearch<'p, 'a> {
         let by_rows = |m: &DMatrix<f64>| -> Vec<f64> { m.transpose().as_slice().to_vec() };
         let mut covariance = by_rows(&(&inverse * middle * inverse.transpose()));
         let penalty: Vec<_> = (self.fit.criterion.penalty.iter().copied())
-            .filter(|penalty| inner(penalty.place))
+            .filter(|penalty| inner(penalty.index))
             .collect();
         // The weights of the prior are w = kappa sigma^2/s^2, and w^2 s^2 = kappa sigma^2 w.
         add_prior_contribution(&mut covariance, scale, &penalty, x, &by_rows(&inverse));
@@ -388,7 +388,7 @@ impl<'p, 'a> InstrumentalSearch<'p, 'a> {
         let p = zero.x.len();
         let mut shares = vec![0.0; p];
         for penalty in &self.fit.criterion.penalty {
-            let (i, scale) = (penalty.place, self.fit.innovation_variance * self.fit.inflation);
+            let (i, scale) = (penalty.index, self.fit.innovation_variance * self.fit.inflation);
             shares[i] = match &zero.covariance {
                 Some(c) if c[i * p + i] > 0.0 => (c[i * p + i] * penalty.curvature(&zero.x) / scale).min(1.0),
                 _ => 1.0,

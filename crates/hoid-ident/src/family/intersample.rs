@@ -12,7 +12,7 @@
 //! noise can show this ([`super::low_noise`]). If it does not, the difference between the two fits is part of the error
 //! bars ([`super::sensitivity`]).
 
-use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice, operator_family::HeldFamily};
+use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice, operator_family::ZohFamilyOperator};
 
 /// Intersample behaviour of the error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
@@ -70,7 +70,7 @@ impl Intersample {
         operator: &FamilyOperator,
         sample: Option<usize>,
         sample_time: SampleTime,
-    ) -> Result<HeldFamily, ModelError> {
+    ) -> Result<ZohFamilyOperator, ModelError> {
         match (self, sample) {
             (Self::Auto, Some(sample)) => operator.interpolate_with_delay_samples(sample, sample_time),
             (Self::Auto, None) => operator.interpolate(sample_time),

@@ -39,7 +39,7 @@ pub(super) fn add_prior_contribution(
 ) {
     let p = x.len();
     for penalty in prior {
-        let (place, weight) = (penalty.place, factor * penalty.curvature(x));
+        let (place, weight) = (penalty.index, factor * penalty.curvature(x));
         for i in 0..p {
             for j in 0..p {
                 covariance[i * p + j] += weight * inverse[i * p + place] * inverse[j * p + place];
@@ -69,7 +69,7 @@ mod tests {
     fn data_and_prior_parts_add_up_to_the_inverse() {
         // H = G + P: H^-1 G H^-1 + H^-1 P H^-1 = H^-1.
         let penalty = |place, logarithmic, precision| Penalty {
-            place,
+            index: place,
             logarithmic,
             mean: 0.3,
             precision,

@@ -257,9 +257,11 @@ impl Parametrisation for FamilyLayout {
 
     fn map(&self, eta: &[f64], record: usize, held: DelayIntervals<'_>) -> Result<MappedPolynomials, ModelError> {
         let operator = self.operator(eta, record)?;
-        let found = self
-            .intersample
-            .discrete_model(&operator, held.of(self.delay_index(record)), self.sample_time)?;
+        let found = self.intersample.discrete_model(
+            &operator,
+            held.sampling_interval(self.delay_index(record)),
+            self.sample_time,
+        )?;
         let noise = &eta[self.noise_offset()..];
         let orders = self.orders(found.nk);
         let mut theta = found.b.clone();
@@ -280,7 +282,7 @@ impl Parametrisation for FamilyLayout {
             let delay = channel.place + channel.limits.len() - 1;
             let found = self
                 .intersample
-                .discrete_model(&operator, held.of(delay), self.sample_time)?;
+                .discrete_model(&operator, held.sampling_interval(delay), self.sample_time)?;
             let from = theta.len();
             theta.extend_from_slice(&found.b);
             theta.extend_from_slice(&found.f);

@@ -60,8 +60,8 @@ impl LineFit {
         });
         let mut prior_shares = vec![0.0; p];
         for penalty in penalty {
-            let variance = by_lines.as_ref().map(|c| c[penalty.place * (p + 1)]);
-            prior_shares[penalty.place] = match variance {
+            let variance = by_lines.as_ref().map(|c| c[penalty.index * (p + 1)]);
+            prior_shares[penalty.index] = match variance {
                 Some(v) if v > 0.0 => (v * penalty.curvature(&found.coordinates)).min(1.0),
                 _ => 1.0,
             };

@@ -191,7 +191,7 @@ impl Search<'_, '_> {
             let Some(end) = criterion.search(eta, &search, None, workspace) else {
                 continue;
             };
-            let share = end.at.sum_of_squares / self.power;
+            let share = end.linearisation.sum_of_squares / self.power;
             if best.as_ref().is_none_or(|known| share < known.share) {
                 let coordinates = criterion.layout.coordinates_of(&end.theta, 0);
                 best = Some(SearchResult { coordinates, share });
@@ -250,7 +250,7 @@ impl Search<'_, '_> {
 #[cfg(test)]
 mod tests {
     use hoid_model::scenario::{Condition, Scenario};
-    use hoid_model::{Channel, Detrend, FamilyOperator, Record, SampleTime, operator_family::HeldFamily};
+    use hoid_model::{Channel, Detrend, FamilyOperator, Record, SampleTime, operator_family::ZohFamilyOperator};
     use hoid_sim::{RunSeed, Simulator};
 
     use crate::family::{
@@ -267,13 +267,13 @@ mod tests {
     }
 
     /// Returns 25 s of [`record_of`] at 40 Hz.
-    fn record(model: &HeldFamily, noise: f64) -> Record {
+    fn record(model: &ZohFamilyOperator, noise: f64) -> Record {
         record_of(model, SampleTime::new(0.025).unwrap(), (200, 1000), noise)
     }
 
     /// Returns a record of `n` samples: an error with a nonzero mean, this much white noise on u, and a level of u. The
     /// run starts `before` samples before the record, away from rest.
-    fn record_of(model: &HeldFamily, ts: SampleTime, (before, n): (usize, usize), noise: f64) -> Record {
+    fn record_of(model: &ZohFamilyOperator, ts: SampleTime, (before, n): (usize, usize), noise: f64) -> Record {
         let mut random = Uniform(7);
         let mut uniform = || random.between(-0.5, 0.5);
         let e: Vec<f64> = (0..before + n)

@@ -18,7 +18,7 @@
 
 use hoid_model::{
     Complex64, FamilyOperator, Form, NotConvertible, PolynomialModel, SampleTime,
-    operator_family::{Coordinate, HeldFamily},
+    operator_family::{Coordinate, ZohFamilyOperator},
     uncertainty::Estimate,
 };
 
@@ -220,7 +220,11 @@ fn fit_form(
                 &mut Workspace::default(),
             )
         })
-        .min_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares))?;
+        .min_by(|a, b| {
+            a.linearisation
+                .sum_of_squares
+                .total_cmp(&b.linearisation.sum_of_squares)
+        })?;
     Some((criterion.mismatch(&found.theta)?, found))
 }
 
@@ -321,7 +325,7 @@ impl<'a> ConversionCriterion<'a> {
         let gram: Vec<f64> = free
             .iter()
             .flat_map(|&i| free.iter().map(move |&j| i * p + j))
-            .map(|at| found.at.gram[at])
+            .map(|at| found.linearisation.gram[at])
             .collect();
         let responses = self.responses(&found.theta)?;
         // S = dx/dtheta, one column per coefficient.
@@ -353,7 +357,7 @@ impl<'a> ConversionCriterion<'a> {
 }
 
 /// Returns `z^-nk B/F` at `z = e^{j angle}`, and its derivatives with respect to the first `p` coordinates.
-fn response(held: &HeldFamily, angle: f64, p: usize) -> (Complex64, Vec<Complex64>) {
+fn response(held: &ZohFamilyOperator, angle: f64, p: usize) -> (Complex64, Vec<Complex64>) {
     let back = |k: usize| Complex64::from_polar(1.0, -angle * k as f64);
     let (mut b, mut f) = (Complex64::new(0.0, 0.0), Complex64::new(1.0, 0.0));
     let (mut of_b, mut of_f) = (vec![Complex64::new(0.0, 0.0); p], vec![Complex64::new(0.0, 0.0); p]);

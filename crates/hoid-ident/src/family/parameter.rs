@@ -48,8 +48,8 @@ pub struct Parameter {
     /// Name of the parameter: K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e, ...
     pub name: String,
     /// Unit of the parameter.
-    #[serde(deserialize_with = "hoid_model::interned::name")]
-    pub unit: hoid_model::interned::Name,
+    #[serde(deserialize_with = "hoid_model::static_names::name")]
+    pub unit: hoid_model::static_names::Name,
     /// Value of the parameter; infinite for T_I of a pure integration.
     pub value: f64,
     /// First-order standard error for the operator in these runs; `None` at a bound or without a covariance.

@@ -191,7 +191,7 @@ impl<'a> PredictionProblem<'a> {
                 let reached = criterion
                     .search(eta, &first_steps, None, workspace)
                     .ok_or(IdentError::NoFiniteLoss)?;
-                if reached.at.sum_of_squares > known {
+                if reached.linearisation.sum_of_squares > known {
                     return Ok(None);
                 }
                 eta = reached.theta;
@@ -200,7 +200,7 @@ impl<'a> PredictionProblem<'a> {
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
             // Without a residual no step can decrease the loss.
-            if minimum.at.sum_of_squares < self.equality_threshold() {
+            if minimum.linearisation.sum_of_squares < self.equality_threshold() {
                 minimum.termination.reason = Reason::ExactFit;
             }
             let fit = self.fit_at_minimum(criterion.clone(), minimum, workspace)?;
@@ -243,14 +243,17 @@ impl<'a> PredictionProblem<'a> {
         let all = layout.form.coordinates(layout.neuromuscular);
         let unit = self.prior.penalties(layout.form, layout.neuromuscular);
         let places = |penalty: Penalty| {
-            let coordinate = all[penalty.place];
+            let coordinate = all[penalty.index];
             let own = layout
                 .elements
                 .iter()
                 .enumerate()
                 .filter(move |(_, e)| e.0 == coordinate);
-            own.map(move |(place, _)| Penalty { place, ..penalty })
-                .collect::<Vec<_>>()
+            own.map(move |(place, _)| Penalty {
+                index: place,
+                ..penalty
+            })
+            .collect::<Vec<_>>()
         };
         unit.into_iter().flat_map(places).collect()
     }
@@ -293,7 +296,7 @@ impl<'a> PredictionProblem<'a> {
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
         let additional = criterion.linearise_additional(&minimum.theta, workspace).sum_of_squares;
         // The noise variance is computed from the residuals alone, without the prior and the lines.
-        let mut squares = minimum.at.sum_of_squares - penalty - additional;
+        let mut squares = minimum.linearisation.sum_of_squares - penalty - additional;
         if self.noise_free_share().is_some() {
             squares = squares.max(self.rounding_floor() * n as f64);
         }

@@ -42,7 +42,7 @@ impl PredictionFit<'_> {
 
     /// Returns the minimum of the criterion: the sum of squares plus the prior and, if they are included, the lines.
     pub fn objective(&self) -> f64 {
-        self.minimum.at.sum_of_squares
+        self.minimum.linearisation.sum_of_squares
     }
 
     /// Returns the residuals of one record.
@@ -65,7 +65,7 @@ impl PredictionFit<'_> {
     pub fn solve(&self, free: &[usize], less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
         let p = self.parameter_count();
         let gram = |i: usize, j: usize| {
-            let own = self.minimum.at.gram[i * p + j];
+            let own = self.minimum.linearisation.gram[i * p + j];
             let held = if i == j { self.ridge * own } else { 0.0 };
             own + held - less.map_or(0.0, |l| l[i * p + j])
         };

@@ -181,7 +181,7 @@ impl OperatorPrior {
             let place = coordinates.iter().position(|c| *c == coordinate)?;
             let sign = if coordinate == Coordinate::LagRate { -1.0 } else { 1.0 };
             Some(Penalty {
-                place,
+                index: place,
                 logarithmic: !matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta),
                 mean: sign * entry.centre.ln(),
                 precision: 1.0 / (entry.spread * entry.spread),
@@ -290,7 +290,7 @@ mod tests {
             panic!("one penalty")
         };
         // ln(1/T_I) is centred at -ln 5.
-        assert_eq!((penalty.place, penalty.mean), (2, -(5.0_f64.ln())));
+        assert_eq!((penalty.index, penalty.mean), (2, -(5.0_f64.ln())));
         assert!(lag.penalties(Form::Lead, true).is_empty());
     }
 

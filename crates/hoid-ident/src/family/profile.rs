@@ -27,7 +27,7 @@ pub(super) fn profile_interval(
 ) -> Option<(f64, f64)> {
     // Increase of the criterion at the ends of the interval: t^2 times the inflated innovation variance.
     let level = fit.inflation * fit.innovation_variance * quantile * quantile;
-    let least = fit.minimum.at.sum_of_squares;
+    let least = fit.minimum.linearisation.sum_of_squares;
     let search = SearchOptions {
         max_iterations: SEARCH_LIMITS.0,
         tolerance: SEARCH_LIMITS.1,
@@ -46,7 +46,7 @@ pub(super) fn profile_interval(
             // The next search starts from the conditional minimum at this point, which takes few iterations and stays
             // in the same valley.
             eta.copy_from_slice(&found.theta);
-            Some(found.at.sum_of_squares - least > level)
+            Some(found.linearisation.sum_of_squares - least > level)
         };
         let (mut inside, mut reach) = (x, step);
         let mut outside = None;

@@ -137,9 +137,15 @@ impl<'p> ResponseCriterion<'p> {
             .into_iter()
             .filter_map(|(_, start)| minimise(self, start, search, None, &mut Workspace::default()))
             .collect();
-        found.sort_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
-        found
-            .dedup_by(|a, b| a.at.sum_of_squares - b.at.sum_of_squares <= SAME_MINIMUM_TOLERANCE * b.at.sum_of_squares);
+        found.sort_by(|a, b| {
+            a.linearisation
+                .sum_of_squares
+                .total_cmp(&b.linearisation.sum_of_squares)
+        });
+        found.dedup_by(|a, b| {
+            a.linearisation.sum_of_squares - b.linearisation.sum_of_squares
+                <= SAME_MINIMUM_TOLERANCE * b.linearisation.sum_of_squares
+        });
         found.into_iter().map(|minimum| self.result(minimum)).collect()
     }
 
@@ -175,7 +181,7 @@ impl<'p> ResponseCriterion<'p> {
         let (p, inner, covariance) = (x.len(), self.free_coordinates(x), self.covariance(minimum));
         let mut shares = vec![0.0; p];
         for penalty in &self.penalty {
-            let i = penalty.place;
+            let i = penalty.index;
             shares[i] = match &covariance {
                 Some(c) if inner.contains(&i) => (c[i * p + i] * penalty.curvature(x)).min(1.0),
                 _ => 1.0,
@@ -224,7 +230,7 @@ impl<'p> ResponseCriterion<'p> {
         ResponseMinimum {
             chi_squared: self.chi_squared(&minimum.theta).unwrap_or(f64::NAN),
             coordinates: minimum.theta,
-            information: minimum.at.gram,
+            information: minimum.linearisation.gram,
             termination: minimum.termination,
         }
     }

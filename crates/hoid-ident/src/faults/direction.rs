@@ -5,14 +5,14 @@
 //!
 //! `u(k) = sum_{i=1..P} a_i u(k-i) + sum_{j=1..L} b_j e(k-j) + c + v(k)`
 //!
-//! and likewise e on u, with P = [`OWN_LAG_COUNT`] and L = [`OTHER_LAG_COUNT`] blocks. In a closed loop a prediction from past
-//! samples is consistent for any feedback (L. Ljung, *System Identification*, 1999, section 13.4).
+//! and likewise e on u, with P = [`OWN_LAG_COUNT`] and L = [`OTHER_LAG_COUNT`] blocks. In a closed loop a prediction
+//! from past samples is consistent for any feedback (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
 //! **Exchanged.** A person responds only after a delay of a tenth of a second or more; a controlled element responds
 //! immediately. The significance of lag j is the relative increase of the loss without it: for b_1,
 //! `R = (V_without - V)/V`. If e responds to u with a delay and u responds to e immediately, i.e. if `R` of u exceeds
-//! both [`MIN_IMMEDIATE_INCREASE`] and [`MIN_INCREASE_RATIO`] times `R` of e, input and output are exchanged. If neither
-//! responds immediately, nothing is reported.
+//! both [`MIN_IMMEDIATE_INCREASE`] and [`MIN_INCREASE_RATIO`] times `R` of e, input and output are exchanged. If
+//! neither responds immediately, nothing is reported.
 //!
 //! **Sign.** A person's response to an error initially has the sign of the error: `sum_j b_j` is positive. The sign is
 //! wrong if the sum is more than [`MIN_NEGATIVE_STANDARD_ERRORS`] standard errors below zero.
@@ -39,7 +39,7 @@ const MIN_BLOCKS: usize = 200;
 /// Returns a wrong direction and its statistic: for exchanged channels the ratio of the increases of the loss, for a
 /// wrong sign the number of standard errors. `None` if no fault is found, or if the record is too short or its sample
 /// time is too long for the test.
-pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
+pub(super) fn find_wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     let block = ((BLOCK_S / record.sample_time().s()).round() as usize).max(1);
     if record.input().is_empty() || record.sample_time().s() > 0.1 {
         return None;
@@ -51,16 +51,21 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     }
     let of_output = CrossResponse::of(&u, &e)?;
     let of_input = CrossResponse::of(&e, &u)?;
-    if of_output.at_once > MIN_IMMEDIATE_INCREASE && of_output.at_once > MIN_INCREASE_RATIO * of_input.at_once {
-        return Some((FaultKind::Exchanged, of_output.at_once / of_input.at_once));
+    if of_output.immediate_effect > MIN_IMMEDIATE_INCREASE
+        && of_output.immediate_effect > MIN_INCREASE_RATIO * of_input.immediate_effect
+    {
+        return Some((
+            FaultKind::Exchanged,
+            of_output.immediate_effect / of_input.immediate_effect,
+        ));
     }
     (of_output.sum < -MIN_NEGATIVE_STANDARD_ERRORS).then_some((FaultKind::Sign, -of_output.sum))
 }
 
 /// Response of one channel to another.
 struct CrossResponse {
-    /// Relative increase of the loss if the first lag of the other channel is left out.
-    at_once: f64,
+    /// Relative increase of the loss if the first lag of the other channel is omitted.
+    immediate_effect: f64,
     /// Sum of the coefficients of the other channel, in standard errors.
     sum: f64,
 }
@@ -118,9 +123,9 @@ impl CrossResponse {
         let along = solve_symmetric(&gram, &of_sum)?;
         let variance = loss / (n - size) as f64 * along.iter().zip(&of_sum).map(|(a, b)| a * b).sum::<f64>();
         let answer = Self {
-            at_once: (other - loss).max(0.0) / loss,
+            immediate_effect: (other - loss).max(0.0) / loss,
             sum: sum / variance.sqrt(),
         };
-        (loss > 1e-12 * power && answer.at_once.is_finite() && answer.sum.is_finite()).then_some(answer)
+        (loss > 1e-12 * power && answer.immediate_effect.is_finite() && answer.sum.is_finite()).then_some(answer)
     }
 }

@@ -1,27 +1,28 @@
 //! Jumps of a channel: wraps, steps, and stretches in other units.
 //!
-//! A change from one sample to the next is *large* if it exceeds [`LARGE_CHANGE`] times the 99 % quantile of all changes.
+//! A change from one sample to the next is *large* if it exceeds [`LARGE_CHANGE`] times the 99 % quantile of all
+//! changes.
 //!
 //! **Wrap.** A channel with the modulus M leaves its range at one end and re-enters at the other: the size of every
 //! large change equals M to within twice that quantile. M is 360, 2 pi, 180, pi, 65536, 65535 or 4096, or the common
-//! size of four or more changes. In the last case, large changes less than [`MAX_BRIDGED_S`](super::limits::MAX_BRIDGED_S)
-//! apart are a spike; for a known modulus they are a turn there and back, and unwrapping repairs the channel in either
-//! case.
+//! size of four or more changes. In the last case, large changes less than
+//! [`MAX_BRIDGED_S`](super::limits::MAX_BRIDGED_S) apart are a spike; for a known modulus they are a turn and its
+//! reversal, and unwrapping repairs the channel in either case.
 //!
 //! **Step.** At a large change, the medians of [`SPAN_S`] before and after differ by more than [`MIN_STEP`] times the
 //! larger deviation within the two spans, and by more than four fifths of the change: the person has not compensated
 //! for the change, as they would for a step of the target.
 //!
 //! **Scale.** In one second the deviation from the level exceeds the median of this deviation over all seconds by the
-//! factor [`UNIT_FACTOR`]. For a stick with a [rest](super::rest) only the samples away from the rest count. No person
-//! increases a signal by this factor from one second to the next. The edges of the stretch are its outermost samples
-//! beyond [`OUTLIER_LIMIT`] deviations of the remaining samples.
+//! factor [`UNIT_FACTOR`]. For a stick with a [rest](super::stick_rest) only the samples away from the rest count. No
+//! person increases a signal by this factor from one second to the next. The edges of the stretch are its outermost
+//! samples beyond [`OUTLIER_LIMIT`] deviations of the remaining samples.
 
 use std::{f64::consts::PI, ops::Range};
 
 use super::{
-    rest::Rest,
     robust::{level_and_deviation, median, quantile},
+    stick_rest::StickRest,
 };
 
 const LARGE_CHANGE: f64 = 6.0;
@@ -130,7 +131,7 @@ pub(super) fn scale_changes(values: &[f64], sample_time_s: f64) -> Vec<(Range<us
     if n < 5 * block {
         return Vec::new();
     }
-    let rest = Rest::of(values).map(|rest| rest.value);
+    let rest = StickRest::of(values).map(|rest| rest.value);
     let level = rest.unwrap_or_else(|| median(values));
     let size = |part: &[f64]| {
         let moved = part.iter().filter(|v| rest != Some(**v));

@@ -5,7 +5,7 @@ use std::ops::Range;
 use hoid_model::{Channel, Fault, FaultAction, FaultHandling, FaultKind, Finding, ModelError, Record, fault_findings};
 
 use super::{
-    direction::wrong_direction,
+    direction::find_wrong_direction,
     limits::{MAX_SPIKE_SHARE, MIN_SEGMENT_S},
     search::{FaultSpan, find_faults},
     spikes,
@@ -74,7 +74,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     faults.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     let repaired = |fault: &Fault| fault.action != FaultAction::Reported;
     if handling == FaultHandling::Report || !faults.iter().any(repaired) {
-        faults.extend(wrong_direction(record).map(|(kind, size)| all_of_it(record, kind, size)));
+        faults.extend(find_wrong_direction(record).map(|(kind, size)| all_of_it(record, kind, size)));
         faults.iter_mut().for_each(|fault| fault.action = FaultAction::Reported);
         return Ok(untouched(faults));
     }
@@ -115,7 +115,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
     let longest = segments.iter().max_by_key(|segment: &&Record| segment.len());
     faults.extend(
         longest
-            .and_then(|r| Some((r, wrong_direction(r)?)))
+            .and_then(|r| Some((r, find_wrong_direction(r)?)))
             .map(|(r, (kind, size))| all_of_it(r, kind, size)),
     );
     Ok(RepairedRecord {

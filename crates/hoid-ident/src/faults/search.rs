@@ -9,7 +9,7 @@ use std::ops::Range;
 use hoid_model::{FaultAction, FaultKind};
 
 use super::{
-    holds, levels,
+    constant_spans, levels,
     limits::{MAX_BRIDGED_S, MAX_SPIKE_SHARE},
     spikes,
 };
@@ -125,7 +125,7 @@ fn lasting_faults(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
         let mut out = vec![false; both[0].len()];
         all.iter().for_each(|place| out[place.samples.clone()].fill(true));
         all.extend(
-            holds::idle_stretches(&both, &out, ts)
+            constant_spans::idle_stretches(&both, &out, ts)
                 .into_iter()
                 .map(|samples| FaultSpan {
                     kind: FaultKind::Idle,
@@ -139,7 +139,7 @@ fn lasting_faults(values: &[Vec<f64>], ts: f64) -> Vec<FaultSpan> {
     let known: Vec<Range<usize>> = all.iter().map(|place| place.samples.clone()).collect();
     for (channel, values) in values.iter().enumerate() {
         let other = both.iter().enumerate().find(|(c, _)| *c != channel).map(|(_, v)| *v);
-        for hold in holds::frozen_holds(values, other, ts) {
+        for hold in constant_spans::frozen_holds(values, other, ts) {
             if known
                 .iter()
                 .any(|k| k.start < hold.samples.end && hold.samples.start < k.end)

@@ -90,7 +90,7 @@ pub(super) fn find_spikes(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> 
             smallest: (MIN_CHANGE * deviation).max(2.0 * step),
             deviation,
             longest,
-            reach: effective_length(&ar),
+            context_samples: effective_length(&ar),
         };
         let mut new = search.search_round(&mut x, &mut eps);
         new.extend(search.search_start(&mut x));
@@ -145,19 +145,19 @@ pub(super) fn innovation_scales(eps: &[f64], window: usize, least: f64) -> Scale
         near.iter().copied().fold(all, f64::max)
     };
     Scales {
-        of_window: (0..local.len()).map(around).collect(),
+        window_scales: (0..local.len()).map(around).collect(),
         window,
     }
 }
 
 pub(super) struct Scales {
-    of_window: Vec<f64>,
+    window_scales: Vec<f64>,
     window: usize,
 }
 
 impl Scales {
     pub(super) fn at(&self, t: usize) -> f64 {
-        self.of_window[t / self.window]
+        self.window_scales[t / self.window]
     }
 }
 
@@ -167,7 +167,7 @@ struct Search<'a> {
     smallest: f64,
     deviation: f64,
     longest: usize,
-    reach: usize,
+    context_samples: usize,
 }
 
 impl Search<'_> {
@@ -221,7 +221,7 @@ impl Search<'_> {
             if fall < ROOT_OF_MIN_REDUCTION * ROOT_OF_MIN_REDUCTION {
                 continue;
             }
-            let rows = start..(start + m + self.reach).min(eps.len());
+            let rows = start..(start + m + self.context_samples).min(eps.len());
             let delta = all.change(m);
             let size = delta
                 .iter()

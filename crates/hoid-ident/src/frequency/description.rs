@@ -137,7 +137,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         excitation: &excitation,
         channel: channel.as_deref(),
         realisation,
-        in_loop: open_loop.as_ref().zip(margins.as_ref()),
+        open_loop: open_loop.as_ref().zip(margins.as_ref()),
         offset_samples: options.offset_samples,
     };
     let verdict = Verdict::of(findings(&judged, &parts)?);

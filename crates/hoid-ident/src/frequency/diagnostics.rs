@@ -46,7 +46,7 @@ pub(super) struct DiagnosticInputs<'a> {
     pub channel: Option<&'a str>,
     pub realisation: Realisation,
     /// Open loop and its margins, if there is a controlled element.
-    pub in_loop: Option<(&'a OpenLoop, &'a DescribingMargins)>,
+    pub open_loop: Option<(&'a OpenLoop, &'a DescribingMargins)>,
     pub offset_samples: f64,
 }
 
@@ -75,7 +75,7 @@ pub(super) fn findings(found: &DiagnosticInputs<'_>, records: &[Record]) -> Resu
     let mut findings = Vec::new();
     findings.extend(runs_finding(found, records.len()));
     findings.extend(coherence_finding(found));
-    if let Some((open_loop, margins)) = found.in_loop {
+    if let Some((open_loop, margins)) = found.open_loop {
         findings.extend(loop_findings(open_loop, margins));
     }
     if found.channel.is_none() {
@@ -161,7 +161,7 @@ fn coherence_finding(found: &DiagnosticInputs<'_>) -> Option<Finding> {
          sets of {n} unrelated runs exceed",
         at.join(", ")
     );
-    let crossover = found.in_loop.and_then(|(_, m)| m.crossover_rad_s);
+    let crossover = found.open_loop.and_then(|(_, m)| m.crossover_rad_s);
     let is_next_to_crossover = |k: &usize| {
         crossover.is_some_and(|c| {
             let above = lines.partition_point(|line| line.omega_rad_s <= c.value);

@@ -35,14 +35,14 @@ pub struct LineDetectionOptions {
     /// Period T in s; if `None`, the shortest period that has all found lines as harmonics.
     pub period_s: Option<f64>,
     /// Minimum amplitude of a line relative to the largest line. Default 0.01.
-    pub least_amplitude: f64,
+    pub min_amplitude: f64,
 }
 
 impl Default for LineDetectionOptions {
     fn default() -> Self {
         Self {
             period_s: None,
-            least_amplitude: 0.01,
+            min_amplitude: 0.01,
         }
     }
 }
@@ -128,10 +128,10 @@ impl Excitation {
     /// [`IdentError::NotWholePeriods`] if the span is not a whole number of the given periods.
     pub fn detect(record: &Record, channel: &str, search: &LineDetectionOptions) -> Result<Self, IdentError> {
         let values = channel_values(record, channel, EXCITATION_OPTION)?;
-        if !(search.least_amplitude > 0.0 && search.least_amplitude <= 1.0) {
+        if !(search.min_amplitude > 0.0 && search.min_amplitude <= 1.0) {
             return refuse(
                 "the smallest amplitude of a line",
-                search.least_amplitude,
+                search.min_amplitude,
                 "above 0 and at most 1",
             );
         }
@@ -151,7 +151,7 @@ impl Excitation {
                 label: record.label().to_owned(),
             });
         }
-        let threshold = largest * search.least_amplitude * search.least_amplitude;
+        let threshold = largest * search.min_amplitude * search.min_amplitude;
         let bins: Vec<usize> = (1..=powers.len()).filter(|k| powers[k - 1] >= threshold).collect();
         let held = bins.iter().map(|k| powers[k - 1]).sum::<f64>() / total;
         let dense = bins.windows(2).filter(|w| w[1] == w[0] + 1).count();
@@ -313,7 +313,7 @@ mod tests {
             let refused = Excitation::detect(&reference(samples, 0.0), "e", &search);
             assert!(matches!(refused, Err(IdentError::NotWholePeriods { .. })));
         }
-        // With twice the period, the lines would also be harmonics; this is refused.
+        // With twice the period, the lines would also be harmonics; this is rejected.
         let wrong = LineDetectionOptions {
             period_s: Some(40.96),
             ..LineDetectionOptions::default()

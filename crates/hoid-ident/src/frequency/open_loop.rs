@@ -30,7 +30,7 @@ pub struct OpenLoop {
     /// L of each run: `per_run[i][k]` is the value of run i at line k.
     pub per_run: Vec<Vec<Complex64>>,
     /// L at each line, computed from the averages over all runs except run i, for each i.
-    without: Vec<Vec<Complex64>>,
+    leave_one_out: Vec<Vec<Complex64>>,
 }
 
 /// A frequency at which `|L|` passes 1.
@@ -110,7 +110,7 @@ impl DescribingFunction {
             per_run: (0..runs)
                 .map(|i| lines().map(|(k, l)| l.per_run[i] * of_run(k, i)).collect())
                 .collect(),
-            without: if runs > 1 {
+            leave_one_out: if runs > 1 {
                 (0..runs).map(|i| average(Some(i))).collect()
             } else {
                 Vec::new()
@@ -129,14 +129,14 @@ impl OpenLoop {
     /// [`DescribingFunction::fit_gain_lead_delay`] gives such a delay.
     pub fn margins_with_delay(&self, delay_s: f64) -> DescribingMargins {
         let of = |response: &Vec<Complex64>| Crossover::of(&self.omega_rad_s, response, delay_s);
-        let without: Vec<Option<Crossover>> = self.without.iter().map(of).collect();
+        let without: Vec<Option<Crossover>> = self.leave_one_out.iter().map(of).collect();
         let per_run: Vec<Option<Crossover>> = self.per_run.iter().map(of).collect();
         let estimate = |get: fn(&Crossover) -> f64| {
             let others: Vec<Option<f64>> = without.iter().map(|c| c.as_ref().map(get)).collect();
             of(&self.response).map(|c| jackknife(get(&c), &others))
         };
         let turning = |response: &Vec<Complex64>| PhaseCrossover::of(&self.omega_rad_s, response, delay_s);
-        let turning_without: Vec<Option<PhaseCrossover>> = self.without.iter().map(turning).collect();
+        let turning_without: Vec<Option<PhaseCrossover>> = self.leave_one_out.iter().map(turning).collect();
         let of_turning = |get: fn(&PhaseCrossover) -> f64| {
             let others: Vec<Option<f64>> = turning_without.iter().map(|c| c.as_ref().map(get)).collect();
             turning(&self.response).map(|c| jackknife(get(&c), &others))

@@ -43,7 +43,7 @@ fn lines() -> Excitation {
 /// Returns the discrete model of the operator with its hold.
 fn operator(scenario: &Scenario) -> PolynomialModel {
     let d = scenario.initial.operator.discretise(scenario.sample_time).unwrap();
-    let theta = vec![d.held.b0, d.held.b1, 0.0, d.held.f1, d.held.f2];
+    let theta = vec![d.zoh.b0, d.zoh.b1, 0.0, d.zoh.f1, d.zoh.f2];
     let orders = Structure::BoxJenkins.operator_orders(d.nk);
     PolynomialModel::new(Structure::BoxJenkins, orders, scenario.sample_time, theta).unwrap()
 }

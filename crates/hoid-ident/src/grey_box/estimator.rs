@@ -175,11 +175,13 @@ impl GreyBox {
             {
                 continue;
             }
-            let known = best.as_ref().map(|(_, b): &(String, Minimum)| b.at.sum_of_squares);
+            let known = best
+                .as_ref()
+                .map(|(_, b): &(String, Minimum)| b.linearisation.sum_of_squares);
             let Some(minimum) = criterion.search(eta, search, known, workspace) else {
                 continue;
             };
-            if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
+            if known.is_none_or(|known| minimum.linearisation.sum_of_squares < known) {
                 best = Some((label, minimum));
             }
         }
@@ -198,13 +200,13 @@ impl GreyBox {
         let p = eta.len();
         let not_fixed = layout.limits.iter().filter(|(low, high)| low < high).count();
         let (n, states) = (criterion.residual_count(), criterion.state_count());
-        let sum_of_squares = minimum.at.sum_of_squares;
+        let sum_of_squares = minimum.linearisation.sum_of_squares;
         let innovation_variance = sum_of_squares / (n - not_fixed - states) as f64;
-        let free = criterion.free_elements(&eta, &minimum.at.descent);
+        let free = criterion.free_elements(&eta, &minimum.linearisation.descent);
         let covariance = if minimum.termination.reason == Reason::ExactFit {
             None
         } else {
-            let inverse = inverse_information_of_free(&minimum.at.gram, &free, &layout.names)?;
+            let inverse = inverse_information_of_free(&minimum.linearisation.gram, &free, &layout.names)?;
             Some(inverse.iter().map(|g| innovation_variance * g).collect::<Vec<f64>>())
         };
         let mut fits = Vec::with_capacity(criterion.data.len());

@@ -317,7 +317,7 @@ impl Parametrisation for Layout {
     }
 
     fn map(&self, eta: &[f64], record: usize, held: DelayIntervals<'_>) -> Result<MappedPolynomials, ModelError> {
-        let sample = held.of(self.delay_index(record));
+        let sample = held.sampling_interval(self.delay_index(record));
         let Polynomials {
             orders,
             theta,

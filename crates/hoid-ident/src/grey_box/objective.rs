@@ -74,7 +74,7 @@ impl AdditionalTerm<'_> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Penalty {
     /// Index i in eta.
-    pub place: usize,
+    pub index: usize,
     /// True for `g = ln eta_i` of a positive element, false for `g = eta_i`.
     pub logarithmic: bool,
     pub mean: f64,
@@ -92,7 +92,7 @@ impl Penalty {
 
     /// Returns `g(eta_i)` and its derivative.
     fn value_and_slope(&self, eta: &[f64]) -> (f64, f64) {
-        let x = eta[self.place];
+        let x = eta[self.index];
         if self.logarithmic {
             let x = x.max(f64::MIN_POSITIVE);
             (x.ln(), 1.0 / x)
@@ -120,7 +120,7 @@ impl Penalty {
 
     /// Adds the value and the derivatives of the penalty to the linearisation.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation) {
-        let i = self.place;
+        let i = self.index;
         let (value, slope) = self.value_and_slope(eta);
         total.sum_of_squares += self.at(eta);
         total.descent[i] += self.weight() * (self.mean - value) * slope;
@@ -261,11 +261,11 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
     fn search_in_intervals(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
         let (delays, ts) = (self.layout.delay_indices(), self.layout.sample_time().s());
         let interval_start = self.layout.first_interval_start();
-        let place = |delay_s: f64| delay_s / ts - interval_start;
+        let slot = |delay_s: f64| delay_s / ts - interval_start;
         let border = |n: usize| (n as f64 + interval_start) * ts;
         let mut samples: Vec<usize> = delays
             .iter()
-            .map(|&i| place(minimum.theta[i]).floor().max(0.0) as usize)
+            .map(|&i| slot(minimum.theta[i]).floor().max(0.0) as usize)
             .collect();
         let inside = |samples: &[usize], start: &Minimum, workspace: &mut Workspace| {
             let mut within = Self {
@@ -285,7 +285,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         for _ in 0..100 {
             let mut moved = false;
             for (k, &i) in delays.iter().enumerate() {
-                let position = place(best.theta[i]);
+                let position = slot(best.theta[i]);
                 let neighbours = [
                     (position <= samples[k] as f64 + BORDER_DISTANCE_SAMPLES)
                         .then(|| samples[k].checked_sub(1))
@@ -300,7 +300,8 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
                         continue;
                     }
                     if let Some(found) = inside(&there, &best, workspace)
-                        && found.at.sum_of_squares < best.at.sum_of_squares * (1.0 - options.tolerance)
+                        && found.linearisation.sum_of_squares
+                            < best.linearisation.sum_of_squares * (1.0 - options.tolerance)
                     {
                         (best, samples, moved) = (found, there, true);
                         break;
@@ -355,13 +356,13 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
                     .record_criterion(&polynomials, record)
                     .linearise(&polynomials.theta, workspace);
                 total.sum_of_squares += of_theta.sum_of_squares;
-                for (i, &place) in positions.iter().enumerate() {
-                    total.descent[place] += dot(&columns[i], &of_theta.descent);
+                for (i, &slot) in positions.iter().enumerate() {
+                    total.descent[slot] += dot(&columns[i], &of_theta.descent);
                     let product: Vec<f64> = (0..n)
                         .map(|k| dot(&of_theta.gram[k * n..(k + 1) * n], &columns[i]))
                         .collect();
                     for (j, &other) in positions.iter().enumerate() {
-                        total.gram[other * p + place] += dot(&columns[j], &product);
+                        total.gram[other * p + slot] += dot(&columns[j], &product);
                     }
                 }
             }

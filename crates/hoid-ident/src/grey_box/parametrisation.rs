@@ -26,21 +26,21 @@ pub(crate) struct DelayIntervals<'s> {
 }
 
 impl DelayIntervals<'_> {
-    /// Returns the sampling interval chosen for the delay at index `place` of eta; `None` if there is no restriction.
-    pub fn of(&self, place: usize) -> Option<usize> {
-        let index = self.delays.iter().position(|&delay| delay == place)?;
+    /// Returns the sampling interval chosen for the delay at index `slot` of eta; `None` if there is no restriction.
+    pub fn sampling_interval(&self, slot: usize) -> Option<usize> {
+        let index = self.delays.iter().position(|&delay| delay == slot)?;
         self.samples.get(index).copied()
     }
 }
 
 impl MappedPolynomials {
-    /// Returns the covariance of theta by rows, `J C J'`, from the covariance C of eta; `places` are the indices in eta
-    /// of the slots of the record.
-    pub fn covariance_of_theta(&self, of_eta: &[f64], p: usize, places: &[usize]) -> Vec<f64> {
+    /// Returns the covariance of theta by rows, `J C J'`, from the covariance C of eta; `indices` are the indices in
+    /// eta of the slots of the record.
+    pub fn covariance_of_theta(&self, of_eta: &[f64], p: usize, indices: &[usize]) -> Vec<f64> {
         let columns = &self.columns;
         let of = |row: usize, other: usize| -> f64 {
-            let pairs = places.iter().enumerate().flat_map(|(i, &a)| {
-                places
+            let pairs = indices.iter().enumerate().flat_map(|(i, &a)| {
+                indices
                     .iter()
                     .enumerate()
                     .map(move |(j, &b)| columns[i][row] * of_eta[a * p + b] * columns[j][other])

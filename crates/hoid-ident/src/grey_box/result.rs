@@ -90,7 +90,7 @@ impl GreyBoxFit {
     /// respect to K_e, `by_lead` its derivative with respect to the coordinate of the lead.
     fn gain_quantity_estimate(&self, record: usize, value: f64, by_gain: f64, by_lead: f64) -> Estimate {
         let places = &self.layout.positions[record];
-        let used = |place: usize, by: f64| by != 0.0 && self.free.contains(&place);
+        let used = |index: usize, by: f64| by != 0.0 && self.free.contains(&index);
         match &self.covariance {
             Some(c) if used(places[0], by_gain) || used(places[LEAD_SLOT], by_lead) => {
                 let mut gradient = vec![0.0; self.eta.len()];
@@ -153,11 +153,11 @@ impl GreyBoxFit {
         if self.layout.order == 0 {
             return None;
         }
-        let place = self.layout.positions[self.record_index(record)][TIME_CONSTANT_SLOT];
-        let noise = remnant_noise(self.eta[place], self.layout.order, self.layout.sample_time).ok()?;
+        let index = self.layout.positions[self.record_index(record)][TIME_CONSTANT_SLOT];
+        let noise = remnant_noise(self.eta[index], self.layout.order, self.layout.sample_time).ok()?;
         let sigma = self.innovation_variance().sqrt();
         let k_n = sigma / noise.gain;
-        let t_n_s = self.estimate(place);
+        let t_n_s = self.estimate(index);
         let of_time = t_n_s.standard_error.unwrap_or(0.0) * noise.log_gain_slope;
         let relative = of_time * of_time + 1.0 / (2.0 * self.residual_count() as f64);
         let k_n = match self.covariance {

@@ -123,8 +123,8 @@ pub(crate) struct Continuation<'c> {
     noise: Option<Vec<f64>>,
     /// Current point of the pole grid; `None` after the last point.
     trial: Option<Start>,
-    tried: usize,
-    ranked: Vec<Start>,
+    tried_count: usize,
+    ranked_starts: Vec<Start>,
     searches: Option<MultiStart<'c>>,
 }
 
@@ -138,8 +138,8 @@ impl<'c> Continuation<'c> {
             grid: grid.into_iter().map(|(_, f)| f).collect(),
             noise: (averaged_criterion.orders.nd == 0).then(Vec::new),
             trial: None,
-            tried: 0,
-            ranked: Vec::new(),
+            tried_count: 0,
+            ranked_starts: Vec::new(),
             searches: None,
         };
         continuation.start_next_trial();
@@ -152,13 +152,13 @@ impl<'c> Continuation<'c> {
         let start = |noise: &[f64], f: &[f64], left| {
             Start::with_unknown("pole grid", [&vec![0.0; o.nb], noise, f].concat(), left)
         };
-        self.trial = match (&self.noise, self.grid.get(self.tried)) {
+        self.trial = match (&self.noise, self.grid.get(self.tried_count)) {
             (None, Some(f)) => Some(start(&vec![0.0; o.nd], f, vec![Block::D, Block::B])),
             (Some(noise), Some(f)) => Some(start(noise, f, vec![Block::B])),
             (_, None) => None,
         };
         if self.trial.is_none() {
-            let mut ranked = std::mem::take(&mut self.ranked);
+            let mut ranked = std::mem::take(&mut self.ranked_starts);
             ranked.sort_by(|a, b| a.value.total_cmp(&b.value));
             ranked.truncate(SEARCHED_POINT_COUNT);
             let starts = ranked.into_iter().map(|start| start.with_unknown_noise(o)).collect();
@@ -176,7 +176,11 @@ impl<'c> Continuation<'c> {
     pub fn into_slow_poles(self) -> SlowPoles {
         let o = &self.averaged_criterion.orders;
         let mut minima = self.searches.map(|searches| searches.minima).unwrap_or_default();
-        minima.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
+        minima.sort_by(|(_, a), (_, b)| {
+            a.linearisation
+                .sum_of_squares
+                .total_cmp(&b.linearisation.sum_of_squares)
+        });
         let f: Vec<Vec<f64>> = minima
             .into_iter()
             .filter_map(|(_, minimum)| root_of_poles(&minimum.theta[o.parameter_count() - o.nf..], self.factor))
@@ -231,16 +235,16 @@ impl LinearisationClient for Continuation<'_> {
         if self.noise.is_none() && known {
             // The ranking starts again at the first point, now with the noise model.
             self.noise = Some(trial.theta[Block::D.range(o)].to_vec());
-            self.tried = 0;
+            self.tried_count = 0;
         } else {
-            self.ranked.extend(known.then_some(trial));
-            self.tried += 1;
+            self.ranked_starts.extend(known.then_some(trial));
+            self.tried_count += 1;
         }
         self.start_next_trial();
     }
 }
 
-/// Returns the means of successive groups of `factor` samples; an incomplete group at the end is left out.
+/// Returns the means of successive groups of `factor` samples; an incomplete group at the end is omitted.
 fn averaged(x: &[f64], factor: usize) -> Vec<f64> {
     let scale = 1.0 / factor as f64;
     x.chunks_exact(factor)

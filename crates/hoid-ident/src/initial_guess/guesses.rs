@@ -20,7 +20,7 @@
 //! otherwise the averaged records determine the poles nearly as well as the original records do. The candidates are
 //! ranked by their loss with the initial states eliminated. Searches start from the best candidates, and the best
 //! minimum is used. Short records and larger models have more minima than these starts find; for them, other starts are
-//! tried afterwards ([`crate::initial_guess::broad`]).
+//! tried afterwards ([`crate::initial_guess::broad_starts`]).
 
 use hoid_model::{Orders, SampleTime, polynomial::reflect_roots_inside};
 

@@ -52,7 +52,11 @@ pub(crate) fn initial_guesses(criterion: &Criterion<'_>, others: Vec<Start>, wor
         .take(TRIED_START_COUNT)
         .filter_map(|start| {
             let end = minimise(criterion, start.theta, &options, None, workspace)?;
-            Some(Start::complete(&start.label, end.theta, end.at.sum_of_squares))
+            Some(Start::complete(
+                &start.label,
+                end.theta,
+                end.linearisation.sum_of_squares,
+            ))
         })
         .collect()
 }

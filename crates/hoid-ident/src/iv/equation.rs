@@ -106,7 +106,7 @@ impl<'a> IvProblem<'a> {
     }
 
     /// Returns the problem with the same orders for other data and noise-free inputs.
-    pub fn of<'b>(&self, data: Vec<Data<'b>>, sources: Vec<Source<'b>>) -> IvProblem<'b> {
+    pub fn with_data<'b>(&self, data: Vec<Data<'b>>, sources: Vec<Source<'b>>) -> IvProblem<'b> {
         IvProblem {
             poles: self.poles,
             nb: self.nb,

@@ -30,8 +30,8 @@
 //! | `methods` | methods, one file each, and their list |
 //! | `instruments`, `external_signal` | choice of instruments, and instruments from an external signal |
 //! | `refined` | iteration of the refined methods |
-//! | `last_iterate` | final state of an iteration |
-//! | `own_poles` | nonlinear form of the equation, used if the iteration does not converge |
+//! | `final_iteration` | final state of an iteration |
+//! | `separate_poles` | nonlinear form of the equation, used if the iteration does not converge |
 //! | `refined_system` | the iteration of RIV-BJ, as a start for the prediction error method |
 //! | `noise_free` | noise-free signals for other estimators |
 //! | `simulation_error` | part of the output that a system does not explain |
@@ -46,13 +46,13 @@ mod covariance;
 pub(crate) mod equation;
 mod estimator;
 mod external_signal;
+mod final_iteration;
 mod instruments;
-mod last_iterate;
 mod methods;
 mod noise_free;
-mod own_poles;
 mod refined;
 mod refined_system;
+mod separate_poles;
 mod simulation_error;
 
 pub use estimator::InstrumentalVariable;

@@ -19,8 +19,8 @@ use super::{
     algorithm::IterationLimits,
     equation::{IvProblem, Prefilter},
     external_signal::driven_parts,
-    last_iterate::{LastIterate, NoiseModel},
-    own_poles::solve_nonlinear_form,
+    final_iteration::{LastIterate, NoiseModel},
+    separate_poles::solve_nonlinear_form,
 };
 
 /// Number of iterations for the start.
@@ -33,8 +33,8 @@ const MAX_VARIANCE_RATIO: f64 = 1.15;
 /// Steps smaller than this share of the output are only rounding errors.
 const ROUNDING_SHARE: f64 = 1e-12;
 
-/// Runs the iteration and, if it does not converge, continues in the nonlinear form ([`super::own_poles`]). `noise_of`
-/// returns the noise model of a system.
+/// Runs the iteration and, if it does not converge, continues in the nonlinear form ([`super::separate_poles`]).
+/// `noise_of` returns the noise model of a system.
 pub(super) fn iterate_to_convergence(
     limits: IterationLimits,
     problem: &IvProblem<'_>,
@@ -173,7 +173,7 @@ fn system_from_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, Ide
     // least squares on these parts is consistent, apart from the error of the expansion.
     let clean = driven_parts(&driving, &outputs);
     let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data::new(e, u)).collect();
-    let parts = problem.of(data, Vec::new());
+    let parts = problem.with_data(data, Vec::new());
     let mut system = parts.least_squares(Prefilter::default())?;
     for _ in 0..START_ITERATIONS {
         (system, _) = parts.stabilise(&system)?;

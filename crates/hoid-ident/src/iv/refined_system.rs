@@ -8,7 +8,7 @@
 use super::{
     algorithm::IterationLimits,
     equation::{IvProblem, Source},
-    last_iterate::NoiseModel,
+    final_iteration::NoiseModel,
     refined::plain_iteration,
     simulation_error::simulation_error,
 };

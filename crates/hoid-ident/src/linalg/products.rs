@@ -33,7 +33,7 @@ struct Tile<F> {
 
 impl<F: FourLanes> Tile<F> {
     /// Creates tiles for the products of column x with each of the columns ys; their sums are zero.
-    fn cover(x: usize, mut ys: &[usize], zero: F, tiles: &mut Vec<Self>) {
+    fn add_tiles(x: usize, mut ys: &[usize], zero: F, tiles: &mut Vec<Self>) {
         while !ys.is_empty() {
             let count = match ys.len() {
                 1 => 1,
@@ -222,7 +222,7 @@ impl FourLaneTask for Gram<'_, '_> {
             others.clear();
             // The products with earlier columns that are not shifts are already known.
             others.extend((0..p).filter(|j| *j >= i || columns[*j].is_shift_of_previous));
-            Tile::cover(i, &others, zero, &mut tiles);
+            Tile::add_tiles(i, &others, zero, &mut tiles);
         }
         match columns {
             &[u, u1, u2, e, e1] if [u, u1, u2, e, e1].map(|c| c.is_shift_of_previous) == COMMON_SHIFTS => {
@@ -327,7 +327,7 @@ impl ResidualProducts {
         with_four_lanes(Residuals {
             columns,
             factors,
-            of: self,
+            products: self,
         });
     }
 }
@@ -335,7 +335,7 @@ impl ResidualProducts {
 struct Residuals<'c, 'a> {
     columns: &'c [LaggedColumn<'a>],
     factors: &'c [f64],
-    of: &'c mut ResidualProducts,
+    products: &'c mut ResidualProducts,
 }
 
 impl FourLaneTask for Residuals<'_, '_> {
@@ -343,12 +343,16 @@ impl FourLaneTask for Residuals<'_, '_> {
 
     #[inline(always)]
     fn run<F: FourLanes>(self, zero: F) {
-        let Self { columns, factors, of } = self;
+        let Self {
+            columns,
+            factors,
+            products: of,
+        } = self;
         let inputs: Vec<usize> = (1..columns.len()).collect();
         // In the tiles for the residual, the residual replaces y.
         let mut tiles = Vec::with_capacity(columns.len());
-        Tile::cover(0, &[0], zero, &mut tiles);
-        Tile::cover(0, &inputs, zero, &mut tiles);
+        Tile::add_tiles(0, &[0], zero, &mut tiles);
+        Tile::add_tiles(0, &inputs, zero, &mut tiles);
         let mut residual = [0.0; STRETCH_LENGTH];
         for stretch in stretches(columns[0].values.len()) {
             let measured = |j: usize| &columns[j].values[stretch.clone()];

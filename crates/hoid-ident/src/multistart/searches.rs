@@ -27,7 +27,7 @@ pub(crate) struct MultiStart<'s> {
     orders: Orders,
     options: &'s SearchOptions,
     /// Largest number of starts from which searches are made.
-    most: usize,
+    max_starts: usize,
     /// All starts until each is complete; then the starts that have not been used yet, the best last.
     starts: Vec<Start>,
     /// Current search, with the label of its start.
@@ -49,7 +49,7 @@ impl<'s> MultiStart<'s> {
             objective,
             orders,
             options,
-            most,
+            max_starts: most,
             starts,
             searching: None,
             minima: Vec::new(),
@@ -105,7 +105,7 @@ impl<'s> MultiStart<'s> {
     fn rank(&mut self) {
         self.starts.retain(|start| start.value.is_finite());
         self.starts.sort_by(|a, b| a.value.total_cmp(&b.value));
-        self.starts.truncate(self.most);
+        self.starts.truncate(self.max_starts);
         self.starts.reverse();
         self.start_next_search();
     }
@@ -113,21 +113,28 @@ impl<'s> MultiStart<'s> {
     /// Starts the search from the best start that has not been used.
     fn start_next_search(&mut self) {
         while let (None, Some(Start { label, theta, .. })) = (&self.searching, self.starts.pop()) {
-            let known = self.best().map(|minimum| minimum.at.sum_of_squares);
+            let known = self.best().map(|minimum| minimum.linearisation.sum_of_squares);
             self.searching =
                 GaussNewton::new(self.objective, theta, self.options, known).map(|descent| (label, descent));
         }
     }
 
     fn best(&self) -> Option<&Minimum> {
-        let lowest = |a: &&Minimum, b: &&Minimum| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares);
+        let lowest = |a: &&Minimum, b: &&Minimum| {
+            a.linearisation
+                .sum_of_squares
+                .total_cmp(&b.linearisation.sum_of_squares)
+        };
         self.minima.iter().map(|(_, minimum)| minimum).min_by(lowest)
     }
 
     /// Returns the lowest minimum and the label of its start.
     pub fn lowest_minimum(self) -> Option<(String, Minimum)> {
-        let lowest =
-            |a: &(String, Minimum), b: &(String, Minimum)| a.1.at.sum_of_squares.total_cmp(&b.1.at.sum_of_squares);
+        let lowest = |a: &(String, Minimum), b: &(String, Minimum)| {
+            a.1.linearisation
+                .sum_of_squares
+                .total_cmp(&b.1.linearisation.sum_of_squares)
+        };
         self.minima.into_iter().min_by(lowest)
     }
 }

@@ -16,7 +16,7 @@ pub(crate) struct Start {
     /// Sum of squares of the start; not finite before the start is complete, or if the regression for B was singular.
     pub value: f64,
     /// Polynomials that are still unknown; the last element is computed next.
-    left: Vec<Block>,
+    unknown_blocks: Vec<Block>,
 }
 
 impl Start {
@@ -26,7 +26,7 @@ impl Start {
             label: label.to_owned(),
             theta,
             value,
-            left: Vec::new(),
+            unknown_blocks: Vec::new(),
         }
     }
 
@@ -47,36 +47,36 @@ impl Start {
             label: label.to_owned(),
             theta,
             value: f64::NAN,
-            left,
+            unknown_blocks: left,
         }
     }
 
     /// Marks D, and then B with this noise model, as unknown; no effect on a model without D.
     pub fn with_unknown_noise(mut self, o: &Orders) -> Self {
         if o.nd > 0 {
-            self.left = vec![Block::B, Block::D];
+            self.unknown_blocks = vec![Block::B, Block::D];
         }
         self
     }
 
     /// Returns the next unknown polynomial; `None` if the start is complete.
     pub fn next_block(&self) -> Option<Block> {
-        self.left.last().copied()
+        self.unknown_blocks.last().copied()
     }
 
     /// Updates the next unknown polynomial from the linearisation at theta. The residual is affine in B and in D, so
     /// one least-squares step computes either polynomial while the others are fixed.
     pub fn update(&mut self, o: &Orders, there: &Linearisation) {
-        let Some(block) = self.left.pop() else { return };
-        let (p, place) = (self.theta.len(), block.range(o));
-        let rows = place.clone().map(|i| &there.gram[i * p..(i + 1) * p]);
-        let gram: Vec<f64> = rows.flat_map(|row| &row[place.clone()]).copied().collect();
-        let descent = &there.descent[place.clone()];
+        let Some(block) = self.unknown_blocks.pop() else { return };
+        let (p, index) = (self.theta.len(), block.range(o));
+        let rows = index.clone().map(|i| &there.gram[i * p..(i + 1) * p]);
+        let gram: Vec<f64> = rows.flat_map(|row| &row[index.clone()]).copied().collect();
+        let descent = &there.descent[index.clone()];
         if let Some(step) = solve_symmetric(&gram, descent) {
             self.value = there.sum_of_squares - dot(&step, descent);
-            add_scaled(&mut self.theta[place], 1.0, &step);
+            add_scaled(&mut self.theta[index], 1.0, &step);
         } else if block == Block::B {
-            (self.value, self.left) = (f64::NAN, Vec::new());
+            (self.value, self.unknown_blocks) = (f64::NAN, Vec::new());
         }
     }
 }

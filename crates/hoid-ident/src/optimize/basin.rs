@@ -9,10 +9,10 @@ pub(crate) fn lies_in_basin(minimum: &Minimum, start: &[f64], sum_of_squares: f6
     let p = start.len();
     let delta: Vec<f64> = start.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
     let rise: f64 = (0..p)
-        .map(|i| delta[i] * dot(&minimum.at.gram[i * p..(i + 1) * p], &delta))
+        .map(|i| delta[i] * dot(&minimum.linearisation.gram[i * p..(i + 1) * p], &delta))
         .sum();
-    let found = sum_of_squares - minimum.at.sum_of_squares;
-    rise <= MAX_LOSS_INCREASE * minimum.at.sum_of_squares && (found - rise).abs() <= 0.1 * rise
+    let found = sum_of_squares - minimum.linearisation.sum_of_squares;
+    rise <= MAX_LOSS_INCREASE * minimum.linearisation.sum_of_squares && (found - rise).abs() <= 0.1 * rise
 }
 
 /// Largest relative increase of the loss at which a start is compared with the quadratic model.

@@ -34,7 +34,7 @@ impl GaussNewton<'_> {
         };
         Some(Minimum {
             theta: self.theta,
-            at: self.at,
+            linearisation: self.linearisation,
             termination: Termination {
                 reason,
                 iterations: self.iterations,
@@ -48,7 +48,7 @@ impl GaussNewton<'_> {
         let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
             return Some(Reason::NoDescent);
         };
-        let Some(mut along) = GaussNewton::new(&coordinates, kappa, self.options, self.rival) else {
+        let Some(mut along) = GaussNewton::new(&coordinates, kappa, self.options, self.loss_to_beat) else {
             return Some(Reason::NoDescent);
         };
         along.iterations = self.iterations;
@@ -57,8 +57,8 @@ impl GaussNewton<'_> {
         let theta = coordinates.theta(&kappa);
         let there = self.objective.linearise(&theta, workspace);
         self.iterations = iterations;
-        if there.sum_of_squares <= self.at.sum_of_squares {
-            (self.theta, self.at) = (theta, there);
+        if there.sum_of_squares <= self.linearisation.sum_of_squares {
+            (self.theta, self.linearisation) = (theta, there);
         }
         Some(match reason {
             Reason::SmallDecrease if coordinates.is_on_border(&kappa) => Reason::Border,

@@ -20,10 +20,10 @@ const ROUNDING_DECREASE: f64 = 1e-10;
 pub(crate) struct GaussNewton<'s> {
     pub(super) objective: &'s dyn Objective,
     pub(super) options: &'s SearchOptions,
-    pub(super) rival: Option<f64>,
+    pub(super) loss_to_beat: Option<f64>,
     output_power: f64,
     pub(super) theta: Vec<f64>,
-    pub(super) at: Linearisation,
+    pub(super) linearisation: Linearisation,
     pub(super) iterations: usize,
     mu: f64,
     growth: f64,
@@ -75,11 +75,11 @@ impl<'s> GaussNewton<'s> {
         objective.is_feasible(&theta).then(|| Self {
             objective,
             options,
-            rival,
+            loss_to_beat: rival,
             output_power: objective.output_power(),
             evaluation_point: theta.clone(),
             theta,
-            at: Linearisation::default(),
+            linearisation: Linearisation::default(),
             iterations: 0,
             mu: 1e-6,
             growth: 8.0,
@@ -114,12 +114,12 @@ impl<'s> GaussNewton<'s> {
         let finite = there.sum_of_squares.is_finite();
         match std::mem::replace(&mut self.trial, Trial::Last) {
             Trial::Start => {
-                self.at = there;
+                self.linearisation = there;
                 self.iterate()
             }
             Trial::Damped { predicted } => {
-                if finite && there.sum_of_squares < self.at.sum_of_squares {
-                    let ratio = (self.at.sum_of_squares - there.sum_of_squares) / predicted;
+                if finite && there.sum_of_squares < self.linearisation.sum_of_squares {
+                    let ratio = (self.linearisation.sum_of_squares - there.sum_of_squares) / predicted;
                     self.mu = (self.mu * (1.0 - (2.0 * ratio - 1.0).powi(3)).clamp(1.0 / 3.0, 2.0)).max(1e-12);
                     self.growth = 2.0;
                     self.move_to(there);
@@ -133,7 +133,7 @@ impl<'s> GaussNewton<'s> {
                 }
             }
             Trial::Share { delta, factor } => {
-                if finite && there.sum_of_squares < self.at.sum_of_squares {
+                if finite && there.sum_of_squares < self.linearisation.sum_of_squares {
                     self.move_to(there);
                     self.iterate()
                 } else {
@@ -143,7 +143,7 @@ impl<'s> GaussNewton<'s> {
             Trial::Last => {
                 // The predicted decrease may be less than the rounding error of the loss, so a small increase is
                 // accepted.
-                if finite && there.sum_of_squares <= self.at.sum_of_squares * (1.0 + ROUNDING_DECREASE) {
+                if finite && there.sum_of_squares <= self.linearisation.sum_of_squares * (1.0 + ROUNDING_DECREASE) {
                     self.move_to(there);
                 }
                 Progress::Ended(Some(Reason::SmallDecrease))
@@ -153,14 +153,14 @@ impl<'s> GaussNewton<'s> {
 
     fn move_to(&mut self, there: Linearisation) {
         if self.options.method == SearchMethod::Automatic
-            && self.predicted_decrease <= SECANT_DECREASE_LIMIT * self.at.sum_of_squares
+            && self.predicted_decrease <= SECANT_DECREASE_LIMIT * self.linearisation.sum_of_squares
         {
             self.update_secant(&there);
         } else {
             self.secant.clear();
         }
         std::mem::swap(&mut self.theta, &mut self.evaluation_point);
-        self.at = there;
+        self.linearisation = there;
     }
 
     /// Corrects the secant by a symmetric matrix of rank one, so `(H + S) s = g - g'` for the last step s.
@@ -176,7 +176,7 @@ impl<'s> GaussNewton<'s> {
         let missing: Vec<f64> = (0..p)
             .map(|i| {
                 let known = dot(&there.gram[i * p..(i + 1) * p], &step) + dot(&self.secant[i * p..(i + 1) * p], &step);
-                self.at.descent[i] - there.descent[i] - known
+                self.linearisation.descent[i] - there.descent[i] - known
             })
             .collect();
         let along = dot(&missing, &step);
@@ -196,22 +196,22 @@ impl<'s> GaussNewton<'s> {
 
     /// Requests the first trial of the next step, or ends the search.
     fn iterate(&mut self) -> Progress {
-        if !self.at.sum_of_squares.is_finite() {
+        if !self.linearisation.sum_of_squares.is_finite() {
             return Progress::Ended(None);
         }
         // Rounding leaves residuals of about 1e-15 of the output.
-        if self.at.sum_of_squares <= 1e-26 * self.output_power {
+        if self.linearisation.sum_of_squares <= 1e-26 * self.output_power {
             return Progress::Ended(Some(Reason::ExactFit));
         }
         let undamped = self.damped_step(0.0, &[]);
-        if let (Some(rival), Some(step)) = (self.rival, &undamped) {
-            let close = self.at.sum_of_squares < rival * (1.0 + 1e-3);
-            if close && self.at.sum_of_squares - step.predicted > rival * (1.0 - 1e-7) {
+        if let (Some(rival), Some(step)) = (self.loss_to_beat, &undamped) {
+            let close = self.linearisation.sum_of_squares < rival * (1.0 + 1e-3);
+            if close && self.linearisation.sum_of_squares - step.predicted > rival * (1.0 - 1e-7) {
                 return Progress::Ended(None);
             }
         }
         if let Some(step) = &undamped
-            && step.predicted <= self.options.tolerance * self.at.sum_of_squares
+            && step.predicted <= self.options.tolerance * self.linearisation.sum_of_squares
         {
             return if self.try_step(&step.delta, 1.0) {
                 self.trial = Trial::Last;
@@ -232,7 +232,7 @@ impl<'s> GaussNewton<'s> {
         };
         match delta {
             Some(delta) => self.try_fraction(delta, 1.0),
-            None => self.give_up(),
+            None => self.stop_without_descent(),
         }
     }
 
@@ -257,7 +257,7 @@ impl<'s> GaussNewton<'s> {
             }
             self.damp();
         }
-        self.give_up()
+        self.stop_without_descent()
     }
 
     fn damp(&mut self) {
@@ -274,12 +274,12 @@ impl<'s> GaussNewton<'s> {
             }
             factor *= 0.5;
         }
-        self.give_up()
+        self.stop_without_descent()
     }
 
-    fn give_up(&self) -> Progress {
+    fn stop_without_descent(&self) -> Progress {
         // The predicted decrease may be hidden by the rounding of the loss.
-        let lost = self.predicted_decrease <= ROUNDING_DECREASE * self.at.sum_of_squares;
+        let lost = self.predicted_decrease <= ROUNDING_DECREASE * self.linearisation.sum_of_squares;
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
@@ -306,13 +306,14 @@ impl<'s> GaussNewton<'s> {
             let mut delta = vec![0.0; p];
             if !free.is_empty() {
                 let lacking = |i: usize, j: usize| secant.get(i * p + j).copied().unwrap_or(0.0);
-                let gram =
-                    |i: usize, j: usize| self.at.gram[i * p + j] * if i == j { 1.0 + mu } else { 1.0 } + lacking(i, j);
+                let gram = |i: usize, j: usize| {
+                    self.linearisation.gram[i * p + j] * if i == j { 1.0 + mu } else { 1.0 } + lacking(i, j)
+                };
                 let damped: Vec<f64> = free
                     .iter()
                     .flat_map(|&i| free.iter().map(move |&j| gram(i, j)))
                     .collect();
-                let descent: Vec<f64> = free.iter().map(|&i| self.at.descent[i]).collect();
+                let descent: Vec<f64> = free.iter().map(|&i| self.linearisation.descent[i]).collect();
                 for (&i, value) in free.iter().zip(solve_symmetric(&damped, &descent)?) {
                     delta[i] = value;
                 }
@@ -340,12 +341,12 @@ impl<'s> GaussNewton<'s> {
         let p = self.theta.len();
         let mut delta = vec![0.0; p];
         for i in self.free_indices() {
-            let curvature = self.at.gram[i * p + i];
+            let curvature = self.linearisation.gram[i * p + i];
             if curvature > 0.0 {
-                delta[i] = self.at.descent[i] / curvature;
+                delta[i] = self.linearisation.descent[i] / curvature;
             }
         }
-        let mut alpha = dot(&self.at.descent, &delta) / curvature(&self.at.gram, &delta);
+        let mut alpha = dot(&self.linearisation.descent, &delta) / curvature(&self.linearisation.gram, &delta);
         if !(alpha.is_finite() && alpha > 0.0) {
             return None;
         }
@@ -359,7 +360,8 @@ impl<'s> GaussNewton<'s> {
 
     /// Returns the step with its predicted decrease, from `V(theta + step) ~ V - 2 g' step + step' H step`.
     fn step(&self, delta: Vec<f64>, secant: &[f64]) -> Option<Step> {
-        let mut predicted = 2.0 * dot(&self.at.descent, &delta) - curvature(&self.at.gram, &delta);
+        let mut predicted =
+            2.0 * dot(&self.linearisation.descent, &delta) - curvature(&self.linearisation.gram, &delta);
         if !secant.is_empty() {
             predicted -= curvature(secant, &delta);
         }
@@ -367,7 +369,7 @@ impl<'s> GaussNewton<'s> {
     }
 
     fn free_indices(&self) -> Vec<usize> {
-        free_parameters(self.objective, &self.theta, &self.at.descent)
+        free_parameters(self.objective, &self.theta, &self.linearisation.descent)
     }
 }
 

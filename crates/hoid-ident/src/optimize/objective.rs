@@ -86,6 +86,6 @@ pub(crate) trait Objective {
 #[derive(Debug, Clone)]
 pub(crate) struct Minimum {
     pub theta: Vec<f64>,
-    pub at: Linearisation,
+    pub linearisation: Linearisation,
     pub termination: Termination,
 }

@@ -72,7 +72,8 @@ fn gradient_is_zero_at_convergence() {
         assert!(end.termination.converged(), "{:?}", end.termination);
         let p = end.theta.len();
         for i in 0..p {
-            let cosine = end.at.descent[i] / (end.at.gram[i * p + i] * end.at.sum_of_squares).sqrt();
+            let cosine = end.linearisation.descent[i]
+                / (end.linearisation.gram[i * p + i] * end.linearisation.sum_of_squares).sqrt();
             assert!(cosine.abs() < left, "{i}: {cosine}");
         }
     }
@@ -133,7 +134,11 @@ fn every_method_descends_the_valley() {
     }
     // Steepest descent is slow in a valley, and goes down.
     let slow = descend(&open, SearchMethod::SteepestDescent, 2000);
-    assert!(slow.at.sum_of_squares < 0.1, "{}", slow.at.sum_of_squares);
+    assert!(
+        slow.linearisation.sum_of_squares < 0.1,
+        "{}",
+        slow.linearisation.sum_of_squares
+    );
     assert!(slow.termination.iterations > 100);
 }
 
@@ -150,7 +155,7 @@ fn limits_and_fixed_parameters_are_respected() {
         let end = descend(&bounded, method, 200);
         assert!(end.termination.converged(), "{method:?}: {:?}", end.termination);
         assert!((end.theta[0] - 0.5).abs() < 1e-12 && (end.theta[1] - 0.25).abs() < 1e-8);
-        assert_eq!(free_parameters(&bounded, &end.theta, &end.at.descent), [1]);
+        assert_eq!(free_parameters(&bounded, &end.theta, &end.linearisation.descent), [1]);
     }
     let fixed = Valley {
         limits: Some(vec![(f64::NEG_INFINITY, f64::INFINITY), (4.0, 4.0)]),
@@ -159,7 +164,7 @@ fn limits_and_fixed_parameters_are_respected() {
     assert_eq!(end.theta[1], 4.0);
     // Stationary in x with y = 4: 200 x (x^2 - 4) = 1 - x, on the same side as the start.
     assert!((end.theta[0] + 1.99812).abs() < 1e-4, "{}", end.theta[0]);
-    let slope = end.at.descent[0] / end.at.gram[0].sqrt();
+    let slope = end.linearisation.descent[0] / end.linearisation.gram[0].sqrt();
     assert!(slope.abs() < 1e-6);
 }
 
@@ -236,7 +241,7 @@ fn secant_saves_steps_for_a_wrong_model() {
     assert!(3 * few <= 2 * many, "{few} steps with the secant, {many} without");
     // A remaining relative decrease of 1e-12 corresponds to 1e-6 of the length of theta in units of the residuals.
     for i in 0..3 {
-        let error = (without.at.sum_of_squares / (3000.0 * without.at.gram[4 * i])).sqrt();
+        let error = (without.linearisation.sum_of_squares / (3000.0 * without.linearisation.gram[4 * i])).sqrt();
         assert!((with.theta[i] - without.theta[i]).abs() < 1e-4 * error);
     }
 }

@@ -64,12 +64,15 @@ impl<'q, 'a> FitProblem<'q, 'a> {
         if settings.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
             // If the search ended on the border of stability, the loss often has a lower minimum inside.
             let inside = starts_with_reduced_c_roots(&settings.orders, &minimum.theta);
-            let known = minimum.at.sum_of_squares;
+            let known = minimum.linearisation.sum_of_squares;
             let others = inside
                 .into_iter()
                 .filter_map(|theta| minimise(constrained, theta, &settings.search, Some(known), workspace));
-            if let Some(lower) = others.min_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares))
-                && lower.at.sum_of_squares < known
+            if let Some(lower) = others.min_by(|a, b| {
+                a.linearisation
+                    .sum_of_squares
+                    .total_cmp(&b.linearisation.sum_of_squares)
+            }) && lower.linearisation.sum_of_squares < known
             {
                 start.push_str(", roots of C moved inside");
                 minimum = lower;
@@ -87,9 +90,9 @@ impl<'q, 'a> FitProblem<'q, 'a> {
                 workspace,
             );
         }
-        let free = free_parameters(constrained, &minimum.theta, &minimum.at.descent);
+        let free = free_parameters(constrained, &minimum.theta, &minimum.linearisation.descent);
         let solution = Solution {
-            sum_of_squares: constrained.sum_without_prior(&minimum.theta, &minimum.at),
+            sum_of_squares: constrained.sum_without_prior(&minimum.theta, &minimum.linearisation),
             is_fixed_or_bounded: fixed_or_bounded_flags(&free, settings.orders.parameter_count()),
             theta: minimum.theta,
             termination: minimum.termination,
@@ -99,7 +102,8 @@ impl<'q, 'a> FitProblem<'q, 'a> {
         if exact {
             return Ok(fit);
         }
-        let inverse = inverse_information_of_free(&minimum.at.gram, &free, &settings.orders.parameter_names())?;
+        let inverse =
+            inverse_information_of_free(&minimum.linearisation.gram, &free, &settings.orders.parameter_names())?;
         let sigma2 = fit.innovation_variance;
         Ok(fit.with_covariance(sigma2, &inverse))
     }

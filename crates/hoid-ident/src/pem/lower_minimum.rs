@@ -1,9 +1,9 @@
 //! Search for a minimum lower than the best minimum from the default starts, for models and records that may have such
 //! a minimum.
 //!
-//! The starts cover the whole region of stability ([`crate::initial_guess::broad`]). A few search steps from each start
-//! show which starts decrease the loss. The best searches are completed, unless they come close to the known minimum
-//! without a predicted lower end. If nothing lower is found, the known result remains bitwise unchanged.
+//! The starts cover the whole region of stability ([`crate::initial_guess::broad_starts`]). A few search steps from
+//! each start show which starts decrease the loss. The best searches are completed, unless they come close to the known
+//! minimum without a predicted lower end. If nothing lower is found, the known result remains bitwise unchanged.
 //!
 //! **Conditions.** Records of some hundred samples have many minima. A model with more coefficients than the operator
 //! (nb, nf > 2, nc > 0, nd > 4) has many minima for longer records too; in this case the first few steps use only a
@@ -13,7 +13,7 @@ use super::{constraints::ConstrainedCriterion, fit_settings::FitSettings};
 use crate::{
     Reason, SearchOptions,
     criterion::{Criterion, Data, Workspace},
-    initial_guess::broad::broad_starts,
+    initial_guess::broad_starts::broad_starts,
     optimize::{Minimum, basin::lies_in_basin, minimise},
 };
 
@@ -28,7 +28,8 @@ const RANKED_START_COUNT: usize = 24;
 const STEP_COUNT: usize = 8;
 /// Largest number of searches that are completed on the whole record.
 const MAX_COMPLETED_SEARCHES: usize = 8;
-/// Values that replace [`RANKED_START_COUNT`] and [`MAX_COMPLETED_SEARCHES`] for a record longer than [`MAX_SPAN_RESIDUALS`].
+/// Values that replace [`RANKED_START_COUNT`] and [`MAX_COMPLETED_SEARCHES`] for a record longer than
+/// [`MAX_SPAN_RESIDUALS`].
 const COUNTS_FOR_LONG_RECORD: [usize; 2] = [12, 3];
 /// Minimum relative decrease of the loss for which a minimum counts as lower.
 const MIN_DECREASE: f64 = 1e-7;
@@ -58,20 +59,28 @@ pub(crate) fn lower_minimum(
     } else {
         COUNTS_FOR_LONG_RECORD
     };
-    let rival = whole.then_some(known.at.sum_of_squares);
+    let rival = whole.then_some(known.linearisation.sum_of_squares);
     let mut tried: Vec<(String, Minimum)> = broad_starts(&part, &known.theta, workspace)
         .into_iter()
         .filter(|start| !whole || !lies_in_basin(known, &start.theta, start.value))
         .take(most_tried)
         .filter_map(|start| Some((start.label, minimise(&on_part, start.theta, &few, rival, workspace)?)))
         .collect();
-    tried.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
+    tried.sort_by(|(_, a), (_, b)| {
+        a.linearisation
+            .sum_of_squares
+            .total_cmp(&b.linearisation.sum_of_squares)
+    });
     tried.truncate(most_finished);
     let mut lowest: Option<(String, Minimum)> = None;
     for (label, near) in tried {
-        let rival = lowest.as_ref().map_or(known, |(_, minimum)| minimum).at.sum_of_squares;
+        let rival = lowest
+            .as_ref()
+            .map_or(known, |(_, minimum)| minimum)
+            .linearisation
+            .sum_of_squares;
         if let Some(mut end) = minimise(constrained, near.theta, &settings.search, Some(rival), workspace)
-            && end.at.sum_of_squares < rival * (1.0 - MIN_DECREASE)
+            && end.linearisation.sum_of_squares < rival * (1.0 - MIN_DECREASE)
         {
             end.termination.iterations += near.termination.iterations;
             lowest = Some((label, end));
@@ -87,8 +96,8 @@ fn may_have_more_minima(criterion: &Criterion<'_>) -> bool {
     o.na == 0 && o.nb > 0 && o.nf > 0 && (larger || criterion.residual_count() <= MAX_SPAN_RESIDUALS)
 }
 
-/// Returns the criterion for about the first [`MAX_SPAN_RESIDUALS`] residuals: records in their order, with the last of them
-/// truncated.
+/// Returns the criterion for about the first [`MAX_SPAN_RESIDUALS`] residuals: records in their order, with the last of
+/// them truncated.
 fn first_span<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
     let mut left = MAX_SPAN_RESIDUALS;
     let mut data = Vec::new();

@@ -11,8 +11,8 @@
 //! so theta becomes biased (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986,
 //! section 6.3: the influence is the product of the influence of the residual and the influence of position). To bound
 //! the influence of position as well, the estimator first limits each sample of e and u by its neighbours
-//! ([`crate::faults::limited_record`]); in a normal channel one sample in 16 000 is changed, so the efficiency of the loss
-//! is retained.
+//! ([`crate::faults::limited_record`]); in a normal channel one sample in 16 000 is changed, so the efficiency of the
+//! loss is retained.
 //!
 //! The covariance is `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi (Huber,
 //! eq. 7.6.8, for residuals that are independent of the gradient).
@@ -121,10 +121,10 @@ pub(crate) fn fit(
         let step: Vec<f64> = next.theta.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
         let p = step.len();
         let curvature: f64 = (0..p)
-            .map(|i| step[i] * dot(&next.at.gram[i * p..(i + 1) * p], &step))
+            .map(|i| step[i] * dot(&next.linearisation.gram[i * p..(i + 1) * p], &step))
             .sum();
         settled = curvature * criterion.residual_count() as f64
-            <= CONVERGENCE_TOLERANCE * CONVERGENCE_TOLERANCE * next.at.sum_of_squares;
+            <= CONVERGENCE_TOLERANCE * CONVERGENCE_TOLERANCE * next.linearisation.sum_of_squares;
         minimum = next;
         residuals = all_residuals(&weighted, &minimum.theta, workspace);
         if settled {
@@ -135,7 +135,7 @@ pub(crate) fn fit(
         Reason::SmallDecrease if !settled => Reason::IterationLimit,
         reason => reason,
     };
-    let free = free_parameters(constrained, &minimum.theta, &minimum.at.descent);
+    let free = free_parameters(constrained, &minimum.theta, &minimum.linearisation.descent);
     let names = criterion.orders.parameter_names();
     // The covariance uses the unweighted psi (Huber 1981, eq. 7.6.8); the weights enter through `variance`.
     let plain = constrained.linearise(&minimum.theta, workspace);

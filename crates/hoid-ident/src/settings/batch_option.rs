@@ -14,8 +14,8 @@ type ValueFormatter<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 pub struct BatchOption<E, X = IdentError> {
     /// Name, type, default, bounds and help text.
     pub setting: Setting,
-    set: ValueSetter<E, X>,
-    printed: Option<(&'static str, ValueFormatter<E>)>,
+    setter: ValueSetter<E, X>,
+    formatter: Option<(&'static str, ValueFormatter<E>)>,
 }
 
 /// An estimator that declares its options.
@@ -29,8 +29,8 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
     pub fn new(setting: Setting, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
         Self {
             setting,
-            set: Box::new(set),
-            printed: None,
+            setter: Box::new(set),
+            formatter: None,
         }
     }
 
@@ -42,7 +42,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         words: impl Fn(&E, SampleTime) -> Option<String> + 'static,
     ) -> Self {
         Self {
-            printed: Some((name, Box::new(words))),
+            formatter: Some((name, Box::new(words))),
             ..self
         }
     }
@@ -52,12 +52,12 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
     /// # Errors
     /// An error of type `X` if the text is not a valid value or contradicts an option that was set before.
     pub fn set(&self, of: &mut E, text: &str) -> Result<(), X> {
-        (self.set)(of, &self.setting, text)
+        (self.setter)(of, &self.setting, text)
     }
 
     /// Returns the name and the value as printed; `None` if the option is not printed.
     pub fn formatted_value(&self, of: &E, sample_time: SampleTime) -> Option<(&'static str, String)> {
-        let (name, words) = self.printed.as_ref()?;
+        let (name, words) = self.formatter.as_ref()?;
         Some((*name, words(of, sample_time)?))
     }
 
@@ -65,7 +65,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
     #[must_use]
     pub fn with_parser(self, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
         Self {
-            set: Box::new(set),
+            setter: Box::new(set),
             ..self
         }
     }
@@ -76,11 +76,15 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         part: fn(&W) -> &E,
         part_mut: fn(&mut W) -> &mut E,
     ) -> BatchOption<W, Y> {
-        let Self { setting, set, printed } = self;
+        let Self {
+            setting,
+            setter: set,
+            formatter: printed,
+        } = self;
         BatchOption {
             setting,
-            set: Box::new(move |whole, setting, text| set(part_mut(whole), setting, text).map_err(Y::from)),
-            printed: printed.map(|(name, words)| -> (&'static str, ValueFormatter<W>) {
+            setter: Box::new(move |whole, setting, text| set(part_mut(whole), setting, text).map_err(Y::from)),
+            formatter: printed.map(|(name, words)| -> (&'static str, ValueFormatter<W>) {
                 (
                     name,
                     Box::new(move |whole, sample_time| words(part(whole), sample_time)),

@@ -54,7 +54,7 @@ pub(crate) fn limits(
         });
     }
     let mut result = Vec::with_capacity(names.len());
-    for (place, (name, element)) in names.iter().zip(layout.elements()).enumerate() {
+    for (index, (name, element)) in names.iter().zip(layout.elements()).enumerate() {
         let (widest, default) = ranges(layout, frame, element)?;
         let asked = constraints.get(name).copied();
         let (low, high) = asked.map_or(default, Constraint::limits);
@@ -67,7 +67,7 @@ pub(crate) fn limits(
                 expected: format!("a value or a range within {:.6} to {:.6}", widest.0, widest.1),
             });
         }
-        let ends = [within.0, within.1].map(|end| layout.theta_from_user_value(place, end));
+        let ends = [within.0, within.1].map(|end| layout.theta_from_user_value(index, end));
         result.push((ends[0].min(ends[1]), ends[0].max(ends[1])));
     }
     Ok(result)
@@ -83,8 +83,8 @@ fn ranges(layout: &Layout, frame: &BoundInputs, element: ThetaElement) -> Result
     // Search range of a coordinate in a fit of the operator family without a change.
     let of_family = |coordinate: Coordinate| {
         let all = coordinates::limits(layout.form, layout.neuromuscular, frame.delay_range_s, sample_time);
-        let place = layout.coordinates().iter().position(|c| *c == coordinate);
-        place.map(|i| all[i])
+        let index = layout.coordinates().iter().position(|c| *c == coordinate);
+        index.map(|i| all[i])
     };
     let known = layout.form == Form::Lead;
     let all = (f64::NEG_INFINITY, f64::INFINITY);
@@ -165,12 +165,12 @@ mod tests {
     fn lag_limits_follow_from_its_time_constant() {
         let layout = Layout::new(Form::LeadLag, true, 0);
         let with = |c: Constraint| limits(&layout, &frame(), &BTreeMap::from([("T_I".to_owned(), c)]));
-        let place = layout.lag.unwrap();
-        assert_eq!(with(Constraint::Fixed(5.0)).unwrap()[place], (0.2, 0.2));
-        assert_eq!(with(Constraint::Between(2.0, 8.0)).unwrap()[place], (0.125, 0.5));
+        let index = layout.lag.unwrap();
+        assert_eq!(with(Constraint::Fixed(5.0)).unwrap()[index], (0.2, 0.2));
+        assert_eq!(with(Constraint::Between(2.0, 8.0)).unwrap()[index], (0.125, 0.5));
         assert!(with(Constraint::Fixed(-5.0)).is_err());
         let default = limits(&layout, &frame(), &BTreeMap::new()).unwrap();
-        let (low, high) = default[place];
+        let (low, high) = default[index];
         assert!((low - 1e-3).abs() < 1e-15 && (high - 30.0).abs() < 1e-12);
     }
 }

@@ -83,8 +83,8 @@ impl SigmoidChange {
         let unit = prior::penalties(&criterion.layout, &self.prior);
         for penalty in &unit {
             // A parameter with a prior must be positive.
-            let (low, high) = criterion.limits[penalty.place];
-            criterion.limits[penalty.place] = (low.max(0.0), high);
+            let (low, high) = criterion.limits[penalty.index];
+            criterion.limits[penalty.index] = (low.max(0.0), high);
         }
         let starts = self.starts(&criterion, off_level, guess)?;
         if let Some((_, theta)) = starts.first() {
@@ -112,7 +112,7 @@ impl SigmoidChange {
             let penalty = criterion.penalty.clone();
             let (mut other, other_levels) = settled(&mut criterion, other)?;
             lower += 1;
-            if other.at.sum_of_squares < minimum.at.sum_of_squares && lower <= MAX_LOWER_MINIMA {
+            if other.linearisation.sum_of_squares < minimum.linearisation.sum_of_squares && lower <= MAX_LOWER_MINIMA {
                 other.termination.iterations += minimum.termination.iterations;
                 (minimum, levels) = (other, other_levels);
                 if lower == 1 {
@@ -243,17 +243,14 @@ impl SigmoidChange {
                 names.join(", ")
             ));
         }
-        let positive = |(place, element): (usize, &ThetaElement)| match element {
-            ThetaElement::LogRate => Some(place),
-            ThetaElement::Constant(_) if place != layout.delay => Some(place),
+        let positive = |(slot, element): (usize, &ThetaElement)| match element {
+            ThetaElement::LogRate => Some(slot),
+            ThetaElement::Constant(_) if slot != layout.delay => Some(slot),
             _ => None,
         };
-        for place in layout.elements().iter().enumerate().filter_map(positive) {
-            if start[place].is_nan() || start[place] <= 0.0 {
-                return bad(format!(
-                    "{} = {}, expected a positive number",
-                    names[place], start[place]
-                ));
+        for slot in layout.elements().iter().enumerate().filter_map(positive) {
+            if start[slot].is_nan() || start[slot] <= 0.0 {
+                return bad(format!("{} = {}, expected a positive number", names[slot], start[slot]));
             }
         }
         if let Some(i) = start.iter().position(|v| !v.is_finite()) {
@@ -261,7 +258,7 @@ impl SigmoidChange {
         }
         let typed = start.iter().enumerate();
         Ok(typed
-            .map(|(place, value)| layout.theta_from_user_value(place, *value))
+            .map(|(slot, value)| layout.theta_from_user_value(slot, *value))
             .collect())
     }
 }

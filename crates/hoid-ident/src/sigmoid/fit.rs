@@ -3,11 +3,11 @@
 use hoid_model::{Form, Record, SampleTime, Structure, uncertainty::Estimate};
 
 use super::{
-    ends::{ChangedOperator, NamedEstimate, ThetaEstimate, estimate},
     inference::{Comparison, Remark, constant_operator, infer},
     layout::Layout,
     objective::{ChangeCriterion, Data},
-    profile_likelihood::{Interval, Profile, profile_likelihood_interval},
+    operator_states::{ChangedOperator, NamedEstimate, ThetaEstimate, estimate},
+    profile_likelihood::{Interval, ProfileEnd, profile_likelihood_interval},
 };
 use crate::{IdentError, Series, Termination, informative_data::check_record, optimize::Minimum};
 
@@ -57,7 +57,8 @@ pub struct SigmoidFit {
     remarks: Vec<Option<Remark>>,
     midpoint_interval: Option<Interval>,
     rate_interval: Option<Interval>,
-    change_point: bool,
+    #[serde(rename = "change_point")]
+    is_change_point: bool,
     loss: f64,
     innovation_variance: f64,
     levels: Option<[f64; 2]>,
@@ -104,7 +105,7 @@ impl SigmoidFit {
             covariance: found.covariance.as_deref(),
             change_point: None,
         };
-        let squares = minimum.at.sum_of_squares - criterion.penalty_at(&minimum.theta);
+        let squares = minimum.linearisation.sum_of_squares - criterion.penalty_at(&minimum.theta);
         Ok(Self {
             layout: criterion.layout,
             sample_time: criterion.sample_time,
@@ -126,7 +127,7 @@ impl SigmoidFit {
             remarks: found.remarks,
             midpoint_interval: None,
             rate_interval: None,
-            change_point: found.change_point,
+            is_change_point: found.is_change_point,
         })
     }
 
@@ -193,17 +194,17 @@ impl SigmoidFit {
         let covariance = self.covariance.as_ref()?;
         let standard_error = |i: usize| Some(covariance[i * p + i].sqrt()).filter(|s| *s > 0.0);
         let standard_errors = [midpoint, log_rate].map(standard_error);
-        for (place, standard_error) in [midpoint, log_rate].into_iter().zip(standard_errors) {
-            if self.remarks[place] == Some(Remark::Fixed) {
+        for (index, standard_error) in [midpoint, log_rate].into_iter().zip(standard_errors) {
+            if self.remarks[index] == Some(Remark::Fixed) {
                 continue;
             }
-            match profile_likelihood_interval(criterion, minimum, place, standard_error, self.change_point, stay) {
-                Profile::Lower(theta) => return Some(theta),
-                Profile::Interval(interval) if place == midpoint => self.midpoint_interval = Some(interval),
-                Profile::Interval(interval) => self.rate_interval = Some(interval),
+            match profile_likelihood_interval(criterion, minimum, index, standard_error, self.is_change_point, stay) {
+                ProfileEnd::Lower(theta) => return Some(theta),
+                ProfileEnd::Interval(interval) if index == midpoint => self.midpoint_interval = Some(interval),
+                ProfileEnd::Interval(interval) => self.rate_interval = Some(interval),
             }
         }
-        if self.change_point
+        if self.is_change_point
             && let (Some(interval), Some(covariance)) = (self.midpoint_interval, self.covariance.as_mut())
         {
             // At a change point, the variance of a normal distribution with the same 95 % interval replaces the
@@ -233,7 +234,7 @@ impl SigmoidFit {
 
     /// True if t_M is a change point: the change is too fast for a normally distributed error of t_M.
     pub fn is_change_point(&self) -> bool {
-        self.change_point
+        self.is_change_point
     }
 
     /// Returns the operator before the change, which is valid only if [`SigmoidFit::has_change`] is true.
@@ -273,7 +274,7 @@ impl SigmoidFit {
             layout: &self.layout,
             theta: &self.theta,
             covariance: self.covariance.as_deref(),
-            change_point: self.covariance.as_ref().filter(|_| self.change_point).map(|c| {
+            change_point: self.covariance.as_ref().filter(|_| self.is_change_point).map(|c| {
                 let (p, i) = (self.theta.len(), self.layout.midpoint);
                 c[i * p + i]
             }),

@@ -7,9 +7,9 @@ use std::fmt;
 
 use super::{
     bounds::MAX_DEFAULT_RATE_TIMES_TS,
-    ends::{ChangedOperator, ThetaEstimate},
     layout::Layout,
     objective::ChangeCriterion,
+    operator_states::{ChangedOperator, ThetaEstimate},
     prior,
     profile_likelihood::is_change_point,
 };
@@ -88,7 +88,7 @@ pub(super) struct Inference {
     pub remarks: Vec<Option<Remark>>,
     pub comparison: Comparison,
     /// True if the change is too fast for a normally distributed error of t_M.
-    pub change_point: bool,
+    pub is_change_point: bool,
 }
 
 /// Computes the inference from the minimum with a change; `constant` is the minimum without a change.
@@ -105,7 +105,7 @@ pub(super) fn infer(
     let layout = &criterion.layout;
     let (midpoint, log_rate) = (layout.midpoint, layout.log_rate);
     let n = criterion.residual_count();
-    let sum_of_squares = minimum.at.sum_of_squares;
+    let sum_of_squares = minimum.linearisation.sum_of_squares;
     let innovation_variance = prior::innovation_variance(criterion, minimum);
     let of_the_change = layout.change_indices().into_iter();
     let extra_parameters = of_the_change
@@ -113,7 +113,7 @@ pub(super) fn infer(
         .count();
     // If the fit without a change is also exact, both losses are only rounding errors.
     let both_exact = constant.termination.reason == Reason::ExactFit;
-    let ratio = (constant.at.sum_of_squares / sum_of_squares).ln();
+    let ratio = (constant.linearisation.sum_of_squares / sum_of_squares).ln();
     let likelihood_ratio = if both_exact { 0.0 } else { n as f64 * ratio };
     let comparison = Comparison {
         likelihood_ratio,
@@ -122,7 +122,7 @@ pub(super) fn infer(
     };
     let change_found = comparison.bic_difference > 0.0;
 
-    let mut free = free_parameters(criterion, theta, &minimum.at.descent);
+    let mut free = free_parameters(criterion, theta, &minimum.linearisation.descent);
     let mut remarks: Vec<Option<Remark>> = (0..p)
         .map(|i| {
             let (low, high) = criterion.limits[i];
@@ -141,7 +141,7 @@ pub(super) fn infer(
     let covariance = if exact {
         None
     } else {
-        let mut covariance = invert(layout, &minimum.at, &mut free, &mut remarks)?;
+        let mut covariance = invert(layout, &minimum.linearisation, &mut free, &mut remarks)?;
         covariance.iter_mut().for_each(|c| *c *= innovation_variance);
         Some(covariance)
     };
@@ -150,13 +150,13 @@ pub(super) fn infer(
         .map(|c: &Vec<f64>| c[midpoint * p + midpoint].sqrt());
     let change_point = change_found && of_midpoint.is_some_and(|s| is_change_point(layout, theta, s));
     if change_point {
-        for place in [midpoint, log_rate] {
-            remarks[place] = remarks[place].or(Some(Remark::ChangePoint));
+        for position in [midpoint, log_rate] {
+            remarks[position] = remarks[position].or(Some(Remark::ChangePoint));
         }
     }
     if let Some(covariance) = &covariance {
         for penalty in &criterion.penalty {
-            let i = penalty.place;
+            let i = penalty.index;
             let share = covariance[i * p + i] * penalty.curvature(theta) / innovation_variance;
             if share > MAX_PRIOR_SHARE {
                 remarks[i] = remarks[i].or(Some(Remark::PriorAlone));
@@ -168,7 +168,7 @@ pub(super) fn infer(
         covariance,
         remarks,
         comparison,
-        change_point,
+        is_change_point: change_point,
     })
 }
 
@@ -213,17 +213,17 @@ pub(super) fn constant_operator(
         changes: false,
         ..criterion.clone()
     };
-    for place in layout.change_indices() {
-        constant.limits[place] = (theta[place], theta[place]);
+    for position in layout.change_indices() {
+        constant.limits[position] = (theta[position], theta[position]);
     }
-    let free = free_parameters(&constant, theta, &minimum.at.descent);
+    let free = free_parameters(&constant, theta, &minimum.linearisation.descent);
     let covariance = if minimum.termination.reason == Reason::ExactFit {
         None
     } else {
         let freedom = criterion.residual_count() - free.len() - criterion.state_count();
-        let squares = minimum.at.sum_of_squares - constant.penalty_at(theta);
+        let squares = minimum.linearisation.sum_of_squares - constant.penalty_at(theta);
         let variance = squares / freedom as f64;
-        let mut inverse = inverse_information_of_free(&minimum.at.gram, &free, &layout.names())?;
+        let mut inverse = inverse_information_of_free(&minimum.linearisation.gram, &free, &layout.names())?;
         inverse.iter_mut().for_each(|c| *c *= variance);
         Some(inverse)
     };

@@ -72,12 +72,12 @@ impl Layout {
         let midpoint = 2 * varying;
         let mut next = midpoint + 2;
         let mut take = |count: usize| {
-            let place = next;
+            let index = next;
             next += count;
-            place
+            index
         };
         let lag = form.has_lag().then(|| take(1));
-        let neuromuscular_indices = neuromuscular.then(|| take(2)).map(|place| [place, place + 1]);
+        let neuromuscular_indices = neuromuscular.then(|| take(2)).map(|index| [index, index + 1]);
         let delay = take(1);
         Self {
             form,
@@ -202,27 +202,27 @@ impl Layout {
 
     /// Converts a number as typed by the user to an element of theta: G to ln G, T_I to 1/T_I. All other numbers stay
     /// the same.
-    pub fn theta_from_user_value(&self, place: usize, value: f64) -> f64 {
-        match place {
-            _ if place == self.log_rate => value.ln(),
-            _ if Some(place) == self.lag => 1.0 / value,
+    pub fn theta_from_user_value(&self, index: usize, value: f64) -> f64 {
+        match index {
+            _ if index == self.log_rate => value.ln(),
+            _ if Some(index) == self.lag => 1.0 / value,
             _ => value,
         }
     }
 
-    pub fn user_value(&self, place: usize, value: f64) -> f64 {
-        match place {
-            _ if place == self.log_rate => value.exp(),
-            _ if Some(place) == self.lag => 1.0 / value,
+    pub fn user_value(&self, index: usize, value: f64) -> f64 {
+        match index {
+            _ if index == self.log_rate => value.exp(),
+            _ if Some(index) == self.lag => 1.0 / value,
             _ => value,
         }
     }
 
     /// Returns the derivative of the reported number with respect to its element of theta.
-    pub fn user_value_slope(&self, place: usize, value: f64) -> f64 {
-        match place {
-            _ if place == self.log_rate => value.exp(),
-            _ if Some(place) == self.lag => -1.0 / (value * value),
+    pub fn user_value_slope(&self, index: usize, value: f64) -> f64 {
+        match index {
+            _ if index == self.log_rate => value.exp(),
+            _ if Some(index) == self.lag => -1.0 / (value * value),
             _ => 1.0,
         }
     }
@@ -244,12 +244,12 @@ impl Layout {
     /// The errors of [`FamilyOperator::new`].
     pub fn operator(&self, theta: &[f64], numerator: &[f64]) -> Result<FamilyOperator, ModelError> {
         let mut x = numerator[..self.varying].to_vec();
-        x.extend(self.lag.map(|place| theta[place]));
+        x.extend(self.lag.map(|index| theta[index]));
         x.extend(
             self.neuromuscular_indices
                 .into_iter()
                 .flatten()
-                .map(|place| theta[place].ln()),
+                .map(|index| theta[index].ln()),
         );
         x.push(theta[self.delay]);
         FamilyOperator::new(self.form, self.neuromuscular, &x)
@@ -288,8 +288,8 @@ mod tests {
                 assert_eq!(elements[layout.log_rate], ThetaElement::LogRate);
                 assert_eq!(elements[layout.delay], ThetaElement::Constant(Coordinate::Delay));
                 assert_eq!(elements[layout.noise], ThetaElement::Noise(1));
-                if let Some(place) = layout.lag {
-                    assert_eq!(elements[place], ThetaElement::Constant(Coordinate::LagRate));
+                if let Some(index) = layout.lag {
+                    assert_eq!(elements[index], ThetaElement::Constant(Coordinate::LagRate));
                 }
                 if let Some([omega, zeta]) = layout.neuromuscular_indices {
                     assert_eq!(elements[omega], ThetaElement::Constant(Coordinate::LogOmega));

@@ -25,40 +25,40 @@
 //! | `estimator` | fit of the change |
 //! | `layout` | order and meaning of the parameters |
 //! | `bounds` | search ranges of the parameters |
-//! | `instant` | sigmoid and numerator at one time |
+//! | `sigmoid_point` | sigmoid and numerator at one time |
 //! | `unit_operator` | responses for each power of s in the numerator, with their derivatives |
 //! | `objective` | criterion and its derivatives |
 //! | `prior` | prior knowledge |
-//! | `frozen`, `ranking`, `starts` | poles, numerators and changes for the starts of searches |
+//! | `start_dynamics`, `ranking`, `starts` | poles, numerators and changes for the starts of searches |
 //! | `search` | searches across the kinks of the loss |
 //! | `noise_level`, `reweighting` | different noise levels before and after the change |
 //! | `inference` | covariance, and the test for a change |
 //! | `profile_likelihood` | intervals of t_M and G |
-//! | `ends` | operator before the change, after the change and at any time |
+//! | `operator_states` | operator before the change, after the change and at any time |
 //! | `fit` | fitted change with its standard errors |
 
 mod bounds;
-mod ends;
 mod estimator;
 mod fit;
-mod frozen;
 mod inference;
-mod instant;
 mod layout;
 mod noise_level;
 mod objective;
+mod operator_states;
 mod options;
 mod prior;
 mod profile_likelihood;
 mod ranking;
 mod reweighting;
 mod search;
+mod sigmoid_point;
+mod start_dynamics;
 mod starts;
 mod unit_operator;
 
-pub use ends::{ChangedOperator, NamedEstimate};
 pub use fit::{ChangeParameter, InstantGains, SigmoidFit};
 pub use inference::{Comparison, Remark};
 pub use layout::SIGMOID_NAMES;
 pub use noise_level::NoiseLevel;
+pub use operator_states::{ChangedOperator, NamedEstimate};
 pub use options::SigmoidChange;

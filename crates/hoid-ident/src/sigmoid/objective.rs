@@ -29,7 +29,7 @@
 
 use hoid_model::{Form, SampleTime, uncertainty::variance_along};
 
-use super::{instant::SigmoidPoint, layout::Layout, unit_operator::UnitOperator};
+use super::{layout::Layout, sigmoid_point::SigmoidPoint, unit_operator::UnitOperator};
 use crate::{
     criterion::Workspace,
     grey_box::objective::Penalty,
@@ -55,8 +55,8 @@ pub(crate) struct ChangeCriterion<'a> {
     /// First sample with a residual; at least the largest nk plus nd.
     pub first: usize,
     pub limits: Vec<(f64, f64)>,
-    /// Piece of a sampling interval to which the delay is restricted ([`Layout::piece_count`]); `None` if the delay itself
-    /// determines the piece.
+    /// Piece of a sampling interval to which the delay is restricted ([`Layout::piece_count`]); `None` if the delay
+    /// itself determines the piece.
     pub piece: Option<usize>,
     /// False for a model without a change, whose initial parameters are valid throughout.
     pub changes: bool,
@@ -115,10 +115,10 @@ impl ChangeCriterion<'_> {
     }
 
     /// Returns the penalties of the prior. For a model without a change, the penalties of the parameters that only a
-    /// change has are left out.
+    /// change has are omitted.
     fn penalties(&self) -> impl Iterator<Item = &Penalty> {
         let last = self.layout.change_indices();
-        (self.penalty.iter()).filter(move |penalty| self.changes || !last.contains(&penalty.place))
+        (self.penalty.iter()).filter(move |penalty| self.changes || !last.contains(&penalty.index))
     }
 
     /// Returns the unweighted residuals of one record, starting at [`ChangeCriterion::first`].
@@ -210,11 +210,11 @@ impl ChangeCriterion<'_> {
             add_scaled(&mut v, -x, column);
         }
         for (age, &(x, _)) in taken[..past_errors].iter().enumerate() {
-            let place = oldest + age;
-            input[place] += x;
+            let position = oldest + age;
+            input[position] += x;
             for (y, h) in y.iter_mut().zip(&h) {
-                let common = h.len().min(y.len() - place);
-                add_scaled(&mut y[place..], x, &h[..common]);
+                let common = h.len().min(y.len() - position);
+                add_scaled(&mut y[position..], x, &h[..common]);
             }
         }
         Some(Pass {
@@ -276,14 +276,14 @@ impl ChangeCriterion<'_> {
                 columns[last] = mapped(&|t, g| g.share * g.gain() * along[t]);
             }
         }
-        columns[layout.midpoint] = mapped(&|t, g| g.by_midpoint * by_share(t, g));
-        columns[layout.log_rate] = mapped(&|t, g| g.by_log_rate * by_share(t, g));
-        for (p, place) in layout.pole_indices().into_iter().enumerate() {
+        columns[layout.midpoint] = mapped(&|t, g| g.derivative_midpoint * by_share(t, g));
+        columns[layout.log_rate] = mapped(&|t, g| g.derivative_log_rate * by_share(t, g));
+        for (p, position) in layout.pole_indices().into_iter().enumerate() {
             let slopes: Vec<Vec<f64>> = (0..y.len())
                 .map(|i| pass.unit.slope(i, p, &pass.input, &pass.y[i]))
                 .collect();
             let slopes: Vec<&[f64]> = slopes.iter().map(|slope| &slope[input_start..]).collect();
-            columns[place] = self.whiten(theta, record, &combine(gains, &slopes, SigmoidPoint::numerator));
+            columns[position] = self.whiten(theta, record, &combine(gains, &slopes, SigmoidPoint::numerator));
         }
         // A longer delay also delays the change.
         let (head, tail) = columns.split_at_mut(layout.delay);

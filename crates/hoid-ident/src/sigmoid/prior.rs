@@ -27,7 +27,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
     let all = layout.coordinates();
     let elements = layout.elements();
     let places = |penalty: Penalty| {
-        let coordinate = all[penalty.place];
+        let coordinate = all[penalty.index];
         let is_own = move |element: &ThetaElement| match element {
             ThetaElement::Varying(own, _) | ThetaElement::Constant(own) => *own == coordinate,
             _ => false,
@@ -35,7 +35,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
         // theta contains omega_nm and zeta_nm, whereas the family uses their logarithms.
         let own = elements.iter().enumerate().filter(move |(_, e)| is_own(e));
         own.map(move |(place, _)| Penalty {
-            place,
+            index: place,
             logarithmic: true,
             ..penalty
         })
@@ -53,7 +53,7 @@ pub(super) fn scaled_penalties(unit: &[Penalty], variance: f64) -> Vec<Penalty> 
 /// Returns the innovation variance at a minimum.
 pub(super) fn innovation_variance(criterion: &ChangeCriterion<'_>, minimum: &Minimum) -> f64 {
     let not_fixed = criterion.limits.iter().filter(|(low, high)| low < high).count();
-    let squares = minimum.at.sum_of_squares - criterion.penalty_at(&minimum.theta);
+    let squares = minimum.linearisation.sum_of_squares - criterion.penalty_at(&minimum.theta);
     squares / (criterion.residual_count() - not_fixed - criterion.state_count()) as f64
 }
 

@@ -34,7 +34,7 @@ pub(crate) struct Interval {
 
 /// Result of a walk along the profile likelihood.
 #[derive(Debug)]
-pub(crate) enum Profile {
+pub(crate) enum ProfileEnd {
     /// The interval of the parameter.
     Interval(Interval),
     /// A theta with a lower loss than at the given minimum.
@@ -58,7 +58,7 @@ pub(crate) fn profile_likelihood_interval(
     standard_error: Option<f64>,
     change_point: bool,
     stay: bool,
-) -> Profile {
+) -> ProfileEnd {
     let quantile = if change_point && place == criterion.layout.midpoint {
         CHANGE_POINT_QUANTILE_95
     } else {
@@ -77,7 +77,7 @@ pub(crate) fn profile_likelihood_interval(
         held.limits[place] = (value, value);
         let found = search(&held, from.to_vec(), &options, None)?;
         Some((
-            n * (found.at.sum_of_squares / minimum.at.sum_of_squares).ln(),
+            n * (found.linearisation.sum_of_squares / minimum.linearisation.sum_of_squares).ln(),
             found.theta,
         ))
     };
@@ -128,10 +128,10 @@ pub(crate) fn profile_likelihood_interval(
         *end = 0.5 * (inside[place] + beyond);
     }
     if let Some(theta) = lower {
-        return Profile::Lower(theta);
+        return ProfileEnd::Lower(theta);
     }
     let [low_end, high_end] = ends;
-    Profile::Interval(if place == criterion.layout.log_rate {
+    ProfileEnd::Interval(if place == criterion.layout.log_rate {
         Interval {
             low: low_end.exp(),
             high: if high_end >= high {

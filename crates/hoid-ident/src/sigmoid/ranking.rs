@@ -8,9 +8,9 @@
 use hoid_model::Form;
 
 use super::{
-    instant::SigmoidPoint,
     layout::{Layout, MAX_VARYING},
     objective::ChangeCriterion,
+    sigmoid_point::SigmoidPoint,
     unit_operator::UnitOperator,
 };
 use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
@@ -85,16 +85,16 @@ impl<'c, 'a> Ranking<'c, 'a> {
                 columns.push(self.whiten(&self.slow_state(u.len())));
             }
             // The initial states of other records have no effect on this record.
-            let place = |i: usize| if i < ends * powers { i } else { i + record };
+            let index = |i: usize| if i < ends * powers { i } else { i + record };
             let target = self.whiten(u);
             power += dot(&target, &target);
             for i in 0..columns.len() {
-                rhs[place(i)] += dot(&columns[i], &target);
+                rhs[index(i)] += dot(&columns[i], &target);
                 for j in 0..=i {
                     let product = dot(&columns[i], &columns[j]);
-                    gram[place(i) * count + place(j)] += product;
+                    gram[index(i) * count + index(j)] += product;
                     if i != j {
-                        gram[place(j) * count + place(i)] += product;
+                        gram[index(j) * count + index(i)] += product;
                     }
                 }
             }
@@ -103,9 +103,9 @@ impl<'c, 'a> Ranking<'c, 'a> {
         let rank = power - dot(&found, &rhs);
         let mut values = vec![0.0; 2 * self.criterion.layout.varying];
         for end in 0..2 {
-            let place = |i: usize| ends * i + end.min(ends - 1);
-            let numerator: Vec<f64> = (0..powers).map(|i| found[place(i)]).collect();
-            let metric = |i: usize, j: usize| gram[place(i) * count + place(j)];
+            let index = |i: usize| ends * i + end.min(ends - 1);
+            let numerator: Vec<f64> = (0..powers).map(|i| found[index(i)]).collect();
+            let metric = |i: usize, j: usize| gram[index(i) * count + index(j)];
             let of_end = parameters(self.criterion.layout.form, &numerator, metric);
             for (i, value) in of_end.into_iter().enumerate().take(self.criterion.layout.varying) {
                 values[Layout::end_indices(i)[end]] = value;
@@ -148,7 +148,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
 
     /// Returns the free response of the pole of a lag or an integration: an exponential, or a constant.
     fn slow_state(&self, n: usize) -> Vec<f64> {
-        let rate = self.criterion.layout.lag.map_or(0.0, |place| self.theta[place]);
+        let rate = self.criterion.layout.lag.map_or(0.0, |index| self.theta[index]);
         let per_sample = (-rate * self.criterion.sample_time.s()).exp();
         std::iter::successors(Some(1.0), |x| Some(x * per_sample))
             .take(n)

@@ -3,10 +3,10 @@
 //! ([`super::noise_level`]).
 
 use super::{
-    instant::SigmoidPoint,
     noise_level::{noise_levels, weights},
     objective::{ChangeCriterion, Data},
     search::search,
+    sigmoid_point::SigmoidPoint,
 };
 use crate::{
     IdentError, Reason, SearchOptions,
@@ -47,7 +47,7 @@ pub(super) fn reweight(
         let kept = criterion.weights.replace(weights);
         let next = search(criterion, minimum.theta.clone(), options, None).ok_or(IdentError::NoFiniteLoss)?;
         iterations += next.termination.iterations;
-        let change = next.at.sum_of_squares / minimum.at.sum_of_squares - 1.0;
+        let change = next.linearisation.sum_of_squares / minimum.linearisation.sum_of_squares - 1.0;
         if round > 0 && change > NEGLIGIBLE_CHANGE {
             // Each of the last two fits has the higher loss with the noise levels of the other; the more likely fit is
             // kept.

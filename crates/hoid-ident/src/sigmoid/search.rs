@@ -30,11 +30,11 @@ pub(super) fn best_minimum(
     };
     let mut best: Option<(String, Minimum)> = None;
     for (label, theta) in starts {
-        let known = best.as_ref().map(|(_, b)| b.at.sum_of_squares);
+        let known = best.as_ref().map(|(_, b)| b.linearisation.sum_of_squares);
         let Some(minimum) = minimise(criterion, theta, &look, known, &mut Workspace::borrow_from_thread()) else {
             continue;
         };
-        if known.is_none_or(|known| minimum.at.sum_of_squares < known) {
+        if known.is_none_or(|known| minimum.linearisation.sum_of_squares < known) {
             best = Some((label, minimum));
         }
     }
@@ -61,8 +61,8 @@ pub(super) fn minimum_without_change(
         ..criterion.clone()
     };
     let start = starts::start_without_change(&constant, theta);
-    for place in constant.layout.change_indices() {
-        constant.limits[place] = (start[place], start[place]);
+    for index in constant.layout.change_indices() {
+        constant.limits[index] = (start[index], start[index]);
     }
     search(&constant, start, options, None).ok_or(IdentError::NoFiniteLoss)
 }
@@ -110,7 +110,8 @@ pub(super) fn search(
                 return None;
             }
             let found = inside(there, &best.theta)?;
-            let lower = found.at.sum_of_squares < best.at.sum_of_squares * (1.0 - options.tolerance);
+            let lower =
+                found.linearisation.sum_of_squares < best.linearisation.sum_of_squares * (1.0 - options.tolerance);
             lower.then_some((there, found))
         });
         let Some((there, found)) = better else { break };

@@ -1,16 +1,16 @@
 //! Automatic starts of the search.
 //!
-//! Poles, delay and noise model come from [`super::frozen`]. If these, t_M and G are given, the residual is linear in
-//! the coefficients of the numerator before and after the change, provided that each coefficient follows the sigmoid.
-//! Pairs of t_M and G are therefore ranked by least squares ([`super::ranking`]): first a grid of t_M for a slow, a
-//! moderate and an abrupt change, then successively halved steps of t_M around the best point of each.
+//! Poles, delay and noise model come from [`super::start_dynamics`]. If these, t_M and G are given, the residual is
+//! linear in the coefficients of the numerator before and after the change, provided that each coefficient follows the
+//! sigmoid. Pairs of t_M and G are therefore ranked by least squares ([`super::ranking`]): first a grid of t_M for a
+//! slow, a moderate and an abrupt change, then successively halved steps of t_M around the best point of each.
 
 use hoid_model::{Form, Record};
 
 use super::{
-    frozen::{PoleCandidate, family_grid_candidates, grid_candidates, guess_candidate, window_candidates},
     objective::ChangeCriterion,
     ranking::Ranking,
+    start_dynamics::{PoleCandidate, family_grid_candidates, grid_candidates, guess_candidate, window_candidates},
 };
 use crate::family::noise::NoiseProducts;
 

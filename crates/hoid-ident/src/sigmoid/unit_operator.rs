@@ -71,9 +71,9 @@ impl UnitOperator {
             .pole_indices()
             .into_iter()
             .enumerate()
-            .map(|(p, place)| {
-                let logarithmic = layout.neuromuscular_indices.is_some_and(|own| own.contains(&place));
-                (layout.varying + p, if logarithmic { 1.0 / theta[place] } else { 1.0 })
+            .map(|(p, index)| {
+                let logarithmic = layout.neuromuscular_indices.is_some_and(|own| own.contains(&index));
+                (layout.varying + p, if logarithmic { 1.0 / theta[index] } else { 1.0 })
             })
             .collect();
         let nb = powers[0].b.len();
@@ -166,9 +166,9 @@ mod tests {
     fn invalid_parameters_give_none() {
         let layout = Layout::new(Form::LeadLag, true, 0);
         let theta = [0.09, 0.07, 0.4, 1.2, 5.0, 0.0, 0.2, 11.0, 0.3, 0.2];
-        let of = |place: usize, value: f64| {
+        let of = |index: usize, value: f64| {
             let mut wrong = theta;
-            wrong[place] = value;
+            wrong[index] = value;
             UnitOperator::of(&layout, &wrong, None, SampleTime::AT_100_HZ)
         };
         assert!(of(layout.delay, 0.2).is_some());

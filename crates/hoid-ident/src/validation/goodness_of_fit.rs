@@ -20,8 +20,8 @@ pub struct GoodnessOfFit {
 pub(super) struct ErrorSums {
     power: f64,
     spread: f64,
-    of_simulation: f64,
-    of_prediction: f64,
+    simulation: f64,
+    prediction: f64,
 }
 
 impl ErrorSums {
@@ -30,17 +30,17 @@ impl ErrorSums {
         Self {
             power: self.power + dot(measured, measured),
             spread: self.spread + squared_deviations(measured),
-            of_simulation: self.of_simulation + squared_distance(measured, simulated),
-            of_prediction: self.of_prediction + squared_distance(measured, predicted),
+            simulation: self.simulation + squared_distance(measured, simulated),
+            prediction: self.prediction + squared_distance(measured, predicted),
         }
     }
 
     pub fn quality(&self) -> GoodnessOfFit {
         GoodnessOfFit {
-            vaf_simulation: vaf_from_sums(self.of_simulation, self.power),
-            vaf_prediction: vaf_from_sums(self.of_prediction, self.power),
-            nrmse_simulation: nrmse_from_sums(self.of_simulation, self.spread),
-            nrmse_prediction: nrmse_from_sums(self.of_prediction, self.spread),
+            vaf_simulation: vaf_from_sums(self.simulation, self.power),
+            vaf_prediction: vaf_from_sums(self.prediction, self.power),
+            nrmse_simulation: nrmse_from_sums(self.simulation, self.spread),
+            nrmse_prediction: nrmse_from_sums(self.prediction, self.spread),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Random numbers from a seed, and u of an operator without noise, for tests and studies of the batch estimators.
 
-use hoid_model::operator_family::HeldFamily;
+use hoid_model::operator_family::ZohFamilyOperator;
 
 /// Uniform random numbers from a linear congruential generator.
 pub struct Uniform(pub u64);
@@ -25,7 +25,7 @@ impl Uniform {
 }
 
 /// Returns `u(k) = sum b_i e(k - nk - i) - sum f_i u(k - i)`, started at rest.
-pub fn response_to(model: &HeldFamily, e: &[f64]) -> Vec<f64> {
+pub fn response_to(model: &ZohFamilyOperator, e: &[f64]) -> Vec<f64> {
     let mut u = vec![0.0; e.len()];
     for k in 0..e.len() {
         let input = (model.b.iter().enumerate()).map(|(i, b)| k.checked_sub(model.nk + i).map_or(0.0, |at| b * e[at]));

@@ -36,7 +36,7 @@ pub(crate) struct Grid {
     /// Rows whose time is earlier than the latest time of all earlier rows.
     pub(super) backward_times: Vec<usize>,
     /// Indices of steps that are longer by one because a row near the step has a wrong time or is out of order.
-    misplaced: Vec<usize>,
+    misplaced_steps: Vec<usize>,
 }
 
 impl Grid {
@@ -106,14 +106,14 @@ impl Grid {
             sample_time_s,
             repeated_times,
             backward_times,
-            misplaced,
+            misplaced_steps: misplaced,
             rows,
         }
     }
 
     /// Returns each gap: the rows before and after it, and the number of missing rows.
     pub(crate) fn gaps(&self) -> impl Iterator<Item = (usize, usize, f64)> + '_ {
-        let recorded = |at: usize| self.misplaced.iter().filter(|one| **one == at).count() as f64;
+        let recorded = |at: usize| self.misplaced_steps.iter().filter(|one| **one == at).count() as f64;
         let missing = (0..).zip(&self.steps).map(move |(at, step)| match *step > 1.5 {
             true => step - 1.0 - recorded(at),
             false => 0.0,

@@ -115,7 +115,7 @@ pub struct QualityIssue {
     /// Unit of the size.
     pub unit: String,
     /// Locations of the problem.
-    pub places: Vec<RowSpan>,
+    pub row_spans: Vec<RowSpan>,
     /// Description as a sentence without a full stop.
     pub text: String,
 }
@@ -150,8 +150,8 @@ impl Serialize for QualityIssue {
             unit: &self.unit,
             text: &self.text,
             remedy: self.kind.remedy(),
-            place_count: self.places.len(),
-            places: self.places.get(..MAX_WRITTEN_PLACES).unwrap_or(&self.places),
+            place_count: self.row_spans.len(),
+            places: self.row_spans.get(..MAX_WRITTEN_PLACES).unwrap_or(&self.row_spans),
         }
         .serialize(serializer)
     }

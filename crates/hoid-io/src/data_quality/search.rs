@@ -6,7 +6,7 @@ use super::grid::Grid;
 use super::issue::QualityIssue;
 use super::signals::{Signal, Signals};
 use super::values::Levels;
-use super::{holds, timing, values};
+use super::{stalls, timing, values};
 
 /// Returns all problems found in columns that share a time.
 pub(crate) fn find_issues(signals: &Signals<'_>) -> Vec<QualityIssue> {
@@ -16,11 +16,11 @@ pub(crate) fn find_issues(signals: &Signals<'_>) -> Vec<QualityIssue> {
     }
     let grid = signals.time.map(|time| Grid::of(time.values));
     if let Some(grid) = &grid {
-        holds::check_non_advancing_rows(signals, grid, &mut found);
+        stalls::check_non_advancing_rows(signals, grid, &mut found);
         timing::check_timing(signals, grid, &mut found);
     }
     let levels: Vec<Levels> = signals.columns.iter().map(|signal| Levels::of(signal.values)).collect();
-    holds::check_stalls(signals, &levels, grid.as_ref(), &mut found);
+    stalls::check_stalls(signals, &levels, grid.as_ref(), &mut found);
     for (signal, levels) in signals.columns.iter().zip(&levels) {
         values::check_values(signals, *signal, levels, &mut found);
     }

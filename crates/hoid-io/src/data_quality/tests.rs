@@ -91,7 +91,7 @@ fn gaps_are_found_despite_large_jitter() {
     }
     let found = issues_in(&t, &e, &u);
     assert_eq!(issue_kinds(&found), [QualityIssueKind::Gap, QualityIssueKind::Jitter]);
-    let places: Vec<(usize, usize)> = found[0].places.iter().map(|place| (place.row, place.rows)).collect();
+    let places: Vec<(usize, usize)> = found[0].row_spans.iter().map(|place| (place.row, place.rows)).collect();
     assert_eq!(places, [(500, 150), (850, 1), (1849, 7), (2842, 1)]);
     assert_eq!(found[0].rows, 159);
     // The jitter is uniform within 0.45 of a sample, so its RMS value is 0.45 / sqrt 3 samples.
@@ -110,8 +110,8 @@ fn stalls_and_repeated_rows_are_found() {
     u[700..792].fill(held_u);
     let found = issues_in(&even_times(), &e, &u);
     assert_eq!(issue_kinds(&found), [QualityIssueKind::Stalled]);
-    let place = found[0].places[0];
-    assert_eq!((found[0].places.len(), place.row, place.rows), (1, 702, 91));
+    let place = found[0].row_spans[0];
+    assert_eq!((found[0].row_spans.len(), place.row, place.rows), (1, 702, 91));
     assert!((found[0].size - 0.91).abs() < 1e-9);
     // Quantised channels also hold their values, but a stall lasts longer.
     let steps = |values: &[f64]| values.iter().map(|v| (v * 20.0).round() / 20.0).collect::<Vec<_>>();
@@ -123,7 +123,7 @@ fn stalls_and_repeated_rows_are_found() {
     assert!(
         stalls
             .iter()
-            .all(|one| one.places.iter().all(|place| (700..=792).contains(&place.row))),
+            .all(|one| one.row_spans.iter().all(|place| (700..=792).contains(&place.row))),
         "{stalls:?}"
     );
     let [mut e, mut u] = smooth_channels();
@@ -136,7 +136,7 @@ fn stalls_and_repeated_rows_are_found() {
     let found = issues_in(&t, &e, &u);
     assert_eq!(issue_kinds(&found), [QualityIssueKind::Repeated]);
     assert_eq!(
-        found[0].places.iter().map(|place| place.row).collect::<Vec<_>>(),
+        found[0].row_spans.iter().map(|place| place.row).collect::<Vec<_>>(),
         [11, 2002]
     );
     t[100] = t[20];

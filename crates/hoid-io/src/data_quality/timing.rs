@@ -50,7 +50,7 @@ pub(super) fn check_timing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Q
     if let Some((rms, worst, row)) =
         jitter.filter(|(_, worst, _)| *worst > (JITTER_LIMIT * ts).max(unit * (1.0 + 1e-6)))
     {
-        let place = signals.row_span(&row_range(row));
+        let index = signals.row_span(&row_range(row));
         found.push(QualityIssue {
             kind: QualityIssueKind::Jitter,
             channel: String::new(),
@@ -64,9 +64,9 @@ pub(super) fn check_timing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Q
                 format_short(ts),
                 format_short(100.0 * rms / ts),
                 format_short(worst),
-                at(&place)
+                at(&index)
             ),
-            places: vec![place],
+            row_spans: vec![index],
         });
     }
     let rms = jitter.map_or(0.0, |(rms, ..)| rms).max(unit / 12_f64.sqrt());
@@ -86,10 +86,10 @@ fn check_gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>)
         })
         .collect();
     let Some(first) = places.first() else { return };
-    let missing = places.iter().fold(0_usize, |sum, place| sum.saturating_add(place.rows));
+    let missing = places.iter().fold(0_usize, |sum, index| sum.saturating_add(index.rows));
     let longest = places
         .iter()
-        .filter_map(|place| Some(place.to_s? - place.from_s?))
+        .filter_map(|index| Some(index.to_s? - index.from_s?))
         .fold(0.0, f64::max);
     found.push(QualityIssue {
         kind: QualityIssueKind::Gap,
@@ -105,7 +105,7 @@ fn check_gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>)
             at(first),
             format_short(longest)
         ),
-        places,
+        row_spans: places,
     });
 }
 
@@ -156,7 +156,7 @@ fn check_rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &m
             format_short(expected),
             format_short(100.0 * off.abs())
         ),
-        places: Vec::new(),
+        row_spans: Vec::new(),
     });
 }
 
@@ -192,7 +192,7 @@ fn check_drift(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &
             format_decimal(last),
             format_short(100.0 * change)
         ),
-        places: Vec::new(),
+        row_spans: Vec::new(),
     });
 }
 
@@ -235,7 +235,7 @@ fn check_second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
                 format_short(100.0 * off.abs()),
                 if off > 0.0 { "faster" } else { "slower" }
             ),
-            places: Vec::new(),
+            row_spans: Vec::new(),
         });
     }
 }

@@ -1,8 +1,8 @@
 //! Saturation, quantisation, constants and missing values of one channel.
 //!
-//! A channel is quantised if at most half of its finite values are distinct (of a long channel, see [`EXAMINED_ROWS`]) and
-//! the distinct values lie on a grid within `1e-3 q`, where q is the smallest step between two of them. The smallest
-//! and the largest value need not be on the grid: they may be the end stops of a stick.
+//! A channel is quantised if at most half of its finite values are distinct (of a long channel, see [`EXAMINED_ROWS`])
+//! and the distinct values lie on a grid within `1e-3 q`, where q is the smallest step between two of them. The
+//! smallest and the largest value need not be on the grid: they may be the end stops of a stick.
 //!
 //! A channel is saturated at a limit if it stays there longer than is possible at a peak. In full precision no two
 //! consecutive values are equal by chance, so three successive rows at the extreme value count as saturation. In a
@@ -41,13 +41,13 @@ pub(crate) struct SaturationLimit {
     pub(crate) value: f64,
     pub(crate) is_upper: bool,
     /// Row ranges in which the channel stays at the limit.
-    pub(crate) stays: Vec<Range<usize>>,
+    pub(crate) row_ranges: Vec<Range<usize>>,
 }
 
 impl SaturationLimit {
     /// Returns the number of rows at the limit.
     pub(crate) fn row_count(&self) -> usize {
-        self.stays.iter().map(Range::len).sum()
+        self.row_ranges.iter().map(Range::len).sum()
     }
 }
 
@@ -58,7 +58,7 @@ pub(crate) struct Levels {
     rows: usize,
     finite: usize,
     /// Levels in increasing order: all levels of a quantised channel, otherwise the levels at both ends.
-    kept: Vec<f64>,
+    values: Vec<f64>,
 }
 
 impl Levels {
@@ -80,7 +80,7 @@ impl Levels {
                     count: rows,
                     rows,
                     finite,
-                    kept: end_levels(values, &first),
+                    values: end_levels(values, &first),
                 };
             }
         }
@@ -94,7 +94,7 @@ impl Levels {
             count,
             rows,
             finite,
-            kept: levels,
+            values: levels,
         }
     }
 
@@ -109,7 +109,7 @@ impl Levels {
         if self.count < 2 || self.count > self.finite / 2 {
             return None;
         }
-        let inner = match self.kept.as_slice() {
+        let inner = match self.values.as_slice() {
             [_, inner @ .., _] if self.count > 4 => inner,
             all => all,
         };
@@ -171,7 +171,7 @@ pub(crate) fn saturation_limits(values: &[f64], levels: &Levels) -> Vec<Saturati
         // A switch or a constant signal has fewer than four levels and stays at its extremes by nature.
         return Vec::new();
     }
-    let (coarse, levels) = (levels.is_quantised(), &levels.kept);
+    let (coarse, levels) = (levels.is_quantised(), &levels.values);
     let count = |level: f64| values.iter().filter(|v| **v == level).count();
     let rail = |is_upper: bool| {
         let (extreme, next) = match (levels.as_slice(), is_upper) {
@@ -200,7 +200,7 @@ pub(crate) fn saturation_limits(values: &[f64], levels: &Levels) -> Vec<Saturati
         is_rail.then_some(SaturationLimit {
             value: extreme,
             is_upper,
-            stays,
+            row_ranges: stays,
         })
     };
     [rail(false), rail(true)].into_iter().flatten().collect()
@@ -218,7 +218,7 @@ pub(super) fn check_values(signals: &Signals<'_>, signal: Signal<'_>, levels: &L
             share: rows as f64 / n as f64,
             size,
             unit: unit.to_owned(),
-            places,
+            row_spans: places,
             text,
         });
     };
@@ -240,7 +240,7 @@ pub(super) fn check_values(signals: &Signals<'_>, signal: Signal<'_>, levels: &L
         return;
     }
     for rail in saturation_limits(values, levels) {
-        let places: Vec<RowSpan> = rail.stays.iter().map(|stay| signals.row_span(stay)).collect();
+        let places: Vec<RowSpan> = rail.row_ranges.iter().map(|stay| signals.row_span(stay)).collect();
         let seconds = |place: &RowSpan| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
         let longest = places.iter().map(seconds).fold(0.0, f64::max);
         let text = format!(
@@ -308,7 +308,7 @@ mod tests {
             let mut values: Vec<f64> = (0..200).map(|k| (0.37 * f64::from(k)).sin()).collect();
             (values[150], values[151]) = (outlier, -0.5 * outlier);
             let quick = Levels::from_first_values(&values, 64);
-            assert!(quick.kept.len() < 4 && saturation_limits(&values, &quick).is_empty());
+            assert!(quick.values.len() < 4 && saturation_limits(&values, &quick).is_empty());
         }
     }
 
@@ -320,16 +320,16 @@ mod tests {
         values[3500] = f64::NAN;
         for most in [64, 1000, 3999] {
             let (quick, all) = (Levels::from_first_values(&values, most), Levels::of(&values));
-            assert_eq!((&quick.kept, quick.finite), (&all.kept, 3999));
+            assert_eq!((&quick.values, quick.finite), (&all.values, 3999));
             assert!(!quick.is_quantised() && quick.quantum().is_none());
             let found = saturation_limits(&values, &quick);
-            assert_eq!((found.len(), found[0].value, found[0].stays.len()), (1, 2.0, 1));
-            assert_eq!(found[0].stays[0], 3000..3005);
+            assert_eq!((found.len(), found[0].value, found[0].row_ranges.len()), (1, 2.0, 1));
+            assert_eq!(found[0].row_ranges[0], 3000..3005);
         }
         // All rows of the quantised channel are examined, because its largest level occurs in one of the last rows.
         let mut coarse: Vec<f64> = values.iter().map(|v| (10.0 * v).round() / 10.0).collect();
         coarse[3990] = 7.0;
         let found = Levels::from_first_values(&coarse, 64);
-        assert!(found.is_quantised() && found.kept.last() == Some(&7.0));
+        assert!(found.is_quantised() && found.values.last() == Some(&7.0));
     }
 }

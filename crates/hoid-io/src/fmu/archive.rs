@@ -27,7 +27,8 @@ struct Platform {
     ending: &'static str,
 }
 
-/// First bytes of a little-endian 64-bit ELF file; each entry of LINUX_PLATFORMS starts with a value of its machine field.
+/// First bytes of a little-endian 64-bit ELF file; each entry of LINUX_PLATFORMS starts with a value of its machine
+/// field.
 const ELF_MAGIC: &[u8] = b"\x7fELF\x02\x01";
 const LINUX_PLATFORMS: [(u16, Platform); 2] = [
     (
@@ -298,7 +299,7 @@ mod tests {
             assert!(refused.contains("cargo xtask ffi"), "{refused}");
         }
         assert!(Library::read(&folder.path().join("nowhere")).is_err());
-        // A library that contains only part of a function name is refused.
+        // A library that contains only part of a function name is rejected.
         for (bytes, ..) in library_headers() {
             let text = String::from_utf8_lossy(EXPORTED_FUNCTIONS[1].as_bytes()).into_owned();
             let place = bytes.windows(text.len()).position(|w| w == text.as_bytes()).unwrap();

@@ -1,5 +1,5 @@
-//! Recordings of the Brain Imaging Data Structure: a table without a header, whose column names and sampling rate are in
-//! a JSON file (BIDS specification, *Physiological recordings* and *Motion*).
+//! Recordings of the Brain Imaging Data Structure: a table without a header, whose column names and sampling rate are
+//! in a JSON file (BIDS specification, *Physiological recordings* and *Motion*).
 //!
 //! By the inheritance principle of the specification, a JSON file with fewer entities, such as
 //! `task-track_physio.json`, in the same directory or in a parent directory, also describes
@@ -90,8 +90,8 @@ fn channels(path: &Path) -> Vec<(String, String)> {
         let text = fs::read_to_string(path.with_file_name(format!("{entities}_channels.tsv"))).ok()?;
         let mut lines = text.lines();
         let header: Vec<&str> = lines.next()?.split('\t').collect();
-        let place = |name: &str| header.iter().position(|column| *column == name);
-        let (name, units) = (place("name")?, place("units"));
+        let index = |name: &str| header.iter().position(|column| *column == name);
+        let (name, units) = (index("name")?, index("units"));
         let channel = |line: &str| {
             let cells: Vec<&str> = line.split('\t').collect();
             let unit = units.and_then(|at| cells.get(at)).filter(|unit| **unit != "n/a");

@@ -26,7 +26,7 @@ pub(super) const MAX_NESTING: usize = 32;
 #[derive(Debug)]
 pub(super) struct Budget {
     remaining: u64,
-    all: u64,
+    limit: u64,
 }
 
 impl Budget {
@@ -37,7 +37,10 @@ impl Budget {
     }
 
     fn with_limit(all: u64) -> Self {
-        Self { remaining: all, all }
+        Self {
+            remaining: all,
+            limit: all,
+        }
     }
 
     /// Reserves memory before it is filled; an error if the limit is exceeded.
@@ -49,7 +52,7 @@ impl Budget {
             }
             None => Err(IoError::Unsupported {
                 file: file.to_owned(),
-                found: format!("it unpacks to more than {} MB", self.all >> 20),
+                found: format!("it unpacks to more than {} MB", self.limit >> 20),
                 remedy: "write it without compression, or in parts; if this size is intended, set HOID_MAX_UNPACKED_MB \
                          in the environment to the number of MB allowed",
             }),

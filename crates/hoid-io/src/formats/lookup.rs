@@ -7,7 +7,7 @@ use std::path::Path;
 use flate2::read::MultiGzDecoder;
 
 use super::format::{Format, FormatWriter, with_time_and_selection};
-use super::{FORMATS, bids, csv, packed};
+use super::{FORMATS, bids, csv, gzip};
 use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::Table;
@@ -125,7 +125,7 @@ fn unreadable_format_error(path: &Path) -> IoError {
 /// format and the file starts with a table. Many programs write text files with the extension `.dat` or `.log`, or
 /// without an extension.
 fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
-    let inner = packed::path_without_gz(path);
+    let inner = gzip::path_without_gz(path);
     match format_of(inner.as_deref().unwrap_or(path)) {
         // Binary formats compress their columns themselves.
         Some(format) if inner.is_none() || format.name == csv::CSV.name => Ok(format),
@@ -189,7 +189,7 @@ pub(crate) fn read_with_format(path: &Path) -> Result<(&'static Format, Vec<u8>)
         return Err(IoError::Directory { file });
     }
     let format = format_to_read(path)?;
-    let inner = packed::path_without_gz(path);
+    let inner = gzip::path_without_gz(path);
     let read = |path| {
         fs::read(path).map_err(|source| IoError::Unreadable {
             file: file.clone(),
@@ -198,7 +198,7 @@ pub(crate) fn read_with_format(path: &Path) -> Result<(&'static Format, Vec<u8>)
     };
     let mut bytes = match (&inner, format.name == csv::CSV.name) {
         (Some(_), _) => {
-            let bytes = packed::decompress(&read(path)?, &file)?;
+            let bytes = gzip::decompress(&read(path)?, &file)?;
             csv::LineLimit::default().add(&bytes, &file)?;
             bytes
         }
@@ -221,7 +221,7 @@ pub(crate) fn read_long_text<'a>(
     file: &'a str,
     options: &ReadOptions,
 ) -> Result<Option<(&'static Format, Table<'a>)>, IoError> {
-    let is_text = |format: &&Format| packed::path_without_gz(path).is_none() && format.name == csv::CSV.name;
+    let is_text = |format: &&Format| gzip::path_without_gz(path).is_none() && format.name == csv::CSV.name;
     let Some(format) = format_to_read(path).ok().filter(is_text) else {
         return Ok(None);
     };

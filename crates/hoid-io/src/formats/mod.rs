@@ -11,31 +11,31 @@
 //! | `npz` | NPZ and NPY of numpy |
 //! | `mat` | variables of MATLAB, HDF5 |
 //! | `xdf` | streams of the Lab Streaming Layer |
-//! | `packed` | text compressed by gzip |
+//! | `gzip` | text compressed by gzip |
 //! | `bids` | tables of BIDS without a header |
 //! | `arrays` | files of named arrays: paths, and selection of columns |
 //! | `budget` | limit of the memory that a file may take |
-//! | `guarded` | conversion of panics in third-party readers to errors |
+//! | `panic_isolation` | conversion of panics in third-party readers to errors |
 
 pub(crate) mod arrays;
 mod bids;
 mod budget;
 mod csv;
 mod format;
-mod guarded;
+mod gzip;
 mod lookup;
 mod mat;
 mod npz;
-mod packed;
+mod panic_isolation;
 mod parquet;
 mod xdf;
 
 pub(crate) use budget::SettingsFormat;
 pub(crate) use csv::write_record as write_record_as_csv;
 pub(crate) use format::{ColumnsWriter, Format, FormatReader, FormatWriter, RowWriter};
+pub(crate) use gzip::path_without_gz;
 pub(crate) use lookup::{format_to_write, read_long_text, read_with_format, table_of_file};
 pub use lookup::{readable_extensions, writable_extensions};
-pub(crate) use packed::path_without_gz;
 
 /// All formats, in the order in which messages list them. No two formats share an extension.
 const FORMATS: &[&Format] = &[

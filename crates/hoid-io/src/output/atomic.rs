@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use super::part_file::Part;
+use super::part_file::TemporaryFile;
 use crate::IoError;
 
 /// Writes a file with the function `write`. An existing file is replaced only after all data have been written to the
@@ -49,8 +49,8 @@ pub(crate) struct WholeFile {
 }
 
 struct PartFile {
-    part: Part,
-    place: PathBuf,
+    part: TemporaryFile,
+    path: PathBuf,
     permissions: Option<fs::Permissions>,
 }
 
@@ -58,16 +58,16 @@ impl WholeFile {
     pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
         let name = path.display().to_string();
         // If the path is a symbolic link, the link is kept, and the file to which it points is replaced.
-        let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
-        let known = fs::metadata(&place).ok();
+        let location = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let known = fs::metadata(&location).ok();
         let opened = match known {
             Some(known) if known.is_dir() => return Err(IoError::Directory { file: name }),
             Some(known) if !known.is_file() => {
-                let direct = fs::OpenOptions::new().write(true).open(&place);
+                let direct = fs::OpenOptions::new().write(true).open(&location);
                 direct.map(|file| (file, None))
             }
             known => {
-                create_part(place, known.map(|k| k.permissions())).map(|(file, part_file)| (file, Some(part_file)))
+                create_part(location, known.map(|k| k.permissions())).map(|(file, part_file)| (file, Some(part_file)))
             }
         };
         match opened {
@@ -106,28 +106,28 @@ impl WholeFile {
 impl PartFile {
     fn persist(self, file: fs::File) -> io::Result<()> {
         file.sync_all()?;
-        self.part.persist(file, &self.place, self.permissions)
+        self.part.persist(file, &self.path, self.permissions)
     }
 }
 
-fn create_part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, PartFile)> {
-    let (file, part) = Part::create_in(&directory_of(&place)?)?;
+fn create_part(location: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, PartFile)> {
+    let (file, part) = TemporaryFile::create_in(&directory_of(&location)?)?;
     Ok((
         file,
         PartFile {
             part,
-            place,
+            path: location,
             permissions,
         },
     ))
 }
 
 /// Returns the directory of a file that will be written.
-pub(super) fn directory_of(place: &Path) -> io::Result<PathBuf> {
-    if place.file_name().is_none() {
+pub(super) fn directory_of(location: &Path) -> io::Result<PathBuf> {
+    if location.file_name().is_none() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
     }
-    Ok(match place.parent() {
+    Ok(match location.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
         _ => PathBuf::from("."),
     })

@@ -24,12 +24,12 @@ const MAX_ATTEMPTS: usize = 16;
 /// Temporary files of this process, and the directories that this process has cleaned.
 struct PartFiles {
     parts: BTreeSet<PathBuf>,
-    swept: BTreeSet<PathBuf>,
+    cleaned_directories: BTreeSet<PathBuf>,
 }
 
 static KNOWN: Mutex<PartFiles> = Mutex::new(PartFiles {
     parts: BTreeSet::new(),
-    swept: BTreeSet::new(),
+    cleaned_directories: BTreeSet::new(),
 });
 
 fn lock_part_files() -> MutexGuard<'static, PartFiles> {
@@ -47,11 +47,11 @@ pub fn remove_unfinished_files() {
 }
 
 /// A temporary file, which is removed when this value is dropped.
-pub(super) struct Part {
+pub(super) struct TemporaryFile {
     path: Option<TempPath>,
 }
 
-impl Part {
+impl TemporaryFile {
     /// Creates a locked temporary file in a directory. The first time, the temporary files of processes that have ended
     /// are removed from the directory.
     pub(super) fn create_in(directory: &Path) -> io::Result<(File, Self)> {
@@ -70,20 +70,25 @@ impl Part {
     }
 
     /// Renames the temporary file to its final path.
-    pub(super) fn persist(mut self, file: File, place: &Path, permissions: Option<fs::Permissions>) -> io::Result<()> {
+    pub(super) fn persist(
+        mut self,
+        file: File,
+        location: &Path,
+        permissions: Option<fs::Permissions>,
+    ) -> io::Result<()> {
         let Some(path) = self.path.take() else {
             return Err(io::Error::other("the file was already moved to its final path"));
         };
         let name = path.to_path_buf();
         let part = NamedTempFile::from_parts(file, path);
         let set = permissions.map_or(Ok(()), |permissions| fs::set_permissions(part.path(), permissions));
-        let persisted = set.and_then(|()| part.persist(place).map(drop).map_err(|error| error.error));
+        let persisted = set.and_then(|()| part.persist(location).map(drop).map_err(|error| error.error));
         lock_part_files().parts.remove(&name);
         persisted
     }
 }
 
-impl Drop for Part {
+impl Drop for TemporaryFile {
     fn drop(&mut self) {
         if let Some(path) = &self.path {
             lock_part_files().parts.remove(&path.to_path_buf());
@@ -114,10 +119,11 @@ fn without_path(error: io::Error) -> io::Error {
     }
 }
 
-/// Removes temporary files that processes left in a directory when they ended, the first time this process writes to it.
+/// Removes temporary files that processes left in a directory when they ended, the first time this process writes to
+/// it.
 fn sweep_once(directory: &Path) {
     let directory = fs::canonicalize(directory).unwrap_or_else(|_| directory.to_owned());
-    if lock_part_files().swept.insert(directory.clone()) {
+    if lock_part_files().cleaned_directories.insert(directory.clone()) {
         sweep(&directory);
     }
 }
@@ -151,7 +157,7 @@ mod tests {
     fn stale_parts_are_removed_and_locked_parts_kept() {
         let dir = tempfile::tempdir().unwrap();
         let path = |name: &str| dir.path().join(name);
-        let (file, living) = Part::create_in(dir.path()).unwrap();
+        let (file, living) = TemporaryFile::create_in(dir.path()).unwrap();
         // No process holds the lock of these temporary files, as after kill -9.
         fs::write(path(".hoid-dead01.part"), "half").unwrap();
         for other in [".hoid-notes", "hoid-a.part", ".part"] {
@@ -169,7 +175,7 @@ mod tests {
     #[test]
     fn errors_do_not_name_the_temporary_file() {
         let dir = tempfile::tempdir().unwrap();
-        let error = Part::create_in(&dir.path().join("none")).err().unwrap();
+        let error = TemporaryFile::create_in(&dir.path().join("none")).err().unwrap();
         assert_eq!(error.kind(), io::ErrorKind::NotFound);
         assert!(!error.to_string().contains(PREFIX), "{error}");
     }
@@ -177,7 +183,7 @@ mod tests {
     #[test]
     fn parts_are_registered_and_removed() {
         let dir = tempfile::tempdir().unwrap();
-        let (_file, part) = Part::create_in(dir.path()).unwrap();
+        let (_file, part) = TemporaryFile::create_in(dir.path()).unwrap();
         // Only the file in this directory is examined: other tests have temporary files in progress.
         let own = part.path.as_ref().unwrap().to_path_buf();
         assert!(lock_part_files().parts.contains(&own) && own.exists());

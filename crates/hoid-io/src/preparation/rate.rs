@@ -86,7 +86,7 @@ impl RecordParts {
             parts.error(
                 step,
                 format!(
-                    "{length} samples for a filter that extends {} samples to each side",
+                    "{length} samples, but the filter extends {} samples to each side",
                     Kernel::for_resampling((1.0 / factor).min(1.0), usize::MAX)
                         .map_or_else(|| "too many".to_owned(), |kernel| kernel.samples_per_side().to_string())
                 ),

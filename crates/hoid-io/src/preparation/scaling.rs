@@ -72,7 +72,7 @@ impl Scaling {
     ///
     /// # Errors
     /// [`IoError::Scaling`] unless the factor is finite and not 0.
-    pub fn by(factor: f64, unit: Option<&str>) -> Result<Self, IoError> {
+    pub fn from_factor(factor: f64, unit: Option<&str>) -> Result<Self, IoError> {
         if factor == 0.0 || !factor.is_finite() {
             return Err(scaling_error(
                 &factor.to_string(),
@@ -114,7 +114,7 @@ impl FromStr for Scaling {
             if right == Some("") {
                 return Err(scaling_error(text, "a unit after the colon, such as 12.5:deg"));
             }
-            return Self::by(factor, right).map_err(|_| {
+            return Self::from_factor(factor, right).map_err(|_| {
                 scaling_error(
                     text,
                     "a finite nonzero factor, since a channel times 0 carries no information",

@@ -104,14 +104,14 @@ fn scaling_changes_values_and_units() {
         let message = bad.parse::<Scaling>().unwrap_err().to_string();
         assert!(message.contains("expected"), "{bad}: {message}");
     }
-    let unknown = scaling_preparation("q", Scaling::by(2.0, None).unwrap());
+    let unknown = scaling_preparation("q", Scaling::from_factor(2.0, None).unwrap());
     assert_eq!(
         message(&unknown, 5),
         "run: scale: there is no channel \"q\", expected one of r-y, stick, or e for the input and u for the output"
     );
     let twice = preparation_with(|p| {
         for name in ["e", "r-y"] {
-            p.scale.insert(name.into(), Scaling::by(2.0, None).unwrap());
+            p.scale.insert(name.into(), Scaling::from_factor(2.0, None).unwrap());
         }
     });
     assert!(message(&twice, 5).contains("named twice"));
@@ -245,7 +245,7 @@ fn invalid_preparations_are_errors() {
     let rate = |rate| preparation_with(|p| p.rate = rate);
     for (preparation, n, words) in [
         (rate(NewRate::Decimated(0)), 10, "found a factor of 0"),
-        (rate(NewRate::Decimated(4)), 1, "found 1 samples for a filter"),
+        (rate(NewRate::Decimated(4)), 1, "found 1 samples, but the filter"),
         (rate(NewRate::Decimated(4)), 50, "a longer record"),
         (rate(NewRate::Decimated(usize::MAX)), 200, "a longer record"),
         (rate(NewRate::Hz(f64::NAN)), 200, "new-fs: NaN Hz, expected a positive"),
@@ -281,7 +281,7 @@ fn invalid_preparations_are_errors() {
     }
     assert_eq!(" 0.02s".parse::<Offset>().unwrap(), Offset::Seconds(0.02));
     // A factor that makes values overflow is reported as an error of the record.
-    let large = scaling_preparation("u", Scaling::by(1e300, None).unwrap());
+    let large = scaling_preparation("u", Scaling::from_factor(1e300, None).unwrap());
     assert!(
         large
             .apply(record(5, signal, |_| 1e300))
@@ -342,7 +342,7 @@ fn arbitrary_preparations_do_not_cause_a_panic() {
                 };
                 p.offset.insert(name, offset);
             }
-            if let Ok(scaling) = Scaling::by(any.number(), None) {
+            if let Ok(scaling) = Scaling::from_factor(any.number(), None) {
                 p.scale
                     .insert(names[any.next() as usize % names.len()].to_owned(), scaling);
             }

@@ -54,11 +54,11 @@ pub fn read_aligned(
             return Ok(ReadRecord { record, steps, ..read });
         }
     }
-    let read = read.prepared(preparation)?;
+    let read = read.prepare(preparation)?;
     if late_samples == 0.0 {
         Ok(read)
     } else {
-        read.prepared(&late)
+        read.prepare(&late)
     }
 }
 

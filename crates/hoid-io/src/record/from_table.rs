@@ -38,7 +38,7 @@ pub(super) fn record_of(
     let output = resolve(&options.output)?;
     if input == Some(output) {
         let asked = options.output.to_string();
-        return Err(IoError::SameColumn { file, asked });
+        return Err(IoError::SameColumn { file, requested: asked });
     }
     let time = names.iter().position(|name| *name == "t");
     if time.is_none() && options.sampling_hz.is_none() {
@@ -73,7 +73,7 @@ pub(super) fn record_of(
 
 impl ReadRecord {
     /// Prepares the record, and appends the preparation steps to those applied in reading.
-    pub(super) fn prepared(mut self, preparation: &Preparation) -> Result<Self, IoError> {
+    pub(super) fn prepare(mut self, preparation: &Preparation) -> Result<Self, IoError> {
         let (record, steps) = preparation.apply(self.record)?;
         self.steps.extend(steps);
         Ok(Self { record, ..self })

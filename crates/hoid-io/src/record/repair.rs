@@ -100,8 +100,8 @@ fn next_missing_run(values: &[f64], from: usize) -> Option<Range<usize>> {
 }
 
 /// Interpolates the points `(t, value)`, where t increases, at the times `start + k step`, k = 0 .. n - 1: linearly, or
-/// with the value of the last point if the signal is held. A held signal changes [`ROUNDING_FRACTION`] of a step before each
-/// point, to allow for rounding.
+/// with the value of the last point if the signal is held. A held signal changes [`ROUNDING_FRACTION`] of a step before
+/// each point, to allow for rounding.
 pub(super) fn resample(t: &[f64], values: &[f64], (start, step): (f64, f64), n: usize, is_held: bool) -> Vec<f64> {
     let early = if is_held { ROUNDING_FRACTION * step } else { 0.0 };
     let mut lines = pairs(t).zip(pairs(values));

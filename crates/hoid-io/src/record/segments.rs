@@ -37,11 +37,11 @@ pub fn read_segments(
 ) -> Result<Vec<ReadRecord>, IoError> {
     let read = read_trial(path, options, preparation, mask, shortest_s);
     let (by, trials) = match read {
-        Err(IoError::SeveralTrials { by, trials, .. })
-            if !options.trial.as_ref().is_some_and(TrialChoice::selects_one_trial) =>
-        {
-            (by, trials)
-        }
+        Err(IoError::SeveralTrials {
+            trial_column: by,
+            trials,
+            ..
+        }) if !options.trial.as_ref().is_some_and(TrialChoice::selects_one_trial) => (by, trials),
         read => return read,
     };
     let mut all = Vec::new();
@@ -141,7 +141,7 @@ fn read_trial(
             ..options.clone()
         };
         // The rows next to a segment are excluded faults; an offset therefore does not use rows beyond the segment.
-        let read = read_as_recorded(path, &span, preparation.drop_repeated)?.prepared(preparation)?;
+        let read = read_as_recorded(path, &span, preparation.drop_repeated)?.prepare(preparation)?;
         let to_s = to.unwrap_or(last);
         let mut steps = vec![Step::Mask {
             what: mask.iter().map(|kind| kind.name()).collect(),
@@ -181,7 +181,7 @@ fn ranges_between_faults(issues: &[QualityIssue], mask: &[QualityIssueKind], row
     let mut out = vec![false; rows.len()];
     let mut cut = out.clone();
     for found in issues.iter().filter(|found| mask.contains(&found.kind)) {
-        for place in &found.places {
+        for place in &found.row_spans {
             // Rows of a location are counted from 1.
             let first = place.row.saturating_sub(1).saturating_sub(rows.start);
             if found.kind == QualityIssueKind::Gap {

@@ -11,7 +11,7 @@
 //! On average, a held value is late by half the time between logged values. Rows before the first logged value and
 //! after the last one are cut. All values are computed before the rows and the span are cut, so a row at the start of a
 //! span takes the value logged before the span. Text and infinite numbers do not count as missing values: they remain,
-//! and reading refuses them.
+//! and reading rejects them.
 
 use std::ops::Range;
 
@@ -44,9 +44,9 @@ pub(super) fn close_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> Res
         let Some(sparse) = table.columns.get_mut(column) else {
             continue;
         };
-        let gaps = Gaps::of(sparse);
+        let gaps = ColumnCoverage::of(sparse);
         let name = format_name(&sparse.name);
-        let Some(own) = gaps.own.clone() else {
+        let Some(own) = gaps.value_range.clone() else {
             let found = format!("column {name} has no value in {} rows", table.rows);
             return Err(sparse_error(
                 &table,
@@ -81,13 +81,13 @@ pub(super) fn close_gaps<'a>(mut table: Table<'a>, options: &ReadOptions) -> Res
         return Err(sparse_error(&table, found, "columns that were logged at the same time"));
     }
     if rows.len() < table.rows {
-        note_cut(&mut table, &bounds);
+        report_cut(&mut table, &bounds);
         table = keep_rows(table, rows);
     }
     Ok((table, steps))
 }
 
-fn note_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
+fn report_cut(table: &mut Table<'_>, bounds: &Range<usize>) {
     let (before, after) = (bounds.start, table.rows.saturating_sub(bounds.end));
     if (before, after) != (0, 0) {
         table.notes.push(format!(
@@ -162,28 +162,28 @@ fn at(values: &[f64], row: usize) -> f64 {
 }
 
 /// Rows of a column with and without a value.
-struct Gaps {
+struct ColumnCoverage {
     /// Range from the first to the last row with a value; `None` if no row has a value.
-    own: Option<Range<usize>>,
+    value_range: Option<Range<usize>>,
     /// Rows without a value.
     missing: Vec<usize>,
 }
 
-impl Gaps {
+impl ColumnCoverage {
     fn of(column: &Column) -> Self {
         let is_missing = |row: &usize| column.is_missing(*row);
         let rows = 0..column.values.len();
         let first = rows.clone().find(|row| !is_missing(row));
         let last = rows.clone().rev().find(|row| !is_missing(row));
         Self {
-            own: first.zip(last).map(|(first, last)| first..last.saturating_add(1)),
+            value_range: first.zip(last).map(|(first, last)| first..last.saturating_add(1)),
             missing: rows.filter(is_missing).collect(),
         }
     }
 
     /// Returns the runs of missing rows that have a value on both sides, each with the row before the run.
     fn runs(&self) -> Vec<(usize, Range<usize>)> {
-        let own = self.own.clone().unwrap_or_default();
+        let own = self.value_range.clone().unwrap_or_default();
         let mut runs: Vec<(usize, Range<usize>)> = Vec::new();
         for row in self.missing.iter().copied().filter(|row| own.contains(row)) {
             let end = row.saturating_add(1);
@@ -198,7 +198,7 @@ impl Gaps {
     fn step(&self, name: &str, how: SparseTreatment, x: &[f64]) -> Step {
         let runs = self.runs();
         let inside: usize = runs.iter().map(|(_, run)| run.len()).sum();
-        let own = self.own.as_ref().map_or(0, Range::len);
+        let own = self.value_range.as_ref().map_or(0, Range::len);
         let since = |before: usize, row: usize| at(x, row) - at(x, before);
         let span = |(before, run): &(usize, Range<usize>)| since(*before, run.end);
         let ages = (runs.iter()).flat_map(|(before, run)| run.clone().map(move |row| since(*before, row)));
@@ -255,7 +255,7 @@ mod tests {
             (SparseTreatment::Linear, [1.0, 2.0, 5.0, 6.0, 11.0]),
         ] {
             let mut e = column(&[1.0, MISSING, MISSING, 6.0, MISSING, 12.0]);
-            Gaps::of(&e).fill(&mut e, how, &x);
+            ColumnCoverage::of(&e).fill(&mut e, how, &x);
             for (found, expected) in e.values.iter().zip(expected) {
                 assert!((found - expected).abs() < 1e-14, "{how}: {:?}", e.values);
             }
@@ -266,7 +266,7 @@ mod tests {
         }
         // The times are constant.
         let mut e = column(&[1.0, MISSING, 2.0]);
-        Gaps::of(&e).fill(&mut e, SparseTreatment::Linear, &[0.0; 3]);
+        ColumnCoverage::of(&e).fill(&mut e, SparseTreatment::Linear, &[0.0; 3]);
         assert_eq!(e.values, [1.0, 1.0, 2.0]);
     }
 }

@@ -132,7 +132,7 @@ impl TableReader<'_> {
             };
             IoError::NothingToBridgeTo {
                 file: self.file.clone(),
-                place: self.table.source.place(row),
+                location: self.table.source.location(row),
                 column: format_name(&source.name),
                 end,
             }

@@ -74,7 +74,7 @@ impl TableReader<'_> {
                 }
             }
             (Some(_), _) => {
-                let place = self.table.source.place(0);
+                let place = self.table.source.location(0);
                 self.table.notes.push(format!(
                     "t is not a number in {place}: the time of the first sample is taken as 0 s"
                 ));
@@ -185,13 +185,13 @@ impl TableReader<'_> {
 
     fn sampling_error(&self, uneven: SamplingFault, rows: &Range<usize>, t: &[f64]) -> IoError {
         let file = self.file.clone();
-        let place = |row: usize| self.table.source.place(rows.start.saturating_add(row));
+        let place = |row: usize| self.table.source.location(rows.start.saturating_add(row));
         let at = |row: usize| t.get(row).copied().unwrap_or(f64::NAN);
         match uneven {
             SamplingFault::TooFew => IoError::TooFewSamples { file, found: t.len() },
             SamplingFault::NotIncreasing { row } => IoError::NotIncreasing {
                 file,
-                place: place(row),
+                location: place(row),
                 found: at(row),
                 previous: at(row.saturating_sub(1)),
                 remedy: backward_remedy(t, row),
@@ -202,7 +202,7 @@ impl TableReader<'_> {
                 sample_time_s,
             } => IoError::WrongTime {
                 file,
-                place: place(row),
+                location: place(row),
                 found: at(row),
                 expected_s: format_decimal(expected_s),
                 hz: 1.0 / sample_time_s,
@@ -214,7 +214,7 @@ impl TableReader<'_> {
                 sample_time_s,
             } => IoError::Gap {
                 file,
-                place: place(row),
+                location: place(row),
                 after_s: at(row),
                 next_s: at(row.saturating_add(1)),
                 missing,
@@ -228,7 +228,7 @@ impl TableReader<'_> {
                 sample_time_s,
             } => IoError::Jitter {
                 file,
-                place: place(row),
+                location: place(row),
                 found: at(row),
                 deviation_s,
                 tolerance_s,

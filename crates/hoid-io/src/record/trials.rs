@@ -40,7 +40,7 @@ pub(crate) fn select_trial<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -
             None => {
                 return Err(IoError::NoSuchTrial {
                     file: file(),
-                    asked: format!("{by}={value}"),
+                    requested: format!("{by}={value}"),
                     available: list_names(&names),
                 });
             }
@@ -57,7 +57,7 @@ pub(crate) fn select_trial<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -
 fn several_trials_error(file: String, by: &str, names: Vec<&str>) -> IoError {
     IoError::SeveralTrials {
         file,
-        by: by.to_owned(),
+        trial_column: by.to_owned(),
         trials: names.into_iter().map(str::to_owned).collect(),
     }
 }
@@ -104,8 +104,8 @@ fn split_by(table: &Table<'_>, choice: &TrialChoice) -> Result<NamedRanges, IoEr
         return Err(IoError::NoSuchColumn {
             file: table.source.file().to_owned(),
             missing: format!("\"{}\"", choice.column),
-            meant: did_you_mean(&[&choice.column], &names).into_boxed_str(),
-            asked: choice.to_string(),
+            suggestion: did_you_mean(&[&choice.column], &names).into_boxed_str(),
+            requested: choice.to_string(),
             available: list_names(&names),
             option: ColumnOption::Trial,
         });
@@ -213,7 +213,7 @@ pub(crate) fn select_trial_in_contents(
         Some(value) => {
             return Err(IoError::NoSuchTrial {
                 file: file.to_owned(),
-                asked: abbreviate(&format!("{array}={value}")),
+                requested: abbreviate(&format!("{array}={value}")),
                 available: list_names(&numbers),
             });
         }

@@ -3,8 +3,8 @@
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
     family_scenario::{
-        Excitation, Feedforward, Followed, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart, RemnantShape,
-        SignalDependence, Stick,
+        DependenceSignal, Excitation, Feedforward, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart,
+        RemnantShape, SignalDependence, Stick,
     },
     forcing::{ForcingFunction, Sinusoid},
     operator_family::Coordinate,
@@ -126,7 +126,7 @@ impl Source<'_> {
         table: &str,
         given: &FamilyStateTable,
     ) -> Result<FamilyOperator, ScenarioFileError> {
-        for (key, value) in given.numbers() {
+        for (key, value) in given.values() {
             // A lag with an infinite time constant is an integrator.
             if let Some(value) = value.filter(|value| !(key == "T_I_s" && value.is_infinite())) {
                 self.check(&format!("{table}.{key}"), value, limits_of(key))?;
@@ -182,7 +182,7 @@ impl Source<'_> {
             coordinates.push(value);
         }
         if let Some(key) = given
-            .numbers()
+            .values()
             .iter()
             .find(|(key, value)| value.is_some() && !used.contains(key))
         {
@@ -448,15 +448,15 @@ impl Source<'_> {
             shape,
             strength,
             signal_dependence: given.follows.map(|follows| SignalDependence {
-                follows: match follows {
-                    FollowsKey::Control => Followed::Control,
-                    FollowsKey::Rate => Followed::Rate,
+                signal: match follows {
+                    FollowsKey::Control => DependenceSignal::Control,
+                    FollowsKey::Rate => DependenceSignal::Rate,
                 },
-                part: given.follows_part.unwrap_or(1.0),
+                share: given.follows_part.unwrap_or(1.0),
                 memory_s: given.follows_memory_s.unwrap_or(1.0),
             }),
             pulses: given.pulses_per_s.map(|rate_per_s| Pulses {
-                part: given.pulses_part.unwrap_or(1.0),
+                share: given.pulses_part.unwrap_or(1.0),
                 rate_per_s,
             }),
             intermittence: given
@@ -478,7 +478,7 @@ fn limits_of(key: &str) -> Limits {
 }
 
 impl FamilyStateTable {
-    fn numbers(&self) -> [(&'static str, Option<f64>); 14] {
+    fn values(&self) -> [(&'static str, Option<f64>); 14] {
         [
             ("K", self.k),
             ("K_over_T_I", self.k_over_t_i),

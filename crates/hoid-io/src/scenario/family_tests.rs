@@ -1,6 +1,6 @@
 use hoid_model::{
     FamilyScenario, Form, SampleTime,
-    family_scenario::{Followed, PartStrength, RemnantShape},
+    family_scenario::{DependenceSignal, PartStrength, RemnantShape},
     scenario::Realisation,
     schedule::Schedule,
 };
@@ -43,7 +43,7 @@ fn a_file_with_every_table_is_read() {
         panic!("three parts");
     };
     assert_eq!(band.strength, PartStrength::Share(0.15));
-    assert_eq!(band.signal_dependence.unwrap().follows, Followed::Rate);
+    assert_eq!(band.signal_dependence.unwrap().signal, DependenceSignal::Rate);
     assert_eq!(band.pulses.unwrap().rate_per_s, 2.0);
     assert_eq!(peak.intermittence.unwrap().off_s, 2.0);
     assert!(matches!(peak.shape, RemnantShape::Resonance { zeta, .. } if zeta == 0.2));

@@ -1,6 +1,6 @@
 //! Contents of a file before any selection: columns, their sampling and ranges, and suspicious values.
 //!
-//! The survey does not judge the file. `data_quality` finds suspicious values in columns that share a time. A constant
+//! The survey does not assess the file. `data_quality` finds suspicious values in columns that share a time. A constant
 //! column is only marked, because many files have legitimate constant columns.
 
 use std::path::Path;

@@ -24,7 +24,7 @@ pub(super) fn columns_of_table(mut table: Table<'_>) -> (Vec<RawColumn>, Vec<Str
     let unusable = unusable_column_notes(&table);
     table.notes.extend(unusable);
     if rows > 1 && table.row_has_no_numbers(0) {
-        let place = table.source.place(0);
+        let place = table.source.location(0);
         table.notes.push(format!("{place}: {UNITS_ROW_REMEDY}"));
     }
     let read = |column: Column| {
@@ -49,7 +49,7 @@ fn decimal_comma_notes(table: &Table<'_>) -> Vec<String> {
         let row = *column.texts.first()?;
         let cell = table.source.cell(row, at);
         has_decimal_comma(&cell).then(|| {
-            let (name, place) = (format_name(&column.name), table.source.place(row));
+            let (name, place) = (format_name(&column.name), table.source.location(row));
             let (count, rows) = (column.texts.len(), table.rows);
             format!("column {name}, {place}: \"{cell}\" is text ({count} of {rows} cells); {DECIMAL_COMMA_REMEDY}")
         })

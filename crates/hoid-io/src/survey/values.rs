@@ -66,7 +66,7 @@ pub(super) fn survey_values(all: &[f64]) -> Option<ValueSurvey> {
         quantum: levels.quantum().map(|(step, _)| step),
         saturated_low: low,
         saturated_high: high,
-        sketch: sketch(all, min, max),
+        sketch: block_plot(all, min, max),
     })
 }
 
@@ -76,7 +76,7 @@ pub(super) fn survey_values(all: &[f64]) -> Option<ValueSurvey> {
     clippy::arithmetic_side_effects,
     reason = "the number of a part is at most 32, and its ends are at most the number of values"
 )]
-fn sketch(all: &[f64], min: f64, max: f64) -> String {
+fn block_plot(all: &[f64], min: f64, max: f64) -> String {
     let parts = SKETCH_CHARS.min(all.len());
     let bar = |part: usize| {
         let values = &all[part * all.len() / parts..(part + 1) * all.len() / parts];

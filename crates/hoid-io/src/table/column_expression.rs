@@ -122,8 +122,8 @@ impl ColumnExpression {
                 Err(IoError::NoSuchColumn {
                     file: file.to_owned(),
                     missing: missing.join(" and no "),
-                    meant: did_you_mean(&unknown, names).into_boxed_str(),
-                    asked: self.text.clone(),
+                    suggestion: did_you_mean(&unknown, names).into_boxed_str(),
+                    requested: self.text.clone(),
                     available: list_names(names),
                     option: ColumnOption::Signals,
                 })

@@ -75,8 +75,8 @@ impl Column {
 pub(crate) trait Source {
     /// Returns the name of the file.
     fn file(&self) -> &str;
-    /// Returns the place of a row in the file: "line 12" or "row 12".
-    fn place(&self, row: usize) -> String;
+    /// Returns the location of a row in the file: "line 12" or "row 12".
+    fn location(&self, row: usize) -> String;
     /// Returns the contents of a cell, shortened to a readable length.
     fn cell(&self, row: usize, column: usize) -> String;
     /// True if the file appears to end in the middle of this row.
@@ -119,7 +119,7 @@ impl Table<'_> {
         let unknown = Column::default();
         let column = self.columns.get(at).unwrap_or(&unknown);
         let file = self.source.file().to_owned();
-        let place = self.source.place(row);
+        let place = self.source.location(row);
         let found = self.source.cell(row, at);
         let is_last_cell = self.columns.len().checked_sub(1) == Some(at);
         let name = format_name(&column.name);
@@ -147,7 +147,7 @@ impl Table<'_> {
             };
             return IoError::NotANumber {
                 file,
-                place,
+                location: place,
                 column: name,
                 found,
                 remedy,
@@ -156,7 +156,7 @@ impl Table<'_> {
         if column.values.get(row).is_some_and(|value| value.is_infinite()) {
             return IoError::Infinite {
                 file,
-                place,
+                location: place,
                 column: name,
                 found,
             };
@@ -167,7 +167,7 @@ impl Table<'_> {
         if column.is_sparse(rows) {
             return IoError::Sparse {
                 file,
-                place,
+                location: place,
                 column: name,
                 found,
                 count,
@@ -176,7 +176,7 @@ impl Table<'_> {
         }
         IoError::Missing {
             file,
-            place,
+            location: place,
             column: name,
             found,
             count,
@@ -224,7 +224,7 @@ pub(crate) fn check_column_count(columns: usize, file: &str) -> Result<(), IoErr
     Err(IoError::TooManyColumns {
         file: file.to_owned(),
         found: columns,
-        most: MAX_COLUMNS,
+        max_columns: MAX_COLUMNS,
     })
 }
 
@@ -275,8 +275,8 @@ impl Source for RowSelection<'_> {
         self.source.file()
     }
 
-    fn place(&self, row: usize) -> String {
-        self.source.place(self.rows.get(row).copied().unwrap_or(row))
+    fn location(&self, row: usize) -> String {
+        self.source.location(self.rows.get(row).copied().unwrap_or(row))
     }
 
     fn cell(&self, row: usize, column: usize) -> String {

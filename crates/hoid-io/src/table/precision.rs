@@ -26,8 +26,8 @@ impl Precision {
     }
 
     /// Determines the precision of times stored as binary numbers. If a recorder rounds its times, for example to
-    /// tenths of a ms, all times are multiples of one unit of the last decimal, which reveals the rounding; with a fixed
-    /// number of significant digits, each time is a multiple of its own unit. A rounded
+    /// tenths of a ms, all times are multiples of one unit of the last decimal, which reveals the rounding; with a
+    /// fixed number of significant digits, each time is a multiple of its own unit. A rounded
     /// number deviates from such a multiple by less than two units of its last binary digit; for the numbers of
     /// decimals tried here, numbers that were not rounded are not so close to a multiple by chance.
     pub(crate) fn from_times(values: &[f64], single: bool) -> Self {
@@ -95,7 +95,7 @@ impl Precision {
     }
 
     /// Returns the precision of the same numbers multiplied by a power of ten.
-    pub(crate) fn shifted(self, power: i32) -> Self {
+    pub(crate) fn scale_by_power_of_ten(self, power: i32) -> Self {
         Self {
             decimals: self.decimals.map(|decimals| decimals.saturating_sub(power)),
             ..self
@@ -103,7 +103,7 @@ impl Precision {
     }
 
     /// Returns the precision limited to a number of decimals, as of binary numbers far from zero.
-    pub(crate) fn limited(self, decimals: i32) -> Self {
+    pub(crate) fn limit_decimals(self, decimals: i32) -> Self {
         Self {
             decimals: Some(self.decimals.map_or(decimals, |own| own.min(decimals))),
             ..self

@@ -17,8 +17,8 @@ impl Source for ColumnSelection<'_> {
         self.source.file()
     }
 
-    fn place(&self, row: usize) -> String {
-        self.source.place(row)
+    fn location(&self, row: usize) -> String {
+        self.source.location(row)
     }
 
     fn cell(&self, row: usize, column: usize) -> String {
@@ -69,8 +69,8 @@ pub(crate) fn check_selected(names: &[&str], options: &ReadOptions, file: &str) 
         Some(missing) => Err(IoError::NoSuchColumn {
             file: file.to_owned(),
             missing: format!("\"{missing}\""),
-            meant: did_you_mean(&[missing], names).into_boxed_str(),
-            asked: kept.join(","),
+            suggestion: did_you_mean(&[missing], names).into_boxed_str(),
+            requested: kept.join(","),
             available: list_names(names),
             option: ColumnOption::Kept,
         }),

@@ -148,7 +148,7 @@ fn parse_duration(cell: &str) -> Option<ClockTime> {
     // Larger numbers of ns are not exact, and may exceed 64 bits.
     (ns.abs() < 9e15).then(|| ClockTime {
         ns: ns as i64,
-        precision: precision.shifted(power),
+        precision: precision.scale_by_power_of_ten(power),
         cycle: None,
     })
 }

@@ -80,7 +80,7 @@ pub(crate) fn even_sampling(t: &[f64], precision: Precision, stated_s: Option<f6
     };
     if let Err(row) = check_increasing(t) {
         let wrong = [Some(row), row.checked_sub(1)].into_iter().flatten();
-        let wrong = wrong.filter_map(|row| wrong_time(t, row, precision)).next();
+        let wrong = wrong.filter_map(|row| find_wrong_time(t, row, precision)).next();
         return Err(wrong.unwrap_or(SamplingFault::NotIncreasing { row }));
     }
     let rounding = Rounding::of(t, precision);
@@ -165,7 +165,7 @@ pub(crate) fn typical_sample_time(t: &[f64], precision: Precision) -> Result<f64
 }
 
 /// Returns the fault of a single time if the times are even with the value that its neighbours suggest in its place.
-fn wrong_time(t: &[f64], row: usize, precision: Precision) -> Option<SamplingFault> {
+fn find_wrong_time(t: &[f64], row: usize, precision: Precision) -> Option<SamplingFault> {
     let at = |row: Option<usize>| row.and_then(|row| t.get(row)).copied();
     let [near, far] = [1, 2].map(|steps| (at(row.checked_sub(steps)), at(row.checked_add(steps))));
     let expected_s = match (near, far) {
@@ -221,7 +221,7 @@ pub(crate) fn median_stride(times: usize) -> usize {
 struct Rounding {
     precision: Precision,
     /// Result of [`Precision::fixed_unit`], which avoids a logarithm for nearly all times.
-    fixed: (f64, f64),
+    fixed_unit: (f64, f64),
     median_step_s: f64,
 }
 
@@ -231,7 +231,7 @@ impl Rounding {
         let middle = steps.len() / 2;
         Self {
             precision,
-            fixed: precision.fixed_unit(),
+            fixed_unit: precision.fixed_unit(),
             median_step_s: *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
         }
     }
@@ -239,7 +239,7 @@ impl Rounding {
     /// Returns one unit of the last digit of t, but at most the median step: with a larger unit t would be constant
     /// over several rows.
     fn unit(self, t: f64) -> f64 {
-        let (limit, fixed) = self.fixed;
+        let (limit, fixed) = self.fixed_unit;
         let unit = if t.abs() < limit { fixed } else { self.precision.unit(t) };
         unit.min(self.median_step_s)
     }

@@ -99,8 +99,8 @@ impl TimeChoice {
         IoError::NoSuchColumn {
             file: file.to_owned(),
             missing: format!("\"{}\"", self.column),
-            meant: did_you_mean(&[&self.column], names).into_boxed_str(),
-            asked: self.to_string(),
+            suggestion: did_you_mean(&[&self.column], names).into_boxed_str(),
+            requested: self.to_string(),
             available: list_names(names),
             option: ColumnOption::Time,
         }

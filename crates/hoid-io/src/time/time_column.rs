@@ -4,11 +4,12 @@
 //! 1. the only column whose name denotes a time, with or without a unit: `Time (s)`, `Zeit [s]`, `time_ns`, `elapsed`,
 //!    `%time`;
 //! 2. the only column with time stamps: dates and clock times as text or as a data type, or numbers counted from 1970
-//!    in a column such as `timestamp` or `header.stamp`, or serial days, or numbers with steps of fractions of a second;
+//!    in a column such as `timestamp` or `header.stamp`, or serial days, or numbers with steps of fractions of a
+//!    second;
 //! 3. whole seconds in one column and nanoseconds in another with the same prefix: `stamp.sec`, `stamp.nanosec`;
 //! 4. the only increasing column with a unit of time, such as `xAxis [s]`;
-//! 5. the first column or the index of pandas if it has no name, or the first row or column of a matrix, if its values increase from row to
-//!    row and are not row numbers.
+//! 5. the first column or the index of pandas if it has no name, or the first row or column of a matrix, if its values
+//!    increase from row to row and are not row numbers.
 //!
 //! A column selected by `--time COLUMN[:unit]` takes precedence. The unit is taken from the name. Without a unit in the
 //! name, the unit follows from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the
@@ -232,8 +233,8 @@ fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
     })
 }
 
-/// Returns the first column if it has no name, the index of pandas if it has no name, or the first row or column of a matrix, if its values increase like a
-/// time.
+/// Returns the first column if it has no name, the index of pandas if it has no name, or the first row or column of a
+/// matrix, if its values increase like a time.
 fn first_time_line(table: &Table<'_>) -> Option<usize> {
     let is_first = |at: usize, column: &Column| {
         let line = ["(1,:)", "(:,1)", "[0,:]", "[:,0]", "[0]"];
@@ -371,10 +372,10 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             // time.
             let is_date = unit == Unit::Days && is_serial_days(&time.values);
             scale(time, unit_s, if is_date { first } else { 0.0 }, false);
-            time.precision = time.precision.shifted(power);
+            time.precision = time.precision.scale_by_power_of_ten(power);
             if is_date {
                 let digit_s = first.abs() * f64::EPSILON * unit_s;
-                time.precision = time.precision.limited((-digit_s.log10()).floor() as i32);
+                time.precision = time.precision.limit_decimals((-digit_s.log10()).floor() as i32);
             }
             let taken = match (was_t, is_date) {
                 (true, _) => "is in s from its first time stamp",
@@ -388,7 +389,7 @@ fn convert_to_time(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             let parts = 10_f64.powi(power.saturating_neg());
             let from_first = first / parts >= MIN_STAMP;
             scale(time, parts, if from_first { first } else { 0.0 }, true);
-            time.precision = time.precision.shifted(power);
+            time.precision = time.precision.scale_by_power_of_ten(power);
             let origin = if from_first { " from its first time stamp" } else { "" };
             let taken = if was_t { "" } else { "taken as t, " };
             format!("{name} is {taken}in s{origin}, from {unit}")

@@ -1,5 +1,5 @@
-// The page without a program behind it: opened as a file, tracked by a person who is a program, the run saved and
-// given to hoid. Usage: node alone.mjs PROGRAM PAGE. With HOID_LAB_PICTURES=DIR its screens are drawn.
+// The page without the program hoid: it is opened as a file, a simulated person tracks, and hoid reads the saved
+// run. Usage: node alone.mjs PROGRAM PAGE. With HOID_LAB_PICTURES=DIR its screens are drawn.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, rmSync } from "node:fs";
@@ -43,7 +43,7 @@ try {
   await page.getByRole("button", { name: "Done" }).click();
   await heading(/^Run 1 of 1/);
 
-  // A run that is ended early is made again.
+  // A run that ended early is repeated.
   await page.locator("#start").click();
   await page.locator("canvas.task").waitFor();
   await page.evaluate(operator, { injected: true, until: 5000 });
@@ -70,7 +70,7 @@ try {
   assert.deepEqual(faults, [], "the page said something to its console");
   assert.deepEqual(asked.filter((url) => !url.startsWith("file:") && !url.startsWith("blob:")), [], "the page asked somebody");
 
-  // hoid finds of the saved run what the page has shown.
+  // For the saved run hoid reports the values that the page has shown.
   const out = join(folder, "trace.csv");
   execFileSync(program, ["track", saved, "--controlled-element", "4/s", "--out", out], { stdio: ["ignore", "ignore", "inherit"] });
   const rows = readFileSync(out, "utf8").trim().split("\n").filter((line) => !line.startsWith("#")).map((line) => line.split(","));

@@ -1,5 +1,5 @@
-// The page's engine without a browser: runs that are asked for as lines of JSON, answered likewise.
-// Tables come of a generator that Rust has too (tests/common/page.rs); times are injected.
+// The engine of the page without a browser: runs are requested and answered as lines of JSON. The tables come
+// from a generator that also exists in Rust (tests/common/page.rs); the times are injected.
 import { createHash } from "node:crypto";
 import { createInterface } from "node:readline";
 import { Operator, Run } from "../dist/engine.mjs";
@@ -17,7 +17,7 @@ const numbers = (base64) => {
   return new Float64Array(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.length));
 };
 
-/** Random tables, events and frames; what came out as a hash. */
+/** Random tables, events and frames; the result as a hash. */
 function arithmetic({ phases, ticks, map, seed }) {
   const random = generator(seed);
   const table = (size) => Float64Array.from({ length: ticks }, () => size * random());
@@ -41,7 +41,7 @@ function arithmetic({ phases, ticks, map, seed }) {
   return { sha256: hash.digest("hex"), events: all.events };
 }
 
-/** A loop with a simulated operator who sees each tick; its signals. */
+/** Signals of a loop with a simulated operator that sees each tick. */
 function loop({ phases, ticks, map, target, operator, noise }) {
   const run = new Run({ run_in: 0, ticks, phases, target: numbers(target), disturbance: new Float64Array(ticks) }, map);
   const person = new Operator(operator, numbers(noise), map);

@@ -1,11 +1,10 @@
-// A long session in real time: the memory of page and server, frames that were missed, runs that were
-// verified. A person who is a program tracks run behind run while a second window looks on.
-// Usage: node hour.mjs PROGRAM [MINUTES]; PROGRAM is hoid with the feature lab. Tells a table in Markdown.
+// A long session in real time: memory of page and server, missed frames, verified runs. A simulated person
+// tracks one run after the other while a second window is open.
+// Usage: node hour.mjs PROGRAM [MINUTES]; PROGRAM is hoid with the feature lab. Prints a table in Markdown.
 //
-// Each half minute: the resident memory of the server, and the JavaScript heap of both windows as it
-// stands. Behind each run, when nothing is measured: the heap of the window that tracks once its garbage is
-// collected, which is what a leak would raise. A slope is that of a line through the samples behind the
-// first run, by least squares.
+// Every half minute: the resident memory of the server and the JavaScript heap of both windows. After each run,
+// outside the measurement: the heap of the tracking window after garbage collection, which a leak would
+// increase. The slopes are those of least-squares lines through the samples after the first run.
 import assert from "node:assert/strict";
 import { mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { cpus, tmpdir } from "node:os";
@@ -18,7 +17,7 @@ const minutes = Number(asked);
 assert.ok(minutes > 0, `found ${asked} minutes, expected a number above zero`);
 const path = browserOrEnd();
 
-// Runs of 90 s as people make them, shorter ones where the whole is short; one more than there is time for.
+// Runs of 90 s, shorter if the session is short; one more run than the time allows.
 const measurement = minutes < 5 ? 12 : 80;
 const runIn = minutes < 5 ? 3 : 10;
 const runs = Math.ceil((60 * minutes) / (measurement + runIn)) + 1;
@@ -43,7 +42,7 @@ const MB = 1e6;
 const began = performance.now();
 const at = () => (performance.now() - began) / 60_000;
 
-/** Resident memory of a process in MB; where there is no /proc, nothing. */
+/** Resident memory of a process in MB; undefined without /proc. */
 function resident(pid) {
   try {
     const line = /VmRSS:\s+(\d+) kB/.exec(readFileSync(`/proc/${pid}/status`, "utf8"));
@@ -53,7 +52,7 @@ function resident(pid) {
   }
 }
 
-/** The slope of a quantity over time, a hour, with its standard error. */
+/** The slope of a quantity per hour, with its standard error. */
 function slope(samples) {
   const known = samples.filter(([, value]) => Number.isFinite(value));
   const n = known.length;
@@ -102,7 +101,7 @@ try {
     await page.evaluate(operator, { injected: false });
     await page.getByRole("heading", { name: /^Score/ }).waitFor({ timeout: 90_000 });
     facts.push(await page.locator("#main").innerText());
-    // The window that tracks holds what the run left, and what its answer needs.
+    // The tracking window contains the data of the run and of its result.
     await page.locator("#person b").first().waitFor({ timeout: 30_000 });
     await person.inside.send("HeapProfiler.collectGarbage");
     samples.collected.push([at(), await person.heap()]);

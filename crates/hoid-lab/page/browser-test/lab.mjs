@@ -4,7 +4,7 @@ import { existsSync } from "node:fs";
 
 const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 
-/** The browser that is at hand; where there is none this is said, and all ends. */
+/** Returns the available browser; without one, reports it and exits. */
 export function browserOrEnd() {
   const found = [process.env.HOID_CHROMIUM, ...BROWSERS].find((path) => path && existsSync(path));
   if (!found) {
@@ -16,12 +16,12 @@ export function browserOrEnd() {
 
 const children = new Set();
 
-/** Ends every server that still runs, as after a failed test. */
+/** Stops all running servers, for example after a failed test. */
 export function endAll() {
   for (const child of children) child.kill("SIGKILL");
 }
 
-/** `hoid lab` with arguments; its address. */
+/** Starts `hoid lab` with arguments; returns its address. */
 export async function lab(program, ...args) {
   const child = spawn(program, ["lab", ...args], { stdio: ["ignore", "pipe", "inherit"] });
   children.add(child);
@@ -45,7 +45,7 @@ export async function lab(program, ...args) {
   };
 }
 
-/** A clock that a test turns on, in place of that of the browser. */
+/** A clock that a test advances, in place of the clock of the browser. */
 export function injectTime() {
   window.hoidTime = {
     clock: "injected",
@@ -112,7 +112,7 @@ export async function operator({ injected, until, K_d = 0 }) {
       move(time.t);
       time.t -= 8;
     }
-    // The socket takes its time.
+    // The socket needs some time.
     if (k % 60 === 0) await new Promise((resolve) => setTimeout(resolve, 0));
   }
 }

@@ -1,5 +1,5 @@
-// The page in a browser: sessions by a person who is a program, windows that are closed, a server that
-// is killed, what is left behind. Usage: node main.mjs PROGRAM; PROGRAM is hoid with the feature lab.
+// The page in a browser: sessions of a simulated person, closed windows, a killed server, and the remaining
+// files. Usage: node main.mjs PROGRAM; PROGRAM is hoid with the feature lab.
 // With HOID_LAB_PICTURES=DIR every screen is drawn at 1200 and 400 pixels.
 import assert from "node:assert/strict";
 import { spawnSync } from "node:child_process";
@@ -14,7 +14,7 @@ const path = browserOrEnd();
 
 const folder = mkdtempSync(join(tmpdir(), "hoid-lab-"));
 const config = join(folder, "lab.toml");
-// A machine of the tests may be slow: what is late is not what is tested.
+// A test machine may be slow, so delays are not tested here.
 writeFileSync(
   config,
   `name = "Test of the page"
@@ -86,7 +86,7 @@ async function consent(page, name) {
   await heading(page, /^Run 1 of/);
 }
 
-/** Starts the next run by the keyboard alone, and waits for its canvas. */
+/** Starts the next run with the keyboard, and waits for its canvas. */
 async function startRun(page) {
   await page.locator("#start").waitFor();
   await page.evaluate(() => document.activeElement?.blur());
@@ -98,7 +98,7 @@ async function runOf(page, address, number) {
   return page.evaluate(async (n) => (await fetch(`data/${n}.json`)).json(), number);
 }
 
-/** Tells how far the live estimate is behind the run, and how often it comes. */
+/** Reports the lag of the live estimate and its rate. */
 async function behind(page, experimenter) {
   await page.waitForFunction(() => window.hoidLab?.run.next > 20_000, undefined, { timeout: 90_000 });
   const began = await page.evaluate(() => window.hoidLab.began());
@@ -111,7 +111,7 @@ async function behind(page, experimenter) {
     }
     return seen;
   });
-  // t counts from the start of the measurement, 10 s behind tick 0.
+  // t is zero at the start of the measurement, 10 s after tick 0.
   const late = seen.map(({ t, at }) => at - began - 1000 * (t + 10)).sort((a, b) => a - b);
   const at = (part) => late[Math.floor(part * (late.length - 1))].toFixed(0);
   console.log(`  live: ${seen.length / 5} a second; behind by ${at(0.5)} ms in the median, ${at(0.95)} ms in 95 of 100`);
@@ -144,19 +144,19 @@ const steps = {
     assert.equal(run.verdict, "verified", run.reasons);
     const last = run.live[run.live.length - 1];
     near(last[1], 0.7, 0.2, "gain");
-    // The program has no neuromuscular system, that of the estimate holds a part of its delay: what is left of the
-    // phase of an integrator at crossover is the delay of both.
+    // The simulated person has no neuromuscular system, and that of the estimate contains a part of the delay: the
+    // remaining phase of an integrator at crossover is the sum of both.
     near(((90 - last[11]) * Math.PI) / 180 / last[9], 0.2, 0.03, "delay at crossover");
     assert.ok(Math.abs(last[7] - 0.2) < 3 * last[8], "the delay is within its error");
     console.log(`  found: gain ${last[1].toFixed(3)} ± ${last[2].toFixed(3)}, delay ${last[7].toFixed(3)} ± ${last[8].toFixed(3)}`);
 
-    // The page is loaded again in the middle of a run, which is made again.
+    // The page is reloaded in the middle of a run, which is then repeated.
     await startRun(page);
     await page.evaluate(operator, { injected: true, until: 8000 });
     await page.reload();
     await page.getByText("The last run was interrupted").waitFor();
     await picture(page, "broken-off");
-    // A second window takes over while nothing runs; the first looks on.
+    // A second window takes over between two runs; the first window becomes view-only.
     const second = await open(server.address);
     await heading(page, "This window is view-only");
     await picture(page, "looks-on");
@@ -192,7 +192,7 @@ const steps = {
     await heading(page, /^Score/);
     await page.getByText("verified", { exact: true }).waitFor();
 
-    // A gamepad that is none: its stick goes from side to side.
+    // A simulated gamepad, whose stick moves from side to side.
     await page.evaluate(() => {
       let phase = 0;
       navigator.getGamepads = () => [{ axes: [Math.sin((phase += 0.05))], timestamp: performance.now() }];
@@ -223,7 +223,7 @@ const steps = {
       return [bytes.length, bytes[0], bytes[1]];
     });
     assert.deepEqual(head.slice(1), [0x50, 0x4b]);
-    // What the page still asks for would be refused by nobody.
+    // No server would answer the remaining requests of the page.
     await page.close();
     await experimenter.close();
     await server.end();
@@ -321,7 +321,7 @@ disturbance = { rms = 0.5, interleaved = "odd" }
       await heading(page, end);
       if (end !== "Done. Thank you.") await page.getByText("The display shows the target").waitFor();
     }
-    // Its page is that of both inputs.
+    // Its page shows both inputs.
     await page.getByRole("link", { name: /: identify/ }).first().waitFor({ timeout: 240_000 });
     const href = await page.getByRole("link", { name: /: identify/ }).first().getAttribute("href");
     const html = await page.evaluate(async (href) => (await fetch(href)).text(), href);
@@ -337,7 +337,7 @@ disturbance = { rms = 0.5, interleaved = "odd" }
       near(K_d.value, 0.15, 0.03, `K_d, ${condition}`);
       near(open_loop.crossover_rad_s.value, 2.8, 0.5, `crossover, ${condition}`);
     }
-    // With the error alone it is doubtful, and the remedy is named.
+    // With the error as the only input the result is doubtful, and the message contains the remedy.
     const run = join(out, "sub-S1", "ses-01");
     for (const name of readdirSync(run).filter((name) => name.endsWith("_beh.parquet"))) {
       const { verdict } = hoid("identify", join(run, name), "--from", "0", "--json");
@@ -349,7 +349,7 @@ disturbance = { rms = 0.5, interleaved = "odd" }
   async "a disk that is full in the middle of a run"() {
     const disk = join(folder, "disk");
     mkdirSync(disk);
-    // The run after it needs 7 MB and more where frames are many.
+    // The next run needs 7 MB or more, depending on the number of frames.
     if (spawnSync("mount", ["-t", "tmpfs", "-o", "size=32m", "tmpfs", disk]).status !== 0) {
       console.log("  skipped: no disk of its own can be mounted here");
       return;
@@ -374,7 +374,7 @@ disturbance = { rms = 0.5, interleaved = "odd" }
       await page.close();
       await server.end();
     } finally {
-      // Lazily: after a failure the server still has its files open.
+      // Retries, because the server still has its files open after a failure.
       spawnSync("umount", ["--lazy", disk]);
     }
   },

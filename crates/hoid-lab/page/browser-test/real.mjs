@@ -1,11 +1,11 @@
-// In real time: are simulated operators found, with the latency that a calibration measured in their delay?
-// Usage: node real.mjs PROGRAM [ROUNDS]; PROGRAM is hoid with the feature lab. Tells a table in Markdown, and
-// fails where a parameter is more than three standard errors from its truth.
+// Test in real time whether simulated operators are identified, with the measured latency in their delay.
+// Usage: node real.mjs PROGRAM [ROUNDS]; PROGRAM is hoid with the feature lab. Prints a table in Markdown, and
+// fails if a parameter is more than three standard errors from its true value.
 //
-// A round is a calibration (its operator has a gain and a neuromuscular system), then a run each of two other
-// operators. All see e as it is drawn and answer by pointer events each 8 ms; `hoid identify` knows the form.
-// The truth of tau_e is the operator's delay and the latency, whose error is the larger of what the calibrations
-// say and what they scatter.
+// A round consists of a calibration (its operator has a gain and a neuromuscular system) and one run of each of
+// two other operators. All see e as it is drawn and respond with pointer events every 8 ms; `hoid identify` is
+// given the form. The true tau_e is the delay of the operator plus the latency, whose error is the larger of the
+// standard error and the scatter of the calibrations.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
@@ -19,7 +19,7 @@ const rounds = Number(asked);
 assert.ok(Number.isInteger(rounds) && rounds > 0, `found ${asked} rounds, expected a whole number above zero`);
 const path = browserOrEnd();
 
-/** Of the lag: x one tick on is a x + (1 - a) e, held over a tick. */
+/** Factor a of the lag: the next x is a x + (1 - a) e, with e held over a tick. */
 const decay = Math.exp(-0.001 / 1.0);
 const PEOPLE = [
   { name: "gain", form: "gain", plant: { a: [], b: [], c: [], d: 0.6 }, delay: 180, truth: { K: 0.6 } },
@@ -51,7 +51,7 @@ target = { rms = 1.5 }
 // The operator of the page itself, without its exports.
 const engine = readFileSync(new URL("../dist/engine.mjs", import.meta.url), "utf8").replace(/export \{[^}]*\};?/, "");
 
-/** In the page: an operator with a remnant of first order, a tenth of u, until the run is done. */
+/** In the page: an operator with a first-order remnant, a tenth of u, until the end of the run. */
 function tracks({ own, seed }) {
   const { run, map } = window.hoidLab;
   const canvas = document.querySelector("canvas.task");
@@ -59,7 +59,7 @@ function tracks({ own, seed }) {
   let [state, n] = [seed >>> 0, 0];
   const uniform = () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 4294967296 - 0.5;
   const a = Math.exp(-0.001 / 0.1);
-  // The variance of a uniform number is a twelfth.
+  // The variance of a uniform number is 1/12.
   const drive = 0.06 * Math.sqrt(12 * (1 - a * a));
   const noise = Float64Array.from({ length: run.task.ticks }, () => (n = a * n + drive * uniform()));
   const person = new window.hoidOperator(own, noise, map);
@@ -102,7 +102,7 @@ async function calibrated() {
   await server.end();
 }
 
-/** A run of the next condition; `hoid identify` on it. */
+/** Performs a run of the next condition and identifies it. */
 async function found(page, session, person, number) {
   await page.locator("#start:not([disabled])").click({ timeout: 90_000 });
   await page.locator("canvas.task").waitFor();

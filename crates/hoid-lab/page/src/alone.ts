@@ -1,5 +1,5 @@
-// The page without a program behind it: one file with the tables of an experiment and the tracker in WebAssembly.
-// What ran stays in the window; nothing outside of it computes a run again, and so none is verified.
+// The page without the program hoid: one file with the tables of an experiment and the tracker in WebAssembly.
+// Runs stay in the window. No other program recomputes them, so no run is verified.
 
 import { button, h } from "./dom";
 import { type Batch, type EventRow, type FrameRow, type Phase, Run } from "./engine";
@@ -7,10 +7,10 @@ import { begin } from "./main";
 import { Kernel, SAMPLE_S, Tracker } from "./tracker";
 import type { Condition, Done, FromPage, Listener, LiveLine, Measures, RunData, State, Wire } from "./wire";
 
-/** A run that is to be; tables in base 64, little end first. */
+/** A planned run; the tables are little-endian numbers in base 64. */
 interface Planned {
   condition: Condition;
-  /** What is controlled, where it stays the same. */
+  /** Controlled element, if it does not change. */
   element: string | null;
   training: boolean;
   run_in: number;
@@ -29,10 +29,10 @@ interface Experiment {
 
 const TICKS_PER_SAMPLE = 10;
 const TICK_S = SAMPLE_S / TICKS_PER_SAMPLE;
-/** From how many usual frames on one is missed. */
+/** A frame counts as missed if the interval exceeds this multiple of the median interval. */
 const MISSED = 1.5;
 
-/** A run as it goes on. */
+/** A run in progress. */
 interface Going {
   number: number;
   planned: Planned;
@@ -53,7 +53,7 @@ class Alone implements Wire {
   private subject: string | null = null;
   private readonly done: Done[] = [];
   private readonly runs: Going[] = [];
-  /** Tables of the run that was asked for. */
+  /** Tables of the requested run. */
   private tables: [Float64Array, Float64Array] = [new Float64Array(), new Float64Array()];
   private going: Going | null = null;
 
@@ -64,7 +64,7 @@ class Alone implements Wire {
   ) {}
 
   say(message: FromPage): void {
-    // As from a program: the answer comes behind what is being done.
+    // As with a program, the answer arrives after the current work is done.
     queueMicrotask(() => this.hear(message));
   }
 
@@ -261,14 +261,14 @@ function tableOf(going: Going): string {
   return ["t,e,u,f_t,d", ...e.map((_, k) => row(k)), ""].join("\n");
 }
 
-/** As verify.rs has them. */
+/** The measures, as in verify.rs. */
 function measured(going: Going): { measures: Measures; rms_e: number; score: number } {
   const steps = going.frames.slice(1).map((frame, k) => frame[0] - going.frames[k][0]);
   const frame_ms = median(steps);
   const usual = going.refresh_ms > 0 ? going.refresh_ms : frame_ms;
   const missed = (step: number) => (step > MISSED * usual ? Math.round(step / usual) - 1 : 0);
   const rms = (values: number[]) => Math.sqrt(values.reduce((sum, v) => sum + v * v, 0) / Math.max(1, values.length));
-  // What hands at rest would leave.
+  // Error without control.
   going.run.advance(going.e.length - 1);
   const rest = rms(going.run.take().e.slice(going.planned.run_in));
   const rms_e = rms(going.e.slice(going.planned.run_in));
@@ -299,7 +299,7 @@ function numbers(text: string): Float64Array {
   return new Float64Array(bytes(text).buffer);
 }
 
-/** What stands packed in the page under a name. */
+/** Returns the data that are packed in the page under a name. */
 async function packed(name: string): Promise<ArrayBuffer> {
   const text = document.getElementById(name)?.textContent ?? "";
   const unpacked = new Blob([bytes(text.trim())]).stream().pipeThrough(new DecompressionStream("gzip"));

@@ -1,4 +1,4 @@
-// The task on a canvas. The middle of the canvas is rest; to the right is up the numbers.
+// The task on a canvas. The middle of the canvas is zero; positive values are to the right.
 
 import { colour } from "./dom";
 import type { Condition } from "./wire";
@@ -7,7 +7,7 @@ export interface Shown {
   e: number;
   y: number;
   f: number;
-  /** The target from now on, in ticks; for previews. */
+  /** The target at the current and the following ticks, for previews. */
   ahead: (ticks: number) => number;
 }
 
@@ -25,7 +25,7 @@ export class Surface {
     this.fit();
   }
 
-  /** As many pixels as the screen has. */
+  /** Sets the resolution of the canvas to that of the screen. */
   fit(): void {
     const box = this.canvas.getBoundingClientRect();
     const ratio = devicePixelRatio || 1;
@@ -91,7 +91,7 @@ export class Surface {
     this.ring(place(shown.y), middle);
   }
 
-  /** The bar of the settings: where the hand is, from -1 to 1. */
+  /** Draws the bar of the settings; the position of the hand is from -1 to 1. */
   hand(part: number): void {
     const { context: c, width, height, colours } = this;
     c.fillStyle = colours.paper;

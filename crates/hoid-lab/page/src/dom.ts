@@ -1,4 +1,4 @@
-// Elements in short.
+// Short functions that create elements.
 
 type Child = Node | string | null | undefined | false;
 type Properties = Record<string, string | boolean | ((event: Event) => void)>;
@@ -25,7 +25,7 @@ export function show(kind: "" | "wide" | "full", ...children: Child[]): HTMLElem
   return main;
 }
 
-/** A colour of the style as it stands now: those that depend on light and dark are resolved on an element. */
+/** Returns the current colour of the style; colours that depend on the theme are resolved on an element. */
 export function colour(name: string): string {
   const probe = h("span");
   document.body.append(probe);

@@ -1,9 +1,9 @@
-// A run: events in, ticks out, everything logged. It knows no browser: times are given to it, in ms
-// from tick 0, so that a test can give it any.
+// A run: it receives events, computes ticks and logs both. It does not depend on a browser: the caller passes
+// the times, in ms from tick 0, so that a test can choose them.
 //
-// Tick k is computed at the first call at or behind k ms, with the last event whose time stamp is at
-// or before it. An event that comes when its tick is past belongs to the next tick; which tick took it
-// is logged, and with that the run can be computed again.
+// Tick k is computed at the first call at or after k ms, with the last event whose time stamp is not later. An
+// event that arrives after its tick was computed belongs to the next tick. The log contains the tick at which
+// each event took effect, so that the run can be recomputed.
 
 import { type InputMap, type Plant, inputOf, output, rawOf, step } from "./plant";
 
@@ -19,7 +19,7 @@ export interface Task {
   disturbance: Float64Array;
 }
 
-/** Tick, time stamp, time at the handler, what the device said. */
+/** Tick, time stamp, time at the handler, value of the device. */
 export type EventRow = [number, number, number, number];
 /** Time of the frame, time of drawing, tick, e as shown. */
 export type FrameRow = [number, number, number, number];
@@ -59,7 +59,7 @@ export class Run {
     return this.next >= this.task.ticks;
   }
 
-  /** An event of the device. */
+  /** Accepts an event of the device. */
   input(stamp: number, handled: number, raw: number): void {
     const tick = Math.max(0, Math.ceil(stamp), this.next, this.lastTick);
     if (tick >= this.task.ticks || !Number.isFinite(raw)) return;
@@ -90,12 +90,12 @@ export class Run {
     }
   }
 
-  /** A frame that shows the last tick was drawn. */
+  /** Logs that a frame with the last tick was drawn. */
   frame(time: number, drawn: number): void {
     this.batch.frames.push([time, drawn, this.next - 1, this.e]);
   }
 
-  /** What happened since the last time. */
+  /** Returns the ticks, events and frames since the last call. */
   take(): Batch {
     const taken = this.batch;
     this.batch = { first: this.next, u: [], e: [], events: [], frames: [] };
@@ -108,7 +108,7 @@ export interface SimulatedOperator {
   delay: number;
 }
 
-/** An operator that is a program: u = (H e)(t - delay) + n, e as it stands on the screen. */
+/** A simulated operator: u = (H e)(t - delay) + n, where e is the error on the screen. */
 export class Operator {
   private readonly x: Float64Array;
   private readonly spare: Float64Array;
@@ -124,13 +124,13 @@ export class Operator {
     this.spare = new Float64Array(own.plant.b.length);
   }
 
-  /** What the screen shows from a time on: the answers up to there are those to what it showed. */
+  /** Sets the error that the screen shows from a time on; the response until then is to the previous error. */
   sees(e: number, at: number): void {
     this.upTo(at);
     this.e = e;
   }
 
-  /** Where the device is at a time. */
+  /** Returns the position of the device at a time. */
   raw(now: number): number {
     this.upTo(now);
     const k = Math.max(0, Math.floor(now));

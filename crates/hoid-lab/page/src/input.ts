@@ -1,4 +1,4 @@
-// The devices: pointers by events with their own time stamps, gamepads by looking at each frame.
+// The devices: pointers send events with time stamps; gamepads are polled at each frame.
 
 import type { InputMap } from "./engine";
 import { time } from "./time";
@@ -34,11 +34,11 @@ export function keep(own: Settings): void {
   try {
     localStorage.setItem(KEY, JSON.stringify(own));
   } catch {
-    // A browser that keeps nothing asks again next time.
+    // A browser without storage asks again next time.
   }
 }
 
-/** The map for a surface: the middle is rest, two fifths of the width are the full deflection. */
+/** Map for a surface: its middle is zero, and two fifths of its width are the full deflection. */
 export function mapOf(own: Settings, surface: DOMRect, full: number): InputMap {
   const gain = full * (own.reversed ? -1 : 1);
   if (own.device === "gamepad") return { centre: 0, span: 1 / own.sensitivity, dead: own.dead, gain };
@@ -83,7 +83,7 @@ function watchGamepad(take: (event: Taken) => void): () => void {
     const raw = pad?.axes[0];
     if (pad && raw !== undefined && raw !== last) {
       last = raw;
-      // The time stamp of a gamepad is that of its last report, where the browser has one.
+      // The time stamp of a gamepad is that of its last report, if the browser provides it.
       const now = time.now();
       const stamp = time.clock === "browser" && pad.timestamp > now - 100 && pad.timestamp <= now ? pad.timestamp : now;
       take({ stamp, raw, synthetic: false });

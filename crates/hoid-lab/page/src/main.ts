@@ -1,4 +1,4 @@
-// The screens of the person, the experimenter and of a session that is shown again.
+// The screens of the person, of the experimenter, and of the replay of a session.
 
 import { Surface } from "./display";
 import { button, h, show } from "./dom";
@@ -14,21 +14,21 @@ import { type Condition, type Done, type FromServer, type LiveLine, type Measure
 const looksOn = location.pathname.endsWith("/experimenter");
 let state: State | null = null;
 let own: Settings = settings();
-/** What the person sees now; a message of the server leaves some screens as they are. */
+/** The current screen of the person; some screens do not change with messages of the server. */
 let screen: "start" | "settings" | "ready" | "run" | "result" | "other" = "start";
 let waiting: RunMessage | null = null;
 let verdict: { done: Done; measures: Measures } | null = null;
 let broken = "";
-/** Ends the run that goes on here. */
+/** Ends the run in this window. */
 let stop: (words: string) => void = () => {};
-/** The session goes on in another window. */
+/** True if the session continues in another window. */
 let elsewhere = false;
 const plotsCanvas = h("canvas", { class: "plots", role: "img", "aria-label": "The estimate over time, with bands of two standard errors" });
 const livePlots = new Plots(plotsCanvas);
 
 let wire: Wire;
 
-/** Shows the page of an experiment; who runs it hears of the page when it is `opened`. */
+/** Shows the page of an experiment; the wire is notified that the page was `opened`. */
 export function begin(connect: (listener: Listener, opened: () => void) => Wire): void {
   show("", h("p", {}, "Connecting ..."));
   wire = connect({ hear, tables, gone }, () => wire.say({ type: "hello", role: looksOn ? "experimenter" : "person", browser: browser() }));
@@ -82,7 +82,7 @@ function hear(message: FromServer): void {
         elsewhere = true;
         show("", h("h1", {}, "This window is view-only"), h("p", {}, message.words), button("Try here", () => location.reload()));
       } else if (screen === "run") {
-        // As where the disk is full: there is no use in going on.
+        // For example, the disk is full: the run cannot continue.
         stop(message.words);
       } else if (screen === "result" && !verdict && !broken) {
         broken = message.words;
@@ -202,7 +202,7 @@ function setUp(): void {
   addEventListener("resize", sized);
 }
 
-/** Asks for the next run by a button or the space bar. */
+/** Requests the next run by a button or the space bar. */
 function startButton(text: string): HTMLButtonElement {
   const go = button(text, () => wire.say({ type: "next" }), { id: "start" });
   return go;
@@ -257,7 +257,7 @@ function result(): void {
   if (state.phase === "finished") return finished();
   const pause = h("p", { "aria-live": "polite" }, "");
   const go = startButton("Next run");
-  // The break is that of the condition that was just done.
+  // The break is that of the condition of the last run.
   let left = Math.round(state.condition?.break_s ?? 0);
   clearInterval(rest);
   const tell = () => {
@@ -379,7 +379,7 @@ function live(number: number, line: LiveLine): void {
   });
 }
 
-// --- A session shown again ---
+// --- Replay of a session ---
 
 async function again(number: number, place: HTMLElement, judged: string): Promise<void> {
   play(await wire.data(number), place, judged);

@@ -1,4 +1,4 @@
-// What several screens show: verdicts, tables of runs.
+// Parts of several screens: verdicts, tables of runs.
 
 import { button, h } from "./dom";
 import type { Done, Measures } from "./wire";

@@ -1,5 +1,5 @@
-// The arithmetic of a tick: the twin of plant.rs, operation by operation. Doubles of ECMAScript and
-// of Rust are the same, products are rounded before they are added in both, and nothing else is used.
+// The arithmetic of a tick, with the same operations as plant.rs. Doubles of ECMAScript and Rust are the same,
+// both round products before they add them, and no other operations are used.
 
 export interface Plant {
   a: number[];
@@ -21,7 +21,7 @@ export function output(p: Plant, x: Float64Array, v: number): number {
   return y + p.d * v;
 }
 
-/** The state one tick on; `next` is as long as `x`. */
+/** Computes the state at the next tick; `next` has the length of `x`. */
 export function step(p: Plant, x: Float64Array, v: number, next: Float64Array): void {
   const n = p.b.length;
   for (let i = 0; i < n; i++) {
@@ -42,7 +42,7 @@ export function inputOf(map: InputMap, raw: number): number {
   return w < 0 ? -(map.gain * moved) : map.gain * moved;
 }
 
-/** What the device must say for a u: for operators that are programs. */
+/** Returns the value of the device for a u, for simulated operators. */
 export function rawOf(map: InputMap, u: number): number {
   let w = u / map.gain;
   if (w > 1) w = 1;

@@ -6,9 +6,9 @@ import type { LiveLine, Told } from "./wire";
 interface Panel {
   title: string;
   of: (line: LiveLine) => Told;
-  /** What stands in place of a number that is not there. */
+  /** Text for a missing number. */
   waiting?: (line: LiveLine) => string | null;
-  /** The span that is shown at least. */
+  /** The smallest span that is shown. */
   least: [number, number];
 }
 
@@ -66,7 +66,7 @@ export class Plots {
       const bottom = (at + 1) * tall - 14;
       const known = this.lines.filter((l) => l.t <= now && panel.of(l)[0] !== null);
       let [low, high] = panel.least;
-      // The curves of the first seconds may be anywhere.
+      // The estimates of the first seconds may have any value.
       for (const line of known.slice(Math.floor(known.length / 4))) {
         const value = panel.of(line)[0] as number;
         low = Math.min(low, value * 1.1);

@@ -1,4 +1,4 @@
-// A run shown again: the task as it was on the screen, and the estimate beside it.
+// Replay of a run: the task as it was on the screen, and the estimate.
 
 import { Surface } from "./display";
 import { button, h } from "./dom";
@@ -7,7 +7,7 @@ import type { RunData } from "./wire";
 
 let stopReplay = () => {};
 
-/** Shows a run again; `judged` is what its verdict is called. */
+/** Replays a run; `judged` is the text of its verdict. */
 export function play(run: RunData | null, place: HTMLElement, judged: string): void {
   stopReplay();
   if (!run) {

@@ -1,4 +1,4 @@
-// The program hoid behind the page: messages by a socket, runs that ended by their address.
+// Connection to the program hoid: messages by a socket; finished runs are requested by their address.
 
 import { h } from "./dom";
 import type { FromPage, Listener, LiveLine, RunData, State, Wire } from "./wire";
@@ -30,7 +30,7 @@ export class Server implements Wire {
       const told = await answer.json();
       return { ...told, live: linesOf(told.live) };
     } catch {
-      // The program has ended; the page says so.
+      // The program has ended; the page reports it.
       return null;
     }
   }

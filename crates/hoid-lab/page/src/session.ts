@@ -15,7 +15,7 @@ export interface Given {
   tables: Float64Array;
 }
 
-/** Runs; `ended` hears whether the run reached its end. What it returns ends the run where the other side has. */
+/** Performs a run; `ended` receives whether the run is complete. The returned function ends the run if the server has ended it. */
 export function start(wire: Wire, given: Given, own: Settings, ended: (finished: boolean, words: string) => void): (words: string) => void {
   const { message } = given;
   const canvas = h("canvas", { class: "task running", role: "img", "aria-label": "The task" });
@@ -31,7 +31,7 @@ export function start(wire: Wire, given: Given, own: Settings, ended: (finished:
   const operator = message.operator
     ? new Operator(message.operator, given.tables.subarray(ahead + disturbed, ahead + disturbed + noise), map)
     : null;
-  // For operators that are programs, and to tell how far behind the live estimate is.
+  // For simulated operators, and for the lag of the live estimate.
   (globalThis as { hoidLab?: unknown }).hoidLab = { run, map, began: () => performance.timeOrigin + zero };
 
   let zero = NaN;
@@ -45,7 +45,7 @@ export function start(wire: Wire, given: Given, own: Settings, ended: (finished:
 
   const stopListening = listen(canvas, own.device, (event) => {
     if (event.synthetic) synthetic++;
-    // Before the start the place of the hand is kept, and is that of tick 0.
+    // The last position of the hand before the start is that of tick 0.
     if (Number.isNaN(zero)) left = event.raw;
     else run.input(event.stamp - zero, time.now() - zero, event.raw);
   });

@@ -1,4 +1,4 @@
-// The clock and the frames. A test may give its own before the page is loaded: then runs say so.
+// The clock and the frames. A test may replace them before the page is loaded; the runs then state it.
 
 export interface Time {
   clock: "browser" | "injected";

@@ -1,4 +1,4 @@
-// The tracker of hoid in WebAssembly, by its C ABI (hoid.h): sizes and places are those of 32-bit pointers.
+// The tracker of hoid in WebAssembly, by its C ABI (hoid.h), with the sizes and offsets for 32-bit pointers.
 
 import type { Told } from "./wire";
 
@@ -17,9 +17,9 @@ interface Exports {
 }
 
 const PAGE = 65536;
-/** Of hoid_estimate: its size, and where value and standard error stand. */
+/** Size of hoid_estimate, and offsets of its value and standard error. */
 const [SIZE, VALUE, ERROR] = [32, 8, 16];
-/** Where in our page of memory what stands: a pointer, a number, an outcome, then lists and texts. */
+/** Offsets in our page of memory: a pointer, a number, an outcome, then lists and texts. */
 const [POINTER, COUNT, OUTCOME, LIST] = [0, 8, 16, 64];
 /** K_e, T_L, K_e_dot, omega_nm, zeta_nm, tau_e; crossover frequency, phase margin. */
 const [OPERATOR, OPEN_LOOP] = [6, 2];
@@ -27,12 +27,12 @@ const [OPERATOR, OPEN_LOOP] = [6, 2];
 export interface Estimates {
   operator: Told[];
   openLoop: Told[];
-  /** Why there is no operator. */
+  /** Reason why there is no operator. */
   waiting: string | null;
 }
 
 export class Kernel {
-  /** A page of memory that the library does not know of. */
+  /** A page of memory that the library does not use. */
   readonly room: number;
 
   private constructor(readonly hoid: Exports) {
@@ -41,7 +41,7 @@ export class Kernel {
 
   static async of(bytes: BufferSource): Promise<Kernel> {
     const module = await WebAssembly.compile(bytes);
-    // A library of random numbers asks for functions of its own making, and nobody calls them.
+    // A library for random numbers imports functions that are never called.
     const imports: WebAssembly.Imports = {};
     for (const { module: from, name } of WebAssembly.Module.imports(module)) {
       (imports[from] ??= {})[name] = () => {
@@ -55,7 +55,7 @@ export class Kernel {
     return new DataView(this.hoid.memory.buffer);
   }
 
-  /** Puts a text where lists stand otherwise. */
+  /** Writes a text into the memory for lists. */
   put(text: string): number {
     const bytes = new TextEncoder().encode(`${text}\0`);
     if (LIST + bytes.length > PAGE) throw new Error("a text is too long");
@@ -73,7 +73,7 @@ export class Kernel {
 export class Tracker {
   private readonly tracker: number;
 
-  /** `element`: what is controlled, in s, where it stays the same. */
+  /** `element`: the controlled element in s, if it does not change. */
   constructor(
     private readonly kernel: Kernel,
     element: string | null,
@@ -84,7 +84,7 @@ export class Tracker {
     this.tracker = kernel.view().getUint32(room + POINTER, true);
   }
 
-  /** Takes a sample; how long ago the person changed, s, where that is declared at it. */
+  /** Processes a sample; returns the time since a change of the person in s, if one is declared at this sample. */
   step(e: number, u: number): number | null {
     const { hoid, room } = this.kernel;
     if (hoid.hoid_tracker_step(this.tracker, e, u, room + OUTCOME) !== 0) throw new Error(this.kernel.reason());

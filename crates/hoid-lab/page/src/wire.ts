@@ -1,4 +1,4 @@
-// What page and server say to each other; wire.rs has the same. Whoever runs the experiment is a `Wire`.
+// Messages between page and server, as in wire.rs. A `Wire` connects the page to the side that runs the experiment.
 
 import type { Batch, InputMap, Phase, SimulatedOperator } from "./engine";
 
@@ -108,7 +108,7 @@ export type FromPage =
   | { type: "abort"; number: number }
   | { type: "reports" };
 
-/** A run that ended, at 100 Hz. */
+/** A finished run at 100 Hz. */
 export interface RunData {
   number: number;
   condition: Condition;
@@ -123,20 +123,20 @@ export interface RunData {
   reasons: string;
 }
 
-/** What a wire tells the page. */
+/** Messages from a wire to the page. */
 export interface Listener {
   hear(message: FromServer): void;
-  /** Target, disturbance and noise of the run that was told last. */
+  /** Target, disturbance and noise of the last announced run. */
   tables(numbers: Float64Array): void;
   gone(): void;
 }
 
-/** Whoever runs the experiment, as the page sees it. */
+/** The side that runs the experiment, as seen by the page. */
 export interface Wire {
-  /** True where there is no program behind the page: nothing is stored, and nobody else looks on. */
+  /** True if the page runs without the program: nothing is stored, and there are no other windows. */
   readonly alone: boolean;
   say(message: FromPage): void;
   data(number: number): Promise<RunData | null>;
-  /** What can be taken home of the session. */
+  /** Files of the session that can be saved. */
   takeHome(state: State): HTMLElement;
 }

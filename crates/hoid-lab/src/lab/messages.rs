@@ -41,7 +41,7 @@ impl SharedState {
         if self.mode != Mode::Sessions {
             return Vec::new();
         }
-        let unfinished = |folder: &PathBuf| Session::read(folder).is_ok_and(|session| !session.facts.finished);
+        let unfinished = |folder: &PathBuf| Session::read(folder).is_ok_and(|session| !session.plan.finished);
         let folders = Session::folders(&self.out).unwrap_or_default();
         folders
             .iter()
@@ -53,12 +53,12 @@ impl SharedState {
     pub(super) fn send_state(&self) {
         let state = self.state();
         let session = state.session.as_ref();
-        let facts = session.map(|session| &session.facts);
+        let facts = session.map(|session| &session.plan);
         let next = session.and_then(Session::next_run);
-        let run = |place: usize| facts.and_then(|facts| facts.planned_run(place));
+        let run = |index: usize| facts.and_then(|facts| facts.planned_run(index));
         let done = match (&self.mode, session) {
             (Mode::Replay(_), Some(session)) => reverified_runs(session),
-            (_, Some(session)) => session.done.clone(),
+            (_, Some(session)) => session.finished_runs.clone(),
             _ => Vec::new(),
         };
         let message = State {
@@ -80,7 +80,7 @@ impl SharedState {
             },
             done,
             planned: (0..facts.map_or(0, |facts| facts.plan.len()))
-                .filter_map(|place| run(place).map(|(_, condition)| condition.name.clone()))
+                .filter_map(|index| run(index).map(|(_, condition)| condition.name.clone()))
                 .collect(),
             next,
             condition: next.and_then(run).map(|(_, condition)| condition.clone()),
@@ -109,7 +109,7 @@ fn reverified_runs(session: &Session) -> Vec<FinishedRun> {
             ..done.clone()
         }
     };
-    session.done.iter().map(again).collect()
+    session.finished_runs.iter().map(again).collect()
 }
 
 /// Returns the name of a session, such as `sub-P01/ses-01`.

@@ -25,7 +25,7 @@ impl SharedState {
         let session = current_session(state)?;
         let next = session
             .next_run()
-            .and_then(|place| Some((place, session.facts.planned_run(place)?)));
+            .and_then(|place| Some((place, session.plan.planned_run(place)?)));
         let Some((planned, (plan, condition))) = next else {
             return Err(LabError::Order("all runs of the session are done".to_owned()));
         };
@@ -53,7 +53,11 @@ impl SharedState {
         if let Some(page) = self.pages().get(&id) {
             let _ = page.sender.send(OutgoingMessage::Binary(bytes));
         }
-        state.ready = Some(PreparedRun { planned, number, task });
+        state.prepared_run = Some(PreparedRun {
+            plan_index: planned,
+            number,
+            task,
+        });
         Ok(())
     }
 
@@ -80,16 +84,21 @@ impl SharedState {
             )));
         }
         let ready = state
-            .ready
+            .prepared_run
             .take()
             .filter(|ready| ready.number == number && state.run.is_none());
-        let Some(PreparedRun { planned, task, .. }) = ready else {
+        let Some(PreparedRun {
+            plan_index: planned,
+            task,
+            ..
+        }) = ready
+        else {
             return Err(LabError::Order(format!("run {number} was not requested")));
         };
         // Until the log exists, batches of this run are ignored.
         state.last_ended_run = Some(number);
         let session = current_session(state)?;
-        let Some((plan, condition)) = session.facts.planned_run(planned) else {
+        let Some((plan, condition)) = session.plan.planned_run(planned) else {
             return Err(LabError::Order(format!("the session has no run {planned}")));
         };
         let condition = condition.clone();
@@ -109,13 +118,13 @@ impl SharedState {
             clock,
             refresh_ms,
             zero_ms,
-            limits: session.facts.config.limits,
+            limits: session.plan.config.limits,
             phases: task.phases.clone(),
             condition,
         };
         run_start.write(&stem, &task).map_err(unverified_run_error)?;
         let log = RunLog::create(&stem, task.ticks).map_err(unverified_run_error)?;
-        let live = LiveRun::new(&session.facts.config.method, run_start.condition.task_definition()?)?;
+        let live = LiveRun::new(&session.plan.config.method, run_start.condition.task_definition()?)?;
         let teller = Arc::downgrade(self);
         let live = start(live, &stem, move |line| {
             if let Some(shared) = teller.upgrade() {
@@ -203,7 +212,7 @@ impl SharedState {
         let Some(run) = state.run.take() else { return Ok(()) };
         state.last_ended_run = Some(run.run_start.number);
         let measures = self.close_run(state, run, how, counted).map_err(unverified_run_error)?;
-        let done = state.session.as_ref().and_then(|session| session.done.last());
+        let done = state.session.as_ref().and_then(|session| session.finished_runs.last());
         if let (Some(done), Some(measures)) = (done, &measures) {
             self.send_to_pages(&ToPage::Verdict { done, measures }, |_, page| page.role.is_some());
         }

@@ -2,8 +2,8 @@
 //!
 //! While no client is connected, the thread waits for the next connection. Otherwise it accepts connections, examines
 //! each client once (complete head, head too long or too late, connection closed by the client), and pauses for
-//! [`IDLE_PAUSE`] if nothing has happened. New connections are examined before any connection is closed. The page, whose
-//! head arrives at once, is therefore served regardless of the number of other clients. If there are more than
+//! [`IDLE_PAUSE`] if nothing has happened. New connections are examined before any connection is closed. The page,
+//! whose head arrives at once, is therefore served regardless of the number of other clients. If there are more than
 //! [`MAX_PENDING`] incomplete connections, the oldest ones are closed.
 
 use std::{

@@ -98,7 +98,7 @@ pub struct RunLog {
     complete_bytes: [u64; 3],
     last_sync: Instant,
     logged: usize,
-    planned: usize,
+    planned_ticks: usize,
 }
 
 impl RunLog {
@@ -128,7 +128,7 @@ impl RunLog {
             complete_bytes: headers.map(|header| header.len() as u64),
             last_sync: Instant::now(),
             logged: 0,
-            planned: ticks,
+            planned_ticks: ticks,
         })
     }
 
@@ -138,13 +138,13 @@ impl RunLog {
     /// [`LabError::Message`] for a batch that does not continue the previous one or extends beyond the end of the run.
     pub fn check_batch(&self, batch: &Batch) -> Result<usize, LabError> {
         let end = batch.first.saturating_add(batch.u.len());
-        if batch.first != self.logged || batch.u.len() != batch.e.len() || end > self.planned {
+        if batch.first != self.logged || batch.u.len() != batch.e.len() || end > self.planned_ticks {
             return Err(LabError::Message(format!(
                 "ticks {} to {end} with {} values of e, expected ticks from {} to at most {}",
                 batch.first,
                 batch.e.len(),
                 self.logged,
-                self.planned
+                self.planned_ticks
             )));
         }
         Ok(end)

@@ -68,7 +68,7 @@ pub enum RunEnd {
 /// Data known after a run, stored in `end.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ended {
+pub struct EndRecord {
     /// End of the run: completed or interrupted.
     pub how: RunEnd,
     /// Time of the end in UTC.
@@ -152,7 +152,7 @@ impl RunStart {
     }
 }
 
-impl Ended {
+impl EndRecord {
     /// Writes `end.json`.
     ///
     /// # Errors

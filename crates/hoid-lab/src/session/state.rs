@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 use super::{
     folder::{Stem, check_subject, session_folder},
     log::{RunLog, complete_lines},
-    run_start::{APPENDED_FILES, Ended, RunEnd, RunStart},
+    run_start::{APPENDED_FILES, EndRecord, RunEnd, RunStart},
 };
 use crate::{
     LabError,
     config::{Condition, Config},
-    order::{Planned, plan},
+    order::{PlannedRun, plan},
     utc,
     verify::{Verification, check},
 };
@@ -58,7 +58,7 @@ pub struct SessionPlan {
     #[serde(default)]
     pub browser: BTreeMap<String, String>,
     /// All planned runs.
-    pub plan: Vec<Planned>,
+    pub plan: Vec<PlannedRun>,
     /// Configuration of the experiment.
     pub config: Config,
 }
@@ -82,8 +82,8 @@ impl SessionPlan {
     }
 
     /// Returns a planned run, by its index in the plan, with its condition.
-    pub fn planned_run(&self, place: usize) -> Option<(&Planned, &Condition)> {
-        let planned = self.plan.get(place)?;
+    pub fn planned_run(&self, index: usize) -> Option<(&PlannedRun, &Condition)> {
+        let planned = self.plan.get(index)?;
         Some((planned, self.config.condition.get(planned.condition)?))
     }
 }
@@ -121,9 +121,9 @@ pub struct Session {
     /// Folder of the session.
     pub folder: PathBuf,
     /// Contents of `lab.toml`.
-    pub facts: SessionPlan,
+    pub plan: SessionPlan,
     /// Runs that have ended, in the order in which they were recorded.
-    pub done: Vec<FinishedRun>,
+    pub finished_runs: Vec<FinishedRun>,
 }
 
 impl Session {
@@ -141,7 +141,7 @@ impl Session {
         hoid_io::make_directory(&folder)?;
         let now = utc::now();
         let session = Self {
-            facts: SessionPlan {
+            plan: SessionPlan {
                 hoid: env!("CARGO_PKG_VERSION").to_owned(),
                 subject: subject.to_owned(),
                 session,
@@ -155,7 +155,7 @@ impl Session {
                 config: config.clone(),
             },
             folder,
-            done: Vec::new(),
+            finished_runs: Vec::new(),
         };
         session.save()?;
         Ok(session)
@@ -169,12 +169,12 @@ impl Session {
     pub fn open(folder: &Path) -> Result<Self, LabError> {
         let mut session = Self::read(folder)?;
         for (number, stem) in Stem::find_all(folder)? {
-            if session.done.iter().any(|done| done.number == number) {
+            if session.finished_runs.iter().any(|done| done.number == number) {
                 continue;
             }
             if RunStart::read(&stem).is_err() {
                 session.mark_run_as_lost(number, &stem)?;
-            } else if Ended::read(&stem).is_ok_and(|ended| ended.is_some()) {
+            } else if EndRecord::read(&stem).is_ok_and(|ended| ended.is_some()) {
                 session.record_run(&stem, &check(&stem)?)?;
             } else {
                 session.end_run(&stem, RunEnd::Interrupted, BTreeMap::new())?;
@@ -194,9 +194,9 @@ impl Session {
             Err(damaged) => SessionPlan::read(&folder.join(PLAN_COPY_FILE)).map_err(|_| damaged)?,
         };
         Ok(Self {
-            done: read_runs(&folder.join("runs.csv"))?,
+            finished_runs: read_runs(&folder.join("runs.csv"))?,
             folder: folder.to_owned(),
-            facts,
+            plan: facts,
         })
     }
 
@@ -207,8 +207,7 @@ impl Session {
     pub fn save(&self) -> Result<(), LabError> {
         for name in [PLAN_FILE, PLAN_COPY_FILE] {
             let path = self.folder.join(name);
-            let text =
-                toml::to_string(&self.facts).map_err(|error| LabError::damaged_file(&path, error.to_string()))?;
+            let text = toml::to_string(&self.plan).map_err(|error| LabError::damaged_file(&path, error.to_string()))?;
             hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
         }
         Ok(())
@@ -216,12 +215,12 @@ impl Session {
 
     /// Returns the index of the next run in the plan; `None` if all runs are done.
     pub fn next_run(&self) -> Option<usize> {
-        let finished = |place: &usize| {
-            self.done
+        let finished = |index: &usize| {
+            self.finished_runs
                 .iter()
-                .any(|done| done.planned == *place && done.how == RunEnd::Finished)
+                .any(|done| done.planned == *index && done.how == RunEnd::Finished)
         };
-        (0..self.facts.plan.len()).find(|place| !finished(place))
+        (0..self.plan.plan.len()).find(|index| !finished(index))
     }
 
     /// Returns the number of a new run, which is one more than the number of the last run that was started.
@@ -235,7 +234,7 @@ impl Session {
 
     /// Returns the common prefix of the file names of a run.
     pub fn stem(&self, condition: &str, number: usize) -> Stem {
-        Stem::new(&self.folder, &self.facts.subject, self.facts.session, condition, number)
+        Stem::new(&self.folder, &self.plan.subject, self.plan.session, condition, number)
     }
 
     /// Ends a run: hashes its files, verifies it and records the result.
@@ -252,17 +251,17 @@ impl Session {
             // The run ended before its first tick: empty files are created.
             drop(RunLog::create(stem, 0)?);
         }
-        Ended {
+        EndRecord {
             how,
             utc: utc::now(),
             counted,
-            sha256: Ended::hashes(stem)?,
+            sha256: EndRecord::hashes(stem)?,
         }
         .write(stem)?;
         let checked = check(stem)?;
         self.record_run(stem, &checked)?;
         if self.next_run().is_none() {
-            self.facts.finished = true;
+            self.plan.finished = true;
             self.save()?;
         }
         Ok(checked)
@@ -276,7 +275,7 @@ impl Session {
             planned: run_start.planned,
             condition: run_start.condition.name.clone(),
             training: run_start.training,
-            how: Ended::read(stem)?.map_or(RunEnd::Interrupted, |ended| ended.how),
+            how: EndRecord::read(stem)?.map_or(RunEnd::Interrupted, |ended| ended.how),
             utc: utc::now(),
             verdict: checked.label().to_owned(),
             reasons: checked.reasons(),
@@ -333,7 +332,7 @@ impl Session {
             let _ = file.set_len(whole as u64);
             return Err(LabError::file(&path, source));
         }
-        self.done.push(done);
+        self.finished_runs.push(done);
         Ok(())
     }
 
@@ -381,7 +380,7 @@ fn latin_square_row(out: &Path, subject: &str) -> Result<usize, LabError> {
             .into_iter()
             .find(|folder| is_session(folder));
         match first {
-            Some(first) if own => return Ok(Session::read(&first)?.facts.row),
+            Some(first) if own => return Ok(Session::read(&first)?.plan.row),
             Some(_) => others = others.saturating_add(1),
             None => {}
         }

@@ -181,7 +181,7 @@ impl HostileTest {
             if draw.integer_below(8) == 0 {
                 mutate_bytes(&mut text, draw);
             }
-            // Invalid messages are refused at once.
+            // Invalid messages are rejected at once.
             if let Ok(message) = serde_json::from_slice::<FromPage>(&text) {
                 let _ = self.person.lab.receive(self.person.page, message);
             }

@@ -10,7 +10,7 @@ use hoid_lab::{
 /// Starts the next run with the given number.
 pub fn start_run(session: &Session, number: usize, input: InputMap) -> Option<(RunStart, Task)> {
     let planned = session.next_run()?;
-    let condition = session.facts.config.condition[0].clone();
+    let condition = session.plan.config.condition[0].clone();
     let task = Task::new(&condition, 0, number as u64).ok()?;
     let run_start = RunStart {
         hoid: "test".to_owned(),

@@ -1,6 +1,6 @@
 //! The methods of discretisation in Table 5.2; some of them are substitutions `s = c (z - 1) / q(z)`.
 
-use super::hold::hold_equivalent;
+use super::hold::zoh_equivalent;
 use super::matched::matched_pole_zero;
 use crate::{ContinuousTransferFunction, DiscreteTransferFunction, ModelError, SampleTime, polynomial};
 
@@ -77,7 +77,7 @@ pub fn discretise(
             substitute(h, omega_rad_s / (omega_rad_s * ts / 2.0).tan(), [1.0, 1.0])?
         }
         Method::ZeroOrderHold | Method::FirstOrderHold => {
-            hold_equivalent(h, ts, fraction, method == Method::FirstOrderHold)
+            zoh_equivalent(h, ts, fraction, method == Method::FirstOrderHold)
                 .ok_or_else(|| non_finite_result_error(h))?
         }
         Method::Matched => matched_pole_zero(h, ts).ok_or_else(|| non_finite_result_error(h))?,

@@ -2,7 +2,8 @@
 //! parts and a drifting stick.
 //!
 //! `e = f - y`, `u = Y e + F f + M y + n`, `y = P (u + d)`, where f is a target that the person may see (F,
-//! [`Feedforward`]), y a motion that the person may feel (M), and d is a disturbance at the input of the controlled element P. Changes follow the sigmoid of eq. 5, as in
+//! [`Feedforward`]), y a motion that the person may feel (M), and d is a disturbance at the input of the controlled
+//! element P. Changes follow the sigmoid of eq. 5, as in
 //! [`Scenario`](crate::scenario::Scenario). `Scenario` is the task of the thesis and remains a separate type: its
 //! operator is a gain with a lead, and its controlled element is `K_c/(s(s + omega_b))`.
 //!
@@ -25,7 +26,9 @@ mod typical_feedforward;
 pub use crate::feedforward::Feedforward;
 pub use display::Display;
 pub use multi_sine::{Excitation, Interleaved, MultiSine};
-pub use remnant::{Followed, Intermittence, PartStrength, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick};
+pub use remnant::{
+    DependenceSignal, Intermittence, PartStrength, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick,
+};
 pub use scenario::{FamilyScenario, ResolvedFamilyScenario};
 pub use state::FamilyState;
 pub use typical_feedforward::{

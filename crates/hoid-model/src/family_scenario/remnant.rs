@@ -64,22 +64,22 @@ pub enum PartStrength {
 
 /// Signal on which a signal-dependent part of the remnant depends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Followed {
+pub enum DependenceSignal {
     /// The part depends on the running rms of u.
     Control,
     /// The part depends on the running rms of the rate of u.
     Rate,
 }
 
-crate::named_choice!(Followed, "signal that a remnant follows", 2, { Control => "control", Rate => "rate" });
+crate::named_choice!(DependenceSignal, "signal that a remnant follows", 2, { Control => "control", Rate => "rate" });
 
 /// Dependence of the standard deviation of a part on u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignalDependence {
     /// Signal that determines the standard deviation.
-    pub follows: Followed,
+    pub signal: DependenceSignal,
     /// c: share of the variance of the part that depends on the signal, 0 to 1.
-    pub part: f64,
+    pub share: f64,
     /// Memory length of the running mean square, s.
     pub memory_s: f64,
 }
@@ -88,7 +88,7 @@ pub struct SignalDependence {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pulses {
     /// p: share of the variance of the part that is due to pulses, 0 to 1.
-    pub part: f64,
+    pub share: f64,
     /// lambda: mean number of pulses per second.
     pub rate_per_s: f64,
 }
@@ -219,12 +219,12 @@ impl RemnantPart {
                 }
             }
         }
-        if let Some(SignalDependence { part: c, memory_s, .. }) = self.signal_dependence {
+        if let Some(SignalDependence { share: c, memory_s, .. }) = self.signal_dependence {
             demand("part of the remnant that follows u", c, (0.0..=1.0).contains(&c), part)?;
             let quantity = "memory length in s of the rms that the remnant follows";
             demand(quantity, memory_s, memory_s > 0.0, positive)?;
         }
-        if let Some(Pulses { part: p, rate_per_s }) = self.pulses {
+        if let Some(Pulses { share: p, rate_per_s }) = self.pulses {
             demand(
                 "part of the remnant that consists of pulses",
                 p,
@@ -310,7 +310,7 @@ mod tests {
             },
             RemnantPart {
                 pulses: Some(Pulses {
-                    part: 1.2,
+                    share: 1.2,
                     rate_per_s: 1.0,
                 }),
                 ..good.clone()
@@ -321,8 +321,8 @@ mod tests {
             },
             RemnantPart {
                 signal_dependence: Some(SignalDependence {
-                    follows: Followed::Rate,
-                    part: 0.5,
+                    signal: DependenceSignal::Rate,
+                    share: 0.5,
                     memory_s: 0.0,
                 }),
                 ..good.clone()

@@ -19,7 +19,7 @@ const MAX_EVALUATIONS: usize = 4_000_000;
 /// frequency is one or more (it has infinitely many poles in the right half plane); and a delay that turns the phase by
 /// millions of radians over frequencies at which the gain exceeds 1/2.
 pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
-    Characteristic::new(open_loop).and_then(|f| f.zeros_in_right_half_plane()) == Some(0)
+    CharacteristicFunction::new(open_loop).and_then(|f| f.zeros_in_right_half_plane()) == Some(0)
 }
 
 /// Lowest frequency at which a closed loop is evaluated, relative to the magnitude of the largest pole of the
@@ -78,7 +78,7 @@ fn max_root_magnitude(p: &[f64]) -> f64 {
 }
 
 /// Characteristic function `F(s) / (s + a)^n` on the imaginary axis.
-pub(super) struct Characteristic<'a> {
+pub(super) struct CharacteristicFunction<'a> {
     open_loop: &'a ContinuousTransferFunction,
     order: usize,
     /// The shift a, 1/s: the magnitude of the largest open-loop pole, or 1 if all poles are zero.
@@ -87,7 +87,7 @@ pub(super) struct Characteristic<'a> {
     last: f64,
 }
 
-impl<'a> Characteristic<'a> {
+impl<'a> CharacteristicFunction<'a> {
     /// Builds the characteristic function of an open loop. Returns `None` if the gain at infinite frequency makes the
     /// closed loop unstable.
     pub(super) fn new(open_loop: &'a ContinuousTransferFunction) -> Option<Self> {

@@ -2,7 +2,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::closed_loop::Characteristic;
+use super::closed_loop::CharacteristicFunction;
 use super::*;
 use crate::{ContinuousTransferFunction, DiscreteTransferFunction, SampleTime, polynomial, scenario::OperatingState};
 
@@ -187,7 +187,7 @@ fn stability_with_delay_matches_closed_form() {
     for product in [1.5, 1.6, 60.0, 5000.0] {
         let h = delayed_transfer_function(&[product / 0.28], &[1.0, 0.0], 0.28);
         let pairs = ((product - PI / 2.0) / (2.0 * PI)).ceil().max(0.0) as usize;
-        let found = Characteristic::new(&h).unwrap().zeros_in_right_half_plane();
+        let found = CharacteristicFunction::new(&h).unwrap().zeros_in_right_half_plane();
         assert_eq!(found, Some(2 * pairs), "{product}");
     }
     // The loop with k e^{-s tau}/(s - 1) and tau = 0.5 is stable for 1 < k < sqrt(1 + w^2) with atan w = w/2 (w =
@@ -325,7 +325,7 @@ fn unstable_pole_counts_match_the_transfer_function() {
                     assert!(l.response(300.0).norm() > 0.5, "{gain} {operator:?} {element:?}");
                     continue;
                 };
-                let exact = Characteristic::new(&l)
+                let exact = CharacteristicFunction::new(&l)
                     .and_then(|f| f.zeros_in_right_half_plane())
                     .unwrap();
                 assert_eq!(found, exact, "{gain} {operator:?} {element:?}");

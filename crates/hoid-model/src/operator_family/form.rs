@@ -66,8 +66,8 @@ pub const POWER_COUNT: usize = 4;
 /// are nearly normal even if the data carry little information.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
-    /// Gain of the form: K without a pole, `K/T_I` with a lag, K_I with an integration, K_d (in s) of a derivative, K_m of the
-    /// semicircular canals.
+    /// Gain of the form: K without a pole, `K/T_I` with a lag, K_I with an integration, K_d (in s) of a derivative, K_m
+    /// of the semicircular canals.
     Gain,
     /// T_L, s.
     Lead,

@@ -21,10 +21,10 @@
 use super::{
     dual::Dual,
     matrices::{
-        MATRIX_SIZE, Vector, characteristic_polynomial, companion, exponential, matrix_vector_product, product,
+        MATRIX_SIZE, Vector, characteristic_polynomial, companion_matrix, exponential, matrix_vector_product, product,
     },
     operator::FamilyOperator,
-    zoh::HeldFamily,
+    zoh::ZohFamilyOperator,
 };
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
 
@@ -38,7 +38,7 @@ impl FamilyOperator {
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] if an exponential overflows or the delay is too long in samples.
-    pub fn interpolate(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
+    pub fn interpolate(&self, sample_time: SampleTime) -> Result<ZohFamilyOperator, ModelError> {
         let late = self.tau_e_s() + 0.5 * sample_time.s();
         self.interpolate_with_delay_samples(whole_samples(late, sample_time)?, sample_time)
     }
@@ -51,7 +51,7 @@ impl FamilyOperator {
         &self,
         sample: usize,
         sample_time: SampleTime,
-    ) -> Result<HeldFamily, ModelError> {
+    ) -> Result<ZohFamilyOperator, ModelError> {
         let variables = self.variables();
         let ts = sample_time.s();
         let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
@@ -66,7 +66,7 @@ impl FamilyOperator {
         let mut phi = [[zero; MATRIX_SIZE]; MATRIX_SIZE];
         let (mut oldest, mut middle, mut newest) = ([zero; MATRIX_SIZE], [zero; MATRIX_SIZE], [zero; MATRIX_SIZE]);
         if order > 0 {
-            let system = companion(&denominator, order);
+            let system = companion_matrix(&denominator, order);
             let (first, second) = (exponential(&system, delta), exponential(&system, rest));
             phi = product(&second, &first, order);
             let column = |m: &super::matrices::Matrix, j: usize| -> Vector { std::array::from_fn(|i| m[i][j]) };
@@ -91,7 +91,7 @@ impl FamilyOperator {
         }
         impulse[0] = impulse[0] + direct * rest;
         impulse[1] = impulse[1] + direct * delta;
-        HeldFamily::from_impulse_response(sample, &impulse, &f)
+        ZohFamilyOperator::from_impulse_response(sample, &impulse, &f)
     }
 }
 
@@ -109,7 +109,7 @@ mod tests {
         operators(&[0.1437, 0.16, 0.002])
     }
 
-    fn response(model: &HeldFamily, omega: f64, ts: f64) -> Complex64 {
+    fn response(model: &ZohFamilyOperator, omega: f64, ts: f64) -> Complex64 {
         let backward = Complex64::from_polar(1.0, -omega * ts);
         let f = [&[1.0][..], &model.f].concat();
         polynomial::value(&model.b, backward) / polynomial::value(&f, backward) * backward.powi(model.nk as i32)

@@ -14,7 +14,7 @@ pub(super) type Vector = [Dual; MATRIX_SIZE];
 
 /// Returns `[A B 0; 0 0 1; 0 0 0]` of the controllable canonical form, with time in samples; the last state is the
 /// slope of the input.
-pub(super) fn companion(denominator: &Vector, order: usize) -> Matrix {
+pub(super) fn companion_matrix(denominator: &Vector, order: usize) -> Matrix {
     let mut m = [[Dual::constant(0.0); MATRIX_SIZE]; MATRIX_SIZE];
     for i in 0..=order {
         m[i][i + 1] = Dual::constant(1.0);

@@ -35,4 +35,4 @@ pub use dual::PARTIAL_COUNT;
 pub use fitted::FittedOperator;
 pub use form::{Coordinate, Form, POWER_COUNT};
 pub use operator::{FamilyOperator, FamilyResponse, NamedParameter, PARAMETERS};
-pub use zoh::HeldFamily;
+pub use zoh::ZohFamilyOperator;

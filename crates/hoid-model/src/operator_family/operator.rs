@@ -33,7 +33,7 @@ pub const PARAMETERS: [(&str, &str); 16] = [
 
 /// An operator: its form and the values of its coordinates.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(try_from = "Written")]
+#[serde(try_from = "SerializedOperator")]
 pub struct FamilyOperator {
     form: Form,
     neuromuscular: bool,
@@ -42,16 +42,16 @@ pub struct FamilyOperator {
 
 /// An operator as read from a file, before it is checked.
 #[derive(serde::Deserialize)]
-struct Written {
+struct SerializedOperator {
     form: Form,
     neuromuscular: bool,
     coordinates: Vec<f64>,
 }
 
-impl TryFrom<Written> for FamilyOperator {
+impl TryFrom<SerializedOperator> for FamilyOperator {
     type Error = ModelError;
 
-    fn try_from(written: Written) -> Result<Self, ModelError> {
+    fn try_from(written: SerializedOperator) -> Result<Self, ModelError> {
         Self::new(written.form, written.neuromuscular, &written.coordinates)
     }
 }
@@ -95,7 +95,8 @@ pub struct NamedParameter {
 }
 
 impl Form {
-    /// Returns the names of the parameters of an operator with this form, in the order of [`FamilyOperator::named_parameters`].
+    /// Returns the names of the parameters of an operator with this form, in the order of
+    /// [`FamilyOperator::named_parameters`].
     pub fn parameters(self, neuromuscular: bool) -> Vec<&'static str> {
         let any = FamilyOperator {
             form: self,
@@ -149,8 +150,8 @@ impl FamilyOperator {
         })
     }
 
-    /// Creates an operator from the named parameters of its form: a gain (`K`, `K_over_T_I`, `K_e`, `K_I`, `K_d`, `K_m` or
-    /// `K_m_rate`),
+    /// Creates an operator from the named parameters of its form: a gain (`K`, `K_over_T_I`, `K_e`, `K_I`, `K_d`, `K_m`
+    /// or `K_m_rate`),
     /// `T_L`, `T_I`, `omega_nm`, `zeta_nm`, `tau_e`, `c_1`, `c_2`, `alpha`. The operator has a neuromuscular part if
     /// omega_nm or zeta_nm is given. A missing tau_e is zero.
     ///
@@ -286,19 +287,20 @@ impl FamilyOperator {
         all
     }
 
-    /// Returns the parameters of [`FamilyOperator::named_parameters`], each with its derivatives with respect to the coordinates.
+    /// Returns the parameters of [`FamilyOperator::named_parameters`], each with its derivatives with respect to the
+    /// coordinates.
     pub fn named_gradients(&self) -> Vec<(NamedParameter, Vec<f64>)> {
         let x = &self.coordinates;
         let all = self.form.coordinates(self.neuromuscular);
-        let place = |wanted: Coordinate| all.iter().position(|c| *c == wanted);
+        let slot = |wanted: Coordinate| all.iter().position(|c| *c == wanted);
         let with = |parameter: NamedParameter| {
             let mut gradient = vec![0.0; x.len()];
-            match (parameter.coordinate.and_then(place), parameter.coordinate) {
+            match (parameter.coordinate.and_then(slot), parameter.coordinate) {
                 (Some(i), Some(Coordinate::LagRate)) => gradient[i] = -1.0 / (x[i] * x[i]),
                 (Some(i), Some(Coordinate::LogOmega | Coordinate::LogZeta)) => gradient[i] = parameter.value,
                 (Some(i), _) => gradient[i] = 1.0,
                 // The parameter is a quotient or a product of coordinates: K = (K/T_I)/(1/T_I), or K_e_dot = K_e T_L.
-                (None, _) => match (place(Coordinate::LagRate), place(Coordinate::Lead)) {
+                (None, _) => match (slot(Coordinate::LagRate), slot(Coordinate::Lead)) {
                     (Some(i), _) => {
                         gradient[0] = 1.0 / x[i];
                         gradient[i] = -x[0] / (x[i] * x[i]);
@@ -312,9 +314,9 @@ impl FamilyOperator {
         self.named_parameters().into_iter().map(with).collect()
     }
 
-    /// Returns the parameters of [`FamilyOperator::named_parameters`] with their standard errors to first order, from the
-    /// covariance of the coordinates by rows. A standard error is missing if there is no covariance or the parameter is
-    /// infinite.
+    /// Returns the parameters of [`FamilyOperator::named_parameters`] with their standard errors to first order, from
+    /// the covariance of the coordinates by rows. A standard error is missing if there is no covariance or the
+    /// parameter is infinite.
     pub fn named_estimates(&self, covariance: Option<&[f64]>) -> Vec<(NamedParameter, Estimate)> {
         let of = |(parameter, gradient): (NamedParameter, Vec<f64>)| {
             let estimate = match covariance {

@@ -22,7 +22,8 @@ use super::{
     dual::{Dual, PARTIAL_COUNT},
     form::{POWER_COUNT, Rational},
     matrices::{
-        MATRIX_SIZE, Matrix, Vector, characteristic_polynomial, companion, exponential, matrix_vector_product, product,
+        MATRIX_SIZE, Matrix, Vector, characteristic_polynomial, companion_matrix, exponential, matrix_vector_product,
+        product,
     },
     operator::FamilyOperator,
 };
@@ -30,7 +31,7 @@ use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
 
 /// Discrete model `q^-nk B/F` of an operator, with the derivatives of its coefficients.
 #[derive(Debug, Clone, PartialEq)]
-pub struct HeldFamily {
+pub struct ZohFamilyOperator {
     /// Delay of the first coefficient of B, in samples.
     pub nk: usize,
     /// Coefficients of B.
@@ -43,7 +44,7 @@ pub struct HeldFamily {
 }
 
 /// Dynamics of the poles and the delay over one sample, independent of the numerator.
-struct HeldPoles {
+struct ZohPoles {
     /// Numerator omega^2 of the neuromuscular part; `None` without a neuromuscular part.
     gain: Option<Dual>,
     f: Vec<Dual>,
@@ -55,7 +56,7 @@ struct HeldPoles {
     gamma_new: Vector,
 }
 
-impl HeldFamily {
+impl ZohFamilyOperator {
     /// Returns the model with the denominator F whose impulse response, from lag nk on, is `impulse`: `B = F h`.
     pub(super) fn from_impulse_response(nk: usize, impulse: &[Dual], f: &[Dual]) -> Result<Self, ModelError> {
         let order = f.len();
@@ -81,7 +82,7 @@ impl HeldFamily {
 impl FamilyOperator {
     /// Returns three numbers that do not depend on the values of the parameters: the numbers of coefficients of B and
     /// of F in the discrete model, and the difference between nk and the number of whole samples in tau.
-    pub fn held_orders(&self) -> (usize, usize, usize) {
+    pub fn zoh_orders(&self) -> (usize, usize, usize) {
         let order = self.order();
         if self.has_direct_part() {
             (order + 3, order, 0)
@@ -103,7 +104,7 @@ impl FamilyOperator {
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] if an exponential overflows or the delay is too long in samples.
-    pub fn zoh(&self, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
+    pub fn zoh(&self, sample_time: SampleTime) -> Result<ZohFamilyOperator, ModelError> {
         self.zoh_with_delay_samples(whole_samples(self.tau_e_s(), sample_time)?, sample_time)
     }
 
@@ -112,11 +113,15 @@ impl FamilyOperator {
     ///
     /// # Errors
     /// As [`FamilyOperator::zoh`].
-    pub fn zoh_with_delay_samples(&self, sample: usize, sample_time: SampleTime) -> Result<HeldFamily, ModelError> {
+    pub fn zoh_with_delay_samples(
+        &self,
+        sample: usize,
+        sample_time: SampleTime,
+    ) -> Result<ZohFamilyOperator, ModelError> {
         let variables = self.variables();
         let Rational { numerator, .. } = self.form().rational(&variables);
-        let poles = self.held_poles(&variables, sample, sample_time.s());
-        self.held_model(&poles, numerator, sample, sample_time.s())
+        let poles = self.zoh_poles(&variables, sample, sample_time.s());
+        self.zoh_model(&poles, numerator, sample, sample_time.s())
     }
 
     /// Returns exact discrete models with the numerators `s^i`, i from 0 to the degree of the numerator, and with the
@@ -130,16 +135,16 @@ impl FamilyOperator {
         &self,
         sample: usize,
         sample_time: SampleTime,
-    ) -> Result<Vec<HeldFamily>, ModelError> {
-        let poles = self.held_poles(&self.variables(), sample, sample_time.s());
+    ) -> Result<Vec<ZohFamilyOperator>, ModelError> {
+        let poles = self.zoh_poles(&self.variables(), sample, sample_time.s());
         let power = |i: usize| std::array::from_fn(|j| Dual::constant(f64::from(u8::from(i == j))));
         (0..=self.form().degree())
-            .map(|i| self.held_model(&poles, power(i), sample, sample_time.s()))
+            .map(|i| self.zoh_model(&poles, power(i), sample, sample_time.s()))
             .collect()
     }
 
     /// Returns the dynamics of the poles and the delay over one sample.
-    fn held_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> HeldPoles {
+    fn zoh_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> ZohPoles {
         let delay = variables[variables.len() - 1];
         // Time is in samples, which keeps the entries of all matrices at moderate size.
         let delta = delay.scaled(1.0 / ts) - Dual::constant(sample as f64);
@@ -153,15 +158,15 @@ impl FamilyOperator {
             [zero; MATRIX_SIZE],
         );
         if order > 0 {
-            let first = exponential(&companion(&denominator, order), delta);
-            let second = exponential(&companion(&denominator, order), rest);
+            let first = exponential(&companion_matrix(&denominator, order), delta);
+            let second = exponential(&companion_matrix(&denominator, order), rest);
             phi = product(&second, &first, order);
             for i in 0..order {
                 gamma_new[i] = second[i][order];
                 gamma_old[i] = (0..order).fold(zero, |sum, j| sum + second[i][j] * first[j][order]);
             }
         }
-        HeldPoles {
+        ZohPoles {
             gain: self.numerator_gain(variables),
             f: characteristic_polynomial(&phi, order),
             denominator,
@@ -173,13 +178,13 @@ impl FamilyOperator {
     }
 
     /// Returns the model with the given numerator and poles.
-    fn held_model(
+    fn zoh_model(
         &self,
-        poles: &HeldPoles,
+        poles: &ZohPoles,
         numerator: [Dual; POWER_COUNT],
         sample: usize,
         ts: f64,
-    ) -> Result<HeldFamily, ModelError> {
+    ) -> Result<ZohFamilyOperator, ModelError> {
         let (zero, one) = (Dual::constant(0.0), Dual::constant(1.0));
         let order = self.order();
         let numerator = self.scaled_numerator(numerator, poles.gain, ts);
@@ -190,7 +195,7 @@ impl FamilyOperator {
             .collect();
 
         // The impulse response h starts at lag nk and has as many values as B; then B = F h.
-        let (nb, _, shift) = self.held_orders();
+        let (nb, _, shift) = self.zoh_orders();
         let first_dynamic = 1 - shift;
         let mut impulse = vec![zero; nb];
         let mut state = poles.gamma_new;
@@ -212,7 +217,7 @@ impl FamilyOperator {
             impulse[whole] = impulse[whole] + direct * (one - part);
             impulse[whole + 1] = impulse[whole + 1] + direct * part;
         }
-        HeldFamily::from_impulse_response(sample + shift, &impulse, &poles.f)
+        ZohFamilyOperator::from_impulse_response(sample + shift, &impulse, &poles.f)
     }
 
     /// Returns numerator and monic denominator of the operator in ascending powers of `s Ts`.
@@ -394,7 +399,7 @@ mod tests {
             |tau| operator(Form::LeadLag, false, tau),
         ] {
             let border = 9.0 / 60.0;
-            let shifted = |held: HeldFamily| [vec![0.0; held.nk], held.b].concat();
+            let shifted = |held: ZohFamilyOperator| [vec![0.0; held.nk], held.b].concat();
             let below = shifted(operator_at(border - 1e-12).zoh(ts()).unwrap());
             let above = shifted(operator_at(border + 1e-12).zoh(ts()).unwrap());
             for i in 0..below.len().max(above.len()) {

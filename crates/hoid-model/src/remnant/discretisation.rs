@@ -1,6 +1,6 @@
 //! The two discretisations of the remnant filter, each with its pole and gain.
 
-use super::held_numerator::FactoredNumerator;
+use super::zoh_numerator::FactoredNumerator;
 
 /// Lower limit of Ts/T_n for which the filter is computed; the upper limit is the reciprocal of this value.
 pub(super) const MIN_TIME_CONSTANT_RATIO: f64 = 1e-9;

@@ -1,7 +1,7 @@
 //! The remnant filter, its discrete transfer function and its monic noise model.
 
 use super::discretisation::{MIN_TIME_CONSTANT_RATIO, RemnantDiscretisation, backward_gain, denominator};
-use super::held_numerator::{FactoredNumerator, HIGHEST_ORDER, held_numerator};
+use super::zoh_numerator::{FactoredNumerator, HIGHEST_ORDER, zoh_numerator};
 use crate::{DiscreteTransferFunction, ModelError, SampleTime};
 
 /// `K_n / (T_n s + 1)^m`, driven by white noise of unit variance.
@@ -90,7 +90,7 @@ impl RemnantFilter {
         let a = self.time_constant_ratio(sample_time)?;
         let num: Vec<f64> = match how {
             RemnantDiscretisation::ZeroOrderHold => {
-                let numerator = held_numerator(self.order, a);
+                let numerator = zoh_numerator(self.order, a);
                 std::iter::once(0.0)
                     .chain(numerator.iter().map(|n| self.gain * n))
                     .collect()

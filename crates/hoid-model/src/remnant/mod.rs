@@ -26,15 +26,15 @@
 
 mod discretisation;
 mod filter;
-mod held_numerator;
 mod retrieval;
+mod zoh_numerator;
 
 pub use discretisation::RemnantDiscretisation;
 pub(crate) use discretisation::denominator;
 pub use filter::{NoiseModel, RemnantFilter};
-pub(crate) use held_numerator::FactoredNumerator;
-pub use held_numerator::HIGHEST_ORDER;
 pub use retrieval::{RetrievedRemnant, retrieval_jacobian, retrieve};
+pub(crate) use zoh_numerator::FactoredNumerator;
+pub use zoh_numerator::HIGHEST_ORDER;
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! Time constant and gain from an estimated noise model, and their derivatives.
 
 use super::discretisation::{MIN_TIME_CONSTANT_RATIO, RemnantDiscretisation, binomial};
-use super::held_numerator::HIGHEST_ORDER;
+use super::zoh_numerator::HIGHEST_ORDER;
 use crate::{NotConvertible, SampleTime};
 
 /// Time constant and gain retrieved from a noise model.

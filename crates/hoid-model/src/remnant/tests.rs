@@ -1,4 +1,4 @@
-use super::held_numerator::held_numerator;
+use super::zoh_numerator::zoh_numerator;
 use super::*;
 use crate::{
     ContinuousTransferFunction, DiscreteTransferFunction, NotConvertible, SampleTime,
@@ -116,7 +116,7 @@ fn zeros_approach_the_euler_frobenius_zeros() {
         (3, vec![-2.0 - 3f64.sqrt(), -2.0 + 3f64.sqrt()]),
         (4, vec![-5.0 - 24f64.sqrt(), -1.0, -5.0 + 24f64.sqrt()]),
     ] {
-        let zeros = polynomial::roots(&held_numerator(m, 1e-7)).unwrap();
+        let zeros = polynomial::roots(&zoh_numerator(m, 1e-7)).unwrap();
         for (zero, expected) in zeros.iter().zip(expected) {
             // The distance of the zeros from their limits is about a.
             assert!(
@@ -131,7 +131,7 @@ fn zeros_approach_the_euler_frobenius_zeros() {
 fn numerator_sums_to_the_static_gain_for_any_sampling() {
     for m in 1..=4 {
         for a in [1e-9, 1e-3, 0.16, 1.0, 7.999, 8.0, 40.0, 800.0] {
-            let sum: f64 = held_numerator(m, a).iter().sum();
+            let sum: f64 = zoh_numerator(m, a).iter().sum();
             let expected = (-(-a).exp_m1()).powi(m as i32);
             assert!((sum / expected - 1.0).abs() < 2e-14, "{m} {a}: {sum} and {expected}");
         }

@@ -114,7 +114,7 @@ pub struct Decimated {
 impl Decimated {
     /// Returns the description of a decimation by a factor, with its filter and the new sample time; `None` if the
     /// filter would be longer than `longest` samples on each side.
-    pub(super) fn by(factor: usize, old: SampleTime, longest: usize) -> Option<(Self, Kernel, SampleTime)> {
+    pub(super) fn from_factor(factor: usize, old: SampleTime, longest: usize) -> Option<(Self, Kernel, SampleTime)> {
         let kernel = Kernel::for_decimation(1.0 / factor as f64, longest)?;
         let new = SampleTime::new(factor as f64 * old.s()).ok()?;
         let to_hz = 1.0 / new.s();

@@ -22,7 +22,7 @@ const MAX_HALF_LENGTH: usize = 1_000_000;
 /// Decimator of C channels together.
 #[derive(Debug, Clone)]
 pub struct Decimator<const C: usize> {
-    done: Decimated,
+    decimation: Decimated,
     kernel: Kernel,
     sample_time: SampleTime,
     lanes: [DecimatedChannel; C],
@@ -60,7 +60,7 @@ impl<const C: usize> Decimator<C> {
     /// [`ModelError::Decimation`] for an invalid factor.
     pub fn new(factor: usize, sample_time: SampleTime, held: [bool; C]) -> Result<Self, ModelError> {
         let found = (factor > 1)
-            .then(|| Decimated::by(factor, sample_time, MAX_HALF_LENGTH))
+            .then(|| Decimated::from_factor(factor, sample_time, MAX_HALF_LENGTH))
             .flatten();
         let Some((done, kernel, new)) = found else {
             return Err(ModelError::Decimation {
@@ -84,7 +84,7 @@ impl<const C: usize> Decimator<C> {
             }
         };
         Ok(Self {
-            done,
+            decimation: done,
             kernel,
             sample_time: new,
             lanes: held.map(lane),
@@ -95,7 +95,7 @@ impl<const C: usize> Decimator<C> {
 
     /// Returns the description of the decimation.
     pub fn applied_decimation(&self) -> Decimated {
-        self.done
+        self.decimation
     }
 
     /// Returns the new sample time.
@@ -105,7 +105,7 @@ impl<const C: usize> Decimator<C> {
 
     /// Returns the number of old samples between the sample to which the last output belongs and the last input.
     pub fn lag_samples(&self) -> u64 {
-        let at = self.output_count.saturating_sub(1) * self.done.factor as u64;
+        let at = self.output_count.saturating_sub(1) * self.decimation.factor as u64;
         self.input_count.saturating_sub(1).saturating_sub(at)
     }
 
@@ -116,7 +116,8 @@ impl<const C: usize> Decimator<C> {
         numbers
     }
 
-    /// Restores the state saved by [`Decimator::saved_state`]; returns false if the numbers belong to another decimator.
+    /// Restores the state saved by [`Decimator::saved_state`]; returns false if the numbers belong to another
+    /// decimator.
     #[must_use]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let (mut left, mut lacking) = (numbers.iter(), false);
@@ -131,7 +132,7 @@ impl<const C: usize> Decimator<C> {
     pub fn push(&mut self, values: [f64; C]) -> Option<[f64; C]> {
         let (number, factor, half) = (
             self.input_count,
-            self.done.factor as u64,
+            self.decimation.factor as u64,
             self.kernel.samples_per_side(),
         );
         self.input_count += 1;
@@ -211,7 +212,7 @@ impl DecimatedChannel {
 impl<const C: usize> State for Decimator<C> {
     /// The restored numbers may come from any source: counts and indices are limited to values that a stream can reach.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        let (half, factor) = (self.kernel.samples_per_side(), self.done.factor);
+        let (half, factor) = (self.kernel.samples_per_side(), self.decimation.factor);
         let most = 2 * half + 4 * factor + 4;
         self.input_count.visit(each);
         self.output_count.visit(each);

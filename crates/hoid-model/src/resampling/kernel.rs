@@ -11,8 +11,8 @@
 //! around c.
 //!
 //! At integer t this is a linear-phase FIR filter whose delay is compensated; at other t it interpolates, with the same
-//! frequency response. The weights for each t are divided by their sum, so a constant is unchanged. A is [`DESIGN_ATTENUATION_DB`],
-//! which exceeds the documented attenuation [`STOP_BAND_ATTENUATION_DB`] by a margin.
+//! frequency response. The weights for each t are divided by their sum, so a constant is unchanged. A is
+//! [`DESIGN_ATTENUATION_DB`], which exceeds the documented attenuation [`STOP_BAND_ATTENUATION_DB`] by a margin.
 
 use std::f64::consts::PI;
 

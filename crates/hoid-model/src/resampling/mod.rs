@@ -34,13 +34,13 @@
 //! |---|---|
 //! | `kernel` | [`Kernel`]: the filter |
 //! | `decimation` | [`Decimation`]: the factor; [`Decimated`]: the data of an applied decimation |
-//! | `of_record` | decimated records |
+//! | `record_decimation` | decimated records |
 //! | `decimator` | [`Decimator`]: decimation sample by sample, with identical values |
 
 mod decimation;
 mod decimator;
 mod kernel;
-mod of_record;
+mod record_decimation;
 
 pub use decimation::{Decimated, Decimation};
 pub use decimator::Decimator;

@@ -40,7 +40,7 @@ fn max_deviation(values: &[f64], ts: f64, lead: f64, f: impl Fn(f64) -> f64) -> 
 fn sum_of_sines_is_preserved_at_the_new_rate() {
     for hz in [250.0, 1000.0 / 3.0, 500.0, 1000.0, 1024.0, 2000.0] {
         let (n, slow) = ((8.0 * hz) as usize, |t: f64| 3.0 + sum_of_sinusoids(t));
-        let (found, done) = Decimation::Auto.of(record(hz, n, slow, |t| 2.0 * slow(t))).unwrap();
+        let (found, done) = Decimation::Auto.apply(record(hz, n, slow, |t| 2.0 * slow(t))).unwrap();
         let (done, ts) = (done.unwrap(), found.sample_time().s());
         assert!((1.0 / ts - hz / done.factor as f64).abs() < 1e-9);
         let lost = found.len() as f64 * ts * hz - n as f64;
@@ -119,18 +119,18 @@ fn records_that_cannot_be_decimated_are_refused() {
     let short = |n| record(1000.0, n, f64::sin, f64::cos);
     let half = short(2000).decimated(10).unwrap().1.taps / 2;
     for n in [1, 10, half] {
-        let error = Decimation::Auto.of(short(n)).unwrap_err();
+        let error = Decimation::Auto.apply(short(n)).unwrap_err();
         let expected = format!(
-            "decimation of run: found {n} samples for a filter that extends {half} samples to each side, expected a longer record"
+            "decimation of run: found {n} samples, but the filter extends {half} samples to each side, expected a longer record"
         );
         assert!(error.to_string().starts_with(&expected), "{error}");
-        assert!(Decimation::Off.of(short(n)).is_ok());
+        assert!(Decimation::Off.apply(short(n)).is_ok());
     }
     assert_eq!(short(half + 1).decimated(10).unwrap().0.len(), (half + 1) / 10);
     assert!(matches!(short(100).decimated(0), Err(ModelError::Decimation { .. })));
     assert!(short(2000).decimated(usize::MAX).is_err());
     let slow = record(200.0, 50, f64::sin, f64::cos);
-    assert_eq!(Decimation::Auto.of(slow.clone()).unwrap(), (slow, None));
+    assert_eq!(Decimation::Auto.apply(slow.clone()).unwrap(), (slow, None));
     for factor in [0, 1, usize::MAX] {
         assert!(
             Decimator::new(factor, SampleTime::AT_100_HZ, [true]).is_err(),

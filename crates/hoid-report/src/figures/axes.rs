@@ -6,8 +6,8 @@ use kuva::prelude::{Layout, TickFormat};
 
 use super::style;
 
-/// Smallest distance between the ticks of an ordinate, in units of the figure; `MIN_LABELLED_DECADE_HEIGHT` is the smallest height of
-/// a decade with labels at 2 and 5.
+/// Smallest distance between the ticks of an ordinate, in units of the figure; `MIN_LABELLED_DECADE_HEIGHT` is the
+/// smallest height of a decade with labels at 2 and 5.
 const MIN_TICK_SPACING: f64 = 16.0;
 const MIN_LABELLED_DECADE_HEIGHT: f64 = 48.0;
 /// Spacings of phase ticks, deg.
@@ -83,13 +83,13 @@ pub fn with_ordinate(
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SymmetricLogAxis {
     /// Limit of the linear part; the linear part has the height of one decade on either side of zero.
-    pub linear_within: f64,
+    pub linear_limit: f64,
 }
 
 impl SymmetricLogAxis {
     /// Height of a value, in decades.
     pub fn height(self, value: f64) -> f64 {
-        let share = value / self.linear_within;
+        let share = value / self.linear_limit;
         match share.abs() {
             size if size <= 1.0 => share,
             size => (1.0 + size.log10()).copysign(share),
@@ -100,14 +100,14 @@ impl SymmetricLogAxis {
     fn value(self, height: f64) -> f64 {
         match height.abs() {
             0.0 => 0.0,
-            decades => (self.linear_within * 10f64.powf(decades - 1.0)).copysign(height),
+            decades => (self.linear_limit * 10f64.powf(decades - 1.0)).copysign(height),
         }
     }
 
     /// Returns the layout with ticks at the integer decades of a range, on axes that are `height` units high.
     pub fn with_ordinate(self, layout: Layout, (low, high): (f64, f64), height: f64) -> Layout {
         let step = ((high - low) * MIN_TICK_SPACING / height).ceil().max(1.0);
-        let range = (self.linear_within, self.value(low.abs().max(high.abs())));
+        let range = (self.linear_limit, self.value(low.abs().max(high.abs())));
         let format = move |h: f64| match self.value(h.round()) {
             0.0 => "0".to_owned(),
             value if value < 0.0 => format!("-{}", log_tick(-value, range)),
@@ -205,7 +205,7 @@ mod tests {
 
     #[test]
     fn symmetric_log_axis_is_continuous_and_invertible() {
-        let bent = SymmetricLogAxis { linear_within: 10.0 };
+        let bent = SymmetricLogAxis { linear_limit: 10.0 };
         assert_eq!(
             [-1000.0, -10.0, -5.0, 0.0, 10.0, 100.0].map(|v| bent.height(v)),
             [-3.0, -1.0, -0.5, 0.0, 1.0, 2.0]

@@ -241,7 +241,7 @@ impl Curve {
     fn of_truth(truth: &TrueResponse, omega: &[f64]) -> Self {
         let discrete = truth.operator.discretise(truth.sample_time).ok().and_then(|d| {
             let orders = Structure::BoxJenkins.operator_orders(d.nk);
-            let theta = [d.held.b0, d.held.b1, 0.0, d.held.f1, d.held.f2];
+            let theta = [d.zoh.b0, d.zoh.b1, 0.0, d.zoh.f1, d.zoh.f2];
             PolynomialModel::new(Structure::BoxJenkins, orders, truth.sample_time, theta.to_vec()).ok()
         });
         let continuous = truth.operator.transfer_function().ok();

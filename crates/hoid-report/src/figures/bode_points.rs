@@ -93,13 +93,13 @@ impl BodePoints {
     pub(super) fn draw(&self, scene: &mut Scene, scale: &Scale, values: &[Estimate], colour: &str) {
         let mut at = Vec::new();
         for (&omega, value) in self.omega_rad_s.iter().zip(values).filter(|(w, _)| scale.has_x(**w)) {
-            let (x, half) = (scale.place_x(omega), bar_half_length(value));
+            let (x, half) = (scale.map_x(omega), bar_half_length(value));
             let (low, high) = (value.value - half, value.value + half);
             if high < scale.y.0 || low > scale.y.1 {
                 continue;
             }
             if half > 0.0 {
-                let place = |v: f64| scale.place_y(scale.clamp_to_axis(v));
+                let place = |v: f64| scale.map_y(scale.clamp_to_axis(v));
                 scene.add(draw::line((x, place(low)), (x, place(high)), colour, 1.0, None));
                 for end in [low, high].into_iter().filter(|end| scale.clamp_to_axis(*end) == *end) {
                     scene.add(draw::line(
@@ -112,7 +112,7 @@ impl BodePoints {
                 }
             }
             if scale.clamp_to_axis(value.value) == value.value {
-                at.push((x, scale.place_y(value.value)));
+                at.push((x, scale.map_y(value.value)));
             }
         }
         draw::points(scene, &at, MARKER_RADIUS, colour, None);

@@ -63,7 +63,7 @@ pub struct BoxPanel {
     /// The boxes by group and series; statistics without values represent a missing box.
     pub boxes: Vec<Vec<BoxStatistics>>,
     /// Limit up to which the ordinate is linear; it is logarithmic beyond. `None` for a linear ordinate.
-    pub linear_within: Option<f64>,
+    pub linear_limit: Option<f64>,
     /// Text above the panel, such as the largest value that it shows; empty for no text.
     pub note: String,
 }
@@ -92,7 +92,7 @@ pub struct BoxGrid {
     pub with_zero: bool,
     /// Smallest half width of the range of each ordinate, so that rounding errors do not look like scatter; zero for no
     /// limit.
-    pub least_reach: f64,
+    pub min_half_range: f64,
 }
 
 /// Draws box plots as one figure. `title` is the text for screen readers.
@@ -141,8 +141,9 @@ pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
 
 impl BoxPanel {
     fn symmetric_log_axis(&self) -> Option<SymmetricLogAxis> {
-        self.linear_within
-            .map(|linear_within| SymmetricLogAxis { linear_within })
+        self.linear_limit.map(|linear_within| SymmetricLogAxis {
+            linear_limit: linear_within,
+        })
     }
 
     /// Position of a value on the ordinate: the value itself on a linear ordinate, otherwise in decades.
@@ -163,8 +164,8 @@ impl BoxGrid {
         }
         let (low, high) = style::padded_range(values.into_iter().map(|v| panel.height(v)));
         let (middle, reach) = (0.5 * (low + high), 0.5 * (high - low));
-        if reach < self.least_reach {
-            (middle - self.least_reach, middle + self.least_reach)
+        if reach < self.min_half_range {
+            (middle - self.min_half_range, middle + self.min_half_range)
         } else {
             (low, high)
         }
@@ -212,9 +213,9 @@ impl BoxGrid {
         let (mut above, mut below, mut missing) = (0, 0, false);
         for group in 0..self.groups.len() {
             let start = area.left + of_group * (group as f64 + 0.5 * (1.0 - GROUP_WIDTH_SHARE));
-            for (place, series) in self.series.iter().enumerate() {
-                let x = start + pitch * (place as f64 + 0.5);
-                let statistics = panel.boxes.get(group).and_then(|b| b.get(place));
+            for (index, series) in self.series.iter().enumerate() {
+                let x = start + pitch * (index as f64 + 0.5);
+                let statistics = panel.boxes.get(group).and_then(|b| b.get(index));
                 let Some(statistics) = statistics.filter(|b| b.is_drawable()) else {
                     missing = true;
                     draw::cross(scene, (x, area.bottom() - 6.0), half.min(3.0), OUTLINE_COLOUR, 1.0);
@@ -407,7 +408,7 @@ mod tests {
         let [small, large] = [1.0, 1e5].map(|v| BoxStatistics::of(&[v, 1.2 * v, 1.4 * v]));
         let of = |linear_within| {
             let mut grid = grid(vec![vec![small.clone()], vec![large.clone()]]);
-            grid.panels[0].linear_within = linear_within;
+            grid.panels[0].linear_limit = linear_within;
             grid.panels[0].note = "at most 1.4e5".to_owned();
             box_plots("b", "t", &grid)
         };

@@ -15,8 +15,8 @@ use super::{
     style::{BLACK, TEXT_SIZE},
 };
 
-/// Space for the colour bar at the right of the panels; `BAR_WIDTH` is the width of the bar and `STEP_COUNT` the number of its
-/// colour steps.
+/// Space for the colour bar at the right of the panels; `BAR_WIDTH` is the width of the bar and `STEP_COUNT` the number
+/// of its colour steps.
 pub const BAR_SPACE: f64 = 72.0;
 const BAR_WIDTH: f64 = 12.0;
 const STEP_COUNT: usize = 64;

@@ -77,7 +77,7 @@ pub struct CurvePanel {
     /// True for a logarithmic ordinate.
     pub logarithmic: bool,
     /// Range of the ordinate; if `None`, it covers the curves with their bands and error bars.
-    pub within: Option<(f64, f64)>,
+    pub ordinate_range: Option<(f64, f64)>,
     /// The curves, drawn over all bands in this order.
     pub curves: Vec<Curve>,
 }
@@ -215,12 +215,12 @@ impl CurvePanel {
                 .filter(|v| *v > 0.0)
                 .fold(f64::INFINITY, f64::min);
             let reached = self.curves.iter().flat_map(edges).filter(|v| *v > 0.1 * least);
-            return match self.within {
+            return match self.ordinate_range {
                 Some((low, high)) if low > 0.0 && high > low && high.is_finite() => (low, high),
                 _ => log_range(values.iter().copied().chain(reached)),
             };
         }
-        if let Some((low, high)) = self.within.filter(|(l, h)| h > l && (h - l).is_finite()) {
+        if let Some((low, high)) = self.ordinate_range.filter(|(l, h)| h > l && (h - l).is_finite()) {
             return (low, high);
         }
         values.extend(self.curves.iter().flat_map(edges));
@@ -296,10 +296,10 @@ impl Curve {
             if !(low.is_finite() && high.is_finite()) || high < scale.y.0 || low > scale.y.1 {
                 continue;
             }
-            let x = scale.place_x(self.x[k]);
+            let x = scale.map_x(self.x[k]);
             let (from, to) = (
-                scale.place_y(scale.clamp_to_axis(low)),
-                scale.place_y(scale.clamp_to_axis(high)),
+                scale.map_y(scale.clamp_to_axis(low)),
+                scale.map_y(scale.clamp_to_axis(high)),
             );
             scene.add(draw::line((x, from), (x, to), &colour, 1.0, None));
             for (end, y) in [(low, from), (high, to)] {
@@ -319,9 +319,9 @@ impl Curve {
         let mut at = Vec::new();
         for run in runs(n, known) {
             for k in run.clone().filter(|_| has_marker || run.len() == 1) {
-                let (x, y) = (scale.place_x(self.x[k]), scale.place_y(scale.clamp_to_axis(self.y[k])));
+                let (x, y) = (scale.map_x(self.x[k]), scale.map_y(scale.clamp_to_axis(self.y[k])));
                 if self.kind == LineKind::Stems {
-                    let foot = scale.place_y(scale.clamp_to_axis(0.0));
+                    let foot = scale.map_y(scale.clamp_to_axis(0.0));
                     scene.add(draw::line((x, foot), (x, y), &colour, 1.2, None));
                 }
                 if scale.clamp_to_axis(self.y[k]) == self.y[k] {

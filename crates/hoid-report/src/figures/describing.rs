@@ -225,7 +225,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
             bars: Vec::new(),
         };
         let mut coherence = panel("coherence", "", vec![points(&coherences, ""), level]);
-        coherence.within = Some((0.0, 1.05));
+        coherence.ordinate_range = Some((0.0, 1.05));
         panels.push(coherence);
     }
     let grid = CurveGrid {

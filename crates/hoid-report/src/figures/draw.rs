@@ -7,7 +7,7 @@ use kuva::render::{
 
 use super::{
     labels::{Level, parts},
-    palette::Mark,
+    palette::MarkerShape,
     style::{GREY, TEXT_SIZE},
 };
 
@@ -72,15 +72,15 @@ pub fn cross(scene: &mut Scene, (x, y): (f64, f64), half: f64, colour: &str, wid
 }
 
 /// Draws a mark of this shape at a position. Marks of all shapes cover about the same area.
-pub fn mark(scene: &mut Scene, at: (f64, f64), radius: f64, form: Mark, colour: &str) {
+pub fn mark(scene: &mut Scene, at: (f64, f64), radius: f64, form: MarkerShape, colour: &str) {
     let (x, y) = at;
     let (side, tall, wide) = (0.9 * radius, 1.35 * radius, 1.3 * radius);
     match form {
-        Mark::Circle => points(scene, &[at], radius, colour, None),
-        Mark::Square => scene.add(rectangle((x - side, y - side), (2.0 * side, 2.0 * side), colour, None)),
-        Mark::Up => triangle(scene, (x, y - tall), wide, true, colour),
-        Mark::Down => triangle(scene, (x, y + tall), wide, false, colour),
-        Mark::Diamond => {
+        MarkerShape::Circle => points(scene, &[at], radius, colour, None),
+        MarkerShape::Square => scene.add(rectangle((x - side, y - side), (2.0 * side, 2.0 * side), colour, None)),
+        MarkerShape::Up => triangle(scene, (x, y - tall), wide, true, colour),
+        MarkerShape::Down => triangle(scene, (x, y + tall), wide, false, colour),
+        MarkerShape::Diamond => {
             triangle(scene, (x, y - tall), 0.8 * radius, true, colour);
             triangle(scene, (x, y + tall), 0.8 * radius, false, colour);
         }

@@ -1,10 +1,10 @@
 //! Text of labels: symbols of parameters, subscripts and superscripts.
 //!
 //! The drawing library has no subscripts. Subscripts and superscripts are marked by characters of the private use area
-//! of Unicode, which become tags in the finished SVG ([`insert_tags`]). SVG readers differ: some add the shifts of nested
-//! tags, others replace them. Some drop tags without text, trim spaces at the edges of a tag, or position each tag of a
-//! centred text separately. The tags are therefore not nested; each contains text and the full shift from the previous
-//! tag, and leading spaces are non-breaking. `svg` sets the start position of a text with tags.
+//! of Unicode, which become tags in the finished SVG ([`insert_tags`]). SVG readers differ: some add the shifts of
+//! nested tags, others replace them. Some drop tags without text, trim spaces at the edges of a tag, or position each
+//! tag of a centred text separately. The tags are therefore not nested; each contains text and the full shift from the
+//! previous tag, and leading spaces are non-breaking. `svg` sets the start position of a text with tags.
 
 /// Markers in a label for the start and end of a subscript and of a superscript; they become tags.
 const SUB: char = '\u{e000}';

@@ -5,7 +5,7 @@ use kuva::render::render::{Scene, TextAnchor};
 use super::{
     draw,
     labels::label_markup,
-    palette::Mark,
+    palette::MarkerShape,
     style::{LEFT_MARGIN, TEXT_SIZE},
 };
 
@@ -29,7 +29,7 @@ pub enum Sample {
     /// A point.
     Point,
     /// A line with a mark.
-    LineMark(Mark),
+    LineMark(MarkerShape),
     /// A small cross.
     Cross,
     /// A hatched box.

@@ -65,7 +65,7 @@ pub struct MapGrid {
     /// True if each row has its own colour map and colour bar.
     pub bar_per_row: bool,
     /// Meaning of the cross, for the legend; empty for no entry.
-    pub mark: String,
+    pub cross_label: String,
 }
 
 /// Draws maps as one figure. `title` is the text for screen readers.
@@ -123,8 +123,8 @@ pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
         whole.add_bar(&mut scene, frame.area(0).top, frame.area(n - 1).bottom(), &grid.value);
     }
     let mut entries = Vec::new();
-    if !grid.mark.is_empty() && grid.panels.iter().any(|p| p.marked.is_some()) {
-        entries.push(Entry::new(&grid.mark, BLACK, Sample::Cross));
+    if !grid.cross_label.is_empty() && grid.panels.iter().any(|p| p.marked.is_some()) {
+        entries.push(Entry::new(&grid.cross_label, BLACK, Sample::Cross));
     }
     if missing {
         entries.push(Entry::new("no value", BLACK, Sample::Hatched));
@@ -287,7 +287,7 @@ mod tests {
             ordinate: "m^*".to_owned(),
             y_categories: vec!["1".to_owned(), "2".to_owned()],
             value: "VAF (%)".to_owned(),
-            mark: "true order".to_owned(),
+            cross_label: "true order".to_owned(),
             ..MapGrid::default()
         }
     }

@@ -13,7 +13,7 @@ const MIN_LIGHTNESS: f64 = 22.0;
 
 /// Shape of the markers of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mark {
+pub enum MarkerShape {
     Circle,
     Square,
     Up,
@@ -43,8 +43,14 @@ impl Shade {
     }
 
     /// The marker of the level.
-    pub(super) fn mark(self) -> Mark {
-        const MARKS: [Mark; 5] = [Mark::Circle, Mark::Square, Mark::Up, Mark::Diamond, Mark::Down];
+    pub(super) fn mark(self) -> MarkerShape {
+        const MARKS: [MarkerShape; 5] = [
+            MarkerShape::Circle,
+            MarkerShape::Square,
+            MarkerShape::Up,
+            MarkerShape::Diamond,
+            MarkerShape::Down,
+        ];
         MARKS[self.level % MARKS.len()]
     }
 

@@ -6,8 +6,8 @@
 //! side, to include the 1 and 99 % quantiles and the middle part of the bands. If a true value is known and at least
 //! one method is near it, methods far from it do not determine the scale either: the ordinate ends at most two spans
 //! from the true values, where a span is the range of the true values or a quarter of their magnitude, and methods and
-//! batch fits beyond are ignored. Values outside the ordinate are cut off at the axes, and [`TracePanel::rows_beyond_axes`]
-//! counts them.
+//! batch fits beyond are ignored. Values outside the ordinate are cut off at the axes, and
+//! [`TracePanel::rows_beyond_axes`] counts them.
 
 use hoid_numerics::statistics::{finite_quantile, quantile, sorted_finite_values};
 

@@ -10,7 +10,7 @@ use super::{
     frame::{self, Area, Frame, Ordinates},
     labels::{label_markup, panel_label},
     legend::{Entry, Sample, add_legend},
-    palette::Mark,
+    palette::MarkerShape,
     style::{self, BLACK, GREY, TEXT_SIZE},
     svg,
 };
@@ -89,11 +89,17 @@ pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
     }
     let mut entries: Vec<Entry> = match grid.people.len() <= MAX_COLOURED_PEOPLE {
         true => (grid.people.iter().enumerate())
-            .map(|(i, name)| Entry::new(name, &colour(i, grid.people.len()), Sample::LineMark(Mark::Circle)))
+            .map(|(i, name)| {
+                Entry::new(
+                    name,
+                    &colour(i, grid.people.len()),
+                    Sample::LineMark(MarkerShape::Circle),
+                )
+            })
             .collect(),
-        false => vec![Entry::new("a person", GREY, Sample::LineMark(Mark::Circle))],
+        false => vec![Entry::new("a person", GREY, Sample::LineMark(MarkerShape::Circle))],
     };
-    entries.push(Entry::new("mean, 95 %", BLACK, Sample::LineMark(Mark::Diamond)));
+    entries.push(Entry::new("mean, 95 %", BLACK, Sample::LineMark(MarkerShape::Diamond)));
     add_legend(&mut scene, &entries);
     svg::finish(id, title, scene)
 }
@@ -137,7 +143,7 @@ impl PeopleGrid {
     fn draw(&self, scene: &mut Scene, panel: &PeoplePanel, area: Area, (low, high): (f64, f64)) {
         let y_of = |v: f64| area.bottom() - (v.clamp(low, high) - low) / (high - low) * area.height;
         let pitch = area.width / self.categories.len() as f64;
-        let x_of = |place: usize, part: f64| area.left + pitch * (place as f64 + part);
+        let x_of = |index: usize, part: f64| area.left + pitch * (index as f64 + part);
         let n = self.people.len();
         for (i, places) in panel.people.iter().enumerate() {
             let share = if n > 1 { i as f64 / (n - 1) as f64 } else { 0.5 };
@@ -145,12 +151,12 @@ impl PeopleGrid {
             let colour = colour(i, n);
             let drawable = |at: &CategoryEstimate| at.filter(|(v, _)| style::is_drawable(*v));
             let mut last: Option<(f64, f64)> = None;
-            for (place, at) in places.iter().enumerate() {
+            for (index, at) in places.iter().enumerate() {
                 let Some((value, error)) = drawable(at) else {
                     last = None;
                     continue;
                 };
-                let point = (x_of(place, part), y_of(value));
+                let point = (x_of(index, part), y_of(value));
                 if let Some(before) = last {
                     scene.add(draw::line(before, point, &colour, 0.6, Some("3 2")));
                 }
@@ -158,20 +164,20 @@ impl PeopleGrid {
                     let ends = [value - error, value + error].map(|v| (point.0, y_of(v)));
                     scene.add(draw::line(ends[0], ends[1], &colour, 1.0, None));
                 }
-                draw::mark(scene, point, 2.2, Mark::Circle, &colour);
+                draw::mark(scene, point, 2.2, MarkerShape::Circle, &colour);
                 last = Some(point);
             }
         }
-        for (place, mean) in panel.means.iter().enumerate() {
+        for (index, mean) in panel.means.iter().enumerate() {
             let Some((value, (from, to))) = mean.filter(|(v, _)| style::is_drawable(*v)) else {
                 continue;
             };
-            let x = x_of(place, MEAN_POSITION);
+            let x = x_of(index, MEAN_POSITION);
             scene.add(draw::line((x, y_of(from)), (x, y_of(to)), BLACK, 1.4, None));
             for end in [from, to] {
                 scene.add(draw::line((x - 4.0, y_of(end)), (x + 4.0, y_of(end)), BLACK, 1.4, None));
             }
-            draw::mark(scene, (x, y_of(value)), 3.4, Mark::Diamond, OUTLINE_COLOUR);
+            draw::mark(scene, (x, y_of(value)), 3.4, MarkerShape::Diamond, OUTLINE_COLOUR);
         }
     }
 }
@@ -203,7 +209,7 @@ mod tests {
         // The ordinate from 0 to 11 has a margin of 5 %.
         let y = |v: f64| 8.0 + PANEL_HEIGHT * (11.55 - v) / 12.1;
         let width = style::WIDTH - style::LEFT_MARGIN - style::RIGHT_MARGIN;
-        let x = |place: f64, part: f64| style::LEFT_MARGIN + 0.5 * width * (place + part);
+        let x = |index: f64, part: f64| style::LEFT_MARGIN + 0.5 * width * (index + part);
         for (at, v) in [
             (x(0.0, PEOPLE_POSITIONS.0), 0.0),
             (x(1.0, PEOPLE_POSITIONS.0), 10.0),

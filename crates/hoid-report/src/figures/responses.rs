@@ -6,8 +6,8 @@ use super::{
     palette::Shade,
 };
 
-/// Draws the responses to several inputs as one figure; the name of each is the title of its column. `title` is the text
-/// for screen readers.
+/// Draws the responses to several inputs as one figure; the name of each is the title of its column. `title` is the
+/// text for screen readers.
 pub fn responses(id: &str, title: &str, inputs: &[ModelCurve]) -> String {
     let curve = |(k, input): (usize, &ModelCurve), part: usize, y: Vec<f64>| Curve {
         // The name is the title of the column, so the curve has no name.

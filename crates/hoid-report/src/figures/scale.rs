@@ -37,11 +37,11 @@ impl Scale {
         }
     }
 
-    pub fn place_x(&self, x: f64) -> f64 {
+    pub fn map_x(&self, x: f64) -> f64 {
         self.area.left + self.area.width * relative_position(x, self.x, self.log_x)
     }
 
-    pub fn place_y(&self, y: f64) -> f64 {
+    pub fn map_y(&self, y: f64) -> f64 {
         self.area.bottom() - self.area.height * relative_position(y, self.y, self.log_y)
     }
 }
@@ -72,8 +72,8 @@ mod tests {
             log_x: false,
             log_y: true,
         };
-        assert_eq!(scale.place_x(1.0), 35.0);
-        assert!((scale.place_y(10.0) - 45.0).abs() < 1e-12);
+        assert_eq!(scale.map_x(1.0), 35.0);
+        assert!((scale.map_y(10.0) - 45.0).abs() < 1e-12);
         assert_eq!(
             (
                 scale.clamp_to_axis(1e3),

@@ -44,7 +44,7 @@ pub struct TraceGrid {
     /// are shades of the colour of the method.
     pub levels: Vec<String>,
     /// Time spans that are shaded, s.
-    pub shaded_s: Vec<(f64, f64)>,
+    pub shaded_spans_s: Vec<(f64, f64)>,
     /// Times marked by a dotted line, s.
     pub marks_s: Vec<f64>,
     /// Declared changes as time in s and description. Each has a dashed line, which is numbered in the first panel.
@@ -112,7 +112,7 @@ impl TraceGrid {
         (from, to): (f64, f64),
         numbered: bool,
     ) -> kuva::prelude::Layout {
-        for &(start, end) in &self.shaded_s {
+        for &(start, end) in &self.shaded_spans_s {
             let (start, end) = (start.clamp(from, to), end.clamp(from, to));
             if start < end {
                 let region = ShadedRegion::vertical(start, end).with_color(GREY).with_opacity(0.14);
@@ -253,8 +253,8 @@ impl TraceCurve {
         let upper: Vec<f64> = self.band[..n].iter().map(|b| cut(b.1)).collect();
         let band = |run: Range<usize>| -> Plot {
             let kept = thinned_band_points(&lower, &upper, run, parts);
-            let places: Vec<usize> = (0..kept.len()).collect();
-            let needed: Vec<_> = remove_constant_stretches(&places, |i| (kept[i].1, kept[i].2))
+            let indices: Vec<usize> = (0..kept.len()).collect();
+            let needed: Vec<_> = remove_constant_stretches(&indices, |i| (kept[i].1, kept[i].2))
                 .into_iter()
                 .map(|i| kept[i])
                 .collect();

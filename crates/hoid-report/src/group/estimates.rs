@@ -45,7 +45,7 @@ impl GroupReport<'_> {
             let key = |row: &(String, String, String, Vec<String>, f64)| {
                 row.0 == subject[i] && row.1 == condition[i] && row.2 == estimator[i]
             };
-            let place = rows.iter().position(key).unwrap_or_else(|| {
+            let index = rows.iter().position(key).unwrap_or_else(|| {
                 rows.push((
                     subject[i].clone(),
                     condition[i].clone(),
@@ -55,8 +55,8 @@ impl GroupReport<'_> {
                 ));
                 rows.len() - 1
             });
-            rows[place].3[at] = numbers::format_significant(median[i], 4);
-            rows[place].4 = rows[place].4.max(runs[i]);
+            rows[index].3[at] = numbers::format_significant(median[i], 4);
+            rows[index].4 = rows[index].4.max(runs[i]);
         }
         rows.into_iter()
             .map(|(subject, condition, estimator, cells, runs)| context! { subject, condition, estimator, cells, runs => numbers::format_plain(runs) })

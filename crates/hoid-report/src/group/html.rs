@@ -2,7 +2,7 @@
 
 use minijinja::context;
 
-use super::{estimates, over_time, report::GroupReport};
+use super::{estimates, report::GroupReport, time_courses};
 use crate::{ReportError, page};
 
 impl GroupReport<'_> {
@@ -19,7 +19,7 @@ impl GroupReport<'_> {
             "group.html",
             context! {
                 title,
-                settings => page::facts(&self.settings),
+                settings => page::settings_rows(&self.settings),
                 notes => self.notes(),
                 verdict => self.verdict(),
                 unreadable_runs => self.unreadable_runs(),
@@ -32,7 +32,7 @@ impl GroupReport<'_> {
                 margins => self.margins(),
                 agreement => self.agreement(),
                 describing_functions => self.describing_functions(),
-                recursions => over_time::methods(),
+                recursions => time_courses::methods(),
                 settling => self.settling_rows(),
                 figures => self.figures_over_time(),
             },
@@ -45,6 +45,6 @@ impl GroupReport<'_> {
             return Vec::new();
         }
         let all = self.manifest.runs.len();
-        vec![format!("Runs left out (counts = false): {left_out} of {all}.")]
+        vec![format!("Runs excluded (counts = false): {left_out} of {all}.")]
     }
 }

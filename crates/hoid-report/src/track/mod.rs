@@ -3,7 +3,7 @@
 
 mod batch_fits;
 mod coefficients;
-mod evaluated;
+mod evaluated_trace;
 mod panels;
 mod report;
 mod section;

@@ -11,7 +11,7 @@ use hoid_track::{StartSource, Trace};
 
 use super::{
     coefficients::{Coefficient, fit_coefficients, must_join_poles, trace_coefficients},
-    evaluated::{EvaluatedTrace, operator_estimate, operator_names, unit},
+    evaluated_trace::{EvaluatedTrace, operator_estimate, operator_names, unit},
     truth,
 };
 use crate::{
@@ -128,7 +128,7 @@ fn grid(traces: &[EvaluatedTrace<'_>], record: &Record, panels: Vec<TracePanel>)
         panels,
         columns: 1,
         methods: traces.iter().map(|t| t.section.name.clone()).collect(),
-        shaded_s,
+        shaded_spans_s: shaded_s,
         marks_s,
         ..TraceGrid::default()
     }
@@ -162,8 +162,8 @@ pub fn response_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> Option<T
     }
     for omega in &frequencies {
         let response = |trace: &Trace, row: usize| {
-            let place = trace.options().at_rad_s.iter().position(|w| w == omega)?;
-            trace.response(row, place)
+            let index = trace.options().at_rad_s.iter().position(|w| w == omega)?;
+            trace.response(row, index)
         };
         add(format!("|H({omega})|"), "dB", &|trace, row| {
             Some(response(trace, row)?.gain_db())

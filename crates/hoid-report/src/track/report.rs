@@ -6,15 +6,15 @@ use minijinja::{Value, context};
 
 use super::{
     batch_fits::BatchFit,
-    evaluated::EvaluatedTrace,
+    evaluated_trace::EvaluatedTrace,
     panels,
     section::{BatchLine, TraceSection},
     tables,
 };
 use crate::{
-    ReportError, facts,
+    ReportError,
     figures::{self, TraceGrid},
-    fit_summary, page, tables as of_fits,
+    fit_summary, page, settings_pairs, tables as of_fits,
 };
 
 /// Maximum number of traces on a page: more curves cannot be distinguished.
@@ -49,7 +49,7 @@ impl<'a> TrackReport<'a> {
         };
         Self {
             title: format!("{} tracked by {}", tracked.record().label(), options.method.name()),
-            settings: facts(&tracked.data.names, &tracked.settings, &tracked.data.accounts),
+            settings: settings_pairs(&tracked.data.names, &tracked.settings, &tracked.data.accounts),
             record: tracked.record(),
             traces: vec![TraceSection {
                 name: format!("{}, {}", options.method.name(), options.structure.label()),
@@ -83,7 +83,7 @@ impl TrackReport<'_> {
         let values = context! {
             title => self.title.clone(),
             answer => self.verdict.as_ref().map(|v| context! { verdict => fit_summary::verdict(v) }),
-            settings => page::facts(&self.settings),
+            settings => page::settings_rows(&self.settings),
             notes => self.notes.clone(),
             names => self.traces.iter().map(|t| t.name.clone()).collect::<Vec<_>>(),
             has_start => self.traces.iter().any(|t| t.trace.start().is_some()),

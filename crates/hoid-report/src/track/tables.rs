@@ -9,7 +9,7 @@ use minijinja::{Value, context};
 
 use super::{
     coefficients::{Coefficient, fit_coefficients, trace_coefficients},
-    evaluated::{EvaluatedTrace, operator_estimate, operator_names},
+    evaluated_trace::{EvaluatedTrace, operator_estimate, operator_names},
     section::BatchLine,
     truth,
 };

@@ -47,9 +47,9 @@ pub fn coefficients(record: &Record, trace: &Trace) -> Vec<(Coefficient, Vec<f64
                 before = now;
                 held = match now.map(|o| o.discretise(record.sample_time())) {
                     Some(Ok(d)) if d.nk == orders.nk && trace.options().method.track_delay_s().is_none() => {
-                        [d.held.b0, d.held.b1, d.held.f1, d.held.f2]
+                        [d.zoh.b0, d.zoh.b1, d.zoh.f1, d.zoh.f2]
                     }
-                    Some(Ok(d)) => [f64::NAN, f64::NAN, d.held.f1, d.held.f2],
+                    Some(Ok(d)) => [f64::NAN, f64::NAN, d.zoh.f1, d.zoh.f2],
                     _ => [f64::NAN; 4],
                 };
             }

@@ -4,7 +4,8 @@
 //! through the closed loop, to one unit of w at sample 0. The sinusoids of target and disturbance contribute
 //! `V_0 = sum of A^2/2 |u/f|^2` at their frequencies, with the responses of the sampled loop. For a target to which the
 //! person responds with F, `e/f = (1 - P F)/(1 + B P)` and `u/f = (B + F)/(1 + B P)`, where B is the response to the
-//! error. With a response M to motion, `1 + B P` is `1 + (B - M) P` and `e/f` has `M + F` in place of F. All parts are independent, so with shares p_i
+//! error. With a response M to motion, `1 + B P` is `1 + (B - M) P` and `e/f` has `M + F` in place of F. All parts are
+//! independent, so with shares p_i
 //!
 //! `var u = (V_0 + sum of K_j^2 V_j of given gains) / (1 - sum of p_i)`, `K_i^2 = p_i var u / V_i`.
 //!
@@ -13,13 +14,13 @@
 use hoid_model::{
     Complex64, FamilyOperator, ModelError,
     family_scenario::{FamilyScenario, PartStrength},
-    operator_family::HeldFamily,
+    operator_family::ZohFamilyOperator,
     polynomial,
 };
 
 use super::{
-    held_loop::{HeldLoop, Inputs, LoopState, Outputs},
     noise::{Shaping, ShapingState},
+    zoh_loop::{Inputs, LoopState, Outputs, ZohLoop},
 };
 
 /// Initial horizon in samples.
@@ -44,7 +45,7 @@ pub(super) struct Calibration {
 
 impl Calibration {
     pub fn of(
-        held: &HeldLoop,
+        held: &ZohLoop,
         scenario: &FamilyScenario,
         shapings: &[Shaping],
         is_last: bool,
@@ -105,7 +106,7 @@ fn scaled(a: MeanSquares, by: f64) -> MeanSquares {
 }
 
 /// Returns the sums of the squared responses of u, of its steps and of e to one unit of w.
-fn response_energies(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError> {
+fn response_energies(held: &ZohLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError> {
     let mut state = LoopState::at_rest(held, held.longest_delay());
     let mut shaped = ShapingState::at_rest(shaping);
     let (mut total, mut before, mut w) = ([0.0; 3], 0.0, 1.0);
@@ -143,14 +144,14 @@ fn response_energies(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, 
 }
 
 /// Returns the frequency response of a held operator; `backward` is the delay operator of one sample.
-fn held_response(held: &HeldFamily, backward: Complex64) -> Complex64 {
+fn zoh_response(held: &ZohFamilyOperator, backward: Complex64) -> Complex64 {
     let denominator = 1.0 + backward * polynomial::value(&held.f, backward);
     polynomial::value(&held.b, backward) * backward.powu(held.nk as u32) / denominator
 }
 
 /// Returns the mean squares due to target and disturbance.
 fn line_powers(
-    held: &HeldLoop,
+    held: &ZohLoop,
     scenario: &FamilyScenario,
     seen: Option<&FamilyOperator>,
 ) -> Result<MeanSquares, ModelError> {
@@ -172,7 +173,7 @@ fn line_powers(
                 (true, Some(seen)) => {
                     // The preview changes only the phase of F relative to f, which affects e.
                     let shown_s = scenario.feedforward.as_ref().map_or(0.0, |seen| seen.preview_s);
-                    let f = held_response(seen, backward) * Complex64::from_polar(1.0, omega * shown_s);
+                    let f = zoh_response(seen, backward) * Complex64::from_polar(1.0, omega * shown_s);
                     ((1.0 - p * (m + f)) / closed, (y + f) / closed)
                 }
                 (true, None) if scenario.motion.is_some() => ((1.0 - p * m) / closed, y / closed),

@@ -5,7 +5,7 @@
 //!
 //! | file | contents |
 //! |---|---|
-//! | `held_loop` | closed loop with its parameters at one instant, and its simulation over one sample |
+//! | `zoh_loop` | closed loop with its parameters at one instant, and its simulation over one sample |
 //! | `noise` | parts of the remnant |
 //! | `remnant_run` | complete remnant of a run, with the random walk of the stick, sample by sample |
 //! | `calibration` | gains at which each part of the remnant has its share of the variance of u |
@@ -13,11 +13,11 @@
 //! | `operator_run` | [`FamilyOperatorRun`]: the operator alone, sample by sample |
 
 mod calibration;
-mod held_loop;
 mod noise;
 mod operator_run;
 mod remnant_run;
 mod simulator;
+mod zoh_loop;
 
 pub use operator_run::FamilyOperatorRun;
 pub use simulator::{FamilySignals, FamilySimulator};

@@ -6,7 +6,7 @@
 use hoid_model::{
     ModelError, SampleTime,
     family_scenario::{RemnantPart, RemnantShape},
-    held_system::HeldSystem,
+    zoh_system::ZohSystem,
 };
 
 use crate::RunSeed;
@@ -15,7 +15,7 @@ use crate::RunSeed;
 #[derive(Debug, Clone)]
 pub(super) enum Shaping {
     White,
-    Held(HeldSystem),
+    Held(ZohSystem),
     Ar(Vec<f64>),
 }
 
@@ -27,12 +27,12 @@ impl Shaping {
             RemnantShape::Lag { time_constant_s, order } => {
                 let a = 1.0 / time_constant_s;
                 let den = (0..*order).fold(vec![1.0], |den, _| hoid_model::polynomial::product(&den, &[1.0, a]));
-                Self::Held(HeldSystem::new(&[a.powi(*order as i32)], &den, 0.0, sample_time)?)
+                Self::Held(ZohSystem::new(&[a.powi(*order as i32)], &den, 0.0, sample_time)?)
             }
             RemnantShape::Resonance { omega_rad_s, zeta } => {
                 let square = omega_rad_s * omega_rad_s;
                 let den = [1.0, 2.0 * zeta * omega_rad_s, square];
-                Self::Held(HeldSystem::new(&[square], &den, 0.0, sample_time)?)
+                Self::Held(ZohSystem::new(&[square], &den, 0.0, sample_time)?)
             }
         })
     }
@@ -83,7 +83,7 @@ impl ShapingState {
     }
 
     /// Returns the state as numbers.
-    pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
+    pub fn state_mut(&mut self) -> impl Iterator<Item = &mut f64> {
         self.state.iter_mut()
     }
 }
@@ -101,7 +101,7 @@ pub(super) fn driving_noise(part: &RemnantPart, run: RunSeed, index: u64, ts_s: 
         let chance = (pulses.rate_per_s * ts_s).min(1.0);
         let heights = run.white_noise_with_tag(PART_STREAM_TAG + 4 * index + 1, samples);
         let places = run.uniform_with_tag(PART_STREAM_TAG + 4 * index + 2, samples);
-        let (steady, size) = ((1.0 - pulses.part).sqrt(), (pulses.part / chance).sqrt());
+        let (steady, size) = ((1.0 - pulses.share).sqrt(), (pulses.share / chance).sqrt());
         for ((w, height), place) in w.iter_mut().zip(heights).zip(places) {
             *w = steady * *w + if place < chance { size * height } else { 0.0 };
         }

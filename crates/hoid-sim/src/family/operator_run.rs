@@ -7,8 +7,8 @@
 //! the loop. The control at a sample
 //! must not depend on the error of the same sample.
 
-use super::{FamilySimulator, held_loop::HeldLoop, remnant_run::RemnantRun};
-use crate::{RunSeed, SimError, held_operator::OperatorState, operator_run::saved_sample};
+use super::{FamilySimulator, remnant_run::RemnantRun, zoh_loop::ZohLoop};
+use crate::{RunSeed, SimError, operator_run::saved_sample, zoh_operator::OperatorState};
 
 /// Running operator of a scenario of the family.
 #[derive(Debug, Clone)]
@@ -53,13 +53,13 @@ impl FamilyOperatorRun {
         })
     }
 
-    fn held_loop(&self) -> &HeldLoop {
+    fn current_loop(&self) -> &ZohLoop {
         self.simulator.loop_at(self.k)
     }
 
     /// Returns the control u of the next sample in deg.
     pub fn control(&self) -> f64 {
-        self.held_loop().operator.output(&self.operator).known + self.n
+        self.current_loop().operator.output(&self.operator).delayed_response + self.n
     }
 
     /// Returns the remnant n of the next sample in deg, including the bias and the random walk of the stick.
@@ -74,7 +74,7 @@ impl FamilyOperatorRun {
         held.advance(&mut self.operator, answer, e);
         let (scenario, remnants) = (&self.simulator.scenario, &self.simulator.remnants);
         self.remnant
-            .update_control(scenario, remnants, self.k, answer.known + self.n);
+            .update_control(scenario, remnants, self.k, answer.delayed_response + self.n);
         self.k += 1;
         self.n = self.remnant.next(scenario, remnants, self.k);
     }
@@ -84,28 +84,28 @@ impl FamilyOperatorRun {
         let own_state = [self.k as f64, self.n];
         own_state
             .into_iter()
-            .chain(self.numbers().map(|number| *number))
+            .chain(self.state_mut().map(|number| *number))
             .collect()
     }
 
-    /// Restores the state that [`FamilyOperatorRun::saved_state`] returned for an operator with the same scenario and run, so
-    /// it continues with bit-identical results. Returns false, without any change, if the numbers belong to another
-    /// operator.
+    /// Restores the state that [`FamilyOperatorRun::saved_state`] returned for an operator with the same scenario and
+    /// run, so it continues with bit-identical results. Returns false, without any change, if the numbers belong to
+    /// another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
             return false;
         };
-        let is_ours = rest.len() == self.numbers().count();
+        let is_ours = rest.len() == self.state_mut().count();
         let Some(k) = saved_sample(k).filter(|_| is_ours) else {
             return false;
         };
         (self.k, self.n) = (k, n);
-        self.numbers().zip(rest).for_each(|(number, saved)| *number = *saved);
+        self.state_mut().zip(rest).for_each(|(number, saved)| *number = *saved);
         true
     }
 
-    fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
-        self.operator.numbers().chain(self.remnant.numbers())
+    fn state_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        self.operator.state_mut().chain(self.remnant.state_mut())
     }
 }
 
@@ -115,7 +115,7 @@ mod tests {
     use hoid_model::{
         ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, SampleTime,
         family_scenario::{
-            Followed, Intermittence, MultiSine, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick,
+            DependenceSignal, Intermittence, MultiSine, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick,
         },
         schedule::Schedule,
     };
@@ -158,22 +158,22 @@ mod tests {
             order: 2,
         };
         let following = |follows| SignalDependence {
-            follows,
-            part: 0.7,
+            signal: follows,
+            share: 0.7,
             memory_s: 0.5,
         };
         scenario.remnant = vec![
             RemnantPart {
-                signal_dependence: Some(following(Followed::Control)),
+                signal_dependence: Some(following(DependenceSignal::Control)),
                 ..RemnantPart::new(lag, 0.1)
             },
             RemnantPart {
-                signal_dependence: Some(following(Followed::Rate)),
+                signal_dependence: Some(following(DependenceSignal::Rate)),
                 ..RemnantPart::new(RemnantShape::White, 0.02)
             },
             RemnantPart {
                 pulses: Some(Pulses {
-                    part: 0.4,
+                    share: 0.4,
                     rate_per_s: 3.0,
                 }),
                 ..RemnantPart::new(

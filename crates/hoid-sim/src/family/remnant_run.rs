@@ -5,7 +5,7 @@
 //! [`noise`](super::noise). In a signal-dependent part, a fraction of the variance of w_i is proportional to the
 //! running mean square of the signal on which it depends. The remnant is known before the control of the same sample.
 
-use hoid_model::family_scenario::{Followed, ResolvedFamilyScenario};
+use hoid_model::family_scenario::{DependenceSignal, ResolvedFamilyScenario};
 
 use super::{
     calibration::Calibration,
@@ -47,14 +47,14 @@ fn sample_count_of(scenario: &ResolvedFamilyScenario) -> usize {
 pub(super) struct RemnantRun {
     run: RunSeed,
     /// Input of each part, from the first sample of the run-in to the last sample drawn.
-    driven: Vec<Vec<f64>>,
+    inputs: Vec<Vec<f64>>,
     /// Steps of the random walk of the stick, for the same samples.
-    steps: Vec<f64>,
-    shaped: Vec<ShapingState>,
+    stick_steps: Vec<f64>,
+    shaping_states: Vec<ShapingState>,
     /// Running mean square of the signal on which each part depends, relative to the mean square of this signal over
     /// the run.
-    followed: Vec<f64>,
-    forgets: Vec<f64>,
+    mean_squares: Vec<f64>,
+    forgetting_factors: Vec<f64>,
     walk: f64,
     /// Control at the previous sample.
     before: f64,
@@ -70,11 +70,11 @@ impl RemnantRun {
         });
         let mut new = Self {
             run,
-            driven: Vec::new(),
-            steps: Vec::new(),
-            shaped: of.shapings.iter().map(ShapingState::at_rest).collect(),
-            followed: vec![1.0; of.shapings.len()],
-            forgets: forgets.collect(),
+            inputs: Vec::new(),
+            stick_steps: Vec::new(),
+            shaping_states: of.shapings.iter().map(ShapingState::at_rest).collect(),
+            mean_squares: vec![1.0; of.shapings.len()],
+            forgetting_factors: forgets.collect(),
             walk: scenario.stick.bias,
             before: 0.0,
         };
@@ -85,16 +85,16 @@ impl RemnantRun {
     /// Draws the random numbers for at least the given number of samples. The random numbers of a sample do not depend
     /// on how many samples are drawn.
     fn draw(&mut self, scenario: &ResolvedFamilyScenario, samples: usize) {
-        if samples <= self.steps.len() {
+        if samples <= self.stick_steps.len() {
             return;
         }
         let scenario = scenario.scenario();
         let ts_s = scenario.sample_time.s();
-        self.driven = (0..)
+        self.inputs = (0..)
             .zip(&scenario.remnant)
             .map(|(i, part)| driving_noise(part, self.run, i, ts_s, samples))
             .collect();
-        self.steps = if scenario.stick.walk_per_root_s == 0.0 {
+        self.stick_steps = if scenario.stick.walk_per_root_s == 0.0 {
             vec![0.0; samples]
         } else {
             self.run.white_noise_with_tag(STICK_STREAM_TAG, samples)
@@ -105,16 +105,16 @@ impl RemnantRun {
     #[inline]
     pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
         // The remnant continues after the end of the scenario.
-        if k >= self.steps.len() {
+        if k >= self.stick_steps.len() {
             self.draw(scenario, 2 * k + 1);
         }
         let mut n = self.walk;
         for (i, part) in scenario.scenario().remnant.iter().enumerate() {
-            let mut w = self.driven[i][k];
+            let mut w = self.inputs[i][k];
             if let Some(own) = part.signal_dependence {
-                w *= (1.0 - own.part + own.part * self.followed[i]).sqrt();
+                w *= (1.0 - own.share + own.share * self.mean_squares[i]).sqrt();
             }
-            n += of.calibrated_value(scenario, k, |c| c.gains[i]) * self.shaped[i].step(&of.shapings[i], w);
+            n += of.calibrated_value(scenario, k, |c| c.gains[i]) * self.shaping_states[i].step(&of.shapings[i], w);
         }
         n
     }
@@ -126,27 +126,27 @@ impl RemnantRun {
         self.draw(scenario, k + 1);
         for (i, part) in scenario.scenario().remnant.iter().enumerate() {
             if let Some(own) = part.signal_dependence {
-                let (square, mean) = match own.follows {
-                    Followed::Control => (u * u, of.calibrated_value(scenario, k, |c| c.mean_squares[0])),
-                    Followed::Rate => (
+                let (square, mean) = match own.signal {
+                    DependenceSignal::Control => (u * u, of.calibrated_value(scenario, k, |c| c.mean_squares[0])),
+                    DependenceSignal::Rate => (
                         (u - self.before).powi(2),
                         of.calibrated_value(scenario, k, |c| c.mean_squares[1]),
                     ),
                 };
-                self.followed[i] += self.forgets[i] * (square / mean - self.followed[i]);
+                self.mean_squares[i] += self.forgetting_factors[i] * (square / mean - self.mean_squares[i]);
             }
         }
         self.before = u;
         let scenario = scenario.scenario();
-        self.walk += scenario.stick.walk_per_root_s * scenario.sample_time.s().sqrt() * self.steps[k];
+        self.walk += scenario.stick.walk_per_root_s * scenario.sample_time.s().sqrt() * self.stick_steps[k];
     }
 
     /// Returns the state as numbers.
-    pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
-        let shaped = self.shaped.iter_mut().flat_map(ShapingState::numbers);
+    pub fn state_mut(&mut self) -> impl Iterator<Item = &mut f64> {
+        let shaped = self.shaping_states.iter_mut().flat_map(ShapingState::state_mut);
         [&mut self.walk, &mut self.before]
             .into_iter()
-            .chain(&mut self.followed)
+            .chain(&mut self.mean_squares)
             .chain(shaped)
     }
 }

@@ -1,7 +1,7 @@
 //! Prepared scenario of the family, and its runs.
 //!
 //! Parameters that change follow the sigmoid at each sample, with the exact hold for these values
-//! ([`held_loop`](super::held_loop)). The gains of the remnant are computed for the initial and the final state and
+//! ([`zoh_loop`](super::zoh_loop)). The gains of the remnant are computed for the initial and the final state and
 //! follow the same sigmoid. The random numbers of a run are identified by its [`RunSeed`]; each part of the remnant,
 //! the stick, and the phases of target and disturbance have separate streams.
 
@@ -16,9 +16,9 @@ use hoid_model::{
 
 use super::{
     calibration::Calibration,
-    held_loop::{HeldLoop, Inputs, LoopState},
     noise::Shaping,
     remnant_run::{RemnantRun, Remnants},
+    zoh_loop::{Inputs, LoopState, ZohLoop},
 };
 use crate::{
     RunSeed, SimError,
@@ -30,12 +30,12 @@ use crate::{
 pub struct FamilySimulator {
     pub(super) scenario: ResolvedFamilyScenario,
     /// Held loops, each with the state of the scenario to which it belongs.
-    loops: Vec<(FamilyState, HeldLoop)>,
+    loops: Vec<(FamilyState, ZohLoop)>,
     /// Index in `loops` for each sample; empty if all samples have the same loop.
-    places: Vec<usize>,
+    loop_indices: Vec<usize>,
     pub(super) remnants: Remnants,
     /// Response to the target; `None` if the person does not see it.
-    seen: Option<TargetResponse>,
+    target_response: Option<TargetResponse>,
 }
 
 /// Signals of one run, including the run-in.
@@ -66,14 +66,14 @@ impl FamilySimulator {
     pub fn new(scenario: &FamilyScenario) -> Result<Self, SimError> {
         let resolved = scenario.resolve()?;
         let ts = scenario.sample_time;
-        let held = |state: &FamilyState, delay| -> Result<HeldLoop, SimError> {
+        let held = |state: &FamilyState, delay| -> Result<ZohLoop, SimError> {
             let felt = resolved.motion_in(state)?;
-            Ok(HeldLoop::new(state, delay, felt.as_ref(), scenario.realisation, ts)?)
+            Ok(ZohLoop::new(state, delay, felt.as_ref(), scenario.realisation, ts)?)
         };
         let samples = resolved.run_in_samples() + resolved.measurement_samples();
         let changes = scenario.schedule.change_s().is_some()
             && (scenario.initial != scenario.last || resolved.feedforward_changes());
-        let mut loops: Vec<(FamilyState, HeldLoop)> = Vec::new();
+        let mut loops: Vec<(FamilyState, ZohLoop)> = Vec::new();
         let mut places = Vec::new();
         for k in 0..if changes { samples } else { 1 } {
             let t_s = resolved.time_s(k);
@@ -115,8 +115,8 @@ impl FamilySimulator {
         Ok(Self {
             scenario: resolved,
             loops,
-            places,
-            seen,
+            loop_indices: places,
+            target_response: seen,
             remnants: Remnants {
                 shapings,
                 calibrations: [initial, last],
@@ -150,9 +150,14 @@ impl FamilySimulator {
 
     /// Returns the loop at sample `k`. After the end of the scenario it is the loop at the last sample.
     #[inline]
-    pub(super) fn loop_at(&self, k: usize) -> &HeldLoop {
-        let place = self.places.get(k).or(self.places.last()).copied().unwrap_or(0);
-        &self.loops[place].1
+    pub(super) fn loop_at(&self, k: usize) -> &ZohLoop {
+        let index = self
+            .loop_indices
+            .get(k)
+            .or(self.loop_indices.last())
+            .copied()
+            .unwrap_or(0);
+        &self.loops[index].1
     }
 
     /// Returns the longest delay in whole samples.
@@ -226,12 +231,12 @@ impl FamilySimulator {
     /// Returns the response of the person to a visible target, from rest; empty if the target is not visible.
     fn response_to_target(&self, run: RunSeed) -> Result<Vec<f64>, SimError> {
         let scenario = self.scenario.scenario();
-        let Some(seen) = &self.seen else {
+        let Some(seen) = &self.target_response else {
             return Ok(Vec::new());
         };
         let shown_s = self.scenario.time_s(0) + seen.preview_s();
         let target = forcing_with_phases(&scenario.target, run, TARGET_PHASE_TAG)?;
-        Ok(seen.of(&target.samples(shown_s, scenario.sample_time, self.sample_count()))?)
+        Ok(seen.respond(&target.samples(shown_s, scenario.sample_time, self.sample_count()))?)
     }
 
     /// Returns one run as a record, from the start of the measurement or, with `keep_run_in`, of the run-in: e, u, d,
@@ -256,7 +261,7 @@ impl FamilySimulator {
         }
         for (name, values) in others {
             let channel = channel(name, values);
-            record = record.with_channel(match &self.seen {
+            record = record.with_channel(match &self.target_response {
                 Some(seen) if name == "f_t" => seen.target(channel),
                 _ if name == "y" && scenario.motion.is_some() => channel.with_role("motion"),
                 _ => channel,
@@ -279,7 +284,7 @@ impl FamilySimulator {
             .map(|(state, _)| state.operator.named_parameters())
             .collect();
         for (i, parameter) in named[0].iter().enumerate() {
-            let value = |k: usize| named[self.places.get(k).copied().unwrap_or(0)][i].value;
+            let value = |k: usize| named[self.loop_indices.get(k).copied().unwrap_or(0)][i].value;
             let values: Vec<f64> = (first..self.sample_count()).map(value).collect();
             if values.iter().all(|v| v.is_finite()) {
                 record = record.with_channel(Channel::new(parameter.name, parameter.unit, values))?;
@@ -289,7 +294,7 @@ impl FamilySimulator {
         let felt = felt.map(|felt| response_parameters(felt, 0.0));
         let felt = felt.map(|named| true_parameter_channels("y", (first, self.sample_count()), |_| &named));
         let seen = self
-            .seen
+            .target_response
             .iter()
             .flat_map(|seen| seen.true_parameters(first, self.sample_count()));
         for channel in seen.chain(felt.into_iter().flatten()) {

@@ -207,8 +207,8 @@ impl Plant {
         }
     }
 
-    /// Returns target and disturbance of a task with a displayed target: the multi-sine of [`Plant::disturbance`], whose
-    /// primes are used alternately by target and disturbance.
+    /// Returns target and disturbance of a task with a displayed target: the multi-sine of [`Plant::disturbance`],
+    /// whose primes are used alternately by target and disturbance.
     pub fn interleaved_excitations(self) -> [MultiSine; 2] {
         [Interleaved::Even, Interleaved::Odd].map(|interleaved| MultiSine {
             interleaved,

@@ -4,7 +4,9 @@
 //! remnant), a peak at the omega_nm of the person with a damping ratio of 0.15 to 0.4 (20 %), and a drift
 //! `1/(T_n s + 1)` with T_n = 3 to 10 s (10 %). [`hoid_model::family_scenario`] describes the kinds and their sources.
 
-use hoid_model::family_scenario::{Followed, Intermittence, Pulses, RemnantPart, RemnantShape, SignalDependence};
+use hoid_model::family_scenario::{
+    DependenceSignal, Intermittence, Pulses, RemnantPart, RemnantShape, SignalDependence,
+};
 
 use super::population::Range;
 
@@ -52,15 +54,15 @@ impl RemnantKind {
             Self::Lag | Self::BroadBand => band,
             Self::SignalDependent => RemnantPart {
                 signal_dependence: Some(SignalDependence {
-                    follows: Followed::Control,
-                    part: 0.8,
+                    signal: DependenceSignal::Control,
+                    share: 0.8,
                     memory_s: 1.0,
                 }),
                 ..band
             },
             Self::Pulsed => RemnantPart {
                 pulses: Some(Pulses {
-                    part: 0.8,
+                    share: 0.8,
                     rate_per_s: 2.0,
                 }),
                 ..band

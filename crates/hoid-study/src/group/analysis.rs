@@ -1,9 +1,9 @@
 //! Analysis of the runs of a person in a condition, jointly and one by one.
 //!
 //! First, all runs of a person in a condition are analysed together. If the task does not change within them, the
-//! family of operators is fitted jointly to all of them ([`hoid_ident::family_estimator`]), which gives the operator of the
-//! person. The orders and delay of the polynomial models (nk, and for Box-Jenkins nd and T_n) are also chosen once for
-//! all of these runs (`run_orders`). In addition, a Box-Jenkins model is fitted to all runs, with separate initial
+//! family of operators is fitted jointly to all of them ([`hoid_ident::family_estimator`]), which gives the operator of
+//! the person. The orders and delay of the polynomial models (nk, and for Box-Jenkins nd and T_n) are also chosen once
+//! for all of these runs (`run_orders`). In addition, a Box-Jenkins model is fitted to all runs, with separate initial
 //! states for each run, the best-fitting delay, and the highest order of the noise model that the manifest allows. In a
 //! closed loop, a noise model of too low an order biases the operator, and a single run is too short for a high order.
 //!

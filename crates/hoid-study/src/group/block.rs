@@ -37,7 +37,10 @@ pub(super) fn blocks(manifest: &Manifest) -> Vec<Block<'_>> {
         }
     }
     for cell in &mut cells {
-        let change_s = manifest.conditions.get(cell.key().1).and_then(|facts| facts.change_s);
+        let change_s = manifest
+            .conditions
+            .get(cell.key().1)
+            .and_then(|settings| settings.change_s);
         cell.changes = match (change_s, cell.runs.iter().any(|run| run.then.is_some())) {
             (Some(at), _) => Some(format!("the task changes within the runs, at {at} s")),
             (None, true) => Some("the task changes where the files are joined".to_owned()),

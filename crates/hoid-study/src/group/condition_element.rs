@@ -85,14 +85,14 @@ impl ConditionElement {
                     ));
                 }
                 for condition in own {
-                    let facts = manifest.conditions.entry(condition.clone()).or_default();
-                    facts.controlled_element = Some(one.element.clone());
+                    let settings = manifest.conditions.entry(condition.clone()).or_default();
+                    settings.controlled_element = Some(one.element.clone());
                     if let Some(change) = &one.change {
-                        facts.changes_to = Some(change.to.clone());
-                        facts.change_s = Some(change.at_s);
-                        facts.change_per_s = change.per_s;
+                        settings.changes_to = Some(change.to.clone());
+                        settings.change_s = Some(change.at_s);
+                        settings.change_per_s = change.per_s;
                     }
-                    facts
+                    settings
                         .check_elements()
                         .map_err(|reason| format!("{condition}: {reason}"))?;
                 }
@@ -124,11 +124,11 @@ mod tests {
     #[test]
     fn elements_and_changes_are_applied_to_conditions() {
         let found = apply_elements(&["C1-*=90/(s(s+6))", "C3-roll=90/(s(s+6)) > 30/(s(s+.2)) @ 50 : 0.5"]).unwrap();
-        let facts = |name: &str| found.conditions.get(name).unwrap();
+        let settings = |name: &str| found.conditions.get(name).unwrap();
         for name in ["C1-roll", "C1-pitch"] {
-            assert_eq!(facts(name).constant_element(), Some("90/(s(s+6))"));
+            assert_eq!(settings(name).constant_element(), Some("90/(s(s+6))"));
         }
-        let changing = facts("C3-roll");
+        let changing = settings("C3-roll");
         assert_eq!(changing.constant_element(), None);
         assert_eq!((changing.change_s, changing.change_per_s), (Some(50.0), Some(0.5)));
         assert_eq!(changing.changes_to.as_deref(), Some("30/(s(s+.2))"));

@@ -25,14 +25,14 @@ pub(super) fn identification(
     condition: &str,
     rows: &RunRows<'_>,
 ) -> Result<Identification, String> {
-    let facts = &rows.condition;
+    let condition_settings = &rows.condition;
     Ok(Identification {
         estimator: FamilyEstimator {
-            channels: facts.channels()?,
+            channels: condition_settings.channels()?,
             ..manifest.analysis.family_estimator()?
         },
-        excitation: (facts.excitation.clone()).map_or(Excitation::Nothing, Excitation::IfRecorded),
-        period_s: facts.period_s,
+        excitation: (condition_settings.excitation.clone()).map_or(Excitation::Nothing, Excitation::IfRecorded),
+        period_s: condition_settings.period_s,
         faults: manifest.read.faults.handling(),
         rate: manifest.rate_decimation(condition)?,
         controlled_element: rows.element().cloned(),

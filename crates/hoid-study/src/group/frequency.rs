@@ -85,7 +85,10 @@ struct Tables {
 /// Computes the describing functions of all subjects and conditions with an excitation, and the distances of the fits
 /// from them; `None` if the manifest names no excitation.
 pub(super) fn frequency_tables(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<FrequencyTables> {
-    manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
+    manifest
+        .conditions
+        .values()
+        .find(|settings| settings.excitation.is_some())?;
     let with_errors: Vec<String> = MARGIN_COLUMNS
         .iter()
         .flat_map(|name| [(*name).to_owned(), format!("{name}_se")])
@@ -108,10 +111,10 @@ pub(super) fn frequency_tables(manifest: &Manifest, base: &Path, fits: &Response
     let mut known: Vec<(&str, &str)> = Vec::new();
     for run in manifest.runs.iter().filter(|run| run.counts) {
         let key = (run.subject.as_str(), run.condition.as_str());
-        let Some(facts) = manifest
+        let Some(settings) = manifest
             .conditions
             .get(&run.condition)
-            .filter(|facts| facts.excitation.is_some())
+            .filter(|settings| settings.excitation.is_some())
         else {
             continue;
         };
@@ -129,7 +132,7 @@ pub(super) fn frequency_tables(manifest: &Manifest, base: &Path, fits: &Response
         // A ratio of Fourier coefficients does not include the hold, so the corresponding shift of the input is
         // reversed.
         let late_samples = runs.first().map_or(0.0, |run| {
-            run.run_samples(facts.offset_samples) + run.input_lead_s / run.record.sample_time().s()
+            run.run_samples(settings.offset_samples) + run.input_lead_s / run.record.sample_time().s()
         });
         let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
         let margins = &mut tables.margins;
@@ -137,7 +140,7 @@ pub(super) fn frequency_tables(manifest: &Manifest, base: &Path, fits: &Response
         margins.set_text("subject", key.0);
         margins.set_text("condition", key.1);
         margins.set_real("runs", records.len() as f64);
-        match write_describing_function(&records, (facts, late_samples), key, fits, &mut tables) {
+        match write_describing_function(&records, (settings, late_samples), key, fits, &mut tables) {
             Ok(()) => tables.margins.set_text("status", "ok"),
             Err(reason) => {
                 tables.margins.set_text("status", "failed");
@@ -154,7 +157,7 @@ pub(super) fn frequency_tables(manifest: &Manifest, base: &Path, fits: &Response
 
 fn write_describing_function(
     records: &[Record],
-    (facts, offset_samples): (&ConditionSettings, f64),
+    (settings, offset_samples): (&ConditionSettings, f64),
     (subject, condition): (&str, &str),
     fits: &ResponseAverages,
     tables: &mut Tables,
@@ -167,14 +170,14 @@ fn write_describing_function(
     if records.is_empty() {
         return Err("no run could be read".to_owned());
     }
-    let element = facts.constant_element();
+    let element = settings.constant_element();
     let element: Option<ContinuousTransferFunction> = element
         .map(str::parse)
         .transpose()
         .map_err(|error: ModelError| error.to_string())?;
     let options = DescriptionOptions {
-        excitation: facts.excitation.clone(),
-        period_s: facts.period_s,
+        excitation: settings.excitation.clone(),
+        period_s: settings.period_s,
         controlled_element: element.clone(),
         offset_samples,
         // The trend was already removed when the runs were read.
@@ -254,7 +257,7 @@ fn write_describing_function(
             }
         }
         let verdict = if agrees { "yes" } else { "no" };
-        agreement.set_text("agrees", if facts.change_s.is_some() { "" } else { verdict });
+        agreement.set_text("agrees", if settings.change_s.is_some() { "" } else { verdict });
     }
     Ok(())
 }

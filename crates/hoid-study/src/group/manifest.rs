@@ -178,8 +178,8 @@ impl Manifest {
             }
         }
         for run in self.runs.iter().filter(|run| run.then.is_some()) {
-            if let Some(facts) = self.conditions.get(&run.condition)
-                && (facts.excitation.is_some() || facts.change_s.is_some())
+            if let Some(condition_settings) = self.conditions.get(&run.condition)
+                && (condition_settings.excitation.is_some() || condition_settings.change_s.is_some())
             {
                 return Err(format!(
                     "run {} of {} is joined from two files, but [conditions.{}] names an excitation or change_s: leave \
@@ -188,10 +188,10 @@ impl Manifest {
                 ));
             }
         }
-        for (name, facts) in &self.conditions {
-            facts
+        for (name, condition_settings) in &self.conditions {
+            condition_settings
                 .check_elements()
-                .and_then(|()| facts.channels().map(|_| ()))
+                .and_then(|()| condition_settings.channels().map(|_| ()))
                 .map_err(|reason| format!("[conditions.{name}]: {reason}"))?;
         }
         self.prepare
@@ -263,7 +263,10 @@ impl Manifest {
     /// # Errors
     /// The invalid key, and the reason.
     pub fn preparation(&self, condition: &str) -> Result<Preparation, String> {
-        let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
+        let of_condition = self
+            .conditions
+            .get(condition)
+            .and_then(|condition_settings| condition_settings.prepare.as_ref());
         self.prepare.preparation(of_condition)
     }
 
@@ -272,7 +275,10 @@ impl Manifest {
     /// # Errors
     /// As [`Manifest::preparation`].
     pub fn rate_decimation(&self, condition: &str) -> Result<Decimation, String> {
-        let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
+        let of_condition = self
+            .conditions
+            .get(condition)
+            .and_then(|condition_settings| condition_settings.prepare.as_ref());
         self.prepare.rate_decimation(of_condition)
     }
 
@@ -289,9 +295,9 @@ impl Manifest {
                 let file = run.file.display();
                 return Err(format!("{file} has no condition: include {{condition}} in --pattern"));
             }
-            let facts = self.conditions.entry(run.condition.clone()).or_default();
-            facts.roles = roles.to_vec();
-            facts.channels()?;
+            let condition_settings = self.conditions.entry(run.condition.clone()).or_default();
+            condition_settings.roles = roles.to_vec();
+            condition_settings.channels()?;
         }
         Ok(())
     }

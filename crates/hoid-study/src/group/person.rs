@@ -5,8 +5,9 @@
 //! (`_se_person`), its 95 % interval (`_low`, `_high`), whether the data determine it (`_determined`), and the share of
 //! the prior (`_prior_share`); crossover and phase margin with the controlled element, with errors and intervals; the
 //! evidence for each form tried (`criterion_FORM`, relative to the best form, and `weight_FORM`); the responses to
-//! further inputs ([`PersonChannel`]); the statistics of the fit and its verdict. There are no columns for parameters that no person has or for forms that were not tried. If
-//! some parameters are individual, a person has one row for each run.
+//! further inputs ([`PersonChannel`]); the statistics of the fit and its verdict. There are no columns for parameters
+//! that no person has or for forms that were not tried. If some parameters are individual, a person has one row for
+//! each run.
 
 use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};

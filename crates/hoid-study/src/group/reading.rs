@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hoid_analysis::{Account, AnalysisError, Of, Recordings};
+use hoid_analysis::{Account, AnalysisError, Recordings, SystemKind};
 use hoid_io::{
     ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, Step, TableSchema,
     read_aligned,
@@ -56,7 +56,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         Pairing::InTheLoop => manifest
             .conditions
             .get(condition)
-            .map_or(0.0, |facts| facts.offset_samples),
+            .map_or(0.0, |settings| settings.offset_samples),
     };
     let read = read_aligned(path, &options, &preparation, late_samples)
         .map_err(|error| AnalysisError::from_reading(error, path, &options).to_string())?;
@@ -75,7 +75,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         recorded.account.clone(),
     );
     let repaired = as_recorded
-        .repaired(reading.faults.handling(), Of::Person)
+        .repaired(reading.faults.handling(), SystemKind::Person)
         .map_err(|error| error.to_string())?;
     let faults = repaired
         .accounts
@@ -90,7 +90,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     // The rate is reduced only now, since faults are detected in the recorded samples.
     let (record, done) = manifest
         .rate_decimation(condition)?
-        .of(read.record)
+        .apply(read.record)
         .map_err(|error| error.to_string())?;
     read.record = record;
     read.steps.extend(done.map(Step::from));
@@ -222,10 +222,10 @@ impl RecordedRun {
     pub fn read(manifest: &Manifest, base: &Path, entry: &RunEntry) -> Result<Self, StudyError> {
         let run =
             read_run(manifest, base, entry, Pairing::InTheLoop).map_err(|reason| StudyError::Recording { reason })?;
-        let facts = manifest.conditions.get(&entry.condition);
+        let settings = manifest.conditions.get(&entry.condition);
         Ok(Self {
             record: run.record,
-            change_s: run.seam_s.or(facts.and_then(|facts| facts.change_s)),
+            change_s: run.seam_s.or(settings.and_then(|settings| settings.change_s)),
         })
     }
 }
@@ -294,8 +294,8 @@ pub(super) fn account_tables(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'st
             trouble.set_text("channel", &one.channel);
             trouble.set_whole("rows", one.rows as u64);
             trouble.set_real("share", one.share);
-            trouble.set_whole("places", one.places.len() as u64);
-            if let Some(place) = one.places.first() {
+            trouble.set_whole("places", one.row_spans.len() as u64);
+            if let Some(place) = one.row_spans.first() {
                 trouble.set_whole("first_row", place.row as u64);
                 trouble.set_real("from_s", place.from_s.unwrap_or(f64::NAN));
             }

@@ -20,7 +20,7 @@ use crate::{
     directory::{part_path, remove_parts, table_path, write_source},
     run::{Outcome, Progress, prepare_continuation, run_on_threads},
     run_record::RunRecord,
-    seal::{OnDisk, block_state, damage_notes, write_block},
+    seal::{BlockState, block_state, damage_notes, write_block},
 };
 
 /// Analyses the runs that the manifest marks with `counts`. File names are relative to `base`.
@@ -63,9 +63,9 @@ pub fn run_group(
     let total = blocks.len() as u64;
     let mut damaged = Vec::new();
     let open = (0..blocks.len()).filter(|i| match block_state(directory, &record.plan_sha256, *i as u64) {
-        OnDisk::Whole => false,
-        OnDisk::Missing => true,
-        OnDisk::Damaged(why) => {
+        BlockState::Whole => false,
+        BlockState::Missing => true,
+        BlockState::Damaged(why) => {
             damaged.push((*i as u64, why));
             true
         }
@@ -75,7 +75,7 @@ pub fn run_group(
     let is_cell = |i: &usize| matches!(blocks[*i], Block::Cell(_));
     let (cells, runs): (Vec<usize>, Vec<usize>) = open.partition(is_cell);
     let notes: Vec<String> = found
-        .note_on_seals()
+        .missing_seals_note()
         .into_iter()
         .chain(damage_notes(&damaged))
         .collect();
@@ -89,8 +89,8 @@ pub fn run_group(
             Block::Run(run) => {
                 let key = (run.subject.as_str(), run.condition.as_str());
                 let of_run = |block: &Block<'_>| matches!(block, Block::Cell(cell) if cell.key() == key);
-                let place = blocks.iter().position(of_run).unwrap_or(i) as u64;
-                let read = |table: &str| hoid_io::read_table(&part_path(directory, place, table));
+                let index = blocks.iter().position(of_run).unwrap_or(i) as u64;
+                let read = |table: &str| hoid_io::read_table(&part_path(directory, index, table));
                 let from_cell = CellResults::of(&read("estimates")?, &read(PEOPLE_TABLE)?);
                 analyse(manifest, base, run, &from_cell)
             }
@@ -104,7 +104,11 @@ pub fn run_group(
         all.extend(found.account.iter().map(|(table, rows)| (*table, rows)));
         write_block(directory, &record.plan_sha256, i as u64, &all)?;
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        progress(Progress { done, total, known });
+        progress(Progress {
+            done,
+            total,
+            done_earlier: known,
+        });
         Ok(true)
     };
     let finished = run_on_threads(options.jobs, &cells, one)? && run_on_threads(options.jobs, &runs, one)?;
@@ -145,8 +149,8 @@ fn check_directory(manifest: &Manifest, base: &Path, directory: &Path) -> Result
         .flat_map(|run| std::iter::once(&run.file).chain(&run.then));
     let files: Vec<PathBuf> = files.map(|file| base.join(file)).collect();
     let files: Vec<&Path> = files.iter().map(PathBuf::as_path).collect();
-    for place in [directory.to_owned(), directory.join("parts")] {
-        hoid_io::check_output_directory(&place, &files)?;
+    for index in [directory.to_owned(), directory.join("parts")] {
+        hoid_io::check_output_directory(&index, &files)?;
     }
     Ok(())
 }

@@ -112,21 +112,26 @@ pub fn simulate_people(
             each();
         }
     }
-    let facts = |plant: &Plant| {
-        let facts = ConditionSettings {
+    let settings = |plant: &Plant| {
+        let settings = ConditionSettings {
             controlled_element: Some(plant.text().to_owned()),
             excitation: Some("d".to_owned()),
             period_s: Some(plant.disturbance().period_s),
             ..ConditionSettings::default()
         };
-        (plant.to_string(), facts)
+        (plant.to_string(), settings)
     };
     let analysis = AnalysisSettings {
         // Realistic remnants are not first-order lags, so several orders are tried.
         nd: (1, 6),
         ..AnalysisSettings::default()
     };
-    files.finish("virtual-people", truth, analysis, experiment.plants.iter().map(facts))
+    files.finish(
+        "virtual-people",
+        truth,
+        analysis,
+        experiment.plants.iter().map(settings),
+    )
 }
 
 impl PeopleExperiment {

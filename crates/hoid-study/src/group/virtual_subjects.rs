@@ -81,11 +81,11 @@ pub fn simulate_group(
             }
         }
     }
-    let facts = |condition: &Condition| {
+    let settings = |condition: &Condition| {
         let scenario = Scenario::condition(*condition);
         let change_s = scenario.schedule.change_s();
         let text = |element: ControlledElement| format!("{}/1,{},0", element.k_c, element.omega_b_rad_s);
-        let facts = ConditionSettings {
+        let settings = ConditionSettings {
             controlled_element: Some(text(scenario.initial.controlled_element)),
             excitation: Some("f_t".to_owned()),
             change_s,
@@ -93,7 +93,7 @@ pub fn simulate_group(
             change_per_s: scenario.schedule.rate_per_s(),
             ..ConditionSettings::default()
         };
-        (condition.to_string(), facts)
+        (condition.to_string(), settings)
     };
     let analysis = AnalysisSettings {
         windows_s: Some([(0.0, 30.72), (51.2, 81.91)]),
@@ -103,7 +103,7 @@ pub fn simulate_group(
         "virtual-experiment",
         truth,
         analysis,
-        experiment.conditions.iter().map(facts),
+        experiment.conditions.iter().map(settings),
     )
 }
 
@@ -119,7 +119,7 @@ pub(super) fn check_run_count(factors: &[u64]) -> Result<(), StudyError> {
     let found: Vec<String> = factors.iter().map(u64::to_string).collect();
     Err(StudyError::Virtual {
         reason: format!(
-            "subjects times runs times conditions is {}, expected at most {MAX_RUNS} runs in all: ask for fewer runs, \
+            "subjects times runs times conditions is {}, expected at most {MAX_RUNS} runs in total: request fewer runs, \
              or make several experiments with different seeds",
             found.join(" x ")
         ),

@@ -18,8 +18,8 @@ use super::{
     estimator::EstimatorCell,
     estimator_table,
     grid::{Axis, Variant, line_at, variants},
-    head::Head,
     problem::PlanProblem,
+    top_level_keys::Head,
 };
 use crate::StudyError;
 
@@ -72,7 +72,7 @@ pub struct Cell {
 
 /// Additional keys of a scenario in a plan.
 #[derive(Debug, Deserialize)]
-struct OwnKeys {
+struct AdditionalKeys {
     name: Option<String>,
     condition: Option<String>,
 }
@@ -364,7 +364,7 @@ fn single_variant(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> R
 }
 
 fn cell(variant: &Variant, index: u64, replications: u64) -> Result<Cell, PlanProblem> {
-    let own: OwnKeys = variant.read()?;
+    let own: AdditionalKeys = variant.read()?;
     let default = own.condition.clone().unwrap_or_else(|| "scenario".to_owned());
     let name = own.name.unwrap_or_else(|| default.clone());
     let scenario: Scenario =

@@ -29,9 +29,9 @@ mod document;
 mod estimator;
 mod estimator_table;
 mod grid;
-mod head;
 mod problem;
 mod schema;
+mod top_level_keys;
 
 pub use document::{Cell, Plan};
 pub use estimator::{EstimatorCell, Task};

@@ -9,7 +9,7 @@ use serde_json::{Map, Value, json};
 
 use super::{
     estimator_table::{EstimatorTable, methods, non_axis_keys, plan_key},
-    head::Head,
+    top_level_keys::Head,
 };
 
 /// Returns the schema (draft 2020-12) as text.

@@ -108,7 +108,7 @@ pub(crate) fn write_fits(
                         // computed.
                         let meant = |lead: &bool| *lead || !name.starts_with("T_L");
                         let error = |v: f64| 100.0 * (v - truth) / truth;
-                        let of_each = values.iter().zip(&found.leads);
+                        let of_each = values.iter().zip(&found.is_gain_with_lead);
                         let bias: Vec<f64> = of_each
                             .map(|(v, lead)| if meant(lead) { error(*v) } else { f64::NAN })
                             .collect();
@@ -184,7 +184,7 @@ fn write_statistics_row(rows: &mut Rows, quantity: &str, s: &Statistics, values:
 
 /// The values of all replications of a cell, by estimator.
 struct CollectedValues<'a> {
-    at: BTreeMap<&'a str, usize>,
+    estimator_indices: BTreeMap<&'a str, usize>,
     quantities: &'a [&'a str],
     estimators: Vec<EstimatorResults>,
 }
@@ -193,7 +193,7 @@ struct CollectedValues<'a> {
 struct EstimatorResults {
     values: Vec<Vec<f64>>,
     /// For each fit, true if its form is a gain with a lead, as simulated, or if no form was selected.
-    leads: Vec<bool>,
+    is_gain_with_lead: Vec<bool>,
     count: usize,
     failed: usize,
     not_convertible: usize,
@@ -210,7 +210,7 @@ impl<'a> CollectedValues<'a> {
             ..EstimatorResults::default()
         };
         Self {
-            at: group.iter().enumerate().map(|(i, e)| (e.label.as_str(), i)).collect(),
+            estimator_indices: group.iter().enumerate().map(|(i, e)| (e.label.as_str(), i)).collect(),
             quantities,
             estimators: vec![empty; group.len()],
         }
@@ -222,7 +222,7 @@ impl<'a> CollectedValues<'a> {
         };
         let places: Vec<Option<usize>> = labels
             .iter()
-            .map(|label| self.at.get(label.as_str()).copied())
+            .map(|label| self.estimator_indices.get(label.as_str()).copied())
             .collect();
         for (q, name) in self.quantities.iter().enumerate() {
             if let Some(ColumnValues::Real(values)) = table.column(name) {
@@ -239,7 +239,7 @@ impl<'a> CollectedValues<'a> {
             let Some(i) = place else { continue };
             let of = &mut self.estimators[*i];
             of.count += 1;
-            of.leads.push(match table.column("form") {
+            of.is_gain_with_lead.push(match table.column("form") {
                 Some(ColumnValues::Text(forms)) => forms[row].is_empty() || forms[row] == Form::Lead.choice_name(),
                 _ => true,
             });

@@ -3,7 +3,7 @@
 use std::ops::AddAssign;
 
 use hoid_core::bounds::clamp;
-use hoid_model::{SampleTime, second_order::HeldStates};
+use hoid_model::{SampleTime, second_order::ZohStates};
 use hoid_track::building::OPERATOR_PARAMETER_COUNT;
 use nalgebra::{DMatrix, DVector, RowDVector};
 
@@ -47,7 +47,7 @@ impl Filters {
         let (omega, zeta) = (w[2], w[3]);
         let square = omega * omega;
         if self.pade == 0 {
-            let of = HeldStates::new(2.0 * zeta * omega, square, self.sample_time);
+            let of = ZohStates::new(2.0 * zeta * omega, square, self.sample_time);
             for i in 0..2 {
                 for j in 0..2 {
                     a[(i, j)] = of.transition[i][j];

@@ -31,8 +31,8 @@ pub(super) struct Model {
 struct HoldCoefficients {
     /// `1 - A`, `R/omega^2`, R, `1 - A - 2 zeta R/omega`.
     values: [f64; 4],
-    by_omega: [f64; 4],
-    by_zeta: [f64; 4],
+    derivative_omega: [f64; 4],
+    derivative_zeta: [f64; 4],
 }
 
 impl HoldCoefficients {
@@ -60,8 +60,8 @@ impl HoldCoefficients {
         };
         Self {
             values: [rest, rate / square, rate, rest - 2.0 * zeta * rate / omega],
-            by_omega: by(0),
-            by_zeta: by(1),
+            derivative_omega: by(0),
+            derivative_zeta: by(1),
         }
     }
 }
@@ -82,7 +82,7 @@ impl Model {
             row[i] = 1.0;
         }
         let by = |h: &[f64; 4]| [-h[0] * m + h[1] * v, h[2] * m + h[3] * v];
-        let (omega, zeta) = (by(&hold.by_omega), by(&hold.by_zeta));
+        let (omega, zeta) = (by(&hold.derivative_omega), by(&hold.derivative_zeta));
         f[0] = [a, b, 0.0, 0.0, omega[0], zeta[0]];
         f[1] = [-c, d, 0.0, 0.0, omega[1], zeta[1]];
         f

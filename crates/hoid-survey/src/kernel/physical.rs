@@ -2,7 +2,7 @@
 //!
 //! The parameters are `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay
 //! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is the Box-Jenkins predictor with the
-//! polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::held_operator`]); its gradient is
+//! polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::zoh_operator`]); its gradient is
 //! `psi_eta = (d theta/d eta)' psi_theta`. The step is computed as in [`hoid_core::rpem`], but each forgetting factor
 //! now belongs to a quantity whose rate of change the user knows: operators adapt their gains, but hardly their
 //! neuromuscular system.
@@ -13,17 +13,17 @@
 //! If the delay is a parameter, `tau_e = l Ts + delta`, and B has three coefficients after a delay of `nk = l + 1`
 //! samples. When tau_e passes a whole sample, B is shifted along the past input that the predictor keeps, without a
 //! transient. At a delay of whole samples the model is continuous, but its derivative has a kink (see
-//! [`hoid_core::held_operator`]).
+//! [`hoid_core::zoh_operator`]).
 
 use hoid_core::{
     adaptation::Adaptation,
     bounds::clamp,
     error_bars::{ErrorBars, ErrorPropagation},
-    held_operator::{held_operator, held_operator_delayed},
     predictor::{Predictor, Regressor},
     recursion::{StablePolynomials, Step, backtrack, ratio},
     sensitivities::{ErrorLayout, LinearForm, Sensitivities},
     shape::Shape,
+    zoh_operator::{zoh_operator, zoh_operator_delayed},
 };
 
 /// Index of omega_nm in eta.
@@ -49,8 +49,8 @@ pub struct PhysicalModel<S, const N: usize> {
 }
 
 /// The recursion. N is the capacity for parameters; K is the capacity for the errors of the filters
-/// ([`ErrorLayout::filter_error_count`]; 0 for the default error bars); L is the number of past inputs that are kept, at
-/// least nc: 2 if tau_e is not a parameter, otherwise 3 plus the range of the delay.
+/// ([`ErrorLayout::filter_error_count`]; 0 for the default error bars); L is the number of past inputs that are kept,
+/// at least nc: 2 if tau_e is not a parameter, otherwise 3 plus the range of the delay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
     model: PhysicalModel<S, N>,
@@ -96,12 +96,12 @@ impl<S: Shape, const N: usize> PhysicalModel<S, N> {
             let whole = libm::floor(samples * (1.0 + 1e-12) + 1e-12).max(0.0);
             whole_samples = whole as usize;
             let delta = (eta[TAU_INDEX] - whole * self.sample_time).clamp(0.0, self.sample_time);
-            let (values, by) = held_operator_delayed(gains, delta, self.sample_time);
+            let (values, by) = zoh_operator_delayed(gains, delta, self.sample_time);
             jacobian = by;
             theta[..3].copy_from_slice(&values[..3]);
             theta[3 + noise..5 + noise].copy_from_slice(&values[3..]);
         } else {
-            let (values, by) = held_operator(gains, self.sample_time);
+            let (values, by) = zoh_operator(gains, self.sample_time);
             for (row, by) in jacobian.iter_mut().zip(by) {
                 row[..4].copy_from_slice(&by);
             }

@@ -54,7 +54,8 @@ settings! {
         /// Limit on innovations, in standard deviations
         #[setting(bounds(Bounds::Positive), default("3.5"))]
         pub limit: Option<f64> = None,
-        /// Smooth a recorded run: use the whole run for each estimate, not only the past (hypotheses run from both ends)
+        /// Smooth a recorded run: use the whole run for each estimate, not only the past (hypotheses run from both
+        /// ends)
         pub smooth: bool = false,
     }
     groups {

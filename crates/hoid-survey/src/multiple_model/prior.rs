@@ -25,8 +25,8 @@ const GAIN_DRIFT: f64 = 0.005;
 const TRANSIENT_DRIFT: [f64; PARAMETER_COUNT] = [0.05, 0.25, 0.2, 0.2];
 const TRANSIENT_TIME_CONSTANT_S: f64 = 3.0;
 /// Prior standard deviations of a relative change of omega_nm and of zeta_nm. A hypothesis that omega_nm and zeta_nm
-/// also changed is created every `NEUROMUSCULAR_BIRTH_INTERVAL` births; `NEUROMUSCULAR_ODDS` are the odds of this change against
-/// a change of the gains alone.
+/// also changed is created every `NEUROMUSCULAR_BIRTH_INTERVAL` births; `NEUROMUSCULAR_ODDS` are the odds of this
+/// change against a change of the gains alone.
 const NEUROMUSCULAR_CHANGE_SD: [f64; 2] = [0.25, 0.4];
 const NEUROMUSCULAR_BIRTH_INTERVAL: u32 = 4;
 const NEUROMUSCULAR_ODDS: f64 = 0.3;

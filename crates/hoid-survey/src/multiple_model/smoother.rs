@@ -228,7 +228,7 @@ fn mixture_product(before: &[OneSidedHypothesis], after: &[OneSidedHypothesis]) 
         for b in after {
             // The comparison is written so that a pair is not skipped if this bound is NaN.
             let highest = f.log_weight + b.log_weight - f.size.max(b.size);
-            if highest < most + least || highest - ForwardBackward::half_square(f, b) < most + least {
+            if highest < most + least || highest - ForwardBackward::half_squared_distance(f, b) < most + least {
                 continue;
             }
             if let Some((log, pair)) = ForwardBackward::of(f, b) {
@@ -294,7 +294,7 @@ impl<'a> ForwardBackward<'a> {
     /// Lower bound of the decrease of the log weight due to the differences between f and b: `z'z` is not smaller than
     /// the squared difference of a single parameter divided by its variance. The constant 0.01 allows for rounding
     /// errors.
-    fn half_square(f: &OneSidedHypothesis, b: &OneSidedHypothesis) -> f64 {
+    fn half_squared_distance(f: &OneSidedHypothesis, b: &OneSidedHypothesis) -> f64 {
         let apart = b.level[0] - f.level[0];
         let mut square = 0.0_f64;
         for i in 0..PARAMETER_COUNT {
@@ -336,7 +336,8 @@ impl<'a> ForwardBackward<'a> {
     }
 }
 
-/// Returns L with `L L' = s`. The known products are summed before they are subtracted, as in [`cholesky::substitute_forward`];
+/// Returns L with `L L' = s`. The known products are summed before they are subtracted, as in
+/// [`cholesky::substitute_forward`];
 /// [`cholesky::cholesky_factor`] gives the same result except for rounding errors.
 fn cholesky_factor(s: &[[f64; PARAMETER_COUNT]; PARAMETER_COUNT]) -> Option<[[f64; PARAMETER_COUNT]; PARAMETER_COUNT]> {
     let mut l = [[0.0; PARAMETER_COUNT]; PARAMETER_COUNT];

@@ -8,27 +8,27 @@ use hoid_track::building::{History, limit_magnitude, weighted_sum};
 #[derive(Debug, Clone)]
 pub(crate) struct FilteredHistory {
     pub raw: History,
-    pub out: History,
+    pub output: History,
 }
 
-hoid_core::state!([] FilteredHistory { raw, out });
+hoid_core::state!([] FilteredHistory { raw, output });
 
 impl FilteredHistory {
     pub fn new(orders: &Orders) -> Self {
         Self {
             raw: History::new(orders.nd),
-            out: History::new(orders.nf.max(orders.nb)),
+            output: History::new(orders.nf.max(orders.nb)),
         }
     }
 
     pub fn next(&self, d: &[f64], f: &[f64], x: f64) -> f64 {
-        limit_magnitude(x + weighted_sum(d, self.raw.newest_first()) - weighted_sum(f, self.out.newest_first()))
+        limit_magnitude(x + weighted_sum(d, self.raw.newest_first()) - weighted_sum(f, self.output.newest_first()))
     }
 
     pub fn push(&mut self, d: &[f64], f: &[f64], x: f64) {
         let y = self.next(d, f, x);
         self.raw.push(x);
-        self.out.push(y);
+        self.output.push(y);
     }
 }
 
@@ -79,12 +79,12 @@ impl ResponseHistory {
 
 pub(crate) fn fill_b(now: f64, input: &FilteredHistory, nb: usize, into: &mut [f64]) {
     into[0] = now;
-    into[1..nb].copy_from_slice(&input.out.newest_first()[..nb - 1]);
+    into[1..nb].copy_from_slice(&input.output.newest_first()[..nb - 1]);
 }
 
 pub(crate) fn fill_f(output: &FilteredHistory, nf: usize, into: &mut [f64]) {
     let first = into.len() - nf;
-    for (place, y) in into[first..].iter_mut().zip(output.out.newest_first()) {
+    for (place, y) in into[first..].iter_mut().zip(output.output.newest_first()) {
         *place = -y;
     }
 }

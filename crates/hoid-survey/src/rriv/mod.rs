@@ -86,7 +86,7 @@ pub(crate) struct RefinedRecursion {
     spread: Vec<f64>,
     first_spread: Vec<f64>,
     variance: f64,
-    least_variance: f64,
+    min_variance: f64,
     samples: f64,
     /// Weight of the newest sample in the innovation variance in the steady state.
     newest_share: f64,
@@ -111,7 +111,7 @@ impl State for RefinedRecursion {
             &mut self.spread.as_mut_slice(),
             &mut self.first_spread.as_mut_slice(),
             &mut self.variance,
-            &mut self.least_variance,
+            &mut self.min_variance,
             &mut self.samples,
             &mut self.newest_share,
             &mut self.system_gain,
@@ -179,7 +179,7 @@ impl RefinedRecursion {
             system_gain: gain_of(&system)?,
             noise_gain: gain_of(&noise)?,
             variance,
-            least_variance: MIN_VARIANCE_RATIO * variance,
+            min_variance: MIN_VARIANCE_RATIO * variance,
             samples: start.samples as f64,
             newest_share: 1.0 - lambda.iter().copied().fold(1.0, f64::min),
             measured: ResponseHistory::new(&orders),
@@ -315,7 +315,7 @@ impl RefinedRecursion {
         self.samples += 1.0;
         let newest = (innovation * innovation / (1.0 + explained) - self.variance)
             * self.newest_share.max(1.0 / self.samples.max(1.0));
-        self.variance = (self.variance + newest).max(self.least_variance);
+        self.variance = (self.variance + newest).max(self.min_variance);
         let shortened = share < 1.0;
         self.shortened += usize::from(shortened);
         shortened

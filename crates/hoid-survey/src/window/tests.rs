@@ -97,7 +97,7 @@ fn time_of_a_fit() {
         recursion.step(sample);
         let took = 1e3 * clock.elapsed().as_secs_f64();
         if recursion.fit_count() > before && recursion.u.len() == 2000 {
-            if recursion.since_comparison == 0 {
+            if recursion.fits_since_comparison == 0 {
                 compared.push(took);
             } else {
                 warm.push(took);

@@ -19,7 +19,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-large-at-m1",
         theme: Theme::BatchArx,
         statement: "\"A large relative bias is obtained for m0 = 1\" by ARX.",
-        place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
+        reference: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
         measure: "Magnitude of the median bias of a1, a2, b0 and b1 at each noise level, C1, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(check_large_bias_at_first_order),
@@ -28,7 +28,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-b-around-50",
         theme: Theme::BatchArx,
         statement: "For m0 >= 2 the ARX \"estimation error in b0 and b1 is still around 50 % in most cases\".",
-        place: "V.A.1, Fig. 5",
+        reference: "V.A.1, Fig. 5",
         measure: "Magnitude of the median bias of b0 and b1 for m0 = 2 to 4 at each noise level, C1, n_k* = 29; the bias of b0 at P_n = 0.1 is also shown with its sign.",
         plans: PLANS,
         source: Source::Data(check_b_bias_around_fifty),
@@ -37,7 +37,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-a-acceptable",
         theme: Theme::BatchArx,
         statement: "For m0 >= 2 \"ARX bias is diminished to acceptable values\", except for b0 and b1.",
-        place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
+        reference: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
         measure: "Magnitude of the median bias of a1 and a2 for m0 = 2 to 4 at each noise level, C1, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(check_acceptable_a_bias),
@@ -46,7 +46,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-linear-in-delay",
         theme: Theme::BatchArx,
         statement: "\"Changes in model time delay (x-axis) produce a linear trend in computed relative bias\" of ARX.",
-        place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
+        reference: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
         measure: "R^2 of a straight line fitted to the median biases at n_k* = 25 to 30, by coefficient, m0 and noise level, C1.",
         plans: PLANS,
         source: Source::Data(check_bias_linear_in_delay),
@@ -55,7 +55,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-no-optimum-at-29",
         theme: Theme::BatchArx,
         statement: "ARX biases \"do not oscillate around zero and no optimal results are found for actual HO time delay\".",
-        place: "6.1.1, Fig. C.1",
+        reference: "6.1.1, Fig. C.1",
         measure: "Magnitude of the median bias at n_k* = 29 minus the smallest magnitude at any other delay, percentage points, by coefficient, C1.",
         plans: PLANS,
         source: Source::Data(check_no_optimal_delay),
@@ -64,7 +64,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-lead-and-lag",
         theme: Theme::BatchArx,
         statement: "\"ARX estimators provide poles at lower frequencies when smaller n_k* are chosen, and vice versa.\"",
-        place: "V.A.1; 6.1.1, Figs. D.1 to D.4",
+        reference: "V.A.1; 6.1.1, Figs. D.1 to D.4",
         measure: "Median paired change in omega_nm from n_k* = 29 to each other delay, % of the true value, m0 = 2 to 4, C1.",
         plans: PLANS,
         source: Source::Data(check_poles_follow_delay),
@@ -73,7 +73,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-more-noise-more-bias",
         theme: Theme::BatchArx,
         statement: "\"Increments in noise level give as a result a greater bias in general\" of ARX.",
-        place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
+        reference: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
         measure: "Increase in the magnitude of the median bias from P_n = 0.1 to 0.2 and from 0.2 to 0.3, percentage \
                   points, by coefficient, C1, n_k* = 29.",
         plans: PLANS,
@@ -83,7 +83,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-null-without-remnant",
         theme: Theme::BatchArx,
         statement: "\"A null bias can be obtained in a remnant-free scenario if the ideal time delay is employed\" (ARX).",
-        place: "V.A.1; 6.1.1, Figs. C.1, C.9",
+        reference: "V.A.1; 6.1.1, Figs. C.1, C.9",
         measure: "Magnitude of the bias of the coefficients at P_n = 0, n_k* = 29, C1 and C2.",
         plans: PLANS,
         source: Source::Data(check_null_bias_without_remnant),
@@ -92,7 +92,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-only-gain-ideal",
         theme: Theme::BatchArx,
         statement: "At the true delay \"Only the HO gain K_e results in Figure C.2 achieve the ideal performance\" (ARX).",
-        place: "6.1.1, Fig. C.2",
+        reference: "6.1.1, Fig. C.2",
         measure: "Magnitude of the median bias of K_e, and of T_L, omega_nm and zeta_nm, m0 = 2 to 4, C1, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(check_only_gain_is_unbiased),
@@ -101,7 +101,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-c2-against-c1",
         theme: Theme::BatchArx,
         statement: "In C2 \"K_e and T_L present a greater bias when compared to the results for C1, while estimations of omega_nm and zeta_nm are slightly improved\" (ARX).",
-        place: "6.1.1, Figs. C.2, C.10",
+        reference: "6.1.1, Figs. C.2, C.10",
         measure: "Magnitude of the median bias in C2 minus that in C1, percentage points, m0 = 2 to 4, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(check_bias_in_second_condition),
@@ -110,7 +110,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-poles-by-order",
         theme: Theme::BatchArx,
         statement: "\"For higher remnant orders in simulation data, the location of poles moves\" to lower frequencies (ARX).",
-        place: "V.A.2, Fig. 10; 6.1.1, Figs. D.1 to D.4",
+        reference: "V.A.2, Fig. 10; 6.1.1, Figs. D.1 to D.4",
         measure: "Median bias of omega_nm at m0 = 3 minus that at m0 = 2, and at m0 = 4 minus that at m0 = 3, percentage points, C1 and C2, n_k* = 29.",
         plans: PLANS,
         source: Source::Data(check_poles_by_order),
@@ -119,7 +119,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-zero-by-noise",
         theme: Theme::BatchArx,
         statement: "\"The zero is located at lower frequencies for higher noise levels in ARX results.\"",
-        place: "V.A.2, Fig. 10",
+        reference: "V.A.2, Fig. 10",
         measure: "Increase in the median T_L (the zero is at 1 / T_L) from one noise level to the next, % of the true value, m0 = 2 to 4, C1.",
         plans: PLANS,
         source: Source::Data(check_zero_by_noise),
@@ -128,7 +128,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "arx-misses-poles-at-m1",
         theme: Theme::BatchArx,
         statement: "\"The correct location of poles is completely missed when a first-order remnant filter is simulated\" (ARX).",
-        place: "6.1.1, Figs. D.1, 10",
+        reference: "6.1.1, Figs. D.1, 10",
         measure: "Share of fits whose poles do not convert to omega_nm and zeta_nm, or whose omega_nm is wrong by more than 25 %, m0 = 1, C1 and C2.",
         plans: PLANS,
         source: Source::Data(check_poles_missed),
@@ -218,7 +218,7 @@ fn check_bias_linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, Stri
         for at in settings(&["C1"], orders, &NOISE_LEVELS) {
             for name in DISCRETE_PARAMETERS {
                 let queries = DELAYS.map(|nk| at.arx(&bias_of(name), nk));
-                let found = study.of(&queries, &|s| {
+                let found = study.evaluate(&queries, &|s| {
                     linearity(&s.iter().map(|v| median_or_nan(v)).collect::<Vec<_>>())
                 })?;
                 part.add_above(at.label(name), found, MIN_LINEAR_R2);
@@ -235,7 +235,7 @@ fn check_no_optimal_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> 
     for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
         for name in DISCRETE_PARAMETERS {
             let queries = DELAYS.map(|nk| at.arx(&bias_of(name), nk));
-            let found = study.of(&queries, &|s| {
+            let found = study.evaluate(&queries, &|s| {
                 let others = s.iter().enumerate().filter(|(i, _)| DELAYS[*i] != TRUE_DELAY);
                 let best = others.map(|(_, v)| median_bias(v)).fold(f64::INFINITY, f64::min);
                 DELAYS

@@ -21,7 +21,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-same-for-all-orders",
         theme: Theme::BatchBj,
         statement: "\"The remnant filter order no longer meaningfully affects the bias and accuracy in BJ estimation.\"",
-        place: "V.A.1, Fig. 6; VIII; 6.1.2",
+        reference: "V.A.1, Fig. 6; VIII; 6.1.2",
         measure: "Median bias at m0 = 2 to 4 minus that at m0 = 1, BJ(m* = m0), C1 and C2, n_k* = 29, percentage \
                   points, by coefficient and noise level.",
         plans: PLANS,
@@ -31,7 +31,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-close-to-zero",
         theme: Theme::BatchBj,
         statement: "BJ: \"relative bias values are close to zero for increasing values in noise level\".",
-        place: "V.A.1, Fig. 6",
+        reference: "V.A.1, Fig. 6",
         measure: "Magnitude of the median bias, BJ(m* = m0), C1, n_k* = 29, by coefficient, m0 and noise level.",
         plans: PLANS,
         source: Source::Data(check_bias_close_to_zero),
@@ -40,7 +40,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-around-noise-free",
         theme: Theme::BatchBj,
         statement: "BJ: \"results fluctuate around the bias of the remnant-free case at each model time delay\".",
-        place: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
+        reference: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
         measure: "Median bias minus that at P_n = 0, BJ(m* = m0), C1, n_k* = 25 to 30, percentage points, by coefficient, m0 and noise level.",
         plans: PLANS,
         source: Source::Data(check_bias_around_noise_free),
@@ -49,7 +49,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-linear-in-delay",
         theme: Theme::BatchBj,
         statement: "\"The BJ estimator creates lag or lead depending on the assumed model time delay, hence, a linear trend is also found.\"",
-        place: "V.A.1, Fig. 6",
+        reference: "V.A.1, Fig. 6",
         measure: "R^2 of a straight line fitted to the median biases at n_k* = 25 to 30, BJ(m* = m0), by coefficient, m0 and noise level, C1.",
         plans: PLANS,
         source: Source::Data(check_bias_linear_in_delay),
@@ -58,7 +58,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-lead-and-lag",
         theme: Theme::BatchBj,
         statement: "\"BJ poles are placed at lower frequencies for smaller model time delays to create additional lag, and vice versa.\"",
-        place: "6.1.2, Figs. D.5 to D.8",
+        reference: "6.1.2, Figs. D.5 to D.8",
         measure: "Median paired change in omega_nm from n_k* = 29 to each other delay, % of the true value, BJ(m* = m0), C1.",
         plans: PLANS,
         source: Source::Data(check_poles_follow_delay),
@@ -67,7 +67,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-almost-exact",
         theme: Theme::BatchBj,
         statement: "BJ(m* = 1): \"almost 100 % accurate estimations in all scenarios\".",
-        place: "V.A.2, Fig. 10",
+        reference: "V.A.2, Fig. 10",
         measure: "Median response_error of BJ(m* = 1), C1, n_k* = 29, by m0 and noise level.",
         plans: PLANS,
         source: Source::Data(check_almost_exact_estimates),
@@ -76,7 +76,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-m2-worst-without-remnant",
         theme: Theme::BatchBj,
         statement: "Remnant-free: \"a remnant order equal to 2 produces the highest deviations\" of BJ.",
-        place: "6.1.2, Figs. D.5 to D.8",
+        reference: "6.1.2, Figs. D.5 to D.8",
         measure: "response_error of BJ(m* = 2) minus the largest of the other orders, without remnant, C1, n_k* = 25 to 28 and 30, %.",
         plans: PLANS,
         source: Source::Data(check_second_order_worst),
@@ -85,7 +85,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-t-n-100-percent",
         theme: Theme::BatchBj,
         statement: "Remnant time constant T_n at orders above 1: \"relative biases around 100 % are obtained\".",
-        place: "6.1.2, Fig. C.5",
+        reference: "6.1.2, Fig. C.5",
         measure: "Magnitude of the median bias of T_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; the bias with exact retrieval is also shown.",
         plans: PLANS,
         source: Source::Data(check_remnant_time_constant),
@@ -94,7 +94,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-remnant-gain",
         theme: Theme::BatchBj,
         statement: "\"The estimation of the remnant gain also presents important errors for m-th orders greater than 1.\"",
-        place: "6.1.2, Fig. C.5",
+        reference: "6.1.2, Fig. C.5",
         measure: "Magnitude of the median bias of K_n (backward Euler, as in B.2), BJ(m* = m0), m0 = 2 to 4, C1, n_k* = 29; the bias with exact retrieval is also shown.",
         plans: PLANS,
         source: Source::Data(check_remnant_gain),
@@ -103,7 +103,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-c2-against-c1",
         theme: Theme::BatchBj,
         statement: "In C2 \"K_e and T_L associated with the HO zero present a less precise estimation, while the neuromuscular dynamics are better captured\" (BJ).",
-        place: "6.1.2, Figs. C.4, C.12",
+        reference: "6.1.2, Figs. C.4, C.12",
         measure: "Median |bias| in C2 minus that in C1, percentage points, BJ(m* = m0), n_k* = 29, by m0 and noise level.",
         plans: PLANS,
         source: Source::Data(check_bias_in_second_condition),
@@ -163,7 +163,7 @@ fn check_bias_linear_in_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, Stri
     for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
         for name in DISCRETE_PARAMETERS {
             let queries = DELAYS.map(|nk| at.bj(&bias_of(name), at.m0, nk));
-            let found = study.of(&queries, &|s| {
+            let found = study.evaluate(&queries, &|s| {
                 linearity(&s.iter().map(|v| median_or_nan(v)).collect::<Vec<_>>())
             })?;
             part.add_above(at.label(name), found, MIN_LINEAR_R2);
@@ -208,7 +208,7 @@ fn check_second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String
     let mut part = Part::new("response_error of m* = 2 minus the largest of the others, above 0");
     for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
         let queries = REMNANT_ORDERS.map(|m| WITHOUT_REMNANT.bj("response_error", m, nk));
-        let found = study.of(&queries, &|s| {
+        let found = study.evaluate(&queries, &|s| {
             median_or_nan(&s[1])
                 - [0, 2, 3]
                     .map(|i| median_or_nan(&s[i]))
@@ -226,7 +226,7 @@ fn check_second_order_worst(evidence: &Evidence<'_>) -> Result<Vec<Part>, String
     Ok(vec![part])
 }
 
-/// Tests the bias of a remnant parameter retrieved as in the text (backward Euler), and shows it next to the bias of
+/// Tests the bias of a remnant parameter retrieved as in the thesis (backward Euler), and shows it next to the bias of
 /// the exact retrieval.
 fn check_remnant_parameter(
     evidence: &Evidence<'_>,

@@ -18,7 +18,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-reduces-bias-at-m1",
         theme: Theme::BatchBj,
         statement: "\"The important bias found in first-order remnant order simulations is now highly reduced\" by BJ.",
-        place: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
+        reference: "V.A.1, Fig. 6; 6.1.2, Fig. C.3",
         measure: "Median |bias| of BJ(m* = 1) divided by that of ARX, m0 = 1, C1, n_k* = 29, by coefficient and noise level.",
         plans: PLANS,
         source: Source::Data(check_bias_reduced_at_first_order),
@@ -27,7 +27,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-5000-percent",
         theme: Theme::BatchBj,
         statement: "\"BJ offers a 5000 % more accurate estimation when the remnant order is m* = 1.\"",
-        place: "VII",
+        reference: "VII",
         measure: "Median |bias| of ARX divided by that of BJ(m* = 1), m0 = 1, C1, n_k* = 29: around 50.",
         plans: PLANS,
         source: Source::Data(check_fifty_times_smaller_bias),
@@ -36,7 +36,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-more-robust",
         theme: Theme::BatchBj,
         statement: "\"BJ presents more robustness than ARX when facing high noise levels.\"",
-        place: "VIII; Conclusions of Part II",
+        reference: "VIII; Conclusions of Part II",
         measure: "Magnitude of the change in the median bias from P_n = 0.1 to 0.3: BJ(m* = m0) minus ARX, C1, n_k* = \
                   29, percentage points.",
         plans: PLANS,
@@ -46,7 +46,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-half-the-error",
         theme: Theme::BatchBj,
         statement: "For m0 >= 2 \"BJ estimators still provide a response with around 50 % less estimation error\" than ARX.",
-        place: "V.A.1, Figs. 5, 6",
+        reference: "V.A.1, Figs. 5, 6",
         measure: "100 (1 - median |bias| of BJ(m* = m0) / median |bias| of ARX), m0 = 2 to 4, C1, n_k* = 29, by coefficient and noise level.",
         plans: PLANS,
         source: Source::Data(check_half_the_error),
@@ -55,7 +55,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-always-outperforms",
         theme: Theme::BatchBj,
         statement: "Except for the remnant-free case, \"the BJ model always outperforms the ARX one, both in magnitude and phase estimation\".",
-        place: "6.1.2, Figs. D.9, D.18",
+        reference: "6.1.2, Figs. D.9, D.18",
         measure: "Median paired difference in response_error (the root mean square of |H - H0| / |H0| at the lines of the forcing function), BJ(m* = m0) minus ARX, C1 and C2, n_k* = 29, %.",
         plans: PLANS,
         source: Source::Data(check_bj_outperforms_arx),
@@ -64,7 +64,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-worse-without-remnant",
         theme: Theme::BatchBj,
         statement: "\"In remnant-free cases, BJ models present higher deviations than ARX models\" at wrong delays.",
-        place: "6.1.2, Figs. D.5 to D.8",
+        reference: "6.1.2, Figs. D.5 to D.8",
         measure: "response_error of BJ(m*) minus that of ARX, without remnant, n_k* = 25 to 28 and 30, C1, m* = 1 to 4, %.",
         plans: PLANS,
         source: Source::Data(check_bj_worse_without_remnant),
@@ -79,7 +79,7 @@ fn check_bias_reduced_at_first_order(evidence: &Evidence<'_>) -> Result<Vec<Part
             let queries = [at.bj(&bias_of(name), 1, TRUE_DELAY), at.arx(&bias_of(name), TRUE_DELAY)];
             part.add_below(
                 at.label(name),
-                study.of(&queries, &|s| median_magnitude(&s[0]) / median_magnitude(&s[1]))?,
+                study.evaluate(&queries, &|s| median_magnitude(&s[0]) / median_magnitude(&s[1]))?,
                 HEAVY_REDUCTION,
             );
         }
@@ -95,7 +95,7 @@ fn check_fifty_times_smaller_bias(evidence: &Evidence<'_>) -> Result<Vec<Part>, 
             let queries = [at.bj(&bias_of(name), 1, TRUE_DELAY), at.arx(&bias_of(name), TRUE_DELAY)];
             part.add_effect(
                 at.label(name),
-                study.of(&queries, &|s| median_magnitude(&s[1]) / median_magnitude(&s[0]))?,
+                study.evaluate(&queries, &|s| median_magnitude(&s[1]) / median_magnitude(&s[0]))?,
                 50.0,
             );
         }
@@ -116,7 +116,7 @@ fn check_more_robust(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                 at.arx(&name_of_bias, TRUE_DELAY),
                 noisy.arx(&name_of_bias, TRUE_DELAY),
             ];
-            let found = study.of(&queries, &|s| {
+            let found = study.evaluate(&queries, &|s| {
                 (median_or_nan(&s[1]) - median_or_nan(&s[0])).abs()
                     - (median_or_nan(&s[3]) - median_or_nan(&s[2])).abs()
             })?;
@@ -135,7 +135,7 @@ fn check_half_the_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                 at.bj(&bias_of(name), at.m0, TRUE_DELAY),
                 at.arx(&bias_of(name), TRUE_DELAY),
             ];
-            let found = study.of(&queries, &|s| {
+            let found = study.evaluate(&queries, &|s| {
                 100.0 * (1.0 - median_magnitude(&s[0]) / median_magnitude(&s[1]))
             })?;
             part.add_effect(at.label(name), found, 50.0);

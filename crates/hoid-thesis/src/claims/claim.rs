@@ -1,8 +1,8 @@
-//! A statement of the text and the way it is tested.
+//! A statement of the thesis and the way it is tested.
 
 use super::{evidence::Evidence, rules::Part};
 
-/// A statement of the text.
+/// A statement of the thesis.
 #[derive(Debug, Clone)]
 pub struct Claim {
     /// Unique name of the claim.
@@ -12,7 +12,7 @@ pub struct Claim {
     /// The statement, quoted or abbreviated.
     pub statement: &'static str,
     /// Section and figures in which the statement occurs.
-    pub place: &'static str,
+    pub reference: &'static str,
     /// Description of the measurement that tests the statement.
     pub measure: &'static str,
     /// Plans whose results the test requires.

@@ -26,8 +26,8 @@ use super::{
     value::Value,
 };
 
-/// Length of the span before the change that gives the initial level, s; `FINAL_SPAN_S` is the length of the span at the end
-/// that gives the final level.
+/// Length of the span before the change that gives the initial level, s; `FINAL_SPAN_S` is the length of the span at
+/// the end that gives the final level.
 const INITIAL_SPAN_S: f64 = 10.24;
 
 const FINAL_SPAN_S: f64 = 15.36;
@@ -110,7 +110,7 @@ impl<'a> Study<'a> {
     }
 
     /// A function of the samples of several queries; values of the same replication stay paired.
-    pub fn of(&self, queries: &[Query], f: &dyn Fn(&[Vec<f64>]) -> f64) -> Result<Value, String> {
+    pub fn evaluate(&self, queries: &[Query], f: &dyn Fn(&[Vec<f64>]) -> f64) -> Result<Value, String> {
         let samples: Result<Vec<_>, _> = queries.iter().map(|query| self.sample(query)).collect();
         Ok(jackknife(&samples?, f))
     }

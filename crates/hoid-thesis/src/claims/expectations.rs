@@ -25,7 +25,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "expect-diminished-at-m1",
         theme: Theme::Recursive,
         statement: "Recursive BJ is expected to \"Diminish the huge bias encountered in recursive ARX results for a first-order remnant filter\".",
-        place: THESIS_SECTION,
+        reference: THESIS_SECTION,
         measure: "Magnitude of the bias of the median trace over the last 30.72 s, RPEM minus RLS, m0 = 1, C3 to C6, by coefficient and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(check_bias_diminished),
@@ -34,7 +34,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "expect-t-l-stable",
         theme: Theme::Recursive,
         statement: "... to \"Solve the instabilities in T_L online estimation when the controlled element acts as a second-order integrator\".",
-        place: THESIS_SECTION,
+        reference: THESIS_SECTION,
         measure: "Share of runs in which T_L has an RMS error above 100 % or no value, RPEM divided by RLS, C2, by m0: below 1/4.",
         plans: PLANS,
         source: Source::Data(check_t_l_stable),
@@ -43,7 +43,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "expect-stable-transitions",
         theme: Theme::Recursive,
         statement: "... to \"Improve the stability of the transitions between estimations from controlled elements with first- to second-order integrator dynamics\".",
-        place: THESIS_SECTION,
+        reference: THESIS_SECTION,
         measure: "Interquartile range of the trace over the runs, averaged over the 10.24 s after t_M, RPEM minus RLS, C3 and C4, K_e, T_L and K_e_dot, by m0 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(check_transitions),
@@ -52,7 +52,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "expect-low-error-at-high-orders",
         theme: Theme::Recursive,
         statement: "... to \"Provide online estimation results with a low error when high remnant filter orders are implemented in the simulation\".",
-        place: THESIS_SECTION,
+        reference: THESIS_SECTION,
         measure: "RPEM, m0 = 3 and 4, by operator parameter and noise level: magnitude of the bias of the median trace over the last 30.72 s, C3 to C6, and median RMS error of the trace, C1 and C2.",
         plans: PLANS,
         source: Source::Data(check_low_error),
@@ -61,7 +61,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "expect-depends-on-start",
         theme: Theme::Recursive,
         statement: "... to \"Be quite dependent on the initial conditions of the discrete-time parameters\".",
-        place: "6.2.2; V.B calls it \"independent of initial conditions set by the user\"",
+        reference: "6.2.2; V.B calls it \"independent of initial conditions set by the user\"",
         measure: "RPEM started from Table 6.1 minus RPEM started from the batch fit of the first 30.72 s, C4, P_n = 0.1, by start, m0 and operator parameter: |median paired difference in RMS error| and |difference in bias over the last 30.72 s|, above 5 points.",
         plans: &["recursive-starts"],
         source: Source::Data(check_dependence_on_start),
@@ -95,7 +95,7 @@ fn check_t_l_stable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         let at = settings(&["C2"], &[m0], &RECURSIVE_NOISE_LEVELS);
         let of = |one: fn(Setting) -> Query| at.iter().map(|at| one(*at)).collect::<Vec<_>>();
         let (rls, rpem) = (of(|at| at.rls("rms_T_L")), of(|at| at.rpem("rms_T_L")));
-        let ratio = study.of(&[rpem.clone(), rls.clone()].concat(), &|s| {
+        let ratio = study.evaluate(&[rpem.clone(), rls.clone()].concat(), &|s| {
             let (rpem, rls) = s.split_at(s.len() / 2);
             failed_share(rpem) / failed_share(rls)
         })?;
@@ -103,7 +103,7 @@ fn check_t_l_stable(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for (name, queries) in [("RLS", rls), ("RPEM", rpem)] {
             part.add_shown(
                 format!("share of {name} at m0 = {m0}"),
-                study.of(&queries, &|s| failed_share(s))?,
+                study.evaluate(&queries, &|s| failed_share(s))?,
             );
         }
     }

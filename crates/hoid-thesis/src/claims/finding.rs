@@ -16,15 +16,15 @@ pub struct Finding {
     /// Parts of the claim with all their cells.
     pub parts: Vec<Part>,
     /// The measured numbers, a few for each part.
-    pub measured: Vec<MeasuredNumber>,
+    pub measured_numbers: Vec<MeasuredNumber>,
     /// Number of cells that pass.
-    pub passed: usize,
+    pub passing_cells: usize,
     /// Number of cells that exceed the claimed number.
-    pub exceeded: usize,
+    pub exceeding_cells: usize,
     /// Number of cells that fail.
-    pub failed: usize,
+    pub failing_cells: usize,
     /// Number of all cells, including the undecided ones.
-    pub of: usize,
+    pub cell_count: usize,
     /// The findings as text.
     pub text: String,
 }
@@ -39,9 +39,9 @@ pub struct MeasuredNumber {
     /// Monte Carlo error of one cell: the median over the cells.
     pub error: f64,
     /// Smallest value in any cell.
-    pub least: f64,
+    pub min: f64,
     /// Largest value in any cell.
-    pub most: f64,
+    pub max: f64,
     /// Number of cells with a value.
     pub cells: usize,
 }
@@ -59,11 +59,11 @@ impl Claim {
         };
         let count = |outcome| parts.iter().map(|part| part.count(outcome)).sum();
         Finding {
-            passed: count(CellOutcome::Passes),
-            exceeded: count(CellOutcome::Exceeds),
-            failed: count(CellOutcome::Fails),
-            of: parts.iter().map(|part| part.tests.len()).sum(),
-            measured: parts.iter().flat_map(measured_numbers).collect(),
+            passing_cells: count(CellOutcome::Passes),
+            exceeding_cells: count(CellOutcome::Exceeds),
+            failing_cells: count(CellOutcome::Fails),
+            cell_count: parts.iter().map(|part| part.tests.len()).sum(),
+            measured_numbers: parts.iter().flat_map(measured_numbers).collect(),
             text: verdict_text(&verdict, &parts),
             verdict,
             parts,
@@ -78,16 +78,16 @@ fn measured_numbers(part: &Part) -> Vec<MeasuredNumber> {
         label: part.label.clone(),
         value: values.median,
         error: of(|test| test.measured.error).median,
-        least: values.min,
-        most: values.max,
+        min: values.min,
+        max: values.max,
         cells: values.count,
     };
     let shown = part.shown.iter().map(|(label, value)| MeasuredNumber {
         label: label.clone(),
         value: value.value,
         error: value.error,
-        least: value.value,
-        most: value.value,
+        min: value.value,
+        max: value.value,
         cells: 1,
     });
     std::iter::once(over_cells).chain(shown).collect()

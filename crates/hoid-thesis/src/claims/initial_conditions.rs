@@ -21,7 +21,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "ic-medians-close-to-zero",
         theme: Theme::InitialConditions,
         statement: "\"The medians of relative bias differences are null or close to zero\" for all starts.",
-        place: "6.1.4, Figs. F.1 to F.8",
+        reference: "6.1.4, Figs. F.1 to F.8",
         measure: "Median paired difference in bias from the base start, percentage points, for all starts, coefficients, orders m0, noise levels and n_k* = 26 to 30.",
         plans: PLANS,
         source: Source::Data(check_medians),
@@ -30,7 +30,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "ic-single-runs-differ",
         theme: Theme::InitialConditions,
         statement: "\"Several particular simulations can lead to considerable differences with respect to the base case.\"",
-        place: "6.1.4, Figs. F.1 to F.8",
+        reference: "6.1.4, Figs. F.1 to F.8",
         measure: "Share of fits whose b0 differs from that of the base start by more than 25 % of the true value, over all cells, by start: more than 1 in 1000.",
         plans: PLANS,
         source: Source::Data(check_single_runs),
@@ -39,7 +39,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "ic-poles-matter-more",
         theme: Theme::InitialConditions,
         statement: "\"The BJ model optimization is more sensitive to high initial deviations for the poles than for the zero location.\"",
-        place: "6.1.4, Figs. F.1 to F.8; Conclusions of Part II",
+        reference: "6.1.4, Figs. F.1 to F.8; Conclusions of Part II",
         measure: "Mean |difference in bias| of b0 and b1 from the base start: IC1 and IC2 (a changed) minus IC3 and IC6 (b changed), at least 0.1 percentage points.",
         plans: PLANS,
         source: Source::Data(check_pole_sensitivity),
@@ -48,7 +48,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "ic3-improves",
         theme: Theme::InitialConditions,
         statement: "IC3, closest to the reference: \"relative bias results are even improved when compared to the base case\".",
-        place: "6.1.4, Fig. F.3",
+        reference: "6.1.4, Fig. F.3",
         measure: "Mean paired difference in |bias|, IC3 minus base start, below -0.1 percentage points, n_k* = 29, by coefficient, m0 and noise level.",
         plans: PLANS,
         source: Source::Data(check_third_start_improves),
@@ -57,7 +57,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "ic-convergence-fails",
         theme: Theme::InitialConditions,
         statement: "\"Initial conditions with high deviations from real values may lead to convergence failure.\"",
-        place: "VII; 6.1.4",
+        reference: "VII; 6.1.4",
         measure: "Share of searches that do not converge, or end at a loss more than 1 % above that of the base start, n_k* = 29, over all cells with remnant, by start (IC1 to IC8, and three with high deviations, such as f1 = .5, f2 = .3, b0 = b1 = 1, d1 = .5): more than 1 in 100.",
         plans: PLANS,
         source: Source::Data(check_convergence),
@@ -66,7 +66,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "ic-from-ols-fails",
         theme: Theme::InitialConditions,
         statement: "Convergence failure is \"quite relevant regarding PEM initialization by a prior OLS estimation\", which may be highly biased.",
-        place: "VII",
+        reference: "VII",
         measure: "Share of PEM fits from OLS that fail, do not converge or have an error of a1 above 25 %, m0 = 1, C1 to C6 and all noise levels, first and last 30.72 s: more than 1 in 100. The search here first assumes zero initial states, then estimates them.",
         plans: &["recursive"],
         source: Source::Data(check_ols_start),
@@ -153,7 +153,7 @@ fn check_third_start_improves(evidence: &Evidence<'_>) -> Result<Vec<Part>, Stri
     for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
         for name in DISCRETE_PARAMETERS {
             let of = |start| fit_query(at, &bias_of(name), 29, start);
-            let found = study.of(&[of("IC3"), of("base")], &|s| {
+            let found = study.evaluate(&[of("IC3"), of("base")], &|s| {
                 mean_magnitude(&s[0]) - mean_magnitude(&s[1])
             })?;
             part.add_below(at.label(name), found, -RELEVANT_DIFFERENCE);

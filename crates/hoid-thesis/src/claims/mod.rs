@@ -1,6 +1,6 @@
 //! Statements of the thesis, tested with the data of studies.
 //!
-//! A claim contains a statement of the text and its place, the plans that provide the data, and the measurement. The
+//! A claim contains a statement of the thesis and its place, the plans that provide the data, and the measurement. The
 //! verdict on a claim follows from the data by the rules of the module [`rules`], which are the same for all claims. If
 //! a plan was not run, or if the results lack the required data, the claim cannot be tested and the verdict gives the
 //! reason. Claims on experiments with people cannot be tested here, because there are no data.
@@ -15,7 +15,7 @@
 //! | `recursive_arx`, `recursive_bj` | RLS, and RPEM compared with RLS |
 //! | `expectations` | expectations of the recursive estimator in Part II |
 //! | `noise` | noise level, remnant time constant, sample time |
-//! | `elsewhere` | claims that are not tested here |
+//! | `untestable` | claims that are not tested here |
 //!
 //! ```no_run
 //! use hoid_study::Results;
@@ -34,7 +34,6 @@ mod batch_arx;
 mod batch_bj;
 mod bj_against_arx;
 mod claim;
-mod elsewhere;
 mod evidence;
 mod expectations;
 mod finding;
@@ -47,6 +46,7 @@ pub mod rules;
 mod settings;
 mod statistics;
 mod table;
+mod untestable;
 mod value;
 mod variance_and_zero;
 
@@ -70,7 +70,7 @@ pub fn claims() -> Vec<Claim> {
         recursive_bj::CLAIMS,
         expectations::CLAIMS,
         noise::CLAIMS,
-        elsewhere::CLAIMS,
+        untestable::CLAIMS,
     ]
     .concat()
 }

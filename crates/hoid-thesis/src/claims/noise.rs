@@ -13,7 +13,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "noise-level-mean",
         theme: Theme::Noise,
         statement: "\"The average obtained noise level only presents small deviations with respect to the demanded ones.\"",
-        place: "A.4, Fig. A.1",
+        reference: "A.4, Fig. A.1",
         measure: "Mean obtained level, (var u - var u0) / var u, minus the demanded level, in magnitude, C1, m0 = 1 to 4, 18 levels: within 0.02.",
         plans: &["noise-level"],
         source: Source::Data(check_mean_level),
@@ -22,7 +22,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "noise-level-scatter",
         theme: Theme::Noise,
         statement: "\"The variability of the resultant P_n is reduced for the entire domain.\"",
-        place: "A.4, Fig. A.1",
+        reference: "A.4, Fig. A.1",
         measure: "Standard deviation of the obtained level of one run, C1, m0 = 1 to 4, 18 levels: within 0.05.",
         plans: &["noise-level"],
         source: Source::Data(check_level_scatter),
@@ -31,7 +31,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "t-n-little-effect",
         theme: Theme::Noise,
         statement: "The remnant time constant \"does not have much effect on the estimation accuracy\".",
-        place: "VII; 6 (\"low relevance\")",
+        reference: "VII; 6 (\"low relevance\")",
         measure: "Median bias at T_n = 0.2 s minus that at 0.06 s, C1 and C2, n_k* = 29, BJ(m* = 1), and ARX at m0 = 2 to 4, percentage points.",
         plans: &["remnant-time-constant"],
         source: Source::Data(check_time_constant),
@@ -40,7 +40,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "pade-need-not-hurt",
         theme: Theme::Noise,
         statement: "Decimation with a Pade delay: \"the BJ algorithm performance does not have to necessarily diminish in this case\".",
-        place: "Conclusions of Part II; VII",
+        reference: "Conclusions of Part II; VII",
         measure: "Median paired difference in response_error, BJ with a Pade delay of order 1 to 3 at Ts = 0.02 to 0.08 s minus BJ at 0.01 s, C1, m0 = 1 and 2: within 5 points.",
         plans: &["decimation"],
         source: Source::Data(check_pade_decimation),
@@ -62,7 +62,7 @@ fn check_level_scatter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let study = evidence.study("noise-level")?;
     let mut part = Part::new("standard deviation of the obtained level within 0.05");
     for at in settings(&["C1"], &REMNANT_ORDERS, &specified_levels()) {
-        let found = study.of(&[at.query("noise_level_obtained")], &|s| {
+        let found = study.evaluate(&[at.query("noise_level_obtained")], &|s| {
             hoid_study::Statistics::of(&s[0]).sd
         })?;
         part.add_below(at.label(""), found, 0.05);

@@ -17,7 +17,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-large-at-m1",
         theme: Theme::Recursive,
         statement: "m0 = 1: \"ARX models lead to significant relative bias while BJ provides a much more precise estimation with almost null bias after full convergence\".",
-        place: "V.B, Fig. 11",
+        reference: "V.B, Fig. 11",
         measure: "Magnitude of the bias of the median trace over the last 30.72 s, C4, m0 = 1, RLS and RPEM, by coefficient and noise level.",
         plans: &["recursive"],
         source: Source::Data(check_large_bias_at_first_order),
@@ -26,7 +26,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-10-times-less",
         theme: Theme::Recursive,
         statement: "\"When simulations with m0 >= 2 are conducted, the bias in ARX estimations is reduced by almost 10 times.\"",
-        place: "V.B, Fig. 12",
+        reference: "V.B, Fig. 12",
         measure: "Bias of the median trace over the last 30.72 s at m0 = 1 divided by that at m0 = 2 to 4, RLS, C4, for the coefficients; the same ratio of the median RMS error for omega_nm and zeta_nm.",
         plans: &["recursive"],
         source: Source::Data(check_ten_times_smaller_bias),
@@ -35,7 +35,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-nms-persistent",
         theme: Theme::Recursive,
         statement: "The bias of ARX for m0 >= 2 \"is still persistent in NMS coefficients\"; \"it will always have a bias\".",
-        place: "V.B, Fig. 12; VII",
+        reference: "V.B, Fig. 12; VII",
         measure: "Magnitude of the bias of the median trace of omega_nm and zeta_nm over the last 30.72 s, RLS, C4, m0 = 2 to 4.",
         plans: &["recursive"],
         source: Source::Data(check_persistent_bias),
@@ -44,7 +44,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "batch-represents-recursion",
         theme: Theme::Recursive,
         statement: "Batch-fitting results \"also represent the real functioning of RLS and RPEM algorithms in recursive estimation\".",
-        place: "V.B, Figs. 11, 12",
+        reference: "V.B, Figs. 11, 12",
         measure: "Bias of the median trace over the last 30.72 s minus the median bias of the batch fit of that span, C4, percentage points, by coefficient, m0 and noise level.",
         plans: &["recursive"],
         source: Source::Data(check_agreement_with_batch),
@@ -53,7 +53,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-a2-violates",
         theme: Theme::Recursive,
         statement: "m0 = 1: \"condition a2 > 0 is not fulfilled at multiple occasions\", with \"important divergences in the computation of T_L\".",
-        place: "6.2.1, Figs. G.1, G.5",
+        reference: "6.2.1, Figs. G.1, G.5",
         measure: "Median share of the trace that does not convert to an operator at m0 = 1 and at m0 = 2 to 4, RLS with matrix, C3.",
         plans: &["recursive-arx"],
         source: Source::Data(check_violated_a2_condition),
@@ -62,7 +62,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-gain-always-accurate",
         theme: Theme::Recursive,
         statement: "\"Nonetheless the estimation of the HO gain is always accurate\" (recursive ARX).",
-        place: "6.2.1, Figs. G.5 to G.8",
+        reference: "6.2.1, Figs. G.5 to G.8",
         measure: "Magnitude of the bias of the median trace of K_e over the last 30.72 s, RLS with matrix, C3, m0 = 2 to 4; at m0 = 1, where models do not convert to an operator, the bias of the static gain at the end.",
         plans: &["recursive-arx"],
         source: Source::Data(check_accurate_gain),
@@ -71,7 +71,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-heavily-reduced",
         theme: Theme::Recursive,
         statement: "\"When the simulation remnant order is increased, the bias is heavily reduced\" (recursive ARX).",
-        place: "6.2.1, Figs. G.1 to G.4",
+        reference: "6.2.1, Figs. G.1 to G.4",
         measure: "Bias of the median trace over the last 30.72 s at m0 = 2 to 4 divided by that at m0 = 1, RLS with matrix, C3, by coefficient.",
         plans: &["recursive-arx"],
         source: Source::Data(check_bias_heavily_reduced),
@@ -80,7 +80,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-more-noise-more-error",
         theme: Theme::Recursive,
         statement: "\"An increment in noise level clearly produces a bigger error in b0 and b1 parameters\" (recursive ARX).",
-        place: "6.2.1, Figs. G.1 to G.4",
+        reference: "6.2.1, Figs. G.1 to G.4",
         measure: "Increase in the magnitude of the bias of the median trace over the last 30.72 s from one noise level to the next, m0 = 2 to 4, C3, percentage points.",
         plans: &["recursive-arx"],
         source: Source::Data(check_bias_grows_with_noise),
@@ -178,7 +178,7 @@ fn check_accurate_gain(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     for at in settings(&["C3"], &[1], &NOISE_LEVELS) {
         let queries = DISCRETE_PARAMETERS.map(|name| at.rls(name));
         let k_e = study.truth(&queries[0])?.operator[0];
-        let found = study.of(&queries, &|s| {
+        let found = study.evaluate(&queries, &|s| {
             let gains: Vec<f64> = (0..s[0].len())
                 .map(|i| (s[2][i] + s[3][i]) / (1.0 + s[0][i] + s[1][i]))
                 .collect();

@@ -22,7 +22,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-less-bias",
         theme: Theme::Recursive,
         statement: "For m0 >= 2 RLS \"still shows a considerable bias with respect to BJ outcome\".",
-        place: "V.B, Fig. 11",
+        reference: "V.B, Fig. 11",
         measure: "Magnitude of the bias of the median trace over the last 30.72 s, RLS minus RPEM, C4, by coefficient, m0 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(check_less_bias),
@@ -31,7 +31,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-5-times-slower",
         theme: Theme::Recursive,
         statement: "\"ARX converges to its final estimation 5 times faster\"; \"the BJ structure needs 500 % more time to process\".",
-        place: "V.B; VII; VIII, Figs. 11, 12",
+        reference: "V.B; VII; VIII, Figs. 11, 12",
         measure: "Settling time (to 90 % of its own step) of the median trace of RPEM divided by that of RLS, C4, by parameter, m0 and noise level: from 2.5 to 7.5.",
         plans: PLANS,
         source: Source::Data(check_five_times_slower),
@@ -40,7 +40,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-slower",
         theme: Theme::Recursive,
         statement: "\"The RPEM algorithm denotes a slower adaptation capacity.\"",
-        place: "V.B, Figs. 11, 12",
+        reference: "V.B, Figs. 11, 12",
         measure: "Settling time (to 90 % of its own step) of the median trace, RPEM minus RLS, C4, by parameter, m0 and noise level, s.",
         plans: PLANS,
         source: Source::Data(check_slower_adaptation),
@@ -49,7 +49,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-diverges",
         theme: Theme::Recursive,
         statement: "RPEM \"may turn into divergence problems due to excessive oscillations in some cases\".",
-        place: "V.B",
+        reference: "V.B",
         measure: "Share of RPEM runs in which a coefficient exceeds 10 or is not a number, and share in which the RMS error of T_L exceeds 100 %, C1 to C6, all m0 and noise levels: more than 1 in 1000.",
         plans: PLANS,
         source: Source::Data(check_divergence),
@@ -58,7 +58,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-better-gain-and-zero",
         theme: Theme::Recursive,
         statement: "For m0 >= 2 \"ARX offers more stable, precise results than BJ in K_e, T_L and K_e_dot, while the BJ model provides a more adequate outcome in NMS parameters\".",
-        place: "V.B, Fig. 12; VII",
+        reference: "V.B, Fig. 12; VII",
         measure: "Median paired difference in the RMS error of the trace, RPEM minus RLS, C4, m0 = 2 to 4, by parameter and noise level.",
         plans: PLANS,
         source: Source::Data(check_better_arx_gain),
@@ -67,7 +67,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rls-0-to-5-percent",
         theme: Theme::Recursive,
         statement: "\"Except for a first-order remnant, the RLS algorithm usually captures the HO gain and zero with 0-5 % less bias.\"",
-        place: "VIII",
+        reference: "VIII",
         measure: "100 (1 - RLS / RPEM) for the magnitude of the bias of the median trace of K_e and T_L over the last 30.72 s, C4, m0 = 2 to 4: from 0 to 5 %; the same for the median RMS error of the trace.",
         plans: PLANS,
         source: Source::Data(check_arx_bias_zero_to_five_less),
@@ -76,7 +76,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-nms-25-percent",
         theme: Theme::Recursive,
         statement: "\"BJ is able to approximate the real Neuro-Muscular (NMS) dynamics with 25 % less error.\"",
-        place: "VIII",
+        reference: "VIII",
         measure: "100 (1 - RPEM / RLS) for the magnitude of the bias of the median trace of omega_nm and zeta_nm over the last 30.72 s, C4, m0 = 2 to 4: from 12.5 to 37.5 %; the same for the median RMS error of the trace.",
         plans: PLANS,
         source: Source::Data(check_nms_error),
@@ -85,7 +85,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-outperforms-at-m1",
         theme: Theme::Recursive,
         statement: "\"When a m0 = 1 simulation is conducted, the BJ model clearly outperforms ARX.\"",
-        place: "VIII; 6.2.2",
+        reference: "VIII; 6.2.2",
         measure: "Median paired difference in the RMS error of the trace, RPEM minus RLS, m0 = 1, C1 to C6, all parameters and noise levels.",
         plans: PLANS,
         source: Source::Data(check_first_order_remnant),
@@ -94,7 +94,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-t-l-oscillates",
         theme: Theme::Recursive,
         statement: "\"Great oscillations are given in T_L estimations from BJ structures\" (recursive).",
-        place: "V.B, Fig. 12; VII",
+        reference: "V.B, Fig. 12; VII",
         measure: "Median RMS error of T_L minus the larger of the errors of K_e and K_e_dot, RPEM, C4, m0 = 2 to 4, by noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(check_t_l_oscillations),
@@ -103,7 +103,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-m2-coupling",
         theme: Theme::Recursive,
         statement: "\"An additional error is produced when m0 = 2 in BJ estimations since coupling can occur in poles.\"",
-        place: "V.B, Fig. 12",
+        reference: "V.B, Fig. 12",
         measure: "Median RMS error of the trace at m0 = 2 minus the larger of the errors at m0 = 3 and 4, RPEM, C4, \
                   by parameter and noise level, percentage points.",
         plans: PLANS,
@@ -113,7 +113,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-tracks",
         theme: Theme::Recursive,
         statement: "RPEM \"is able to correctly track HO adaptations to CE dynamics transitions\".",
-        place: "VII",
+        reference: "VII",
         measure: "Magnitude of the bias of the median trace of K_e, T_L and K_e_dot over the last 30.72 s, C3 to C6, RPEM, by m0 and noise level.",
         plans: PLANS,
         source: Source::Data(check_tracking),
@@ -122,7 +122,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-noisier-in-s2",
         theme: Theme::Recursive,
         statement: "RPEM has \"strong oscillations that are given in state s2\".",
-        place: "VII",
+        reference: "VII",
         measure: "Median RMS error of K_e and T_L in C2 minus that in C1, RPEM, by m0 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(check_second_state_oscillations),
@@ -131,7 +131,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "rpem-matrix-helps",
         theme: Theme::Recursive,
         statement: "\"RPEM could be implemented with a forgetting matrix ... diminishing the persistent bias\" in NMS coefficients.",
-        place: "VII",
+        reference: "VII",
         measure: "Median paired difference in the RMS error of omega_nm and zeta_nm, RPEM with a forgetting matrix minus RPEM with a factor, C3 to C6, P_n = 0.1.",
         plans: &["forgetting"],
         source: Source::Data(check_forgetting_matrix),
@@ -224,8 +224,8 @@ fn rms(study: Study<'_>, at: Setting, name: &str) -> Result<Value, String> {
 }
 
 /// Percentage by which the median RMS error for the first query is smaller than that for the second, in the same runs.
-fn less_rms(study: Study<'_>, one: Query, other: Query) -> Result<Value, String> {
-    study.of(&[one, other], &|s| {
+fn rms_reduction(study: Study<'_>, one: Query, other: Query) -> Result<Value, String> {
+    study.evaluate(&[one, other], &|s| {
         100.0 * (1.0 - median_or_nan(&s[0]) / median_or_nan(&s[1]))
     })
 }
@@ -254,7 +254,12 @@ fn check_arx_bias_zero_to_five_less(evidence: &Evidence<'_>) -> Result<Vec<Part>
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
             let rms = format!("rms_{name}");
             bias.add_effect_between(at.label(name), rls?.abs().percent_less_than(rpem?.abs()), 0.0, 5.0);
-            error.add_effect_between(at.label(name), less_rms(study, at.rls(&rms), at.rpem(&rms))?, 0.0, 5.0);
+            error.add_effect_between(
+                at.label(name),
+                rms_reduction(study, at.rls(&rms), at.rpem(&rms))?,
+                0.0,
+                5.0,
+            );
         }
     }
     Ok(vec![bias, error])
@@ -269,7 +274,7 @@ fn check_nms_error(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             let [rls, rpem] = [at.rls(""), at.rpem("")].map(|query| study.trace_bias(&query, name));
             let rms = format!("rms_{name}");
             bias.add_effect(at.label(name), rpem?.abs().percent_less_than(rls?.abs()), 25.0);
-            error.add_effect(at.label(name), less_rms(study, at.rpem(&rms), at.rls(&rms))?, 25.0);
+            error.add_effect(at.label(name), rms_reduction(study, at.rpem(&rms), at.rls(&rms))?, 25.0);
         }
     }
     Ok(vec![bias, error])
@@ -300,7 +305,7 @@ fn check_t_l_oscillations(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> 
         let queries = ["rms_T_L", "rms_K_e", "rms_K_e_dot"].map(|quantity| at.rpem(quantity));
         part.add_above(
             at.label(""),
-            study.of(&queries, &|s| {
+            study.evaluate(&queries, &|s| {
                 median_or_nan(&s[0]) - median_or_nan(&s[1]).max(median_or_nan(&s[2]))
             })?,
             0.0,
@@ -317,7 +322,7 @@ fn check_pole_coupling(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
             let queries = HIGHER_REMNANT_ORDERS.map(|m0| Setting { m0, ..at }.rpem(&format!("rms_{name}")));
             part.add_above(
                 at.label(name),
-                study.of(&queries, &|s| {
+                study.evaluate(&queries, &|s| {
                     median_or_nan(&s[0]) - median_or_nan(&s[1]).max(median_or_nan(&s[2]))
                 })?,
                 0.0,

@@ -19,7 +19,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "vaf-same-for-all-m",
         theme: Theme::RemnantOrder,
         statement: "\"The BJ estimator presents a homogeneous average VAF value for all model remnant orders\" (m0 = 3).",
-        place: "V.A.2, Fig. 7; 6.1.3, Fig. E.5",
+        reference: "V.A.2, Fig. 7; 6.1.3, Fig. E.5",
         measure: "Spread of the mean VAF over m* = 1 to 4 in C1, m0 = 3, by n_k* = 25 to 30 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(check_vaf_homogeneous),
@@ -28,7 +28,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "vaf-lower-with-m4-at-m1",
         theme: Theme::RemnantOrder,
         statement: "At m0 = 1 \"a model remnant order equal to 4 (the simulation one is 1 for this case) provides lower VAF results\".",
-        place: "V.A.2; 6.1.3, Figs. E.1, E.9",
+        reference: "V.A.2; 6.1.3, Figs. E.1, E.9",
         measure: "Mean paired difference in VAF, m* = 4 minus m* = 1, at m0 = 1 in C1 and C2, for each n_k* and noise level: below -0.1 points.",
         plans: PLANS,
         source: Source::Data(check_vaf_lower_at_fourth_order),
@@ -37,7 +37,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "vaf-bj-as-arx",
         theme: Theme::RemnantOrder,
         statement: "VAF: \"No significant differences are found between BJ and ARX for cases with a time delay close to n_k* = 29\".",
-        place: "V.A.2, Fig. 8",
+        reference: "V.A.2, Fig. 8",
         measure: "Magnitude of the mean paired difference in VAF, BJ minus ARX, C1, m0 = 3, n_k* = 28 to 30, m* = 1 to 4.",
         plans: PLANS,
         source: Source::Data(check_vaf_of_arx),
@@ -46,7 +46,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "vaf-does-not-find-delay",
         theme: Theme::RemnantOrder,
         statement: "There are \"limitations in the VAF metric to find the actual n_k\".",
-        place: "Conclusions of Part II; 6.1.3",
+        reference: "Conclusions of Part II; 6.1.3",
         measure: "Share of records in which the VAF of BJ(m* = 1) over n_k* = 25 to 30 is largest at 29, C1 and C2, by m0 and noise level: below 0.9.",
         plans: PLANS,
         source: Source::Data(check_vaf_and_delay),
@@ -55,7 +55,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "m1-same-bias",
         theme: Theme::RemnantOrder,
         statement: "\"The use of a fixed model remnant order m* = 1 does not change the bias obtained by BJ.\"",
-        place: "V.A.2, Fig. 9; VIII; 6.1.3, Figs. C.6, C.14",
+        reference: "V.A.2, Fig. 9; VIII; 6.1.3, Figs. C.6, C.14",
         measure: "Median paired difference in bias, m* = 1 minus m* = m0, m0 = 2 to 4, C1 and C2, n_k* = 29, percentage points.",
         plans: PLANS,
         source: Source::Data(check_same_bias),
@@ -64,7 +64,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "m1-better-at-m4",
         theme: Theme::RemnantOrder,
         statement: "With m* = 1 \"the bias in m0 = 4 is even slightly diminished\".",
-        place: "V.A.2, Fig. 9",
+        reference: "V.A.2, Fig. 9",
         measure: "Magnitude of the median bias of b0 and b1, m* = 1 minus m* = 4, m0 = 4, C1, n_k* = 29, by noise level: below -0.1 percentage points.",
         plans: PLANS,
         source: Source::Data(check_better_at_fourth_order),
@@ -73,7 +73,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "m1-small-loss-at-high-orders",
         theme: Theme::RemnantOrder,
         statement: "m* = 1 \"could imply a small decrease in accuracy estimation for high simulation remnant orders\".",
-        place: "6.1.3",
+        reference: "6.1.3",
         measure: "Median paired difference in response_error, m* = 1 minus m* = m0, averaged over the noise levels, m0 = 3 and 4, C1 and C2, n_k* = 29: at least 0.1 percentage points.",
         plans: PLANS,
         source: Source::Data(check_loss_at_high_orders),
@@ -82,7 +82,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "m1-wider-boxes",
         theme: Theme::RemnantOrder,
         statement: "With m* = 1 \"the interquartile range may increase slightly\".",
-        place: "6.1.3, Figs. C.6, C.14",
+        reference: "6.1.3, Figs. C.6, C.14",
         measure: "Interquartile range of the bias with m* = 1 divided by that with m* = m0, averaged over the noise levels, m0 = 2 to 4, C1 and C2, n_k* = 29: from 1 to 1.5.",
         plans: PLANS,
         source: Source::Data(check_wider_boxes),
@@ -91,7 +91,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "m1-gain-and-zero-by-delay",
         theme: Theme::RemnantOrder,
         statement: "With m* = 1 the NMS values are very similar, but the \"bias in K_e and T_L become noticeably higher when the model time delay differs from the simulation one\".",
-        place: "6.1.3, Figs. C.7, C.15",
+        reference: "6.1.3, Figs. C.7, C.15",
         measure: "Median |bias| with m* = 1 minus that with m* = m0 at n_k* = 25 to 28 and 30, m0 = 2 to 4, C1: above 0 for K_e and T_L; within 5 points for the NMS parameters.",
         plans: PLANS,
         source: Source::Data(check_bias_by_delay),
@@ -100,7 +100,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "m1-remnant-wrong",
         theme: Theme::RemnantOrder,
         statement: "\"The remnant parameters are obviously wrongly estimated for the m* = 1 case.\"",
-        place: "6.1.3, Figs. C.8, C.16",
+        reference: "6.1.3, Figs. C.8, C.16",
         measure: "Magnitude of the median bias of T_n and K_n with m* = 1, m0 = 2 to 4, C1, n_k* = 29, backward Euler.",
         plans: PLANS,
         source: Source::Data(check_wrong_remnant_parameters),
@@ -109,7 +109,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "delay-over-order",
         theme: Theme::RemnantOrder,
         statement: "\"The time delay is a more determinant factor than the remnant order in terms of relative bias reduction.\"",
-        place: "6.1.3, Figs. E.2, E.4, E.6, E.8",
+        reference: "6.1.3, Figs. E.2, E.4, E.6, E.8",
         measure: "Spread of the median |bias| over n_k* (m* = m0) minus that over m* (n_k* = 29), C1, by coefficient, m0 and noise level, percentage points.",
         plans: PLANS,
         source: Source::Data(check_delay_more_important_than_order),
@@ -118,7 +118,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "match-matters-at-m1",
         theme: Theme::RemnantOrder,
         statement: "Only at m0 = 1 a \"model remnant order that matches the simulation one reduces the bias significantly\".",
-        place: "6.1.3, Fig. E.2",
+        reference: "6.1.3, Fig. E.2",
         measure: "Median |bias| with m* = m0 divided by the mean for the other orders, n_k* = 29, C1, by coefficient and noise level: below 1/2 at m0 = 1, above 1/2 at m0 = 2 to 4.",
         plans: PLANS,
         source: Source::Data(check_order_match),
@@ -127,7 +127,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "order-over-delay-for-remnant",
         theme: Theme::RemnantOrder,
         statement: "Innovation variance and d1: \"the time delay becomes irrelevant in terms of bias reduction, while the remnant order is fundamental\".",
-        place: "6.1.3, Figs. E.2, E.4, E.6, E.8",
+        reference: "6.1.3, Figs. E.2, E.4, E.6, E.8",
         measure: "Spread of the medians over m* (n_k* = 29) divided by that over n_k* (m* = m0), C1, by m0 and noise level: above 1.",
         plans: PLANS,
         source: Source::Data(check_order_more_important_than_delay),
@@ -147,7 +147,7 @@ fn check_vaf_homogeneous(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
                 let queries = REMNANT_ORDERS.map(|m| at.bj("vaf", m, *nk));
                 part.add_below(
                     at.label(&format!("n_k* = {nk}")),
-                    study.of(&queries, &|s| spread(s.iter().map(|v| mean(v))))?,
+                    study.evaluate(&queries, &|s| spread(s.iter().map(|v| mean(v))))?,
                     1.0,
                 );
             }
@@ -162,7 +162,7 @@ fn check_vaf_and_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     let mut part = Part::new("share of records with the largest VAF at n_k* = 29, below 0.9");
     for at in settings(&["C1", "C2"], &REMNANT_ORDERS, &NOISE_LEVELS) {
         let queries = DELAYS.map(|nk| at.bj("vaf", 1, nk));
-        let found = study.of(&queries, &|s| {
+        let found = study.evaluate(&queries, &|s| {
             let best = |i: usize| {
                 DELAYS
                     .iter()
@@ -188,7 +188,7 @@ fn check_vaf_lower_at_fourth_order(evidence: &Evidence<'_>) -> Result<Vec<Part>,
     for at in settings(&["C1", "C2"], &[1], &NOISE_LEVELS) {
         for nk in DELAYS {
             let queries = [at.bj("vaf", 4, nk), at.bj("vaf", 1, nk)];
-            let found = study.of(&queries, &|s| mean(&s[0]) - mean(&s[1]))?;
+            let found = study.evaluate(&queries, &|s| mean(&s[0]) - mean(&s[1]))?;
             part.add_below(at.label(&format!("n_k* = {nk}")), found, -RELEVANT_DIFFERENCE);
         }
     }
@@ -202,7 +202,7 @@ fn check_vaf_of_arx(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for nk in 28..=30 {
             for m in REMNANT_ORDERS {
                 let queries = [at.bj("vaf", m, nk), at.arx("vaf", nk)];
-                let found = study.of(&queries, &|s| mean(&s[0]) - mean(&s[1]))?;
+                let found = study.evaluate(&queries, &|s| mean(&s[0]) - mean(&s[1]))?;
                 part.add_below(at.label(&format!("n_k* = {nk}, m* = {m}")), found.abs(), 1.0);
             }
         }
@@ -234,7 +234,7 @@ fn check_better_at_fourth_order(evidence: &Evidence<'_>) -> Result<Vec<Part>, St
             let queries = [1, 4].map(|m| at.bj(&bias_of(name), m, TRUE_DELAY));
             part.add_below(
                 at.label(name),
-                study.of(&queries, &|s| median_bias(&s[0]) - median_bias(&s[1]))?,
+                study.evaluate(&queries, &|s| median_bias(&s[0]) - median_bias(&s[1]))?,
                 -RELEVANT_DIFFERENCE,
             );
         }
@@ -268,7 +268,7 @@ fn check_wider_boxes(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for name in DISCRETE_PARAMETERS {
             let fits =
                 NOISE_LEVELS.map(|level| [1, at.m0].map(|m| Setting { level, ..at }.bj(&bias_of(name), m, TRUE_DELAY)));
-            let found = study.of(&fits.concat(), &|s| {
+            let found = study.evaluate(&fits.concat(), &|s| {
                 s.chunks(2)
                     .map(|pair| interquartile_range(&pair[0]) / interquartile_range(&pair[1]))
                     .sum::<f64>()
@@ -288,7 +288,7 @@ fn check_bias_by_delay(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
         for nk in DELAYS.into_iter().filter(|nk| *nk != TRUE_DELAY) {
             let change = |name: &str| {
                 let queries = [1, at.m0].map(|m| at.bj(&bias_of(name), m, nk));
-                study.of(&queries, &|s| median_magnitude(&s[0]) - median_magnitude(&s[1]))
+                study.evaluate(&queries, &|s| median_magnitude(&s[0]) - median_magnitude(&s[1]))
             };
             for name in ["K_e", "T_L"] {
                 higher.add_above(at.label(&format!("n_k* = {nk}, {name}")), change(name)?, 0.0);
@@ -333,7 +333,7 @@ fn check_delay_more_important_than_order(evidence: &Evidence<'_>) -> Result<Vec<
     let mut part = Part::new("spread over n_k* minus that over m*, above 0");
     for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
         for name in DISCRETE_PARAMETERS {
-            let found = study.of(&delay_and_order_queries(at, &bias_of(name)), &|s| {
+            let found = study.evaluate(&delay_and_order_queries(at, &bias_of(name)), &|s| {
                 let (delays, orders) = s.split_at(DELAYS.len());
                 spread(delays.iter().map(|v| median_magnitude(v))) - spread(orders.iter().map(|v| median_magnitude(v)))
             })?;
@@ -350,7 +350,7 @@ fn check_order_match(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
     for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
         for name in DISCRETE_PARAMETERS {
             let queries = REMNANT_ORDERS.map(|m| at.bj(&bias_of(name), m, TRUE_DELAY));
-            let found = study.of(&queries, &|s| {
+            let found = study.evaluate(&queries, &|s| {
                 let rest = s
                     .iter()
                     .enumerate()
@@ -373,7 +373,7 @@ fn check_order_more_important_than_delay(evidence: &Evidence<'_>) -> Result<Vec<
     for name in ["innovation_variance", "d1"] {
         let mut part = Part::new(&format!("{name}: spread over m* divided by that over n_k*, above 1"));
         for at in settings(&["C1"], &REMNANT_ORDERS, &NOISE_LEVELS) {
-            let found = study.of(&delay_and_order_queries(at, name), &|s| {
+            let found = study.evaluate(&delay_and_order_queries(at, name), &|s| {
                 let (delays, orders) = s.split_at(DELAYS.len());
                 spread(orders.iter().map(|v| median_or_nan(v))) / spread(delays.iter().map(|v| median_or_nan(v)))
             })?;

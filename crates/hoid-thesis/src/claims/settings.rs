@@ -12,7 +12,7 @@ pub(super) const HIGHER_REMNANT_ORDERS: [usize; 3] = [2, 3, 4];
 pub(super) const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
 /// The simulated delay, samples.
 pub(super) const TRUE_DELAY: usize = 29;
-/// Coefficients by their names in the text.
+/// Coefficients by their names in the thesis.
 pub(super) const DISCRETE_PARAMETERS: [&str; 4] = ["a1", "a2", "b0", "b1"];
 /// Neuromuscular parameters.
 pub(super) const NMS_PARAMETERS: [&str; 2] = ["omega_nm", "zeta_nm"];
@@ -47,7 +47,7 @@ pub(super) fn settings(conditions: &[&'static str], orders: &[usize], levels: &[
     all
 }
 
-/// Name of a quantity for models with F, in which a1 and a2 of the text are called f1 and f2.
+/// Name of a quantity for models with F, in which a1 and a2 of the thesis are called f1 and f2.
 pub(super) fn name_with_f(quantity: &str) -> String {
     match quantity
         .strip_suffix("a1")

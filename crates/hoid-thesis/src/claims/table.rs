@@ -22,7 +22,7 @@ pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
         values: ColumnValues::Real(
             findings
                 .iter()
-                .map(|(_, finding)| finding.measured.first().map_or(f64::NAN, of))
+                .map(|(_, finding)| finding.measured_numbers.first().map_or(f64::NAN, of))
                 .collect(),
         ),
     };
@@ -32,18 +32,18 @@ pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
             text("id", &|claim, _| claim.id.to_owned()),
             text("theme", &|claim, _| claim.theme.title().to_owned()),
             text("statement", &|claim, _| claim.statement.to_owned()),
-            text("place", &|claim, _| claim.place.to_owned()),
+            text("place", &|claim, _| claim.reference.to_owned()),
             text("measure", &|claim, _| claim.measure.to_owned()),
             text("plans", &|claim, _| claim.plans.join(" ")),
             text("verdict", &|_, finding| finding.verdict.to_string()),
-            whole("passed", &|finding| finding.passed),
-            whole("exceeded", &|finding| finding.exceeded),
-            whole("failed", &|finding| finding.failed),
-            whole("cells", &|finding| finding.of),
+            whole("passed", &|finding| finding.passing_cells),
+            whole("exceeded", &|finding| finding.exceeding_cells),
+            whole("failed", &|finding| finding.failing_cells),
+            whole("cells", &|finding| finding.cell_count),
             real("value", &|measured| measured.value),
             real("error", &|measured| measured.error),
-            real("least", &|measured| measured.least),
-            real("most", &|measured| measured.most),
+            real("least", &|measured| measured.min),
+            real("most", &|measured| measured.max),
             text("found", &|_, finding| finding.text.clone()),
         ],
     }

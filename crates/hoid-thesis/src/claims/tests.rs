@@ -49,7 +49,7 @@ fn claim_ids_are_unique_and_statements_short() {
     assert!(all.is_sorted_by_key(|claim| claim.theme));
     for claim in &all {
         assert!(claim.statement.len() <= 200, "{}: {}", claim.id, claim.statement.len());
-        assert!(!claim.place.is_empty() && !claim.measure.is_empty(), "{}", claim.id);
+        assert!(!claim.reference.is_empty() && !claim.measure.is_empty(), "{}", claim.id);
         assert!(
             claim
                 .plans
@@ -77,14 +77,14 @@ fn each_claim_finds_its_cells_in_its_plans() {
         let finding = claim.evaluate(&evidence);
         assert!(!finding.parts.is_empty(), "{}: {}", claim.id, finding.verdict);
         assert!(finding.parts.iter().all(|part| !part.tests.is_empty()), "{}", claim.id);
-        assert!(!finding.measured.is_empty() && !finding.text.is_empty());
+        assert!(!finding.measured_numbers.is_empty() && !finding.text.is_empty());
         let without = claim.evaluate(&Evidence::new());
         assert!(
             matches!(&without.verdict, Verdict::CannotBeTested(reason) if reason.contains("was not run")),
             "{}",
             claim.id
         );
-        assert_eq!((without.of, without.measured.len()), (0, 0));
+        assert_eq!((without.cell_count, without.measured_numbers.len()), (0, 0));
     }
 }
 

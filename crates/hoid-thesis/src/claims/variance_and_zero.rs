@@ -1,10 +1,10 @@
 //! Claims on batch fits that do not concern the bias of the coefficients: the innovation variance by order of the
 //! remnant and in C2, b at a wrong delay, and the zero in C2.
 //!
-//! The *modified remnant noise variance* of the text is the variance of the innovation that drives 1/D. The reference
+//! The *modified remnant noise variance* of the thesis is the variance of the innovation that drives 1/D. The reference
 //! value is the variance of the backward Euler form (eq. B.12), `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. In the
-//! simulations of the text and in those of hoid, the remnant is held exactly over a sample. The innovations of an exact
-//! model therefore have a different variance, which is also shown.
+//! simulations of the thesis and in those of hoid, the remnant is held exactly over a sample. The innovations of an
+//! exact model therefore have a different variance, which is also shown.
 
 use super::{
     claim::{Claim, Source, Theme},
@@ -24,7 +24,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-variance-by-order",
         theme: Theme::BatchBj,
         statement: "\"The modified remnant noise variance\" presents an \"important deviation with respect to the reference value as well, which increases for higher remnant orders\".",
-        place: "6.1.2, Fig. C.5",
+        reference: "6.1.2, Fig. C.5",
         measure: "Magnitude of the median bias of the innovation variance relative to eq. B.12, BJ(m* = m0), C1, n_k* = 29: at m0 = 2 to 4, and its increase from each order to the next, m0 = 1 to 4.",
         plans: PLANS,
         source: Source::Data(check_variance_by_order),
@@ -33,7 +33,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-remnant-in-c2",
         theme: Theme::BatchBj,
         statement: "C2: \"the results in the modified noise variance (and the remnant gain in consequence) have improved, although the variability of the obtained biases is much higher\".",
-        place: "6.1.2, Fig. C.13",
+        reference: "6.1.2, Fig. C.13",
         measure: "Innovation variance (relative to eq. B.12) and K_n (backward Euler), BJ(m* = m0), n_k* = 29, by m0 and noise level: |median bias| in C2 minus that in C1; interquartile range in C2 divided by that in C1, at least 1.5.",
         plans: PLANS,
         source: Source::Data(check_remnant_in_second_condition),
@@ -42,7 +42,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "bj-b-at-wrong-delay",
         theme: Theme::BatchBj,
         statement: "BJ biases can be \"considerable for b0 and b1 in scenarios with model time delays far from the reference one, but those ones are a bit smaller than in the ARX case\".",
-        place: "6.1.2, Fig. C.3",
+        reference: "6.1.2, Fig. C.3",
         measure: "Magnitude of the median bias of b0 and b1, BJ(m* = m0), C1, n_k* = 25 and 26, by m0 and noise level; the same minus the magnitude for ARX, m0 = 1 to 4.",
         plans: PLANS,
         source: Source::Data(check_wrong_delay),
@@ -51,7 +51,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "zero-in-c2",
         theme: Theme::BatchBj,
         statement: "C2, BJ: \"Similar to the ARX case, the placement of the zero is estimated less accurately than for simulation condition C1\".",
-        place: "6.1.1, 6.1.2, Figs. D.10 to D.17",
+        reference: "6.1.1, 6.1.2, Figs. D.10 to D.17",
         measure: "Median magnitude of the relative error of the zero 1/T_L in C2 minus that in C1, percentage points, n_k* = 29, by noise level: BJ(m* = m0), m0 = 1 to 4, and ARX, m0 = 2 to 4.",
         plans: PLANS,
         source: Source::Data(check_zero_in_second_condition),
@@ -60,7 +60,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         id: "zero-matters-in-c2",
         theme: Theme::BatchBj,
         statement: "Bode plots: \"the effect of correct zeros estimation is especially noticeable for condition C2\".",
-        place: "Conclusions of Part II, Figs. D.9, D.18",
+        reference: "Conclusions of Part II, Figs. D.9, D.18",
         measure: "Median magnitude of the relative error of the zero 1/T_L, ARX minus BJ(m* = m0), in C2 minus the same difference in C1, percentage points, n_k* = 29, m0 = 2 to 4, by noise level.",
         plans: PLANS,
         source: Source::Data(check_importance_of_zero),
@@ -82,7 +82,7 @@ fn variance_bias(study: Study<'_>, at: Setting, figure: fn(&[f64]) -> f64) -> Re
     let query = at.bj("innovation_variance", at.m0, TRUE_DELAY);
     study.sample(&query)?;
     let reference = backward_euler_variance(study, at)?;
-    study.of(&[query], &|s| {
+    study.evaluate(&[query], &|s| {
         let biases: Vec<f64> = s[0].iter().map(|v| 100.0 * (v / reference - 1.0)).collect();
         figure(&biases)
     })
@@ -119,7 +119,7 @@ fn check_remnant_in_second_condition(evidence: &Evidence<'_>) -> Result<Vec<Part
     let study = evidence.study("bias")?;
     let gain = |at: Setting, figure: fn(&[f64]) -> f64| {
         let query = at.bj("bias_K_n_backward_euler", at.m0, TRUE_DELAY);
-        study.of(&[query], &|s| figure(&s[0]))
+        study.evaluate(&[query], &|s| figure(&s[0]))
     };
     let of_variance = |at: Setting, figure: fn(&[f64]) -> f64| variance_bias(study, at, figure);
     type BiasStatistic<'f> = &'f dyn Fn(Setting, fn(&[f64]) -> f64) -> Result<Value, String>;
@@ -174,7 +174,7 @@ fn zero_errors(t_l_percent: &[f64]) -> Vec<f64> {
 /// median for the second query is first subtracted from the median for the first.
 fn zero_change(study: Study<'_>, of: &dyn Fn(Setting) -> Vec<hoid_study::Query>, at: Setting) -> Result<Value, String> {
     let error = |condition| {
-        study.of(&of(Setting { condition, ..at }), &|s| {
+        study.evaluate(&of(Setting { condition, ..at }), &|s| {
             let each: Vec<f64> = s.iter().map(|errors| median_magnitude(&zero_errors(errors))).collect();
             each[0] - each.get(1).unwrap_or(&0.0)
         })

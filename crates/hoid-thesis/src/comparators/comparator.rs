@@ -25,7 +25,7 @@ pub struct Task<'a> {
     /// The record.
     pub record: &'a Record,
     /// Samples after which an estimate is requested, in ascending order.
-    pub at: &'a [usize],
+    pub requested_samples: &'a [usize],
     /// Frequencies of the lines of the forcing function, rad/s.
     pub lines_rad_s: &'a [f64],
     /// Frequencies at which the response is requested, rad/s; each is the frequency of a line.
@@ -72,13 +72,13 @@ impl TrackingResult {
 /// A method that is included for comparison with others.
 pub trait Comparator: Settings + Send + Sync {
     /// Returns the description of the method.
-    fn about(&self) -> ComparatorDescription;
+    fn description(&self) -> ComparatorDescription;
 
     /// Tracks the operator over a record.
     ///
     /// # Errors
     /// [`ThesisError`] if the record is unsuitable.
-    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError>;
+    fn track(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError>;
 }
 
 impl Task<'_> {
@@ -105,7 +105,7 @@ impl Task<'_> {
                 "an input that varies",
             ));
         }
-        if let Some(k) = self.at.iter().find(|k| **k >= e.len()) {
+        if let Some(k) = self.requested_samples.iter().find(|k| **k >= e.len()) {
             let expected = format!("a number below {}", e.len());
             return Err(unsuited("the index of a requested sample", k.to_string(), &expected));
         }

@@ -58,7 +58,7 @@ impl FourierCoefficients {
 }
 
 impl Comparator for FourierCoefficients {
-    fn about(&self) -> ComparatorDescription {
+    fn description(&self) -> ComparatorDescription {
         ComparatorDescription {
             name: NAME,
             help: "Fourier coefficients at the lines, in a moving window",
@@ -67,12 +67,12 @@ impl Comparator for FourierCoefficients {
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+    fn track(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let signals = task.signals(NAME, 2 * task.lines_rad_s.len())?;
         let n = task.record.len();
         let length = ((self.window / task.record.sample_time().s()).round() as usize).clamp(1, n);
-        let mut response = Vec::with_capacity(task.at.len());
-        for at in task.at {
+        let mut response = Vec::with_capacity(task.requested_samples.len());
+        for at in task.requested_samples {
             let first = at.saturating_sub(length / 2).min(n - length);
             let all = Self::coefficients(task, signals, first..first + length)?;
             let at_line = |omega: &f64| {
@@ -105,7 +105,7 @@ mod tests {
             lines_rad_s: &omega,
             ..test_task(&record, &[255], &omega)
         };
-        let found = FourierCoefficients { window: 5.12 }.follow(&task).unwrap();
+        let found = FourierCoefficients { window: 5.12 }.track(&task).unwrap();
         // The ridge reduces e and u by the same fraction.
         let expected = [Complex64::new(2.0, 0.0), Complex64::from_polar(1.0, -omega[1] * 0.2)];
         for (found, expected) in found.response[0].iter().zip(expected) {
@@ -117,7 +117,7 @@ mod tests {
             ..task
         };
         assert!(
-            FourierCoefficients { window: 5.12 }.follow(&other).unwrap().response[0][0]
+            FourierCoefficients { window: 5.12 }.track(&other).unwrap().response[0][0]
                 .re
                 .is_nan()
         );
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn window_is_limited_to_the_record() {
         let run = Run::of(hoid_model::scenario::Condition::C1, 1, 0.0);
-        let whole = FourierCoefficients { window: 1e4 }.follow(&run.task()).unwrap();
+        let whole = FourierCoefficients { window: 1e4 }.track(&run.task()).unwrap();
         let truth = run.responses();
         // 81.92 s is a whole period, so without remnant each line is exact except for the ridge.
         for (found, expected) in whole.response[0].iter().zip(&truth[0]) {
@@ -134,7 +134,7 @@ mod tests {
         }
         assert!(
             FourierCoefficients::default()
-                .follow(&test_task(&test_record(&[0.0; 99], &[0.0; 99]), &[9], &[]))
+                .track(&test_task(&test_record(&[0.0; 99], &[0.0; 99]), &[9], &[]))
                 .is_err()
         );
     }

@@ -208,7 +208,7 @@ fn operator_at(fit: &SigmoidFit, time_s: f64) -> Option<OperatorParameters> {
 }
 
 impl Comparator for GeneticSigmoid {
-    fn about(&self) -> ComparatorDescription {
+    fn description(&self) -> ComparatorDescription {
         ComparatorDescription {
             name: NAME,
             help: "maximum-likelihood fit of gains that follow a sigmoid, by a genetic search",
@@ -217,10 +217,10 @@ impl Comparator for GeneticSigmoid {
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+    fn track(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let fit = self.fit(task)?;
         let mut found = TrackingResult::default();
-        for at in task.at {
+        for at in task.requested_samples {
             found.push(task, operator_at(&fit, task.record.time_s(*at)))?;
         }
         Ok(found)
@@ -297,7 +297,7 @@ mod tests {
         let silent = test_record(&[0.0; 4000], &[1.0; 4000]);
         assert!(
             GeneticSigmoid::default()
-                .follow(&test_task(&silent, &[3999], &[1.0]))
+                .track(&test_task(&silent, &[3999], &[1.0]))
                 .is_err()
         );
     }

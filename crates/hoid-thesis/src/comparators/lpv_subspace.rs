@@ -166,7 +166,7 @@ impl LpvSubspace {
 }
 
 impl Comparator for LpvSubspace {
-    fn about(&self) -> ComparatorDescription {
+    fn description(&self) -> ComparatorDescription {
         ComparatorDescription {
             name: NAME,
             help: "predictor-based subspace identification of an LPV model",
@@ -175,7 +175,7 @@ impl Comparator for LpvSubspace {
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+    fn track(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let d = self.decimate;
         let (e, u) = task.signals(NAME, d * (4 * self.past + 4) + task.nk)?;
         let ts = task.record.sample_time().s();
@@ -200,7 +200,7 @@ impl Comparator for LpvSubspace {
             };
             task.omega_rad_s.iter().map(of).collect()
         };
-        let response: Vec<Vec<Complex64>> = task.at.iter().map(at).collect();
+        let response: Vec<Vec<Complex64>> = task.requested_samples.iter().map(at).collect();
         Ok(TrackingResult::without_operator(response))
     }
 }
@@ -266,7 +266,7 @@ mod tests {
         let mut mean = [0.0; 2];
         for replication in 0..RUN_COUNT {
             let run = Run::replication(Condition::C4, 1, 0.1, replication);
-            let found = LpvSubspace::default().follow(&run.task()).unwrap();
+            let found = LpvSubspace::default().track(&run.task()).unwrap();
             for ((mean, found), expected) in mean.iter_mut().zip(&found.response).zip(run.responses()) {
                 *mean += error(found, &expected) / RUN_COUNT as f64;
             }
@@ -279,19 +279,15 @@ mod tests {
         let e: Vec<f64> = (0..2000).map(|k| (0.1 * f64::from(k)).sin()).collect();
         let record = test_record(&e, &vec![0.0; 2000]);
         let refused = LpvSubspace::default()
-            .follow(&test_task(&record, &[1999], &[1.0]))
+            .track(&test_task(&record, &[1999], &[1.0]))
             .unwrap_err();
         assert!(refused.to_string().contains("rank"), "{refused}");
         let many = LpvSubspace {
             future: 2,
             ..LpvSubspace::default()
         };
-        assert!(many.follow(&test_task(&record, &[1999], &[1.0])).is_err());
+        assert!(many.track(&test_task(&record, &[1999], &[1.0])).is_err());
         let short = test_record(&[1.0; 100], &[1.0; 100]);
-        assert!(
-            LpvSubspace::default()
-                .follow(&test_task(&short, &[99], &[1.0]))
-                .is_err()
-        );
+        assert!(LpvSubspace::default().track(&test_task(&short, &[99], &[1.0])).is_err());
     }
 }

@@ -81,10 +81,10 @@ pub fn untracked_comparator_message(name: &str) -> Option<String> {
     ))
 }
 
-/// The names that [`untracked_comparator_message`] accepts: the name of each comparator and its first word, such as `lpv`, unless that
-/// word names a recursive method.
+/// The names that [`untracked_comparator_message`] accepts: the name of each comparator and its first word, such as
+/// `lpv`, unless that word names a recursive method.
 pub fn names_and_descriptions() -> impl Iterator<Item = (&'static str, ComparatorDescription)> {
-    let all = comparators().into_iter().map(|one| one.about());
+    let all = comparators().into_iter().map(|one| one.description());
     all.flat_map(|about| {
         let first = about.name.split('-').next().unwrap_or(about.name);
         let is_short = first != about.name && !["rpem", "rls"].contains(&first);

@@ -77,7 +77,10 @@ impl RlsFir {
         let prior = self.inverse_kernel() * (self.penalty * power.max(f64::MIN_POSITIVE));
         let mut equations = NormalEquations::new(self.nb, 1);
         let mut regressors = vec![0.0; self.nb];
-        let (mut found, mut asked) = (Vec::with_capacity(task.at.len()), task.at.iter().peekable());
+        let (mut found, mut asked) = (
+            Vec::with_capacity(task.requested_samples.len()),
+            task.requested_samples.iter().peekable(),
+        );
         for k in 0..e.len() {
             regressors.rotate_right(1);
             regressors[0] = e[k];
@@ -95,7 +98,7 @@ impl RlsFir {
 }
 
 impl Comparator for RlsFir {
-    fn about(&self) -> ComparatorDescription {
+    fn description(&self) -> ComparatorDescription {
         ComparatorDescription {
             name: NAME,
             help: "regularised recursive least squares for a finite impulse response",
@@ -104,7 +107,7 @@ impl Comparator for RlsFir {
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+    fn track(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let ts = task.record.sample_time().s();
         let of = |g: &Vec<f64>| {
             let at = |omega: &f64| {
@@ -147,7 +150,7 @@ mod tests {
         let task = test_task(&record, &[59, 119], &[]);
         let found = method.impulse_responses(&task).unwrap();
         let power = u.iter().map(|u| u * u).sum::<f64>() / 120.0;
-        for (at, found) in task.at.iter().zip(&found) {
+        for (at, found) in task.requested_samples.iter().zip(&found) {
             let mut rows: Vec<[f64; 6]> = Vec::new();
             let mut right = Vec::new();
             for k in 5..=*at {
@@ -195,7 +198,7 @@ mod tests {
         };
         let record = test_record(&e, &u);
         let task = test_task(&record, &[3999, 7999], &[3.0]);
-        let found = method.follow(&task).unwrap();
+        let found = method.track(&task).unwrap();
         for (row, gain) in found.response.iter().zip([0.5, 1.0]) {
             let expected = Complex64::from_polar(gain, -3.0 * 0.01 * 20.0);
             // A fraction exp(-4000/600) of the old gain remains.
@@ -214,18 +217,18 @@ mod tests {
             nb: 256,
             ..RlsFir::default()
         };
-        let found = method.follow(&test_task(&record, &[2999], &[2.0])).unwrap();
+        let found = method.track(&test_task(&record, &[2999], &[2.0])).unwrap();
         // With u = e, the response at the line is near 1, however uncertain the response at other frequencies is.
         assert!((found.response[0][0] - 1.0).norm() < 0.05, "{:?}", found.response);
         let silent = test_record(&[0.0; 500], &[1.0; 500]);
         let refused = method
-            .follow(&test_task(&silent, &[499], &[2.0]))
+            .track(&test_task(&silent, &[499], &[2.0]))
             .unwrap_err()
             .to_string();
         assert!(refused.contains("rls-fir") && refused.contains("zero"), "{refused}");
         assert!(
             method
-                .follow(&test_task(&test_record(&e[..200], &e[..200]), &[0], &[]))
+                .track(&test_task(&test_record(&e[..200], &e[..200]), &[0], &[]))
                 .is_err()
         );
     }

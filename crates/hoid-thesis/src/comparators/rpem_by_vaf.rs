@@ -2,7 +2,7 @@
 //! of a validation set, as the discussion of the thesis proposes (VII: *the covariance matrix could be updated based on
 //! VAF from a validation data set, in order to reduce the strong oscillations that are given in state s2*).
 //!
-//! This comparator is the method `rpem` of `hoid_track` with the settings of the text and with [`track_validated`],
+//! This comparator is the method `rpem` of `hoid_track` with the settings of the thesis and with [`track_validated`],
 //! which contains the update rule. The validation set is a second run of the same person in the same task, with a
 //! different remnant.
 
@@ -40,7 +40,7 @@ settings! {
 }
 
 impl Comparator for RpemByVaf {
-    fn about(&self) -> ComparatorDescription {
+    fn description(&self) -> ComparatorDescription {
         ComparatorDescription {
             name: NAME,
             help: "recursive prediction-error method with a covariance update from the VAF of a validation set",
@@ -49,7 +49,7 @@ impl Comparator for RpemByVaf {
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+    fn track(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let (e, _) = task.signals(NAME, task.nk)?;
         let unsuited = |found: String| ThesisError::Unsuited {
             method: NAME,
@@ -82,7 +82,7 @@ impl Comparator for RpemByVaf {
         };
         let trace = track_validated(task.record, validation, &options.with(&of_the_text)?, &updates, 1)?;
         let mut found = TrackingResult::default();
-        for at in task.at {
+        for at in task.requested_samples {
             let theta = trace.theta(*at).to_vec();
             let model = PolynomialModel::new(structure, orders, task.record.sample_time(), theta)?;
             let operator = model.discrete_operator().and_then(|of| of.parameters());
@@ -110,14 +110,14 @@ mod tests {
                 power,
                 ..RpemByVaf::default()
             };
-            method.follow(&run.task()).unwrap().response
+            method.track(&run.task()).unwrap().response
         };
         assert_ne!(of(0.0), of(4.0));
         let without = Task {
             validation: None,
             ..run.task()
         };
-        let refused = RpemByVaf::default().follow(&without).unwrap_err().to_string();
+        let refused = RpemByVaf::default().track(&without).unwrap_err().to_string();
         assert!(refused.contains("validation set"), "{refused}");
     }
 }

@@ -25,7 +25,7 @@ pub(super) fn test_record(e: &[f64], u: &[f64]) -> Record {
 pub(super) fn test_task<'a>(record: &'a Record, at: &'a [usize], omega_rad_s: &'a [f64]) -> Task<'a> {
     Task {
         record,
-        at,
+        requested_samples: at,
         lines_rad_s: &[],
         omega_rad_s,
         start_s: (0.0, 30.72),
@@ -35,7 +35,7 @@ pub(super) fn test_task<'a>(record: &'a Record, at: &'a [usize], omega_rad_s: &'
     }
 }
 
-/// A run in a condition of the text, and its true values.
+/// A run in a condition of the thesis, and its true values.
 pub(super) struct Run {
     pub record: Record,
     validation: Record,
@@ -78,7 +78,7 @@ impl Run {
     pub fn task(&self) -> Task<'_> {
         Task {
             record: &self.record,
-            at: &self.at,
+            requested_samples: &self.at,
             lines_rad_s: &self.lines_rad_s,
             omega_rad_s: &self.lines_rad_s[2..9],
             start_s: (0.0, 30.72),
@@ -121,10 +121,10 @@ pub(super) fn error(found: &[Complex64], expected: &[Complex64]) -> f64 {
 #[test]
 fn comparators_have_unique_names_and_sources() {
     let all = comparators();
-    let names: BTreeSet<&str> = all.iter().map(|c| c.about().name).collect();
+    let names: BTreeSet<&str> = all.iter().map(|c| c.description().name).collect();
     assert_eq!(names.len(), all.len());
     for comparator in &all {
-        let about = comparator.about();
+        let about = comparator.description();
         assert!(!about.help.is_empty() && !about.source.is_empty(), "{}", about.name);
         assert!(
             comparator.list().iter().all(|setting| !setting.help.is_empty()),
@@ -141,9 +141,9 @@ fn all_comparators_follow_a_reference_run() {
     let run = Run::of(Condition::C4, 1, 0.01);
     let truth = run.responses();
     for comparator in comparators() {
-        let name = comparator.about().name;
+        let name = comparator.description().name;
         let found = comparator
-            .follow(&run.task())
+            .track(&run.task())
             .unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((found.response.len(), found.operator.len()), (2, 2), "{name}");
         for (k, (found, expected)) in found.response.iter().zip(&truth).enumerate() {
@@ -158,17 +158,17 @@ fn zero_input_and_late_samples_are_refused_by_all() {
     let silent = test_record(&[0.0; 4000], &[1.0; 4000]);
     let moving = Run::of(Condition::C1, 1, 0.1);
     let beyond = Task {
-        at: &[8192],
+        requested_samples: &[8192],
         ..moving.task()
     };
     for comparator in comparators() {
-        let name = comparator.about().name;
+        let name = comparator.description().name;
         let refused = comparator
-            .follow(&test_task(&silent, &[3999], &[1.0]))
+            .track(&test_task(&silent, &[3999], &[1.0]))
             .unwrap_err()
             .to_string();
         assert!(refused.contains(name) && refused.contains("zero"), "{refused}");
-        let refused = comparator.follow(&beyond).unwrap_err().to_string();
+        let refused = comparator.track(&beyond).unwrap_err().to_string();
         assert!(refused.contains("8192"), "{refused}");
     }
 }

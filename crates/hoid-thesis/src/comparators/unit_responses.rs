@@ -4,7 +4,7 @@
 //! `omega^2/(s^2 + 2 zeta omega s + omega^2)` to the held error, delayed by nk - 1 samples, and y_1 is its rate. This
 //! model of u has the form of [`hoid_ident::SigmoidChange`] for a delay of whole samples.
 
-use hoid_model::{SampleTime, second_order::HeldStates};
+use hoid_model::{SampleTime, second_order::ZohStates};
 
 /// Returns y_0 and y_1, starting from rest.
 pub(super) fn unit_responses(
@@ -15,7 +15,7 @@ pub(super) fn unit_responses(
     sample_time: SampleTime,
 ) -> [Vec<f64>; 2] {
     let square = omega_rad_s * omega_rad_s;
-    let held = HeldStates::new(2.0 * zeta * omega_rad_s, square, sample_time);
+    let held = ZohStates::new(2.0 * zeta * omega_rad_s, square, sample_time);
     let mut state = [0.0; 2];
     let (mut y_0, mut y_1) = (Vec::with_capacity(e.len()), Vec::with_capacity(e.len()));
     for k in 0..e.len() {
@@ -50,7 +50,7 @@ mod tests {
             .map(|k| (0.07 * f64::from(k)).sin() + f64::from(k % 7))
             .collect();
         let [y_0, y_1] = unit_responses(&e, 11.25, 0.35, discrete.nk, ts);
-        let held = discrete.held;
+        let held = discrete.zoh;
         let mut u = vec![0.0; e.len()];
         for k in 0..e.len() {
             let at = |signal: &[f64], lag: usize| if k >= lag { signal[k - lag] } else { 0.0 };

@@ -49,7 +49,7 @@ impl WaveletRatio {
 }
 
 impl Comparator for WaveletRatio {
-    fn about(&self) -> ComparatorDescription {
+    fn description(&self) -> ComparatorDescription {
         ComparatorDescription {
             name: NAME,
             help: "ratio of the wavelet transforms of u and e at the lines",
@@ -58,7 +58,7 @@ impl Comparator for WaveletRatio {
         }
     }
 
-    fn follow(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
+    fn track(&self, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
         let (e, u) = task.signals(NAME, 1)?;
         let ts = task.record.sample_time().s();
         let of = |at: &usize| {
@@ -68,7 +68,7 @@ impl Comparator for WaveletRatio {
             };
             task.omega_rad_s.iter().map(ratio).collect()
         };
-        let response: Vec<Vec<Complex64>> = task.at.iter().map(of).collect();
+        let response: Vec<Vec<Complex64>> = task.requested_samples.iter().map(of).collect();
         Ok(TrackingResult::without_operator(response))
     }
 }
@@ -89,7 +89,7 @@ mod tests {
             .collect();
         let record = test_record(&e, &u);
         let found = WaveletRatio::default()
-            .follow(&test_task(&record, &[1500, 4500], &[omega]))
+            .track(&test_task(&record, &[1500, 4500], &[omega]))
             .unwrap();
         for (row, gain) in found.response.iter().zip([1.0, 3.0]) {
             let expected = Complex64::from_polar(gain, -omega * 0.1);
@@ -119,13 +119,13 @@ mod tests {
         let silent = test_record(&[0.0; 50], &[1.0; 50]);
         assert!(
             WaveletRatio::default()
-                .follow(&test_task(&silent, &[9], &[1.0]))
+                .track(&test_task(&silent, &[9], &[1.0]))
                 .is_err()
         );
         let e: Vec<f64> = (0..500).map(|k| (0.1 * f64::from(k)).sin()).collect();
         let record = test_record(&e, &[0.0; 500]);
         let found = WaveletRatio::default()
-            .follow(&test_task(&record, &[250], &[10.0]))
+            .track(&test_task(&record, &[250], &[10.0]))
             .unwrap();
         assert!(found.response[0][0].norm() < 1e-12);
     }

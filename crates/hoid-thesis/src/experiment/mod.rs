@@ -1,19 +1,19 @@
 //! The experiment of section VI and appendix I of the thesis, with virtual or recorded people.
 //!
-//! The recordings of the text come from three subjects in a simulator and are not public. The procedure of the text can
-//! be applied to virtual people with known parameters (three different subjects, seven runs in each of C1 to C6, of
+//! The recordings of the thesis come from three subjects in a simulator and are not public. The procedure of the thesis
+//! can be applied to virtual people with known parameters (three different subjects, seven runs in each of C1 to C6, of
 //! which the last five are evaluated), and to the user's own recordings. For each run ([`procedure`]):
 //!
-//! 1. Batch fits to the first and the last three eighths of the run, [0, 30.72] and [51.20, 81.92] s in the text: ARX
+//! 1. Batch fits to the first and the last three eighths of the run, [0, 30.72] and [51.20, 81.92] s in the thesis: ARX
 //!    by OLS and BJ(m* = 1) by PEM, with every delay of a range. In each span, the delay with the highest VAF is
 //!    selected. The n_k* of the run and structure is the rounded mean of the two selected delays; T_n* is the mean of
-//!    the remnant time constants of the two fits (the text: *the average between the best two sub-batch-fitting
+//!    the remnant time constants of the two fits (the thesis: *the average between the best two sub-batch-fitting
 //!    estimations made*).
 //! 2. With this n_k*, OLS and PEM fits to both spans are repeated.
 //! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I track the run, starting from the fit of the first span. T_n*
 //!    is only reported in Table 3: d1 is a parameter of RPEM and starts from the value in its fit, as in section V.B.
 //!
-//! Figures show the average over the five runs, as in the text, and also the median.
+//! Figures show the average over the five runs, as in the thesis, and also the median.
 //!
 //! | module | contents |
 //! |---|---|
@@ -45,13 +45,14 @@ pub struct RunKey {
     pub run: String,
 }
 
-/// A condition of an experiment, and the condition of the text in which the controlled element changes in the same way.
+/// A condition of an experiment, and the condition of the thesis in which the controlled element changes in the same
+/// way.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ExperimentCondition {
     /// Name of the condition in the experiment.
     pub name: String,
-    /// Corresponding condition of the text.
-    pub of_text: Condition,
+    /// Corresponding condition of the thesis.
+    pub thesis_condition: Condition,
 }
 
 /// A run whose times are counted from the start of the measurement.

@@ -41,7 +41,7 @@ fn invalid_value(key: &str, found: &str, expected: &str) -> ThesisError {
 }
 
 impl ExperimentPlan {
-    /// The conditions of the text.
+    /// The conditions of the thesis.
     pub const CONDITIONS: [Condition; 6] = [
         Condition::C1,
         Condition::C2,
@@ -161,7 +161,7 @@ impl Experiment for ExperimentPlan {
     fn conditions(&self) -> Vec<ExperimentCondition> {
         let of = |condition: Condition| ExperimentCondition {
             name: condition.to_string(),
-            of_text: condition,
+            thesis_condition: condition,
         };
         Self::CONDITIONS.map(of).to_vec()
     }

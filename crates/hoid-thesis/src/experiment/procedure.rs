@@ -54,13 +54,13 @@ pub struct RunOutcome {
     /// Delay n_k* by structure, samples.
     pub nk: [usize; 2],
     /// Selected delay by structure and span, samples.
-    pub nk_of_span: [[usize; 2]; 2],
+    pub nk_by_span: [[usize; 2]; 2],
     /// Time constant T_n* of the Box-Jenkins model, s; NaN if neither span gives one.
     pub t_n_s: f64,
     /// Batch fits with the delay n_k*, by structure and span.
     pub batch: [[State; 2]; 2],
     /// Recursive estimates by RLS and RPEM.
-    pub courses: [RecursiveTrace; 2],
+    pub traces: [RecursiveTrace; 2],
     /// The simulated operator; `None` for recorded people.
     pub truth: Option<Truth>,
 }
@@ -78,10 +78,10 @@ pub fn evaluate(record: &Record, delays: (usize, usize)) -> Result<RunOutcome, T
     Ok(RunOutcome {
         spans_s,
         nk: [arx.nk, bj.nk],
-        nk_of_span: [arx.nk_of_span, bj.nk_of_span],
+        nk_by_span: [arx.nk_by_span, bj.nk_by_span],
         t_n_s: bj.t_n_s,
         batch: [arx.batch, bj.batch],
-        courses: [arx.course, bj.course],
+        traces: [arx.trace, bj.trace],
         truth: truth(record),
     })
 }
@@ -97,10 +97,10 @@ fn spans_s(record: &Record) -> [(f64, f64); 2] {
 /// Results for one structure.
 struct StructureResults {
     nk: usize,
-    nk_of_span: [usize; 2],
+    nk_by_span: [usize; 2],
     t_n_s: f64,
     batch: [State; 2],
-    course: RecursiveTrace,
+    trace: RecursiveTrace,
 }
 
 fn evaluate_structure(
@@ -124,10 +124,10 @@ fn evaluate_structure(
     ];
     Ok(StructureResults {
         nk,
-        nk_of_span,
+        nk_by_span: nk_of_span,
         t_n_s,
         batch: fits.each_ref().map(state_of_fit),
-        course: track_from_fit(record, &fits[0])?,
+        trace: track_from_fit(record, &fits[0])?,
     })
 }
 
@@ -200,7 +200,7 @@ fn track_from_fit(record: &Record, start: &Fit) -> Result<RecursiveTrace, Thesis
         });
         let n = theta.len();
         let covariance = trace.covariance(row);
-        let variance = |place: Option<usize>| match (place, &covariance) {
+        let variance = |index: Option<usize>| match (index, &covariance) {
             (Some(p), Some(all)) => all[p * n + p],
             _ => f64::NAN,
         };
@@ -258,7 +258,7 @@ fn true_state(record: &Record, k: usize) -> Option<State> {
         zeta_nm: of("zeta_nm")?,
         tau_e_s: of("tau_e")?,
     };
-    let held = operator.discretise(record.sample_time()).ok().map(|found| found.held);
+    let held = operator.discretise(record.sample_time()).ok().map(|found| found.zoh);
     Some(State {
         discrete: held.map_or([f64::NAN; 4], |h| [h.f1, h.f2, h.b0, h.b1]),
         operator: operator_values(Some(operator)),
@@ -291,7 +291,7 @@ mod tests {
         let found = evaluate(&run(0.0), (27, 31)).unwrap();
         let truth = found.truth.unwrap();
         assert_eq!((found.nk[0], truth.nk), (29, 29));
-        assert_eq!(found.nk_of_span[0], [29, 29]);
+        assert_eq!(found.nk_by_span[0], [29, 29]);
         for (found, of_text) in found.spans_s.iter().zip([(0.0, 30.72), (51.2, 81.92)]) {
             assert!((found.0 - of_text.0).abs() + (found.1 - of_text.1).abs() < 1e-9);
         }
@@ -308,7 +308,7 @@ mod tests {
         assert!((28..=30).contains(&found.nk[1]), "{:?}", found.nk);
         // The remnant is held exactly, so d1 gives T_n* = .055 by backward Euler; the standard error is .006.
         assert!((found.t_n_s - 0.055).abs() < 0.02, "{}", found.t_n_s);
-        let [rls, rpem] = &found.courses;
+        let [rls, rpem] = &found.traces;
         assert_eq!((rls.times_s.len(), rpem.times_s.len()), (256, 256));
         assert!(rls.variances[0][4].is_nan() && rpem.variances[0][4] > 0.0);
         let last = rpem.states[255].operator[2];

@@ -1,11 +1,11 @@
 //! Recorded people: the runs in the manifest of a group ([`Manifest`]), read and prepared as by `hoid group`.
 //!
-//! For each person and condition the last five runs that count are evaluated, as in the text. Times are measured from
-//! the start of the evaluated span, `from_s` in the manifest; the text omits a run-in of 8.08 s.
+//! For each person and condition the last five runs that count are evaluated, as in the thesis. Times are measured from
+//! the start of the evaluated span, `from_s` in the manifest; the thesis omits a run-in of 8.08 s.
 //!
-//! A condition replaces the condition of the text in which the controlled element changes in the same way. The change
+//! A condition replaces the condition of the thesis in which the controlled element changes in the same way. The change
 //! is determined from `controlled_element`, `changes_to`, `change_s` and `change_per_s` of the manifest. An element
-//! counts as s1 or s2 of the text according to the slope of its logarithmic gain `d ln|H| / d ln w` at 2 rad/s, near
+//! counts as s1 or s2 of the thesis according to the slope of its logarithmic gain `d ln|H| / d ln w` at 2 rad/s, near
 //! the crossover frequency of people; the slope is -1.1 for s1 and -2.0 for s2. A change is sudden if the duration of
 //! its middle 80 %, `2 ln 9 / G`, is less than a second. If no element is given, the name of the condition (C1 to C6)
 //! is used.
@@ -29,10 +29,10 @@ const MAX_SUDDEN_S: f64 = 1.0;
 #[derive(Debug, Clone)]
 pub struct RecordedPeople {
     manifest: Manifest,
-    base: PathBuf,
-    evaluated: Vec<RunEntry>,
+    directory: PathBuf,
+    evaluated_runs: Vec<RunEntry>,
     conditions: Vec<ExperimentCondition>,
-    left_out: Vec<(String, String)>,
+    skipped_conditions: Vec<(String, String)>,
     delays: (usize, usize),
 }
 
@@ -41,16 +41,16 @@ impl RecordedPeople {
     ///
     /// # Errors
     /// [`ThesisError::Study`] if the manifest is missing or invalid, or if no run can be read;
-    /// [`ThesisError::Recordings`] if no condition corresponds to one of the text, or if no run counts.
-    pub fn open(place: &Path) -> Result<Self, ThesisError> {
-        let path = Manifest::manifest_path(place)?;
+    /// [`ThesisError::Recordings`] if no condition corresponds to one of the thesis, or if no run counts.
+    pub fn open(location: &Path) -> Result<Self, ThesisError> {
+        let path = Manifest::manifest_path(location)?;
         let manifest = Manifest::read(&path)?;
         let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
         let (conditions, left_out) = conditions(&manifest);
         if conditions.is_empty() {
             let reasons: Vec<String> = left_out.iter().map(|(name, why)| format!("{name}: {why}")).collect();
             return Err(ThesisError::Recordings {
-                place: path.display().to_string(),
+                subject: path.display().to_string(),
                 reason: format!(
                     "no condition corresponds to a condition of the thesis; {}",
                     reasons.join("; ")
@@ -71,7 +71,7 @@ impl RecordedPeople {
         let Some(read) = read else {
             return Err(failed.map_or_else(
                 || ThesisError::Recordings {
-                    place: path.display().to_string(),
+                    subject: path.display().to_string(),
                     reason: "no run counts, expected at least one run with counts = true".to_owned(),
                 },
                 ThesisError::from,
@@ -81,10 +81,10 @@ impl RecordedPeople {
         let (least_s, most_s) = manifest.analysis.delay_s;
         Ok(Self {
             delays: (samples(least_s), samples(most_s)),
-            base,
-            evaluated,
+            directory: base,
+            evaluated_runs: evaluated,
             conditions,
-            left_out,
+            skipped_conditions: left_out,
             manifest,
         })
     }
@@ -94,15 +94,15 @@ impl RecordedPeople {
         &self.manifest.name
     }
 
-    /// Conditions that correspond to no condition of the text, with the reason.
+    /// Conditions that correspond to no condition of the thesis, with the reason.
     pub fn omitted_conditions(&self) -> &[(String, String)] {
-        &self.left_out
+        &self.skipped_conditions
     }
 }
 
 impl Experiment for RecordedPeople {
     fn runs(&self) -> Vec<RunKey> {
-        self.evaluated.iter().map(key_of).collect()
+        self.evaluated_runs.iter().map(key_of).collect()
     }
 
     fn conditions(&self) -> Vec<ExperimentCondition> {
@@ -114,15 +114,15 @@ impl Experiment for RecordedPeople {
     }
 
     fn read_run(&self, key: &RunKey) -> Result<MeasuredRun, ThesisError> {
-        let entry = self.evaluated.iter().find(|entry| key_of(entry) == *key);
+        let entry = self.evaluated_runs.iter().find(|entry| key_of(entry) == *key);
         let entry = entry.ok_or_else(|| ThesisError::Recordings {
-            place: self.manifest.name.clone(),
+            subject: self.manifest.name.clone(),
             reason: format!(
                 "there is no run {} of {} in condition {}",
                 key.run, key.subject, key.condition
             ),
         })?;
-        let read = RecordedRun::read(&self.manifest, &self.base, entry)?;
+        let read = RecordedRun::read(&self.manifest, &self.directory, entry)?;
         let start_s = read.record.time_s(0);
         Ok(MeasuredRun {
             change_s: read.change_s.map(|change_s| change_s - start_s),
@@ -163,19 +163,19 @@ fn last_runs(manifest: &Manifest, condition: &str, count: usize) -> Vec<RunEntry
     last
 }
 
-/// Returns the conditions with the corresponding conditions of the text, and the names of the other conditions with the
-/// reason.
+/// Returns the conditions with the corresponding conditions of the thesis, and the names of the other conditions with
+/// the reason.
 fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, String)>) {
     let mut names: Vec<&str> = manifest.runs.iter().map(|run| run.condition.as_str()).collect();
     names.sort_unstable();
     names.dedup();
     let (mut found, mut others) = (Vec::new(), Vec::new());
     for name in names {
-        let facts = manifest.conditions.get(name).cloned().unwrap_or_default();
-        match matching_condition(name, &facts) {
+        let settings = manifest.conditions.get(name).cloned().unwrap_or_default();
+        match matching_condition(name, &settings) {
             Ok(of_text) => found.push(ExperimentCondition {
                 name: name.to_owned(),
-                of_text,
+                thesis_condition: of_text,
             }),
             Err(reason) => others.push((name.to_owned(), reason)),
         }
@@ -183,19 +183,19 @@ fn conditions(manifest: &Manifest) -> (Vec<ExperimentCondition>, Vec<(String, St
     (found, others)
 }
 
-/// Returns the condition of the text in which the controlled element changes in the same way.
-fn matching_condition(name: &str, facts: &ConditionSettings) -> Result<Condition, String> {
+/// Returns the condition of the thesis in which the controlled element changes in the same way.
+fn matching_condition(name: &str, settings: &ConditionSettings) -> Result<Condition, String> {
     let unknown = |what: &str| {
         format!(
             "{what}: set controlled_element in [conditions.{name}], with changes_to, change_s and change_per_s if it \
              changes, or give the condition its name in the thesis (C1 to C6)"
         )
     };
-    let Some(before) = &facts.controlled_element else {
+    let Some(before) = &settings.controlled_element else {
         return name.parse().map_err(|_| unknown("its controlled element is not known"));
     };
-    let Some(after) = &facts.changes_to else {
-        if facts.change_s.is_some() {
+    let Some(after) = &settings.changes_to else {
+        if settings.change_s.is_some() {
             return name
                 .parse()
                 .map_err(|_| unknown("the controlled element after the change is not known"));
@@ -205,7 +205,7 @@ fn matching_condition(name: &str, facts: &ConditionSettings) -> Result<Condition
             true => Condition::C2,
         });
     };
-    let is_sudden = facts
+    let is_sudden = settings
         .change_per_s
         .is_none_or(|rate| 2.0 * 9.0_f64.ln() / rate < MAX_SUDDEN_S);
     match (is_double(before)?, is_double(after)?, is_sudden) {

@@ -1,4 +1,4 @@
-//! Figs. H.1 to H.12 as in the text, *obtained values averaged from M realizations*: averages over the runs, with the
+//! Figs. H.1 to H.12 as in the thesis, *obtained values averaged from M realizations*: averages over the runs, with the
 //! medians for comparison.
 //!
 //! A single run in which K_e nearly vanishes dominates the average of `T_L = K_e_dot/K_e`. The figures of the module

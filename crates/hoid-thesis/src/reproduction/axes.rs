@@ -1,4 +1,4 @@
-//! Orders, delays and noise levels in the figures of the text, and their labels.
+//! Orders, delays and noise levels in the figures of the thesis, and their labels.
 
 /// Delays in the figures, samples.
 pub(super) const DELAYS: [usize; 5] = [26, 27, 28, 29, 30];

@@ -35,7 +35,7 @@ impl Model {
     }
 
     /// Restricts a query to this estimator in the study of biases.
-    pub(super) fn of(self, query: Query, remnant_order: usize) -> Query {
+    pub(super) fn restrict(self, query: Query, remnant_order: usize) -> Query {
         match self {
             Self::Arx => query.name("ARX"),
             Self::Matched => query.name("BJ").nd(remnant_order),
@@ -189,7 +189,7 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
                     let query = Query::of(&format!("bias_{column}"))
                         .condition(condition)
                         .remnant_order(m0);
-                    let query = model.of(query.noise_level(level).nk(nk), m0);
+                    let query = model.restrict(query.noise_level(level).nk(nk), m0);
                     let s = BoxStatistics::of(&results.values(&query));
                     let outliers: Vec<String> = s.outliers.iter().map(f64::to_string).collect();
                     data.add_row(
@@ -214,7 +214,7 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
                 name: format!("B_r({symbol})"),
                 unit: "%".to_owned(),
                 boxes,
-                linear_within: has_large_biases(model, m0, letters).then_some(LINEAR_LIMIT_PERCENT),
+                linear_limit: has_large_biases(model, m0, letters).then_some(LINEAR_LIMIT_PERCENT),
                 ..BoxPanel::default()
             });
         }
@@ -239,7 +239,7 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
         range: BoxRange::Whiskers,
         shared_ordinates: false,
         with_zero: true,
-        least_reach: 0.1,
+        min_half_range: 0.1,
     };
     item.draw(box_plots, &grid, data)
 }

@@ -1,12 +1,12 @@
-//! All tables and figures, in the order of the text.
+//! All tables and figures, in the order of the thesis.
 
 use crate::experiment::RecordedPeople;
 
-use super::{averages, bias, experiment, further, item::Item, orders, responses, setting, starts, traces};
+use super::{averages, bias, experiment, extensions, item::Item, orders, responses, simulation_setup, starts, traces};
 
-/// All tables and figures, in the order of the text.
+/// All tables and figures, in the order of the thesis.
 pub fn items() -> Vec<Item> {
-    let mut all = setting::items();
+    let mut all = simulation_setup::items();
     all.extend(bias::items());
     all.extend(orders::items());
     all.extend(responses::items());
@@ -14,11 +14,11 @@ pub fn items() -> Vec<Item> {
     all.extend(traces::items());
     all.extend(averages::items());
     all.extend(experiment::items());
-    all.extend(further::items());
+    all.extend(extensions::items());
     sort_items(all)
 }
 
-/// The tables and figures of the experiment with recorded people, in the order of the text.
+/// The tables and figures of the experiment with recorded people, in the order of the thesis.
 pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
     sort_items(experiment::recorded_items(people))
 }

@@ -18,8 +18,8 @@ pub struct IndexPage {
     pub notes: Vec<String>,
     entries: Vec<Value>,
     claims: Vec<Value>,
-    /// Numbers of claims by verdict: hold, hold and more so, hold in part, do not hold, cannot be tested.
-    tally: [usize; 5],
+    /// Numbers of claims by verdict: hold, hold more strongly, hold in part, do not hold, cannot be tested.
+    verdict_counts: [usize; 5],
     studies: Vec<Value>,
 }
 
@@ -49,7 +49,7 @@ impl IndexPage {
         });
     }
 
-    /// Adds the claims of the text with the evidence about them.
+    /// Adds the claims of the thesis with the evidence about them.
     pub fn add_claims(&mut self, findings: &[(Claim, Finding)]) {
         let mut theme = "";
         for (claim, finding) in findings {
@@ -62,14 +62,14 @@ impl IndexPage {
                 Verdict::DoesNotHold => "not",
                 Verdict::CannotBeTested(_) => "open",
             };
-            let measured: Vec<String> = finding.measured.iter().map(format_measured).collect();
+            let measured: Vec<String> = finding.measured_numbers.iter().map(format_measured).collect();
             self.claims.push(context! {
-                heading, class, measured, id => claim.id, statement => claim.statement, place => claim.place, measure => claim.measure,
+                heading, class, measured, id => claim.id, statement => claim.statement, place => claim.reference, measure => claim.measure,
                 found => &finding.text, verdict => finding.verdict.to_string(),
             });
         }
         let count = |of: fn(&Verdict) -> bool| findings.iter().filter(|(_, finding)| of(&finding.verdict)).count();
-        self.tally = [
+        self.verdict_counts = [
             count(|v| *v == Verdict::Holds),
             count(|v| *v == Verdict::HoldsWithLargerEffect),
             count(|v| *v == Verdict::HoldsInPart),
@@ -78,9 +78,9 @@ impl IndexPage {
         ];
     }
 
-    /// Returns the numbers of claims by verdict: hold, hold and more so, hold in part, do not hold, cannot be tested.
+    /// Returns the numbers of claims by verdict: hold, hold more strongly, hold in part, do not hold, cannot be tested.
     pub fn verdict_counts(&self) -> [usize; 5] {
-        self.tally
+        self.verdict_counts
     }
 
     /// Adds a study.
@@ -110,7 +110,7 @@ impl IndexPage {
                 notes => &self.notes,
                 entries => &self.entries,
                 claims => &self.claims,
-                tally => self.tally,
+                tally => self.verdict_counts,
                 studies => &self.studies,
             },
         )?;
@@ -129,8 +129,8 @@ fn format_measured(of: &MeasuredNumber) -> String {
     let range = if of.cells > 1 {
         format!(
             " ({} to {} in {} cells)",
-            format_number(of.least),
-            format_number(of.most),
+            format_number(of.min),
+            format_number(of.max),
             of.cells
         )
     } else {

@@ -1,4 +1,4 @@
-//! A table or figure of the text, made from the results of its study.
+//! A table or figure of the thesis, made from the results of its study.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -28,7 +28,7 @@ pub(super) struct SharedRuns {
     /// Number of estimates in all runs.
     pub estimates: u64,
     /// Makes the runs and returns notes about failed runs, or an error if all runs fail.
-    pub make: MakeRuns,
+    pub make_runs: MakeRuns,
 }
 
 /// Function that makes shared runs.
@@ -37,16 +37,16 @@ type MakeRuns = Arc<dyn Fn(&ProgressCallbacks<'_>) -> Result<Vec<String>, Thesis
 /// Callbacks with which a caller follows or cancels the making of shared runs.
 pub(super) struct ProgressCallbacks<'a> {
     /// Called with the number of newly completed estimates.
-    pub done: &'a (dyn Fn(u64) + Sync),
+    pub completed: &'a (dyn Fn(u64) + Sync),
     /// Returns true if the reproduction continues.
-    pub keep_running: &'a (dyn Fn() -> bool + Sync),
+    pub should_continue: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl ProgressCallbacks<'_> {
     /// Callbacks that report no progress and never cancel.
     pub const IGNORED: ProgressCallbacks<'static> = ProgressCallbacks {
-        done: &|_| (),
-        keep_running: &|| true,
+        completed: &|_| (),
+        should_continue: &|| true,
     };
 }
 
@@ -61,7 +61,7 @@ pub struct Item {
     /// Plan whose results the item shows; `None` if it shows no results of a plan.
     pub plan: Option<&'static str>,
     pub(super) shared: Option<SharedRuns>,
-    make: MakeItem,
+    make_item: MakeItem,
 }
 
 impl std::fmt::Debug for Item {
@@ -103,7 +103,7 @@ impl Item {
             caption: caption.into(),
             plan,
             shared: None,
-            make: Box::new(make),
+            make_item: Box::new(make),
         }
     }
 
@@ -138,6 +138,6 @@ impl Item {
 
     /// Makes the item from the results of the studies; the output is empty if the results of its plan are missing.
     pub fn make(&self, studies: &Studies) -> ItemOutput {
-        (self.make)(self, self.plan.and_then(|plan| studies.get(plan)))
+        (self.make_item)(self, self.plan.and_then(|plan| studies.get(plan)))
     }
 }

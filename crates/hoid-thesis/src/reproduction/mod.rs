@@ -2,16 +2,16 @@
 //!
 //! | module | output | study |
 //! |---|---|---|
-//! | `setting` | Tables 1, 2 (4.2, 4.3), 4.4, 6.1; Figs. 3, 4, A.1 | `noise-level` |
+//! | `simulation_setup` | Tables 1, 2 (4.2, 4.3), 4.4, 6.1; Figs. 3, 4, A.1 | `noise-level` |
 //! | `bias` | Figs. 5, 6, 9, C.1 to C.16: box plots of relative biases | `bias` |
 //! | `orders` | Figs. 7, 8, E.1 to E.16: maps against n_k* and m* | `bias` |
 //! | `responses` | Figs. 10, D.1 to D.18: Bode plots of averaged models | `bias` |
 //! | `starts` | Figs. F.1 to F.8: fits from other starts compared with fits from the base start | `initial-conditions` |
 //! | `traces` | Figs. 11, 12, G.1 to G.8, H.1 to H.12: recursive estimates | `recursive`, `recursive-arx` |
-//! | `averages` | Figs. H.1 to H.12 as in the text: averages, with the medians | `recursive` |
+//! | `averages` | Figs. H.1 to H.12 as in the thesis: averages, with the medians | `recursive` |
 //! | `experiment` | Table 3, Figs. 13, 14, I.1 to I.18 with virtual or recorded people | its own |
-//! | `further` | topics that the text leaves for future work | the other plans |
-//! | `catalogue` | all tables and figures in the order of the text | |
+//! | `extensions` | topics that the thesis leaves for future work | the other plans |
+//! | `catalogue` | all tables and figures in the order of the thesis | |
 //! | `item`, `table_builder`, `axes` | components of these outputs | |
 //! | `index` | the page with all tables, figures and claims | all |
 //! | `run` | the whole reproduction in a directory | |
@@ -25,13 +25,13 @@ mod axes;
 mod bias;
 mod catalogue;
 mod experiment;
-mod further;
+mod extensions;
 mod index;
 mod item;
 mod orders;
 mod responses;
 mod run;
-mod setting;
+mod simulation_setup;
 mod starts;
 mod table_builder;
 mod traces;

@@ -159,7 +159,7 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: MapQu
         },
         limits: None,
         bar_per_row: shown == MapQuantity::Bias,
-        mark: "simulated".to_owned(),
+        cross_label: "simulated".to_owned(),
     };
     let figure = grid(drawn, titles);
     item.draw(maps, &figure, data)

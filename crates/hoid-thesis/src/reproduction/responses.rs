@@ -104,7 +104,9 @@ fn averaged_response(
                 .remnant_order(m0)
                 .noise_level(level)
                 .nk(nk);
-            results.find_one(&model.of(query, m0)).map(|row| row.statistics.mean)
+            results
+                .find_one(&model.restrict(query, m0))
+                .map(|row| row.statistics.mean)
         })
         .collect();
     response(&theta?, nk, omega)

@@ -72,13 +72,13 @@ pub struct ReproductionSummary {
     pub index: PathBuf,
     /// Number of tables and figures.
     pub items: usize,
-    /// Numbers of claims by verdict: hold, hold and more so, hold in part, do not hold, cannot be tested; `None` if the
-    /// claims were not selected.
-    pub tally: Option<[usize; 5]>,
+    /// Numbers of claims by verdict: hold, hold more strongly, hold in part, do not hold, cannot be tested; `None` if
+    /// the claims were not selected.
+    pub verdict_counts: Option<[usize; 5]>,
     /// Duration of the studies, s.
-    pub simulated_s: f64,
+    pub simulation_time_s: f64,
     /// Duration of drawing the tables and figures, s.
-    pub drawn_s: f64,
+    pub drawing_time_s: f64,
 }
 
 /// Runs the reproduction in a directory. Returns `None` if `keep_running` has stopped it; another call then continues
@@ -97,8 +97,8 @@ pub fn reproduce(
     let mut index = IndexPage::default();
     let all = match &wanted.recordings {
         Some(_) if wanted.only != [EXPERIMENT_RUNS] => return Err(ThesisError::NotTheExperiment),
-        Some(place) => {
-            let people = RecordedPeople::open(place)?;
+        Some(location) => {
+            let people = RecordedPeople::open(location)?;
             for (name, reason) in people.omitted_conditions() {
                 let note = format!("condition {name} is left out: {reason}");
                 notify(ReproductionEvent::Note(&note));
@@ -135,14 +135,18 @@ pub fn reproduce(
         let start_time = Instant::now();
         let done = AtomicU64::new(0);
         let watch = ProgressCallbacks {
-            done: &|estimates| {
+            completed: &|estimates| {
                 let done = done.fetch_add(estimates, Ordering::Relaxed) + estimates;
                 let total = shared.estimates;
-                notify(ReproductionEvent::Progress(Progress { done, total, known: 0 }));
+                notify(ReproductionEvent::Progress(Progress {
+                    done,
+                    total,
+                    done_earlier: 0,
+                }));
             },
-            keep_running,
+            should_continue: keep_running,
         };
-        let notes = on_threads(wanted.jobs, || (shared.make)(&watch))??;
+        let notes = on_threads(wanted.jobs, || (shared.make_runs)(&watch))??;
         if !keep_running() {
             return Ok(None);
         }
@@ -178,7 +182,7 @@ pub fn reproduce(
         None
     };
     let of_runs = match &wanted.recordings {
-        Some(place) => ("recordings".to_owned(), place.display().to_string()),
+        Some(location) => ("recordings".to_owned(), location.display().to_string()),
         None => ("replications of each cell".to_owned(), wanted.replications.to_string()),
     };
     index.settings = vec![
@@ -197,9 +201,9 @@ pub fn reproduce(
     Ok(Some(ReproductionSummary {
         index,
         items: chosen.len(),
-        tally,
-        simulated_s,
-        drawn_s: start_time.elapsed().as_secs_f64() - simulated_s,
+        verdict_counts: tally,
+        simulation_time_s: simulated_s,
+        drawing_time_s: start_time.elapsed().as_secs_f64() - simulated_s,
     }))
 }
 
@@ -234,7 +238,7 @@ fn select_items(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, boo
         let known: Vec<&str> = all.iter().map(|item| item.name.as_str()).collect();
         return Err(ThesisError::UnknownItem {
             name: (*name).to_owned(),
-            known: known.join(", "),
+            available: known.join(", "),
         });
     }
     let items = all
@@ -243,7 +247,7 @@ fn select_items(all: Vec<Item>, wanted: &Reproduction) -> Result<(Vec<Item>, boo
     Ok((items.collect(), names.contains(&CLAIMS_NAME)))
 }
 
-/// Tests the claims of the text, writes their table, adds them to the page, and counts the verdicts.
+/// Tests the claims of the thesis, writes their table, adds them to the page, and counts the verdicts.
 fn test_claims(studies: &Studies, index: &mut IndexPage, directory: &Path) -> Result<[usize; 5], ThesisError> {
     let mut evidence = Evidence::new();
     for results in studies.values() {

@@ -120,7 +120,7 @@ fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
         range: BoxRange::Full,
         shared_ordinates: false,
         with_zero: true,
-        least_reach: 0.01,
+        min_half_range: 0.01,
     };
     item.draw(box_plots, &grid, data)
 }

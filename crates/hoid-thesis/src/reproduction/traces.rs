@@ -253,7 +253,7 @@ fn truth(cell: &Cell, name: &str) -> TraceCurve {
         .collect();
     let value = |t: &f64| {
         let operator = cell.resolved.parameters_at(*t).operator;
-        let held = operator.discretise(scenario.sample_time).map(|d| d.held).ok();
+        let held = operator.discretise(scenario.sample_time).map(|d| d.zoh).ok();
         match name {
             "K_e" => operator.k_e,
             "T_L" => operator.t_l_s,

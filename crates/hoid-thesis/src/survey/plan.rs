@@ -59,11 +59,11 @@ fn comparator(
     };
     let (name, method) = (text("name")?, text("method")?);
     let all = comparators();
-    let known: Vec<&str> = all.iter().map(|of| of.about().name).collect();
+    let known: Vec<&str> = all.iter().map(|of| of.description().name).collect();
     let missing = || wrong("method", method.to_owned(), format!("one of {}", known.join(", ")));
     let mut found = comparators()
         .into_iter()
-        .find(|of| of.about().name == method)
+        .find(|of| of.description().name == method)
         .ok_or_else(missing)?;
     for (key, value) in table
         .iter()
@@ -100,12 +100,12 @@ method = "rls"
     #[test]
     fn survey_plan_has_all_comparators() {
         let plan = SurveyPlan::parse(SURVEY.text, super::super::COMPARATOR_PLAN, "survey.toml").unwrap();
-        let methods: Vec<&str> = plan.comparators.iter().map(|(_, of)| of.about().name).collect();
+        let methods: Vec<&str> = plan.comparators.iter().map(|(_, of)| of.description().name).collect();
         for comparator in comparators() {
             assert!(
-                methods.contains(&comparator.about().name),
+                methods.contains(&comparator.description().name),
                 "{}",
-                comparator.about().name
+                comparator.description().name
             );
         }
     }

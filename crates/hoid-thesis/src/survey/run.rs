@@ -101,7 +101,7 @@ fn method_results(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &
         .collect();
     let task = Task {
         record,
-        at: &at,
+        requested_samples: &at,
         lines_rad_s: &lines,
         omega_rad_s: omega,
         start_s: (0.0, 0.375 * scenario.measurement_s),
@@ -127,8 +127,8 @@ fn method_results(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &
         measured(&estimator.label, "", &follow)
     });
     let comparators = plan.comparators.iter().map(|(name, of)| {
-        let follow = || of.follow(&task);
-        measured(name, of.about().extra_information, &follow)
+        let follow = || of.track(&task);
+        measured(name, of.description().extra_information, &follow)
     });
     estimators.chain(comparators).collect()
 }
@@ -147,8 +147,8 @@ fn estimator_result(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> 
             let operator = fit.operator().ok().map(|found| found.parameters());
             let response = responses(fit.model(), task.omega_rad_s);
             Ok(TrackingResult {
-                response: vec![response; task.at.len()],
-                operator: vec![operator; task.at.len()],
+                response: vec![response; task.requested_samples.len()],
+                operator: vec![operator; task.requested_samples.len()],
             })
         }
         StudyTask::Describe | StudyTask::GreyBox(_) | StudyTask::Analysis(_) => Err(ThesisError::Unsuited {
@@ -162,7 +162,7 @@ fn estimator_result(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> 
 
 fn trace_result(trace: &Trace, task: &Task<'_>) -> Result<TrackingResult, ThesisError> {
     let (options, mut found) = (trace.options(), TrackingResult::default());
-    for row in 0..task.at.len().min(trace.len()) {
+    for row in 0..task.requested_samples.len().min(trace.len()) {
         let theta = trace.theta(row).to_vec();
         let model = PolynomialModel::new(options.structure, options.orders, trace.sample_time(), theta)?;
         found.response.push(responses(&model, task.omega_rad_s));

@@ -87,8 +87,8 @@ pub fn survey_tables(plan: &SurveyPlan, found: &[MethodErrors]) -> String {
     let extra_information: Vec<String> = plan
         .comparators
         .iter()
-        .filter(|(_, of)| !of.about().extra_information.is_empty())
-        .map(|(name, of)| format!("- *{name}*: {}.", of.about().extra_information))
+        .filter(|(_, of)| !of.description().extra_information.is_empty())
+        .map(|(name, of)| format!("- *{name}*: {}.", of.description().extra_information))
         .collect();
     format!(
         "{text}\n\\* needs more than e, u and n_k:\n\n{}\n{each}",

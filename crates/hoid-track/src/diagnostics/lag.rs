@@ -22,7 +22,7 @@ const LAG_PHASE_DEG: f64 = -15.0;
 /// 46 (1978) 1251-1271).
 const MAX_DISTANCE: f64 = 2.0;
 const MAX_DIFFERENCE_DEG: f64 = 5.0;
-/// Lags that are proposed, s.
+/// Smallest and largest lag that the finding proposes, s.
 const PROPOSED_LAGS_S: (f64, f64) = (0.5, 10.0);
 
 impl Trace {

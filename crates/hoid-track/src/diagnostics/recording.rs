@@ -177,7 +177,7 @@ impl Trace {
                     let words = format!(
                         "in the last {length:.0} s the data require a {name} that differs from the last row by {}: the \
                          estimate does not follow a change of the person, or has not recovered; restart it there",
-                        step.by
+                        step.step
                     );
                     worst = Some((p_value, words));
                 }

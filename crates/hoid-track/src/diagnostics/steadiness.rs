@@ -99,7 +99,7 @@ impl Trace {
     /// changes.
     pub(super) fn response_change_finding(&self, record: &Record) -> Option<Finding> {
         self.options().basis_lag_of_one_input_s()?;
-        let unlikely = |found: &ResponseChange| match found.course {
+        let unlikely = |found: &ResponseChange| match found.time_course {
             TimeCourse::Oscillation(_) => found.p_value / OSCILLATION_P_VALUE,
             TimeCourse::Step => found.p_value / STEP_P_VALUE,
             TimeCourse::Drift => found.p_value / DRIFT_P_VALUE,
@@ -109,19 +109,19 @@ impl Trace {
             .into_iter()
             .filter(|found| unlikely(found) < 1.0);
         let found = found.min_by(|a, b| unlikely(a).total_cmp(&unlikely(b)))?;
-        let [by, error] = found.by;
+        let [by, error] = found.size;
         let size = match found.name {
             "gain" => format!("{:+.0} ± {:.0} %", 100.0 * by, 100.0 * error),
             _ => format!("{by:+.3} ± {error:.3} s"),
         };
         let (name, p) = (found.name, found.p_value);
-        let (kind, words) = match found.course {
+        let (kind, words) = match found.time_course {
             TimeCourse::Step => (
                 "undeclared-change",
                 format!(
                     "the {name} of the person changes by {size} about {:.0} s after the start (p = {p:.0e}), where the \
                      trace declares no change",
-                    record.time_s(found.at) - record.time_s(0)
+                    record.time_s(found.first_sample) - record.time_s(0)
                 ),
             ),
             TimeCourse::Drift => (

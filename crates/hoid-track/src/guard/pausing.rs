@@ -79,7 +79,7 @@ impl Guard {
         } else {
             0
         };
-        if self.pause.good >= self.settle && !self.pause.bad_block {
+        if self.pause.good >= self.settling_samples && !self.pause.bad_block {
             let action = match self.pause.kind() {
                 GuardKind::Missing => GuardAction::Resumed,
                 _ => GuardAction::Restarted,

@@ -1,4 +1,4 @@
-"""What the peers share: the data, the clock and the lines of JSON that `cargo xtask bench` collects.
+"""Shared parts of the peers: data, clock, and the lines of JSON that `cargo xtask bench` collects.
 
 A peer is called as `python PEER.py RECORD.csv [RUNS [TASK,...]]`; RECORD.csv has the columns e, u without their names, and the folder holds what
 the example `tasks` has written next to it. For each task it prints {"task", "peer", "seconds", "answer"} and, where its answer is another by
@@ -17,10 +17,10 @@ LAMBDA = 1.0 - 1.0 / 256.0
 CELL_RUNS = 100
 DELAYS = range(20, 41)
 RPEM_START = [0.04, -0.04, -0.8, -1.9, 0.92]
-# A start that the ARX start cannot give: that leads to another minimum here. Ours gets none.
+# A given start, because the ARX start leads to another minimum here. hoid gets no start.
 BJ_START = [0.05, -0.05, -0.8, -1.9, 0.92]
 OWN_NOISE = "other random numbers"
-# Ours finds smaller losses there.
+# hoid finds smaller losses there.
 HIGHER_MINIMA = "from its neighbour into higher minima at nk = 36, 39, 40"
 
 
@@ -61,7 +61,7 @@ def median(work):
 
 
 def measure(task, peer, work, answer=lambda a: a, differs=None, compile_first=False):
-    """Measures a task where it is requested, and prints its line."""
+    """Measures a task if it is requested, and prints its line."""
     if len(sys.argv) > 3 and sys.argv[3] and task not in sys.argv[3].split(","):
         return
     line = {"task": task, "peer": peer}
@@ -87,7 +87,7 @@ def delayed(x, k):
 
 
 class Loop:
-    """The closed loop of condition C1 by exact holds: numbers that a simulation needs."""
+    """The closed loop of condition C1 with exact holds: the numbers for a simulation."""
 
     def __init__(self):
         from scipy.signal import cont2discrete

@@ -156,7 +156,7 @@ def rls(e, u):
         g = p @ psi
         scale = 1.0 / (LAMBDA + psi @ g)
         theta = theta + scale * (u[t] - psi @ theta) * g
-        # Symmetric to the last bit: what is not would grow by 1/lambda each sample.
+        # Symmetric to the last bit, because an asymmetry would grow by 1/lambda per sample.
         p = (p - scale * np.outer(g, g)) / LAMBDA
         history[t] = theta
         psi = np.array([-u[t], psi[0], psi[2], psi[3]])

@@ -1,7 +1,8 @@
 //! The tasks for the comparison of hoid with other programs, as performed by hoid. `cargo xtask bench` runs this
 //! example together with the peer programs in `crates/hoid/benches/peers` and makes the table of the book.
 //!
-//! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S | --times K] [--reproduce M]`
+//! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S | --times K] [--reproduce
+//! M]`
 //!
 //! The data that all programs share ([`data`]) are written to DIRECTORY. Each task prints one line of JSON,
 //! `{"task", "peer", "seconds", "answer"}`, with the median time of as many runs as fit into S seconds (at least five),

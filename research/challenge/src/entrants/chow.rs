@@ -27,9 +27,10 @@ const MIN_PAST_BLOCKS: usize = 24;
 const KEPT_BLOCKS: usize = 12;
 const TEST_OMEGA_RAD_S: f64 = 2.5;
 const RESIDUAL_LIMIT: f64 = 3.5;
-/// Ratio of T to its level above which a change is declared, if it is exceeded in `PERSISTENCE_BLOCKS` consecutive blocks. In
-/// runs 2 to 5 of the cases without a change (open seeds; 1.8 h), which are not in any table, ratios of 6, 8, 12 and 25
-/// are exceeded 32, 15, 9 and 5 times; without the cases with a missing and a silent span, 21, 5, 0 and 0 times.
+/// Ratio of T to its level above which a change is declared, if it is exceeded in `PERSISTENCE_BLOCKS` consecutive
+/// blocks. In runs 2 to 5 of the cases without a change (open seeds; 1.8 h), which are not in any table, ratios of 6,
+/// 8, 12 and 25 are exceeded 32, 15, 9 and 5 times; without the cases with a missing and a silent span, 21, 5, 0 and 0
+/// times.
 const THRESHOLD: f64 = 10.0;
 const PERSISTENCE_BLOCKS: usize = 4;
 /// Expectation of the logarithm of a chi-square variable with two degrees of freedom. The following constants are the

@@ -6,7 +6,7 @@ mod pooled;
 
 use std::path::{Path, PathBuf};
 
-use hoid::analysis::LookOptions;
+use hoid::analysis::ExaminationOptions;
 use hoid::model::{SampleTime, VerdictLevel};
 use hoid::report::{group_figures, write_group_pages};
 use hoid::sim::people::{Population, Range};
@@ -112,9 +112,9 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         )));
     }
     let (mut manifest, others) = Manifest::from_directory(&args.directory, &pattern)?;
-    let known = LookOptions {
+    let known = ExaminationOptions {
         offset_samples: args.offset,
-        ..args.look.to_options()
+        ..args.examination.to_options()
     };
     let evidence = inspect(&mut manifest, &args.directory, &known)?;
     ConditionElement::apply(&args.element, &mut manifest)
@@ -145,10 +145,10 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         ));
     }
     for one in &evidence {
-        let place = [one.table.as_str(), one.key].join(" ");
-        let place = place.trim();
-        let colon = if place.is_empty() { "" } else { ": " };
-        message.push_str(&format!("- {place}{colon}{}\n", one.words));
+        let location = [one.table.as_str(), one.key].join(" ");
+        let location = location.trim();
+        let colon = if location.is_empty() { "" } else { ": " };
+        message.push_str(&format!("- {location}{colon}{}\n", one.text));
     }
     message.push_str(&format!(
         "Check {}, then: hoid group {} --out results\n",
@@ -180,10 +180,10 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     let outcome = analyse_with_progress(&manifest, path, out, &options)?;
     let summary = GroupSummary::read(&manifest, out)?;
     let pages = path_texts(&write_group_pages(&manifest, path, out)?);
-    if let Some(place) = &args.picture.figure {
+    if let Some(location) = &args.picture.figure {
         write_figures(
             &group_figures(&manifest, out, args.picture.width)?,
-            place,
+            location,
             args.picture.width,
         )?;
     }
@@ -231,7 +231,7 @@ pub fn analyse_with_progress(
 
 /// Writes one figure for each condition. With several conditions, the name of the condition is appended to the given
 /// file name.
-fn write_figures(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
+fn write_figures(figures: &[(String, String)], location: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
     if figures.is_empty() {
         output::add_notice(
             "",
@@ -241,12 +241,12 @@ fn write_figures(figures: &[(String, String)], place: &Path, width_mm: Option<f6
         );
     }
     for (condition, svg) in figures {
-        let stem = place.file_stem().unwrap_or_default().to_string_lossy();
-        let ending = place.extension().unwrap_or_default().to_string_lossy();
+        let stem = location.file_stem().unwrap_or_default().to_string_lossy();
+        let ending = location.extension().unwrap_or_default().to_string_lossy();
         let of_condition = pooled::to_file_name(condition);
         let own = match figures.len() {
-            1 => place.to_owned(),
-            _ => place.with_file_name(format!("{stem}-{of_condition}.{ending}")),
+            1 => location.to_owned(),
+            _ => location.with_file_name(format!("{stem}-{of_condition}.{ending}")),
         };
         figure::write(&own, svg, width_mm)?;
     }

@@ -5,7 +5,7 @@ mod family;
 mod family_form;
 mod request;
 mod run;
-mod several;
+mod several_inputs;
 mod sigmoid;
 
 pub use run::run;

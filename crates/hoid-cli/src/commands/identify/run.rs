@@ -15,7 +15,7 @@ use hoid::model::{GainUnit, Record};
 use hoid::report::{FitSummary, ModelSection, Report, known_operator, model_figure, model_picture, write_report};
 use serde_json::Value;
 
-use super::{axes, family, request, several, sigmoid};
+use super::{axes, family, request, several_inputs, sigmoid};
 use crate::{
     args::IdentifyArgs,
     commands::{figure, output_paths, paper_table, reading},
@@ -24,9 +24,9 @@ use crate::{
 };
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
-    if let Some(structure) = several::structure(args) {
+    if let Some(structure) = several_inputs::structure(args) {
         check_paths(args)?;
-        return several::run(args, structure);
+        return several_inputs::run(args, structure);
     }
     if !args.pair.is_empty() {
         return axes::run(args);
@@ -105,7 +105,7 @@ fn show<F: JsonFit>(
                 truth: known_operator(records),
                 margins: answer.margins,
             }],
-            answer: Some(FitSummary {
+            fit_summary: Some(FitSummary {
                 verdict: verdict.clone(),
                 sentence: sentence(&answer),
                 parameters: Vec::new(),

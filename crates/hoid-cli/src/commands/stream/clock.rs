@@ -35,9 +35,10 @@ pub struct Clock {
     sample_time_s: f64,
     /// Position of the last sample on the grid, and its time.
     last: Option<(f64, f64)>,
-    /// Time of the last line that was not later than the last accepted line, and the number of such lines in succession.
+    /// Time of the last line that was not later than the last accepted line, and the number of such lines in
+    /// succession.
     late: Option<(f64, usize)>,
-    too_fast: bool,
+    has_advanced_too_fast: bool,
     /// Differences of successive times, collected for the next check of the rate, s.
     steps: Vec<f64>,
 }
@@ -48,7 +49,7 @@ impl Clock {
             sample_time_s,
             last: None,
             late: None,
-            too_fast: false,
+            has_advanced_too_fast: false,
             steps: Vec::with_capacity(RATE_LINES),
         }
     }
@@ -92,7 +93,7 @@ impl Clock {
         }
         let expected = place + steps * ts;
         self.steps.push(t - last_s);
-        self.too_fast |= expected - t > MAX_ADVANCE_SAMPLES * ts;
+        self.has_advanced_too_fast |= expected - t > MAX_ADVANCE_SAMPLES * ts;
         self.last = Some((expected + GRID_GAIN * (t - expected), t));
         Arrival::Sample {
             missing: steps as usize - 1,
@@ -117,8 +118,8 @@ impl Clock {
 
     /// True, once, after the grid has run ahead of the times by more than [`MAX_ADVANCE_SAMPLES`] samples, because the
     /// times advance by less than the sample time per line.
-    pub fn grid_ran_ahead(&mut self) -> bool {
-        std::mem::take(&mut self.too_fast)
+    pub fn has_run_ahead(&mut self) -> bool {
+        std::mem::take(&mut self.has_advanced_too_fast)
     }
 }
 
@@ -154,7 +155,7 @@ mod tests {
             }
         );
         assert_eq!(missing_samples(&mut clock, 100.01), 0);
-        assert!(!clock.grid_ran_ahead());
+        assert!(!clock.has_run_ahead());
     }
 
     #[test]
@@ -206,6 +207,6 @@ mod tests {
         for k in 0..200 {
             assert_eq!(missing_samples(&mut clock, 0.005 * f64::from(k)), 0);
         }
-        assert!(clock.grid_ran_ahead() && !clock.grid_ran_ahead());
+        assert!(clock.has_run_ahead() && !clock.has_run_ahead());
     }
 }

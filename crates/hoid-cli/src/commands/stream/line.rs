@@ -86,8 +86,10 @@ impl From<Decimated> for Rate {
 
 #[derive(Serialize)]
 struct WarmUp<'a> {
-    collected: usize,
-    needed: usize,
+    #[serde(rename = "collected")]
+    collected_samples: usize,
+    #[serde(rename = "needed")]
+    required_samples: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
     reason: Option<&'a str>,
 }
@@ -182,8 +184,8 @@ impl StreamStatus<'_> {
             findings: self.finding.map(json::finding).into_iter().collect(),
             warm_up: match self.live.stage() {
                 Stage::Collecting(warm_up) => Some(WarmUp {
-                    collected: warm_up.collected,
-                    needed: warm_up.needed,
+                    collected_samples: warm_up.collected,
+                    required_samples: warm_up.needed,
                     reason: warm_up.trouble.as_deref(),
                 }),
                 Stage::Tracking(_) => None,

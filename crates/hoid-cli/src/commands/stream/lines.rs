@@ -1,5 +1,5 @@
-//! Parsing of the lines of a stream, which may come from untrusted sources. For a line that cannot be parsed, the reason
-//! is returned; only a header that lacks a column ends a stream.
+//! Parsing of the lines of a stream, which may come from untrusted sources. For a line that cannot be parsed, the
+//! reason is returned; only a header that lacks a column ends a stream.
 
 use std::io::{self, BufRead, ErrorKind};
 
@@ -102,7 +102,7 @@ pub struct Columns {
     output: String,
     with_input: bool,
     largest: f64,
-    places: Option<ColumnPositions>,
+    positions: Option<ColumnPositions>,
 }
 
 impl Columns {
@@ -112,18 +112,18 @@ impl Columns {
             output: output.to_owned(),
             with_input,
             largest,
-            places: None,
+            positions: None,
         }
     }
 
     /// True if the samples have a column t.
     pub fn has_time(&self) -> bool {
-        self.places.is_some_and(|p| p.t.is_some())
+        self.positions.is_some_and(|p| p.t.is_some())
     }
 
     /// True once a header or a line of numbers has given the columns.
     pub fn are_known(&self) -> bool {
-        self.places.is_some()
+        self.positions.is_some()
     }
 
     /// Parses a line.
@@ -140,15 +140,15 @@ impl Columns {
         }
         let separator = ['\t', ';', ','].into_iter().find(|s| line.contains(*s)).unwrap_or(',');
         let cells: Vec<&str> = line.split(separator).map(|c| c.trim().trim_matches('"')).collect();
-        let places = match self.places {
+        let places = match self.positions {
             Some(places) => places,
             None => {
                 if is_header(&cells) {
-                    self.places = Some(self.positions_from_header(&cells)?);
+                    self.positions = Some(self.positions_from_header(&cells)?);
                     return Ok(ParsedLine::Nothing);
                 }
                 match self.positions_from_count(&cells) {
-                    Some(places) => *self.places.insert(places),
+                    Some(places) => *self.positions.insert(places),
                     None => return Ok(ParsedLine::Unreadable(format!("no numbers: {}", quote(line)))),
                 }
             }
@@ -161,7 +161,7 @@ impl Columns {
                 quote(line)
             )));
         }
-        let of = |place: Option<usize>| place.map(|i| parse_number(cells[i]));
+        let of = |index: Option<usize>| index.map(|i| parse_number(cells[i]));
         Ok(self.new_sample(
             of(places.t),
             of(places.e),
@@ -240,15 +240,15 @@ impl Columns {
     }
 
     fn positions_from_header(&self, cells: &[&str]) -> Result<ColumnPositions, CliError> {
-        let place = |name: &str| cells.iter().position(|c| *c == name);
-        let e = place(&self.input);
-        match (e, place(&self.output)) {
+        let index = |name: &str| cells.iter().position(|c| *c == name);
+        let e = index(&self.input);
+        match (e, index(&self.output)) {
             (e, Some(u)) if e.is_some() || !self.with_input => Ok(ColumnPositions {
                 count: cells.len(),
-                t: place("t"),
+                t: index("t"),
                 e: e.filter(|_| self.with_input),
                 u,
-                reference: place("f_t"),
+                reference: index("f_t"),
             }),
             (e, u) => Err(CliError::Stream(format!(
                 "the header has the columns {}, expected {}; choose with --input and --output{}",

@@ -46,7 +46,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     }
     let sample_time = SampleTime::new(1.0 / args.fs)?;
     let asked = recursion::request(&args.recursion)?;
-    let decimation = args.rate.of(asked.counts_samples());
+    let decimation = args.rate.decimation(asked.counts_samples());
     if asked.method.requests_two_sided() {
         return Err(CliError::Usage(
             "--smooth applies only to hoid track, because a stream has no future samples".to_owned(),

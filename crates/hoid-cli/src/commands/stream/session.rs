@@ -21,7 +21,7 @@ const MAX_FAULTS: usize = 4;
 
 /// The state of the stream, which each line of the input updates.
 pub struct Session {
-    asked: TrackRequest,
+    request: TrackRequest,
     columns: Columns,
     clock: Clock,
     live: Live,
@@ -47,7 +47,7 @@ pub struct Session {
     names: Vec<String>,
     faults: VecDeque<String>,
     /// True once a warning about the rate of the times has been printed.
-    rate_reported: bool,
+    has_reported_rate: bool,
     /// Finding about the rate of the time stamps, if it differs from `--fs`.
     rate: Option<Finding>,
 }
@@ -59,7 +59,7 @@ impl Session {
         let largest = live.plan().options().largest;
         let mut session = Self {
             live,
-            asked,
+            request: asked,
             columns: Columns::new(&args.input, &args.output, with_input, largest),
             clock: Clock::new(sample_time.s()),
             sample_time,
@@ -75,7 +75,7 @@ impl Session {
             event: None,
             names: Vec::new(),
             faults: VecDeque::new(),
-            rate_reported: false,
+            has_reported_rate: false,
             rate: None,
         };
         if session.live.tracker().is_some() {
@@ -91,7 +91,7 @@ impl Session {
         if let Some(tracker) = self.live.tracker() {
             self.names = tracker.parameter_names();
         }
-        let mut settings = settings_of_recursion(&self.asked, self.live.plan(), options, choice);
+        let mut settings = settings_of_recursion(&self.request, self.live.plan(), options, choice);
         if let Some(done) = self.live.decimation() {
             settings.push(Setting::new("rate", format!("{done}, delayed by {:.3} s", done.lag_s)));
         }
@@ -221,9 +221,9 @@ impl Session {
     /// the output contains the finding.
     fn check_rate(&mut self, t: f64) {
         let fs = 1.0 / self.sample_time.s();
-        let (hurried, other) = (self.clock.grid_ran_ahead(), self.clock.deviating_rate());
+        let (hurried, other) = (self.clock.has_run_ahead(), self.clock.deviating_rate());
         let mut warn = |words: &str| {
-            if !std::mem::replace(&mut self.rate_reported, true) {
+            if !std::mem::replace(&mut self.has_reported_rate, true) {
                 output::print_message(&format!("warning: {words}"));
             }
         };

@@ -72,13 +72,13 @@ pub(crate) fn score_blocks(
                     score: vec![0.0; p],
                     information: vec![0.0; p * p],
                 };
-                for (i, (place, column)) in columns.iter().enumerate() {
+                for (i, (index, column)) in columns.iter().enumerate() {
                     let column = &column[part.clone()];
-                    block.score[*place] += dot(column, &eps[part.clone()]);
+                    block.score[*index] += dot(column, &eps[part.clone()]);
                     for (other, against) in &columns[..=i] {
                         let product = dot(column, &against[part.clone()]);
-                        block.information[place * p + other] = product;
-                        block.information[other * p + place] = product;
+                        block.information[index * p + other] = product;
+                        block.information[other * p + index] = product;
                     }
                 }
                 blocks.push(block);
@@ -116,13 +116,13 @@ pub(crate) fn physical_score_blocks<P: Parametrisation>(
         let places = criterion.layout.positions(record).iter();
         let columns = places
             .zip(&mapped.columns)
-            .filter(|(place, _)| free.contains(place))
-            .map(|(place, slopes)| {
+            .filter(|(index, _)| free.contains(index))
+            .map(|(index, slopes)| {
                 let mut column = vec![0.0; eps.len()];
                 for (slope, psi) in slopes.iter().zip(&psi).filter(|(slope, _)| **slope != 0.0) {
                     add_scaled(&mut column, *slope, psi);
                 }
-                (*place, column)
+                (*index, column)
             })
             .collect();
         Some((eps, columns))

@@ -24,8 +24,9 @@
 //!
 //! **Level.** T is compared with Student's distribution with n - 2 degrees of freedom. The p-value of the supremum is
 //! the smaller of Bonferroni's bound and the value for continuous time ([`critical`]), corrected for the number of
-//! directions. The delay and the other parameters are tested separately, each at the level [`SIGNIFICANCE_LEVEL`]. The directions
-//! are the parameters of the operator or, if the coefficients do not correspond to an operator, the coefficients.
+//! directions. The delay and the other parameters are tested separately, each at the level [`SIGNIFICANCE_LEVEL`]. The
+//! directions are the parameters of the operator or, if the coefficients do not correspond to an operator, the
+//! coefficients.
 //!
 //! | file | contents |
 //! |---|---|
@@ -33,33 +34,33 @@
 //! | `critical` | p-values of a supremum |
 //! | `polynomials` | scores of a polynomial fit, including the score of the delay |
 //! | `search` | search for the most significant change |
-//! | `steadiness` | test of a known response for jumps, drifts and periodic changes |
-//! | `stretch` | search for the block with the most influence on the fit |
+//! | `response_changes` | test of a known response for jumps, drifts and periodic changes |
+//! | `influential_block` | search for the block with the most influence on the fit |
 
 mod blocks;
 mod critical;
+mod influential_block;
 mod polynomials;
+mod response_changes;
 mod search;
-mod steadiness;
-mod stretch;
 #[cfg(test)]
 mod tests;
 
 use hoid_model::Finding;
 
 pub(crate) use blocks::{physical_score_blocks, score_blocks};
+use influential_block::most_influential_block;
+pub use response_changes::{ResponseBasis, ResponseChange, response_changes};
 pub use search::TimeCourse;
 use search::{Change, strongest_step};
 pub(crate) use search::{Constancy, Direction};
-pub use steadiness::{ResponseBasis, ResponseChange, response_changes};
-use stretch::most_influential_block;
 
 /// Largest p-value at which a parameter counts as changed, both in the test of the delay and in the test of the other
 /// parameters.
 const SIGNIFICANCE_LEVEL: f64 = 5e-4;
-/// Default relative standard deviation of a person's gain, crossover and delay from run to run. In six cells of ten runs
-/// of three people, each run identified alone, the crossover varied by 13 % in the median after the errors of the estimates were
-/// subtracted (7 to 21 %), and the gain by more (11 to 32 %).
+/// Default relative standard deviation of a person's gain, crossover and delay from run to run. In six cells of ten
+/// runs of three people, each run identified alone, the crossover varied by 13 % in the median after the errors of the
+/// estimates were subtracted (7 to 21 %), and the gain by more (11 to 32 %).
 pub const RUN_TO_RUN_DEVIATION: f64 = 0.13;
 
 impl Constancy<'_> {
@@ -75,7 +76,9 @@ impl Constancy<'_> {
     fn stretch_finding(&self) -> Option<Finding> {
         let found = most_influential_block(self)?;
         let time = |sample: usize| sample as f64 * self.sample_time_s;
-        let to = found.to.map_or("the end".to_owned(), |to| format!("{:.0} s", time(to)));
+        let to = found
+            .next_sample
+            .map_or("the end".to_owned(), |to| format!("{:.0} s", time(to)));
         let records = self.blocks.last().map_or(0, |block| block.record + 1);
         let record = if records > 1 {
             format!(" of record {}", found.record + 1)
@@ -83,16 +86,16 @@ impl Constancy<'_> {
             String::new()
         };
         let moves: Vec<String> = found
-            .moves
+            .parameter_changes
             .iter()
             .map(|(name, by)| format!("{name} by {by:.1}"))
             .collect();
         Some(Finding::warning(
             "stretch",
             format!(
-                "the fit depends on the stretch from {:.0} s to {to}{record}: leaving it out changes {} standard \
-                 errors; look at the recording there",
-                time(found.from),
+                "the fit depends on the interval from {:.0} s to {to}{record}: omitting it changes {} standard \
+                 errors; inspect the recording there",
+                time(found.first_sample),
                 moves.join(", ")
             ),
         ))
@@ -121,15 +124,15 @@ impl Constancy<'_> {
     }
 
     fn change_description(&self, change: &Change, records: usize) -> String {
-        let at_s = change.at as f64 * self.sample_time_s;
-        let place = match (records, change.at) {
+        let at_s = change.first_sample as f64 * self.sample_time_s;
+        let place = match (records, change.first_sample) {
             (0 | 1, _) => format!("about {at_s:.0} s after the start"),
             (_, 0) => format!("in record {} compared with the others", change.record + 1),
             _ => format!("about {at_s:.0} s after the start of record {}", change.record + 1),
         };
         format!(
             "{} changes by about {:+.2} ± {:.2}{} {place} (p = {:.0e})",
-            change.name, change.by, change.error, change.unit, change.p_value
+            change.name, change.size, change.error, change.unit, change.p_value
         )
     }
 }

@@ -82,9 +82,9 @@ impl Fit {
     /// coefficients.
     fn directions(&self) -> Vec<Direction> {
         let (orders, p) = (self.orders(), self.model.theta().len());
-        let unit_vector = |place: usize| {
+        let unit_vector = |index: usize| {
             let mut v = vec![0.0; p + 1];
-            v[place] = 1.0;
+            v[index] = 1.0;
             v
         };
         let mut all = vec![Direction {
@@ -126,8 +126,8 @@ impl Fit {
         let named = [("K_e", ""), ("K_e_dot", " s"), ("omega_nm", " rad/s"), ("zeta_nm", "")];
         let of = |(k, (name, unit)): (usize, (&str, &'static str))| {
             let mut vector = vec![0.0; self.model.theta().len() + 1];
-            for (place, row) in places.into_iter().zip([0, 1, 3, 4]) {
-                vector[place] += slopes[row][k];
+            for (index, row) in places.into_iter().zip([0, 1, 3, 4]) {
+                vector[index] += slopes[row][k];
             }
             Direction {
                 name: name.to_owned(),

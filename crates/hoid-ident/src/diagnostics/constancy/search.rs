@@ -58,13 +58,13 @@ pub enum TimeCourse {
 /// A significant change of a parameter.
 #[derive(Debug, Clone)]
 pub(super) struct Change {
-    pub course: TimeCourse,
+    pub time_course: TimeCourse,
     pub name: String,
     pub unit: &'static str,
     pub record: usize,
     /// First sample after a step; 0 if a whole record differs from the others, and for a drift or a periodic change.
-    pub at: usize,
-    pub by: f64,
+    pub first_sample: usize,
+    pub size: f64,
     pub error: f64,
     pub p_value: f64,
 }
@@ -72,8 +72,8 @@ pub(super) struct Change {
 /// A candidate change: record, first sample, course, and the size of the change in each block.
 pub(super) struct Candidate {
     record: usize,
-    at: usize,
-    course: TimeCourse,
+    first_sample: usize,
+    time_course: TimeCourse,
     weights: Vec<f64>,
 }
 
@@ -83,8 +83,8 @@ impl Candidate {
         let weights = (0..all).map(|c| f64::from(u8::from(blocks.contains(&c)))).collect();
         Self {
             record,
-            at,
-            course: TimeCourse::Step,
+            first_sample: at,
+            time_course: TimeCourse::Step,
             weights,
         }
     }
@@ -96,7 +96,7 @@ struct CandidateTest {
     share: f64,
     u: f64,
     r: f64,
-    by_model: f64,
+    model_variance_test: f64,
     by_blocks: f64,
     between_runs: f64,
 }
@@ -138,31 +138,31 @@ pub(super) fn strongest_change(of: &Constancy<'_>, directions: &[&Direction], se
         let all: Vec<CandidateTest> = (0..sets.len())
             .filter_map(|k| test_candidate(of, (&matrices, &scores), &inverse, (&v, direction.size), &sets[k], k))
             .collect();
-        let mut ratios: Vec<f64> = all.iter().map(|t| t.by_blocks / t.by_model).collect();
+        let mut ratios: Vec<f64> = all.iter().map(|t| t.by_blocks / t.model_variance_test).collect();
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
-            // A periodic change affects all blocks alike; the variance for such a change uses the median scatter over all
-            // candidates.
-            let (scatter, freedom) = match sets[t.set].course {
+            // A periodic change affects all blocks alike; the variance for such a change uses the median scatter over
+            // all candidates.
+            let (scatter, freedom) = match sets[t.set].time_course {
                 TimeCourse::Step | TimeCourse::Drift => (t.by_blocks, n - 2),
                 TimeCourse::Oscillation(_) => (0.0, 4 * (n - 2)),
             };
-            let variance = scatter.max(t.by_model * typical.max(1.0)) + t.between_runs;
+            let variance = scatter.max(t.model_variance_test * typical.max(1.0)) + t.between_runs;
             let p_one = student_p_value(t.u / variance.sqrt(), freedom as f64);
-            let of_all = match sets[t.set].course {
+            let of_all = match sets[t.set].time_course {
                 TimeCourse::Step => supremum_p_value(p_one, all.len(), smallest.max(1e-3)),
                 _ => p_one * all.len() as f64,
             };
             let p_value = (of_all * directions.len() as f64).min(1.0);
             if best.as_ref().is_none_or(|known| p_value < known.p_value) {
                 best = Some(Change {
-                    course: sets[t.set].course,
+                    time_course: sets[t.set].time_course,
                     name: direction.name.clone(),
                     unit: direction.unit,
                     record: sets[t.set].record,
-                    at: sets[t.set].at,
-                    by: t.u / t.r,
+                    first_sample: sets[t.set].first_sample,
+                    size: t.u / t.r,
                     error: variance.sqrt() / t.r,
                     p_value,
                 });
@@ -195,11 +195,11 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     let n = blocks.len();
     let weight = |c: usize| (c as f64 + 0.5) / n.max(1) as f64 - 0.5;
     let weights = (0..n).map(weight).collect();
-    let course = TimeCourse::Drift;
+    let time_course = TimeCourse::Drift;
     vec![Candidate {
         record: 0,
-        at: 0,
-        course,
+        first_sample: 0,
+        time_course,
         weights,
     }]
 }
@@ -214,8 +214,8 @@ pub(super) fn periodic_changes(blocks: &[ScoreBlock], block_s: f64) -> Vec<Candi
         .take_while(|f| *f <= 1.0 / MIN_PERIOD_BLOCKS);
     let of = |frequency: f64, phase: u32| Candidate {
         record: 0,
-        at: 0,
-        course: TimeCourse::Oscillation(block_s / frequency),
+        first_sample: 0,
+        time_course: TimeCourse::Oscillation(block_s / frequency),
         weights: (0..n)
             .map(|c| (TAU * (c as f64 + 0.5) * frequency + FRAC_PI_4 * f64::from(phase)).sin())
             .collect(),
@@ -267,7 +267,7 @@ fn test_candidate(
         share: of_set / information,
         u,
         r,
-        by_model: of.variance * r,
+        model_variance_test: of.variance * r,
         by_blocks: scatter * n / (n - 2.0),
         between_runs: (of.run_to_run * size).powi(2) * runs,
     })

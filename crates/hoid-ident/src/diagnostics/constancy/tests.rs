@@ -170,13 +170,22 @@ impl Regression {
 fn change_equals_the_coefficient_of_its_regressor() {
     let regression = Regression::new(5, 4000, 0.9, 0.8);
     let found = regression.strongest_change();
-    assert!(found.at.abs_diff(2000) <= 200 && found.p_value < 1e-4, "{found:?}");
+    assert!(
+        found.first_sample.abs_diff(2000) <= 200 && found.p_value < 1e-4,
+        "{found:?}"
+    );
     // Reference: least squares with the regressor of the change as an additional column.
     let changed_input: Vec<f64> = (0..4000)
-        .map(|t| if t >= found.at { regression.x[0][t] } else { 0.0 })
+        .map(|t| {
+            if t >= found.first_sample {
+                regression.x[0][t]
+            } else {
+                0.0
+            }
+        })
         .collect();
     let theta = regression.solve(&[&regression.x[0], &regression.x[1], &changed_input]);
-    assert!((found.by - theta[2]).abs() < 1e-9, "{} and {}", found.by, theta[2]);
+    assert!((found.size - theta[2]).abs() < 1e-9, "{} and {}", found.size, theta[2]);
 }
 
 #[test]

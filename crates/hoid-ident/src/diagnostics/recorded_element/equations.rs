@@ -17,7 +17,7 @@ pub(super) struct ElementFit {
     pub(super) num: Vec<f64>,
     pub(super) den: Vec<f64>,
     pub(super) delay_s: f64,
-    pub(super) unexplained: f64,
+    pub(super) unexplained_share: f64,
     /// Weights of each record.
     weights: Vec<Vec<f64>>,
 }
@@ -53,14 +53,14 @@ impl ElementFit {
             den: [1.0].into_iter().chain(descending(0..n)).collect(),
             num: descending(n..n + m + 1).collect(),
             delay_s: found.delay_s,
-            unexplained: found.sum_of_squares / found.power,
+            unexplained_share: found.sum_of_squares / found.power,
             weights,
         })
     }
 
-    /// Returns the delay beyond that of the given element at which this element explains most of the power, and the share
-    /// that it leaves unexplained, with the weights of this fit. Delays of up to `aligned_s` are tried. `None` without
-    /// power.
+    /// Returns the delay beyond that of the given element at which this element explains most of the power, and the
+    /// share that it leaves unexplained, with the weights of this fit. Delays of up to `aligned_s` are tried. `None`
+    /// without power.
     pub(super) fn of_given(
         &self,
         spectra: &[Spectra],
@@ -100,7 +100,7 @@ fn unexplained_share(
     for rows in rows {
         let mut own = rows.right.clone();
         let ascending = den.iter().rev();
-        rows.of_e
+        rows.a_columns
             .iter()
             .zip(ascending)
             .for_each(|(column, a)| add_scaled(&mut own, *a, column));
@@ -112,7 +112,7 @@ fn unexplained_share(
             .zip(num.iter().rev())
             .for_each(|(column, b)| add_scaled(&mut by_u, *b, column));
         add_scaled(&mut own, 1.0, &by_u);
-        let others = disturbances.into_iter().chain(rows.of_targets.iter().cloned());
+        let others = disturbances.into_iter().chain(rows.c_columns.iter().cloned());
         for (j, column) in others.enumerate() {
             if free.len() <= j {
                 free.push(Vec::new());
@@ -146,10 +146,10 @@ struct Rows<'a> {
     /// Orthonormal columns that span T.
     transient: Vec<Vec<f64>>,
     m: usize,
-    /// Columns that do not depend on the delay: the columns of A (`of_e`), the columns of C (`of_targets`), and the
+    /// Columns that do not depend on the delay: the columns of A (`a_columns`), the columns of C (`c_columns`), and the
     /// right-hand side `s^n E`.
-    of_e: Vec<Vec<f64>>,
-    of_targets: Vec<Vec<f64>>,
+    a_columns: Vec<Vec<f64>>,
+    c_columns: Vec<Vec<f64>>,
     right: Vec<f64>,
 }
 
@@ -188,8 +188,8 @@ impl<'a> Rows<'a> {
         };
         Self {
             m,
-            of_e: (0..n).map(|i| free(&spectra.e, i)).collect(),
-            of_targets: spectra
+            a_columns: (0..n).map(|i| free(&spectra.e, i)).collect(),
+            c_columns: spectra
                 .targets
                 .iter()
                 .flat_map(|target| (0..=n).map(|i| free(target, i)).collect::<Vec<_>>())
@@ -260,10 +260,10 @@ impl Solution {
         let blocks: Vec<Vec<Vec<f64>>> = rows
             .iter()
             .map(|rows| {
-                let negative = rows.of_e.iter().map(|c| c.iter().map(|v| -v).collect::<Vec<_>>());
+                let negative = rows.a_columns.iter().map(|c| c.iter().map(|v| -v).collect::<Vec<_>>());
                 let inputs = rows.input_columns(delay_s, of_disturbances_s);
                 let inputs = inputs.into_iter().map(|c| c.iter().map(|v| -v).collect());
-                negative.chain(inputs).chain(rows.of_targets.iter().cloned()).collect()
+                negative.chain(inputs).chain(rows.c_columns.iter().cloned()).collect()
             })
             .collect();
         let p = blocks.first()?.len();
@@ -279,7 +279,7 @@ impl Solution {
             return None;
         }
         let theta = solved.solution();
-        let inputs = rows[0].of_e.len()..p - rows[0].of_targets.len();
+        let inputs = rows[0].a_columns.len()..p - rows[0].c_columns.len();
         let mut residuals = right;
         (0..p).for_each(|j| add_scaled(&mut residuals, -theta[j], &columns[j]));
         let mut power = residuals.clone();

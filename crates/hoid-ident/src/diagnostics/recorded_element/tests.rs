@@ -63,7 +63,7 @@ fn element_of_the_loop_is_found_and_a_wrong_one_rejected() {
             element(-90.0, 6.0),
         ] {
             let found = recorded_element(&record, &given, None).unwrap();
-            assert!(found.unexplained < 1e-4, "{found:?}");
+            assert!(found.unexplained_share < 1e-4, "{found:?}");
             assert_eq!(found.element, element(90.0, 6.0), "{found:?}");
             assert_eq!(found.matches_given(), given == element(90.0, 6.0), "{found:?}");
             assert_eq!(found.finding(&given).is_none(), found.matches_given());

@@ -319,7 +319,7 @@ fn dead_zone_is_not_mistaken_for_a_target_response() {
     assert!(
         records
             .iter()
-            .all(|record| crate::faults::Rest::of(record.output()).is_some())
+            .all(|record| crate::faults::StickRest::of(record.output()).is_some())
     );
     let one = FamilyEstimator {
         channels: Vec::new(),

@@ -17,7 +17,7 @@ use crate::iv::{
     algorithm::{Algorithm, IterationLimits, IvSolution},
     covariance,
     equation::IvProblem,
-    last_iterate::{LastIterate, NoiseModel},
+    final_iteration::{LastIterate, NoiseModel},
     refined,
     simulation_error::simulation_error,
 };

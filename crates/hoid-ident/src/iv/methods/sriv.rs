@@ -13,7 +13,7 @@ use crate::iv::{
     columns::split_by_record,
     covariance::covariance,
     equation::IvProblem,
-    last_iterate::NoiseModel,
+    final_iteration::NoiseModel,
     refined,
 };
 use crate::{IdentError, Reason, criterion::Criterion};

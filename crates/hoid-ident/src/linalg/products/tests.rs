@@ -125,7 +125,7 @@ fn residuals_are_bit_identical_on_each_path() {
                 let task = Residuals {
                     columns: &unshifted_columns(&columns),
                     factors: &factors[..p],
-                    of: &mut found,
+                    products: &mut found,
                 };
                 path.with_four_lanes(task).unwrap();
                 assert_eq!(found, defined, "{path:?}: {p} inputs, {n} samples");

@@ -151,7 +151,7 @@ pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [
         }
         return;
     }
-    divide_again(zero, f, r, at);
+    continue_division(zero, f, r, at);
     whiten(zero, d, r, x_f, at);
 }
 
@@ -160,12 +160,12 @@ pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [
 fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     y[at..at + x.len()].copy_from_slice(x);
     let end = at + x.len();
-    divide_again(zero, f, &mut y[..end], at);
+    continue_division(zero, f, &mut y[..end], at);
 }
 
 /// Computes `y <- y/F` from index `at` on; the previous values are already filtered.
 #[inline(always)]
-fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
+fn continue_division<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lane_count();
     if f.len() == 2 * width {
         let (f1, f2) = (zero.load(f), zero.load(&f[width..]));

@@ -1,7 +1,7 @@
 //! The criterion and its derivatives for several records at the same time, each record with its own theta.
 //!
-//! The criterion is the criterion of a Box-Jenkins model without C ([`crate::criterion`]), with the initial states
-//! eliminated. For the record in each lane,
+//! The criterion is that of a Box-Jenkins model without C ([`crate::criterion`]), with the initial states eliminated.
+//! For the record in each lane,
 //!
 //! `s = e(t-nk)/F`,  `w = B s`,  `v = u - w`,  `eps = D v`,  `x_b = D s`,  `r = w/F`,  `x_f = D r`
 //!

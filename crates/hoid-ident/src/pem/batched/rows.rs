@@ -8,7 +8,7 @@ const CACHE_LINE_BYTES: usize = 64;
 /// Memory with one row per sample. It is aligned, because a row that crosses a cache line takes two reads.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
-    all: Vec<f64>,
+    storage: Vec<f64>,
     first: usize,
     count: usize,
 }
@@ -17,10 +17,10 @@ impl Rows {
     /// Allocates `count` values without initialising them.
     pub fn allocate(&mut self, count: usize) {
         let spare = CACHE_LINE_BYTES / size_of::<f64>();
-        if self.all.len() < count + spare {
-            self.all.resize(count + spare, 0.0);
+        if self.storage.len() < count + spare {
+            self.storage.resize(count + spare, 0.0);
         }
-        self.first = self.all.as_ptr().align_offset(CACHE_LINE_BYTES).min(spare);
+        self.first = self.storage.as_ptr().align_offset(CACHE_LINE_BYTES).min(spare);
         self.count = count;
     }
 }
@@ -30,13 +30,13 @@ impl Deref for Rows {
 
     #[inline(always)]
     fn deref(&self) -> &[f64] {
-        &self.all[self.first..self.first + self.count]
+        &self.storage[self.first..self.first + self.count]
     }
 }
 
 impl DerefMut for Rows {
     #[inline(always)]
     fn deref_mut(&mut self) -> &mut [f64] {
-        &mut self.all[self.first..self.first + self.count]
+        &mut self.storage[self.first..self.first + self.count]
     }
 }

@@ -16,8 +16,8 @@ fn theta(layout: &Layout) -> Vec<f64> {
         (theta[a], theta[b]) = (first, last);
     }
     (theta[layout.midpoint], theta[layout.log_rate]) = (3.1, f64::ln(2.0));
-    if let Some(place) = layout.lag {
-        theta[place] = 0.4;
+    if let Some(position) = layout.lag {
+        theta[position] = 0.4;
     }
     if let Some([omega, zeta]) = layout.neuromuscular_indices {
         (theta[omega], theta[zeta]) = (11.25, 0.35);
@@ -59,7 +59,7 @@ fn gradient_agrees_with_finite_differences() {
         let theta = theta(&layout);
         // The criterion includes a prior.
         c.penalty = vec![Penalty {
-            place: layout.delay,
+            index: layout.delay,
             logarithmic: true,
             mean: -1.5,
             precision: 30.0,
@@ -127,8 +127,8 @@ fn only_the_first_state_is_used_without_a_change() {
             changes: false,
             ..criterion(layout, &e, &u)
         };
-        let prior = |place: usize| Penalty {
-            place,
+        let prior = |position: usize| Penalty {
+            index: position,
             logarithmic: true,
             mean: 0.0,
             precision: 1.0,
@@ -137,8 +137,8 @@ fn only_the_first_state_is_used_without_a_change() {
         c.penalty = vec![prior(0), prior(1)];
         let at = c.linearise(&theta(&layout), &mut Workspace::default());
         let mut other = theta(&layout);
-        for place in layout.change_indices() {
-            other[place] *= 1.3;
+        for position in layout.change_indices() {
+            other[position] *= 1.3;
         }
         let there = c.linearise(&other, &mut Workspace::default());
         assert_eq!(at.sum_of_squares, there.sum_of_squares, "{layout:?}");

@@ -10,7 +10,7 @@ pub(crate) struct Array {
     pub(crate) dims: Vec<usize>,
     /// True if the last index varies fastest, as in C; false if the first index varies fastest, as in Fortran and
     /// MATLAB.
-    pub(crate) last_fastest: bool,
+    pub(crate) is_row_major: bool,
 }
 
 impl Array {
@@ -19,7 +19,7 @@ impl Array {
         Self {
             dims: vec![numbers.len()],
             numbers,
-            last_fastest: true,
+            is_row_major: true,
         }
     }
 
@@ -30,7 +30,7 @@ impl Array {
         };
         let len = if along_first { rows } else { columns };
         // Elements along the fastest index are adjacent in the file.
-        let (first, stride) = match (along_first, self.last_fastest) {
+        let (first, stride) = match (along_first, self.is_row_major) {
             (true, true) => (k, columns),
             (true, false) => (k.saturating_mul(rows), 1),
             (false, true) => (k.saturating_mul(columns), 1),

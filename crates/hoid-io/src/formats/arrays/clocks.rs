@@ -119,7 +119,7 @@ fn increasing_times(time: &ColumnPath, file: &str) -> Result<Vec<f64>, IoError> 
         None => Ok(times),
         Some((row, previous, found)) => Err(IoError::NotIncreasing {
             file: file.to_owned(),
-            place: format!("{}, row {row}", abbreviate(&time.path)),
+            location: format!("{}, row {row}", abbreviate(&time.path)),
             found,
             previous,
             remedy: "sort the rows by t, and write t with all its digits",

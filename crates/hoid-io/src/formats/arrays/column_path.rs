@@ -158,7 +158,7 @@ mod tests {
         let array = Array {
             numbers: Numbers::from_f64(&numbers),
             dims: dims.to_vec(),
-            last_fastest,
+            is_row_major: last_fastest,
         };
         let column_paths = Entry::new("x", Value::Array(array)).column_paths(indexing);
         let values = |column_path: ColumnPath| {

@@ -38,7 +38,7 @@ impl Source for ArraySource<'_> {
         self.file
     }
 
-    fn place(&self, row: usize) -> String {
+    fn location(&self, row: usize) -> String {
         format!("row {}", row.saturating_add(1))
     }
 
@@ -79,7 +79,8 @@ pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a 
     let chosen = output.map(|output| chosen_times(&column_paths, output, options, file));
     let chosen = chosen.transpose()?.unwrap_or_default();
     let is_chosen = |time: &&ColumnPath| chosen.iter().any(|(_, chosen)| chosen.path == time.path);
-    // The times of the record: the chosen times if they are the own times of a column, otherwise the times of the output.
+    // The times of the record: the chosen times if they are the own times of a column, otherwise the times of the
+    // output.
     let reference = (paths().filter_map(own_times).find(is_chosen)).or_else(|| output.and_then(own_times));
     let counted = options.sampling_hz.is_some() && !options.repair.resample && !contents.own_clocks;
     let aligned = |column_path: &ColumnPath| match own_times(column_path).zip(reference) {
@@ -286,14 +287,15 @@ fn path_ending_in<'a>(
             let paths: Vec<&str> = several.iter().map(|one| one.path.as_str()).collect();
             Err(IoError::AmbiguousColumn {
                 file: file.to_owned(),
-                asked: abbreviate(name),
+                requested: abbreviate(name),
                 found: list_names(&paths),
             })
         }
     }
 }
 
-/// Returns the columns that `--time` names, with their names as typed; the column of nanoseconds may be named after a `+`.
+/// Returns the columns that `--time` names, with their names as typed; the column of nanoseconds may be named after a
+/// `+`.
 fn chosen_times<'a>(
     column_paths: &'a [ColumnPath],
     output: &ColumnPath,

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 
 use super::quotes::check_quotes;
 use super::text::{
-    comments, escape_formula, is_comment_or_blank, place, reader, row_start, separator, text, unescape_formula,
+    comments, escape_formula, is_comment_or_blank, location, reader, row_start, separator, text, unescape_formula,
 };
 use crate::IoError;
 use crate::formats::format::RowWriter;
@@ -150,7 +150,7 @@ fn survey_columns(text: &str, file: &str, separator: u8) -> Result<(Vec<String>,
             separator,
             file,
         )?;
-        let line = || place(bytes, start);
+        let line = || location(bytes, start);
         if names.is_empty() {
             names = record
                 .iter()
@@ -159,7 +159,7 @@ fn survey_columns(text: &str, file: &str, separator: u8) -> Result<(Vec<String>,
             if names.iter().all(|name| !matches!(Cell::parse(name), Cell::Text)) {
                 return Err(IoError::NoHeader {
                     file: file.to_owned(),
-                    place: line(),
+                    location: line(),
                     found: abbreviate(&names.join(", ")),
                 });
             }
@@ -170,7 +170,7 @@ fn survey_columns(text: &str, file: &str, separator: u8) -> Result<(Vec<String>,
         if record.len() != names.len() {
             return Err(IoError::RowLength {
                 file: file.to_owned(),
-                place: line(),
+                location: line(),
                 found: record.len(),
                 expected: names.len(),
             });

@@ -18,7 +18,7 @@ const READ_BYTES: usize = 1 << 20;
 #[derive(Debug, Default)]
 pub(in crate::formats) struct LineLimit {
     /// Number of bytes examined.
-    at: usize,
+    examined_bytes: usize,
     /// Start of the current line.
     line: usize,
 }
@@ -26,7 +26,10 @@ pub(in crate::formats) struct LineLimit {
 impl LineLimit {
     /// Starts at a line that starts at byte `at` of the file.
     pub(super) fn starting_at(at: usize) -> Self {
-        Self { at, line: at }
+        Self {
+            examined_bytes: at,
+            line: at,
+        }
     }
 
     /// Examines the next bytes.
@@ -37,17 +40,17 @@ impl LineLimit {
         let is_end = |byte: &u8| matches!(byte, b'\n' | b'\r');
         for part in bytes.chunks(READ_BYTES) {
             let first = part.iter().position(is_end).unwrap_or(part.len());
-            if self.at.saturating_add(first).saturating_sub(self.line) > MAX_LINE_BYTES {
+            if self.examined_bytes.saturating_add(first).saturating_sub(self.line) > MAX_LINE_BYTES {
                 return Err(IoError::LongLine {
                     file: file.to_owned(),
                     byte: self.line,
-                    most_mb: MAX_LINE_BYTES >> 20,
+                    max_mb: MAX_LINE_BYTES >> 20,
                 });
             }
             if let Some(last) = part.iter().rposition(is_end) {
-                self.line = self.at.saturating_add(last).saturating_add(1);
+                self.line = self.examined_bytes.saturating_add(last).saturating_add(1);
             }
-            self.at = self.at.saturating_add(part.len());
+            self.examined_bytes = self.examined_bytes.saturating_add(part.len());
         }
         Ok(())
     }

@@ -5,28 +5,28 @@
 //! |---|---|
 //! | `foreign` | conversion of files from other programs to plain CSV |
 //! | `text` | encoding, comments, separator, lines |
-//! | `table`, `plain` | the columns of a record; fast reading of rows of plain numbers |
+//! | `table`, `plain_rows` | the columns of a record; fast reading of rows of plain numbers |
 //! | `line_limit` | the length of a line |
 //! | `quotes` | quotation marks that are not closed |
-//! | `long` | reading of a long text of plain numbers, block by block |
+//! | `block_reader` | reading of a long text of plain numbers, block by block |
 //! | `span_end` | the row at which reading stops if only a span is requested |
 //! | `record` | writing of a record |
 //! | `columns` | writing and reading of tables of results |
 
+mod block_reader;
 mod columns;
 mod foreign;
 mod line_limit;
-mod long;
-mod plain;
+mod plain_rows;
 mod quotes;
 mod record;
 mod span_end;
 mod table;
 mod text;
 
+pub(super) use block_reader::table as long_table;
 pub(super) use foreign::is_table;
 pub(super) use line_limit::{LineLimit, read_whole_text};
-pub(super) use long::table as long_table;
 pub(crate) use record::write_with_commas as write_record;
 
 use crate::formats::format::{Format, FormatReader, FormatWriter};

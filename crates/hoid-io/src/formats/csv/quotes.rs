@@ -2,7 +2,7 @@
 //! file, would be read as the text of one cell.
 
 use super::foreign::{Separator, is_row};
-use super::text::{place, reader};
+use super::text::{location, reader};
 use crate::IoError;
 
 /// Number of lines in one cell that may look like rows of the table.
@@ -44,10 +44,10 @@ pub(super) fn check_quotes(
     let closing = text.trim_ascii_end().len();
     Err(IoError::OpenQuote {
         file: file.to_owned(),
-        place: place(bytes, start.saturating_add(before)),
+        location: location(bytes, start.saturating_add(before)),
         end: match is_open {
             true => String::from("is never closed"),
-            false => format!("is closed only in {}", place(bytes, start.saturating_add(closing))),
+            false => format!("is closed only in {}", location(bytes, start.saturating_add(closing))),
         },
     })
 }

@@ -25,7 +25,7 @@ impl Source for PlaceholderSource<'_> {
         self.0
     }
 
-    fn place(&self, row: usize) -> String {
+    fn location(&self, row: usize) -> String {
         format!("row {}", row.saturating_add(1))
     }
 

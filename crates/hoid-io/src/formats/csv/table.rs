@@ -17,11 +17,11 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use super::foreign::{joined_lines, mismatch};
-use super::plain::{Layout, RowStarts, read_plain_rows};
+use super::plain_rows::{Layout, RowStarts, read_plain_rows};
 use super::quotes::check_quotes;
 use super::text::{
-    comments, has_decimal_commas, is_comment_or_blank, is_unit, place, reader, row_start, separator, single_line, text,
-    unescape_formula, unterminated_line,
+    comments, has_decimal_commas, is_comment_or_blank, is_unit, location, reader, row_start, separator, single_line,
+    text, unescape_formula, unterminated_line,
 };
 use crate::IoError;
 use crate::table::{Cell, Column, Source, Table, check_column_count, check_names, read_comments, with_decimal_point};
@@ -41,7 +41,7 @@ struct CsvSource<'a> {
 impl CsvSource<'_> {
     /// Returns the position in the text and the cells of a row.
     fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
-        let (from, behind) = self.starts.nearest_kept(row)?;
+        let (from, behind) = self.starts.nearest_stored(row)?;
         let (start, record) = nth_row(self.text.as_bytes().get(from..)?, behind, self.separator)?;
         Some((from.saturating_add(start), record))
     }
@@ -69,9 +69,9 @@ impl Source for CsvSource<'_> {
         self.file
     }
 
-    fn place(&self, row: usize) -> String {
+    fn location(&self, row: usize) -> String {
         let start = self.row(row).map_or(self.text.len(), |(start, _)| start);
-        place(self.text.as_bytes(), start)
+        location(self.text.as_bytes(), start)
     }
 
     fn cell(&self, row: usize, column: usize) -> String {
@@ -170,15 +170,15 @@ pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> 
     }
     if let Some(found) = mismatch(text) {
         let (file, place) = (file.to_owned(), format!("line {}", found.line));
-        return Err(match found.words {
+        return Err(match found.header_words {
             0 => IoError::NoHeader {
                 file,
-                place,
+                location: place,
                 found: found.first_row,
             },
             words => IoError::Words {
                 file,
-                place,
+                location: place,
                 words,
                 cells: found.cells,
             },
@@ -191,7 +191,7 @@ pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> 
     let (names, first) = first.ok_or_else(|| IoError::Empty { file: file.to_owned() })?;
     check_quotes(bytes, (first.start, first.end), &names, separator, file)?;
     let mut notes = Vec::new();
-    let mut columns = header(&names, commas, file, &mut || place(bytes, first.start), &mut notes)?;
+    let mut columns = header(&names, commas, file, &mut || location(bytes, first.start), &mut notes)?;
     let mut rows = RowReader {
         file,
         bytes,
@@ -199,7 +199,7 @@ pub(super) fn parse_text(text: &str, file: &str) -> Result<ParsedText, IoError> 
         commas,
         open: unterminated_line(text),
         times: columns.iter().map(|column| is_time(&column.name)).collect(),
-        wanted: vec![true; columns.len()],
+        requested_columns: vec![true; columns.len()],
         moments: columns.iter().map(|_| ClockTimes::default()).collect(),
         starts: RowStarts::default(),
         empty_at_end: 0,
@@ -260,7 +260,7 @@ struct RowReader<'a> {
     open: Option<usize>,
     /// True for each column that may be a time.
     times: Vec<bool>,
-    wanted: Vec<bool>,
+    requested_columns: Vec<bool>,
     moments: Vec<ClockTimes>,
     starts: RowStarts,
     empty_at_end: usize,
@@ -275,7 +275,7 @@ impl RowReader<'_> {
         let layout = Layout {
             separator: self.separator,
             with_precision: &self.times,
-            wanted: &self.wanted,
+            requested_columns: &self.requested_columns,
         };
         let (moments, starts, empty_at_end) = (&mut self.moments, &mut self.starts, &mut self.empty_at_end);
         read_plain_rows(self.bytes, from, layout, |run| {
@@ -315,11 +315,11 @@ impl RowReader<'_> {
     }
 
     fn add_row(&mut self, record: &csv::ByteRecord, start: usize, columns: &mut [Column]) -> Result<(), IoError> {
-        let line = || place(self.bytes, start);
+        let line = || location(self.bytes, start);
         if record.len() < columns.len() && self.open.is_some_and(|open| start >= open) {
             return Err(IoError::CutRow {
                 file: self.file.to_owned(),
-                place: line(),
+                location: line(),
                 found: record.len(),
                 expected: columns.len(),
             });
@@ -329,13 +329,13 @@ impl RowReader<'_> {
         if record.len() != columns.len() && is_below_rows && starts_table(rest, self.separator) {
             return Err(IoError::SecondTable {
                 file: self.file.to_owned(),
-                place: line(),
+                location: line(),
             });
         }
         if record.len() != columns.len() {
             return Err(IoError::RowLength {
                 file: self.file.to_owned(),
-                place: line(),
+                location: line(),
                 found: record.len(),
                 expected: columns.len(),
             });
@@ -410,7 +410,7 @@ fn header(
     if names.iter().all(is_number) {
         return Err(IoError::NoHeader {
             file: file.to_owned(),
-            place: place(),
+            location: place(),
             found: abbreviate(&names.join(", ")),
         });
     }
@@ -556,7 +556,7 @@ mod tests {
             }
             for row in [0, 1023, 1024, 100_001, plain.rows - 1] {
                 assert_eq!(plain.source.cell(row, at).trim(), quoted.source.cell(row, at).trim());
-                assert_eq!(plain.source.place(row), quoted.source.place(row));
+                assert_eq!(plain.source.location(row), quoted.source.location(row));
             }
         }
     }
@@ -565,8 +565,8 @@ mod tests {
     fn line_numbers_match_a_text_editor() {
         let text = "# one\r\n\r\nt,e,u\r\n0,1,2\r\n# five\r\n\r\n1,x,4\r\n";
         let table = parse(text.as_bytes(), "run.csv").unwrap();
-        assert_eq!(table.source.place(0), "line 4");
-        assert_eq!(table.source.place(1), "line 7");
+        assert_eq!(table.source.location(0), "line 4");
+        assert_eq!(table.source.location(1), "line 7");
         assert_eq!(table.source.cell(1, 1), "x");
         assert_eq!(table.columns[1].texts, [1]);
         assert!(message(b"# one\n\nt,e,u\n0,1,2\n#\n1,2\n").contains("run.csv, line 6: 2 values, expected 3"));

@@ -9,7 +9,7 @@ pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> 
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     let not_text = |at: usize, found: String| IoError::NotText {
         file: file.to_owned(),
-        place: place(bytes, at),
+        location: location(bytes, at),
         found,
     };
     if let Some(at) = bytes.iter().position(|b| *b == 0) {
@@ -167,7 +167,7 @@ pub(crate) fn row_start(bytes: &[u8], at: usize) -> usize {
     }
 }
 
-pub(crate) fn place(bytes: &[u8], at: usize) -> String {
+pub(crate) fn location(bytes: &[u8], at: usize) -> String {
     let before = bytes.get(..at).unwrap_or(bytes);
     // A file without line feeds has carriage returns as line ends.
     let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };

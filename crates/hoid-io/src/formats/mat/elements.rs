@@ -89,7 +89,7 @@ impl<'a> Elements<'a> {
     }
 
     /// Returns the next element, which must be of the given type.
-    pub(super) fn of(&mut self, kind: u32, what: &str) -> Result<&'a [u8], String> {
+    pub(super) fn next_of_type(&mut self, kind: u32, what: &str) -> Result<&'a [u8], String> {
         match self.next()? {
             element if element.kind == kind => Ok(element.bytes),
             element => Err(format!("{what} is of type {}, expected {kind}", element.kind)),

@@ -91,7 +91,7 @@ fn read_variable(bytes: &[u8]) -> Result<(Entry, &[u8]), String> {
             Value::Array(Array {
                 numbers,
                 dims: vec![rows, columns],
-                last_fastest: false,
+                is_row_major: false,
             })
         }
         1 => {

@@ -137,7 +137,7 @@ impl Reader<'_> {
             return self.push(place, place.path, Value::Array(Array::vector(Numbers::from_f64(&[]))));
         }
         let mut parts = Elements::new(bytes, big_endian);
-        let flags = parts.of(data::UINT32, "the flags of an array")?;
+        let flags = parts.next_of_type(data::UINT32, "the flags of an array")?;
         let flags = parts
             .u32s(flags)
             .first()
@@ -156,7 +156,7 @@ impl Reader<'_> {
             };
             return self.push(place, &path, Value::Unread(what));
         }
-        let dims = parts.of(data::INT32, "the size of an array")?;
+        let dims = parts.next_of_type(data::INT32, "the size of an array")?;
         let dims: Vec<usize> = parts.u32s(dims).iter().map(|side| *side as usize).collect();
         let count = dims.iter().try_fold(1_usize, |count, side| count.checked_mul(*side));
         let count = count.ok_or_else(|| format!("an array of {}", abbreviate(&format!("{dims:?}"))))?;
@@ -195,7 +195,7 @@ impl Reader<'_> {
                 let array = Array {
                     numbers,
                     dims,
-                    last_fastest: false,
+                    is_row_major: false,
                 };
                 self.push(place, place.path, Value::Array(array))
             }
@@ -240,7 +240,7 @@ impl Reader<'_> {
         place: VariablePath<'_>,
     ) -> Result<(), VariableError> {
         let depth = next_depth(place)?;
-        let length = parts.of(data::INT32, "the length of the field names")?;
+        let length = parts.next_of_type(data::INT32, "the length of the field names")?;
         let length = parts.u32s(length).first().map_or(0, |length| *length as usize);
         let names = parts.next()?.bytes;
         if names.is_empty() || count == 0 {
@@ -256,7 +256,7 @@ impl Reader<'_> {
                 _ => format!("{}({})", place.path, at.saturating_add(1)),
             };
             for name in &names {
-                let matrix = parts.of(data::MATRIX, "a field")?;
+                let matrix = parts.next_of_type(data::MATRIX, "a field")?;
                 let path = format!("{parent}.{name}");
                 let place = VariablePath {
                     parent: &parent,
@@ -279,7 +279,7 @@ impl Reader<'_> {
         let depth = next_depth(place)?;
         let before = self.entries.len();
         for at in 0..count {
-            let matrix = parts.of(data::MATRIX, "a cell")?;
+            let matrix = parts.next_of_type(data::MATRIX, "a cell")?;
             let path = format!("{}{{{}}}", place.path, at.saturating_add(1));
             self.read_matrix(
                 matrix,

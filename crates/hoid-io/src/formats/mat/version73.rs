@@ -11,7 +11,7 @@ use super::{objects::describe_object, records};
 use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Indexing, Kind, Numbers, Value};
 use crate::formats::budget::{Budget, MAX_NESTING};
-use crate::formats::guarded::guard_read;
+use crate::formats::panic_isolation::guard_read;
 use crate::wording::short_error;
 
 /// Memory in bytes charged for each visit to a group or dataset, because links may be circular.
@@ -279,7 +279,7 @@ impl Reader<'_> {
         Ok(Value::Array(Array {
             numbers,
             dims,
-            last_fastest: self.indexing == Indexing::Python,
+            is_row_major: self.indexing == Indexing::Python,
         }))
     }
 }

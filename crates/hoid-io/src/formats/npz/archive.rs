@@ -14,7 +14,7 @@ use super::npy::{self, NpyError};
 use crate::IoError;
 use crate::formats::arrays::{COMMENTS_ARRAY, Contents, Entry, Indexing};
 use crate::formats::budget::Budget;
-use crate::formats::guarded::guard_read;
+use crate::formats::panic_isolation::guard_read;
 use crate::results::{TableSchema, Values};
 use crate::wording::{abbreviate, quote_start, short_error};
 

@@ -5,12 +5,12 @@
 //! | `header` | the header before the data of an array, a Python literal |
 //! | `npy` | reading and writing of one array |
 //! | `archive` | NPZ: the zip archive that contains the arrays |
-//! | `single` | NPY: a file that contains one array |
+//! | `npy_format` | NPY: a file that contains one array |
 
 mod archive;
 mod header;
 mod npy;
-mod single;
+mod npy_format;
 
 use crate::formats::format::{Format, FormatReader, FormatWriter};
 
@@ -25,7 +25,7 @@ pub(super) const NPZ: Format = Format {
 pub(super) const NPY: Format = Format {
     name: "NPY",
     extensions: &["npy"],
-    reading: FormatReader::Arrays(single::read),
+    reading: FormatReader::Arrays(npy_format::read),
     writing: FormatWriter::ReadOnly("hoid only reads this format, which holds one unnamed array"),
     record: None,
 };

@@ -229,7 +229,7 @@ fn plain_value(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, Npy
         Item::Numbers { kind, big_endian } => Value::Array(Array {
             numbers: Numbers::new(data, *kind, *big_endian),
             dims: header.shape.clone(),
-            last_fastest: !header.fortran_order,
+            is_row_major: !header.fortran_order,
         }),
         // Items of length zero take no bytes, so the data do not limit their number.
         Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } => Value::Texts(vec![String::new(); count]),
@@ -246,7 +246,7 @@ fn plain_value(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, Npy
         } => Value::Array(Array {
             numbers: clock_seconds(&Numbers::new(data, Kind::I64, *big_endian), *unit_s, *moments),
             dims: header.shape.clone(),
-            last_fastest: !header.fortran_order,
+            is_row_major: !header.fortran_order,
         }),
         Item::Unread { .. } => unread_value(item),
     })

@@ -5,7 +5,7 @@ pub(super) const COMMENTS_KEY: &str = "hoid.comments";
 
 /// The values of a column.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Data {
+pub(super) enum ColumnData {
     Real(Vec<f64>),
     Signed(Vec<i64>),
     Unsigned(Vec<u64>),
@@ -24,7 +24,7 @@ pub(super) struct ReadColumn {
     /// True if the values have single precision.
     pub(super) single: bool,
     /// One value per row; undefined in rows without a value.
-    pub(super) data: Data,
+    pub(super) data: ColumnData,
     /// Rows without a value, in increasing order.
     pub(super) nulls: Vec<usize>,
 }

@@ -13,7 +13,7 @@
 //! | 5.1, 8.1 | number of values of a data page |
 //! | 8.5, 8.6, 8.7 | sizes of the levels before the values in bytes, and whether the values are compressed |
 //!
-//! Pages without compression, or with Snappy or LZ4, have the stated length or are refused by the crate `parquet`. A
+//! Pages without compression, or with Snappy or LZ4, have the stated length or are rejected by the crate `parquet`. A
 //! gzip page is decompressed here without storing the result, up to one byte beyond the stated size.
 
 use std::io::{self, Read as _};

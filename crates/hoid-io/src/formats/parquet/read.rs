@@ -16,18 +16,18 @@ use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
 use super::{
-    columns::{COMMENTS_KEY, Data, ReadColumn, ReadFile},
+    columns::{COMMENTS_KEY, ColumnData, ReadColumn, ReadFile},
     pages,
 };
 use crate::IoError;
 use crate::formats::budget::Budget;
-use crate::formats::guarded::guard_read;
+use crate::formats::panic_isolation::guard_read;
 use crate::table::check_column_count;
 use crate::wording::{abbreviate, quote_start, short_error};
 
 /// Magic bytes at the start and the end of a file.
 const MAGIC: &[u8; 4] = b"PAR1";
-/// Maximum number of rows (a month at 100 samples/s); files with more rows are refused before they exhaust the memory.
+/// Maximum number of rows (a month at 100 samples/s); files with more rows are rejected before they exhaust the memory.
 const MAX_ROWS: usize = 1 << 28;
 const TIME_DESCRIPTION: &str = "a date or time";
 /// Number of ns in a µs and in a ms.
@@ -176,50 +176,52 @@ struct LeafColumn<'a> {
 impl LeafColumn<'_> {
     /// Reads the values by their converted type, which the crate `parquet` derives from the logical type where the two
     /// are equivalent, and otherwise by their logical type.
-    fn read_data(&mut self, column: &ColumnDescriptor) -> Result<Data, IoError> {
+    fn read_data(&mut self, column: &ColumnDescriptor) -> Result<ColumnData, IoError> {
         use ConvertedType as C;
         let unit = 10_f64.powi(column.type_scale());
         let logical = column.logical_type_ref();
         if column.max_rep_level() > 0 {
-            return Ok(Data::Unread("a list"));
+            return Ok(ColumnData::Unread("a list"));
         }
         Ok(match (column.physical_type(), column.converted_type()) {
-            (Type::BOOLEAN, _) => Data::Signed(self.read_values::<BoolType, _>(|value| i64::from(*value))?),
-            (Type::FLOAT, _) => Data::Real(self.read_values::<FloatType, _>(|value| f64::from(*value))?),
-            (Type::DOUBLE, _) => Data::Real(self.read_values::<DoubleType, _>(|value| *value)?),
-            (Type::INT96, _) => Data::Moments(self.read_values::<Int96Type, _>(Int96::to_nanos)?),
+            (Type::BOOLEAN, _) => ColumnData::Signed(self.read_values::<BoolType, _>(|value| i64::from(*value))?),
+            (Type::FLOAT, _) => ColumnData::Real(self.read_values::<FloatType, _>(|value| f64::from(*value))?),
+            (Type::DOUBLE, _) => ColumnData::Real(self.read_values::<DoubleType, _>(|value| *value)?),
+            (Type::INT96, _) => ColumnData::Moments(self.read_values::<Int96Type, _>(Int96::to_nanos)?),
             (Type::INT32, C::TIME_MILLIS) => {
-                Data::Moments(self.read_values::<Int32Type, _>(|ms| i64::from(*ms).saturating_mul(NS_PER_MS))?)
+                ColumnData::Moments(self.read_values::<Int32Type, _>(|ms| i64::from(*ms).saturating_mul(NS_PER_MS))?)
             }
             (Type::INT64, _) if let Some(unit_ns) = clock_ns(column) => {
-                Data::Moments(self.read_values::<Int64Type, _>(|value| value.saturating_mul(unit_ns))?)
+                ColumnData::Moments(self.read_values::<Int64Type, _>(|value| value.saturating_mul(unit_ns))?)
             }
             (_, C::DATE | C::TIME_MILLIS | C::TIME_MICROS | C::TIMESTAMP_MILLIS | C::TIMESTAMP_MICROS) => {
-                Data::Unread(TIME_DESCRIPTION)
+                ColumnData::Unread(TIME_DESCRIPTION)
             }
             (Type::INT32, C::DECIMAL) => {
-                Data::Real(self.read_values::<Int32Type, _>(|value| f64::from(*value) / unit)?)
+                ColumnData::Real(self.read_values::<Int32Type, _>(|value| f64::from(*value) / unit)?)
             }
-            (Type::INT64, C::DECIMAL) => Data::Real(self.read_values::<Int64Type, _>(|value| *value as f64 / unit)?),
+            (Type::INT64, C::DECIMAL) => {
+                ColumnData::Real(self.read_values::<Int64Type, _>(|value| *value as f64 / unit)?)
+            }
             (Type::INT32, C::UINT_8 | C::UINT_16 | C::UINT_32) => {
-                Data::Unsigned(self.read_values::<Int32Type, _>(|value| u64::from(value.cast_unsigned()))?)
+                ColumnData::Unsigned(self.read_values::<Int32Type, _>(|value| u64::from(value.cast_unsigned()))?)
             }
             (Type::INT64, C::UINT_64) => {
-                Data::Unsigned(self.read_values::<Int64Type, _>(|value| value.cast_unsigned())?)
+                ColumnData::Unsigned(self.read_values::<Int64Type, _>(|value| value.cast_unsigned())?)
             }
-            (Type::INT32, _) => Data::Signed(self.read_values::<Int32Type, _>(|value| i64::from(*value))?),
-            (Type::INT64, _) => Data::Signed(self.read_values::<Int64Type, _>(|value| *value)?),
-            (Type::FIXED_LEN_BYTE_ARRAY, C::DECIMAL) if column.type_length() <= 16 => Data::Real(
+            (Type::INT32, _) => ColumnData::Signed(self.read_values::<Int32Type, _>(|value| i64::from(*value))?),
+            (Type::INT64, _) => ColumnData::Signed(self.read_values::<Int64Type, _>(|value| *value)?),
+            (Type::FIXED_LEN_BYTE_ARRAY, C::DECIMAL) if column.type_length() <= 16 => ColumnData::Real(
                 self.read_values::<FixedLenByteArrayType, _>(|value| big_endian_integer(value.data()) as f64 / unit)?,
             ),
-            (_, C::DECIMAL) => Data::Unread("decimal numbers of variable length or more than 16 bytes"),
+            (_, C::DECIMAL) => ColumnData::Unread("decimal numbers of variable length or more than 16 bytes"),
             (Type::FIXED_LEN_BYTE_ARRAY, _) if logical == Some(&LogicalType::Float16) => {
-                Data::Real(self.read_values::<FixedLenByteArrayType, _>(|value| f16_to_f64(value.data()))?)
+                ColumnData::Real(self.read_values::<FixedLenByteArrayType, _>(|value| f16_to_f64(value.data()))?)
             }
-            (Type::BYTE_ARRAY, C::UTF8 | C::ENUM | C::JSON) => Data::Text(
+            (Type::BYTE_ARRAY, C::UTF8 | C::ENUM | C::JSON) => ColumnData::Text(
                 self.read_values::<ByteArrayType, _>(|value| String::from_utf8_lossy(value.data()).into_owned())?,
             ),
-            _ => Data::Unread("binary data"),
+            _ => ColumnData::Unread("binary data"),
         })
     }
 

@@ -3,7 +3,7 @@
 //! Numeric columns of any type are read as numbers, a null is a missing value, and text columns are treated as in CSV.
 //! Units and sample time are in the comments, in the same format as in CSV.
 
-use super::columns::{Data, ReadColumn};
+use super::columns::{ColumnData, ReadColumn};
 use super::read::read;
 use crate::IoError;
 use crate::table::{Cell, Column, Precision, Source, Table, check_names, read_comments};
@@ -37,7 +37,7 @@ impl Source for ParquetSource<'_> {
         self.file
     }
 
-    fn place(&self, row: usize) -> String {
+    fn location(&self, row: usize) -> String {
         format!("row {}", row.saturating_add(1))
     }
 
@@ -91,10 +91,10 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
     let nulls = read.nulls;
     let single = read.single;
     column.values = match read.data {
-        Data::Real(values) => values,
-        Data::Signed(values) => values.into_iter().map(|value| value as f64).collect(),
-        Data::Unsigned(values) => values.into_iter().map(|value| value as f64).collect(),
-        Data::Text(texts) => {
+        ColumnData::Real(values) => values,
+        ColumnData::Signed(values) => values.into_iter().map(|value| value as f64).collect(),
+        ColumnData::Unsigned(values) => values.into_iter().map(|value| value as f64).collect(),
+        ColumnData::Text(texts) => {
             let mut moments = ClockTimes::default();
             for text in &texts {
                 match Cell::parse(text) {
@@ -108,7 +108,7 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
             }
             return (column, Cells::Texts { texts, nulls });
         }
-        Data::Moments(moments) => {
+        ColumnData::Moments(moments) => {
             let known = |row: &usize| nulls.binary_search(row).is_err();
             let first = (moments.iter().enumerate()).find(|(row, _)| known(row));
             let first = first.map_or(0, |(_, moment)| *moment);
@@ -119,7 +119,7 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
             column.precision = Precision::from_times(&column.values, single);
             return (column, Cells::Moments { nulls });
         }
-        Data::Unread(what) => {
+        ColumnData::Unread(what) => {
             column.values = vec![f64::NAN; rows];
             column.texts = (0..rows).collect();
             return (column, Cells::Unread(what));

@@ -1,6 +1,6 @@
 //! Tables of results in Parquet.
 
-use super::columns::{Data, ReadColumn};
+use super::columns::{ColumnData, ReadColumn};
 use super::read::read as read_columns;
 use super::record::mark_missing;
 use crate::IoError;
@@ -22,17 +22,17 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
             ColumnValues::Real(values)
         };
         let values = match data {
-            Data::Real(values) => real(values),
-            Data::Signed(values) if nulls.is_empty() && values.iter().all(|value| *value >= 0) => {
+            ColumnData::Real(values) => real(values),
+            ColumnData::Signed(values) if nulls.is_empty() && values.iter().all(|value| *value >= 0) => {
                 ColumnValues::Whole(values.into_iter().map(|value| value as u64).collect())
             }
-            Data::Signed(values) => real(values.into_iter().map(|value| value as f64).collect()),
-            Data::Unsigned(values) if nulls.is_empty() => ColumnValues::Whole(values),
-            Data::Unsigned(values) => real(values.into_iter().map(|value| value as f64).collect()),
+            ColumnData::Signed(values) => real(values.into_iter().map(|value| value as f64).collect()),
+            ColumnData::Unsigned(values) if nulls.is_empty() => ColumnValues::Whole(values),
+            ColumnData::Unsigned(values) => real(values.into_iter().map(|value| value as f64).collect()),
             // A missing text is read as an empty text.
-            Data::Text(values) => ColumnValues::Text(values),
-            Data::Moments(_) => return Err(unread(&name, "a date or time")),
-            Data::Unread(what) => return Err(unread(&name, what)),
+            ColumnData::Text(values) => ColumnValues::Text(values),
+            ColumnData::Moments(_) => return Err(unread(&name, "a date or time")),
+            ColumnData::Unread(what) => return Err(unread(&name, what)),
         };
         columns.push(OutputColumn { name, values });
     }

@@ -7,11 +7,11 @@
 //! `t + b_0 + b_1 t`. If the clock was reset, each part between resets has its own line. Finally, in a stream with a
 //! nominal rate, the time stamps between two breaks are replaced by their least-squares line over the sample index.
 //!
-//! Unlike in pyxdf, lost samples also count as a break: a step of more than [`LOST_SAMPLE_LIMIT`] nominal sample times `T`
-//! after which the time stamps remain late. The lateness is the difference between the medians of `t_k - k T` before
-//! the step and after it, where as many samples after the step are skipped as would have been lost. Samples that arrive
-//! late and catch up count as jitter. Without this rule a loss of one second would be spread over the recording and
-//! appear as a lower rate without a gap.
+//! Unlike in pyxdf, lost samples also count as a break: a step of more than [`LOST_SAMPLE_LIMIT`] nominal sample times
+//! `T` after which the time stamps remain late. The lateness is the difference between the medians of `t_k - k T`
+//! before the step and after it, where as many samples after the step are skipped as would have been lost. Samples that
+//! arrive late and catch up count as jitter. Without this rule a loss of one second would be spread over the recording
+//! and appear as a lower rate without a gap.
 
 use std::ops::Range;
 
@@ -23,7 +23,8 @@ use crate::wording::abbreviate;
 const UNIT_S: f64 = 1e-4;
 const MAX_ITERATIONS: usize = 1000;
 /// Limits for a reset of the clock (multiple of the median absolute deviation, and s). The time between two offset
-/// measurements must differ from its median by more than both limits, and the offset step by more than [`RESET_VALUE_LIMITS`].
+/// measurements must differ from its median by more than both limits, and the offset step by more than
+/// [`RESET_VALUE_LIMITS`].
 const RESET_TIME_LIMITS: (f64, f64) = (5.0, 5.0);
 const RESET_VALUE_LIMITS: (f64, f64) = (10.0, 1.0);
 /// A break is a step longer than this time in s and longer than [`MIN_BREAK_SAMPLES`] nominal sample times.

@@ -140,7 +140,7 @@ fn entries_of(stream: Stream, parent: &str, times: &[f64]) -> Vec<Entry> {
 /// Makes names unique by appending a number to the second and each further use of a name.
 #[derive(Default)]
 struct UniqueNames {
-    known: HashSet<String>,
+    names: HashSet<String>,
     /// Number to try next for a name.
     next: HashMap<String, usize>,
 }
@@ -149,7 +149,7 @@ impl UniqueNames {
     fn unique(&mut self, name: &str) -> String {
         let mut unique = name.to_owned();
         let number: &mut usize = self.next.entry(unique.clone()).or_insert(2);
-        while !self.known.insert(unique.clone()) {
+        while !self.names.insert(unique.clone()) {
             unique = format!("{name}({number})");
             *number = number.saturating_add(1);
         }

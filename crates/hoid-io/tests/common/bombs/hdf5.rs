@@ -21,9 +21,9 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             .fold(0, |sum, byte| sum << 8 | u64::from(*byte));
         SIZES.contains(&number)
     };
-    let places: Vec<usize> = (512..file.len() - width).step_by(4).filter(small).collect();
+    let indices: Vec<usize> = (512..file.len() - width).step_by(4).filter(small).collect();
     for _ in 0..1 + draw.below(4) {
-        let at = *draw.one_of(&places);
+        let at = *draw.one_of(&indices);
         let size = (1_u64 << draw.below(if width == 8 { 62 } else { 32 })).wrapping_sub(draw.below(2) as u64);
         file[at..at + width].copy_from_slice(&size.to_le_bytes()[..width]);
     }

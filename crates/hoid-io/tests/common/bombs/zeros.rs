@@ -4,7 +4,7 @@ use flate2::{Compress, Compression, Crc, FlushCompress};
 
 /// A megabyte.
 pub const MEGABYTE: usize = 1 << 20;
-/// Largest size of data, in MB, with a valid checksum; readers refuse larger data before they reach the checksum.
+/// Largest size of data, in MB, with a valid checksum; readers reject larger data before they reach the checksum.
 const MAX_CHECKSUM_MB: usize = 100;
 
 /// Returns deflated data: the given start, followed by a number of megabytes of zeros.

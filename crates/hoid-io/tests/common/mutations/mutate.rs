@@ -81,7 +81,7 @@ pub fn mutated(original: &Original, other: &Original, draw: &mut Draw) -> Vec<u8
 
 /// One mutation.
 fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Draw) {
-    // A binary file with a byte too many or too few is refused at once.
+    // A binary file with a byte too many or too few is rejected at once.
     let keeps_length = !original.is_text() && draw.below(3) > 0;
     let kind = if keeps_length {
         *draw.one_of(&[0, 1, 2, 7, 8, 9, 11])

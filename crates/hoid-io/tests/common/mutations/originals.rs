@@ -70,7 +70,7 @@ pub fn originals() -> Vec<Original> {
                 continue;
             };
             let name = path.file_name().unwrap().to_str().unwrap().to_owned();
-            // This file is refused as a whole, because hoid does not read Zstandard.
+            // This file is rejected as a whole, because hoid does not read Zstandard.
             if name == "zstd.parquet" {
                 continue;
             }

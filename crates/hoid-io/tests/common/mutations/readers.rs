@@ -15,7 +15,7 @@ const MAX_MESSAGE_CHARS: usize = 4000;
 /// Maximum number of samples per byte of a file; `--resample` may create several samples per recorded sample.
 const MAX_SAMPLES_PER_BYTE: usize = 200;
 
-/// Numbers of successful and refused reads.
+/// Numbers of successful and rejected reads.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ReadCounts {
     pub read: u64,

@@ -11,7 +11,7 @@ const MAX_DEPTH: usize = 50;
 /// Parser with the remaining characters and the current depth of parentheses.
 pub(super) struct Reader {
     signs: Vec<char>,
-    at: usize,
+    position: usize,
     depth: usize,
 }
 
@@ -26,22 +26,22 @@ impl Reader {
         };
         Self {
             signs: text.chars().map(plain).collect(),
-            at: 0,
+            position: 0,
             depth: 0,
         }
     }
 
     /// Returns the next character that is not a blank, without consuming it.
     fn peek(&mut self) -> Option<char> {
-        while self.signs.get(self.at).is_some_and(|sign| sign.is_whitespace()) {
-            self.at += 1;
+        while self.signs.get(self.position).is_some_and(|sign| sign.is_whitespace()) {
+            self.position += 1;
         }
-        self.signs.get(self.at).copied()
+        self.signs.get(self.position).copied()
     }
 
     fn accept(&mut self, wanted: char) -> bool {
         let found = self.peek() == Some(wanted);
-        self.at += usize::from(found);
+        self.position += usize::from(found);
         found
     }
 
@@ -52,7 +52,7 @@ impl Reader {
         };
         Err(format!(
             "at character {} there is {found}, expected {expected}; {EXAMPLES}",
-            self.at + 1
+            self.position + 1
         ))
     }
 
@@ -72,16 +72,16 @@ impl Reader {
     fn sum(&mut self) -> Result<Ratio, String> {
         let mut sum = self.product()?;
         loop {
-            let start = self.at;
+            let start = self.position;
             let sign = match self.peek() {
                 Some('+') => 1.0,
                 Some('-') => -1.0,
                 _ => return Ok(sum),
             };
-            self.at += 1;
+            self.position += 1;
             let term = self.product()?;
             let Some(total) = sum.plus(&term, sign) else {
-                self.at = start;
+                self.position = start;
                 return self.expected_error("one delay, as a factor of the whole function: 5exp(-0.1s)/(s+1)");
             };
             sum = self.check_ratio(total, start)?;
@@ -92,18 +92,18 @@ impl Reader {
         let mut product = self.factor()?;
         let mut divided = false;
         loop {
-            let start = self.at;
+            let start = self.position;
             match self.peek() {
                 Some('*') => {
-                    self.at += 1;
+                    self.position += 1;
                     divided = false;
                     product = product.times(&self.factor()?);
                 }
                 Some('/') => {
-                    self.at += 1;
+                    self.position += 1;
                     divided = true;
                     self.peek();
-                    let at = self.at;
+                    let at = self.position;
                     let by = self.factor()?;
                     if by.is_zero() {
                         return Err(format!("it divides by zero at character {}; {EXAMPLES}", at + 1));
@@ -146,19 +146,19 @@ impl Reader {
             return Ok(base);
         }
         self.peek();
-        let start = self.at;
+        let start = self.position;
         let negative = self.accept('-');
         self.peek();
-        let from = self.at;
-        while self.signs.get(self.at).is_some_and(char::is_ascii_digit) {
-            self.at += 1;
+        let from = self.position;
+        while self.signs.get(self.position).is_some_and(char::is_ascii_digit) {
+            self.position += 1;
         }
-        let digits: String = self.signs[from..self.at].iter().collect();
+        let digits: String = self.signs[from..self.position].iter().collect();
         let expected = format!("a whole number up to {HIGHEST_DEGREE} as power");
         let whole = digits.parse::<usize>().ok().filter(|n| *n <= HIGHEST_DEGREE);
-        let fraction = self.signs.get(self.at).is_some_and(|sign| *sign == '.');
+        let fraction = self.signs.get(self.position).is_some_and(|sign| *sign == '.');
         let Some(n) = whole.filter(|_| !fraction) else {
-            self.at = start;
+            self.position = start;
             return self.expected_error(&expected);
         };
         if negative && base.is_zero() {
@@ -175,7 +175,7 @@ impl Reader {
     fn atom(&mut self) -> Result<Ratio, String> {
         match self.peek() {
             Some('s') => {
-                self.at += 1;
+                self.position += 1;
                 Ok(Ratio::of(&[1.0, 0.0]))
             }
             Some('(') => self.parentheses(),
@@ -186,8 +186,8 @@ impl Reader {
     }
 
     fn parentheses(&mut self) -> Result<Ratio, String> {
-        let opened = self.at + 1;
-        self.at += 1;
+        let opened = self.position + 1;
+        self.position += 1;
         self.depth += 1;
         if self.depth > MAX_DEPTH {
             return Err(format!(
@@ -205,12 +205,12 @@ impl Reader {
     /// Parses `exp(-0.1s)` or `e^(-0.1s)`.
     fn delay(&mut self) -> Result<Ratio, String> {
         const EXPECTED: &str = "exp(-0.1s), a delay in s";
-        let start = self.at;
+        let start = self.position;
         let rest = &self.signs[start..];
         let length = if rest.starts_with(&['e', 'x', 'p']) { 3 } else { 1 };
-        self.at += length;
+        self.position += length;
         if (length == 1 && !self.accept('^')) || self.peek() != Some('(') {
-            self.at = start;
+            self.position = start;
             return self.expected_error(EXPECTED);
         }
         let exponent = self.parentheses()?;
@@ -219,7 +219,7 @@ impl Reader {
             _ => None,
         };
         let Some(slope) = slope.filter(|v| v.is_finite()) else {
-            self.at = start;
+            self.position = start;
             return self.expected_error(EXPECTED);
         };
         Ok(Ratio {
@@ -229,7 +229,7 @@ impl Reader {
     }
 
     fn number(&mut self) -> Result<Ratio, String> {
-        let start = self.at;
+        let start = self.position;
         let signs = &self.signs;
         let digits = |from: usize| signs[from..].iter().take_while(|sign| sign.is_ascii_digit()).count();
         let mut end = start + digits(start);
@@ -247,7 +247,7 @@ impl Reader {
         let text: String = signs[start..end].iter().collect();
         match text.parse::<f64>() {
             Ok(value) if value.is_finite() => {
-                self.at = end;
+                self.position = end;
                 Ok(Ratio::of(&[value]))
             }
             _ => self.expected_error("a finite number"),
@@ -257,11 +257,11 @@ impl Reader {
     /// Checks that an intermediate result is finite and of a reasonable degree.
     fn check_ratio(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
         if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
-            self.at = at;
+            self.position = at;
             return self.expected_error(&format!("a degree of at most {HIGHEST_DEGREE}"));
         }
         if ratio.num.iter().chain(&ratio.den).any(|c| !c.is_finite()) {
-            self.at = at;
+            self.position = at;
             return self.expected_error("coefficients within the range of floating point");
         }
         Ok(ratio)

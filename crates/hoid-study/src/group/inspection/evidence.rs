@@ -8,7 +8,7 @@ pub struct Evidence {
     /// Key in that table; empty if the evidence concerns the table as a whole.
     pub key: &'static str,
     /// Text of the evidence.
-    pub words: String,
+    pub text: String,
 }
 
 impl Evidence {
@@ -16,7 +16,7 @@ impl Evidence {
         Self {
             table: table.into(),
             key,
-            words: words.into(),
+            text: words.into(),
         }
     }
 }

@@ -1,5 +1,5 @@
-//! Inspection of the files of a group before the analysis ([`FileExamination`]). The results are written to the manifest together
-//! with their evidence, for the user to check. Settings given by the user are kept.
+//! Inspection of the files of a group before the analysis ([`FileExamination`]). The results are written to the
+//! manifest together with their evidence, for the user to check. Settings given by the user are kept.
 //!
 //! | file | contents |
 //! |---|---|
@@ -11,7 +11,7 @@ mod first_fit;
 
 use std::path::Path;
 
-use hoid_analysis::{FileExamination, LookOptions, RecordSummary};
+use hoid_analysis::{ExaminationOptions, FileExamination, RecordSummary};
 
 pub use evidence::Evidence;
 
@@ -23,7 +23,11 @@ use crate::StudyError;
 /// # Errors
 /// [`StudyError::Io`] if the first file cannot be read. Properties that cannot be determined are reported in the
 /// evidence.
-pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -> Result<Vec<Evidence>, StudyError> {
+pub fn inspect(
+    manifest: &mut Manifest,
+    directory: &Path,
+    known: &ExaminationOptions,
+) -> Result<Vec<Evidence>, StudyError> {
     let mut evidence = Vec::new();
     let first = FileExamination::at(&directory.join(&manifest.runs[0].file), known)?;
     let shown = manifest.runs[0].file.display().to_string();
@@ -48,10 +52,10 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         },
     ));
     let (input, output) = (first.roles.input.clone(), first.roles.output.clone());
-    evidence.push(Evidence::new("[read]", "input", input.why));
-    evidence.push(Evidence::new("[read]", "output", output.why));
+    evidence.push(Evidence::new("[read]", "input", input.reason));
+    evidence.push(Evidence::new("[read]", "output", output.reason));
     // All files are read with the columns found in the first file.
-    let of_all = LookOptions {
+    let of_all = ExaminationOptions {
         input: Some(input.column.clone()),
         output: Some(output.column.clone()),
         ..known.clone()
@@ -61,7 +65,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
     manifest.read.time = known.time.as_ref().map(ToString::to_string);
     manifest.read.sampling_hz = known.sampling_hz;
     (manifest.read.from_s, manifest.read.to_s) = (known.from_s, known.to_s);
-    let mut of_first = first.seen.as_ref().ok().map(|seen| seen.record.clone());
+    let mut of_first = first.summary.as_ref().ok().map(|seen| seen.record.clone());
     let mut first = Some(first);
 
     let mut conditions: Vec<String> = Vec::new();
@@ -79,7 +83,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         let look = first
             .take()
             .map_or_else(|| FileExamination::at(&directory.join(&run.file), &of_all), Ok);
-        let seen = match look.and_then(|look| look.seen) {
+        let seen = match look.and_then(|look| look.summary) {
             Ok(seen) => seen,
             Err(reason) => {
                 evidence.push(Evidence::new("", "", format!("not examined: {reason}")));
@@ -128,7 +132,7 @@ fn inspect_condition(
     seen: &RecordSummary,
     condition: &str,
     table: &str,
-    known: &LookOptions,
+    known: &ExaminationOptions,
     evidence: &mut Vec<Evidence>,
     spans: &mut Vec<(f64, f64)>,
 ) -> ConditionSettings {
@@ -141,7 +145,7 @@ fn inspect_condition(
             settings.excitation = Some(found.channel.clone());
             settings.period_s = Some(found.period_s);
             spans.push(found.span_s);
-            evidence.push(Evidence::new(table, "excitation", found.words.clone()));
+            evidence.push(Evidence::new(table, "excitation", found.description.clone()));
         }
         Err(reason) => evidence.push(Evidence::new(
             if condition.is_empty() { "" } else { table },
@@ -153,7 +157,7 @@ fn inspect_condition(
         settings.offset_samples = samples;
     } else if let Some(Ok(lag)) = &seen.lag {
         settings.offset_samples = lag.samples;
-        evidence.push(Evidence::new(table, "offset_samples", lag.words.clone()));
+        evidence.push(Evidence::new(table, "offset_samples", lag.evidence.clone()));
     }
     settings
 }
@@ -179,7 +183,7 @@ pub fn with_comments(text: &str, evidence: &[Evidence]) -> String {
         for one in evidence.iter().filter(|one| one.table == table && one.key == key) {
             written.push_str(&format!(
                 "# {}\n",
-                hoid_io::escape_control_characters(&one.words).replace('\n', " ")
+                hoid_io::escape_control_characters(&one.text).replace('\n', " ")
             ));
         }
     };

@@ -75,7 +75,7 @@ impl<const M: usize> Bank<M> {
     fn bounded(&mut self) {
         self.samples_until_birth = self.samples_until_birth.clamp(1, self.prior.birth_interval.max(1));
         for h in self.hypotheses.iter_mut().flatten() {
-            h.born = h.born.min(self.samples);
+            h.birth_sample = h.birth_sample.min(self.samples);
             h.extra_delay = h.extra_delay.min(self.prior.delay.count.saturating_sub(1));
         }
     }
@@ -144,7 +144,7 @@ impl<const M: usize> Bank<M> {
 
     /// True if the hypothesis assumes that omega_nm and zeta_nm changed within the change window.
     fn is_recent_neuromuscular(&self, h: &Hypothesis) -> bool {
-        h.neuromuscular_changed && self.samples - h.born < self.prior.change_window
+        h.neuromuscular_changed && self.samples - h.birth_sample < self.prior.change_window
     }
 
     /// As [`Bank::update`], but without detection of changes.
@@ -238,7 +238,7 @@ impl<const M: usize> Bank<M> {
                 .into_iter()
                 .flatten()
             {
-                let is_there = |h: &Hypothesis| h.extra_delay == extra_delay && h.born == parent.born;
+                let is_there = |h: &Hypothesis| h.extra_delay == extra_delay && h.birth_sample == parent.birth_sample;
                 if extra_delay < delay.count && !self.hypotheses().any(is_there) {
                     self.spawn(
                         parent.with_neighbouring_delay(extra_delay, &self.prior),
@@ -307,7 +307,7 @@ impl<const M: usize> Bank<M> {
         for (i, h) in self.hypotheses.iter().enumerate() {
             match h {
                 None => (slot, lowest) = (Some(i), f64::NEG_INFINITY),
-                Some(h) if self.samples - h.born >= self.prior.pruning_age && h.probability < lowest => {
+                Some(h) if self.samples - h.birth_sample >= self.prior.pruning_age && h.probability < lowest => {
                     (slot, lowest) = (Some(i), h.probability);
                 }
                 Some(_) => {}
@@ -379,7 +379,7 @@ impl<const M: usize> Bank<M> {
     }
 
     /// Returns the delay of the likeliest hypothesis, in samples beyond the shortest delay.
-    pub fn likeliest_delay(&self) -> usize {
+    pub fn most_likely_delay(&self) -> usize {
         let likeliest = self.hypotheses().max_by(|a, b| a.probability.total_cmp(&b.probability));
         likeliest.map_or(0, |h| h.extra_delay)
     }

@@ -106,7 +106,7 @@ impl ChangeDetector {
     /// Declares the change of the likeliest recent hypothesis, provided that this hypothesis is old enough and that the
     /// change, or a part of it, has not been declared yet.
     fn declare_change(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
-        let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
+        let Some(h) = sums.most_likely.filter(|h| now - h.birth_sample >= prior.settling_time) else {
             return;
         };
         let others = sums.recent + sums.older - sums.neuromuscular;
@@ -147,7 +147,7 @@ struct Sums<'a> {
     older: f64,
     /// Sum over the recent hypotheses in which omega_nm and zeta_nm changed as well.
     neuromuscular: f64,
-    likeliest: Option<&'a Hypothesis>,
+    most_likely: Option<&'a Hypothesis>,
 }
 
 impl<'a> Sums<'a> {
@@ -156,7 +156,7 @@ impl<'a> Sums<'a> {
             recent: 0.0,
             older: 0.0,
             neuromuscular: 0.0,
-            likeliest: None,
+            most_likely: None,
         };
         for h in hypotheses.iter().flatten() {
             if !is_recent(h, now, prior) {
@@ -165,8 +165,8 @@ impl<'a> Sums<'a> {
             }
             sums.recent += h.probability;
             sums.neuromuscular += if h.neuromuscular_changed { h.probability } else { 0.0 };
-            if sums.likeliest.is_none_or(|l| h.probability > l.probability) {
-                sums.likeliest = Some(h);
+            if sums.most_likely.is_none_or(|l| h.probability > l.probability) {
+                sums.most_likely = Some(h);
             }
         }
         sums
@@ -180,7 +180,7 @@ fn log_odds(probability: f64, of_others: f64) -> f64 {
 /// True if the hypothesis was born within the change window. The first hypothesis, born at sample 0, does not represent
 /// a change.
 fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
-    h.born > 0 && now - h.born < prior.change_window
+    h.birth_sample > 0 && now - h.birth_sample < prior.change_window
 }
 
 /// Mean and variance of the delay over hypotheses, in samples beyond the shortest delay. The variance includes 1/12 for
@@ -200,7 +200,7 @@ pub(super) fn mean_delay<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -
 /// Returns the change that a hypothesis represents; `delay` is the delay after the change.
 fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change {
     let (before, after) = (h.before, Snapshot { delay, ..h.snapshot() });
-    let samples_ago = now - h.born;
+    let samples_ago = now - h.birth_sample;
     let mut z = [0.0; PARAMETER_COUNT + 2];
     for i in 0..PARAMETER_COUNT {
         let variance_of = |s: &Snapshot| {

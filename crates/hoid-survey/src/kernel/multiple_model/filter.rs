@@ -130,7 +130,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
     /// Returns the prediction of `D u`, with the mean parameters of the mixture and the likeliest delay.
     fn prediction(&self, signals: DelayedSignals<'_>) -> f64 {
         let eta = self.bank.mixture().eta;
-        let r = signals.at(self.bank.likeliest_delay());
+        let r = signals.at(self.bank.most_likely_delay());
         let psi = hypothesis::gradient(&eta, r, self.response.point());
         eta[0] * psi[0] + eta[1] * psi[1]
     }

@@ -43,14 +43,14 @@ pub struct Hypothesis {
     /// Probability of the hypothesis.
     pub probability: f64,
     /// Sample at which the hypothesis was born.
-    pub born: u64,
+    pub birth_sample: u64,
     /// True if the hypothesis assumes that the neuromuscular system also changed at its birth.
     pub neuromuscular_changed: bool,
     /// Delay of the hypothesis, in samples beyond the shortest delay.
     pub extra_delay: usize,
     /// Estimate before the birth of the hypothesis.
     pub before: Snapshot,
-    least_variance: f64,
+    min_variance: f64,
 }
 
 /// Estimate of a hypothesis at a given time.
@@ -68,7 +68,7 @@ pub struct Snapshot {
     pub delay: [f64; 2],
 }
 
-hoid_core::state!([] Hypothesis { eta, covariance, innovation_variance, probability, born, neuromuscular_changed, extra_delay, before, least_variance });
+hoid_core::state!([] Hypothesis { eta, covariance, innovation_variance, probability, birth_sample, neuromuscular_changed, extra_delay, before, min_variance });
 hoid_core::state!([] Snapshot { eta, gain_covariance, neuromuscular_variance, innovation_variance, delay });
 
 /// Visits the numbers of a slot of the bank: a number that indicates whether the slot is occupied, and the numbers of
@@ -116,11 +116,11 @@ impl Hypothesis {
             covariance: UdCovariance::diagonal([0.0; PARAMETER_COUNT]),
             innovation_variance: InnovationVariance::new(0.0, 1.0, 1.0),
             probability: 0.0,
-            born: 0,
+            birth_sample: 0,
             neuromuscular_changed: false,
             extra_delay: 0,
             before: Snapshot::default(),
-            least_variance: 0.0,
+            min_variance: 0.0,
         }
     }
 
@@ -137,11 +137,11 @@ impl Hypothesis {
             covariance,
             innovation_variance,
             probability: 1.0,
-            born: 0,
+            birth_sample: 0,
             neuromuscular_changed: false,
             extra_delay: 0,
             before: Snapshot::default(),
-            least_variance: MIN_VARIANCE_RATIO * innovation_variance.variance(),
+            min_variance: MIN_VARIANCE_RATIO * innovation_variance.variance(),
         };
         first.before = first.snapshot();
         Some(first)
@@ -152,7 +152,7 @@ impl Hypothesis {
     pub fn step(&mut self, y: f64, r: &Signals, point: [f64; 2], prior: &ChangePrior) -> (f64, f64) {
         let psi = gradient(&self.eta, r, point);
         let eps = y - self.eta[0] * psi[0] - self.eta[1] * psi[1];
-        let variance = self.innovation_variance.variance().max(self.least_variance);
+        let variance = self.innovation_variance.variance().max(self.min_variance);
         let (f, v) = self.covariance.projections(&psi);
         let total = variance + f[0] * v[0] + f[1] * v[1] + f[2] * v[2] + f[3] * v[3];
         if !(total > 0.0 && total < OVERFLOW_LIMIT) {
@@ -196,7 +196,7 @@ impl Hypothesis {
     pub fn drift(&mut self, now: u64, prior: &ChangePrior) {
         let scales = self.gain_scales(prior);
         // The first hypothesis, born at sample 0, does not represent a change.
-        let transient = match self.born {
+        let transient = match self.birth_sample {
             0 => 0.0,
             born => exp(-((now - born) as f64) / prior.transient_time_constant),
         };
@@ -258,7 +258,7 @@ impl Hypothesis {
         child
             .innovation_variance
             .limit_residual_count(prior.residuals_after_change);
-        child.born = now;
+        child.birth_sample = now;
         child.neuromuscular_changed = neuromuscular;
         child.before = self.snapshot();
         child

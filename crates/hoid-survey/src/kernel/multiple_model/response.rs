@@ -1,7 +1,7 @@
 //! Response of the neuromuscular system to a held error and to its rate, with derivatives with respect to omega_nm and
 //! zeta_nm.
 //!
-//! With the coefficients of the exact hold of [`hoid_core::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
+//! With the coefficients of the exact hold of [`hoid_core::zoh_operator`] for the gains `[1, 0]` and `[0, 1]`,
 //!
 //! `x(t) = b0 e(t) + b1 e(t-1) - f1 x(t-1) - f2 x(t-2)`,
 //! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
@@ -11,7 +11,7 @@
 //! states that belong to another point would have a kink there, which the whitening filter, a difference of high order,
 //! amplifies above the noise.
 
-use hoid_core::held_operator::held_operator;
+use hoid_core::zoh_operator::zoh_operator;
 
 /// The signals x1 and x2, their derivatives with respect to omega_nm, and their derivatives with respect to zeta_nm.
 pub type Signals = [f64; 6];
@@ -50,7 +50,7 @@ impl Response {
     fn set(&mut self, point: [f64; 2]) {
         self.point = point;
         for (gain, gains) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
-            let (value, by) = held_operator([gains[0], gains[1], point[0], point[1]], self.sample_time);
+            let (value, by) = zoh_operator([gains[0], gains[1], point[0], point[1]], self.sample_time);
             for lag in 0..2 {
                 self.b[gain][lag] = [value[lag], by[lag][2], by[lag][3]];
                 self.f[lag] = [value[2 + lag], by[2 + lag][2], by[2 + lag][3]];

@@ -28,12 +28,12 @@ impl<'a> DelayedSignals<'a> {
     /// A delay that exceeds the longest delay causes a panic or returns the signals of another delay.
     #[inline(always)]
     pub fn at(&self, extra_delay: usize) -> &'a Signals {
-        let place = if extra_delay > self.newest {
+        let index = if extra_delay > self.newest {
             self.newest + self.ring.len() - extra_delay
         } else {
             self.newest - extra_delay
         };
-        &self.ring[place]
+        &self.ring[index]
     }
 }
 

@@ -50,7 +50,7 @@ fn static_gain(theta: &[f64]) -> f64 {
 #[test]
 fn bias_is_small_in_a_closed_loop() {
     let held = Scenario::condition(Condition::C1).initial.operator;
-    let held = held.discretise(SampleTime::AT_100_HZ).unwrap().held;
+    let held = held.discretise(SampleTime::AT_100_HZ).unwrap().zoh;
     let truth = [held.b0, held.b1, held.f1, held.f2];
     let runs = 20;
     for m0 in [1, 2] {

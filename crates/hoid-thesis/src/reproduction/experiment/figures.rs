@@ -3,7 +3,7 @@
 use hoid_model::scenario::{Condition, Scenario};
 use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, trace_panels};
 
-use super::of_runs::{mean_and_median, of, subjects};
+use super::run_selection::{mean_and_median, select, subjects};
 use crate::{
     experiment::{
         EvaluatedRun,
@@ -83,7 +83,7 @@ pub(super) fn draw(
     let mut data = TableBuilder::new(&["parameter", "estimator", "subject"], &["t", "mean", "median"]);
     let people: Vec<(&str, Vec<&EvaluatedRun>)> = subjects(runs, condition)
         .into_iter()
-        .map(|subject| (subject, of(runs, subject, condition)))
+        .map(|subject| (subject, select(runs, subject, condition)))
         .collect();
     let simulated = runs.iter().any(|run| run.outcome.truth.is_some());
     let mut panels = Vec::new();
@@ -144,7 +144,7 @@ fn recursive_curves(
     (name, subject): (&str, &str),
     data: &mut TableBuilder,
 ) -> Vec<TraceCurve> {
-    let courses = || own.iter().map(|run| &run.outcome.courses[method]);
+    let courses = || own.iter().map(|run| &run.outcome.traces[method]);
     let longest = courses().max_by_key(|course| course.times_s.len());
     let times_s = longest.map_or(Vec::new(), |course| course.times_s.clone());
     let at = |row: usize| mean_and_median(courses().map(|course| shown.value_in_trace(course, row)));

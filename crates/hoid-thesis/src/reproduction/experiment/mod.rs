@@ -1,17 +1,17 @@
 //! The experiment with virtual or recorded people: Table 3, Figs. 13, 14 and I.1 to I.18.
 //!
 //! All items of the experiment show the same runs, which are made once, before the first item is drawn. A figure of
-//! recorded people has the number of the figure in the text in which the controlled element changes in the same way,
-//! followed by the name of the condition if it differs from that in the text.
+//! recorded people has the number of the figure in the thesis in which the controlled element changes in the same way,
+//! followed by the name of the condition if it differs from that in the thesis.
 //!
 //! | module | contents |
 //! |---|---|
 //! | `figures` | quantities over time: mean and median over the runs |
-//! | `of_runs` | the runs of a subject, their mean and median |
+//! | `run_selection` | the runs of a subject, their mean and median |
 //! | `tables` | Table 3 (for recorded people also with all conditions), and the operators before and after the change |
 
 mod figures;
-mod of_runs;
+mod run_selection;
 mod tables;
 
 use std::sync::{Arc, OnceLock};
@@ -35,21 +35,26 @@ pub(super) const NAME: &str = "experiment";
 #[derive(Clone)]
 struct Runs {
     people: Arc<dyn Experiment>,
-    made: Arc<OnceLock<Evaluation>>,
+    evaluation: Arc<OnceLock<Evaluation>>,
 }
 
 impl Runs {
     fn new(people: impl Experiment + 'static) -> Self {
         Self {
             people: Arc::new(people),
-            made: Arc::default(),
+            evaluation: Arc::default(),
         }
     }
 
     fn get(&self, watch: &ProgressCallbacks<'_>) -> &Evaluation {
         let estimates = self.people.estimate_count_per_run();
-        self.made
-            .get_or_init(|| experiment(self.people.as_ref(), &|| (watch.done)(estimates), watch.keep_running))
+        self.evaluation.get_or_init(|| {
+            experiment(
+                self.people.as_ref(),
+                &|| (watch.completed)(estimates),
+                watch.should_continue,
+            )
+        })
     }
 
     /// Returns the runs in the form in which items share them.
@@ -59,7 +64,7 @@ impl Runs {
             name: NAME,
             title,
             estimates: self.people.estimate_count_per_run() * self.people.runs().len() as u64,
-            make: Arc::new(move |watch| failure_notes(runs.get(watch))),
+            make_runs: Arc::new(move |watch| failure_notes(runs.get(watch))),
         }
     }
 
@@ -83,7 +88,7 @@ fn failure_notes(found: &Evaluation) -> Result<Vec<String>, ThesisError> {
     };
     match (found.runs.first(), found.failed.first()) {
         (None, Some(first)) => Err(ThesisError::Recordings {
-            place: NAME.to_owned(),
+            subject: NAME.to_owned(),
             reason: format!(
                 "none of the {} runs can be evaluated; first failure: {}",
                 found.failed.len(),
@@ -131,7 +136,7 @@ pub(super) fn recorded_items(people: RecordedPeople) -> Vec<Item> {
         let own = conditions.iter().filter(|condition| wanted(condition));
         own.map(|condition| condition.name.clone()).collect()
     };
-    let of_table_3 = names(&|condition| condition.of_text == Condition::C4);
+    let of_table_3 = names(&|condition| condition.thesis_condition == Condition::C4);
     let every = names(&|_| true);
     let title =
         |what: &str| format!("Model parameters n_k* and T_n* used in each run and model structure, {what} ({name})");
@@ -187,7 +192,7 @@ fn condition_figures(runs: &Runs, people: &str, caption: &str) -> Vec<Item> {
     ];
     let mut all = Vec::new();
     for condition in runs.people.conditions() {
-        let of_text = condition.of_text;
+        let of_text = condition.thesis_condition;
         let mut figure = |number: String, (what, rows): (&str, &'static [Row])| {
             let (name, title) = figure_name_and_title(&number, what, &condition, people);
             let own = condition.name.clone();
@@ -211,7 +216,10 @@ fn condition_figures(runs: &Runs, people: &str, caption: &str) -> Vec<Item> {
 
 /// Name and title of a figure.
 fn figure_name_and_title(number: &str, what: &str, condition: &ExperimentCondition, people: &str) -> (String, String) {
-    let ExperimentCondition { name, of_text } = condition;
+    let ExperimentCondition {
+        name,
+        thesis_condition: of_text,
+    } = condition;
     if *name == of_text.to_string() {
         return (number.to_owned(), format!("{what}, condition {name} ({people})"));
     }

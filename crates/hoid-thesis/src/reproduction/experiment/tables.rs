@@ -1,6 +1,6 @@
-//! Table 3 of the text, and the operators before and after the change.
+//! Table 3 of the thesis, and the operators before and after the change.
 
-use super::of_runs::{mean_and_median, of, subjects};
+use super::run_selection::{mean_and_median, select, subjects};
 use crate::{
     experiment::{EvaluatedRun, procedure::RunOutcome},
     reproduction::{
@@ -31,13 +31,13 @@ pub(super) fn delays(item: &Item, runs: &[EvaluatedRun], conditions: &[String]) 
     let mut data = TableBuilder::new(texts, numbers);
     for condition in conditions {
         for subject in subjects(runs, condition) {
-            for run in of(runs, subject, condition) {
+            for run in select(runs, subject, condition) {
                 let found = &run.outcome;
                 let [arx, bj] = found.nk.map(|nk| nk as f64);
                 match &found.truth {
                     Some(truth) => data.add_row(&[subject, &run.key.run], &[truth.nk as f64, arx, bj, found.t_n_s]),
                     None => {
-                        let [of_arx, of_bj] = found.nk_of_span.map(|spans| spans.map(|nk| nk as f64));
+                        let [of_arx, of_bj] = found.nk_by_span.map(|spans| spans.map(|nk| nk as f64));
                         data.add_row(
                             &[subject, condition, &run.key.run],
                             &[arx, bj, found.t_n_s, of_arx[0], of_arx[1], of_bj[0], of_bj[1]],
@@ -58,7 +58,7 @@ pub(super) fn operators(item: &Item, runs: &[EvaluatedRun], conditions: &[String
     );
     for condition in conditions {
         for subject in subjects(runs, condition) {
-            let own = of(runs, subject, condition);
+            let own = select(runs, subject, condition);
             for (estimator, method, is_batch) in [
                 ("OLS", 0, true),
                 ("PEM", 1, true),
@@ -91,7 +91,7 @@ pub(super) fn operators(item: &Item, runs: &[EvaluatedRun], conditions: &[String
 /// Returns the medians of a recursive estimate over the second half of a span.
 fn final_medians(outcome: &RunOutcome, method: usize, span: usize) -> [f64; 5] {
     let (from_s, to_s) = outcome.spans_s[span];
-    let course = &outcome.courses[method];
+    let course = &outcome.traces[method];
     let within: Vec<&[f64; 5]> = (course.times_s.iter().zip(&course.states))
         .filter(|(t, _)| (0.5 * (from_s + to_s)..to_s).contains(*t))
         .map(|(_, state)| &state.operator)

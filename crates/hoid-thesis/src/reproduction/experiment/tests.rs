@@ -1,6 +1,6 @@
 #![allow(clippy::unwrap_used)]
 
-use super::{of_runs::mean_and_median, *};
+use super::{run_selection::mean_and_median, *};
 use crate::experiment::{
     RunKey,
     procedure::{RecursiveTrace, RunOutcome, State, Truth},
@@ -26,10 +26,10 @@ fn run(subject: &str, number: u64, value: f64) -> EvaluatedRun {
         outcome: RunOutcome {
             spans_s: [(0.0, 30.72), (51.2, 81.92)],
             nk: [24, 29],
-            nk_of_span: [[23, 25], [28, 30]],
+            nk_by_span: [[23, 25], [28, 30]],
             t_n_s: 0.06,
             batch: [[state; 2]; 2],
-            courses: [course.clone(), course],
+            traces: [course.clone(), course],
             truth: Some(Truth {
                 nk: 29,
                 states: [state; 2],
@@ -76,7 +76,7 @@ fn recorded_runs_may_differ_in_length_and_have_no_truth() {
         run.outcome.truth = None;
         run.change_s = Some(41.92);
     }
-    for course in &mut runs[0].outcome.courses {
+    for course in &mut runs[0].outcome.traces {
         course.times_s.pop();
         course.states.pop();
         course.variances.pop();
@@ -110,7 +110,7 @@ fn figures_are_named_by_number_and_condition() {
     assert_eq!(names.len(), 21);
     let condition = |name: &str| ExperimentCondition {
         name: name.to_owned(),
-        of_text: Condition::C4,
+        thesis_condition: Condition::C4,
     };
     assert_eq!(figure_name_and_title("I.10", "x", &condition("C4"), "p").0, "I.10");
     let (name, title) = figure_name_and_title("I.10", "x", &condition("C7 pitch"), "p");

@@ -2,11 +2,12 @@
 //!
 //! The error of a parameter is its distance from the true value in its own standard errors; a delay that is estimated
 //! only in whole samples has a standard error of one sample. A parameter that is reported as not determined, or has no
-//! standard error, is not judged.
+//! standard error, is not assessed.
 //!
-//! A trace is wrong if it is wrong at its last row or [`RECOVERY_CHECK_S`] after the fault. Its recovery time is the time from
-//! the end of the fault to the last row in which a parameter differs by more than [`MAX_RECOVERED_ERRORS`] of its standard
-//! errors and by more than [`MAX_RECOVERED_RELATIVE_ERROR`] of its true value. Its lasting error is the largest error that it had for
+//! A trace is wrong if it is wrong at its last row or [`RECOVERY_CHECK_S`] after the fault. Its recovery time is the
+//! time from the end of the fault to the last row in which a parameter differs by more than [`MAX_RECOVERED_ERRORS`] of
+//! its standard errors and by more than [`MAX_RECOVERED_RELATIVE_ERROR`] of its true value. Its lasting error is the
+//! largest error that it had for
 //! [`MIN_LASTING_S`] without interruption.
 
 use serde_json::Value;
@@ -44,7 +45,7 @@ pub struct CaseOutcome {
     /// The parameter with the largest error, and its error in standard errors.
     pub worst: Option<(String, f64)>,
     pub wrong: bool,
-    /// The verdict in one word; "refused" if there is no result.
+    /// The verdict in one word; "rejected" if there is no result.
     pub level: String,
     /// Kinds of the findings against the result.
     pub kinds: Vec<String>,
@@ -60,7 +61,7 @@ pub struct CaseOutcome {
 }
 
 impl CaseOutcome {
-    /// Outcome for a record that the program refuses.
+    /// Outcome for a record that the program rejects.
     pub fn refused() -> Self {
         Self {
             level: "refused".to_owned(),
@@ -89,7 +90,7 @@ pub struct Row {
     pub claims: Vec<Claim>,
 }
 
-/// Judges a fit from the output of the program.
+/// Assesses a fit from the output of the program.
 pub fn judge_fit(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let claims = parse_claims(json, known);
     let worst = worst_claim(&claims, &known.truth);
@@ -100,7 +101,7 @@ pub fn judge_fit(json: &Value, known: &CaseTruth) -> CaseOutcome {
     }
 }
 
-/// Judges a trace.
+/// Assesses a trace.
 pub fn judge_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
     let truth_at = |t: f64| match (&known.then, known.span_s) {
         (Some(then), Some((from, _))) if t >= from => then,

@@ -1,4 +1,4 @@
-//! Runs of the program on a case; the output for the user is judged.
+//! Runs of the program on a case; the output for the user is assessed.
 
 use std::{
     fs::{self, File},
@@ -229,11 +229,11 @@ fn run_to_end(command: &mut Command, folder: &Path) -> Result<(String, String), 
 pub fn parse_rows(text: &str) -> Vec<Row> {
     let mut lines = text.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = lines.next().unwrap_or("").split(',').collect();
-    let place = |name: &str| names.iter().position(|n| *n == name);
+    let index = |name: &str| names.iter().position(|n| *n == name);
     let pairs: Vec<(&str, usize, usize)> = names
         .iter()
         .enumerate()
-        .filter_map(|(i, name)| Some((*name, i, place(&format!("{name}_se"))?)))
+        .filter_map(|(i, name)| Some((*name, i, index(&format!("{name}_se"))?)))
         .collect();
     let row = |line: &str| {
         let cells: Vec<Option<f64>> = line.split(',').map(|cell| cell.parse().ok()).collect();
@@ -242,7 +242,7 @@ pub fn parse_rows(text: &str) -> Vec<Row> {
             Some(((*name).to_owned(), cell(*value)?, cell(*error).filter(|s| *s > 0.0)?))
         };
         Some(Row {
-            t: cell(place("t")?)?,
+            t: cell(index("t")?)?,
             claims: pairs.iter().filter_map(claim).collect(),
         })
     };

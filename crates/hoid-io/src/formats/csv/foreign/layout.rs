@@ -2,15 +2,15 @@
 //!
 //! The first rows are the first [`MIN_ROWS`] lines with equal numbers of cells, more than half of which are numbers or
 //! clock times. The header is the line of words above them, or a comment directly above them; a line further up with
-//! equally many words takes precedence if it has the requested columns, or else names of error and control or of a time. The header must name the
-//! cells unambiguously ([`super::names`]).
+//! equally many words takes precedence if it has the requested columns, or else names of error and control or of a
+//! time. The header must name the cells unambiguously ([`super::names`]).
 
 use std::borrow::Cow;
 
 use super::lines::{
     Separator, is_missing, is_number, is_row, is_value, joined_lines, non_blank_lines, split_line_end, unquoted,
 };
-use super::names::{ExtraCells, Names, names_of, without_comment_signs};
+use super::names::{ColumnNames, ExtraCells, names_of, without_comment_signs};
 use super::units;
 use crate::formats::csv::text::is_comment_or_blank;
 use crate::record::ReadOptions;
@@ -27,8 +27,8 @@ const OWN_COMMENTS: [&str; 3] = ["units:", "roles:", "sample_time:"];
 /// Structure of the start of a table. Lines are counted from 0.
 #[derive(Debug, Clone)]
 pub(super) struct Layout<'a> {
-    pub(super) mark: Separator,
-    pub(super) names: Names<'a>,
+    pub(super) separator: Separator,
+    pub(super) names: ColumnNames<'a>,
     /// Line of the header, which may be a comment.
     header: usize,
     is_comment: bool,
@@ -46,7 +46,7 @@ pub(in crate::formats::csv) struct Mismatch {
     /// Line of the header, counted from 1.
     pub(in crate::formats::csv) line: usize,
     /// Number of words of the header; 0 if the first line holds numbers.
-    pub(in crate::formats::csv) words: usize,
+    pub(in crate::formats::csv) header_words: usize,
     pub(in crate::formats::csv) cells: usize,
     /// Text of the first row, shortened.
     pub(in crate::formats::csv) first_row: String,
@@ -64,7 +64,7 @@ fn first_rows<'a>(filled: &[(usize, &'a str)], from: usize, mark: Separator) -> 
 }
 
 /// Returns the names in a header whose separator differs from the separator of the rows.
-fn names_with_other_separator<'a>(header: &'a str, rows: &[Vec<&str>]) -> Option<Names<'a>> {
+fn names_with_other_separator<'a>(header: &'a str, rows: &[Vec<&str>]) -> Option<ColumnNames<'a>> {
     let marks = Separator::ALL.iter().filter(|mark| **mark != Separator::Blanks);
     let mut names = marks.filter_map(|mark| names_of(header, *mark, rows));
     names.find(|names| names.extra == ExtraCells::None)
@@ -135,7 +135,7 @@ impl<'a> Layout<'a> {
             }
             let comment = units::units_comment(&names.names, &cells)?;
             Some(Self {
-                mark,
+                separator: mark,
                 names,
                 header: *header,
                 is_comment: false,
@@ -149,7 +149,7 @@ impl<'a> Layout<'a> {
         }
         let names = names_of(line, mark, rows).or_else(|| names_with_other_separator(line, rows))?;
         let named = Self {
-            mark,
+            separator: mark,
             header: *at,
             is_comment: false,
             units: None,
@@ -200,7 +200,7 @@ impl<'a> Layout<'a> {
         let own = names_of(words, mark, rows).or_else(|| names_with_other_separator(words, rows));
         let names = own.or_else(|| names_of(words, Separator::Blanks, rows))?;
         Some(Self {
-            mark,
+            separator: mark,
             names,
             header,
             is_comment: true,
@@ -217,7 +217,7 @@ impl<'a> Layout<'a> {
         if self.units.is_some() {
             notes.push(String::from("the line below the header is taken as the units"));
         }
-        if self.mark == Separator::Blanks {
+        if self.separator == Separator::Blanks {
             notes.push(String::from("the columns are separated by blanks"));
         }
         if !self.lines_above.is_empty() {
@@ -284,7 +284,7 @@ impl<'a> Layout<'a> {
 
     /// Returns the separator in the rewritten text.
     fn separator(&self) -> char {
-        match self.mark {
+        match self.separator {
             Separator::Char(mark) => mark,
             Separator::Blanks => '\t',
         }
@@ -313,8 +313,8 @@ impl<'a> Layout<'a> {
 
     /// Returns a row of the rewritten text.
     fn row_of<'b>(&self, line: &'b str) -> Cow<'b, str> {
-        let line = match self.mark {
-            Separator::Blanks => return Cow::Owned(self.mark.cells(line).join("\t")),
+        let line = match self.separator {
+            Separator::Blanks => return Cow::Owned(self.separator.cells(line).join("\t")),
             Separator::Char(_) => line,
         };
         let line = match self.names.extra {
@@ -324,7 +324,11 @@ impl<'a> Layout<'a> {
         let padding = format!("{} \"", self.separator());
         match line.contains(&padding) {
             true => {
-                let cells = self.mark.cells(line).into_iter().map(|cell| self.without_padding(cell));
+                let cells = self
+                    .separator
+                    .cells(line)
+                    .into_iter()
+                    .map(|cell| self.without_padding(cell));
                 Cow::Owned(cells.collect::<Vec<_>>().join(&self.separator().to_string()))
             }
             false => Cow::Borrowed(line),
@@ -364,7 +368,7 @@ pub(in crate::formats::csv) fn mismatch(text: &str) -> Option<Mismatch> {
     };
     (is_uncertain && !is_named).then(|| Mismatch {
         line: line.saturating_add(1),
-        words,
+        header_words: words,
         cells,
         first_row: abbreviate(&numbers.join(", ")),
     })

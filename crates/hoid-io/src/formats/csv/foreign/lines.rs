@@ -86,8 +86,8 @@ pub(super) fn is_open(line: &str) -> bool {
     open
 }
 
-/// Returns the lines of a text, each with its line end and the number of its first line in the file. Lines that a cell in
-/// quotation marks joins are one line.
+/// Returns the lines of a text, each with its line end and the number of its first line in the file. Lines that a cell
+/// in quotation marks joins are one line.
 pub(in crate::formats::csv) fn joined_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let mut rest = text;
     let mut number = 0_usize;

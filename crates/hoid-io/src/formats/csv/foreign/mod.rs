@@ -39,7 +39,9 @@ pub(super) fn convert_to_plain_csv(bytes: &mut Vec<u8>, options: &ReadOptions) -
     }
     let text = tabs.as_deref().unwrap_or(text);
     let layout = Layout::of(text, options);
-    let end = layout.as_ref().and_then(|layout| tail::words_below(text, layout.mark));
+    let end = layout
+        .as_ref()
+        .and_then(|layout| tail::text_below(text, layout.separator));
     let kept = match &end {
         Some((end, _)) => text.get(..*end).unwrap_or(text),
         None => text,
@@ -63,8 +65,8 @@ pub(super) fn convert_to_plain_csv(bytes: &mut Vec<u8>, options: &ReadOptions) -
 /// True if the start of a file holds a table: text with a line of several numbers.
 pub(in crate::formats) fn is_table(start: &[u8]) -> bool {
     let mut bytes = start.to_vec();
-    // The start may end in the middle of a character: in UTF-8 it is cut after a line, in UTF-16 after an even number of
-    // bytes.
+    // The start may end in the middle of a character: in UTF-8 it is cut after a line, in UTF-16 after an even number
+    // of bytes.
     if bytes.contains(&0) {
         bytes.truncate(start.len() & !1);
     } else if let Some(line) = bytes.iter().rposition(|byte| matches!(byte, b'\n' | b'\r')) {

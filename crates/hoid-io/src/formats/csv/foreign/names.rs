@@ -4,7 +4,7 @@ use super::lines::{Separator, is_number, unquoted};
 
 /// Names of the columns of a table, and the cells of a line that have no name.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Names<'a> {
+pub(super) struct ColumnNames<'a> {
     pub(super) names: Vec<&'a str>,
     pub(super) extra: ExtraCells,
 }
@@ -36,14 +36,14 @@ pub(super) fn without_comment_signs(header: &str, mark: Separator) -> &str {
 
 /// Returns the names that `header` gives to the cells of `rows`, which are the first rows and have equally many cells;
 /// `None` if the assignment is not certain.
-pub(super) fn names_of<'a>(header: &'a str, mark: Separator, rows: &[Vec<&str>]) -> Option<Names<'a>> {
+pub(super) fn names_of<'a>(header: &'a str, mark: Separator, rows: &[Vec<&str>]) -> Option<ColumnNames<'a>> {
     let header = without_comment_signs(header, mark);
     let count = rows.first()?.len();
     let words = mark.cells(header);
     let named = |names: Vec<&'a str>, extra: ExtraCells| {
         let is_name = |name: &&str| !is_number(name);
         let any = names.iter().any(|name| !unquoted(name).is_empty());
-        (any && names.iter().all(is_name)).then_some(Names { names, extra })
+        (any && names.iter().all(is_name)).then_some(ColumnNames { names, extra })
     };
     if words.len() == count {
         return named(words, ExtraCells::None);

@@ -13,7 +13,7 @@ const COMPARED_ROWS: usize = 3;
 ///
 /// A line belongs to the words if its first cell is text while the first cells of the rows above are numbers or clock
 /// times. A last line without a line end may be truncated, and is not omitted.
-pub(super) fn words_below(text: &str, mark: Separator) -> Option<(usize, String)> {
+pub(super) fn text_below(text: &str, mark: Separator) -> Option<(usize, String)> {
     let mut end = text.len();
     let mut found: Vec<&str> = Vec::new();
     let starts_with_value = |line: &str| mark.cells(line).first().is_some_and(|cell| is_value(cell));
@@ -65,7 +65,7 @@ mod tests {
             "# aside\nMean,2\n",
         ] {
             let text = format!("{rows}{words}");
-            let (at, note) = words_below(&text, Separator::Char(',')).unwrap();
+            let (at, note) = text_below(&text, Separator::Char(',')).unwrap();
             assert_eq!(text[..at].trim_end(), rows.trim_end(), "{words:?}");
             let first = words.lines().find(|line| !line.is_empty() && !line.starts_with('#'));
             assert!(note.contains(first.unwrap()), "{note}");
@@ -87,9 +87,9 @@ mod tests {
             "t,e\n0,1\n1,2\n2,3\nx,4",
             "t,note\n0,1\n1,2\n2,3\n3,\"two\nlines\"\n",
         ] {
-            assert_eq!(words_below(text, Separator::Char(',')), None, "{text:?}");
+            assert_eq!(text_below(text, Separator::Char(',')), None, "{text:?}");
         }
         let many = format!("t,e\n0,1\n1,2\n2,3\n{}", "word\n".repeat(MAX_LINES_BELOW + 1));
-        assert_eq!(words_below(&many, Separator::Char(',')), None);
+        assert_eq!(text_below(&many, Separator::Char(',')), None);
     }
 }
