@@ -21,7 +21,10 @@
 
 use hoid_numerics::{cholesky, products::dot};
 
-use super::{blocks::Block, sizes::STATE_COUNT};
+use super::{
+    blocks::{Block, Solution},
+    sizes::STATE_COUNT,
+};
 
 pub(super) type Matrix = [[f64; STATE_COUNT]; STATE_COUNT];
 
@@ -54,39 +57,29 @@ pub struct Contrast {
 crate::state!([] Contrast { difference, covariance, before, covariance_before, residual_squares, samples });
 
 impl Contrast {
-    /// Computes the difference between two spans of blocks. `with_prior` adds a prior to the sums of each span;
-    /// `empirical_share` is w. Returns `None` if the data of a span do not determine a state.
-    pub(super) fn from_spans(
-        sides: [&[Block]; 2],
-        empirical_share: f64,
-        with_prior: impl Fn(Block) -> Block,
-    ) -> Option<Self> {
-        let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
-        let [Some(before), Some(now)] = sums.each_ref().map(Block::solve) else {
-            return None;
-        };
-        let solutions = [before, now];
+    /// Computes the difference between two spans; `empirical_share` is w.
+    pub(super) fn of(spans: &SolvedSpans<'_>, empirical_share: f64) -> Self {
+        let SolvedSpans {
+            sides, sums, solutions, ..
+        } = spans;
         let mut scores = Scores::default();
-        for (blocks, solution) in sides.iter().zip(&solutions) {
+        for (blocks, solution) in sides.iter().zip(solutions) {
             scores.add(blocks, &solution.state);
         }
-        let samples = sums.map(|s| s.samples);
-        let all = samples[0] + samples[1];
-        let residual_squares = before.residual_squares + now.residual_squares;
-        let variance = residual_squares / (all - 2.0 * STATE_COUNT as f64).max(1.0);
+        let samples = sums.each_ref().map(|s| s.samples);
         let [covariance_before, covariance_now] = core::array::from_fn(|side| {
-            let inverse = &solutions[side].inverse;
-            let of_score = scores.covariance(&sums[side], all, empirical_share, variance);
-            matrix_product(&matrix_product(inverse, &of_score), inverse)
+            let of_score = scores.covariance(&sums[side], samples[0] + samples[1], empirical_share, spans.variance);
+            sandwich(&solutions[side].inverse, &of_score)
         });
-        Some(Self {
+        let [before, now] = solutions;
+        Self {
             difference: core::array::from_fn(|i| now.state[i] - before.state[i]),
             covariance: matrix_from_fn(|i, j| covariance_before[i][j] + covariance_now[i][j]),
             before: before.state,
             covariance_before,
-            residual_squares,
+            residual_squares: spans.residual_squares,
             samples,
-        })
+        }
     }
 
     /// Returns the mean ratio of this covariance to the covariance of another contrast, `tr(C_other^-1 C)/N`, or `None`
@@ -117,15 +110,52 @@ impl Contrast {
     /// Returns the Wald statistic `d' C^-1 d` of the selected components, or `None` if their covariance C is not
     /// positive definite.
     pub(super) fn wald_statistic<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
-        let d = places.map(|i| self.difference[i]);
-        let mut factor = places.map(|i| places.map(|j| self.covariance[i][j]));
-        let mut solved = d;
-        if !cholesky::factor(&mut factor, N) {
-            return None;
-        }
-        cholesky::solve(&factor, N, &mut solved);
-        let t = dot(&solved, &d);
-        t.is_finite().then_some(t)
+        wald(
+            places.map(|i| self.difference[i]),
+            places.map(|i| places.map(|j| self.covariance[i][j])),
+        )
+    }
+}
+
+/// Returns the Wald statistic `d' C^-1 d`, or `None` if C is not positive definite.
+pub(super) fn wald<const N: usize>(d: [f64; N], mut c: [[f64; N]; N]) -> Option<f64> {
+    if !cholesky::factor(&mut c, N) {
+        return None;
+    }
+    let mut solved = d;
+    cholesky::solve(&c, N, &mut solved);
+    let t = dot(&solved, &d);
+    t.is_finite().then_some(t)
+}
+
+/// Past and present, each with its sums and its least-squares solution.
+#[derive(Debug, Clone)]
+pub(super) struct SolvedSpans<'b> {
+    pub sides: [&'b [Block]; 2],
+    pub sums: [Block; 2],
+    pub solutions: [Solution; 2],
+    /// Residual sum of squares over both spans.
+    residual_squares: f64,
+    /// Variance sigma^2 over both spans.
+    pub variance: f64,
+}
+
+impl<'b> SolvedSpans<'b> {
+    /// Solves both spans. `with_prior` adds a prior to the sums of each span. Returns `None` if the data of a span do not
+    /// determine a state.
+    pub fn new(sides: [&'b [Block]; 2], with_prior: impl Fn(Block) -> Block) -> Option<Self> {
+        let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
+        let solutions = [sums[0].solve()?, sums[1].solve()?];
+        let samples = sums[0].samples + sums[1].samples;
+        let residual_squares = solutions[0].residual_squares + solutions[1].residual_squares;
+        let variance = residual_squares / (samples - 2.0 * STATE_COUNT as f64).max(1.0);
+        Some(Self {
+            sides,
+            sums,
+            solutions,
+            residual_squares,
+            variance,
+        })
     }
 }
 
@@ -162,8 +192,10 @@ fn matrix_from_fn(of: impl Fn(usize, usize) -> f64) -> Matrix {
     core::array::from_fn(|i| core::array::from_fn(|j| of(i, j)))
 }
 
-pub(super) fn matrix_product(a: &Matrix, b: &Matrix) -> Matrix {
-    matrix_from_fn(|i, j| (0..STATE_COUNT).map(|k| a[i][k] * b[k][j]).sum())
+/// Returns `A M A` for symmetric matrices.
+pub(super) fn sandwich(a: &Matrix, m: &Matrix) -> Matrix {
+    let product = |a: &Matrix, b: &Matrix| matrix_from_fn(|i, j| (0..STATE_COUNT).map(|k| a[i][k] * b[k][j]).sum());
+    product(&product(a, m), a)
 }
 
 #[cfg(test)]
@@ -220,12 +252,12 @@ pub(super) mod tests {
         let (mut sum, mut square, mut by_model) = (0.0, 0.0, 0.0);
         for _ in 0..runs {
             let all = blocks(70, &STATE, noise_pole, &mut random);
-            let sides = [&all[..60], &all[60..]];
-            let contrast = Contrast::from_spans(sides, EMPIRICAL_WEIGHT, |sum| sum).unwrap();
+            let spans = SolvedSpans::new([&all[..60], &all[60..]], |sum| sum).unwrap();
+            let contrast = Contrast::of(&spans, EMPIRICAL_WEIGHT);
             let t = contrast.wald_statistic(TESTED_STATES).unwrap();
             sum += t;
             square += t * t;
-            let model = Contrast::from_spans(sides, MODEL_ONLY_WEIGHT, |sum| sum).unwrap();
+            let model = Contrast::of(&spans, MODEL_ONLY_WEIGHT);
             by_model += model.wald_statistic(TESTED_STATES).unwrap();
         }
         let n = runs as f64;
@@ -255,10 +287,8 @@ pub(super) mod tests {
         for (pole, [low, high]) in [(0.0, [0.9, 1.6]), (0.9, [3.0, 12.0])] {
             let mut random = 5;
             let all = blocks(70, &STATE, pole, &mut random);
-            let [shown, model] = [1.0, MODEL_ONLY_WEIGHT].map(|w| {
-                let sides = [&all[..60], &all[60..]];
-                Contrast::from_spans(sides, w, |sum| sum).unwrap()
-            });
+            let spans = SolvedSpans::new([&all[..60], &all[60..]], |sum| sum).unwrap();
+            let [shown, model] = [1.0, MODEL_ONLY_WEIGHT].map(|w| Contrast::of(&spans, w));
             let times = shown.dispersion(&model).unwrap();
             assert!((low..high).contains(&times), "{pole}: {times}");
             assert!((model.scaled(times).dispersion(&model).unwrap() - times).abs() < 1e-9);
@@ -271,7 +301,10 @@ pub(super) mod tests {
         let mut all = blocks(60, &STATE, 0.0, &mut random);
         let changed = core::array::from_fn(|i| STATE[i] + if i == 1 { 1.0 } else { 0.0 });
         all.extend(blocks(10, &changed, 0.0, &mut random));
-        let contrast = Contrast::from_spans([&all[..60], &all[60..]], EMPIRICAL_WEIGHT, |sum| sum).unwrap();
+        let contrast = Contrast::of(
+            &SolvedSpans::new([&all[..60], &all[60..]], |sum| sum).unwrap(),
+            EMPIRICAL_WEIGHT,
+        );
         assert!(contrast.wald_statistic(TESTED_STATES).unwrap() > 100.0);
         for i in 0..STATE_COUNT {
             let expected = if i == 1 { 1.0 } else { 0.0 };
@@ -286,10 +319,10 @@ pub(super) mod tests {
     fn empty_blocks_give_no_contrast() {
         let mut random = 4;
         let all = blocks(20, &STATE, 0.0, &mut random);
-        assert!(Contrast::from_spans([&[], &all], EMPIRICAL_WEIGHT, |sum| sum).is_none());
-        assert!(Contrast::from_spans([&all, &[EMPTY; 4]], EMPIRICAL_WEIGHT, |sum| sum).is_none());
+        assert!(SolvedSpans::new([&[], &all], |sum| sum).is_none());
+        assert!(SolvedSpans::new([&all, &[EMPTY; 4]], |sum| sum).is_none());
         let nothing = |sum: Block| sum;
-        assert!(Contrast::from_spans([&[EMPTY; 10], &[EMPTY; 4]], EMPIRICAL_WEIGHT, nothing).is_none());
+        assert!(SolvedSpans::new([&[EMPTY; 10], &[EMPTY; 4]], nothing).is_none());
         assert!(Contrast::default().wald_statistic(TESTED_STATES).is_none());
     }
 }

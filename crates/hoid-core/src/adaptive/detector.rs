@@ -35,7 +35,7 @@
 
 use super::{
     blocks::Block,
-    contrast::{Contrast, EMPIRICAL_WEIGHT, MODEL_ONLY_WEIGHT},
+    contrast::{Contrast, EMPIRICAL_WEIGHT, MODEL_ONLY_WEIGHT, SolvedSpans},
     difference::Difference,
     gain_and_lead,
     last_blocks::{BLOCK_S, LastBlocks, MAX_BLOCKS},
@@ -189,18 +189,13 @@ impl Detector {
             .min(usize::try_from(self.since).unwrap_or(MAX_BLOCKS) + self.ago);
         let blocks = &last.blocks()[last.blocks().len() - known..];
         let fresh = last.fresh_block_count();
-        let [short, long] = self.settings.recent.map(|recent| self.spans(blocks, fresh, recent));
-        let deviations = self.settings.dynamics;
-        let all = |sides| {
-            self.compare(sides, EMPIRICAL_WEIGHT, dynamics)?
-                .wald_statistic(TESTED_STATES)
-        };
-        let of_gain_and_lead =
-            |sides| gain_and_lead::wald_statistic(sides, gain_and_lead, |sum| sum.with_prior(dynamics, deviations));
+        let spans = |recent| self.solve(self.spans(blocks, fresh, recent)?, dynamics);
+        let [short, long] = self.settings.recent.map(spans);
+        let of_all = |spans: &SolvedSpans<'_>| Contrast::of(spans, EMPIRICAL_WEIGHT).wald_statistic(TESTED_STATES);
         let values = [
-            short.and_then(all),
-            long.and_then(all),
-            short.and_then(of_gain_and_lead),
+            short.as_ref().and_then(of_all),
+            long.as_ref().and_then(of_all),
+            short.and_then(|spans| gain_and_lead::wald_statistic(&spans, gain_and_lead)),
         ];
         for (statistic, value) in self.statistics.iter_mut().zip(values) {
             match value {
@@ -236,27 +231,28 @@ impl Detector {
         self.ago = recent.min(blocks.len().saturating_sub(1));
         for after in 1..=self.ago {
             let (past, present) = blocks.split_at(blocks.len() - after);
-            let Some(contrast) = self.compare([past, present], MODEL_ONLY_WEIGHT, dynamics) else {
+            let Some(spans) = self.solve([past, present], dynamics) else {
                 continue;
             };
+            let contrast = Contrast::of(&spans, MODEL_ONLY_WEIGHT);
             if best.is_none_or(|best| contrast.residual_squares < best.residual_squares) {
                 (best, self.ago) = (Some(contrast), after);
             }
         }
         let (past, present) = blocks.split_at(blocks.len() - self.ago);
         let halves = past.split_at(past.len() / 2);
-        let [by_model, shown] =
-            [MODEL_ONLY_WEIGHT, EMPIRICAL_WEIGHT].map(|w| self.compare([halves.0, halves.1], w, dynamics));
-        let dispersion = shown.zip(by_model).and_then(|(shown, model)| shown.dispersion(&model));
+        let dispersion = self.solve([halves.0, halves.1], dynamics).and_then(|halves| {
+            let [by_model, shown] = [MODEL_ONLY_WEIGHT, EMPIRICAL_WEIGHT].map(|w| Contrast::of(&halves, w));
+            shown.dispersion(&by_model)
+        });
         self.declared_contrast = best.unwrap_or_default().scaled(dispersion.unwrap_or(1.0).max(1.0));
         self.innovation_variances = [past, present].map(|side| Block::of(side).innovation_variance());
         self.difference = Difference::of(&self.declared_contrast).unwrap_or_default();
     }
 
-    /// Computes the difference of all states between two spans.
-    fn compare(&self, sides: [&[Block]; 2], empirical_share: f64, dynamics: [f64; DYNAMICS_COUNT]) -> Option<Contrast> {
-        let deviations = self.settings.dynamics;
-        Contrast::from_spans(sides, empirical_share, |sum| sum.with_prior(dynamics, deviations))
+    /// Solves past and present, each with the prior of the dynamics.
+    fn solve<'b>(&self, sides: [&'b [Block]; 2], dynamics: [f64; DYNAMICS_COUNT]) -> Option<SolvedSpans<'b>> {
+        SolvedSpans::new(sides, |sum| sum.with_prior(dynamics, self.settings.dynamics))
     }
 
     /// Returns the time in s between the last declared change and its declaration.

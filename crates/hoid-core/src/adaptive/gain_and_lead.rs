@@ -25,8 +25,7 @@
 use hoid_numerics::{cholesky, products::dot};
 
 use super::{
-    blocks::{Block, Solution},
-    contrast::{EMPIRICAL_WEIGHT, Matrix, Scores, matrix_product},
+    contrast::{EMPIRICAL_WEIGHT, Matrix, Scores, SolvedSpans, sandwich, wald},
     operator::congruence,
     sizes::{GAIN_COUNT, STATE_COUNT},
 };
@@ -40,23 +39,19 @@ const RELATIVE_RIDGE: f64 = 1e-6;
 
 type Directions = [[f64; STATE_COUNT]; DIRECTION_COUNT];
 
-/// Returns T for the blocks of the past and of the present. `with_prior` adds a prior to the sums of each span, and
-/// `gain_and_lead` contains the directions of gain and lead in the space of the gains. `None` if the data do not
-/// determine the past, or gain and lead of the present.
-pub(super) fn wald_statistic(
-    [past, present]: [&[Block]; 2],
-    gain_and_lead: [[f64; GAIN_COUNT]; 2],
-    with_prior: impl Fn(Block) -> Block,
-) -> Option<f64> {
-    let sums = [past, present].map(|blocks| with_prior(Block::of(blocks)));
-    let [before, now]: [Solution; 2] = [sums[0].solve()?, sums[1].solve()?];
+/// Returns T for the past and the present; `gain_and_lead` contains the directions of gain and lead in the space of the
+/// gains. `None` if the data do not determine gain and lead.
+pub(super) fn wald_statistic(spans: &SolvedSpans<'_>, gain_and_lead: [[f64; GAIN_COUNT]; 2]) -> Option<f64> {
+    let SolvedSpans {
+        sides: [past, _],
+        sums,
+        solutions: [before, _],
+        ..
+    } = spans;
     let mut scores = Scores::default();
     scores.add(past, &before.state);
-    let samples = sums[0].samples + sums[1].samples;
-    let residual_squares = before.residual_squares + now.residual_squares;
-    let variance = residual_squares / (samples - 2.0 * STATE_COUNT as f64).max(1.0);
     let [w_0, w_1] =
-        [0, 1].map(|side: usize| scores.covariance(&sums[side], sums[0].samples, EMPIRICAL_WEIGHT, variance));
+        [0, 1].map(|side: usize| scores.covariance(&sums[side], sums[0].samples, EMPIRICAL_WEIGHT, spans.variance));
     let [a_0, a_1] = [0, 1].map(|side: usize| sums[side].matrix());
 
     let mut e: Directions = [[0.0; STATE_COUNT]; DIRECTION_COUNT];
@@ -65,46 +60,42 @@ pub(super) fn wald_statistic(
     }
     e[2][GAIN_COUNT] = 1.0;
 
-    let delta = project(&e, &a_1, &sums[1].score(&before.state))?;
-    let c_0 = matrix_product(&matrix_product(&before.inverse, &w_0), &before.inverse);
-    let of_past = matrix_product(&matrix_product(&a_1, &c_0), &a_1);
+    let projection = projection(&e, &a_1)?;
+    let score = sums[1].score(&before.state);
+    let of_past = sandwich(&a_1, &sandwich(&before.inverse, &w_0));
     let of_score = core::array::from_fn(|i| core::array::from_fn(|j| w_1[i][j] + of_past[i][j]));
-    let inverse = cholesky::scaled_inverse(&information(&e, &a_1)?, DIRECTION_COUNT, 1.0);
-    // The rows of F^-1 E' map a score to delta.
-    let rows: Directions =
-        core::array::from_fn(|i| core::array::from_fn(|j| (0..DIRECTION_COUNT).map(|k| inverse[i][k] * e[k][j]).sum()));
-    let c = congruence(&rows, &of_score);
+    let c = congruence(&projection, &of_score);
 
-    let mut gains = before.state;
-    gains[GAIN_COUNT..].fill(0.0);
-    let of_gains = a_0.map(|row| dot(&row, &gains));
-    let h = project(&e, &a_0, &of_gains)?;
+    let h = gain_and_lead_of(&before.state, &e, &a_0)?;
     let share = RELATIVE_FLUCTUATION * RELATIVE_FLUCTUATION;
-    let mut factor: [[f64; 2]; 2] = core::array::from_fn(|i| core::array::from_fn(|j| c[i][j] + share * h[i] * h[j]));
-    if !cholesky::factor(&mut factor, 2) {
-        return None;
-    }
-    let mut solved = [delta[0], delta[1]];
-    cholesky::solve(&factor, 2, &mut solved);
-    let t = dot(&solved, &delta[..2]);
-    t.is_finite().then_some(t)
+    wald(
+        [dot(&projection[0], &score), dot(&projection[1], &score)],
+        core::array::from_fn(|i| core::array::from_fn(|j| c[i][j] + share * h[i] * h[j])),
+    )
 }
 
-/// Cholesky factor of `E' A E`.
-fn information(e: &Directions, a: &Matrix) -> Option<[[f64; DIRECTION_COUNT]; DIRECTION_COUNT]> {
+/// Returns the gain and lead nearest to the gains of a state, by least squares with the information A.
+fn gain_and_lead_of(state: &[f64; STATE_COUNT], e: &Directions, a: &Matrix) -> Option<[f64; 2]> {
+    let mut gains = *state;
+    gains[GAIN_COUNT..].fill(0.0);
+    let of_gains = a.map(|row| dot(&row, &gains));
+    let [gain, lead, _] = projection(e, a)?.map(|row| dot(&row, &of_gains));
+    Some([gain, lead])
+}
+
+/// Returns `F^-1 E'` with `F = E' A E`, which maps a score to the change in the directions E.
+fn projection(e: &Directions, a: &Matrix) -> Option<Directions> {
     let mut factor = congruence(e, a);
     for (i, row) in factor.iter_mut().enumerate() {
         row[i] *= 1.0 + RELATIVE_RIDGE;
     }
-    cholesky::factor(&mut factor, DIRECTION_COUNT).then_some(factor)
-}
-
-/// Returns `(E' A E)^-1 E' b`.
-fn project(e: &Directions, a: &Matrix, b: &[f64; STATE_COUNT]) -> Option<[f64; DIRECTION_COUNT]> {
-    let factor = information(e, a)?;
-    let mut x = e.map(|row| dot(&row, b));
-    cholesky::solve(&factor, DIRECTION_COUNT, &mut x);
-    Some(x)
+    if !cholesky::factor(&mut factor, DIRECTION_COUNT) {
+        return None;
+    }
+    let inverse = cholesky::scaled_inverse(&factor, DIRECTION_COUNT, 1.0);
+    Some(core::array::from_fn(|i| {
+        core::array::from_fn(|j| (0..DIRECTION_COUNT).map(|k| inverse[i][k] * e[k][j]).sum())
+    }))
 }
 
 #[cfg(test)]
@@ -121,7 +112,7 @@ mod tests {
     fn statistic(past: [f64; STATE_COUNT], present: [f64; STATE_COUNT], random: &mut u64) -> f64 {
         let before = blocks(PAST, &past, 0.0, random);
         let now = blocks(PRESENT, &present, 0.0, random);
-        wald_statistic([&before, &now], DIRECTIONS, |sum| sum).unwrap()
+        wald_statistic(&SolvedSpans::new([&before, &now], |sum| sum).unwrap(), DIRECTIONS).unwrap()
     }
 
     /// Without gain and lead there is no fluctuation, so T is about a chi-square with two degrees of freedom, with mean 2
@@ -167,7 +158,7 @@ mod tests {
         let mut random = 8;
         let some = blocks(PAST, &[1.0; STATE_COUNT], 0.0, &mut random);
         for sides in [[&[][..], &some], [&some, &[]], [&some, &[EMPTY; 4]]] {
-            assert!(wald_statistic(sides, DIRECTIONS, |sum| sum).is_none());
+            assert!(SolvedSpans::new(sides, |sum| sum).is_none());
         }
     }
 }
