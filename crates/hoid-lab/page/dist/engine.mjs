@@ -57,7 +57,7 @@ var Run = class {
   get done() {
     return this.next >= this.task.ticks;
   }
-  /** An event of the device. */
+  /** Accepts an event of the device. */
   input(stamp, handled, raw) {
     const tick = Math.max(0, Math.ceil(stamp), this.next, this.lastTick);
     if (tick >= this.task.ticks || !Number.isFinite(raw)) return;
@@ -86,11 +86,11 @@ var Run = class {
       batch.e.push(this.e);
     }
   }
-  /** A frame that shows the last tick was drawn. */
+  /** Logs that a frame with the last tick was drawn. */
   frame(time, drawn) {
     this.batch.frames.push([time, drawn, this.next - 1, this.e]);
   }
-  /** What happened since the last time. */
+  /** Returns the ticks, events and frames since the last call. */
   take() {
     const taken = this.batch;
     this.batch = { first: this.next, u: [], e: [], events: [], frames: [] };
@@ -112,12 +112,12 @@ var Operator = class {
   spare;
   answers = [];
   e = 0;
-  /** What the screen shows from a time on: the answers up to there are those to what it showed. */
+  /** Sets the error that the screen shows from a time on; the response until then is to the previous error. */
   sees(e, at) {
     this.upTo(at);
     this.e = e;
   }
-  /** Where the device is at a time. */
+  /** Returns the position of the device at a time. */
   raw(now) {
     this.upTo(now);
     const k = Math.max(0, Math.floor(now));
