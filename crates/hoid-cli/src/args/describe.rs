@@ -10,8 +10,8 @@ use hoid::model::ContinuousTransferFunction;
 use super::{
     figure::FigureArgs,
     output_options::ShowArgs,
+    parse::parse_duration,
     reading::{FaultArgs, MaskArgs, ReadArgs},
-    recursion::parse_duration,
 };
 
 #[derive(Debug, Args)]

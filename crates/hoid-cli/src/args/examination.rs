@@ -2,13 +2,9 @@
 
 use clap::Args;
 use hoid::analysis::ExaminationOptions;
-use hoid::io::{TimeChoice, TrialChoice};
 use hoid::model::ContinuousTransferFunction;
 
-use super::{
-    reading::{parse_time, parse_trial},
-    recursion::parse_frequency,
-};
+use super::reading::ClockArgs;
 
 /// Options given by the user, which are therefore not searched for.
 #[derive(Debug, Args)]
@@ -26,17 +22,8 @@ pub struct ExaminationArgs {
     /// every target and disturbance is recorded
     #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// Time column, and its unit: s, ms, us, ns, min, h, days, iso, sec+nanosec [default: t, or a column recognised as
-    /// time]
-    #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
-    pub time: Option<TimeChoice>,
-    /// Column that numbers the trials, or t (time restarts at each trial); each trial becomes a record. COLUMN=VALUE,
-    /// such as trial=3, reads one trial [default: t if time restarts]
-    #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
-    pub trial: Option<TrialChoice>,
-    /// Sampling frequency in Hz; replaces the column t
-    #[arg(long, value_name = "HZ", value_parser = parse_frequency, allow_hyphen_values = true)]
-    pub fs: Option<f64>,
+    #[command(flatten)]
+    pub clock: ClockArgs,
     /// Start of the span to use, s [default: whole periods of the excitation]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub from: Option<f64>,
@@ -53,9 +40,9 @@ impl ExaminationArgs {
             output: self.output.clone(),
             excitation: self.excitation.clone(),
             controlled_element: self.controlled_element.clone(),
-            time: self.time.clone(),
-            trial: self.trial.clone(),
-            sampling_hz: self.fs,
+            time: self.clock.time.clone(),
+            trial: self.clock.trial.clone(),
+            sampling_hz: self.clock.fs,
             from_s: self.from,
             to_s: self.to,
             offset_samples: None,

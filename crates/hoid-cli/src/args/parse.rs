@@ -1,4 +1,4 @@
-//! Values as they are typed: spans of numbers, widths of figures.
+//! Values as they are typed: numbers with a range, spans of numbers, widths of figures.
 
 /// `LO..HI`, finite and in order.
 pub fn parse_span(text: &str) -> Result<(f64, f64), String> {
@@ -27,6 +27,28 @@ pub fn parse_width(text: &str) -> Result<f64, String> {
         })
 }
 
+/// Parses a number of samples, at least one.
+pub fn parse_count(text: &str) -> Result<usize, String> {
+    let count = text.trim().parse().ok().filter(|n| *n > 0);
+    count.ok_or_else(|| format!("{text:?} is not a number of samples; write a whole number, 1 or more"))
+}
+
+/// Parses a frequency in Hz.
+pub fn parse_frequency(text: &str) -> Result<f64, String> {
+    positive_number(text)
+        .ok_or_else(|| format!("{text:?} is not a frequency; write a positive number in Hz, such as 100"))
+}
+
+/// Parses a duration in s.
+pub fn parse_duration(text: &str) -> Result<f64, String> {
+    positive_number(text).ok_or_else(|| format!("{text:?} is not a duration; write a positive number in s, such as 5"))
+}
+
+fn positive_number(text: &str) -> Option<f64> {
+    let number = text.trim().parse().ok();
+    number.filter(|x: &f64| *x > 0.0 && x.is_finite())
+}
+
 /// Longest prediction horizon, samples.
 const MAX_HORIZON: usize = 1_000_000;
 
@@ -41,6 +63,12 @@ pub fn parse_horizon(text: &str) -> Result<usize, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn counts_frequencies_and_durations_are_parsed() {
+        assert!(parse_count("0").is_err() && parse_frequency("0").is_err() && parse_duration("nan").is_err());
+        assert_eq!((parse_count(" 7 "), parse_frequency("100")), (Ok(7), Ok(100.0)));
+    }
 
     #[test]
     fn widths_are_parsed() {

@@ -6,8 +6,25 @@ use hoid::model::{Decimation, Detrend, FaultHandling};
 
 use super::{
     choices::choice_parser,
-    recursion::{parse_duration, parse_frequency},
+    parse::{parse_duration, parse_frequency},
 };
+
+/// Times of the rows of record files, and their trials.
+#[derive(Debug, Clone, Args)]
+pub struct ClockArgs {
+    /// Time column, and its unit if it is not recognised: s, ms, us, ns, min, h, days, iso (dates and times),
+    /// sec+nanosec
+    /// [default: t, or a column recognised as time]
+    #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
+    pub time: Option<TimeChoice>,
+    /// Column that numbers the trials, or t (time restarts at each trial); each trial becomes a record. COLUMN=VALUE,
+    /// such as trial=3, reads one trial [default: t if time restarts]
+    #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
+    pub trial: Option<TrialChoice>,
+    /// Sampling frequency in Hz [default: from column t, in s]
+    #[arg(long, value_name = "HZ", value_parser = parse_frequency, allow_hyphen_values = true)]
+    pub fs: Option<f64>,
+}
 
 /// How record files are read.
 #[derive(Debug, Clone, Args)]
@@ -24,18 +41,8 @@ pub struct ReadArgs {
     /// Output column (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
-    /// Time column, and its unit if it is not recognised: s, ms, us, ns, min, h, days, iso (dates and times),
-    /// sec+nanosec
-    /// [default: t, or a column recognised as time]
-    #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
-    pub time: Option<TimeChoice>,
-    /// Column that numbers the trials, or t (time restarts at each trial); each trial becomes a record. COLUMN=VALUE,
-    /// such as trial=3, reads one trial [default: t if time restarts]
-    #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
-    pub trial: Option<TrialChoice>,
-    /// Sampling frequency in Hz [default: from column t, in s]
-    #[arg(long, value_name = "HZ", value_parser = parse_frequency, allow_hyphen_values = true)]
-    pub fs: Option<f64>,
+    #[command(flatten)]
+    pub clock: ClockArgs,
     /// Start of the span to use, s
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub from: Option<f64>,
@@ -163,12 +170,12 @@ fn parse_pair(text: &str) -> Result<(String, &str), String> {
 }
 
 /// The column of the time.
-pub(super) fn parse_time(text: &str) -> Result<TimeChoice, String> {
+fn parse_time(text: &str) -> Result<TimeChoice, String> {
     text.parse::<TimeChoice>().map_err(|error| error.to_string())
 }
 
 /// The trials of a file.
-pub(super) fn parse_trial(text: &str) -> Result<TrialChoice, String> {
+fn parse_trial(text: &str) -> Result<TrialChoice, String> {
     text.parse::<TrialChoice>().map_err(|error| error.to_string())
 }
 

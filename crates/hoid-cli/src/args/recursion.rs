@@ -17,8 +17,15 @@ use hoid::thesis::comparators;
 use hoid::track::Method;
 
 use super::{
-    ReadArgs, choices::choice_parser, figure::FigureArgs, output_options::ShowArgs, parse_span, reading::DecimateArgs,
-    settings::SettingArgs, udp::UdpAddresses,
+    ReadArgs,
+    choices::choice_parser,
+    figure::FigureArgs,
+    output_options::ShowArgs,
+    parse::{parse_count, parse_frequency},
+    parse_span,
+    reading::DecimateArgs,
+    settings::SettingArgs,
+    udp::UdpAddresses,
 };
 
 /// The tracked signal, and how.
@@ -183,42 +190,4 @@ pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
         Some(reason) => Err(reason),
         None => Ok(name.to_lowercase()),
     })
-}
-
-fn parse_count(text: &str) -> Result<usize, String> {
-    match text.trim().parse::<usize>() {
-        Ok(n) if n > 0 => Ok(n),
-        _ => Err(format!(
-            "{text:?} is not a number of samples; write a whole number, 1 or more"
-        )),
-    }
-}
-
-pub(super) fn parse_frequency(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(hz) if hz > 0.0 && hz.is_finite() => Ok(hz),
-        _ => Err(format!(
-            "{text:?} is not a frequency; write a positive number in Hz, such as 100"
-        )),
-    }
-}
-
-pub(super) fn parse_duration(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(s) if s > 0.0 && s.is_finite() => Ok(s),
-        _ => Err(format!(
-            "{text:?} is not a duration; write a positive number in s, such as 5"
-        )),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn counts_and_frequencies_are_parsed() {
-        assert!(parse_count("0").is_err() && parse_frequency("0").is_err() && parse_duration("nan").is_err());
-        assert_eq!((parse_count(" 7 "), parse_frequency("100")), (Ok(7), Ok(100.0)));
-    }
 }

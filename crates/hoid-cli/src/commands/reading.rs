@@ -54,9 +54,9 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
             }
         },
         output: column(&args.output)?,
-        time: args.time.clone(),
-        trial: args.trial.clone(),
-        sampling_hz: args.fs,
+        time: args.clock.time.clone(),
+        trial: args.clock.trial.clone(),
+        sampling_hz: args.clock.fs,
         span_s: (args.from, args.to),
         sparse: values_by_channel("--sparse", &args.sparse)?,
         columns: args.kept_columns(),

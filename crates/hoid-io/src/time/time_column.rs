@@ -15,9 +15,10 @@
 //! name, the unit follows from the size of numbers counted from 1970 (1e11 s would be the year 5138), or else from the
 //! steps: integers with steps of 5 or more are a count, in the unit that gives a sampling frequency from 2 to 2000 Hz.
 //! Times with decimals, such as `10.0`, are in s, and so are integers whose steps are all the same number of minutes
-//! (60, 300, 900 ... s). The note on a unit inferred from the steps names the option that changes it. Numbers from 20 000 to 80 000 or from 700 000 to 800 000 with steps of 0.5 ms to 10 s in days are the serial
-//! days of spreadsheets (from 1900) or the date numbers of MATLAB (from the year 0): in s, the sampling frequency would
-//! be above 8 kHz. The choice is reported.
+//! (60, 300, 900 ... s). The note on a unit inferred from the steps names the option that changes it. Numbers from
+//! 20 000 to 80 000 or from 700 000 to 800 000 with steps of 0.5 ms to 10 s in days are the serial days of spreadsheets
+//! (from 1900) or the date numbers of MATLAB (from the year 0): in s, the sampling frequency would be above 8 kHz. The
+//! choice is reported.
 
 use std::ops::Range;
 
