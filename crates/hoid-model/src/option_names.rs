@@ -106,6 +106,21 @@ fn value_of<'m>(option: &str, rest: &'m str) -> Option<&'m str> {
     is_value.then_some(value)
 }
 
+/// Returns a value as TOML and Python write it: a number as it is, anything else in quotation marks.
+pub fn literal(value: &str) -> String {
+    match value.parse::<f64>() {
+        Ok(_) => value.to_owned(),
+        Err(_) => format!("{value:?}"),
+    }
+}
+
+/// Returns the assignments `NAME=VALUE,...` of a value as the entries of a table, separated by commas.
+pub fn literal_entries(value: &str, entry: impl Fn(&str, String) -> String) -> String {
+    let pairs = value.split(',').filter_map(|pair| pair.split_once('='));
+    let entries: Vec<String> = pairs.map(|(name, value)| entry(name, literal(value))).collect();
+    entries.join(", ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -133,5 +148,11 @@ mod tests {
         ] {
             assert_eq!(rename_options(typed, rename), expected);
         }
+    }
+
+    #[test]
+    fn assignments_become_entries() {
+        let entries = literal_entries("e=0.5,u=deg", |name, value| format!("{name} = {value}"));
+        assert_eq!(entries, "e = 0.5, u = \"deg\"");
     }
 }

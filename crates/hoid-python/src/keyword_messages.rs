@@ -3,7 +3,7 @@
 //! `--new-fs 50` becomes `new_sampling_frequency=50`, `--fill` becomes `fill=True`, and `--trial t=1` becomes
 //! `trial="t=1"`.
 
-use hoid_model::option_names::{NamedOption, Renamed, rename_options};
+use hoid_model::option_names::{NamedOption, Renamed, literal, literal_entries, rename_options};
 use pyo3::pyfunction;
 
 /// Options whose keyword has a different name.
@@ -35,19 +35,11 @@ pub fn in_python(message: &str) -> String {
 }
 
 fn python_argument(option: &str, value: &str) -> String {
-    let quoted = |text: &str| match text.parse::<f64>() {
-        Ok(_) => text.to_owned(),
-        Err(_) => format!("\"{text}\""),
-    };
     if value.chars().all(|c| c.is_ascii_uppercase()) {
         return value.to_owned();
     }
     if !DICTIONARY_OPTIONS.contains(&option) {
-        return quoted(value);
+        return literal(value);
     }
-    let pairs = value.split(',').filter_map(|pair| pair.split_once('='));
-    let pairs: Vec<String> = pairs
-        .map(|(name, value)| format!("\"{name}\": {}", quoted(value)))
-        .collect();
-    format!("{{{}}}", pairs.join(", "))
+    format!("{{{}}}", literal_entries(value, |name, value| format!("{name:?}: {value}")))
 }

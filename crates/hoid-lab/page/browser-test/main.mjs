@@ -342,7 +342,7 @@ disturbance = { rms = 0.5, interleaved = "odd" }
     for (const name of readdirSync(run).filter((name) => name.endsWith("_beh.parquet"))) {
       const { verdict } = hoid("identify", join(run, name), "--from", "0", "--json");
       assert.equal(verdict.level, "doubtful", name);
-      assert.match(verdict.reasons.join(" "), /the display showed f_t .*--role f_t=feedforward/, name);
+      assert.match(verdict.reasons.map((reason) => reason.message).join(" "), /the display showed f_t .*--role f_t=feedforward/, name);
     }
   },
 

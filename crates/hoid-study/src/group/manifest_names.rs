@@ -2,7 +2,7 @@
 //! `--input r` is `conditions.C1.roles = ["r=feedforward"]`. Options without a key in the manifest belong to
 //! `hoid identify`, which takes the runs of the person.
 
-use hoid_model::option_names::{NamedOption, Renamed, rename_options};
+use hoid_model::option_names::{NamedOption, Renamed, literal, literal_entries, rename_options};
 
 /// Keys of the manifest with a single value, by their option.
 const KEYS: [(&str, &str); 19] = [
@@ -85,21 +85,14 @@ fn toml_key(name: &str) -> String {
 }
 
 fn toml_value(option: &str, value: &str) -> String {
-    let one = |value: &str| match value.parse::<f64>() {
-        Ok(_) => value.to_owned(),
-        Err(_) => format!("{value:?}"),
-    };
     if option == "role" {
         return format!("[{value:?}]");
     }
     if !TABLES.contains(&option) {
-        return one(value);
+        return literal(value);
     }
-    let pairs = value.split(',').filter_map(|pair| pair.split_once('='));
-    let pairs: Vec<String> = pairs
-        .map(|(name, value)| format!("{} = {}", toml_key(name), one(value)))
-        .collect();
-    format!("{{ {} }}", pairs.join(", "))
+    let entries = literal_entries(value, |name, value| format!("{} = {value}", toml_key(name)));
+    format!("{{ {entries} }}")
 }
 
 #[cfg(test)]
