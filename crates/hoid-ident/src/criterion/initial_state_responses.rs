@@ -17,6 +17,8 @@
 //! be a difference of numbers that are larger by the inverse of `1 - pole`, and `psi' psi` would lose all digits. The
 //! response to the level does not decay, so its basis vector is as long as the record.
 
+use std::sync::Arc;
+
 use hoid_core::filter::{divide_from, divide_in_place};
 
 use crate::{
@@ -58,6 +60,36 @@ pub(crate) struct InitialHistory<'a> {
     pub weights: Option<&'a [f64]>,
     /// True if u has a level.
     pub level: bool,
+}
+
+/// The last responses that were computed: records of the same length have the same responses.
+#[derive(Debug, Default)]
+pub(super) struct LastResponses {
+    /// C, D and the F of each input.
+    polynomials: Vec<Vec<f64>>,
+    /// Lead, rows, and whether there is a level.
+    size: (usize, usize, bool),
+    responses: Arc<InitialStateResponses>,
+}
+
+impl LastResponses {
+    /// Returns the responses, computed only if they differ from the last ones. With weights or a stationary past they
+    /// are always computed.
+    pub fn of(&mut self, past: &InitialHistory<'_>, rows: usize) -> Arc<InitialStateResponses> {
+        if past.noise.is_some() || past.weights.is_some() {
+            return Arc::new(InitialStateResponses::of(past, rows));
+        }
+        let polynomials = || [past.c, past.d].into_iter().chain(past.f.iter().copied());
+        let size = (past.lead, rows, past.level);
+        if self.size != size || !polynomials().eq(self.polynomials.iter().map(Vec::as_slice)) {
+            *self = Self {
+                polynomials: polynomials().map(<[f64]>::to_vec).collect(),
+                size,
+                responses: Arc::new(InitialStateResponses::of(past, rows)),
+            };
+        }
+        self.responses.clone()
+    }
 }
 
 impl InitialStateResponses {

@@ -1,7 +1,7 @@
 //! The signals of a record: w, v and eps with the least squares initial states, and the filtered signals whose shifts
 //! are the columns of psi.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use hoid_core::filter::divide;
 
@@ -19,7 +19,7 @@ use crate::linalg::least_squares::add_scaled;
 /// Initial states that a pass over a record has eliminated.
 #[derive(Default)]
 pub(super) struct EliminatedStates {
-    pub responses: InitialStateResponses,
+    pub responses: Arc<InitialStateResponses>,
     pub noise: Option<StationaryNoise>,
     pub z: Vec<f64>,
 }
@@ -74,7 +74,7 @@ impl Criterion<'_> {
                 weights,
                 level: data.level,
             };
-            states.responses = InitialStateResponses::of(&past, n - self.first);
+            states.responses = ws.responses.of(&past, n - self.first);
             let from = pad + regressed;
             let own = std::iter::once(&mut ws.w[from..]);
             let mut w: Vec<&mut [f64]> = own.chain(ws.further.iter_mut().map(|s| &mut s.w[from..])).collect();

@@ -206,6 +206,31 @@ fn residuals_are_orthogonal_to_the_free_responses() {
     }
 }
 
+/// The responses to the initial states are computed once for records of the same length.
+#[test]
+fn shared_responses_change_no_digit() {
+    let (first, second) = (record(400), record(500));
+    let records = [
+        (&first.0[..], &first.1[..], true),
+        (&first.0[..], &second.1[..400], true),
+        (&second.0[..], &second.1[..], true),
+        (&second.0[..], &second.1[..], false),
+        (&first.0[..], &first.1[..], false),
+    ];
+    for (orders, theta) in cases() {
+        let mut shared = Workspace::default();
+        for theta in [theta.clone(), theta.iter().map(|x| 0.9 * x).collect()] {
+            for (e, u, level) in records {
+                let data = Data { e, u, level };
+                let c = criterion(orders, vec![data], InitialState::Estimate);
+                let [again, alone] = [&mut shared, &mut Workspace::default()].map(|ws| c.linearise(&theta, ws));
+                assert_eq!(again.sum_of_squares.to_bits(), alone.sum_of_squares.to_bits());
+                assert_eq!((again.descent, again.gram), (alone.descent, alone.gram));
+            }
+        }
+    }
+}
+
 #[test]
 fn estimated_states_of_a_noise_free_record_are_exact() {
     // The record is cut out of a longer one, so its past is unknown; the residuals are still zero.

@@ -7,7 +7,10 @@ use std::{
 
 use hoid_model::Orders;
 
-use super::further_input::{FurtherInput, FurtherSignals};
+use super::{
+    further_input::{FurtherInput, FurtherSignals},
+    initial_state_responses::LastResponses,
+};
 
 /// Signals of one record for one theta. Each signal is preceded by `pad` zeros, so shifts need no special case at the
 /// start.
@@ -22,6 +25,7 @@ pub(crate) struct Workspace {
     pub(super) scratch: Vec<f64>,
     /// Signals of the further inputs.
     pub(super) further: Vec<FurtherSignals>,
+    pub(super) responses: LastResponses,
 }
 
 thread_local! {
