@@ -41,5 +41,8 @@ fn python_argument(option: &str, value: &str) -> String {
     if !DICTIONARY_OPTIONS.contains(&option) {
         return literal(value);
     }
-    format!("{{{}}}", literal_entries(value, |name, value| format!("{name:?}: {value}")))
+    format!(
+        "{{{}}}",
+        literal_entries(value, |name, value| format!("{name:?}: {value}"))
+    )
 }

@@ -22,7 +22,7 @@ use std::sync::Arc;
 use hoid_core::filter::{divide_from, divide_in_place};
 
 use crate::{
-    criterion::stationary_noise::StationaryNoise,
+    criterion::{stationary_noise::StationaryNoise, whitening::whiten},
     linalg::least_squares::{add_scaled, dot},
 };
 
@@ -109,15 +109,11 @@ impl InitialStateResponses {
             } else {
                 impulse_response(f, rows + lead)
             };
-            let mut s = h.clone();
-            s.resize((h.len() + d.len()).min(rows + lead), 0.0);
-            for (i, di) in d.iter().enumerate() {
-                add_scaled(s.get_mut(i + 1..).unwrap_or_default(), *di, &h);
-            }
-            if !c.is_empty() {
-                s.resize(rows + lead, 0.0);
-                divide_in_place(c, &mut s);
-            }
+            let longest = if c.is_empty() { h.len() + d.len() } else { usize::MAX };
+            let mut padded = h.clone();
+            padded.resize(longest.min(rows + lead), 0.0);
+            let mut s = vec![0.0; padded.len()];
+            whiten(c, d, &padded, &mut s, 0);
             // w increases with the state, and the residual decreases with w.
             s.iter_mut().for_each(|v| *v = -*v);
             for i in 0..f.len() {
@@ -143,12 +139,11 @@ impl InitialStateResponses {
             (columns.len(), response)
         });
         if let Some((_, response)) = &level {
-            let mut column: Vec<f64> = response.iter().map(|x| -x).collect();
-            for (i, di) in d.iter().enumerate() {
-                add_scaled(column.get_mut(i + 1..).unwrap_or_default(), -*di, response);
-            }
+            let mut column = vec![0.0; response.len()];
+            whiten(&[], d, response, &mut column, 0);
             column.drain(..lead);
             divide_in_place(c, &mut column);
+            column.iter_mut().for_each(|v| *v = -*v);
             columns.push(column);
         }
         if let Some(weights) = past.weights {
