@@ -739,6 +739,11 @@ fn methods_are_listed_without_a_record() {
         lines.iter().any(|line| line.starts_with("dual-ekf        survey")),
         "{text}"
     );
+    // Options that only methods for comparison have are listed here, and not in help.
+    let window = lines.iter().find(|line| line.starts_with("window ")).unwrap();
+    assert!(window.ends_with("further options: --window, --refit)"), "{window}");
+    let help = stdout_of(directory.path(), &["track", "--help"]);
+    assert!(!help.contains("--refit") && help.contains("--memory"), "{help}");
     let all = json(directory.path(), &["track", "--methods", "--json"]);
     let all = all.as_array().unwrap();
     assert_eq!(all.len(), lines.len());

@@ -1,4 +1,4 @@
-//! Products of vectors.
+//! Products of vectors and of small matrices.
 
 /// Returns `sum_i a_i b_i` over the length of the shorter slice, summed from the first term to the last; zero for empty
 /// slices.
@@ -16,6 +16,15 @@ pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     sum
 }
 
+/// Returns `M C M'`, where M has the given rows.
+pub fn congruence<const K: usize, const S: usize>(rows: &[[f64; S]; K], c: &[[f64; S]; S]) -> [[f64; K]; K] {
+    let of = |a: &[f64; S], b: &[f64; S]| -> f64 {
+        let each = (0..S).map(|i| a[i] * (0..S).map(|j| c[i][j] * b[j]).sum::<f64>());
+        each.sum()
+    };
+    core::array::from_fn(|i| core::array::from_fn(|j| of(&rows[i], &rows[j])))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -28,5 +37,12 @@ mod tests {
         assert_eq!(dot(&a, &b).to_bits(), sum.to_bits());
         assert_eq!(dot(&a[..2], &b), 0.1 * 1.7 - 7.3 * 0.3);
         assert_eq!(dot(&[], &b), 0.0);
+    }
+
+    #[test]
+    fn congruence_is_the_covariance_of_linear_combinations() {
+        let rows = [[1.0, 2.0, 0.0], [0.0, -1.0, 3.0]];
+        let c = [[4.0, 1.0, 0.0], [1.0, 2.0, 0.5], [0.0, 0.5, 1.0]];
+        assert_eq!(congruence(&rows, &c), [[16.0, -2.0], [-2.0, 8.0]]);
     }
 }

@@ -68,6 +68,13 @@ pub fn is_for_comparison(method: &Method) -> bool {
         .any(|own| own.name() == method.name())
 }
 
+/// True for an option that only methods of this crate have; the help text of the command line omits such options.
+pub fn is_option_for_comparison(option: &str) -> bool {
+    let has = |method: &Method| method.spec().settings.iter().any(|setting| setting.name == option);
+    let mut with_option = methods().into_iter().filter(has).peekable();
+    with_option.peek().is_some() && with_option.all(|method| is_for_comparison(&method))
+}
+
 /// Returns the properties of each method, for the command line, plans, Python and the book.
 pub fn registry() -> Vec<MethodSpec> {
     methods().iter().map(Method::spec).collect()

@@ -172,7 +172,8 @@ fn method_help() -> String {
         .map(Method::name)
         .collect();
     format!(
-        "Recursive method. Further methods, for comparison: {}; hoid track --methods lists all methods",
+        "Recursive method. Further methods, for comparison: {}; hoid track --methods lists all methods and the \
+         options that only these have",
         others.join(", ")
     )
 }

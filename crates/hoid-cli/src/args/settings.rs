@@ -25,11 +25,20 @@ pub struct BatchEstimators;
 pub trait Registry {
     /// The available items, in the order of help.
     fn specs() -> Vec<MethodSpec>;
+
+    /// True for an option that help does not show.
+    fn is_hidden(_option: &str) -> bool {
+        false
+    }
 }
 
 impl Registry for RecursiveMethods {
     fn specs() -> Vec<MethodSpec> {
         survey::registry()
+    }
+
+    fn is_hidden(option: &str) -> bool {
+        survey::is_option_for_comparison(option)
     }
 }
 
@@ -173,7 +182,12 @@ fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
 
 impl<R: Registry> Args for SettingArgs<R> {
     fn augment_args(command: Command) -> Command {
-        with_settings(command, &R::specs())
+        let hidden: Vec<&str> = (R::specs().iter().flat_map(|spec| &spec.settings))
+            .map(|setting| setting.name)
+            .filter(|name| R::is_hidden(name))
+            .collect();
+        let command = with_settings(command, &R::specs());
+        (hidden.into_iter()).fold(command, |command, name| command.mut_arg(name, |arg| arg.hide(true)))
     }
 
     fn augment_args_for_update(command: Command) -> Command {

@@ -22,11 +22,13 @@
 //! pilots, this T at two false alarms per hour finds 64 % of sudden changes of the controlled element within 10 s; T
 //! without the fluctuation finds 49 %, and the test of all parameters 35 %.
 
-use hoid_numerics::{cholesky, products::dot};
+use hoid_numerics::{
+    cholesky,
+    products::{congruence, dot},
+};
 
 use super::{
     contrast::{EMPIRICAL_WEIGHT, Matrix, Scores, SolvedSpans, sandwich, wald},
-    operator::congruence,
     sizes::{GAIN_COUNT, STATE_COUNT},
 };
 

@@ -112,7 +112,6 @@ mod sizes;
 mod volatility;
 
 pub use filter::{AdaptiveFilter, REPLAY_SAMPLES_PER_STEP, errors_needed, memory_needed, min_memory};
-pub use operator::congruence;
 pub use prior::AdaptivePrior;
 pub use sizes::{
     DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_HYPOTHESES, MAX_NOISE_ORDER, PARAMETER_COUNT, SIGNAL_COUNT,

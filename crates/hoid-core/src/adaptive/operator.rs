@@ -6,6 +6,8 @@
 //! maps the state to them and P is the covariance of the mixture ([`super::mixture`]). The scatter of other operators
 //! that predict u about as well ([`super::alternatives`]) is added.
 
+use hoid_numerics::products::congruence;
+
 use super::{
     AdaptiveFilter,
     candidate::FIT_FREQUENCIES_RAD_S,
@@ -87,16 +89,4 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
         c
     }
-}
-
-/// Returns `M C M'`, where M has the given rows.
-pub fn congruence<const K: usize>(
-    rows: &[[f64; STATE_COUNT]; K],
-    c: &[[f64; STATE_COUNT]; STATE_COUNT],
-) -> [[f64; K]; K] {
-    let of = |a: &[f64; STATE_COUNT], b: &[f64; STATE_COUNT]| -> f64 {
-        let each = (0..STATE_COUNT).map(|i| a[i] * (0..STATE_COUNT).map(|j| c[i][j] * b[j]).sum::<f64>());
-        each.sum()
-    };
-    core::array::from_fn(|i| core::array::from_fn(|j| of(&rows[i], &rows[j])))
 }

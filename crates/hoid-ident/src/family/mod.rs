@@ -55,6 +55,7 @@
 //! | `intersample` | intersample behaviour of the error |
 //! | `low_noise` | starts by output error, for little or no noise |
 //! | `open_loop` | crossover and phase margin |
+//! | `known_response` | an operator at one frequency with the error of its response |
 //! | `loop_shape` | all crossings of the open loop, and the stability of the closed loop |
 //! | `of_polynomials`, `pole_reading` | conversion of polynomials to an operator; assignment of the poles |
 //! | `diagnostics` | findings for and against a result |
@@ -78,6 +79,7 @@ mod instrumental;
 mod intersample;
 mod jackknife;
 mod joint;
+mod known_response;
 mod layout;
 mod line_fit;
 mod lines;
@@ -110,8 +112,9 @@ pub use clusters::ClusterKind;
 pub use deviation::{Misfit, ResponseDeviation};
 pub use instrumental::InstrumentalFit;
 pub use intersample::Intersample;
+pub use known_response::KnownResponse;
 pub use line_fit::LineFit;
-pub use loop_shape::{KnownResponse, LoopShape};
+pub use loop_shape::LoopShape;
 pub use of_polynomials::{FamilyConversion, family_from_polynomials};
 pub use open_loop::{Crossover, LoopMeasures, loop_measures};
 pub use options::{FamilyEstimator, HIGHEST_NOISE_ORDER};

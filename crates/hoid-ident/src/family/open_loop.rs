@@ -15,7 +15,7 @@ use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, SampleTi
 use super::{
     clusters::quantile,
     intersample::Intersample,
-    loop_shape::KnownResponse,
+    known_response::KnownResponse,
     mixture::{Component, Mixture, widen_interval},
 };
 

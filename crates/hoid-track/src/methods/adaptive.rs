@@ -18,7 +18,6 @@ use hoid_core::{
     adaptive::{
         AdaptiveFilter, DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT,
         basis::Basis,
-        congruence,
         defaults::{self, DefaultOperator},
         memory_needed,
     },
@@ -29,6 +28,7 @@ use hoid_model::{
     SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate},
 };
+use hoid_numerics::products::congruence;
 use starting_point::{StartingPoint, initial_estimate};
 
 use crate::{

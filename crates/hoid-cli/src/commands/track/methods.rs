@@ -1,9 +1,9 @@
-//! `hoid track --methods`: list of the recursive methods.
+//! `hoid track --methods`: list of the recursive methods, with the options that help does not show.
 
-use hoid::survey::{ListedMethod, list_methods};
+use hoid::survey::{ListedMethod, is_option_for_comparison, list_methods};
 use serde_json::{Value, json};
 
-use crate::{error::CliError, json, output};
+use crate::{args::flag, error::CliError, json, output};
 
 /// Prints the methods, one per line, or as a JSON list.
 pub fn list(as_json: bool) -> Result<(), CliError> {
@@ -26,8 +26,14 @@ fn method_line(one: &ListedMethod) -> String {
         _ => "",
     };
     let spec = &one.spec;
+    let hidden = spec.settings.iter().filter(|s| is_option_for_comparison(s.name));
+    let hidden: Vec<String> = hidden.map(|s| format!("--{}", flag(s.name))).collect();
+    let options = match hidden.as_slice() {
+        [] => String::new(),
+        all => format!("; further options: {}", all.join(", ")),
+    };
     format!(
-        "{:15} {mark:8} {} ({}; {})\n",
+        "{:15} {mark:8} {} ({}; {}{options})\n",
         spec.name,
         spec.help,
         structure_names(one).join(", "),
