@@ -7,13 +7,15 @@
 //!
 //! `T = d' C^-1 d`
 //!
-//! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change (G. C. Chow, *Econometrica* 28
-//! (1960) 591-605). T is computed for a short and for a long present, since small changes take more data to detect than
-//! large ones. One second between past and present is left out, since a change need not coincide with the border of a
+//! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change, and four more for each further
+//! input (G. C. Chow, *Econometrica* 28 (1960) 591-605). T is computed for a short and for a long present, since small
+//! changes take more data to detect than large ones. One second between past and present is left out, since a change need not coincide with the border of a
 //! block.
 //!
 //! A third statistic, for the short present, supposes that only gain and lead change (`gain_and_lead`). It has 2 degrees
-//! of freedom.
+//! of freedom. With further inputs there is such a statistic for each response. A statistic of all parameters of one
+//! response, with those of the others free, would have little power: a few seconds of data show that u is predicted
+//! worse, but hardly which response changed.
 //!
 //! **Normalisation.** Some operators vary more than others. T is therefore divided by the square root of c, the level
 //! of T relative to a chi-square in the absence of a change. c is estimated from the mean of `ln T`, whose expected
@@ -39,21 +41,13 @@ use super::{
     difference::Difference,
     gain_and_lead,
     last_blocks::{BLOCK_S, LastBlocks, MAX_BLOCKS},
-    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT},
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, correction_places},
 };
 
 /// Expected value of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
 const MEAN_LOG_CHI_SQUARE: f64 = 0.115_931_515_658_412_45;
-/// Number of tested parameters: gains and dynamics.
-const TESTED_COUNT: usize = GAIN_COUNT + DYNAMICS_COUNT;
-/// Indices of the tested parameters in the state: all states except the level.
-const TESTED_STATES: [usize; TESTED_COUNT] = [0, 1, 2, LINEAR_COUNT, LINEAR_COUNT + 1, LINEAR_COUNT + 2];
-/// Numbers of pairs of degrees of freedom of the statistics: all parameters, for the short and for the long present, and
-/// gain and lead.
-const PAIR_COUNTS: [u32; 3] = [TESTED_COUNT as u32 / 2, TESTED_COUNT as u32 / 2, 1];
-const GAIN_AND_LEAD: usize = 2;
-/// Factors of the log significances of the statistics.
-const SIGNIFICANCE_FACTORS: [f64; 3] = [1.0, 1.0, 1.9];
+/// Factor of the log significance of the statistics of gain and lead.
+const GAIN_AND_LEAD_FACTOR: f64 = 1.9;
 /// Number of blocks left out between past and present.
 const GUARD_BLOCKS: usize = 2;
 /// Minimum number of blocks in a present that starts after a gap.
@@ -86,6 +80,7 @@ pub struct DetectorSettings {
 /// Statistic, with its level in the absence of a change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
+    /// Number of pairs of degrees of freedom.
     pairs: u32,
     level: f64,
     levels: f64,
@@ -136,22 +131,27 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
 
 /// Detector of changes of the operator.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Detector {
+pub struct Detector<const I: usize, const S: usize> {
     settings: DetectorSettings,
-    /// Statistics of all parameters, for the short and for the long present, and of gain and lead.
-    statistics: [Statistic; 3],
+    /// Statistics of all parameters, for the short and for the long present.
+    statistics: [Statistic; 2],
+    /// Statistics of gain and lead of each input.
+    gain_and_lead: [Statistic; I],
     /// Number of blocks since the last change was declared.
     since: u64,
     declared: bool,
-    declared_contrast: Contrast,
+    declared_contrast: Contrast<S>,
     innovation_variances: [f64; 2],
-    difference: Difference,
+    difference: Difference<S>,
     ago: usize,
 }
 
-crate::state!([] Detector { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
+crate::state!([const I: usize, const S: usize] Detector<I, S> { statistics, gain_and_lead, since, declared, declared_contrast, innovation_variances, difference, ago });
 
-impl Detector {
+impl<const I: usize, const S: usize> Detector<I, S> {
+    /// Number of pairs of degrees of freedom of the statistic: gains and dynamics are tested, but not the level.
+    const PAIR_COUNT: u32 = (S as u32 - 1) / 2;
+
     /// Builds the detector. Returns `None` if the settings are not valid or need more blocks than can be stored.
     pub fn new(settings: DetectorSettings) -> Option<Self> {
         let [short, long] = settings.recent;
@@ -161,7 +161,8 @@ impl Detector {
         let sound = settings.dynamics.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
             settings,
-            statistics: PAIR_COUNTS.map(Statistic::new),
+            statistics: [Statistic::new(Self::PAIR_COUNT); 2],
+            gain_and_lead: [Statistic::new(1); I],
             since: u64::MAX >> 12,
             declared: false,
             declared_contrast: Contrast::default(),
@@ -171,14 +172,13 @@ impl Detector {
         })
     }
 
-    /// Tests the stored blocks; the last one is new. `dynamics` are the current corrections of natural frequency,
-    /// damping and delay, relative to the basis of the blocks, and `gain_and_lead` contains the directions of gain and
-    /// lead in that basis.
-    pub(super) fn test(
+    /// Tests the stored blocks; the last one is new. `mean` is the current state, in the basis of the blocks, and
+    /// `gain_and_lead` contains the directions of gain and lead of each input in that basis.
+    pub(super) fn test<const P: usize>(
         &mut self,
-        last: &LastBlocks,
-        dynamics: [f64; DYNAMICS_COUNT],
-        gain_and_lead: [[f64; GAIN_COUNT]; 2],
+        last: &LastBlocks<S, P>,
+        mean: &[f64; S],
+        gain_and_lead: &[[[f64; GAIN_COUNT]; 2]; I],
     ) {
         self.declared = false;
         self.since += 1;
@@ -189,15 +189,15 @@ impl Detector {
             .min(usize::try_from(self.since).unwrap_or(MAX_BLOCKS) + self.ago);
         let blocks = &last.blocks()[last.blocks().len() - known..];
         let fresh = last.fresh_block_count();
-        let spans = |recent| self.solve(self.spans(blocks, fresh, recent)?, dynamics);
+        let spans = |recent| self.solve(self.spans(blocks, fresh, recent)?, mean);
         let [short, long] = self.settings.recent.map(spans);
-        let of_all = |spans: &SolvedSpans<'_>| Contrast::of(spans, EMPIRICAL_WEIGHT).wald_statistic(TESTED_STATES);
-        let values = [
-            short.as_ref().and_then(of_all),
-            long.as_ref().and_then(of_all),
-            short.and_then(|spans| gain_and_lead::wald_statistic(&spans, gain_and_lead)),
-        ];
-        for (statistic, value) in self.statistics.iter_mut().zip(values) {
+        let of_all =
+            |spans: &SolvedSpans<'_, S, P>| Contrast::of(spans, EMPIRICAL_WEIGHT).wald_statistic(|i| i != GAIN_COUNT);
+        let values = [&short, &long].map(|spans| spans.as_ref().and_then(of_all));
+        let of_inputs: [Option<f64>; I] =
+            core::array::from_fn(|input| gain_and_lead::wald_statistic(short.as_ref()?, input, gain_and_lead[input]));
+        let statistics = self.statistics.iter_mut().chain(&mut self.gain_and_lead);
+        for (statistic, value) in statistics.zip(values.into_iter().chain(of_inputs)) {
             match value {
                 Some(t) => statistic.update(t),
                 None => statistic.log_significance = 0.0,
@@ -207,12 +207,17 @@ impl Detector {
             self.declared = true;
             self.since = 0;
             let [_, long] = self.settings.recent;
-            self.locate_change(blocks, dynamics, long.min(last.fresh_block_count()));
+            self.locate_change(blocks, mean, long.min(last.fresh_block_count()));
         }
     }
 
     /// Returns the blocks of the past and of a present of the given length; `None` if there are too few blocks.
-    fn spans<'b>(&self, blocks: &'b [Block], fresh: usize, recent: usize) -> Option<[&'b [Block]; 2]> {
+    fn spans<'b, const P: usize>(
+        &self,
+        blocks: &'b [Block<S, P>],
+        fresh: usize,
+        recent: usize,
+    ) -> Option<[&'b [Block<S, P>]; 2]> {
         let DetectorSettings { least, most, .. } = self.settings;
         let enough = MIN_BLOCKS_AFTER_GAP.min(self.settings.recent[0]);
         let recent = recent.min(fresh);
@@ -226,12 +231,12 @@ impl Detector {
     /// the covariance estimated from the scores to that given by the noise model, for the difference between the two
     /// halves of the past. The covariance from the scores alone is too uncertain to distinguish gains from a delay, and
     /// the scores of the present contain the change.
-    fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS_COUNT], recent: usize) {
-        let mut best: Option<Contrast> = None;
+    fn locate_change<const P: usize>(&mut self, blocks: &[Block<S, P>], mean: &[f64; S], recent: usize) {
+        let mut best: Option<Contrast<S>> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
         for after in 1..=self.ago {
             let (past, present) = blocks.split_at(blocks.len() - after);
-            let Some(spans) = self.solve([past, present], dynamics) else {
+            let Some(spans) = self.solve([past, present], mean) else {
                 continue;
             };
             let contrast = Contrast::of(&spans, MODEL_ONLY_WEIGHT);
@@ -241,7 +246,7 @@ impl Detector {
         }
         let (past, present) = blocks.split_at(blocks.len() - self.ago);
         let halves = past.split_at(past.len() / 2);
-        let dispersion = self.solve([halves.0, halves.1], dynamics).and_then(|halves| {
+        let dispersion = self.solve([halves.0, halves.1], mean).and_then(|halves| {
             let [by_model, shown] = [MODEL_ONLY_WEIGHT, EMPIRICAL_WEIGHT].map(|w| Contrast::of(&halves, w));
             shown.dispersion(&by_model)
         });
@@ -250,9 +255,19 @@ impl Detector {
         self.difference = Difference::of(&self.declared_contrast).unwrap_or_default();
     }
 
-    /// Solves past and present, each with the prior of the dynamics.
-    fn solve<'b>(&self, sides: [&'b [Block]; 2], dynamics: [f64; DYNAMICS_COUNT]) -> Option<SolvedSpans<'b>> {
-        SolvedSpans::new(sides, |sum| sum.with_prior(dynamics, self.settings.dynamics))
+    /// Solves past and present, each with the prior of the corrections.
+    fn solve<'b, const P: usize>(
+        &self,
+        sides: [&'b [Block<S, P>]; 2],
+        mean: &[f64; S],
+    ) -> Option<SolvedSpans<'b, S, P>> {
+        let mut deviations = [0.0; S];
+        for input in 0..I {
+            for (place, deviation) in correction_places(input).into_iter().zip(self.settings.dynamics) {
+                deviations[place] = deviation;
+            }
+        }
+        SolvedSpans::new(sides, |sum| sum.with_prior(mean, &deviations))
     }
 
     /// Returns the time in s between the last declared change and its declaration.
@@ -263,20 +278,22 @@ impl Detector {
     /// Returns the log significance in nats at the last block: the largest of the statistics, where that of gain and
     /// lead counts 1.9 times; zero while there are too few blocks.
     pub fn log_significance(&self) -> f64 {
-        let each = self.statistics.iter().zip(SIGNIFICANCE_FACTORS);
-        each.fold(0.0, |most, (s, factor)| (factor * s.log_significance).max(most))
+        let all = self.statistics.iter().map(|s| s.log_significance);
+        let of_gain_and_lead = self
+            .gain_and_lead
+            .iter()
+            .map(|s| GAIN_AND_LEAD_FACTOR * s.log_significance);
+        all.chain(of_gain_and_lead).fold(0.0, |most, s| s.max(most))
     }
 
     /// Returns the typical ratio of T of all parameters to a chi-square in the absence of a change: the larger of the
     /// ratios for the short and for the long present.
     pub fn typical_level(&self) -> f64 {
-        self.statistics[..GAIN_AND_LEAD]
-            .iter()
-            .fold(1.0, |most, s| s.scale().max(most))
+        self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }
 
     /// Returns the difference between present and past at the last declared change, computed with all parameters free.
-    pub fn contrast(&self) -> &Contrast {
+    pub fn contrast(&self) -> &Contrast<S> {
         &self.declared_contrast
     }
 
@@ -291,7 +308,7 @@ impl Detector {
     }
 
     /// Returns the parameters that differ at the last declared change, and the sizes of their changes.
-    pub fn difference(&self) -> &Difference {
+    pub fn difference(&self) -> &Difference<S> {
         &self.difference
     }
 

@@ -106,11 +106,24 @@ pub(crate) struct GuardDecision {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct RawSample {
     values: [f64; CHANNEL_COUNT],
+    /// External signal; NaN if it is not known.
+    reference: f64,
     held: [bool; CHANNEL_COUNT],
     moves: bool,
 }
 
-hoid_core::state!([] RawSample { values, held, moves });
+hoid_core::state!([] RawSample { values, reference, held, moves });
+
+impl RawSample {
+    /// Returns the sample with other values of e and u.
+    fn with_values(&self, [e, u]: [f64; CHANNEL_COUNT]) -> Sample {
+        Sample {
+            e,
+            u,
+            reference: Some(self.reference).filter(|reference| reference.is_finite()),
+        }
+    }
+}
 
 /// A pause, in which the estimate is kept constant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
