@@ -5,6 +5,7 @@ use hoid_model::Record;
 use hoid_numerics::statistics::mean;
 
 use crate::{
+    change::Change,
     diagnostics::COMPARED_RAD_S,
     idle::idle_head,
     open_loop::OpenLoop,
@@ -97,6 +98,14 @@ pub(crate) fn track_with(
         each(&mut tracker, k);
         if let Some(change) = tracker.change() {
             trace.changes.push((t, change));
+        }
+        if let Some(revised) = tracker.revised_change()
+            && let Some((_, last)) = trace.changes.last_mut()
+        {
+            *last = Change {
+                odds: last.odds,
+                ..revised
+            };
         }
         if let Some(event) = tracker.event() {
             if let Some(from) = event.withdrawn_from_s(t, sample_time) {

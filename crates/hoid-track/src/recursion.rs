@@ -66,6 +66,10 @@ pub trait Recursion: State + Send + Sync {
     fn change(&self) -> Option<Change> {
         None
     }
+    /// Returns the last declared change if its parameters were estimated again at the last sample, from more data.
+    fn revised_change(&self) -> Option<Change> {
+        None
+    }
     /// Returns the number of failed fits and the reason for the last failure, for methods that fit.
     fn failures(&self) -> Option<(usize, String)> {
         None

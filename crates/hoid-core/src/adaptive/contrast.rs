@@ -157,7 +157,7 @@ pub(super) struct SolvedSpans<'b, const S: usize, const P: usize> {
     pub sums: [Block<S, P>; 2],
     pub solutions: [Solution<S>; 2],
     /// Residual sum of squares over both spans.
-    residual_squares: f64,
+    pub residual_squares: f64,
     /// Variance sigma^2 over both spans.
     pub variance: f64,
 }

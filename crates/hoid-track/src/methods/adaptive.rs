@@ -408,6 +408,32 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> AdaptiveRec
         of_input.into_iter().any(|group| difference.has_changed(group))
     }
 
+    /// Returns the last declared change.
+    fn last_change(&self) -> Option<Change> {
+        let detector = self.model.detector();
+        let (pairs, z) = self.changed_parameters(0);
+        let further = self.further_change();
+        let told = detector.contrast();
+        let variance = detector.innovation_variances();
+        let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
+        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.typical_level()).sqrt();
+        let [k_e, k_e_dot, omega_nm_rad_s, zeta_nm, tau_e_s] = pairs;
+        Some(Change {
+            seconds_ago: detector.detection_delay_s(),
+            odds: self.change_odds()?,
+            k_e,
+            k_e_dot,
+            omega_nm_rad_s,
+            zeta_nm,
+            tau_e_s,
+            t_l_s: [0, 1].map(|side| k_e_dot[side].value / k_e[side].value),
+            innovation_variance: variance,
+            z: [z[0], z[1], z[2], z[3], level, z[4]],
+            of_operator: I == 1 || self.has_changed(0) || detector.difference().has_changed(ParameterGroup::System),
+            further,
+        })
+    }
+
     fn further_change(&self) -> Option<FurtherChange> {
         if I == 1 {
             return None;
@@ -540,31 +566,11 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> Recursion f
     }
 
     fn change(&self) -> Option<Change> {
-        let detector = self.model.detector();
-        if !detector.is_change_declared() {
-            return None;
-        }
-        let (pairs, z) = self.changed_parameters(0);
-        let further = self.further_change();
-        let told = detector.contrast();
-        let variance = detector.innovation_variances();
-        let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
-        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.typical_level()).sqrt();
-        let [k_e, k_e_dot, omega_nm_rad_s, zeta_nm, tau_e_s] = pairs;
-        Some(Change {
-            seconds_ago: detector.detection_delay_s(),
-            odds: self.change_odds()?,
-            k_e,
-            k_e_dot,
-            omega_nm_rad_s,
-            zeta_nm,
-            tau_e_s,
-            t_l_s: [0, 1].map(|side| k_e_dot[side].value / k_e[side].value),
-            innovation_variance: variance,
-            z: [z[0], z[1], z[2], z[3], level, z[4]],
-            of_operator: I == 1 || self.has_changed(0) || detector.difference().has_changed(ParameterGroup::System),
-            further,
-        })
+        self.model.detector().is_change_declared().then(|| self.last_change())?
+    }
+
+    fn revised_change(&self) -> Option<Change> {
+        self.model.detector().is_change_revised().then(|| self.last_change())?
     }
 
     fn response(&self, omega_rad_s: f64) -> Option<Response> {

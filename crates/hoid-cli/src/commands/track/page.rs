@@ -177,7 +177,8 @@ fn further_response_table(tracked: &TrackingResult) -> String {
     let mut header = vec!["t in s".to_owned()];
     let has_parameters = (0..trace.len()).any(|row| trace.further_operator(row).is_some());
     if has_parameters {
-        header.extend(FurtherOperator::NAMES.map(str::to_owned));
+        let [k_f, k_f_dot, tau_f] = FurtherOperator::NAMES;
+        header.extend([k_f.to_owned(), k_f_dot.to_owned(), format!("{tau_f} (s)")]);
     }
     header.extend(
         at.iter()
