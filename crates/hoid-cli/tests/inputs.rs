@@ -322,21 +322,11 @@ fn omitted_displayed_target_is_reported() {
 fn recursion_tracks_both_responses() {
     let at = TempDir::new().unwrap();
     let run = simulate_runs(at.path(), PURSUIT, 1).remove(0);
-    let two = [
-        "track",
-        &run,
-        "--input",
-        "e",
-        "--input",
-        "f_t",
-        "--role",
-        "f_t=feedforward",
-        "--at",
-        "2,4",
-    ];
+    let two = ["track", &run, "--input", "e", "--input", "f_t", "--at", "2,4"];
     let model = ["--method", "rpem", "--orders", "nb=2,2,nf=2,nd=1", "--nk", "14,1"];
+    let role = ["--role", "f_t=feedforward"];
     let out = ["--out", "trace.csv", "--every", "60", "--json"];
-    let found = json(at.path(), &[&two[..], &model, &out].concat());
+    let found = json(at.path(), &[&two[..], &role, &model, &out].concat());
     let channels = found["channels"].as_array().unwrap();
     let names: Vec<&str> = channels.iter().map(|c| c["input"].as_str().unwrap()).collect();
     let roles: Vec<&str> = channels.iter().map(|c| c["role"].as_str().unwrap()).collect();
