@@ -9,8 +9,8 @@
 //!
 //! has a chi-square distribution with `nu = 6` degrees of freedom if there is no change, and four more for each further
 //! input (G. C. Chow, *Econometrica* 28 (1960) 591-605). T is computed for a short and for a long present, since small
-//! changes take more data to detect than large ones. One second between past and present is left out, since a change need not coincide with the border of a
-//! block.
+//! changes take more data to detect than large ones. One second between past and present is left out, since a change
+//! need not coincide with the border of a block.
 //!
 //! A third statistic, for the short present, supposes that only gain and lead change (`gain_and_lead`). It has 2 degrees
 //! of freedom. With further inputs there is such a statistic for each response. A statistic of all parameters of one

@@ -40,8 +40,8 @@ const STATIONARY_AFTER_S: f64 = 0.1;
 /// Time in s in which the filters settle after a span of constant signals.
 const SETTLING_S: f64 = 2.0;
 
-/// Adaptive recursion. E is the memory for past samples, I the number of inputs, and S, M and P are the sizes that follow
-/// from it ([`super::sizes`]).
+/// Adaptive recursion. E is the memory for past samples and I the number of inputs; S ([`state_count`]), M
+/// ([`sum_count`]) and P ([`product_count`]) follow from I.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveFilter<
     E,

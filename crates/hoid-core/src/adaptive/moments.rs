@@ -1,8 +1,8 @@
 //! Step 4: the second moments of a block, which are a sufficient statistic for the likelihood of a hypothesis.
 //!
 //! After the whitening filter, a sample consists of the signals of the basis of each input and the level, `z` (seven
-//! numbers for one input), and the output y. The response in a state x (gains, level, corrections) is `w(x)' z`. It is bilinear in gains and
-//! corrections, so the block enters the likelihood only through
+//! numbers for one input), and the output y. The response in a state x (gains, level, corrections) is `w(x)' z`. It is
+//! bilinear in gains and corrections, so the block enters the likelihood only through
 //!
 //! `sum z z'`, `sum z y`, `sum y^2`.
 //!

@@ -506,18 +506,25 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> Recursion f
         let Some(of_d) = self.model.noise_model().covariance() else {
             return false;
         };
+        let write_block = |input: usize, block: &mut [f64]| {
+            let c = self.model.operator_covariance_of(input);
+            let whole = std::array::from_fn(|i| std::array::from_fn(|j| c[i][j]));
+            self.reported[input].covariance(&whole, block);
+            if input == 0 {
+                self.reported[input].write_noise_covariance(&of_d, block);
+            }
+        };
+        if I == 1 {
+            write_block(0, into);
+            return true;
+        }
         into.fill(0.0);
         // The coefficients of different inputs are reported without their covariance.
         let (width, mut first) = (self.theta.len(), 0);
         for (input, reported) in self.reported.iter().enumerate() {
-            let c = self.model.operator_covariance_of(input);
-            let whole = std::array::from_fn(|i| std::array::from_fn(|j| c[i][j]));
             let own = reported.theta().len();
             let mut block = vec![0.0; own * own];
-            reported.covariance(&whole, &mut block);
-            if input == 0 {
-                reported.write_noise_covariance(&of_d, &mut block);
-            }
+            write_block(input, &mut block);
             for (i, row) in block.chunks_exact(own).enumerate() {
                 let at = (first + i) * width + first;
                 into[at..at + own].copy_from_slice(row);
