@@ -43,6 +43,19 @@ impl TrackPlan {
             false => ranges,
         };
         let combinations = ranges.combinations()?;
+        if let Some(further) = &options.further
+            && combinations.len() > 1
+        {
+            return Err(IdentError::BadOption {
+                option: "the orders of a model with two inputs".to_owned(),
+                found: format!("{} combinations of orders", combinations.len()),
+                expected: format!(
+                    "one number for each order, and one delay in samples for each input: the order search fits only \
+                     models with one input, and so ignores {}",
+                    further.channel
+                ),
+            });
+        }
         if matches!(options.start, StartSource::Theta(_)) && combinations.len() > 1 {
             return Err(several_models_error());
         }
