@@ -1,6 +1,6 @@
 //! Test of inputs for linear dependence.
 
-use crate::{IdentError, linalg::least_squares::dot};
+use crate::{IdentError, linalg::vectors::dot};
 
 /// Fraction of the power of an input that the previous inputs must leave unexplained.
 const MIN_UNEXPLAINED_SHARE: f64 = 1e-9;

@@ -14,7 +14,7 @@ use hoid_ident::{
 };
 use hoid_model::{Orders, SampleTime, Structure, uncertainty::Estimate};
 
-use crate::{response::Response, setup::DEFAULT_DELAY_S};
+use crate::{response::Response, shared_options::DEFAULT_DELAY_S};
 
 /// Frequencies in rad/s at which the response to a further input is compared, and reported if no others are requested.
 pub const FURTHER_RESPONSES_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];

@@ -12,7 +12,8 @@ use crate::{
     memory::Memory,
     method::invalid_option,
     methods::Method,
-    setup::{DEFAULT_DELAY_S, Setup, StartSource, parameter_names, polynomial_orders},
+    setup::{Setup, StartSource, parameter_names, polynomial_orders},
+    shared_options::DEFAULT_DELAY_S,
     start::check_sample_time,
 };
 

@@ -5,11 +5,8 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use crate::{
-    forgetting::ForgettingRule,
-    methods::Method,
-    options::TrackOptions,
-    person_prior::PersonPrior,
-    setup::{DEFAULT_DELAY_S, StartSource},
+    forgetting::ForgettingRule, methods::Method, options::TrackOptions, person_prior::PersonPrior, setup::StartSource,
+    shared_options::DEFAULT_DELAY_S,
 };
 use hoid_ident::{
     Choice, IdentError, NamedOrders, OrderRanges,

@@ -37,8 +37,6 @@ pub(super) const MAX_SIGNAL: f64 = 1e100;
 /// the basis point in one step (relative for omega and zeta, in s for tau).
 const BASIS_POINT_RANGE: [[f64; 2]; DYNAMICS_COUNT] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
 const CORRECTION_RANGE: [[f64; 2]; DYNAMICS_COUNT] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
-/// Longest delay in s.
-pub(super) const LONGEST_DELAY_S: f64 = 0.9;
 /// Frequencies in rad/s at which K_e and K_e_dot are fitted to the numerator of the operator.
 pub(super) const FIT_FREQUENCIES_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Initial time in s during which blocks do not count as evidence.

@@ -2,11 +2,13 @@
 
 use super::{
     basis::Point,
-    candidate::LONGEST_DELAY_S,
     detector::DetectorSettings,
     mixture::ChangePrior,
     sizes::{DYNAMICS_COUNT, START_COUNT},
 };
+
+/// Longest delay in s.
+pub(super) const LONGEST_DELAY_S: f64 = 0.9;
 
 /// Prior of the delay of a further input.
 #[derive(Debug, Clone, Copy, PartialEq)]

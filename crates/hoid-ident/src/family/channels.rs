@@ -46,7 +46,7 @@ use crate::{
     },
     grey_box::parametrisation::Parametrisation,
     independent_inputs::check_independent_inputs,
-    linalg::least_squares::add_scaled,
+    linalg::vectors::add_scaled,
     several_inputs::SeveralInputs,
 };
 

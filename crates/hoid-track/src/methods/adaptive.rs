@@ -46,7 +46,8 @@ use crate::{
     recursion::{Recursion, Sample, StepOutcome},
     reported::ReportedModel,
     response::Response,
-    setup::{DEFAULT_DELAY_S, Setup, StartSource},
+    setup::{Setup, StartSource},
+    shared_options::DEFAULT_DELAY_S,
     start::StartState,
 };
 
