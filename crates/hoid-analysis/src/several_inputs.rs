@@ -139,8 +139,29 @@ pub fn several_inputs(
 /// [`AnalysisError::Options`] if the text is not a role, names something other than a further input, or gives a preview
 /// or a form, which polynomials do not have.
 pub fn parse_roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, AnalysisError> {
+    let all = parse_seen_channels(further, text)?;
+    if let Some(named) = all
+        .iter()
+        .find(|named| **named != SeenChannel::new(named.name.clone(), named.role))
+    {
+        return Err(AnalysisError::Options {
+            reason: format!(
+                "role: found {named}; polynomials have neither a preview nor a form: expected {}={}",
+                named.name, named.role
+            ),
+        });
+    }
+    Ok(all.into_iter().map(|named| named.role).collect())
+}
+
+/// Like [`parse_roles`], with the preview and the forms of each input.
+///
+/// # Errors
+/// [`AnalysisError::Options`] if the text is not a role or names something other than a further input.
+pub(crate) fn parse_seen_channels(further: &[String], text: &str) -> Result<Vec<SeenChannel>, AnalysisError> {
     let options = |reason: String| AnalysisError::Options { reason };
-    let mut all = vec![ChannelRole::default(); further.len()];
+    let default = |name: &String| SeenChannel::new(name.clone(), ChannelRole::default());
+    let mut all: Vec<SeenChannel> = further.iter().map(default).collect();
     for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
         let named: SeenChannel = part
             .parse()
@@ -152,13 +173,7 @@ pub fn parse_roles(further: &[String], text: &str) -> Result<Vec<ChannelRole>, A
                 further.join(", ")
             )));
         };
-        if named != SeenChannel::new(named.name.clone(), named.role) {
-            return Err(options(format!(
-                "role: found {part:?}; polynomials have neither a preview nor a form: expected {}={}",
-                named.name, named.role
-            )));
-        }
-        all[index] = named.role;
+        all[index] = named;
     }
     Ok(all)
 }

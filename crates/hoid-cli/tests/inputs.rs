@@ -159,8 +159,8 @@ fn invalid_inputs_are_refused_with_a_remedy() {
             "--role applies only to",
         ),
         (
-            &["track", run, "--input", "e", "--input", "f_t"],
-            "use rls or rpem for f_t",
+            &["track", run, "--input", "e", "--input", "f_t", "--method", "window"],
+            "use adaptive, rls or rpem for f_t",
         ),
     ] {
         let (_, message) = failure_of(at.path(), options);
@@ -322,21 +322,11 @@ fn omitted_displayed_target_is_reported() {
 fn recursion_tracks_both_responses() {
     let at = TempDir::new().unwrap();
     let run = simulate_runs(at.path(), PURSUIT, 1).remove(0);
-    let two = [
-        "track",
-        &run,
-        "--input",
-        "e",
-        "--input",
-        "f_t",
-        "--role",
-        "f_t=feedforward",
-        "--at",
-        "2,4",
-    ];
+    let two = ["track", &run, "--input", "e", "--input", "f_t", "--at", "2,4"];
     let model = ["--method", "rpem", "--orders", "nb=2,2,nf=2,nd=1", "--nk", "14,1"];
+    let role = ["--role", "f_t=feedforward"];
     let out = ["--out", "trace.csv", "--every", "60", "--json"];
-    let found = json(at.path(), &[&two[..], &model, &out].concat());
+    let found = json(at.path(), &[&two[..], &role, &model, &out].concat());
     let channels = found["channels"].as_array().unwrap();
     let names: Vec<&str> = channels.iter().map(|c| c["input"].as_str().unwrap()).collect();
     let roles: Vec<&str> = channels.iter().map(|c| c["role"].as_str().unwrap()).collect();
@@ -369,7 +359,8 @@ fn recursion_tracks_both_responses() {
 
     for (options, words) in [
         (&["--method", "rpem"][..], "give nk for each in samples"),
-        (&["--method", "adaptive", "--nk", "14,1"], "rls or rpem"),
+        (&["--orders", "nb=3"], "nb = 2 and nf = 2"),
+        (&["--role", "f_t=feedforward/derivative"], "drop /derivative"),
         (&["--method", "rpem", "--nk", "14,1,3"], "3 numbers for 2 inputs"),
         (&["--method", "rpem", "--nk", "0.2s,0.1s"], "one number of samples"),
         (&["--method", "rpem", "--nk", "14,1", "--validate", &run], "--validate"),
@@ -379,4 +370,21 @@ fn recursion_tracks_both_responses() {
     }
     let (_, message) = failure_of(at.path(), &["track", &run, "--role", "f_t=feedforward"]);
     assert!(message.contains("add it with --input"), "{message}");
+
+    // The default tracker needs neither orders nor delays, and knows the preview.
+    let role = ["--role", "f_t=feedforward:0.25"];
+    let found = json(at.path(), &[&two[..], &role, &out].concat());
+    let channels = found["channels"].as_array().unwrap();
+    let parameter = |name: &str| of(&channels[1]["parameters"], name).clone();
+    for (name, truth) in [("K_f", 0.0), ("K_f_dot", 0.7), ("tau_f", -0.05)] {
+        let found = parameter(name);
+        assert!(deviation(&found, truth).abs() < 3.0, "{name}: {found} {truth}");
+    }
+    let gain = &channels[1]["response"][1]["gain_db"];
+    assert!(deviation(gain, truth).abs() < 3.0, "{gain} {truth}");
+    let table = fs::read_to_string(at.path().join("trace.csv")).unwrap();
+    let header = table.lines().find(|line| !line.starts_with('#')).unwrap();
+    for name in ["K_f[f_t]", "K_f_dot[f_t]_se", "tau_f[f_t]", "b0[f_t]", "gain_db[f_t]@2"] {
+        assert!(header.split(',').any(|column| column == name), "{name}: {header}");
+    }
 }

@@ -7,6 +7,7 @@ use hoid_core::{
         basis::{Basis, Point},
         defaults::{DefaultOperator, REPLAY_SPAN_S},
         detector::DetectorSettings,
+        difference::ParameterGroup,
         initial_estimate::InitialEstimate,
         memory_needed, min_memory,
         mixture::ChangePrior,
@@ -291,7 +292,11 @@ fn delay_change_is_distinguished_from_a_gain_change() {
                     told.value[STATE_COUNT - 1],
                     told.covariance[STATE_COUNT - 1][STATE_COUNT - 1].sqrt(),
                 );
-                found += u32::from(told.changed[2] && !told.changed[0] && by > 3.0 * error);
+                found += u32::from(
+                    told.has_changed(ParameterGroup::Delay(0))
+                        && !told.has_changed(ParameterGroup::Gains(0))
+                        && by > 3.0 * error,
+                );
             }
         }
     }
@@ -533,7 +538,7 @@ fn initial_estimate_is_used() {
         state,
         covariance,
         variance: 0.05 * 0.05,
-        unit: 1.5,
+        units: [1.5],
         remnant: Some((lags, 20.0)),
     };
     let mut told = filter(1e9).with_initial_estimate(&known).expect("a sound estimate");
@@ -564,7 +569,7 @@ fn initial_estimate_is_used() {
     }
     assert!(errors[0] < 0.25 * errors[1], "{errors:?}");
     for wrong in [
-        InitialEstimate { unit: 0.0, ..known },
+        InitialEstimate { units: [0.0], ..known },
         InitialEstimate {
             variance: f64::NAN,
             ..known

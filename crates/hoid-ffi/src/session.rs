@@ -275,6 +275,7 @@ mod tests {
                 innovation_variance: [1.0; 2],
                 z: [0.0; 6],
                 of_operator: false,
+                further: None,
             };
             change.z[i] = 5.0;
             assert_eq!(change.changed_quantities(), [name.to_str().unwrap()]);

@@ -12,7 +12,7 @@ use hoid_numerics::statistics::mean;
 use crate::{
     IdentError, InitialState, Termination,
     criterion::{Criterion, Data, Workspace, first_residual},
-    linalg::least_squares::dot,
+    linalg::vectors::dot,
 };
 
 /// A fitted model.

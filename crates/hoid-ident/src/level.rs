@@ -23,7 +23,7 @@ use hoid_model::{
 };
 use hoid_numerics::statistics::mean;
 
-use crate::{Fit, IdentError, linalg::least_squares::dot};
+use crate::{Fit, IdentError, linalg::vectors::dot};
 
 /// Mean square of the residuals for u = 1 below which a constant in u counts as having no effect on the residuals.
 const MIN_MEAN_SQUARE: f64 = 1e-16;

@@ -2,7 +2,7 @@
 
 use hoid_model::polynomial::reflect_roots_inside;
 
-use crate::linalg::least_squares::{dot, solve_symmetric};
+use crate::linalg::{least_squares::solve_symmetric, vectors::dot};
 
 /// Returns C and D of `v = (C/D) eps` by the method of Hannan and Rissanen (*Biometrika* 69 (1982) 81-94). For nc = 0
 /// this is one autoregression; otherwise a long autoregression estimates eps, and v is then regressed on past v and

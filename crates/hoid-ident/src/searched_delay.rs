@@ -27,7 +27,7 @@ use crate::{
     Fit,
     criterion::{Criterion, Data, Workspace, first_residual},
     fit::SearchedDelay,
-    linalg::least_squares::dot,
+    linalg::vectors::dot,
 };
 
 impl Fit {

@@ -48,7 +48,10 @@ use crate::{
     criterion::{Criterion, Data, Workspace, further_input::FurtherInput},
     family::noise::{NoiseProducts, hannan_rissanen},
     informative_data::{check_degrees_of_freedom, common_sample_time},
-    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    linalg::{
+        least_squares::solve_symmetric,
+        vectors::{add_scaled, dot},
+    },
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 

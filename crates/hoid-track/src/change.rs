@@ -8,6 +8,8 @@
 use hoid_model::{SampleTime, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};
 
+use crate::further_input::FurtherOperator;
+
 /// A change of the person that was declared.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
@@ -33,9 +35,38 @@ pub struct Change {
     /// Changes of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and tau_e, each divided by
     /// its standard error.
     pub z: [f64; 6],
-    /// True if the operator was tested as a whole: its response has then changed, even if no single quantity changed by
-    /// two standard errors.
+    /// True if the response to e was tested as a whole and changed, even if no single quantity changed by two standard
+    /// errors.
     pub of_operator: bool,
+    /// Change of the response to a further input, for a model with one.
+    pub further: Option<FurtherChange>,
+}
+
+/// Change of the response to a further input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FurtherChange {
+    /// The response before and after the change.
+    pub operators: [FurtherOperator; 2],
+    /// Changes of K_f, K_f_dot and tau_f, each divided by its standard error.
+    pub z: [f64; 3],
+    /// True if the response changed, even if no single quantity changed by two standard errors.
+    pub is_changed: bool,
+}
+
+impl FurtherChange {
+    /// Returns the names of the quantities that changed by more than two standard errors; if the response changed and
+    /// none of its quantities changed by so much, `response_f`.
+    pub fn changed_quantities(&self) -> Vec<&'static str> {
+        let each = FurtherOperator::NAMES.into_iter().zip(self.z);
+        let named: Vec<&str> = each
+            .filter(|(_, z)| z.abs() > SIGNIFICANT_CHANGE)
+            .map(|(name, _)| name)
+            .collect();
+        match named.is_empty() && self.is_changed {
+            true => vec!["response_f"],
+            false => named,
+        }
+    }
 }
 
 /// Change of a quantity, in standard errors, beyond which the quantity counts as changed.
@@ -52,8 +83,9 @@ impl Change {
     }
 
     /// Returns the names of the quantities that changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`,
-    /// `zeta_nm`, `remnant`, `tau_e`. If the operator was tested as a whole and none of its quantities changed by so
-    /// much, its response is named: `response`.
+    /// `zeta_nm`, `remnant`, `tau_e`, and for a further input `K_f`, `K_f_dot`, `tau_f`. If the response to e changed as
+    /// a whole and none of its quantities changed by so much, it is named: `response` (`response_f` for a further
+    /// input).
     pub fn changed_quantities(&self) -> Vec<&'static str> {
         let each = || {
             QUANTITY_NAMES
@@ -63,7 +95,19 @@ impl Change {
         };
         let is_named = each().any(|(name, _)| name != REMNANT);
         let whole = (self.of_operator && !is_named).then_some("response");
-        whole.into_iter().chain(each().map(|(name, _)| name)).collect()
+        let further = self.further.iter().flat_map(FurtherChange::changed_quantities);
+        whole
+            .into_iter()
+            .chain(each().map(|(name, _)| name))
+            .chain(further)
+            .collect()
+    }
+
+    /// Returns the names of the quantities of the response to e that changed, without the remnant.
+    pub(crate) fn changed_quantities_of_e(&self) -> Vec<&'static str> {
+        let alone = Self { further: None, ..*self };
+        let all = alone.changed_quantities().into_iter();
+        all.filter(|name| *name != REMNANT).collect()
     }
 }
 
@@ -144,7 +188,23 @@ mod tests {
             innovation_variance: [1.0; 2],
             z,
             of_operator,
+            further: None,
         };
+        let further = |z: [f64; 3]| FurtherChange {
+            operators: [FurtherOperator {
+                k_f: estimate,
+                k_f_dot: estimate,
+                tau_f_s: estimate,
+            }; 2],
+            z,
+            is_changed: true,
+        };
+        let both = |z| Change {
+            further: Some(further(z)),
+            ..of(false, [0.0; 6])
+        };
+        assert_eq!(both([2.4, 0.0, -1.0]).changed_quantities(), ["K_f"]);
+        assert_eq!(both([0.0; 3]).changed_quantities(), ["response_f"]);
         let louder = [0.5, -1.7, 0.0, 0.0, 6.0, 0.0];
         assert_eq!(of(true, louder).changed_quantities(), ["response", "remnant"]);
         assert_eq!(of(false, louder).changed_quantities(), ["remnant"]);

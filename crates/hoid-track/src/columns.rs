@@ -5,7 +5,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 
-use crate::{OPERATOR_COLUMNS, OpenLoop, Response, Trace};
+use crate::{FurtherOperator, OPERATOR_COLUMNS, OpenLoop, Response, Trace};
 
 /// Named columns of equal length.
 pub type Columns = Vec<(String, Vec<f64>)>;
@@ -26,7 +26,8 @@ impl Trace {
         names
     }
 
-    /// Returns `t`, each coefficient, each parameter of the operator, gain in dB and phase in degrees at the
+    /// Returns `t`, each coefficient, each parameter of the operator, for methods that estimate it those of the response
+    /// to a further input r (`K_f[r]`, `K_f_dot[r]`, `tau_f[r]`), gain in dB and phase in degrees at the
     /// frequencies of the options (`gain_db@2.5`, `phase_deg@2.5`; for a further input r also `gain_db[r]@2.5`,
     /// `phase_deg[r]@2.5`), and with a controlled element `crossover_rad_s` and
     /// `phase_margin_deg`. Each of these columns except `t` is followed by its standard error (`_se`). NaN marks a
@@ -47,6 +48,21 @@ impl Trace {
         for name in self.operator_columns() {
             let each: Vec<Option<Estimate>> = operators.iter().map(|o| operator_parameter(o, name)).collect();
             add(name, &each);
+        }
+        if let Some(further) = self
+            .options()
+            .further
+            .as_ref()
+            .filter(|_| !self.further_operator.is_empty())
+        {
+            let found: Vec<_> = (0..self.len()).map(|row| self.further_operator(row)).collect();
+            for (i, name) in FurtherOperator::NAMES.iter().enumerate() {
+                let each: Vec<Option<Estimate>> = found
+                    .iter()
+                    .map(|found| Some(found.as_ref()?.parameters()[i]))
+                    .collect();
+                add(&format!("{name}[{}]", further.channel), &each);
+            }
         }
         for (place, omega) in self.options().at_rad_s.iter().enumerate() {
             let responses: Vec<_> = (0..self.len()).map(|row| self.response(row, place)).collect();

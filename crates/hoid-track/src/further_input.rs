@@ -12,17 +12,75 @@ use hoid_ident::{
     family::ChannelRole,
     several_inputs::{InputOrders, SeveralInputs},
 };
-use hoid_model::{Orders, SampleTime, Structure};
+use hoid_model::{Orders, SampleTime, Structure, uncertainty::Estimate};
 
-use crate::response::Response;
+use crate::{response::Response, shared_options::DEFAULT_DELAY_S};
 
-/// A further input of a tracked model.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TrackedInput {
-    /// Role of the input in the task of the person.
+/// Frequencies in rad/s at which the response to a further input is compared, and reported if no others are requested.
+pub const FURTHER_RESPONSES_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+
+/// A requested further input, before the sample time is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RequestedInput {
+    /// Name of the channel.
     pub channel: String,
     /// Its role in the task of the person.
     pub role: ChannelRole,
+    /// Time by which the person sees the channel ahead, s.
+    pub preview_s: f64,
+    /// Numbers of coefficients of B and F.
+    pub coefficients: [usize; 2],
+    /// Delay in samples; `None` for the default delay of people.
+    pub nk: Option<usize>,
+}
+
+impl RequestedInput {
+    /// Returns the input for a sample time.
+    pub fn tracked(&self, sample_time: SampleTime) -> TrackedInput {
+        let [nb, nf] = self.coefficients;
+        TrackedInput {
+            channel: self.channel.clone(),
+            role: self.role,
+            preview_s: self.preview_s,
+            orders: InputOrders {
+                nb,
+                nf,
+                nk: self.nk.unwrap_or_else(|| sample_time.nk(DEFAULT_DELAY_S)),
+            },
+        }
+    }
+}
+
+/// Response to a further input, in the parameters of an operator with the neuromuscular system of the operator of e.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FurtherOperator {
+    /// Gain.
+    pub k_f: Estimate,
+    /// Gain of the rate of the input, s.
+    pub k_f_dot: Estimate,
+    /// Delay relative to the input as recorded, s; negative for a person who uses a preview.
+    pub tau_f_s: Estimate,
+}
+
+impl FurtherOperator {
+    /// Names of the parameters.
+    pub const NAMES: [&'static str; 3] = ["K_f", "K_f_dot", "tau_f"];
+
+    /// Returns the parameters, in the order of their names.
+    pub fn parameters(&self) -> [Estimate; 3] {
+        [self.k_f, self.k_f_dot, self.tau_f_s]
+    }
+}
+
+/// A further input of a tracked model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackedInput {
+    /// Name of the channel.
+    pub channel: String,
+    /// Its role in the task of the person.
+    pub role: ChannelRole,
+    /// Time by which the person sees the channel ahead, s: the model has the channel advanced by this time as its input.
+    pub preview_s: f64,
     /// Numbers of coefficients of B and F, and the delay in samples.
     pub orders: InputOrders,
 }
@@ -30,11 +88,20 @@ pub struct TrackedInput {
 impl fmt::Display for TrackedInput {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let InputOrders { nb, nf, nk } = self.orders;
-        write!(f, "{} ({}), nb={nb}, nf={nf}, nk={nk}", self.channel, self.role)
+        write!(f, "{} ({}), nb={nb}, nf={nf}, nk={nk}", self.channel, self.role)?;
+        match self.preview_s > 0.0 {
+            true => write!(f, ", preview {} s", self.preview_s),
+            false => Ok(()),
+        }
     }
 }
 
 impl TrackedInput {
+    /// Returns the preview in samples.
+    pub(crate) fn preview_samples(&self, sample_time: SampleTime) -> usize {
+        (self.preview_s / sample_time.s()).round() as usize
+    }
+
     /// Returns the number of coefficients.
     pub fn parameter_count(&self) -> usize {
         self.orders.nb + self.orders.nf
@@ -121,6 +188,7 @@ mod tests {
         let input = TrackedInput {
             channel: "r".to_owned(),
             role: ChannelRole::Feedforward,
+            preview_s: 0.0,
             orders: InputOrders { nb: 2, nf: 1, nk: 5 },
         };
         assert_eq!(input.names(), ["b0[r]", "b1[r]", "f1[r]"]);

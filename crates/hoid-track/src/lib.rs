@@ -114,7 +114,7 @@ pub use change::{Change, ErrorThreshold};
 pub use columns::{Columns, operator_parameter};
 pub use determined::Determination;
 pub use forgetting::ForgettingRule;
-pub use further_input::TrackedInput;
+pub use further_input::{FURTHER_RESPONSES_RAD_S, FurtherOperator, RequestedInput, TrackedInput};
 pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, GuardOptions, TrackFault};
 pub use idle::{default_start_span, idle_head};
 pub use live::{ChooseOrders, DEFAULT_WARM_UP_S, Live};

@@ -7,14 +7,18 @@ use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structu
 
 use crate::{
     forgetting::ForgettingRule,
-    further_input::{TrackedInput, coefficient_names, submatrix},
+    further_input::{FURTHER_RESPONSES_RAD_S, TrackedInput, coefficient_names, submatrix},
     idle::default_start_span,
     memory::Memory,
     method::invalid_option,
     methods::Method,
-    setup::{DEFAULT_DELAY_S, Setup, StartSource, parameter_names, polynomial_orders},
+    setup::{Setup, StartSource, parameter_names, polynomial_orders},
+    shared_options::DEFAULT_DELAY_S,
     start::check_sample_time,
 };
+
+/// Longest preview of a further input, s.
+const MAX_PREVIEW_S: f64 = 10.0;
 
 /// Options of a recursive estimate: the method with its own options, and the options that all methods share.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +29,7 @@ pub struct TrackOptions {
     pub structure: Structure,
     /// The orders.
     pub orders: Orders,
-    /// A further input of the model, for the methods `rls` and `rpem`. Default none.
+    /// A further input of the model, for the methods `adaptive`, `rls` and `rpem`. Default none.
     pub further: Option<TrackedInput>,
     /// Start of the recursion. Default: a batch fit of the first third of the record.
     pub start: StartSource,
@@ -104,6 +108,24 @@ impl TrackOptions {
     pub(crate) fn delay_range_s(&self) -> Option<(f64, f64)> {
         let method = &self.method;
         method.track_delay_s().filter(|_| method.delay_is_parameter())
+    }
+
+    /// Returns the lag of the basis of a method with a basis, s, if its model has one input: the tests of form and
+    /// constancy of the response examine the response to e alone.
+    pub(crate) fn basis_lag_of_one_input_s(&self) -> Option<f64> {
+        self.method.basis_lag_s().filter(|_| self.further.is_none())
+    }
+
+    /// Returns the frequencies at which the trace of a method that starts itself contains the response to a further
+    /// input, rad/s.
+    pub(crate) fn further_rad_s(&self) -> Vec<f64> {
+        let mut all = self.at_rad_s.clone();
+        all.extend(
+            FURTHER_RESPONSES_RAD_S
+                .iter()
+                .filter(|omega| !self.at_rad_s.contains(omega)),
+        );
+        all
     }
 
     /// Returns the names of the estimated parameters: coefficients of theta, or physical parameters.
@@ -214,7 +236,7 @@ impl TrackOptions {
         if !self.method.supports_further_input() {
             return refused(
                 format!("{} with the method {name}", further.channel),
-                "the method rls or rpem; the other methods track the response to one input",
+                "the method adaptive, rls or rpem; the other methods track the response to one input",
             );
         }
         if setup.track_delay_s.is_some() {
@@ -223,10 +245,22 @@ impl TrackOptions {
                 "no track_delay: with a further input the delays are fixed",
             );
         }
-        if self.method.is_guarded() {
+        if self.method.is_guarded() && !self.method.is_self_starting() {
             return refused(
                 format!("{} and guard = yes", further.channel),
-                "guard = no: the guard predicts u from one input",
+                "guard = no: the guard compares the estimate with a start model, which has one input",
+            );
+        }
+        if further.preview_s > 0.0 && !self.method.is_self_starting() {
+            return refused(
+                format!("{} with a preview and the method {name}", further.channel),
+                "no preview with polynomials; the method adaptive has a preview",
+            );
+        }
+        if !(0.0..=MAX_PREVIEW_S).contains(&further.preview_s) {
+            return refused(
+                format!("{} with {} s of preview", further.channel, further.preview_s),
+                "0 to 10 s of preview",
             );
         }
         further.batch_model(self.structure, &self.orders, self.search).check()

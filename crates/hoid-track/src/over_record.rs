@@ -1,9 +1,11 @@
 //! A recursive estimate over a record.
 
-use hoid_ident::{Fit, IdentError};
+use hoid_ident::{Fit, IdentError, check_independent_inputs};
 use hoid_model::Record;
+use hoid_numerics::statistics::mean;
 
 use crate::{
+    change::Change,
     diagnostics::COMPARED_RAD_S,
     idle::idle_head,
     open_loop::OpenLoop,
@@ -72,6 +74,10 @@ pub(crate) fn track_with(
         .update_from_s
         .unwrap_or(if known { end_s } else { f64::NEG_INFINITY })
         .max(record.time_s(0));
+    let further_rad_s = options
+        .further
+        .as_ref()
+        .map_or_else(Vec::new, |_| options.further_rad_s());
     let rows = record.len().div_ceil(every);
     let mut trace = Trace::empty(options.clone(), sample_time, rows, every);
     trace.start = tracker.start.fit.clone();
@@ -86,12 +92,20 @@ pub(crate) fn track_with(
         let sample = Sample {
             e: input.get(k).copied().unwrap_or(0.0),
             u: output[k],
-            reference: reference.map(|r| r[k]),
+            reference: reference.and_then(|r| r.get(k).copied()),
         };
         let outcome = tracker.update(sample, t >= first_update);
         each(&mut tracker, k);
         if let Some(change) = tracker.change() {
             trace.changes.push((t, change));
+        }
+        if let Some(revised) = tracker.revised_change()
+            && let Some((_, last)) = trace.changes.last_mut()
+        {
+            *last = Change {
+                odds: last.odds,
+                ..revised
+            };
         }
         if let Some(event) = tracker.event() {
             if let Some(from) = event.withdrawn_from_s(t, sample_time) {
@@ -110,7 +124,17 @@ pub(crate) fn track_with(
         pack(&covariance, p, &mut trace.covariance);
         trace.operator.extend(tracker.recursion.operator());
         trace.delays.extend(tracker.recursion.delay());
+        trace.further_operator.extend(tracker.recursion.further_operator());
         if options.method.is_self_starting() {
+            for omega in further_rad_s.iter() {
+                let told = tracker
+                    .recursion
+                    .further_response(*omega)
+                    .map(|response| response.pack());
+                trace
+                    .further_responses
+                    .extend(told.unwrap_or([f64::NAN; Response::PACKED_LEN]));
+            }
             for omega in &options.at_rad_s {
                 let told = tracker.response(*omega).map(|response| response.pack());
                 trace.responses.extend(told.unwrap_or([f64::NAN; Response::PACKED_LEN]));
@@ -157,7 +181,22 @@ fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
     (0..samples).filter(kept).collect()
 }
 
-/// Returns the further input, or the external signal for methods that use one.
+/// Checks that a further input varies and is not a multiple of the error.
+fn check_further_input(record: &Record, options: &TrackOptions, values: &[f64]) -> Result<(), IdentError> {
+    let Some(further) = &options.further else {
+        return Ok(());
+    };
+    // Missing values of a record are not numbers; they count as the mean.
+    let centred = |values: &[f64]| {
+        let known: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+        let centre = mean(&known);
+        let of = |v: &f64| if v.is_finite() { v - centre } else { 0.0 };
+        values.iter().map(of).collect::<Vec<f64>>()
+    };
+    check_independent_inputs([("e", centred(record.input())), (&further.channel, centred(values))])
+}
+
+/// Returns the further input, advanced by its preview, or the external signal for methods that use one.
 fn reference_signal<'r>(record: &'r Record, options: &TrackOptions) -> Result<Option<&'r [f64]>, IdentError> {
     let further = options.further.as_ref().map(|further| further.channel.as_str());
     let Some(name) = further.or_else(|| options.method.reference_channel()) else {
@@ -171,7 +210,14 @@ fn reference_signal<'r>(record: &'r Record, options: &TrackOptions) -> Result<Op
             .join(", ")
     };
     match record.channel(name) {
-        Some(values) => Ok(Some(values)),
+        Some(values) => {
+            let lead = options
+                .further
+                .as_ref()
+                .map_or(0, |f| f.preview_samples(record.sample_time()));
+            check_further_input(record, options, values)?;
+            Ok(Some(values.get(lead..).unwrap_or_default()))
+        }
         None => Err(IdentError::NoChannel {
             channel: name.to_owned(),
             label: record.label().to_owned(),

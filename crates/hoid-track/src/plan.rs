@@ -5,11 +5,8 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use crate::{
-    forgetting::ForgettingRule,
-    methods::Method,
-    options::TrackOptions,
-    person_prior::PersonPrior,
-    setup::{DEFAULT_DELAY_S, StartSource},
+    forgetting::ForgettingRule, methods::Method, options::TrackOptions, person_prior::PersonPrior, setup::StartSource,
+    shared_options::DEFAULT_DELAY_S,
 };
 use hoid_ident::{
     Choice, IdentError, NamedOrders, OrderRanges,
@@ -43,6 +40,19 @@ impl TrackPlan {
             false => ranges,
         };
         let combinations = ranges.combinations()?;
+        if let Some(further) = &options.further
+            && combinations.len() > 1
+        {
+            return Err(IdentError::BadOption {
+                option: "the orders of a model with two inputs".to_owned(),
+                found: format!("{} combinations of orders", combinations.len()),
+                expected: format!(
+                    "one number for each order, and one delay in samples for each input: the order search fits only \
+                     models with one input, and so ignores {}",
+                    further.channel
+                ),
+            });
+        }
         if matches!(options.start, StartSource::Theta(_)) && combinations.len() > 1 {
             return Err(several_models_error());
         }

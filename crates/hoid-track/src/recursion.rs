@@ -3,7 +3,7 @@
 use hoid_core::{recursion::Step, state::State};
 use hoid_model::uncertainty::{Estimate, OperatorEstimate};
 
-use crate::{change::Change, response::Response};
+use crate::{change::Change, further_input::FurtherOperator, response::Response};
 
 /// One sample of the loop.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +66,10 @@ pub trait Recursion: State + Send + Sync {
     fn change(&self) -> Option<Change> {
         None
     }
+    /// Returns the last declared change if its parameters were estimated again at the last sample, from more data.
+    fn revised_change(&self) -> Option<Change> {
+        None
+    }
     /// Returns the number of failed fits and the reason for the last failure, for methods that fit.
     fn failures(&self) -> Option<(usize, String)> {
         None
@@ -77,6 +81,15 @@ pub trait Recursion: State + Send + Sync {
     /// Returns the real and imaginary part of the response at a frequency in rad/s, without covariance, if it differs
     /// from the response of the polynomials.
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
+        None
+    }
+    /// Returns the response to the further input, for methods that estimate it.
+    fn further_operator(&self) -> Option<FurtherOperator> {
+        None
+    }
+    /// Returns the response to the further input at a frequency in rad/s, if it differs from the response of the
+    /// polynomials.
+    fn further_response(&self, _omega_rad_s: f64) -> Option<Response> {
         None
     }
     /// Multiplies the covariance in the gain, P, by a factor; returns false if there is none.

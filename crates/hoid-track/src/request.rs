@@ -7,7 +7,7 @@ use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion, settings::
 use hoid_model::{ContinuousTransferFunction, SampleTime, Structure, theta_from_start};
 
 use crate::{
-    further_input::{TrackedInput, coefficient_names},
+    further_input::{RequestedInput, coefficient_names},
     methods::Method,
     options::TrackOptions,
     plan::{TrackPlan, search_ranges, several_models_error},
@@ -37,8 +37,8 @@ pub struct TrackRequest {
     pub orders: NamedOrders,
     /// The delay, in samples or in s.
     pub delay: Option<DelayRange>,
-    /// A further input, for the methods `rls` and `rpem`.
-    pub further: Option<TrackedInput>,
+    /// A further input, for the methods `adaptive`, `rls` and `rpem`.
+    pub further: Option<RequestedInput>,
     /// The start.
     pub start: RequestedStart,
     /// Criterion that chooses between the searched orders.
@@ -82,7 +82,7 @@ impl TrackRequest {
     /// True for a recursion of polynomials, or if the delay is in samples: the sampling rate is then kept.
     pub fn counts_samples(&self) -> bool {
         let in_samples = matches!(self.delay, Some(DelayRange::Samples(_))) || self.orders.contains_key("nk");
-        in_samples || self.further.is_some() || self.method.counts_samples()
+        in_samples || self.further.as_ref().is_some_and(|further| further.nk.is_some()) || self.method.counts_samples()
     }
 
     /// Returns the plan for a sample time, after a check of everything that does not depend on data.
@@ -120,25 +120,13 @@ impl TrackRequest {
         let combinations = ranges.combinations()?;
         // These are the largest values of each order: a name that is unknown for them is unknown for all orders.
         let largest = combinations[combinations.len() - 1];
-        if let Some(further) = &self.further
-            && combinations.len() > 1
-        {
-            return Err(IdentError::BadOption {
-                option: "the orders of a model with two inputs".to_owned(),
-                found: format!("{} combinations of orders", combinations.len()),
-                expected: format!(
-                    "one number for each order, and one delay in samples for each input: the order search fits only \
-                     models with one input, and so ignores {}",
-                    further.channel
-                ),
-            });
-        }
+        let further = self.further.as_ref().map(|further| further.tracked(sample_time));
         let start = match &self.start {
             RequestedStart::Default => StartSource::Span(None),
             RequestedStart::Nothing => StartSource::Nothing,
             RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(several_models_error()),
             RequestedStart::Coefficients(named) => StartSource::Theta(
-                theta_from_start(&coefficient_names(&largest, self.further.as_ref()), named).map_err(|reason| {
+                theta_from_start(&coefficient_names(&largest, further.as_ref()), named).map_err(|reason| {
                     IdentError::BadStart {
                         reason: format!("it {reason}"),
                     }
@@ -150,7 +138,7 @@ impl TrackRequest {
             largest: self.largest,
             at_rad_s: self.at_rad_s.clone(),
             controlled_element: self.controlled_element.clone(),
-            further: self.further.clone(),
+            further,
             ..TrackOptions::new(self.method.clone(), structure, largest)
         };
         TrackPlan::new(options, ranges, self.criterion, sample_time)

@@ -42,6 +42,21 @@ impl Response {
         })
     }
 
+    /// Returns the response with its phase increased by an angle in rad.
+    pub(crate) fn advanced(&self, angle_rad: f64) -> Self {
+        let (sin, cos) = angle_rad.sin_cos();
+        let turn = [[cos, -sin], [sin, cos]];
+        let ([re, im], c) = (self.value, &self.covariance);
+        let element = |i: usize, j: usize| -> f64 {
+            let pairs = (0..2).flat_map(|k| (0..2).map(move |l| (k, l)));
+            pairs.map(|(k, l)| turn[i][k] * c[k][l] * turn[j][l]).sum()
+        };
+        Self {
+            value: turn.map(|row| row[0] * re + row[1] * im),
+            covariance: [0, 1].map(|i| [0, 1].map(|j| element(i, j))),
+        }
+    }
+
     /// |H| in dB.
     pub fn gain_db(&self) -> Estimate {
         let [re, im] = self.value;

@@ -8,9 +8,6 @@ use hoid_model::{Orders, Structure};
 
 use crate::{forgetting::ForgettingRule, further_input::TrackedInput, memory::Memory, shared_options::WindupGuard};
 
-/// Default delay of people who track, s.
-pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
-
 /// Names of the operator's parameters in a physical recursion.
 pub(crate) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 

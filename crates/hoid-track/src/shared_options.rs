@@ -10,6 +10,9 @@ use hoid_ident::{
 
 use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 
+/// Default delay of people who track, s.
+pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
+
 /// Limit on the growth of the variances of P for unexcited parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WindupGuard {

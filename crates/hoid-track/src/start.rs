@@ -5,7 +5,7 @@
 //! selects a multiple of the unit matrix instead (`0.1 I` in the thesis), it determines only the gain; the error bars
 //! still start with the covariance of the fit.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::Range};
 
 use hoid_core::{bounds::clamp, recursion::StablePolynomials, stability::roots_inside};
 use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
@@ -13,7 +13,7 @@ use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 use hoid_ident::{Constraint, Fit, GreyBox, IdentError};
 
 use crate::{
-    further_input::{TrackedInput, coefficient_names},
+    further_input::{TrackedInput, coefficient_names, submatrix},
     setup::{PHYSICAL_NAMES, Setup, StartSource},
     start_noise::StartNoise,
 };
@@ -87,6 +87,18 @@ pub struct StartState {
 }
 
 impl StartState {
+    /// Returns the start of some of the parameters.
+    pub(crate) fn part(&self, places: Range<usize>) -> Self {
+        let (p, places) = (self.values.len(), places.collect::<Vec<_>>());
+        Self {
+            values: places.iter().map(|&i| self.values[i]).collect(),
+            covariance: submatrix(&self.covariance, p, &places),
+            spread: submatrix(&self.spread, p, &places),
+            fit: None,
+            ..*self
+        }
+    }
+
     /// Computes the start that the options select. If a fit is needed, it is `known` or is computed from the record of
     /// the start span.
     ///

@@ -7,6 +7,7 @@ use hoid_model::{
 
 use crate::{
     Change, Counts, TrackFault,
+    further_input::FurtherOperator,
     open_loop::{NoCrossover, OpenLoop},
     options::TrackOptions,
     recursion::Delay,
@@ -33,6 +34,10 @@ pub struct Trace {
     /// Responses of each row at the frequencies of the options, for methods whose response differs from the response of
     /// the polynomials.
     pub(crate) responses: Vec<f64>,
+    /// Response to the further input of each row, for methods that estimate it in parameters, and at the frequencies
+    /// [`TrackOptions::further_rad_s`].
+    pub(crate) further_operator: Vec<FurtherOperator>,
+    pub(crate) further_responses: Vec<f64>,
     /// Crossover and margin of each row, for methods whose response differs from the response of the polynomials, and
     /// the reason in rows without a crossover.
     pub(crate) open_loops: Vec<f64>,
@@ -88,6 +93,8 @@ impl Trace {
             operator: Vec::new(),
             delays: Vec::new(),
             responses: Vec::new(),
+            further_operator: Vec::new(),
+            further_responses: Vec::new(),
             open_loops: Vec::new(),
             no_crossover: Vec::new(),
             innovation: Vec::with_capacity(rows),
@@ -279,9 +286,26 @@ impl Trace {
         )
     }
 
-    /// Returns the response to the further input in a row, at a frequency in rad/s; `None` without a further input.
+    /// Returns the response to the further input in a row, for methods that estimate it in parameters; `None` without a
+    /// further input, and while there is no estimate.
+    pub fn further_operator(&self, row: usize) -> Option<FurtherOperator> {
+        self.further_operator
+            .get(row)
+            .copied()
+            .filter(|_| !self.is_before_first_estimate(row))
+    }
+
+    /// Returns the response to the further input in a row, at a frequency in rad/s; `None` without a further input. For
+    /// a method that starts itself, the frequency must be one of those of the options or of
+    /// [`crate::FURTHER_RESPONSES_RAD_S`].
     pub fn further_response(&self, row: usize, omega_rad_s: f64) -> Option<Response> {
         let further = self.options.further.as_ref()?;
+        if self.options.method.is_self_starting() {
+            let all = self.options.further_rad_s();
+            let place = all.iter().position(|omega| *omega == omega_rad_s)?;
+            let from = (row * all.len() + place) * Response::PACKED_LEN;
+            return Response::unpack(&self.further_responses[from..from + Response::PACKED_LEN]);
+        }
         let (orders, covariance) = (self.orders_at(row), self.covariance(row));
         let (theta, ts) = (self.theta(row), self.sample_time);
         Some(further.response(&orders, theta, covariance.as_deref(), omega_rad_s, ts))
@@ -407,6 +431,25 @@ impl Trace {
         let width = Response::PACKED_LEN * self.options.at_rad_s.len();
         if !self.responses.is_empty() {
             self.responses = causal_mean(&self.responses, width, rows);
+        }
+        if !self.further_responses.is_empty() {
+            let width = Response::PACKED_LEN * self.options.further_rad_s().len();
+            self.further_responses = causal_mean(&self.further_responses, width, rows);
+        }
+        let packed = |e: Estimate| [e.value, e.standard_error.map_or(f64::NAN, |s| s * s)];
+        let of_further = self
+            .further_operator
+            .iter()
+            .flat_map(FurtherOperator::parameters)
+            .flat_map(packed);
+        let means = causal_mean(&of_further.collect::<Vec<_>>(), 6, rows);
+        for (operator, mean) in self.further_operator.iter_mut().zip(means.chunks_exact(6)) {
+            let of = |i: usize| Estimate::with_variance(mean[i], mean[i + 1]);
+            *operator = FurtherOperator {
+                k_f: of(0),
+                k_f_dot: of(2),
+                tau_f_s: of(4),
+            };
         }
         if !self.open_loops.is_empty() {
             self.open_loops = causal_mean(&self.open_loops, OpenLoop::PACKED_LEN, rows);

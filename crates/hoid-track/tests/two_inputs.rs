@@ -7,7 +7,7 @@ use hoid_ident::{
     several_inputs::{InputOrders, SeveralInputs},
 };
 use hoid_model::{Channel, Orders, Record, SampleTime, Structure};
-use hoid_track::{Method, Sample, StartSource, Trace, TrackOptions, TrackedInput, Tracker, track};
+use hoid_track::{GuardKind, Method, Sample, StartSource, Trace, TrackOptions, TrackedInput, Tracker, track};
 
 /// Standard normal random numbers.
 struct Noise(u64);
@@ -38,9 +38,14 @@ fn gain(k: usize, changes: bool) -> f64 {
     if changes && k >= SAMPLE_COUNT / 2 { 0.06 } else { 0.03 }
 }
 
+/// Returns a record in which the response to r may double, see [`record_with`].
+fn record(seed: u64, level: f64, changes: bool) -> Record {
+    record_with(seed, level, |k| gain(k, changes))
+}
+
 /// Returns a record of `u = (B/F) q^-10 e + (B_r/F) q^-5 r + n`, `n = eps/D`, where e and r are sums of sines with
 /// random phases.
-fn record(seed: u64, level: f64, changes: bool) -> Record {
+fn record_with(seed: u64, level: f64, gain: impl Fn(usize) -> f64) -> Record {
     let mut noise = Noise(seed);
     let mut sines = |lines: &[f64]| -> Vec<f64> {
         let phases: Vec<f64> = lines.iter().map(|_| 6.3 * noise.uniform()).collect();
@@ -57,7 +62,7 @@ fn record(seed: u64, level: f64, changes: bool) -> Record {
     let u = (0..SAMPLE_COUNT)
         .map(|k| {
             let w = 0.05 * past(&e, k, NK) - 0.03 * past(&e, k, NK + 1) - F[0] * of_e[0] - F[1] * of_e[1];
-            let w_r = gain(k, changes) * past(&r, k, NK_R) - F[0] * of_r[0] - F[1] * of_r[1];
+            let w_r = gain(k) * past(&r, k, NK_R) - F[0] * of_r[0] - F[1] * of_r[1];
             (of_e, of_r) = ([w, of_e[0]], [w_r, of_r[0]]);
             n = level * noise.next() - D * n;
             w + w_r + n
@@ -77,6 +82,7 @@ fn input(nb: usize, nf: usize, nk: usize) -> Option<TrackedInput> {
     Some(TrackedInput {
         channel: "r".to_owned(),
         role: ChannelRole::Feedforward,
+        preview_s: 0.0,
         orders: InputOrders { nb, nf, nk },
     })
 }
@@ -280,7 +286,16 @@ fn options_that_a_further_input_excludes_are_refused() {
         further: input(1, 0, 1),
         ..TrackOptions::default_for(Method::adaptive(), NK)
     });
-    assert!(words.contains("rls or rpem"), "{words}");
+    assert!(words.contains("nb = 2, nf = 2"), "{words}");
+    let previewed = input(1, 2, NK_R).map(|input| TrackedInput {
+        preview_s: 0.2,
+        ..input
+    });
+    let words = refused(TrackOptions {
+        further: previewed,
+        ..box_jenkins()
+    });
+    assert!(words.contains("preview"), "{words}");
     for (option, text) in [("track_delay", "0.1..0.3"), ("guard", "yes"), ("regressor", "cascade")] {
         let words = refused(box_jenkins().with(&[(option, text)]).unwrap());
         assert!(
@@ -302,4 +317,142 @@ fn options_that_a_further_input_excludes_are_refused() {
         ..TrackOptions::new(Method::rls(), Structure::Arx, orders(2, 0, 0))
     });
     assert!(words.contains("nf"), "{words}");
+}
+
+/// Returns the options of the default tracker, with the default delays.
+fn default_tracker(preview_s: f64) -> TrackOptions {
+    let ts = SampleTime::new(TS).unwrap();
+    let plain = TrackOptions::without_prior(Method::adaptive(), ts);
+    TrackOptions {
+        further: input(2, 2, plain.orders.nk).map(|input| TrackedInput { preview_s, ..input }),
+        at_rad_s: vec![2.0],
+        ..plain
+    }
+}
+
+#[test]
+fn default_tracker_follows_both_responses_and_names_the_input_that_changed() {
+    let (mut named, mut inside, mut count) = (0, 0, 0);
+    for seed in 0..6 {
+        let record = record(seed, 0.01, true);
+        let trace = track(&record, &default_tracker(0.0), 20).unwrap();
+        let row = |t: f64| trace.times_s().partition_point(|time| *time < t);
+        for (t, change_db) in [(38.0, 0.0), (78.0, 20.0 * 2.0_f64.log10())] {
+            let own = trace.response(row(t), 0).unwrap().gain_db();
+            let further = trace.further_response(row(t), 2.0).unwrap().gain_db();
+            for (found, expected) in [(own, e_gain_db()), (further, r_gain_db() + change_db)] {
+                let away = found.value - expected;
+                assert!(away.abs() < 2.0, "{seed} {t}: {found:?} {expected}");
+                inside += usize::from(away.abs() < 1.96 * found.standard_error.unwrap());
+                count += 1;
+            }
+        }
+        let named_r = |(t, change): &(f64, hoid_track::Change)| {
+            let further = change.further.unwrap();
+            *t > 40.0 && !further.changed_quantities().is_empty() && !change.of_operator
+        };
+        let verdict = trace.verdict(&record, None).unwrap();
+        let note = verdict
+            .findings()
+            .iter()
+            .find(|finding| finding.kind == "changed-input");
+        let note = note.map_or("", |note| note.message.as_str());
+        let said = note.contains("the response to r changed") && note.contains("no change of the response to e");
+        named += usize::from(trace.changes().iter().any(named_r) && said);
+    }
+    assert!(named >= 5, "{named} of 6");
+    assert!(inside + 2 >= count, "{inside} of {count}");
+}
+
+/// With little remnant a change of a response makes the innovations many times larger, as a fault of a channel would.
+#[test]
+fn change_with_little_remnant_is_followed() {
+    for seed in 0..6 {
+        for factor in [3.0, -1.0] {
+            let gain = |k: usize| if k < SAMPLE_COUNT / 2 { 0.03 } else { factor * 0.03 };
+            let record = record_with(seed, 1e-4, gain);
+            let trace = track(&record, &default_tracker(0.0), 20).unwrap();
+            let paused: Vec<_> = trace.faults().iter().filter(|f| f.kind == GuardKind::Misfit).collect();
+            assert!(paused.is_empty(), "{seed} {factor}: {paused:?}");
+            let row = trace.times_s().partition_point(|time| *time < 52.0);
+            let before = trace.times_s().partition_point(|time| *time < 38.0);
+            let [now, before] = [row, before].map(|row| trace.further_response(row, 2.0).unwrap());
+            let turned = (now.phase_deg().value - before.phase_deg().value + 90.0).rem_euclid(360.0) - 90.0;
+            let away = now.gain_db().value - r_gain_db() - 20.0 * factor.abs().log10();
+            assert!(
+                away.abs() < 2.0 && (turned > 150.0) == (factor < 0.0),
+                "{seed} {factor}: {away} {turned}"
+            );
+        }
+    }
+}
+
+#[test]
+fn preview_advances_the_further_input() {
+    const LEAD: usize = 5;
+    let original = record(9, 0.01, false).span(0.0, 30.0).unwrap();
+    let r = original.channel("r").unwrap().to_vec();
+    let shown: Vec<f64> = (0..r.len())
+        .map(|k| k.checked_sub(LEAD).map_or(0.0, |k| r[k]))
+        .collect();
+    let delayed = Record::new(
+        original.sample_time(),
+        Channel::new("e", "", original.input().to_vec()),
+        Channel::new("u", "", original.output().to_vec()),
+    )
+    .unwrap()
+    .with_channel(Channel::new("r", "", shown))
+    .unwrap();
+    let preview_s = LEAD as f64 * TS;
+    let (plain, ahead) = (
+        track(&original, &default_tracker(0.0), 100).unwrap(),
+        track(&delayed, &default_tracker(preview_s), 100).unwrap(),
+    );
+    // The person sees the same input, so the estimates are equal until the last samples, at which it is not known.
+    let row = plain.len() - 2;
+    assert_eq!(plain.theta(row), ahead.theta(row));
+    let [one, other] = [&plain, &ahead].map(|trace| trace.further_operator(row).unwrap());
+    assert_eq!(one.k_f, other.k_f);
+    assert!((one.tau_f_s.value - preview_s - other.tau_f_s.value).abs() < 1e-12);
+    let [one, other] = [&plain, &ahead].map(|trace| trace.further_response(row, 2.0).unwrap());
+    assert!((one.gain_db().value - other.gain_db().value).abs() < 1e-9);
+    let turned = other.phase_deg().value - one.phase_deg().value;
+    assert!((turned - (2.0 * preview_s).to_degrees()).abs() < 1e-9, "{turned}");
+    let errors = [one, other].map(|response| response.phase_deg().standard_error.unwrap());
+    assert!((errors[0] / errors[1] - 1.0).abs() < 1e-9, "{errors:?}");
+}
+
+#[test]
+fn default_tracker_pauses_without_the_further_input_and_refuses_dependent_inputs() {
+    let record = record(5, 0.01, false);
+    let options = default_tracker(0.0).with(&[("guard", "no")]).unwrap();
+    let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
+    let r = record.channel("r").unwrap();
+    let mut before = Vec::new();
+    for k in 0..1200 {
+        let reference = Some(r[k]).filter(|_| !(1000..1050).contains(&k));
+        let (e, u) = (record.input()[k], record.output()[k]);
+        tracker.update(Sample { e, u, reference }, true);
+        match k {
+            999 => before = tracker.theta().to_vec(),
+            1000 | 1049 => assert_eq!(tracker.theta(), before),
+            1199 => assert_ne!(tracker.theta(), before),
+            _ => {}
+        }
+    }
+    let with_r = |r: Vec<f64>| {
+        let channels = ["e", "u"].map(|name| {
+            let values = if name == "e" { record.input() } else { record.output() };
+            Channel::new(name, "", values.to_vec())
+        });
+        let [e, u] = channels;
+        let made = Record::new(record.sample_time(), e, u).unwrap();
+        let made = made.with_channel(Channel::new("r", "", r)).unwrap();
+        track(&made, &default_tracker(0.0), 100).unwrap_err().to_string()
+    };
+    let multiple = record.input().iter().map(|e| 3.0 - 2.0 * e).collect();
+    let refused = with_r(multiple);
+    assert!(refused.contains("r is a linear combination of e"), "{refused}");
+    let refused = with_r(vec![0.0; SAMPLE_COUNT]);
+    assert!(refused.contains("r is constant"), "{refused}");
 }

@@ -72,12 +72,14 @@ def track(
     method : str
         {methods}
     inputs : sequence of str, optional
-        For ``"rls"`` and ``"rpem"``: the error and one further channel to which the person responds, such as
-        ``["e", "r"]``. Each order is then one number for both inputs or a pair with one for each, and `nk`
-        must be given. The trace has the coefficients ``b0[r]``, ... and with `at` the columns
+        For ``"adaptive"``, ``"rls"`` and ``"rpem"``: the error and one further channel to which the person responds,
+        such as ``["e", "r"]``. Each order is then one number for both inputs or a pair with one for each;
+        ``"rls"`` and ``"rpem"`` require `nk`. The trace has the coefficients ``b0[r]``, ..., with ``"adaptive"``
+        the parameters ``K_f[r]``, ``K_f_dot[r]`` and ``tau_f[r]``, and with `at` the columns
         ``gain_db[r]@2.5`` and ``phase_deg[r]@2.5``.
     roles : mapping of str to str, optional
-        Role of the further input: ``{{"r": "feedforward"}}`` (the default), ``"motion"`` or ``"output"``.
+        Role of the further input: ``{{"r": "feedforward"}}`` (the default), ``"motion"`` or ``"output"``; with
+        ``"adaptive"`` also its preview in s, ``{{"r": "feedforward:0.25"}}``.
     structure : str, optional
         By default ``"arx"`` for ``"rls"``, otherwise ``"bj"``.
     na, nb, nc, nd, nf, nk : int or (int, int) or range, optional

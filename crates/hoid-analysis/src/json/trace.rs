@@ -6,7 +6,7 @@ use hoid_model::{
     remnant::RemnantDiscretisation,
     uncertainty::{Estimate, OperatorEstimate},
 };
-use hoid_track::{Change, Determination, NoCrossover, OpenLoop, Response, TrackFault};
+use hoid_track::{Change, Determination, FurtherOperator, NoCrossover, OpenLoop, Response, TrackFault};
 use serde_json::{Map, Value, json};
 
 use super::{PolynomialResult, envelope, estimate, loop_shape, number, operator, optional, orders};
@@ -136,11 +136,16 @@ impl TrackingResult {
                 true => name.starts_with(['b', 'f']) && !own.contains(name),
                 false => own.contains(name),
             });
-            let parameters = of_input.map(|(name, e)| {
+            let operator = trace.further_operator(row).filter(|_| !first);
+            let physical = operator.iter().flat_map(|found| {
+                let names = FurtherOperator::NAMES.map(str::to_owned);
+                names.into_iter().zip(found.parameters())
+            });
+            let parameters = of_input.chain(physical).map(|(name, e)| {
                 json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
             });
-            let response = |_, omega: f64| match first {
-                true => Some(trace.response_at(row, omega)),
+            let response = |place: usize, omega: f64| match first {
+                true => trace.response(row, place),
                 false => trace.further_response(row, omega),
             };
             json!({
@@ -240,7 +245,7 @@ pub fn track_fault(fault: &TrackFault) -> Value {
 pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
     let before_and_after = |pair: &[Estimate; 2]| json!({"before": estimate(&pair[0]), "after": estimate(&pair[1])});
     let numbers = |pair: &[f64; 2]| json!({"before": number(pair[0]), "after": number(pair[1])});
-    json!({
+    let mut whole = json!({
         "t": optional(declared_at),
         "since": optional(declared_at.map(|t| t - c.seconds_ago)),
         "probability": number(c.probability()),
@@ -261,5 +266,13 @@ pub fn change(declared_at: Option<f64>, c: &Change) -> Value {
             "remnant": number(c.z[4]),
             "tau_e": number(c.z[5]),
         },
-    })
+    });
+    if let Some(further) = &c.further {
+        let [before, after] = further.operators.map(|operator| operator.parameters());
+        for (i, name) in FurtherOperator::NAMES.iter().enumerate() {
+            whole[*name] = before_and_after(&[before[i], after[i]]);
+            whole["z"][*name] = number(further.z[i]);
+        }
+    }
+    whole
 }

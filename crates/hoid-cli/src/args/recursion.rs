@@ -82,8 +82,8 @@ pub struct TrackArgs {
     pub methods: bool,
     #[command(flatten)]
     pub recursion: RecursionArgs,
-    /// Role of a second --input: feedforward, motion or output, such as r=motion [default: feedforward]. A model with
-    /// two inputs requires --method rls or rpem, and --nk
+    /// Role of a second --input: feedforward, motion or output, such as r=motion [default: feedforward]; with the method
+    /// adaptive also its preview in s (r=feedforward:0.5). The methods rls and rpem require --nk for two inputs
     #[arg(long, value_name = "COLUMN=ROLE")]
     pub role: Option<String>,
     /// Span of the start fit, s, for methods that have one [default: the first third of the record]

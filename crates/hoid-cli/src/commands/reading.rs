@@ -48,7 +48,7 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
             [_] => None,
             _ => {
                 return Err(CliError::Usage(
-                    "give only one --input here; several inputs require hoid identify, or hoid track with the method rls or rpem"
+                    "give only one --input here; several inputs require hoid identify, or hoid track with the method adaptive, rls or rpem"
                         .to_owned(),
                 ));
             }

@@ -16,39 +16,39 @@ const TEMPERATURE_NATS: f64 = 3.0;
 
 /// Operator rejected in a trial from another starting point.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Alternative {
-    operator: [f64; PARAMETER_COUNT],
+struct Alternative<const I: usize> {
+    operators: [[f64; PARAMETER_COUNT]; I],
     deficit: f64,
     samples: u64,
     known: bool,
 }
 
-crate::state!([] Alternative { operator, deficit, samples, known });
+crate::state!([const I: usize] Alternative<I> { operators, deficit, samples, known });
 
 /// Operators rejected in the last trial from each starting point.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Alternatives {
-    all: [Alternative; START_COUNT],
+pub(super) struct Alternatives<const I: usize> {
+    all: [Alternative<I>; START_COUNT],
 }
 
-crate::state!([] Alternatives { all });
+crate::state!([const I: usize] Alternatives<I> { all });
 
-impl Alternatives {
+impl<const I: usize> Alternatives<I> {
     pub const EMPTY: Self = Self {
         all: [Alternative {
-            operator: [0.0; PARAMETER_COUNT],
+            operators: [[0.0; PARAMETER_COUNT]; I],
             deficit: 0.0,
             samples: 0,
             known: false,
         }; START_COUNT],
     };
 
-    /// Stores the operator rejected in the trial from a starting point, with its deficit of evidence and the number of
-    /// samples read by then.
-    pub fn store(&mut self, start: usize, operator: [f64; PARAMETER_COUNT], deficit: f64, samples: u64) {
+    /// Stores the responses to all inputs rejected in the trial from a starting point, with their deficit of evidence
+    /// and the number of samples read by then.
+    pub fn store(&mut self, start: usize, operators: [[f64; PARAMETER_COUNT]; I], deficit: f64, samples: u64) {
         if let Some(place) = self.all.get_mut(start) {
             *place = Alternative {
-                operator,
+                operators,
                 deficit: deficit.max(0.0),
                 samples,
                 known: true,
@@ -56,10 +56,11 @@ impl Alternatives {
         }
     }
 
-    /// Returns the weighted scatter of the alternatives about an operator. `samples` is the current number of samples;
-    /// the last `window` of them are replayed.
+    /// Returns the weighted scatter of the alternatives about the operator of an input. `samples` is the current number
+    /// of samples; the last `window` of them are replayed.
     pub fn scatter(
         &self,
+        input: usize,
         about: &[f64; PARAMETER_COUNT],
         samples: u64,
         window: u64,
@@ -71,9 +72,10 @@ impl Alternatives {
             let share = (1.0 - since / samples.min(window).max(1) as f64).max(0.0);
             let weight = libm::exp(-other.deficit / TEMPERATURE_NATS) * share * share;
             weights += weight;
+            let own = &other.operators[input];
             for i in 0..PARAMETER_COUNT {
                 for j in 0..PARAMETER_COUNT {
-                    scatter[i][j] += weight * (other.operator[i] - about[i]) * (other.operator[j] - about[j]);
+                    scatter[i][j] += weight * (own[i] - about[i]) * (own[j] - about[j]);
                 }
             }
         }
@@ -89,17 +91,20 @@ mod tests {
     fn alternatives_are_weighted_by_prediction_and_age() {
         let about = [0.1, 0.04, 11.0, 0.3, 0.28];
         let mut all = Alternatives::EMPTY;
-        assert_eq!(all.scatter(&about, 100, 150), [[0.0; PARAMETER_COUNT]; PARAMETER_COUNT]);
+        assert_eq!(
+            all.scatter(0, &about, 100, 150),
+            [[0.0; PARAMETER_COUNT]; PARAMETER_COUNT]
+        );
         let mut other = about;
         other[2] = 13.0;
-        all.store(0, other, 0.0, 100);
-        assert!((all.scatter(&about, 100, 150)[2][2] - 2.0).abs() < 1e-12);
+        all.store(0, [other], 0.0, 100);
+        assert!((all.scatter(0, &about, 100, 150)[2][2] - 2.0).abs() < 1e-12);
         // If half of the replayed samples are new, its weight is 1/4; if all are, it is zero.
-        assert!((all.scatter(&about, 175, 150)[2][2] - 0.8).abs() < 1e-12);
-        assert_eq!(all.scatter(&about, 250, 150)[2][2], 0.0);
+        assert!((all.scatter(0, &about, 175, 150)[2][2] - 0.8).abs() < 1e-12);
+        assert_eq!(all.scatter(0, &about, 250, 150)[2][2], 0.0);
         // The same operator again, with a much larger deficit.
-        all.store(0, other, 300.0, 200);
-        assert!(all.scatter(&about, 200, 150)[2][2] < 1e-9);
-        all.store(START_COUNT, other, 0.0, 200);
+        all.store(0, [other], 300.0, 200);
+        assert!(all.scatter(0, &about, 200, 150)[2][2] < 1e-9);
+        all.store(START_COUNT, [other], 0.0, 200);
     }
 }

@@ -30,7 +30,7 @@
 use super::{
     f64x2::F64x2,
     signal_history::{SignalPairs, to_pairs},
-    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, SIGNAL_COUNT, STATE_COUNT},
+    sizes::{DYNAMICS_COUNT, GAIN_COUNT, SIGNAL_COUNT},
 };
 
 /// Frequency in rad/s at which each response is scaled to a gain of one.
@@ -277,15 +277,15 @@ impl Basis {
         r
     }
 
-    /// Returns the weights of the signals in the response `sum_i theta_i (r_i + sum_j c_j dr_i/dj)`, where `state`
-    /// contains the gains theta and the corrections c.
-    pub fn weights(&self, state: &[f64; STATE_COUNT]) -> Signals {
+    /// Returns the weights of the signals in the response `sum_i theta_i (r_i + sum_j c_j dr_i/dj)` with the gains theta
+    /// and the corrections c.
+    pub fn weights(&self, gains: &[f64; GAIN_COUNT], corrections: &[f64; DYNAMICS_COUNT]) -> Signals {
         let Point { omega, zeta, .. } = self.point;
         let (p, q) = (2.0 * zeta * omega, omega * omega);
-        let [_, _, _, _, of_omega, of_zeta, of_tau] = *state;
+        let [of_omega, of_zeta, of_tau] = *corrections;
         let mut weights = [0.0; SIGNAL_COUNT];
         for i in 0..GAIN_COUNT {
-            let a = state[i] * self.scale[i] * q;
+            let a = gains[i] * self.scale[i] * q;
             let b = a * (1.0 + 2.0 * of_omega / omega);
             weights[i] += b * q - 2.0 * a * omega * of_omega;
             weights[i + 1] += b * p - 2.0 * a * (zeta * of_omega + omega * of_zeta) - a * of_tau * q;
@@ -298,21 +298,6 @@ impl Basis {
     /// Returns the factors that convert gains from the units of this basis to the units of the basis `to`.
     pub(super) fn gain_conversion(&self, to: &Self) -> [f64; GAIN_COUNT] {
         core::array::from_fn(|i| self.scale[i] / to.scale[i])
-    }
-
-    /// Converts a state to the coordinates of the basis `to`: the gains are converted to the units of `to`, and the
-    /// corrections are taken relative to the point of `to`.
-    pub(super) fn convert_state(&self, to: &Self, state: &[f64; STATE_COUNT]) -> [f64; STATE_COUNT] {
-        let mut carried = *state;
-        for (s, unit) in carried.iter_mut().zip(self.gain_conversion(to)) {
-            *s *= unit;
-        }
-        let (from, there) = (self.point, to.point);
-        let moved = [from.omega - there.omega, from.zeta - there.zeta, from.tau - there.tau];
-        for (c, moved) in carried[LINEAR_COUNT..].iter_mut().zip(moved) {
-            *c += moved;
-        }
-        carried
     }
 
     /// Resets the filter to rest.

@@ -12,18 +12,16 @@
 
 use hoid_numerics::{cholesky, products::dot};
 
-use super::sizes::{DYNAMICS_COUNT, LINEAR_COUNT, STATE_COUNT};
+use super::sizes::is_correction;
 
-/// Number of products in the upper triangle of the normal equations.
-const PRODUCT_COUNT: usize = STATE_COUNT * (STATE_COUNT + 1) / 2;
 /// Ridge that is added to the diagonal, relative to the diagonal and divided by the number of samples.
 const RELATIVE_RIDGE: f64 = 1e-3;
 
 /// Row of one sample in the normal equations.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Row {
+pub(super) struct Row<const S: usize> {
     /// Regressors of gains and level, followed by the regressors of the dynamics.
-    pub x: [f64; STATE_COUNT],
+    pub x: [f64; S],
     /// Output, with its innovation limited, plus `q' p`.
     pub y: f64,
     /// Innovation before limiting.
@@ -34,43 +32,44 @@ pub(super) struct Row {
 
 /// Sums over one block from which its normal equations are formed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Block {
-    products: [f64; PRODUCT_COUNT],
-    with_output: [f64; STATE_COUNT],
+pub(super) struct Block<const S: usize, const P: usize> {
+    /// Products of the regressors: the upper triangle, by rows.
+    products: [f64; P],
+    with_output: [f64; S],
     square: f64,
     pub samples: f64,
     /// Sum of the squares of the innovations before limiting.
     power: f64,
 }
 
-crate::state!([] Block { products, with_output, square, samples, power });
-
-pub(super) const EMPTY: Block = Block {
-    products: [0.0; PRODUCT_COUNT],
-    with_output: [0.0; STATE_COUNT],
-    square: 0.0,
-    samples: 0.0,
-    power: 0.0,
-};
+crate::state!([const S: usize, const P: usize] Block<S, P> { products, with_output, square, samples, power });
 
 /// Solution of the normal equations `A x = b`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Solution {
-    pub state: [f64; STATE_COUNT],
+pub(super) struct Solution<const S: usize> {
+    pub state: [f64; S],
     /// `A^-1`.
-    pub inverse: [[f64; STATE_COUNT]; STATE_COUNT],
+    pub inverse: [[f64; S]; S],
     /// Residual sum of squares, including the contribution of the prior.
     pub residual_squares: f64,
 }
 
-impl Block {
+impl<const S: usize, const P: usize> Block<S, P> {
+    pub const EMPTY: Self = Self {
+        products: [0.0; P],
+        with_output: [0.0; S],
+        square: 0.0,
+        samples: 0.0,
+        power: 0.0,
+    };
+
     /// Adds the row of one sample to the sums.
     #[inline(always)]
-    pub fn add(&mut self, row: &Row) {
+    pub fn add(&mut self, row: &Row<S>) {
         let Row { x, y, .. } = row;
         let weight = 1.0 / row.variance;
         let mut k = 0;
-        for i in 0..STATE_COUNT {
+        for i in 0..S {
             let a = weight * x[i];
             for x in &x[i..] {
                 self.products[k] += a * x;
@@ -93,26 +92,26 @@ impl Block {
     }
 
     pub fn of(blocks: &[Self]) -> Self {
-        blocks.iter().fold(EMPTY, |mut sum, block| {
+        blocks.iter().fold(Self::EMPTY, |mut sum, block| {
             sum.merge(block);
             sum
         })
     }
 
     /// Returns the block with a normal prior of the dynamics, of the given mean and standard deviations, added to its
-    /// sums.
-    pub fn with_prior(mut self, mean: [f64; DYNAMICS_COUNT], deviations: [f64; DYNAMICS_COUNT]) -> Self {
+    /// sums. Only the numbers of the corrections are used.
+    pub fn with_prior(mut self, mean: &[f64; S], deviations: &[f64; S]) -> Self {
         let mut diagonal = 0;
-        for i in 0..STATE_COUNT {
-            if let Some(j) = i.checked_sub(LINEAR_COUNT) {
+        for i in 0..S {
+            if is_correction(i) {
                 // The sums are in units of the variance of eps, so the weight of the prior is the reciprocal of its
                 // variance.
-                let weight = 1.0 / (deviations[j] * deviations[j]);
+                let weight = 1.0 / (deviations[i] * deviations[i]);
                 self.products[diagonal] += weight;
-                self.with_output[i] += weight * mean[j];
-                self.square += weight * mean[j] * mean[j];
+                self.with_output[i] += weight * mean[i];
+                self.square += weight * mean[i] * mean[i];
             }
-            diagonal += STATE_COUNT - i;
+            diagonal += S - i;
         }
         self
     }
@@ -123,11 +122,11 @@ impl Block {
     }
 
     /// Matrix A of the normal equations.
-    pub fn matrix(&self) -> [[f64; STATE_COUNT]; STATE_COUNT] {
-        let mut matrix = [[0.0; STATE_COUNT]; STATE_COUNT];
+    pub fn matrix(&self) -> [[f64; S]; S] {
+        let mut matrix = [[0.0; S]; S];
         let mut k = 0;
-        for i in 0..STATE_COUNT {
-            for j in i..STATE_COUNT {
+        for i in 0..S {
+            for j in i..S {
                 (matrix[i][j], matrix[j][i]) = (self.products[k], self.products[k]);
                 k += 1;
             }
@@ -136,20 +135,20 @@ impl Block {
     }
 
     /// Least-squares solution; `None` if the equations are singular or there are too few samples.
-    pub fn solve(&self) -> Option<Solution> {
-        if self.samples <= STATE_COUNT as f64 {
+    pub fn solve(&self) -> Option<Solution<S>> {
+        if self.samples <= S as f64 {
             return None;
         }
         let mut factor = self.matrix();
         for (i, row) in factor.iter_mut().enumerate() {
             row[i] *= 1.0 + RELATIVE_RIDGE / self.samples;
         }
-        if !cholesky::factor(&mut factor, STATE_COUNT) {
+        if !cholesky::factor(&mut factor, S) {
             return None;
         }
         let mut state = self.with_output;
-        cholesky::solve(&factor, STATE_COUNT, &mut state);
-        let inverse = cholesky::scaled_inverse(&factor, STATE_COUNT, 1.0);
+        cholesky::solve(&factor, S, &mut state);
+        let inverse = cholesky::scaled_inverse(&factor, S, 1.0);
         let residual_squares = (self.square - dot(&state, &self.with_output)).max(self.samples * 1e-12);
         Some(Solution {
             state,
@@ -159,7 +158,7 @@ impl Block {
     }
 
     /// Score `b - A x` of a state x. Its expected value is zero at the true state.
-    pub fn score(&self, state: &[f64; STATE_COUNT]) -> [f64; STATE_COUNT] {
+    pub fn score(&self, state: &[f64; S]) -> [f64; S] {
         let matrix = self.matrix();
         core::array::from_fn(|i| self.with_output[i] - dot(&matrix[i], state))
     }

@@ -14,15 +14,19 @@
 //! estimate rather than the speed of initial convergence.
 
 use super::{
-    basis::{Basis, Complex, Point, Regressors},
+    bases::Bases,
+    basis::{Complex, Point, Regressors, Signals},
     blocks::Row,
     f64x2::F64x2,
     last_blocks::LastBlocks,
     mixture::{ChangePrior, Mixture, NoiseScales, Segments},
     moments::Moments,
     noise::NoiseModel,
-    signal_history::{SignalHistory, SignalPairs, to_pairs},
-    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT, SIGNAL_COUNT, STATE_COUNT},
+    signal_history::{SignalHistory, SignalPairs, from_pairs, to_pairs},
+    sizes::{
+        DYNAMICS_COUNT, GAIN_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT, SIGNAL_COUNT, correction_places, delay_place,
+        first_gain, input_part, is_correction,
+    },
     volatility::Volatility,
 };
 use crate::state::{State, visit_all};
@@ -33,8 +37,6 @@ pub(super) const MAX_SIGNAL: f64 = 1e100;
 /// the basis point in one step (relative for omega and zeta, in s for tau).
 const BASIS_POINT_RANGE: [[f64; 2]; DYNAMICS_COUNT] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
 const CORRECTION_RANGE: [[f64; 2]; DYNAMICS_COUNT] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
-/// Longest delay in s.
-pub(super) const LONGEST_DELAY_S: f64 = 0.9;
 /// Frequencies in rad/s at which K_e and K_e_dot are fitted to the numerator of the operator.
 pub(super) const FIT_FREQUENCIES_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Initial time in s during which blocks do not count as evidence.
@@ -54,28 +56,28 @@ const MIN_RELATIVE_VARIANCE: f64 = 1e-24;
 
 /// Sample after the whitening filter.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct WhitenedSample {
+pub(super) struct WhitenedSample<const I: usize> {
     pub y: f64,
-    pub signals: [f64; SIGNAL_COUNT],
+    pub signals: [Signals; I],
     pub level: f64,
 }
 
 /// One pass over the data, described in the module documentation.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Candidate {
-    basis: Basis,
-    now: [f64; SIGNAL_COUNT],
-    past: SignalHistory,
+pub(super) struct Candidate<const I: usize, const S: usize, const M: usize, const P: usize> {
+    bases: Bases<I>,
+    now: [Signals; I],
+    past: [SignalHistory; I],
     outputs: [f64; MAX_NOISE_ORDER],
     d: [f64; MAX_NOISE_ORDER],
     pub noise: NoiseModel,
     /// Sums over the first p samples of the current block (p is the order of D), and over its other samples.
-    early: Moments,
-    late: Moments,
+    early: Moments<M>,
+    late: Moments<M>,
     block: u64,
-    pub mixture: Mixture,
-    pub scales: NoiseScales,
-    guide: Segments,
+    pub mixture: Mixture<S>,
+    pub scales: NoiseScales<I>,
+    guide: Segments<S>,
     skipped: u64,
     volatility: Volatility,
     predictive_variance: [f64; 2],
@@ -83,16 +85,16 @@ pub(super) struct Candidate {
     samples: u64,
     /// Number of further samples that are not used because the filter D contains predicted outputs.
     predicted: u64,
-    pub blocks: LastBlocks,
+    pub blocks: LastBlocks<S, P>,
     /// Index of the sample at which the candidate started.
     pub start: u64,
 }
 
-impl State for Candidate {
+impl<const I: usize, const S: usize, const M: usize, const P: usize> State for Candidate<I, S, M, P> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         visit_all(
             &mut [
-                &mut self.basis,
+                &mut self.bases,
                 &mut self.now,
                 &mut self.past,
                 &mut self.outputs,
@@ -117,14 +119,14 @@ impl State for Candidate {
     }
 }
 
-impl Candidate {
+impl<const I: usize, const S: usize, const M: usize, const P: usize> Candidate<I, S, M, P> {
     /// Builds a candidate at rest. `d` is the initial noise model, already solved.
     pub fn new(
-        basis: Basis,
+        bases: Bases<I>,
         d: &NoiseModel,
         empty: NoiseModel,
-        mixture: Mixture,
-        scales: NoiseScales,
+        mixture: Mixture<S>,
+        scales: NoiseScales<I>,
         prior: &ChangePrior,
         start: u64,
     ) -> Self {
@@ -132,9 +134,9 @@ impl Candidate {
         let mut padded = [0.0; MAX_NOISE_ORDER];
         padded[..d.order()].copy_from_slice(d.d());
         Self {
-            basis,
-            now: [0.0; SIGNAL_COUNT],
-            past: SignalHistory::ZERO,
+            bases,
+            now: [[0.0; SIGNAL_COUNT]; I],
+            past: [SignalHistory::ZERO; I],
             outputs: [0.0; MAX_NOISE_ORDER],
             d: padded,
             noise: empty,
@@ -157,7 +159,7 @@ impl Candidate {
 
     /// Makes the candidate compute the residuals for the noise model with the states of the given segments instead of
     /// the mean of the mixture.
-    pub fn with_guide(mut self, guide: Segments) -> Self {
+    pub fn with_guide(mut self, guide: Segments<S>) -> Self {
         self.guide = guide;
         self
     }
@@ -174,8 +176,8 @@ impl Candidate {
         self.guide = Segments::EMPTY;
     }
 
-    pub fn basis(&self) -> &Basis {
-        &self.basis
+    pub fn bases(&self) -> &Bases<I> {
+        &self.bases
     }
 
     pub fn block_samples(&self) -> u64 {
@@ -187,47 +189,58 @@ impl Candidate {
         self.volatility.dispersion()
     }
 
-    /// Advances the basis by one sample; `error(age)` is the error `age` samples ago.
+    /// Advances the bases by one sample; `value(input, age)` is the value of an input `age` samples ago.
     #[inline(always)]
-    pub fn advance_basis(&mut self, error: impl Fn(usize) -> f64) {
-        let l = self.basis.delay();
-        self.now = self.basis.step([error(l), error(l + 1), error(l + 2)]);
+    pub fn advance_bases(&mut self, value: impl Fn(usize, usize) -> f64) {
+        self.now = self.bases.step(value);
     }
 
     /// Step 2: returns `y = D u`, the signals of the basis filtered by D, and `D(1)`, the factor of the level.
     #[inline(always)]
-    pub fn whiten(&self, u: f64) -> WhitenedSample {
-        let (mut y, mut z, mut level) = (u, to_pairs(&self.now), 1.0);
+    pub fn whiten(&self, u: f64) -> WhitenedSample<I> {
+        let (mut y, mut z, mut level) = (u, to_pairs(&self.now[0]), 1.0);
         let order = self.noise.order().next_multiple_of(4).min(MAX_NOISE_ORDER);
         // All hypotheses are linear in the signals, so filtering the signals once by D serves every hypothesis.
-        for ((d, u), before) in self.d[..order].iter().zip(&self.outputs).zip(self.past.newest_first()) {
+        for ((d, u), before) in self.d[..order]
+            .iter()
+            .zip(&self.outputs)
+            .zip(self.past[0].newest_first())
+        {
             y += d * u;
             level += d;
             for (z, before) in z.iter_mut().zip(before) {
                 *z += F64x2::splat(*d) * *before;
             }
         }
-        WhitenedSample {
-            y,
-            signals: core::array::from_fn(|i| z[i / 2].0[i % 2]),
-            level,
+        let mut signals = [from_pairs(&z); I];
+        for input in 1..I {
+            let mut z = to_pairs(&self.now[input]);
+            for (d, before) in self.d[..order].iter().zip(self.past[input].newest_first()) {
+                for (z, before) in z.iter_mut().zip(before) {
+                    *z += F64x2::splat(*d) * *before;
+                }
+            }
+            signals[input] = from_pairs(&z);
         }
+        WhitenedSample { y, signals, level }
     }
 
     /// Step 3: returns `nu = y - H x^`, the innovation of a whitened sample for the mean of the mixture.
     #[inline(always)]
-    pub fn innovation(&self, white: &WhitenedSample) -> f64 {
+    pub fn innovation(&self, white: &WhitenedSample<I>) -> f64 {
         let state = self.mixture.mean();
-        let w = self.basis.weights(state);
-        white.y - state[GAIN_COUNT] * white.level - (0..SIGNAL_COUNT).map(|k| w[k] * white.signals[k]).sum::<f64>()
+        let weights = self.bases.weights(state);
+        let response = |w: &Signals, z: &Signals| (0..SIGNAL_COUNT).map(|k| w[k] * z[k]).sum::<f64>();
+        let unexplained = white.y - state[GAIN_COUNT] * white.level;
+        (weights.iter().zip(&white.signals)).fold(unexplained, |left, (w, z)| left - response(w, z))
     }
 
     /// Adds a sample to the sums of the block, to the noise model and to the detector, and completes the block if it is
     /// full. Returns false if a number has overflowed.
     #[inline(always)]
-    pub fn update(&mut self, white: &WhitenedSample, u: f64, prior: &ChangePrior) -> bool {
+    pub fn update(&mut self, white: &WhitenedSample<I>, u: f64, prior: &ChangePrior) -> bool {
         let sound = |x: &f64| x.abs() < MAX_SIGNAL;
-        if !(sound(&white.y) && white.signals.iter().all(sound)) {
+        if !(sound(&white.y) && white.signals.as_flattened().iter().all(sound)) {
             return false;
         }
         if self.predicted > 0 {
@@ -272,23 +285,26 @@ impl Candidate {
 
     /// Returns the row of the sample in the normal equations of the detector.
     #[inline(always)]
-    fn row(&self, white: &WhitenedSample, innovation: f64, limit: f64) -> Row {
-        let Regressors { x, by } = self.basis.regressors(&white.signals);
+    fn row(&self, white: &WhitenedSample<I>, innovation: f64, limit: f64) -> Row<S> {
         let state = self.mixture.mean();
-        let (mut row, mut shift) = ([0.0; STATE_COUNT], 0.0);
+        let (mut row, mut shift) = ([0.0; S], 0.0);
         // The response is linearised about the current state: dy/dtheta_i = r_i + sum_j c_j dr_i/dj, dy/dc_j = sum_i
         // theta_i dr_i/dj.
-        for i in 0..GAIN_COUNT {
-            row[i] = x[i];
-            for j in 0..DYNAMICS_COUNT {
-                row[i] += state[LINEAR_COUNT + j] * by[j][i];
-                row[LINEAR_COUNT + j] += state[i] * by[j][i];
+        for input in 0..I {
+            let Regressors { x, by } = self.bases.of(input).regressors(&white.signals[input]);
+            let (first, places) = (first_gain(input), correction_places(input));
+            for i in 0..GAIN_COUNT {
+                row[first + i] = x[i];
+                for (j, place) in places.into_iter().enumerate() {
+                    row[first + i] += state[place] * by[j][i];
+                    row[place] += state[first + i] * by[j][i];
+                }
             }
         }
         row[GAIN_COUNT] = white.level;
         // The products theta_i c_j appear in both derivatives; H_c c is added once to y so that y = H x is exact at the
         // state.
-        for j in LINEAR_COUNT..STATE_COUNT {
+        for j in (0..S).filter(|j| is_correction(*j)) {
             shift += row[j] * state[j];
         }
         Row {
@@ -309,15 +325,21 @@ impl Candidate {
         }
         let state = self.guide.at(self.mixture.blocks).unwrap_or(self.mixture.mean());
         let level = state[GAIN_COUNT];
-        let weights = to_pairs(&self.basis.weights(state));
-        let left = |u: f64, z: &SignalPairs| {
+        let weights = self.bases.weights(state).map(|weights| to_pairs(&weights));
+        let response = |weights: &SignalPairs, z: &SignalPairs| {
             let response = weights[0] * z[0] + weights[1] * z[1] + weights[2] * z[2];
-            u - level - response.sum()
+            response.sum()
         };
         let mut v = [0.0; MAX_NOISE_ORDER + 1];
-        v[0] = left(u, &to_pairs(&self.now));
-        for ((v, u), z) in v[1..=order].iter_mut().zip(&self.outputs).zip(self.past.newest_first()) {
-            *v = left(*u, z);
+        v[0] = u - level - response(&weights[0], &to_pairs(&self.now[0]));
+        for ((v, u), z) in (v[1..=order].iter_mut().zip(&self.outputs)).zip(self.past[0].newest_first()) {
+            *v = u - level - response(&weights[0], z);
+        }
+        for input in 1..I {
+            v[0] -= response(&weights[input], &to_pairs(&self.now[input]));
+            for (v, z) in v[1..=order].iter_mut().zip(self.past[input].newest_first()) {
+                *v -= response(&weights[input], z);
+            }
         }
         // After a change of the operator, v contains the unmodelled part of the response. The weight
         // `min(1, c sigma^2/eps^2)` limits the contribution of samples with a large residual to the sums of D.
@@ -331,7 +353,7 @@ impl Candidate {
         let moments = early.merged(&late);
         let (n, ts) = (moments.samples, self.scales.sample_time);
         let least = MIN_RELATIVE_VARIANCE * self.scales.size * self.scales.size;
-        let energy = moments.residual_energy(&self.basis, self.mixture.mean()).max(n * least);
+        let energy = moments.residual_energy(&self.bases, self.mixture.mean()).max(n * least);
         let settled = self.samples as f64 * ts > SETTLING_S;
         let [predictive_variance, rests_on] = &mut self.predictive_variance;
         if settled {
@@ -345,7 +367,7 @@ impl Candidate {
         *predictive_variance = (*predictive_variance + n / *rests_on * (energy / n - *predictive_variance)).max(least);
         // The variance in the predictive density follows the mean energy of the blocks with a memory that grows to at
         // most LEVEL_S.
-        let left = self.mixture.update([&early, &late], &self.basis, prior, &self.scales);
+        let left = self.mixture.update([&early, &late], &self.bases, prior, &self.scales);
         if settled {
             self.volatility.add(left, n);
         }
@@ -368,7 +390,9 @@ impl Candidate {
     pub fn store(&mut self, u: f64) {
         self.outputs.copy_within(0..MAX_NOISE_ORDER - 1, 1);
         self.outputs[0] = u;
-        self.past.push(&self.now);
+        for (past, now) in self.past.iter_mut().zip(&self.now) {
+            past.push(now);
+        }
     }
 
     /// Stores, for the whitening filter, a sample whose output is a prediction or was recorded at a limit of the stick.
@@ -383,86 +407,98 @@ impl Candidate {
         &self.d[..self.noise.order()]
     }
 
-    /// Returns the basis point plus the corrections of a state; each correction is limited to the largest step, and the
-    /// resulting point to the range of the basis.
-    pub fn corrected_point(&self, state: &[f64; STATE_COUNT]) -> Point {
-        let at = self.basis.point();
-        let of = [at.omega, at.zeta, 1.0];
-        let [omega, zeta, tau] = core::array::from_fn(|j| {
-            let [down, up] = CORRECTION_RANGE[j].map(|far| far * of[j]);
-            let [low, high] = BASIS_POINT_RANGE[j];
-            let from = [at.omega, at.zeta, at.tau][j];
-            (from + state[LINEAR_COUNT + j].max(down).min(up)).max(low).min(high)
-        });
-        Point { omega, zeta, tau, ..at }
+    /// Returns the basis point of each input plus the corrections of a state; each correction is limited to the largest
+    /// step, and the resulting points to the range of the basis.
+    pub fn corrected_points(&self, state: &[f64; S]) -> [Point; I] {
+        core::array::from_fn(|input| {
+            let (at, (_, corrections)) = (self.bases.of(input).point(), input_part(state, input));
+            let of = [at.omega, at.zeta, 1.0];
+            let [omega, zeta, tau] = core::array::from_fn(|j| {
+                let [down, up] = CORRECTION_RANGE[j].map(|far| far * of[j]);
+                let [low, high] = BASIS_POINT_RANGE[j];
+                let from = [at.omega, at.zeta, at.tau][j];
+                (from + corrections[j].max(down).min(up)).max(low).min(high)
+            });
+            Point { omega, zeta, tau, ..at }
+        })
     }
 
-    /// Returns the basis point plus the current corrections, within the same limits.
-    pub fn point(&self) -> Point {
-        self.corrected_point(self.mixture.mean())
+    /// Returns the basis point of each input plus the current corrections, within the same limits.
+    pub fn points(&self) -> [Point; I] {
+        self.corrected_points(self.mixture.mean())
     }
 
-    /// Estimates of K_e, K_e_dot, omega, zeta and tau.
-    pub fn operator(&self) -> [f64; PARAMETER_COUNT] {
-        let (map, state) = (
-            self.basis.gain_and_lead_matrix(&FIT_FREQUENCIES_RAD_S),
-            self.mixture.mean(),
-        );
-        let Point { omega, zeta, tau, .. } = self.point();
-        let gain = |i: usize| (0..GAIN_COUNT).map(|k| map[i][k] * state[k]).sum();
-        [gain(0), gain(1), omega, zeta, tau]
+    /// Estimates of K_e, K_e_dot, omega, zeta and tau for each input.
+    pub fn operators(&self) -> [[f64; PARAMETER_COUNT]; I] {
+        let (state, points) = (self.mixture.mean(), self.points());
+        core::array::from_fn(|input| {
+            let (map, (gains, _)) = (self.gain_and_lead_matrix(input), input_part(state, input));
+            let Point { omega, zeta, tau, .. } = points[input];
+            let gain = |i: usize| (0..GAIN_COUNT).map(|k| map[i][k] * gains[k]).sum();
+            [gain(0), gain(1), omega, zeta, tau]
+        })
     }
 
-    /// Frequency responses by which the gains are multiplied, at a frequency in rad/s and at the current point.
-    pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAIN_COUNT] {
-        self.basis.response(omega_rad_s, self.point())
+    /// Matrix that maps the gains of an input to K_e and K_e_dot.
+    pub fn gain_and_lead_matrix(&self, input: usize) -> [[f64; GAIN_COUNT]; 2] {
+        self.bases.of(input).gain_and_lead_matrix(&FIT_FREQUENCIES_RAD_S)
     }
 
-    /// Frequency response Y of the operator at a frequency in rad/s.
-    pub fn response(&self, omega_rad_s: f64) -> Complex {
-        let (state, h) = (self.mixture.mean(), self.responses(omega_rad_s));
-        [0, 1].map(|part| (0..GAIN_COUNT).map(|i| state[i] * h[i][part]).sum())
+    /// Frequency responses by which the gains of an input are multiplied, at a frequency in rad/s and at the current
+    /// point.
+    pub fn responses(&self, input: usize, omega_rad_s: f64) -> [Complex; GAIN_COUNT] {
+        self.bases.of(input).response(omega_rad_s, self.points()[input])
     }
 
-    /// As [`Candidate::response`], with the derivatives of the real and imaginary parts with respect to gains, level
-    /// and corrections. The derivatives are exact for the gains and finite differences for the corrections.
-    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATE_COUNT]; 2]) {
-        let (state, point) = (self.mixture.mean(), self.point());
-        let h = self.basis.response(omega_rad_s, point);
+    /// Frequency response to an input at a frequency in rad/s.
+    pub fn response(&self, input: usize, omega_rad_s: f64) -> Complex {
+        let (gains, h) = (self.gains(input), self.responses(input, omega_rad_s));
+        [0, 1].map(|part| (0..GAIN_COUNT).map(|i| gains[i] * h[i][part]).sum())
+    }
+
+    fn gains(&self, input: usize) -> [f64; GAIN_COUNT] {
+        input_part(self.mixture.mean(), input).0
+    }
+
+    /// As [`Candidate::response`], with the derivatives of the real and imaginary parts with respect to the state. The
+    /// derivatives are exact for the gains and finite differences for the corrections.
+    pub fn response_with_derivatives(&self, input: usize, omega_rad_s: f64) -> (Complex, [[f64; S]; 2]) {
+        let (gains, basis, point) = (self.gains(input), self.bases.of(input), self.points()[input]);
+        let h = basis.response(omega_rad_s, point);
         let of =
-            |h: &[Complex; GAIN_COUNT]| [0, 1].map(|part| (0..GAIN_COUNT).map(|i| state[i] * h[i][part]).sum::<f64>());
-        let mut by = [[0.0; STATE_COUNT]; 2];
+            |h: &[Complex; GAIN_COUNT]| [0, 1].map(|part| (0..GAIN_COUNT).map(|i| gains[i] * h[i][part]).sum::<f64>());
+        let mut by = [[0.0; S]; 2];
         for part in 0..2 {
             for i in 0..GAIN_COUNT {
-                by[part][i] = h[i][part];
+                by[part][first_gain(input) + i] = h[i][part];
             }
         }
+        let places = correction_places(input);
         for (j, size) in [point.omega, point.zeta, 0.1].into_iter().enumerate() {
             let step = 1e-5 * size;
             let at = |sign: f64| {
                 let mut by = [0.0; DYNAMICS_COUNT];
                 by[j] = sign * step;
-                of(&self.basis.response(omega_rad_s, point.moved(by)))
+                of(&basis.response(omega_rad_s, point.moved(by)))
             };
             let (up, down) = (at(1.0), at(-1.0));
             for part in 0..2 {
-                by[part][LINEAR_COUNT + j] = (up[part] - down[part]) / (2.0 * step);
+                by[part][places[j]] = (up[part] - down[part]) / (2.0 * step);
             }
         }
         (of(&h), by)
     }
 
-    /// Returns a state in the coordinates of another basis; if the points of the two bases are far apart, the
-    /// corrections are set to zero.
-    pub fn convert_state(&self, to: &Basis, state: &[f64; STATE_COUNT]) -> [f64; STATE_COUNT] {
-        let mut carried = self.basis.convert_state(to, state);
-        let [omega, _, tau] = [
-            carried[LINEAR_COUNT],
-            carried[LINEAR_COUNT + 1],
-            carried[LINEAR_COUNT + 2],
-        ];
-        if tau.abs() > 0.03 || omega.abs() > 0.3 * to.point().omega {
-            carried[LINEAR_COUNT..].fill(0.0);
+    /// Returns a state in the coordinates of other bases; if their points are far apart, the corrections are set to
+    /// zero.
+    pub fn convert_state(&self, to: &Bases<I>, state: &[f64; S]) -> [f64; S] {
+        let mut carried = self.bases.convert_state(to, state);
+        let [omega, ..] = correction_places(0).map(|place| carried[place]);
+        let is_far = |input: usize| carried[delay_place(input)].abs() > 0.03;
+        if (0..I).any(is_far) || omega.abs() > 0.3 * to.first().point().omega {
+            for (_, correction) in carried.iter_mut().enumerate().filter(|(i, _)| is_correction(*i)) {
+                *correction = 0.0;
+            }
         }
         carried
     }

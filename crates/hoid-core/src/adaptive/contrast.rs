@@ -21,12 +21,9 @@
 
 use hoid_numerics::{cholesky, products::dot};
 
-use super::{
-    blocks::{Block, Solution},
-    sizes::STATE_COUNT,
-};
+use super::blocks::{Block, Solution};
 
-pub(super) type Matrix = [[f64; STATE_COUNT]; STATE_COUNT];
+pub(super) type Matrix<const S: usize> = [[f64; S]; S];
 
 /// Number of blocks over which each score is summed.
 const BLOCKS_PER_SCORE: usize = 2;
@@ -38,27 +35,47 @@ pub(super) const MODEL_ONLY_WEIGHT: f64 = 0.0;
 const MIN_DIVISOR: f64 = 0.3;
 
 /// Difference between present and past in gains, level, natural frequency, damping and delay.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Contrast {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contrast<const S: usize> {
     /// State of the present minus state of the past.
-    pub difference: [f64; STATE_COUNT],
+    pub difference: [f64; S],
     /// Covariance of the difference.
-    pub covariance: Matrix,
+    pub covariance: Matrix<S>,
     /// State of the past, with corrections relative to the point of the basis.
-    pub before: [f64; STATE_COUNT],
+    pub before: [f64; S],
     /// Covariance of the state of the past.
-    pub covariance_before: Matrix,
+    pub covariance_before: Matrix<S>,
     /// Residual sum of squares over both spans.
     pub residual_squares: f64,
     /// Numbers of samples in the past and in the present.
     pub samples: [f64; 2],
 }
 
-crate::state!([] Contrast { difference, covariance, before, covariance_before, residual_squares, samples });
+crate::state!([const S: usize] Contrast<S> {
+    difference,
+    covariance,
+    before,
+    covariance_before,
+    residual_squares,
+    samples,
+});
 
-impl Contrast {
+impl<const S: usize> Default for Contrast<S> {
+    fn default() -> Self {
+        Self {
+            difference: [0.0; S],
+            covariance: [[0.0; S]; S],
+            before: [0.0; S],
+            covariance_before: [[0.0; S]; S],
+            residual_squares: 0.0,
+            samples: [0.0; 2],
+        }
+    }
+}
+
+impl<const S: usize> Contrast<S> {
     /// Computes the difference between two spans; `empirical_share` is w.
-    pub(super) fn of(spans: &SolvedSpans<'_>, empirical_share: f64) -> Self {
+    pub(super) fn of<const P: usize>(spans: &SolvedSpans<'_, S, P>, empirical_share: f64) -> Self {
         let SolvedSpans {
             sides, sums, solutions, ..
         } = spans;
@@ -86,16 +103,16 @@ impl Contrast {
     /// if the latter is not positive definite.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
-        if !cholesky::factor(&mut factor, STATE_COUNT) {
+        if !cholesky::factor(&mut factor, S) {
             return None;
         }
         let mut trace = 0.0;
-        for i in 0..STATE_COUNT {
+        for i in 0..S {
             let mut column = core::array::from_fn(|j| self.covariance[j][i]);
-            cholesky::solve(&factor, STATE_COUNT, &mut column);
+            cholesky::solve(&factor, S, &mut column);
             trace += column[i];
         }
-        Some(trace / STATE_COUNT as f64)
+        Some(trace / S as f64)
     }
 
     /// Returns this contrast with both covariances multiplied by a factor.
@@ -109,46 +126,51 @@ impl Contrast {
 
     /// Returns the Wald statistic `d' C^-1 d` of the selected components, or `None` if their covariance C is not
     /// positive definite.
-    pub(super) fn wald_statistic<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
-        wald(
-            places.map(|i| self.difference[i]),
-            places.map(|i| places.map(|j| self.covariance[i][j])),
-        )
+    pub(super) fn wald_statistic(&self, is_selected: impl Fn(usize) -> bool) -> Option<f64> {
+        let (mut d, mut c, mut n) = ([0.0; S], [[0.0; S]; S], 0);
+        for i in (0..S).filter(|i| is_selected(*i)) {
+            d[n] = self.difference[i];
+            for (j, place) in (0..S).filter(|j| is_selected(*j)).enumerate() {
+                c[n][j] = self.covariance[i][place];
+            }
+            n += 1;
+        }
+        wald(d, c, n)
     }
 }
 
-/// Returns the Wald statistic `d' C^-1 d`, or `None` if C is not positive definite.
-pub(super) fn wald<const N: usize>(d: [f64; N], mut c: [[f64; N]; N]) -> Option<f64> {
-    if !cholesky::factor(&mut c, N) {
+/// Returns the Wald statistic `d' C^-1 d` of the first n components, or `None` if C is not positive definite.
+pub(super) fn wald<const N: usize>(d: [f64; N], mut c: [[f64; N]; N], n: usize) -> Option<f64> {
+    if !cholesky::factor(&mut c, n) {
         return None;
     }
     let mut solved = d;
-    cholesky::solve(&c, N, &mut solved);
-    let t = dot(&solved, &d);
+    cholesky::solve(&c, n, &mut solved);
+    let t = dot(&solved[..n], &d[..n]);
     t.is_finite().then_some(t)
 }
 
 /// Past and present, each with its sums and its least-squares solution.
 #[derive(Debug, Clone)]
-pub(super) struct SolvedSpans<'b> {
-    pub sides: [&'b [Block]; 2],
-    pub sums: [Block; 2],
-    pub solutions: [Solution; 2],
+pub(super) struct SolvedSpans<'b, const S: usize, const P: usize> {
+    pub sides: [&'b [Block<S, P>]; 2],
+    pub sums: [Block<S, P>; 2],
+    pub solutions: [Solution<S>; 2],
     /// Residual sum of squares over both spans.
-    residual_squares: f64,
+    pub residual_squares: f64,
     /// Variance sigma^2 over both spans.
     pub variance: f64,
 }
 
-impl<'b> SolvedSpans<'b> {
+impl<'b, const S: usize, const P: usize> SolvedSpans<'b, S, P> {
     /// Solves both spans. `with_prior` adds a prior to the sums of each span. Returns `None` if the data of a span do not
     /// determine a state.
-    pub fn new(sides: [&'b [Block]; 2], with_prior: impl Fn(Block) -> Block) -> Option<Self> {
+    pub fn new(sides: [&'b [Block<S, P>]; 2], with_prior: impl Fn(Block<S, P>) -> Block<S, P>) -> Option<Self> {
         let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
         let solutions = [sums[0].solve()?, sums[1].solve()?];
         let samples = sums[0].samples + sums[1].samples;
         let residual_squares = solutions[0].residual_squares + solutions[1].residual_squares;
-        let variance = residual_squares / (samples - 2.0 * STATE_COUNT as f64).max(1.0);
+        let variance = residual_squares / (samples - 2.0 * S as f64).max(1.0);
         Some(Self {
             sides,
             sums,
@@ -160,15 +182,24 @@ impl<'b> SolvedSpans<'b> {
 }
 
 /// Sum of the squares `g_k g_k'` of the scores of stretches of one second, and the number of stretches.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Scores {
-    squares: Matrix,
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scores<const S: usize> {
+    squares: Matrix<S>,
     stretches: f64,
 }
 
-impl Scores {
+impl<const S: usize> Default for Scores<S> {
+    fn default() -> Self {
+        Self {
+            squares: [[0.0; S]; S],
+            stretches: 0.0,
+        }
+    }
+}
+
+impl<const S: usize> Scores<S> {
     /// Adds the scores of a span at its least-squares solution.
-    pub fn add(&mut self, blocks: &[Block], state: &[f64; STATE_COUNT]) {
+    pub fn add<const P: usize>(&mut self, blocks: &[Block<S, P>], state: &[f64; S]) {
         for stretch in blocks.rchunks_exact(BLOCKS_PER_SCORE) {
             let score = Block::of(stretch).score(state);
             for (row, a) in self.squares.iter_mut().zip(score) {
@@ -180,21 +211,27 @@ impl Scores {
 
     /// Covariance W of the score of a span with the given sums. `samples` is the number n of samples that the scores
     /// come from, `empirical_share` is w, and `variance` is sigma^2.
-    pub fn covariance(&self, sums: &Block, samples: f64, empirical_share: f64, variance: f64) -> Matrix {
-        let free = (1.0 - (STATE_COUNT + 3) as f64 / self.stretches).max(MIN_DIVISOR);
+    pub fn covariance<const P: usize>(
+        &self,
+        sums: &Block<S, P>,
+        samples: f64,
+        empirical_share: f64,
+        variance: f64,
+    ) -> Matrix<S> {
+        let free = (1.0 - (S + 3) as f64 / self.stretches).max(MIN_DIVISOR);
         let share = empirical_share * sums.samples / (samples * free);
         let (model, matrix) = ((1.0 - empirical_share) * variance, sums.matrix());
         matrix_from_fn(|i, j| share * self.squares[i][j] + model * matrix[i][j])
     }
 }
 
-fn matrix_from_fn(of: impl Fn(usize, usize) -> f64) -> Matrix {
+fn matrix_from_fn<const S: usize>(of: impl Fn(usize, usize) -> f64) -> Matrix<S> {
     core::array::from_fn(|i| core::array::from_fn(|j| of(i, j)))
 }
 
 /// Returns `A M A` for symmetric matrices.
-pub(super) fn sandwich(a: &Matrix, m: &Matrix) -> Matrix {
-    let product = |a: &Matrix, b: &Matrix| matrix_from_fn(|i, j| (0..STATE_COUNT).map(|k| a[i][k] * b[k][j]).sum());
+pub(super) fn sandwich<const S: usize>(a: &Matrix<S>, m: &Matrix<S>) -> Matrix<S> {
+    let product = |a: &Matrix<S>, b: &Matrix<S>| matrix_from_fn(|i, j| (0..S).map(|k| a[i][k] * b[k][j]).sum());
     product(&product(a, m), a)
 }
 
@@ -202,7 +239,10 @@ pub(super) fn sandwich(a: &Matrix, m: &Matrix) -> Matrix {
 pub(super) mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::blocks::{EMPTY, Row};
+    use crate::adaptive::{
+        blocks::Row,
+        sizes::{GAIN_COUNT, PRODUCT_COUNT, STATE_COUNT},
+    };
 
     /// Returns a number of the standard normal distribution, except for its tails.
     fn random_normal(state: &mut u64) -> f64 {
@@ -216,17 +256,21 @@ pub(super) mod tests {
     }
 
     const STATE: [f64; STATE_COUNT] = [1.0, -0.5, 0.3, 0.2, 0.1, -0.2, 0.4];
-    const TESTED_STATES: [usize; 6] = [0, 1, 2, 4, 5, 6];
     /// Number of samples in a block.
     const SAMPLES_PER_BLOCK: usize = 25;
 
     /// Returns blocks whose regressors and noise are first-order processes, with the pole 0.8 for the regressors and
     /// the given pole for the noise.
-    pub fn blocks(count: usize, state: &[f64; STATE_COUNT], noise_pole: f64, random: &mut u64) -> std::vec::Vec<Block> {
+    pub fn blocks(
+        count: usize,
+        state: &[f64; STATE_COUNT],
+        noise_pole: f64,
+        random: &mut u64,
+    ) -> std::vec::Vec<Block<STATE_COUNT, PRODUCT_COUNT>> {
         let (mut x, mut v) = ([0.0; STATE_COUNT], 0.0);
         let mut all = std::vec::Vec::new();
         for _ in 0..count {
-            let mut block = EMPTY;
+            let mut block = Block::EMPTY;
             for _ in 0..SAMPLES_PER_BLOCK {
                 for x in &mut x {
                     *x = 0.8 * *x + 0.6 * random_normal(random);
@@ -254,11 +298,11 @@ pub(super) mod tests {
             let all = blocks(70, &STATE, noise_pole, &mut random);
             let spans = SolvedSpans::new([&all[..60], &all[60..]], |sum| sum).unwrap();
             let contrast = Contrast::of(&spans, EMPIRICAL_WEIGHT);
-            let t = contrast.wald_statistic(TESTED_STATES).unwrap();
+            let t = contrast.wald_statistic(|i| i != GAIN_COUNT).unwrap();
             sum += t;
             square += t * t;
             let model = Contrast::of(&spans, MODEL_ONLY_WEIGHT);
-            by_model += model.wald_statistic(TESTED_STATES).unwrap();
+            by_model += model.wald_statistic(|i| i != GAIN_COUNT).unwrap();
         }
         let n = runs as f64;
         let mean = sum / n;
@@ -305,7 +349,7 @@ pub(super) mod tests {
             &SolvedSpans::new([&all[..60], &all[60..]], |sum| sum).unwrap(),
             EMPIRICAL_WEIGHT,
         );
-        assert!(contrast.wald_statistic(TESTED_STATES).unwrap() > 100.0);
+        assert!(contrast.wald_statistic(|i| i != GAIN_COUNT).unwrap() > 100.0);
         for i in 0..STATE_COUNT {
             let expected = if i == 1 { 1.0 } else { 0.0 };
             let error = libm::sqrt(contrast.covariance[i][i]);
@@ -320,9 +364,13 @@ pub(super) mod tests {
         let mut random = 4;
         let all = blocks(20, &STATE, 0.0, &mut random);
         assert!(SolvedSpans::new([&[], &all], |sum| sum).is_none());
-        assert!(SolvedSpans::new([&all, &[EMPTY; 4]], |sum| sum).is_none());
-        let nothing = |sum: Block| sum;
-        assert!(SolvedSpans::new([&[EMPTY; 10], &[EMPTY; 4]], nothing).is_none());
-        assert!(Contrast::default().wald_statistic(TESTED_STATES).is_none());
+        assert!(SolvedSpans::new([&all, &[Block::EMPTY; 4]], |sum| sum).is_none());
+        let nothing = |sum: Block<STATE_COUNT, PRODUCT_COUNT>| sum;
+        assert!(SolvedSpans::new([&[Block::EMPTY; 10], &[Block::EMPTY; 4]], nothing).is_none());
+        assert!(
+            Contrast::<STATE_COUNT>::default()
+                .wald_statistic(|i| i != GAIN_COUNT)
+                .is_none()
+        );
     }
 }

@@ -10,7 +10,7 @@ use super::{
     detector::DetectorSettings,
     last_blocks::BLOCK_S,
     mixture::ChangePrior,
-    prior::AdaptivePrior,
+    prior::{AdaptivePrior, DelayPrior},
     sizes::{DYNAMICS_COUNT, START_COUNT},
 };
 
@@ -65,6 +65,9 @@ const STARTING_POINTS: [[f64; 3]; START_COUNT] = [
     [0.0, 16.0, 0.25],
     [0.1, 16.0, 0.3],
 ];
+/// Delays of a further input at the starting points, in s relative to its delay: with the delays above, the starting
+/// points cover longer and shorter delays of either input.
+const FURTHER_STARTING_DELAYS: [f64; START_COUNT] = [0.0, -0.08, 0.1, 0.1, -0.08, 0.1, 0.1, 0.0];
 /// Shortest delay of a starting point in s.
 const SHORTEST_DELAY_S: f64 = 0.03;
 /// Spans of the detector in s: `PRESENT_LENGTHS_S` contains the lengths of the short and the long present, `PAST_LENGTHS_S` the
@@ -81,6 +84,20 @@ const THRESHOLD_NATS: f64 = 15.0;
 const THRESHOLD_SLOPE: f64 = 3.3;
 /// Prior standard deviation of a change of the delay in s.
 const DELAY_CHANGE_DEVIATION_S: f64 = 0.05;
+
+/// Returns the prior of the delay of a further input, for a delay in s as in [`DefaultOperator::with_delay`]; `is_given` is
+/// true if the user gave this delay.
+pub fn further_delay(tau: f64, is_given: bool) -> DelayPrior {
+    DelayPrior {
+        tau,
+        deviation: if is_given {
+            GIVEN_DELAY_DEVIATION_S
+        } else {
+            PRIOR_DEVIATIONS[2]
+        },
+        starts: FURTHER_STARTING_DELAYS.map(|later| (tau + if is_given { 0.0 } else { later }).max(SHORTEST_DELAY_S)),
+    }
+}
 
 /// Operator and settings assumed before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -10,16 +10,20 @@ pub use replay::REPLAY_SAMPLES_PER_STEP;
 
 use super::{
     alternatives::Alternatives,
+    bases::Bases,
     basis::{Basis, Complex, Point},
-    candidate::{Candidate, LONGEST_DELAY_S, MAX_SIGNAL},
+    candidate::{Candidate, MAX_SIGNAL},
     detector::Detector,
-    history::{History, SampleUse},
+    history::{History, SampleUse, ring_count},
     initial_estimate::InitialEstimate,
     mixture::{Mixture, NoiseScales, gain_and_lead_directions},
     noise::NoiseModel,
-    prior::AdaptivePrior,
+    prior::{AdaptivePrior, DelayPrior, LONGEST_DELAY_S},
     saturation::Saturation,
-    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, STATE_COUNT},
+    sizes::{
+        DYNAMICS_COUNT, GAIN_COUNT, PRODUCT_COUNT, STATE_COUNT, SUM_COUNT, correction_places, input_count,
+        product_count, state_count, sum_count,
+    },
 };
 use crate::{
     recursion::Step,
@@ -36,29 +40,40 @@ const STATIONARY_AFTER_S: f64 = 0.1;
 /// Time in s in which the filters settle after a span of constant signals.
 const SETTLING_S: f64 = 2.0;
 
-/// Adaptive recursion. E is the memory for past samples.
+/// Adaptive recursion. E is the memory for past samples and I the number of inputs; S ([`state_count`]), M
+/// ([`sum_count`]) and P ([`product_count`]) follow from I.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AdaptiveFilter<E> {
+pub struct AdaptiveFilter<
+    E,
+    const I: usize = 1,
+    const S: usize = STATE_COUNT,
+    const M: usize = SUM_COUNT,
+    const P: usize = PRODUCT_COUNT,
+> {
     prior: AdaptivePrior,
-    origin: Basis,
-    initial: Option<InitialEstimate>,
+    /// Priors of the delays of all inputs.
+    delays: [DelayPrior; I],
+    origin: Bases<I>,
+    initial: Option<InitialEstimate<I, S>>,
     prior_noise: NoiseModel,
-    live: Candidate,
+    live: Candidate<I, S, M, P>,
     started: bool,
-    trial: Candidate,
+    trial: Candidate<I, S, M, P>,
     /// Stage of the replay: 0 for no replay, 1 for a replay from the estimate, 2 or more for a replay from another
     /// starting point.
     replay_stage: u64,
     /// Index of the next sample of the replay.
     next_sample: u64,
     replays: u64,
-    alternatives: Alternatives,
-    detector: Detector,
-    history: History<E>,
+    alternatives: Alternatives<I>,
+    detector: Detector<I, S>,
+    history: History<E, I>,
     saturation: Saturation,
-    /// Sums of the squares of e, of u, and of `D u` with the prior D. The third sum gives an upper bound for the
-    /// innovation variance, namely the variance for an operator that does not respond to e.
-    powers: [f64; 3],
+    /// Sums of the squares of each input.
+    input_powers: [f64; I],
+    /// Sums of the squares of u, and of `D u` with the prior D. The second sum gives an upper bound for the innovation
+    /// variance, namely the variance for an operator that does not respond to any input.
+    powers: [f64; 2],
     restarts: u64,
     age: u64,
     /// Number of samples in the current or last span of constant signals.
@@ -69,7 +84,12 @@ pub struct AdaptiveFilter<E> {
     passed: u64,
 }
 
-impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
+/// Adaptive recursion with one further input in addition to the error.
+pub type TwoInputFilter<E> = AdaptiveFilter<E, 2, { state_count(2) }, { sum_count(2) }, { product_count(2) }>;
+
+impl<E: AsMut<[f64]>, const I: usize, const S: usize, const M: usize, const P: usize> State
+    for AdaptiveFilter<E, I, S, M, P>
+{
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         visit_all(
             &mut [
@@ -83,6 +103,7 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
                 &mut self.alternatives,
                 &mut self.detector,
                 &mut self.saturation,
+                &mut self.input_powers,
                 &mut self.powers,
                 &mut self.restarts,
                 &mut self.age,
@@ -100,23 +121,65 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// With fewer numbers the replays are shorter, and with [`min_memory`], the minimum, there are none. Returns
     /// `None` for invalid numbers or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
+        Self::with_inputs(prior, [], memory)
+    }
+
+    /// Takes a sample. e and u must be finite.
+    pub fn step(&mut self, e: f64, u: f64) -> Step {
+        self.step_inputs([e], u)
+    }
+
+    /// Like [`AdaptiveFilter::step`], but the estimate stays constant and only the filters are advanced.
+    pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
+        self.follow_inputs([e], u)
+    }
+
+    /// Like [`AdaptiveFilter::step_without_update`], for a sample without u; the one-step prediction replaces the
+    /// missing output.
+    pub fn bridge(&mut self, e: f64) {
+        self.bridge_inputs([e]);
+    }
+}
+
+impl<E: AsRef<[f64]> + AsMut<[f64]>> TwoInputFilter<E> {
+    /// Builds the recursion with a further input at rest, given the prior of its delay. The memory is that for two
+    /// inputs, otherwise as for [`AdaptiveFilter::new`].
+    pub fn with_further_input(prior: AdaptivePrior, further: DelayPrior, memory: E) -> Option<Self> {
+        Self::with_inputs(prior, [further], memory)
+    }
+}
+
+impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: usize, const P: usize>
+    AdaptiveFilter<E, I, S, M, P>
+{
+    fn with_inputs<const F: usize>(prior: AdaptivePrior, further: [DelayPrior; F], memory: E) -> Option<Self> {
+        const { assert!(F + 1 == I && S == state_count(I) && M == sum_count(I) && P == product_count(I)) };
         let ts = prior.sample_time;
-        if !prior.is_valid() || prior.person.tau > LONGEST_DELAY_S || memory.as_ref().len() < min_memory(ts) {
+        let delays = core::array::from_fn(|input| match input.checked_sub(1) {
+            Some(further_input) => further[further_input],
+            None => DelayPrior {
+                tau: prior.person.tau,
+                deviation: prior.spread[DYNAMICS_COUNT - 1],
+                starts: prior.starts.map(|start| start.tau),
+            },
+        });
+        if !prior.is_valid() || !delays.iter().all(DelayPrior::is_valid) || memory.as_ref().len() < min_memory_of(I, ts)
+        {
             return None;
         }
-        let basis = Basis::new(prior.person, ts)?;
+        let bases = Bases::new(delays.map(|DelayPrior { tau, .. }| Point { tau, ..prior.person }), ts)?;
         let detector = Detector::new(prior.detection)?;
         let prior_noise = NoiseModel::new(prior.order, prior.noise_memory, ts)?;
         let scales = NoiseScales {
-            unit: 1.0,
+            units: [1.0; I],
             size: 1.0,
             innovations: 1.0,
             sample_time: ts,
             dispersion: 1.0,
         };
-        let mixture = Mixture::new(&prior.changes, &basis, &scales, correction_variances(&prior));
+        let mixture = Mixture::new(&prior.changes, &bases, &scales, &correction_variances(&prior, &delays));
         let live = Candidate::new(
-            basis.clone(),
+            bases.clone(),
             &prior_noise,
             prior_noise.clone(),
             mixture,
@@ -126,7 +189,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         );
         Some(Self {
             prior,
-            origin: basis,
+            delays,
+            origin: bases,
             initial: None,
             prior_noise,
             trial: live.clone(),
@@ -139,7 +203,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             detector,
             history: History::new(memory),
             saturation: Saturation::new(),
-            powers: [0.0; 3],
+            input_powers: [0.0; I],
+            powers: [0.0; 2],
             restarts: 0,
             age: 0,
             constant_samples: 0,
@@ -150,23 +215,23 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// Makes the recursion start immediately from an earlier estimate of the operator. Returns `None` for invalid
     /// numbers.
-    pub fn with_initial_estimate(mut self, known: &InitialEstimate) -> Option<Self> {
+    pub fn with_initial_estimate(mut self, known: &InitialEstimate<I, S>) -> Option<Self> {
         if !known.is_valid() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
             return None;
         }
         self.initial = Some(*known);
-        self.live = self.build_candidate(self.origin.point(), &self.prior_noise, 1.0)?;
+        self.live = self.build_candidate(self.origin.points(), &self.prior_noise, 1.0)?;
         self.started = true;
         Some(self)
     }
 
     /// Scales of the signals, from the data so far.
-    fn noise_scales(&self, dispersion: f64) -> NoiseScales {
-        let [e, u, y] = self.powers;
+    fn noise_scales(&self, dispersion: f64) -> NoiseScales<I> {
+        let [u, y] = self.powers;
         let samples = self.history.sample_count().max(1) as f64;
         let measured = NoiseScales {
             // |Y| is about sqrt(power of u/power of e), the scale of the prior of the gains.
-            unit: libm::sqrt(u / e),
+            units: self.input_powers.map(|e| libm::sqrt(u / e)),
             size: libm::sqrt(u / samples),
             innovations: match (self.started, &self.initial) {
                 (true, _) => self.live.mixture.variance(),
@@ -178,7 +243,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         };
         match &self.initial {
             Some(known) => NoiseScales {
-                unit: known.unit,
+                units: known.units,
                 size: measured.size.max(libm::sqrt(known.covariance[GAIN_COUNT][GAIN_COUNT])),
                 ..measured
             },
@@ -187,38 +252,37 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Builds a candidate that starts at the oldest sample of a replay.
-    fn build_candidate(&self, point: Point, d: &NoiseModel, dispersion: f64) -> Option<Candidate> {
+    fn build_candidate(&self, points: [Point; I], d: &NoiseModel, dispersion: f64) -> Option<Candidate<I, S, M, P>> {
         let (ts, changes) = (self.prior.sample_time, &self.prior.changes);
-        let basis = Basis::new(point, ts)?;
+        let bases = Bases::new(points, ts)?;
         let scales = self.noise_scales(dispersion);
         let mixture = match &self.initial {
             Some(known) => {
-                let units = self.origin.gain_conversion(&basis);
-                let of = |i: usize| units.get(i).copied().unwrap_or(1.0);
+                let units = self.origin.unit_conversion::<S>(&bases);
                 let mut covariance = known.covariance;
                 for (i, row) in covariance.iter_mut().enumerate() {
                     for (j, c) in row.iter_mut().enumerate() {
-                        *c *= of(i) * of(j);
+                        *c *= units[i] * units[j];
                     }
                 }
-                let state = self.origin.convert_state(&basis, &known.state);
+                let state = self.origin.convert_state(&bases, &known.state);
                 Mixture::at(changes, state, covariance, known.variance)
             }
             None => {
                 // With replays, the basis changes from one replay to the next, and each replay has a trust region about
                 // its point. Without replays, the corrections have the full prior for a person.
                 let dynamics = match self.has_replays() {
-                    true => trust_region(point),
-                    false => correction_variances(&self.prior),
+                    true => trust_region(&points),
+                    false => self.correction_variances(),
                 };
-                Mixture::new(changes, &basis, &scales, dynamics)
+                Mixture::new(changes, &bases, &scales, &dynamics)
             }
         };
         let start = self.history.sample_count().saturating_sub(self.max_replay_samples());
         let empty = NoiseModel::new(self.prior.order, self.prior.noise_memory, ts)?;
         let there = self.history.sample_count().saturating_sub(start);
         let skipped = (libm::round(REPLAY_RUN_IN_S / ts) as u64).min(there / 2);
-        Some(Candidate::new(basis, d, empty, mixture, scales, changes, start).with_skipped(skipped))
+        Some(Candidate::new(bases, d, empty, mixture, scales, changes, start).with_skipped(skipped))
     }
 
     /// Maximum number of samples that a replay reads.
@@ -231,9 +295,22 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.max_replay_samples() > 0
     }
 
-    /// Takes a sample. e and u must be finite.
-    pub fn step(&mut self, e: f64, u: f64) -> Step {
-        self.advance_basis(e);
+    /// Prior variances of the corrections.
+    fn correction_variances(&self) -> [f64; S] {
+        correction_variances(&self.prior, &self.delays)
+    }
+
+    /// Points of all inputs for a starting point.
+    fn starting_points(&self, start: usize) -> [Point; I] {
+        self.delays.map(|delay| Point {
+            tau: delay.starts[start],
+            ..self.prior.starts[start]
+        })
+    }
+
+    /// Takes a sample: the error, the further inputs, and u. All must be finite.
+    pub fn step_inputs(&mut self, inputs: [f64; I], u: f64) -> Step {
+        self.advance_bases(&inputs);
         let end = self.saturation.limit_reached(u).filter(|_| self.started);
         self.saturation.update(u);
         self.detector.ignore_sample();
@@ -246,13 +323,15 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         if self.is_stationary(u) {
             return self.process_without_update(u, SampleUse::FilterOnly);
         }
-        self.powers[0] += e * e;
-        self.powers[1] += u * u;
+        for (power, x) in self.input_powers.iter_mut().zip(inputs) {
+            *power += x * x;
+        }
+        self.powers[0] += u * u;
         if !self.started {
             // At the first samples the whitening filter does not yet contain enough outputs.
             if self.history.sample_count() > self.prior.order as u64 {
                 let y = self.live.whiten(u).y;
-                self.powers[2] += y * y;
+                self.powers[1] += y * y;
             }
             self.store_sample(u);
             self.try_to_start();
@@ -285,7 +364,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// True once neither signal has changed for longer than `STATIONARY_AFTER_S`, and afterwards until the filters have settled.
+    /// True once no signal has changed for longer than `STATIONARY_AFTER_S`, and afterwards until the filters have settled.
     /// The estimate is then not updated: the recorder has stopped or the person is resting, and the innovation variance
     /// would tend to zero.
     #[inline(always)]
@@ -293,7 +372,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let samples = self.history.sample_count();
         let moved = samples < 2 || {
             let (newest, before) = (samples - 1, samples - 2);
-            self.history.error(newest, 0) != self.history.error(before, 0) || u != self.history.output(before).0
+            let is_moving = |input| self.history.input(input, newest, 0) != self.history.input(input, before, 0);
+            (0..I).any(is_moving) || u != self.history.output(before).0
         };
         let seconds = |samples: u64| samples as f64 * self.prior.sample_time;
         if !moved {
@@ -327,28 +407,28 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// Like [`AdaptiveFilter::step`], but the estimate stays constant and only the filters are advanced.
-    pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
-        self.advance_basis(e);
+    /// Like [`AdaptiveFilter::step_inputs`], but the estimate stays constant and only the filters are advanced.
+    pub fn follow_inputs(&mut self, inputs: [f64; I], u: f64) -> Step {
+        self.advance_bases(&inputs);
         self.detector.ignore_sample();
         self.process_without_update(u, SampleUse::FilterOnly)
     }
 
-    /// Like [`AdaptiveFilter::step_without_update`], for a sample without u; the one-step prediction replaces the
-    /// missing output.
-    pub fn bridge(&mut self, e: f64) {
-        self.advance_basis(e);
+    /// Like [`AdaptiveFilter::follow_inputs`], for a sample without u; the one-step prediction replaces the missing
+    /// output.
+    pub fn bridge_inputs(&mut self, inputs: [f64; I]) {
+        self.advance_bases(&inputs);
         self.detector.ignore_sample();
         self.process_without_update(0.0, SampleUse::Missing);
     }
 
-    /// Advances the basis by one sample.
+    /// Advances the bases by one sample.
     #[inline(always)]
-    fn advance_basis(&mut self, e: f64) {
-        self.history.push(e);
+    fn advance_bases(&mut self, inputs: &[f64; I]) {
+        self.history.push(inputs);
         let newest = self.history.sample_count() - 1;
         let history = &self.history;
-        self.live.advance_basis(|age| history.error(newest, age));
+        self.live.advance_bases(|input, age| history.input(input, newest, age));
     }
 
     fn store_sample(&mut self, u: f64) {
@@ -358,9 +438,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// Step 12: tests the last blocks of the live candidate for a change.
     fn test_for_change(&mut self) {
-        let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR_COUNT + j]);
-        let directions = gain_and_lead_directions(self.live.basis());
-        self.detector.test(&self.live.blocks, dynamics, directions);
+        let directions = core::array::from_fn(|input| gain_and_lead_directions(self.basis_of(input)));
+        self.detector
+            .test(&self.live.blocks, self.live.mixture.mean(), &directions);
     }
 
     /// Restarts the recursion after an overflow of a signal.
@@ -368,11 +448,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.history.clear();
         self.detector.ignore_sample();
         self.saturation = Saturation::new();
-        (self.powers, self.replay_stage, self.age, self.replays, self.passed) = ([0.0; 3], 0, 0, 0, 0);
+        (self.input_powers, self.powers) = ([0.0; I], [0.0; 2]);
+        (self.replay_stage, self.age, self.replays, self.passed) = (0, 0, 0, 0);
         self.alternatives = Alternatives::EMPTY;
         self.restarts += 1;
         self.started = false;
-        if let Some(live) = self.build_candidate(self.origin.point(), &self.prior_noise, 1.0) {
+        if let Some(live) = self.build_candidate(self.origin.points(), &self.prior_noise, 1.0) {
             self.live = live;
             self.started = self.initial.is_some();
         }
@@ -398,12 +479,17 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.prior.sample_time
     }
 
-    /// Returns the basis of the live candidate.
+    /// Returns the basis of the error of the live candidate.
     pub fn basis(&self) -> &Basis {
-        self.live.basis()
+        self.live.bases().first()
     }
 
-    pub(super) fn alternatives(&self) -> &Alternatives {
+    /// Returns the basis of an input of the live candidate.
+    pub fn basis_of(&self, input: usize) -> &Basis {
+        self.live.bases().of(input)
+    }
+
+    pub(super) fn alternatives(&self) -> &Alternatives<I> {
         &self.alternatives
     }
 
@@ -413,34 +499,39 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.history.sample_count().saturating_sub(self.passed)
     }
 
-    pub(super) fn live_candidate(&self) -> &Candidate {
+    pub(super) fn live_candidate(&self) -> &Candidate<I, S, M, P> {
         &self.live
     }
 
     /// Returns the current basis point plus its corrections, limited to the range of the basis.
     pub fn dynamics(&self) -> Point {
-        self.live.point()
+        self.live.points()[0]
     }
 
     /// Returns the frequency responses by which the gains are multiplied, at a frequency in rad/s and at the current
     /// point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAIN_COUNT] {
-        self.live.responses(omega_rad_s)
+        self.live.responses(0, omega_rad_s)
     }
 
     /// Returns the frequency response Y of the operator at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Complex {
-        self.live.response(omega_rad_s)
+        self.live.response(0, omega_rad_s)
     }
 
     /// Returns Y at a frequency in rad/s, with the derivatives of its real and imaginary parts with respect to gains,
     /// level and corrections. The derivatives are exact for the gains and finite differences for the corrections.
-    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATE_COUNT]; 2]) {
-        self.live.response_with_derivatives(omega_rad_s)
+    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; S]; 2]) {
+        self.response_of_with_derivatives(0, omega_rad_s)
+    }
+
+    /// Like [`AdaptiveFilter::response_with_derivatives`], for the response to an input.
+    pub fn response_of_with_derivatives(&self, input: usize, omega_rad_s: f64) -> (Complex, [[f64; S]; 2]) {
+        self.live.response_with_derivatives(input, omega_rad_s)
     }
 
     /// Returns the change detector.
-    pub fn detector(&self) -> &Detector {
+    pub fn detector(&self) -> &Detector<I, S> {
         &self.detector
     }
 
@@ -465,7 +556,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 }
 
-fn store(candidate: &mut Candidate, sample_use: SampleUse, u: f64) {
+fn store<const I: usize, const S: usize, const M: usize, const P: usize>(
+    candidate: &mut Candidate<I, S, M, P>,
+    sample_use: SampleUse,
+    u: f64,
+) {
     match sample_use {
         SampleUse::Update => {}
         SampleUse::FilterOnly | SampleUse::Missing => candidate.blocks.count_unused_sample(),
@@ -485,16 +580,33 @@ fn filter_output(saturation: &Saturation, sample_use: SampleUse, u: f64, predict
     }
 }
 
-/// Prior variances of the corrections of omega, zeta and tau.
-fn correction_variances(prior: &AdaptivePrior) -> [f64; DYNAMICS_COUNT] {
-    let [omega, zeta, tau] = prior.spread;
-    [omega * prior.person.omega, zeta * prior.person.zeta, tau].map(|s| s * s)
+/// Prior variances of the corrections of omega, zeta and the delays.
+fn correction_variances<const I: usize, const S: usize>(prior: &AdaptivePrior, delays: &[DelayPrior; I]) -> [f64; S] {
+    let [omega, zeta, _] = prior.spread;
+    corrections_of(|input| {
+        [
+            omega * prior.person.omega,
+            zeta * prior.person.zeta,
+            delays[input].deviation,
+        ]
+    })
 }
 
 /// Variances of the corrections in the trust region of a replay.
-fn trust_region(point: Point) -> [f64; DYNAMICS_COUNT] {
+fn trust_region<const I: usize, const S: usize>(points: &[Point; I]) -> [f64; S] {
     let [omega, zeta, tau] = TRUST_DEVIATIONS;
-    [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
+    corrections_of(|input| [omega * points[input].omega, zeta * points[input].zeta, tau])
+}
+
+/// Squares of standard deviations of omega, zeta and the delay of each input, at the places of the corrections.
+fn corrections_of<const S: usize>(deviations: impl Fn(usize) -> [f64; DYNAMICS_COUNT]) -> [f64; S] {
+    let mut variances = [0.0; S];
+    for input in 0..input_count(S) {
+        for (place, s) in correction_places(input).into_iter().zip(deviations(input)) {
+            variances[place] = s * s;
+        }
+    }
+    variances
 }
 
 /// Returns the number of past errors that must be stored for the longest delay. The sample time is in s.
@@ -504,7 +616,11 @@ pub fn errors_needed(sample_time: f64) -> usize {
 
 /// Returns the minimum length of the memory in numbers. The sample time is in s.
 pub fn min_memory(sample_time: f64) -> usize {
-    3 * errors_needed(sample_time)
+    min_memory_of(1, sample_time)
+}
+
+fn min_memory_of(inputs: usize, sample_time: f64) -> usize {
+    ring_count(inputs) * errors_needed(sample_time)
 }
 
 /// Maximum number of samples in a replay.
@@ -512,6 +628,11 @@ const MAX_REPLAY_SAMPLES: f64 = 12_000.0;
 
 /// Returns the length of the memory, in numbers, for replays over `seconds`. The sample time is in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
+    memory_needed_for(1, sample_time, seconds)
+}
+
+/// Like [`memory_needed`], for a model with the given number of inputs.
+pub fn memory_needed_for(inputs: usize, sample_time: f64, seconds: f64) -> usize {
     let samples = (seconds / sample_time).clamp(0.0, MAX_REPLAY_SAMPLES);
-    3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)
+    ring_count(inputs) * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)
 }

@@ -29,7 +29,7 @@ use hoid_numerics::{
 
 use super::{
     contrast::{EMPIRICAL_WEIGHT, Matrix, Scores, SolvedSpans, sandwich, wald},
-    sizes::{GAIN_COUNT, STATE_COUNT},
+    sizes::{GAIN_COUNT, first_gain},
 };
 
 /// Number of directions: gain, lead and level.
@@ -39,11 +39,15 @@ const RELATIVE_FLUCTUATION: f64 = 0.2;
 /// Ridge that is added to the diagonal of F, relative to the diagonal.
 const RELATIVE_RIDGE: f64 = 1e-6;
 
-type Directions = [[f64; STATE_COUNT]; DIRECTION_COUNT];
+type Directions<const S: usize> = [[f64; S]; DIRECTION_COUNT];
 
-/// Returns T for the past and the present; `gain_and_lead` contains the directions of gain and lead in the space of the
-/// gains. `None` if the data do not determine gain and lead.
-pub(super) fn wald_statistic(spans: &SolvedSpans<'_>, gain_and_lead: [[f64; GAIN_COUNT]; 2]) -> Option<f64> {
+/// Returns T of the response to an input for the past and the present; `gain_and_lead` contains the directions of gain
+/// and lead in the space of the gains of that input. `None` if the data do not determine gain and lead.
+pub(super) fn wald_statistic<const S: usize, const P: usize>(
+    spans: &SolvedSpans<'_, S, P>,
+    input: usize,
+    gain_and_lead: [[f64; GAIN_COUNT]; 2],
+) -> Option<f64> {
     let SolvedSpans {
         sides: [past, _],
         sums,
@@ -56,9 +60,9 @@ pub(super) fn wald_statistic(spans: &SolvedSpans<'_>, gain_and_lead: [[f64; GAIN
         [0, 1].map(|side: usize| scores.covariance(&sums[side], sums[0].samples, EMPIRICAL_WEIGHT, spans.variance));
     let [a_0, a_1] = [0, 1].map(|side: usize| sums[side].matrix());
 
-    let mut e: Directions = [[0.0; STATE_COUNT]; DIRECTION_COUNT];
+    let (first, mut e) = (first_gain(input), [[0.0; S]; DIRECTION_COUNT]);
     for (row, direction) in e.iter_mut().zip(gain_and_lead) {
-        row[..GAIN_COUNT].copy_from_slice(&direction);
+        row[first..first + GAIN_COUNT].copy_from_slice(&direction);
     }
     e[2][GAIN_COUNT] = 1.0;
 
@@ -68,25 +72,32 @@ pub(super) fn wald_statistic(spans: &SolvedSpans<'_>, gain_and_lead: [[f64; GAIN
     let of_score = core::array::from_fn(|i| core::array::from_fn(|j| w_1[i][j] + of_past[i][j]));
     let c = congruence(&projection, &of_score);
 
-    let h = gain_and_lead_of(&before.state, &e, &a_0)?;
+    let h = gain_and_lead_of(&before.state, first, &e, &a_0)?;
     let share = RELATIVE_FLUCTUATION * RELATIVE_FLUCTUATION;
     wald(
         [dot(&projection[0], &score), dot(&projection[1], &score)],
         core::array::from_fn(|i| core::array::from_fn(|j| c[i][j] + share * h[i] * h[j])),
+        2,
     )
 }
 
-/// Returns the gain and lead nearest to the gains of a state, by least squares with the information A.
-fn gain_and_lead_of(state: &[f64; STATE_COUNT], e: &Directions, a: &Matrix) -> Option<[f64; 2]> {
-    let mut gains = *state;
-    gains[GAIN_COUNT..].fill(0.0);
+/// Returns the gain and lead nearest to the gains of a state whose places start at `first`, by least squares with the
+/// information A.
+fn gain_and_lead_of<const S: usize>(
+    state: &[f64; S],
+    first: usize,
+    e: &Directions<S>,
+    a: &Matrix<S>,
+) -> Option<[f64; 2]> {
+    let mut gains = [0.0; S];
+    gains[first..first + GAIN_COUNT].copy_from_slice(&state[first..first + GAIN_COUNT]);
     let of_gains = a.map(|row| dot(&row, &gains));
     let [gain, lead, _] = projection(e, a)?.map(|row| dot(&row, &of_gains));
     Some([gain, lead])
 }
 
 /// Returns `F^-1 E'` with `F = E' A E`, which maps a score to the change in the directions E.
-fn projection(e: &Directions, a: &Matrix) -> Option<Directions> {
+fn projection<const S: usize>(e: &Directions<S>, a: &Matrix<S>) -> Option<Directions<S>> {
     let mut factor = congruence(e, a);
     for (i, row) in factor.iter_mut().enumerate() {
         row[i] *= 1.0 + RELATIVE_RIDGE;
@@ -104,7 +115,7 @@ fn projection(e: &Directions, a: &Matrix) -> Option<Directions> {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::{blocks::EMPTY, contrast::tests::blocks};
+    use crate::adaptive::{blocks::Block, contrast::tests::blocks, sizes::STATE_COUNT};
 
     const DIRECTIONS: [[f64; GAIN_COUNT]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     const PAST: usize = 60;
@@ -114,7 +125,7 @@ mod tests {
     fn statistic(past: [f64; STATE_COUNT], present: [f64; STATE_COUNT], random: &mut u64) -> f64 {
         let before = blocks(PAST, &past, 0.0, random);
         let now = blocks(PRESENT, &present, 0.0, random);
-        wald_statistic(&SolvedSpans::new([&before, &now], |sum| sum).unwrap(), DIRECTIONS).unwrap()
+        wald_statistic(&SolvedSpans::new([&before, &now], |sum| sum).unwrap(), 0, DIRECTIONS).unwrap()
     }
 
     /// Without gain and lead there is no fluctuation, so T is about a chi-square with two degrees of freedom, with mean 2
@@ -159,7 +170,7 @@ mod tests {
     fn empty_blocks_give_no_statistic() {
         let mut random = 8;
         let some = blocks(PAST, &[1.0; STATE_COUNT], 0.0, &mut random);
-        for sides in [[&[][..], &some], [&some, &[]], [&some, &[EMPTY; 4]]] {
+        for sides in [[&[][..], &some], [&some, &[]], [&some, &[Block::EMPTY; 4]]] {
             assert!(SolvedSpans::new(sides, |sum| sum).is_none());
         }
     }

@@ -1,13 +1,8 @@
 //! Ring buffer of the last samples of the record, in the memory of the caller.
 //!
-//! The memory is divided into three rings of equal length: errors, outputs, and the use of each sample.
+//! The memory is divided into rings of equal length: the values of each input, the outputs, and the use of each sample.
 
 use crate::state::State;
-
-/// Index of the ring of errors; the constants below are the indices of the other rings.
-const ERROR_RING: usize = 0;
-const OUTPUT_RING: usize = 1;
-const USE_RING: usize = 2;
 
 /// Use of a sample by the recursion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,21 +37,30 @@ impl SampleUse {
     }
 }
 
-/// Rings of errors, outputs and uses.
+/// Number of rings, and of numbers per sample, for a model with the given number of inputs.
+pub(super) const fn ring_count(inputs: usize) -> usize {
+    inputs + 2
+}
+
+/// Rings of the inputs, the outputs and the uses.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct History<E> {
+pub(super) struct History<E, const I: usize> {
     memory: E,
     samples: u64,
 }
 
-impl<E: AsMut<[f64]>> State for History<E> {
+impl<E: AsMut<[f64]>, const I: usize> State for History<E, I> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.memory.as_mut().visit(each);
         self.samples.visit(each);
     }
 }
 
-impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
+impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize> History<E, I> {
+    /// Indices of the rings after the rings of the inputs.
+    const OUTPUT_RING: usize = I;
+    const USE_RING: usize = I + 1;
+
     pub fn new(mut memory: E) -> Self {
         memory.as_mut().fill(0.0);
         Self { memory, samples: 0 }
@@ -64,7 +68,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
 
     /// Capacity in samples.
     pub fn capacity(&self) -> usize {
-        self.memory.as_ref().len() / 3
+        self.memory.as_ref().len() / ring_count(I)
     }
 
     /// Number of samples stored so far, including those already overwritten.
@@ -92,10 +96,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
             .map_or(0.0, |place| self.memory.as_ref()[place])
     }
 
-    /// Stores the error of a new sample; [`History::complete`] adds the output and the use of the sample.
+    /// Stores the inputs of a new sample; [`History::complete`] adds the output and the use of the sample.
     #[inline(always)]
-    pub fn push(&mut self, error: f64) {
-        self.set(ERROR_RING, self.samples, error);
+    pub fn push(&mut self, inputs: &[f64; I]) {
+        for (input, value) in inputs.iter().enumerate() {
+            self.set(input, self.samples, *value);
+        }
         self.samples += 1;
     }
 
@@ -103,8 +109,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
     #[inline(always)]
     pub fn complete(&mut self, output: f64, sample_use: SampleUse) {
         let newest = self.samples.saturating_sub(1);
-        self.set(OUTPUT_RING, newest, output);
-        self.set(USE_RING, newest, sample_use.to_number());
+        self.set(Self::OUTPUT_RING, newest, output);
+        self.set(Self::USE_RING, newest, sample_use.to_number());
     }
 
     /// Changes the use of the sample before the newest one if its output was `u` and it updated the estimate.
@@ -112,22 +118,23 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         if let Some(previous) = self.samples.checked_sub(2)
             && self.output(previous) == (u, SampleUse::Update)
         {
-            self.set(USE_RING, previous, sample_use.to_number());
+            self.set(Self::USE_RING, previous, sample_use.to_number());
         }
     }
 
-    /// Error `age` samples before the given sample; zero before the start of the record.
+    /// Value of an input `age` samples before the given sample; zero before the start of the record.
     #[inline(always)]
-    pub fn error(&self, sample: u64, age: usize) -> f64 {
-        sample
-            .checked_sub(age as u64)
-            .map_or(0.0, |at| self.get(ERROR_RING, at))
+    pub fn input(&self, input: usize, sample: u64, age: usize) -> f64 {
+        sample.checked_sub(age as u64).map_or(0.0, |at| self.get(input, at))
     }
 
     /// Output and use of a sample.
     #[inline(always)]
     pub fn output(&self, sample: u64) -> (f64, SampleUse) {
-        (self.get(OUTPUT_RING, sample), SampleUse::of(self.get(USE_RING, sample)))
+        (
+            self.get(Self::OUTPUT_RING, sample),
+            SampleUse::of(self.get(Self::USE_RING, sample)),
+        )
     }
 
     /// Removes all samples.
@@ -145,7 +152,7 @@ mod tests {
     fn only_equal_outputs_are_revised() {
         let mut history = History::new([0.0; 30]);
         for u in [1.0, 2.0, 2.0, 1.0] {
-            history.push(0.5);
+            history.push(&[0.5]);
             history.complete(u, SampleUse::Update);
             history.revise_previous(u, SampleUse::AtUpperLimit);
         }
@@ -165,20 +172,20 @@ mod tests {
     fn last_samples_are_kept_and_earlier_ones_are_zero() {
         let mut history = History::new([9.0; 30]);
         for k in 0..25_u32 {
-            history.push(f64::from(k));
+            history.push(&[f64::from(k)]);
             history.complete(-f64::from(k), SampleUse::ALL[k as usize % 5]);
         }
         assert_eq!((history.capacity(), history.sample_count()), (10, 25));
         for k in 15..25_u64 {
-            assert_eq!(history.error(24, (24 - k) as usize), k as f64);
+            assert_eq!(history.input(0, 24, (24 - k) as usize), k as f64);
             assert_eq!(history.output(k), (-(k as f64), SampleUse::ALL[k as usize % 5]));
         }
-        assert_eq!(history.error(3, 4), 0.0);
+        assert_eq!(history.input(0, 3, 4), 0.0);
         history.clear();
-        assert_eq!((history.sample_count(), history.error(0, 0)), (0, 0.0));
+        assert_eq!((history.sample_count(), history.input(0, 0, 0)), (0, 0.0));
         // A memory without room for a sample causes no panic.
         let mut none = History::new([0.0; 2]);
-        none.push(1.0);
+        none.push(&[1.0]);
         none.complete(1.0, SampleUse::Update);
         assert_eq!(none.output(0), (0.0, SampleUse::FilterOnly));
     }

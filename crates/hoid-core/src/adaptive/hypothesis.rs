@@ -18,28 +18,24 @@
 
 use hoid_numerics::elimination;
 
-use super::{
-    basis::Basis,
-    moments::Moments,
-    sizes::{MAX_SEGMENTS, STATE_COUNT},
-};
+use super::{bases::Bases, moments::Moments, sizes::MAX_SEGMENTS};
 
-pub(super) type Covariance = [[f64; STATE_COUNT]; STATE_COUNT];
+pub(super) type Covariance<const S: usize> = [[f64; S]; S];
 
 /// Segment that ended with a change: its last block, and the state at its end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Segment {
+pub(super) struct Segment<const S: usize> {
     pub until: u64,
-    pub state: [f64; STATE_COUNT],
+    pub state: [f64; S],
 }
 
-crate::state!([] Segment { until, state });
+crate::state!([const S: usize] Segment<S> { until, state });
 
 /// Hypothesis about the last change of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Hypothesis {
-    pub state: [f64; STATE_COUNT],
-    pub covariance: Covariance,
+pub(super) struct Hypothesis<const S: usize> {
+    pub state: [f64; S],
+    pub covariance: Covariance<S>,
     /// Innovation variance, followed by its degrees of freedom.
     pub variance: f64,
     pub residuals: f64,
@@ -47,11 +43,11 @@ pub(super) struct Hypothesis {
     /// Block at which the hypothesis was born; zero for the initial hypotheses.
     pub born: u64,
     pub class: usize,
-    segments: [Segment; MAX_SEGMENTS],
+    segments: [Segment<S>; MAX_SEGMENTS],
     changes: usize,
 }
 
-crate::state!([] Hypothesis { state, covariance, variance, residuals, log_weight, born, class, segments, changes });
+crate::state!([const S: usize] Hypothesis<S> { state, covariance, variance, residuals, log_weight, born, class, segments, changes });
 
 /// Residual energy of a block for a hypothesis, with the other quantities in its likelihood.
 #[derive(Debug, Clone, Copy)]
@@ -73,14 +69,8 @@ impl BlockResidual {
     };
 }
 
-impl Hypothesis {
-    pub fn new(
-        state: [f64; STATE_COUNT],
-        covariance: Covariance,
-        variance: f64,
-        class: usize,
-        log_weight: f64,
-    ) -> Self {
+impl<const S: usize> Hypothesis<S> {
+    pub fn new(state: [f64; S], covariance: Covariance<S>, variance: f64, class: usize, log_weight: f64) -> Self {
         Self {
             state,
             covariance,
@@ -91,7 +81,7 @@ impl Hypothesis {
             class,
             segments: [Segment {
                 until: 0,
-                state: [0.0; STATE_COUNT],
+                state: [0.0; S],
             }; MAX_SEGMENTS],
             changes: 0,
         }
@@ -102,7 +92,7 @@ impl Hypothesis {
     }
 
     /// Segments between earlier changes, the oldest first.
-    pub fn segments(&self) -> &[Segment] {
+    pub fn segments(&self) -> &[Segment<S>] {
         &self.segments[..self.changes.min(MAX_SEGMENTS)]
     }
 
@@ -124,32 +114,35 @@ impl Hypothesis {
 
     /// Step 6: computes the gain and updates state and covariance with a block, in which each sample counts as
     /// `1/dispersion` of an independent sample.
-    pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> BlockResidual {
+    pub fn update<const I: usize, const M: usize>(
+        &mut self,
+        moments: &Moments<M>,
+        bases: &Bases<I>,
+        dispersion: f64,
+    ) -> BlockResidual {
         // The block is linearised about the predicted state, since the response is bilinear in gains and corrections.
-        let about = moments.local_model(basis, &self.state);
+        let about = moments.local_model(bases, &self.state);
         let per = 1.0 / (self.variance * dispersion);
-        let mut matrix: Covariance = core::array::from_fn(|i| {
+        let mut matrix: Covariance<S> = core::array::from_fn(|i| {
             core::array::from_fn(|j| {
-                let product: f64 = (0..STATE_COUNT)
-                    .map(|k| self.covariance[i][k] * about.information[k][j])
-                    .sum();
+                let product: f64 = (0..S).map(|k| self.covariance[i][k] * about.information[k][j]).sum();
                 product * per
             })
         });
-        (0..STATE_COUNT).for_each(|i| matrix[i][i] += 1.0);
+        (0..S).for_each(|i| matrix[i][i] += 1.0);
         // Solving (I + P A/sigma^2) P+ = P also gives the determinant of I + P A/sigma^2, which equals the determinant
         // of S/sigma^2.
         let mut after = self.covariance;
         let log_determinant = elimination::solve_general(&mut matrix, &mut after);
         // Rounding makes P+ slightly asymmetric, and without this correction the asymmetry would grow from block to
         // block.
-        for i in 0..STATE_COUNT {
+        for i in 0..S {
             for j in 0..i {
                 let mean = 0.5 * (after[i][j] + after[j][i]);
                 (after[i][j], after[j][i]) = (mean, mean);
             }
         }
-        let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATE_COUNT).all(|i| after[i][i] >= 0.0);
+        let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..S).all(|i| after[i][i] >= 0.0);
         if !sound {
             return BlockResidual {
                 energy: about.energy,
@@ -158,8 +151,8 @@ impl Hypothesis {
         }
         // The step x+ - x^ = P+ b/sigma^2 is the sum of W_k nu_k over the samples of the block.
         let mut explained = 0.0;
-        for i in 0..STATE_COUNT {
-            let step: f64 = (0..STATE_COUNT).map(|k| after[i][k] * about.score[k]).sum();
+        for i in 0..S {
+            let step: f64 = (0..S).map(|k| after[i][k] * about.score[k]).sum();
             self.state[i] += per * step;
             explained += per * about.score[i] * step;
         }
@@ -201,20 +194,20 @@ mod tests {
     use super::*;
     use crate::adaptive::{
         basis::Point,
-        sizes::{GAIN_COUNT, LINEAR_COUNT, SIGNAL_COUNT},
+        sizes::{GAIN_COUNT, LINEAR_COUNT, SIGNAL_COUNT, STATE_COUNT, SUM_COUNT},
     };
 
-    fn basis() -> Basis {
+    fn bases() -> Bases<1> {
         let point = Point {
             tau: 0.2,
             omega: 10.0,
             zeta: 0.3,
             lag: 3.0,
         };
-        Basis::new(point, 0.01).unwrap()
+        Bases::new([point], 0.01).unwrap()
     }
 
-    fn covariance(gains: f64) -> Covariance {
+    fn covariance(gains: f64) -> Covariance<STATE_COUNT> {
         let mut p = [[0.0; STATE_COUNT]; STATE_COUNT];
         for (i, row) in p.iter_mut().enumerate() {
             row[i] = if i < LINEAR_COUNT { gains } else { 1e-4 };
@@ -222,12 +215,12 @@ mod tests {
         p
     }
 
-    fn blocks(count: usize) -> Moments {
-        let (mut basis, mut moments) = (basis(), Moments::EMPTY);
+    fn blocks(count: usize) -> Moments<SUM_COUNT> {
+        let (mut bases, mut moments) = (bases(), Moments::EMPTY);
         for k in 0..32 * count {
             let e = |k: usize| libm::sin(0.05 * k as f64) + libm::cos(0.02 * k as f64);
-            let z = basis.step([e(k + 2), e(k + 1), e(k)]);
-            moments.add(&z, 1.0, 0.3 * z[2] + 0.05 * libm::sin(0.7 * k as f64 * k as f64));
+            let z = bases.step(|_, age| e(k + 22 - age));
+            moments.add(&z, 1.0, 0.3 * z[0][2] + 0.05 * libm::sin(0.7 * k as f64 * k as f64));
         }
         moments
     }
@@ -244,8 +237,8 @@ mod tests {
         p[GAIN_COUNT][GAIN_COUNT] = 0.2;
         let mut h = Hypothesis::new([0.0; STATE_COUNT], p, 0.01, 0, 0.0);
         let moments = blocks(2);
-        let about = moments.local_model(&basis(), &h.state);
-        h.update(&moments, &basis(), 1.0);
+        let about = moments.local_model(&bases(), &h.state);
+        h.update(&moments, &bases(), 1.0);
         // A is singular here, so P+ = P - P (A^-1 sigma^2 + P)^-1 P cannot be used; P+ (I + A P/sigma^2) = P is
         // equivalent.
         for i in 0..STATE_COUNT {
@@ -272,15 +265,15 @@ mod tests {
     fn empty_and_overflowing_blocks_change_nothing() {
         let mut h = Hypothesis::new([0.1; STATE_COUNT], covariance(1.0), 0.01, 0, 0.0);
         let before = h;
-        let left = h.update(&Moments::EMPTY, &basis(), 1.0);
+        let left = h.update(&Moments::<SUM_COUNT>::EMPTY, &bases(), 1.0);
         assert_eq!(
             (h.state, h.covariance, left.energy),
             (before.state, before.covariance, 0.0)
         );
         // A block that overflows does not change the estimate either.
-        let mut huge = Moments::EMPTY;
-        huge.add(&[1e200; SIGNAL_COUNT], 1.0, 1.0);
-        h.update(&huge, &basis(), 1.0);
+        let mut huge = Moments::<SUM_COUNT>::EMPTY;
+        huge.add(&[[1e200; SIGNAL_COUNT]], 1.0, 1.0);
+        h.update(&huge, &bases(), 1.0);
         assert!(h.state.iter().all(|s| s.is_finite()));
     }
 

@@ -5,7 +5,7 @@
 //! incomplete block and the block before it are dropped, since samples just before such a gap may already be faulty.
 //! The samples in the two seconds after the gap are skipped, because the filters have to settle.
 
-use super::blocks::{Block, EMPTY, Row};
+use super::blocks::{Block, Row};
 
 /// Maximum number of blocks.
 pub const MAX_BLOCKS: usize = 96;
@@ -17,10 +17,10 @@ const SKIPPED_AFTER_GAP_S: f64 = 2.0;
 
 /// Last blocks, the oldest first.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct LastBlocks {
+pub(super) struct LastBlocks<const S: usize, const P: usize> {
     samples_of_block: u64,
-    open: Block,
-    blocks: [Block; MAX_BLOCKS],
+    open: Block<S, P>,
+    blocks: [Block<S, P>; MAX_BLOCKS],
     count: usize,
     /// Number of consecutive unused samples, and number of samples that still have to be skipped.
     gap: u64,
@@ -29,9 +29,9 @@ pub(super) struct LastBlocks {
     closed: bool,
 }
 
-crate::state!([] LastBlocks { open, blocks, count, gap, to_skip, fresh, closed }, limit_restored);
+crate::state!([const S: usize, const P: usize] LastBlocks<S, P> { open, blocks, count, gap, to_skip, fresh, closed }, limit_restored);
 
-impl LastBlocks {
+impl<const S: usize, const P: usize> LastBlocks<S, P> {
     /// Limits the restored number of blocks.
     fn limit_restored(&mut self) {
         self.count = self.count.min(MAX_BLOCKS);
@@ -41,8 +41,8 @@ impl LastBlocks {
     pub fn new(ts: f64) -> Self {
         Self {
             samples_of_block: libm::round(BLOCK_S / ts).max(1.0) as u64,
-            open: EMPTY,
-            blocks: [EMPTY; MAX_BLOCKS],
+            open: Block::EMPTY,
+            blocks: [Block::EMPTY; MAX_BLOCKS],
             count: 0,
             gap: 0,
             to_skip: 0,
@@ -53,7 +53,7 @@ impl LastBlocks {
 
     /// Adds a sample to the current block, unless it follows a gap and has to be skipped.
     #[inline(always)]
-    pub fn add(&mut self, row: &Row) {
+    pub fn add(&mut self, row: &Row<S>) {
         (self.gap, self.closed) = (0, false);
         if self.to_skip > 0 {
             self.to_skip -= 1;
@@ -70,7 +70,7 @@ impl LastBlocks {
             self.blocks.copy_within(1.., 0);
             self.count -= 1;
         }
-        self.blocks[self.count] = core::mem::replace(&mut self.open, EMPTY);
+        self.blocks[self.count] = core::mem::replace(&mut self.open, Block::EMPTY);
         self.count += 1;
         self.fresh = (self.fresh + 1).min(MAX_BLOCKS);
         self.closed = true;
@@ -89,7 +89,7 @@ impl LastBlocks {
         let (long, to_skip) = (samples(MIN_GAP_S).max(1), samples(SKIPPED_AFTER_GAP_S));
         if self.gap == long {
             // Drops the incomplete block and the block before it.
-            self.open = EMPTY;
+            self.open = Block::EMPTY;
             self.count = self.count.saturating_sub(1);
             self.fresh = 0;
         }
@@ -99,7 +99,7 @@ impl LastBlocks {
     }
 
     /// All stored blocks, the oldest first.
-    pub fn blocks(&self) -> &[Block] {
+    pub fn blocks(&self) -> &[Block<S, P>] {
         &self.blocks[..self.count.min(MAX_BLOCKS)]
     }
 
@@ -117,9 +117,12 @@ impl LastBlocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{adaptive::sizes::STATE_COUNT, state::State};
+    use crate::{
+        adaptive::sizes::{PRODUCT_COUNT, STATE_COUNT},
+        state::State,
+    };
 
-    const ROW: Row = Row {
+    const ROW: Row<STATE_COUNT> = Row {
         x: [1.0; STATE_COUNT],
         y: 1.0,
         innovation: 0.0,
@@ -128,7 +131,7 @@ mod tests {
 
     #[test]
     fn blocks_last_half_a_second_and_the_oldest_is_dropped() {
-        let mut last = LastBlocks::new(0.1);
+        let mut last = LastBlocks::<STATE_COUNT, PRODUCT_COUNT>::new(0.1);
         let mut closed = 0;
         for _ in 0..5 * (MAX_BLOCKS + 3) {
             last.add(&ROW);
@@ -140,17 +143,17 @@ mod tests {
     /// The number of blocks remains within the list after invalid numbers were restored.
     #[test]
     fn restored_block_count_is_limited() {
-        let mut last = LastBlocks::new(0.1);
+        let mut last = LastBlocks::<STATE_COUNT, PRODUCT_COUNT>::new(0.1);
         last.visit(&mut |number| *number = 1e18);
         (0..20).for_each(|_| last.add(&ROW));
-        (last.to_skip, last.open) = (0, EMPTY);
+        (last.to_skip, last.open) = (0, Block::EMPTY);
         (0..20).for_each(|_| last.add(&ROW));
         assert_eq!(last.blocks().len(), MAX_BLOCKS);
     }
 
     #[test]
     fn blocks_next_to_a_gap_are_dropped() {
-        let mut last = LastBlocks::new(0.05);
+        let mut last = LastBlocks::<STATE_COUNT, PRODUCT_COUNT>::new(0.05);
         (0..25).for_each(|_| last.add(&ROW));
         assert_eq!(last.blocks().len(), 2);
         // First fewer unused samples than in a gap, then a gap.

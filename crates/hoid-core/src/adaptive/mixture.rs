@@ -27,10 +27,11 @@
 use hoid_numerics::elimination;
 
 use super::{
+    bases::Bases,
     basis::Basis,
     hypothesis::{BlockResidual, Covariance, Hypothesis, Segment},
     moments::Moments,
-    sizes::{CLASS_COUNT, DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_HYPOTHESES, MAX_SEGMENTS, STATE_COUNT},
+    sizes::{CLASS_COUNT, GAIN_COUNT, MAX_HYPOTHESES, MAX_SEGMENTS, first_gain, is_correction},
 };
 
 /// Prior of the changes of the operator. Gains are in units of |Y| at the reference frequency.
@@ -93,9 +94,10 @@ const INITIAL_GAIN_DEVIATION: f64 = 2.0;
 
 /// Scales of the signals and of the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct NoiseScales {
-    /// Ratio of the magnitudes of u and e, followed by the root mean square of u.
-    pub unit: f64,
+pub(super) struct NoiseScales<const I: usize> {
+    /// Ratio of the magnitudes of u and of each input.
+    pub units: [f64; I],
+    /// Root mean square of u.
     pub size: f64,
     /// Initial innovation variance.
     pub innovations: f64,
@@ -104,56 +106,55 @@ pub(super) struct NoiseScales {
     pub dispersion: f64,
 }
 
-crate::state!([] NoiseScales { unit, size, innovations, sample_time, dispersion });
+crate::state!([const I: usize] NoiseScales<I> { units, size, innovations, sample_time, dispersion });
 
 /// Mixture of hypotheses.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Mixture {
-    hypotheses: [Hypothesis; MAX_HYPOTHESES],
+pub(super) struct Mixture<const S: usize> {
+    hypotheses: [Hypothesis<S>; MAX_HYPOTHESES],
     count: usize,
     pub blocks: u64,
-    mean: [f64; STATE_COUNT],
+    mean: [f64; S],
 }
 
-crate::state!([] Mixture { hypotheses, count, blocks, mean });
+crate::state!([const S: usize] Mixture<S> { hypotheses, count, blocks, mean });
 
-impl Mixture {
-    /// Returns a mixture with one hypothesis of each class, all at the prior. `dynamics` are the prior variances of the
-    /// corrections.
-    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, dynamics: [f64; DYNAMICS_COUNT]) -> Self {
-        let mut p = [[0.0; STATE_COUNT]; STATE_COUNT];
-        p[GAIN_COUNT][GAIN_COUNT] = scales.size * scales.size;
-        for (j, variance) in dynamics.into_iter().enumerate() {
-            p[LINEAR_COUNT + j][LINEAR_COUNT + j] = variance;
+impl<const S: usize> Mixture<S> {
+    /// Returns a mixture with one hypothesis of each class, all at the prior. `dynamics` contains the prior variances of
+    /// the corrections; its other numbers are zero.
+    pub fn new<const I: usize>(
+        prior: &ChangePrior,
+        bases: &Bases<I>,
+        scales: &NoiseScales<I>,
+        dynamics: &[f64; S],
+    ) -> Self {
+        let mut p = [[0.0; S]; S];
+        for (i, variance) in dynamics.iter().enumerate() {
+            p[i][i] = *variance;
         }
+        p[GAIN_COUNT][GAIN_COUNT] = scales.size * scales.size;
         Self::of(prior, |class| {
             let mut p = p;
-            inflate_gains(&mut p, basis, class, [INITIAL_GAIN_DEVIATION * scales.unit; 2]);
-            ([0.0; STATE_COUNT], p, scales.innovations)
+            inflate_gains(&mut p, bases, class, [INITIAL_GAIN_DEVIATION; 2], &scales.units);
+            ([0.0; S], p, scales.innovations)
         })
     }
 
     /// Returns a mixture with one hypothesis of each class, all at a known estimate.
-    pub fn at(prior: &ChangePrior, state: [f64; STATE_COUNT], covariance: Covariance, variance: f64) -> Self {
+    pub fn at(prior: &ChangePrior, state: [f64; S], covariance: Covariance<S>, variance: f64) -> Self {
         Self::of(prior, |_| (state, covariance, variance))
     }
 
-    fn of(prior: &ChangePrior, start: impl Fn(usize) -> ([f64; STATE_COUNT], Covariance, f64)) -> Self {
+    fn of(prior: &ChangePrior, start: impl Fn(usize) -> ([f64; S], Covariance<S>, f64)) -> Self {
         let share = |class: usize| {
             [prior.steady, 1.0 - prior.steady][class % 2]
                 * [1.0 - prior.free_numerator, prior.free_numerator][class / 2]
         };
         let mut mixture = Self {
-            hypotheses: [Hypothesis::new(
-                [0.0; STATE_COUNT],
-                [[0.0; STATE_COUNT]; STATE_COUNT],
-                0.0,
-                0,
-                MIN_LOG_WEIGHT,
-            ); MAX_HYPOTHESES],
+            hypotheses: [Hypothesis::new([0.0; S], [[0.0; S]; S], 0.0, 0, MIN_LOG_WEIGHT); MAX_HYPOTHESES],
             count: 0,
             blocks: 0,
-            mean: [0.0; STATE_COUNT],
+            mean: [0.0; S],
         };
         for class in (0..CLASS_COUNT).filter(|class| share(*class) > 0.0) {
             let (state, covariance, variance) = start(class);
@@ -165,27 +166,27 @@ impl Mixture {
         mixture
     }
 
-    fn hypotheses(&self) -> &[Hypothesis] {
+    fn hypotheses(&self) -> &[Hypothesis<S>] {
         &self.hypotheses[..self.count.min(MAX_HYPOTHESES)]
     }
 
-    fn hypotheses_mut(&mut self) -> &mut [Hypothesis] {
+    fn hypotheses_mut(&mut self) -> &mut [Hypothesis<S>] {
         &mut self.hypotheses[..self.count.min(MAX_HYPOTHESES)]
     }
 
     /// Performs steps 5 to 9 for a block, given the sums over its first p samples and over its other samples. Returns
     /// the smallest residual energy among all hypotheses.
-    pub fn update(
+    pub fn update<const I: usize, const M: usize>(
         &mut self,
-        [early, late]: [&Moments; 2],
-        basis: &Basis,
+        [early, late]: [&Moments<M>; 2],
+        bases: &Bases<I>,
         prior: &ChangePrior,
-        scales: &NoiseScales,
+        scales: &NoiseScales<I>,
     ) -> f64 {
         self.blocks += 1;
         let moments = &early.merged(late);
         let (blocks, seconds) = (self.blocks, moments.samples * scales.sample_time);
-        let newborn = |h: &Hypothesis| h.born > 0 && h.born + 1 == blocks;
+        let newborn = |h: &Hypothesis<S>| h.born > 0 && h.born + 1 == blocks;
         let parents = self.likeliest_per_class().map(|best| best.map(|i| self.hypotheses[i]));
         let mut left = [BlockResidual::ZERO; MAX_HYPOTHESES];
         let (mut common, mut best) = (f64::INFINITY, self.mean);
@@ -198,22 +199,22 @@ impl Mixture {
                 let [size, time] = prior.settling;
                 drift += size * size * libm::exp(-2.0 * age / time);
             }
-            let step = libm::sqrt(drift * seconds) * scales.unit;
-            inflate_gains(&mut h.covariance, basis, h.class, [step; 2]);
+            let step = libm::sqrt(drift * seconds);
+            inflate_gains(&mut h.covariance, bases, h.class, [step; 2], &scales.units);
             let level = prior.level * scales.size;
             h.covariance[GAIN_COUNT][GAIN_COUNT] += level * level * seconds;
             if newborn(h) {
-                *left = h.update(late, basis, scales.dispersion);
+                *left = h.update(late, bases, scales.dispersion);
                 continue;
             }
-            *left = h.update(moments, basis, scales.dispersion);
+            *left = h.update(moments, bases, scales.dispersion);
             if left.energy < common {
                 (common, best) = (left.energy, h.state);
             }
         }
         // A newborn hypothesis skips its early samples. It is charged the residual energy that the best hypothesis has
         // at these samples, so skipping gives it neither an advantage nor a disadvantage.
-        let of_early = early.residual_energy(basis, &best);
+        let of_early = early.residual_energy(bases, &best);
         for (_, left) in self.hypotheses().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
             left.passed = [early.samples, of_early];
             left.energy += of_early;
@@ -233,7 +234,7 @@ impl Mixture {
         self.normalise();
         self.average();
         if blocks as f64 * seconds >= FIRST_BIRTH_S {
-            self.add_children(&parents, basis, prior, scales, seconds);
+            self.add_children(&parents, bases, prior, scales, seconds);
         }
         common
     }
@@ -261,7 +262,7 @@ impl Mixture {
     }
 
     fn average(&mut self) {
-        let mut mean = [0.0; STATE_COUNT];
+        let mut mean = [0.0; S];
         for h in self.hypotheses() {
             let weight = h.weight();
             for (m, s) in mean.iter_mut().zip(h.state) {
@@ -271,7 +272,7 @@ impl Mixture {
         self.mean = mean;
     }
 
-    fn likeliest_index(&self, of: impl Fn(&Hypothesis) -> bool) -> Option<usize> {
+    fn likeliest_index(&self, of: impl Fn(&Hypothesis<S>) -> bool) -> Option<usize> {
         (0..self.hypotheses().len())
             .filter(|i| of(&self.hypotheses[*i]))
             .max_by(|a, b| {
@@ -296,12 +297,12 @@ impl Mixture {
 
     /// Step 9: adds the children of a block, with the hypotheses before the block as parents. Wandering classes have
     /// children in every second block only.
-    fn add_children(
+    fn add_children<const I: usize>(
         &mut self,
-        parents: &[Option<Hypothesis>; CLASS_COUNT],
-        basis: &Basis,
+        parents: &[Option<Hypothesis<S>>; CLASS_COUNT],
+        bases: &Bases<I>,
         prior: &ChangePrior,
-        scales: &NoiseScales,
+        scales: &NoiseScales<I>,
         seconds: f64,
     ) {
         for class in 0..CLASS_COUNT {
@@ -332,9 +333,10 @@ impl Mixture {
             child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.mean_interval_s).min(0.5));
             inflate_gains(
                 &mut child.covariance,
-                basis,
+                bases,
                 class,
-                prior.change_deviation.map(|jump| jump * scales.unit),
+                prior.change_deviation,
+                &scales.units,
             );
             // A change may also change the remnant, so the variance of a child adapts faster to its own data.
             let youth = prior.variance[1] / scales.sample_time / scales.dispersion;
@@ -366,17 +368,17 @@ impl Mixture {
     }
 
     /// Returns `x^ = sum_j mu_j x^_j`.
-    pub fn mean(&self) -> &[f64; STATE_COUNT] {
+    pub fn mean(&self) -> &[f64; S] {
         &self.mean
     }
 
     /// Returns `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`. The second term is the spread of the means.
-    pub fn covariance(&self) -> Covariance {
-        let mut c = [[0.0; STATE_COUNT]; STATE_COUNT];
+    pub fn covariance(&self) -> Covariance<S> {
+        let mut c = [[0.0; S]; S];
         for h in self.hypotheses() {
             let weight = h.weight();
-            for i in 0..STATE_COUNT {
-                for j in 0..STATE_COUNT {
+            for i in 0..S {
+                for j in 0..S {
                     let apart = (h.state[i] - self.mean[i]) * (h.state[j] - self.mean[j]);
                     c[i][j] += weight * (h.covariance[i][j] + apart);
                 }
@@ -386,7 +388,7 @@ impl Mixture {
     }
 
     /// Returns the weighted mean, over the hypotheses, of a function of state and covariance.
-    pub fn weighted_mean(&self, what: impl Fn(&[f64; STATE_COUNT], &Covariance) -> f64) -> f64 {
+    pub fn weighted_mean(&self, what: impl Fn(&[f64; S], &Covariance<S>) -> f64) -> f64 {
         self.hypotheses()
             .iter()
             .map(|h| h.weight() * what(&h.state, &h.covariance))
@@ -400,7 +402,7 @@ impl Mixture {
 
     /// Returns the segments of the likeliest hypothesis: the states before each of the changes that it assumes, the
     /// oldest first, followed by the current state.
-    pub fn segments(&self) -> Segments {
+    pub fn segments(&self) -> Segments<S> {
         let mut segments = Segments::EMPTY;
         if let Some(best) = self.likeliest_index(|_| true) {
             for segment in self.hypotheses[best].segments() {
@@ -416,35 +418,28 @@ impl Mixture {
 
     /// Replaces the prior of the corrections. The old prior is normal with mean zero and variances `was`, the new
     /// prior, for people, is normal with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`,
-    /// `x' = x + P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one.
-    pub fn replace_prior(
-        &mut self,
-        was: [f64; DYNAMICS_COUNT],
-        is: [f64; DYNAMICS_COUNT],
-        mean: [f64; DYNAMICS_COUNT],
-    ) {
+    /// `x' = x + P' (mean/is - D x)`. In information form this subtracts the old prior and adds the new one. Only the
+    /// numbers of the corrections are used.
+    pub fn replace_prior(&mut self, was: &[f64; S], is: &[f64; S], mean: &[f64; S]) {
         for h in self.hypotheses_mut() {
-            let mut matrix: Covariance = [[0.0; STATE_COUNT]; STATE_COUNT];
+            let mut matrix: Covariance<S> = [[0.0; S]; S];
             for (i, row) in matrix.iter_mut().enumerate() {
                 row[i] = 1.0;
-                for j in 0..DYNAMICS_COUNT {
-                    row[LINEAR_COUNT + j] += h.covariance[i][LINEAR_COUNT + j] * (1.0 / is[j] - 1.0 / was[j]);
+                for j in (0..S).filter(|j| is_correction(*j)) {
+                    row[j] += h.covariance[i][j] * (1.0 / is[j] - 1.0 / was[j]);
                 }
             }
             let mut after = h.covariance;
             elimination::solve_general(&mut matrix, &mut after);
-            let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATE_COUNT).all(|i| after[i][i] >= 0.0);
+            let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..S).all(|i| after[i][i] >= 0.0);
             if !sound {
                 continue;
             }
-            let pull: [f64; DYNAMICS_COUNT] = core::array::from_fn(|j| {
-                let s = h.state[LINEAR_COUNT + j];
-                (mean[j] - s) / is[j] + s / was[j]
-            });
-            for i in 0..STATE_COUNT {
-                h.state[i] += (0..DYNAMICS_COUNT)
-                    .map(|j| after[i][LINEAR_COUNT + j] * pull[j])
-                    .sum::<f64>();
+            let pull = |j: usize, s: f64| (mean[j] - s) / is[j] + s / was[j];
+            let pulls: [f64; S] = core::array::from_fn(|j| if is_correction(j) { pull(j, h.state[j]) } else { 0.0 });
+            for i in 0..S {
+                let corrections = (0..S).filter(|j| is_correction(*j));
+                h.state[i] += corrections.map(|j| after[i][j] * pulls[j]).sum::<f64>();
                 for j in 0..i {
                     let half = 0.5 * (after[i][j] + after[j][i]);
                     (after[i][j], after[j][i]) = (half, half);
@@ -458,23 +453,23 @@ impl Mixture {
 
 /// States of successive segments, each with the last block of its segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Segments {
-    all: [Segment; MAX_SEGMENTS + 1],
+pub(super) struct Segments<const S: usize> {
+    all: [Segment<S>; MAX_SEGMENTS + 1],
     count: usize,
 }
 
-crate::state!([] Segments { all, count });
+crate::state!([const S: usize] Segments<S> { all, count });
 
-impl Segments {
+impl<const S: usize> Segments<S> {
     pub const EMPTY: Self = Self {
         all: [Segment {
             until: 0,
-            state: [0.0; STATE_COUNT],
+            state: [0.0; S],
         }; MAX_SEGMENTS + 1],
         count: 0,
     };
 
-    fn push(&mut self, segment: Segment) {
+    fn push(&mut self, segment: Segment<S>) {
         if let Some(place) = self.all.get_mut(self.count) {
             *place = segment;
             self.count += 1;
@@ -482,7 +477,7 @@ impl Segments {
     }
 
     /// Returns the segments for a candidate that starts `later` blocks later, with the states converted by `to`.
-    pub fn converted(mut self, later: u64, to: impl Fn(&[f64; STATE_COUNT]) -> [f64; STATE_COUNT]) -> Self {
+    pub fn converted(mut self, later: u64, to: impl Fn(&[f64; S]) -> [f64; S]) -> Self {
         for segment in &mut self.all {
             *segment = Segment {
                 until: segment.until.saturating_sub(later),
@@ -493,7 +488,7 @@ impl Segments {
     }
 
     /// Returns the state of the segment that contains a block, or `None` if no segment contains it.
-    pub fn at(&self, block: u64) -> Option<&[f64; STATE_COUNT]> {
+    pub fn at(&self, block: u64) -> Option<&[f64; S]> {
         let all = &self.all[..self.count.min(MAX_SEGMENTS + 1)];
         all.iter()
             .find(|segment| block < segment.until)
@@ -511,19 +506,30 @@ pub(super) fn gain_and_lead_directions(basis: &Basis) -> [[f64; GAIN_COUNT]; 2] 
     ]
 }
 
-/// Adds variances to the covariance of the gains (for `Q_j`, the jump of a child, or the prior): along gain and lead,
-/// or in all directions if the class has a free numerator.
-fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
-    if class >= 2 {
-        for (i, size) in [gain, lead, lead].into_iter().enumerate() {
-            p[i][i] += size * size;
+/// Adds variances to the covariance of the gains of all inputs (for `Q_j`, the jump of a child, or the prior): along gain
+/// and lead, or in all directions if the class has a free numerator. The deviations are relative to the units of the
+/// inputs.
+fn inflate_gains<const I: usize, const S: usize>(
+    p: &mut Covariance<S>,
+    bases: &Bases<I>,
+    class: usize,
+    deviations: [f64; 2],
+    units: &[f64; I],
+) {
+    for input in 0..I {
+        let (first, [gain, lead]) = (first_gain(input), deviations.map(|size| size * units[input]));
+        if class >= 2 {
+            for (i, size) in [gain, lead, lead].into_iter().enumerate() {
+                p[first + i][first + i] += size * size;
+            }
+            continue;
         }
-        return;
-    }
-    for (direction, size) in gain_and_lead_directions(basis).into_iter().zip([gain, lead]) {
-        for i in 0..GAIN_COUNT {
-            for j in 0..GAIN_COUNT {
-                p[i][j] += size * size * direction[i] * direction[j];
+        let directions = gain_and_lead_directions(bases.of(input));
+        for (direction, size) in directions.into_iter().zip([gain, lead]) {
+            for i in 0..GAIN_COUNT {
+                for j in 0..GAIN_COUNT {
+                    p[first + i][first + j] += size * size * direction[i] * direction[j];
+                }
             }
         }
     }
@@ -533,7 +539,11 @@ fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: 
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::{basis::Point, defaults::DefaultOperator, sizes::SIGNAL_COUNT};
+    use crate::adaptive::{
+        basis::Point,
+        defaults::DefaultOperator,
+        sizes::{SIGNAL_COUNT, STATE_COUNT, SUM_COUNT},
+    };
 
     /// Sample of the change: two samples before the end of block 56.
     const CHANGE_SAMPLE: usize = 32 * 56 - 2;
@@ -547,24 +557,25 @@ mod tests {
             zeta: 0.3,
             lag: 3.0,
         };
-        let (mut basis, prior) = (
-            Basis::new(point, 0.01).unwrap(),
+        let (mut bases, prior) = (
+            Bases::new([point], 0.01).unwrap(),
             DefaultOperator::with_delay(0.2).prior(0.01).changes,
         );
         let scales = NoiseScales {
-            unit: 1.0,
+            units: [1.0],
             size: 1.0,
             innovations: 1e-8,
             sample_time: 0.01,
             dispersion: 1.0,
         };
-        let mut mixture = Mixture::new(&prior, &basis, &scales, [1e-6, 1e-8, 1e-8]);
+        let mut mixture = Mixture::new(&prior, &bases, &scales, &[0.0, 0.0, 0.0, 0.0, 1e-6, 1e-8, 1e-8]);
         let gains = [[0.2, 0.6, 0.3], [0.2, 1.0, 0.5]];
+        let bases_delay = bases.first().delay();
         let a: f64 = 0.85;
         let d = [-4.0 * a, 6.0 * a * a, -4.0 * a.powi(3), a.powi(4)];
         let (mut past, mut v, mut seed) = ([([0.0; SIGNAL_COUNT], 0.0); 4], [0.0; 4], 5_u64);
         for block in 0..blocks {
-            let mut parts = [Moments::EMPTY; 2];
+            let mut parts = [Moments::<SUM_COUNT>::EMPTY; 2];
             for k in 0..32 {
                 seed = seed
                     .wrapping_mul(6_364_136_223_846_793_005)
@@ -574,26 +585,26 @@ mod tests {
                 let e = |age: f64| {
                     libm::sin(0.031 * (t - age)) + libm::cos(0.012 * (t - age)) + libm::sin(0.07 * (t - age))
                 };
-                let z = basis.step([e(0.0), e(1.0), e(2.0)]);
+                let [z] = bases.step(|_, age| e((age - bases_delay) as f64));
                 let mut state = [0.0; STATE_COUNT];
                 state[..GAIN_COUNT].copy_from_slice(&gains[usize::from(32 * block + k >= CHANGE_SAMPLE)]);
                 let noise = eps - d.iter().zip(v).map(|(d, v)| d * v).sum::<f64>();
-                let u = noise + basis.weights(&state).iter().zip(z).map(|(w, z)| w * z).sum::<f64>();
+                let u = noise + bases.weights(&state)[0].iter().zip(z).map(|(w, z)| w * z).sum::<f64>();
                 let (mut white, mut y) = (z, u);
                 for (d, (z, u)) in d.iter().zip(past) {
                     y += d * u;
                     white.iter_mut().zip(z).for_each(|(w, z)| *w += d * z);
                 }
-                parts[usize::from(k >= first)].add(&white, 1.0 + d.iter().sum::<f64>(), y);
+                parts[usize::from(k >= first)].add(&[white], 1.0 + d.iter().sum::<f64>(), y);
                 past.rotate_right(1);
                 v.rotate_right(1);
                 (past[0], v[0]) = ((z, u), noise);
             }
             let [early, late] = &parts;
-            mixture.update([early, late], &basis, &prior, &scales);
+            mixture.update([early, late], &bases, &prior, &scales);
         }
-        let [before, after] = gains.map(|g| response(&basis, &g));
-        let now = response(&basis, &mixture.mean()[..GAIN_COUNT]);
+        let [before, after] = gains.map(|g| response(bases.first(), &g));
+        let now = response(bases.first(), &mixture.mean()[..GAIN_COUNT]);
         libm::hypot(now[0] - after[0], now[1] - after[1]) / libm::hypot(after[0] - before[0], after[1] - before[1])
     }
 

@@ -95,6 +95,7 @@ pub mod mixture;
 pub mod noise;
 
 mod alternatives;
+mod bases;
 mod blocks;
 mod candidate;
 mod f64x2;
@@ -111,9 +112,13 @@ mod signal_history;
 mod sizes;
 mod volatility;
 
-pub use filter::{AdaptiveFilter, REPLAY_SAMPLES_PER_STEP, errors_needed, memory_needed, min_memory};
-pub use prior::AdaptivePrior;
+pub use filter::{
+    AdaptiveFilter, REPLAY_SAMPLES_PER_STEP, TwoInputFilter, errors_needed, memory_needed, memory_needed_for,
+    min_memory,
+};
+pub use prior::{AdaptivePrior, DelayPrior};
 pub use sizes::{
-    DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_HYPOTHESES, MAX_NOISE_ORDER, PARAMETER_COUNT, SIGNAL_COUNT,
-    START_COUNT, STATE_COUNT,
+    DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_HYPOTHESES, MAX_NOISE_ORDER, PARAMETER_COUNT, PRODUCT_COUNT,
+    SIGNAL_COUNT, START_COUNT, STATE_COUNT, SUM_COUNT, correction_places, delay_place, first_gain, product_count,
+    state_count, sum_count,
 };

@@ -1,8 +1,8 @@
 //! Step 4: the second moments of a block, which are a sufficient statistic for the likelihood of a hypothesis.
 //!
-//! After the whitening filter, a sample consists of the signals of the basis and the level, `z` (seven numbers), and
-//! the output y. The response in a state x (gains, level, corrections) is `w(x)' z`. It is bilinear in gains and
-//! corrections, so the block enters the likelihood only through
+//! After the whitening filter, a sample consists of the signals of the basis of each input and the level, `z` (seven
+//! numbers for one input), and the output y. The response in a state x (gains, level, corrections) is `w(x)' z`. It is
+//! bilinear in gains and corrections, so the block enters the likelihood only through
 //!
 //! `sum z z'`, `sum z y`, `sum y^2`.
 //!
@@ -15,44 +15,48 @@
 //! measurement row of a sample.
 
 use super::{
-    basis::Basis,
-    sizes::{DYNAMICS_COUNT, GAIN_COUNT, INPUT_COUNT, LINEAR_COUNT, SIGNAL_COUNT, STATE_COUNT},
+    bases::Bases,
+    basis::Signals,
+    sizes::{GAIN_COUNT, SIGNAL_COUNT, correction_places, first_gain, input_part},
 };
 
-const SUM_COUNT: usize = INPUT_COUNT + 1;
-
-/// Sums of products over a number of samples.
+/// Sums of products over a number of samples, for M numbers per sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Moments {
+pub(super) struct Moments<const M: usize> {
     /// Products of the signals, the level and the output; only the upper triangle is used.
-    products: [[f64; SUM_COUNT]; SUM_COUNT],
+    products: [[f64; M]; M],
     pub samples: f64,
 }
 
-crate::state!([] Moments { products, samples });
+crate::state!([const M: usize] Moments<M> { products, samples });
 
 /// Gauss-Newton model of a block about a state.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct LocalModel {
+pub(super) struct LocalModel<const S: usize> {
     /// Information matrix, followed by the score, both multiplied by the innovation variance.
-    pub information: [[f64; STATE_COUNT]; STATE_COUNT],
-    pub score: [f64; STATE_COUNT],
+    pub information: [[f64; S]; S],
+    pub score: [f64; S],
     /// Sum of the squared residuals at the state.
     pub energy: f64,
 }
 
-impl Moments {
+/// Weights of the signals and of the level; the last number, in the place of the output, is not used.
+type Weights<const M: usize> = [f64; M];
+
+impl<const M: usize> Moments<M> {
     pub const EMPTY: Self = Self {
-        products: [[0.0; SUM_COUNT]; SUM_COUNT],
+        products: [[0.0; M]; M],
         samples: 0.0,
     };
+    /// Place of the output and number of the weights; the level is at the place before it.
+    const OUTPUT: usize = M - 1;
 
     /// Adds a whitened sample.
     #[inline(always)]
-    pub fn add(&mut self, signals: &[f64; SIGNAL_COUNT], level: f64, y: f64) {
-        let mut z = [0.0; SUM_COUNT];
-        z[..SIGNAL_COUNT].copy_from_slice(signals);
-        (z[SIGNAL_COUNT], z[INPUT_COUNT]) = (level, y);
+    pub fn add(&mut self, signals: &[Signals], level: f64, y: f64) {
+        let mut z = [0.0; M];
+        z[..Self::OUTPUT - 1].copy_from_slice(signals.as_flattened());
+        (z[Self::OUTPUT - 1], z[Self::OUTPUT]) = (level, y);
         // Whole rows are summed: the entries below the diagonal are not used, but the loop has a constant length.
         for (row, a) in self.products.iter_mut().zip(z) {
             for (sum, b) in row.iter_mut().zip(z) {
@@ -75,16 +79,16 @@ impl Moments {
     }
 
     /// Sum of the squared residuals at a state.
-    pub fn residual_energy(&self, basis: &Basis, state: &[f64; STATE_COUNT]) -> f64 {
-        self.residual_sums(&weights(basis, state)).1
+    pub fn residual_energy<const I: usize, const S: usize>(&self, bases: &Bases<I>, state: &[f64; S]) -> f64 {
+        self.residual_sums(&weights(bases, state)).1
     }
 
     /// Returns `sum z r` and `sum r^2`, where r are the residuals for the weights w of a response.
-    fn residual_sums(&self, w: &[f64; INPUT_COUNT]) -> ([f64; INPUT_COUNT], f64) {
-        let (mut c, mut energy) = ([0.0; INPUT_COUNT], self.at(INPUT_COUNT, INPUT_COUNT));
-        for i in 0..INPUT_COUNT {
-            let response: f64 = (0..INPUT_COUNT).map(|k| self.at(i, k) * w[k]).sum();
-            let with_output = self.at(i, INPUT_COUNT);
+    fn residual_sums(&self, w: &Weights<M>) -> (Weights<M>, f64) {
+        let (mut c, mut energy) = ([0.0; M], self.at(Self::OUTPUT, Self::OUTPUT));
+        for i in 0..Self::OUTPUT {
+            let response: f64 = (0..Self::OUTPUT).map(|k| self.at(i, k) * w[k]).sum();
+            let with_output = self.at(i, Self::OUTPUT);
             c[i] = with_output - response;
             energy += w[i] * (response - 2.0 * with_output);
         }
@@ -93,55 +97,64 @@ impl Moments {
     }
 
     /// Gauss-Newton model of the block about a state.
-    pub fn local_model(&self, basis: &Basis, state: &[f64; STATE_COUNT]) -> LocalModel {
-        let w = weights(basis, state);
+    pub fn local_model<const I: usize, const S: usize>(&self, bases: &Bases<I>, state: &[f64; S]) -> LocalModel<S> {
+        let w = weights(bases, state);
         let (c, energy) = self.residual_sums(&w);
-        let t = weight_derivatives(basis, state, &w);
-        let through: [[f64; INPUT_COUNT]; STATE_COUNT] =
-            t.map(|column| core::array::from_fn(|i| (0..INPUT_COUNT).map(|k| self.at(i, k) * column[k]).sum()));
-        let mut information = [[0.0; STATE_COUNT]; STATE_COUNT];
-        for i in 0..STATE_COUNT {
-            for j in i..STATE_COUNT {
-                let sum = (0..INPUT_COUNT).map(|k| t[i][k] * through[j][k]).sum();
+        let t = weight_derivatives(bases, state, &w);
+        let mut through: [Weights<M>; S] = [[0.0; M]; S];
+        for (through, column) in through.iter_mut().zip(&t) {
+            for i in 0..Self::OUTPUT {
+                through[i] = (0..Self::OUTPUT).map(|k| self.at(i, k) * column[k]).sum();
+            }
+        }
+        let mut information = [[0.0; S]; S];
+        for i in 0..S {
+            for j in i..S {
+                let sum = (0..Self::OUTPUT).map(|k| t[i][k] * through[j][k]).sum();
                 (information[i][j], information[j][i]) = (sum, sum);
             }
         }
         LocalModel {
             information,
-            score: t.map(|column| (0..INPUT_COUNT).map(|k| column[k] * c[k]).sum()),
+            score: t.map(|column| (0..Self::OUTPUT).map(|k| column[k] * c[k]).sum()),
             energy,
         }
     }
 }
 
 /// Weights of the signals and of the level in the response at a state.
-pub(super) fn weights(basis: &Basis, state: &[f64; STATE_COUNT]) -> [f64; INPUT_COUNT] {
-    let mut w = [0.0; INPUT_COUNT];
-    w[..SIGNAL_COUNT].copy_from_slice(&basis.weights(state));
-    w[SIGNAL_COUNT] = state[GAIN_COUNT];
+fn weights<const I: usize, const S: usize, const M: usize>(bases: &Bases<I>, state: &[f64; S]) -> Weights<M> {
+    let mut w = [0.0; M];
+    w[..I * SIGNAL_COUNT].copy_from_slice(bases.weights(state).as_flattened());
+    w[I * SIGNAL_COUNT] = state[GAIN_COUNT];
     w
 }
 
 /// Derivatives of the weights `w` with respect to each element of the state. They are exact, because the weights are
 /// bilinear in gains and corrections.
-fn weight_derivatives(
-    basis: &Basis,
-    state: &[f64; STATE_COUNT],
-    w: &[f64; INPUT_COUNT],
-) -> [[f64; INPUT_COUNT]; STATE_COUNT] {
-    let mut t = [[0.0; INPUT_COUNT]; STATE_COUNT];
-    for i in 0..GAIN_COUNT {
-        let mut one = *state;
-        one[..LINEAR_COUNT].fill(0.0);
-        one[i] = 1.0;
-        t[i] = weights(basis, &one);
-    }
-    t[GAIN_COUNT][SIGNAL_COUNT] = 1.0;
-    for j in 0..DYNAMICS_COUNT {
-        let mut moved = *state;
-        moved[LINEAR_COUNT + j] += 1.0;
-        let there = weights(basis, &moved);
-        t[LINEAR_COUNT + j] = core::array::from_fn(|k| there[k] - w[k]);
+fn weight_derivatives<const I: usize, const S: usize, const M: usize>(
+    bases: &Bases<I>,
+    state: &[f64; S],
+    w: &Weights<M>,
+) -> [Weights<M>; S] {
+    let mut t = [[0.0; M]; S];
+    t[GAIN_COUNT][I * SIGNAL_COUNT] = 1.0;
+    for input in 0..I {
+        let (basis, (gains, corrections)) = (bases.of(input), input_part(state, input));
+        let (first, at) = (first_gain(input), input * SIGNAL_COUNT);
+        for i in 0..GAIN_COUNT {
+            let mut one = [0.0; GAIN_COUNT];
+            one[i] = 1.0;
+            t[first + i][at..at + SIGNAL_COUNT].copy_from_slice(&basis.weights(&one, &corrections));
+        }
+        for (j, place) in correction_places(input).into_iter().enumerate() {
+            let mut moved = corrections;
+            moved[j] += 1.0;
+            let there = basis.weights(&gains, &moved);
+            for k in 0..SIGNAL_COUNT {
+                t[place][at + k] = there[k] - w[at + k];
+            }
+        }
     }
     t
 }
@@ -150,40 +163,46 @@ fn weight_derivatives(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::basis::Point;
+    use crate::adaptive::{
+        basis::Point,
+        sizes::{STATE_COUNT, SUM_COUNT, state_count, sum_count},
+    };
 
-    fn basis() -> Basis {
-        let point = Point {
-            tau: 0.213,
+    fn bases<const I: usize>() -> Bases<I> {
+        let point = |input: usize| Point {
+            tau: 0.213 - 0.06 * input as f64,
             omega: 10.0,
             zeta: 0.3,
             lag: 3.0,
         };
-        Basis::new(point, 0.01).unwrap()
+        Bases::new(core::array::from_fn(point), 0.01).unwrap()
     }
 
-    fn block(mut y: impl FnMut(&[f64; SIGNAL_COUNT], usize) -> f64) -> Moments {
-        let (mut basis, mut moments) = (basis(), Moments::EMPTY);
+    fn block<const I: usize, const M: usize>(mut y: impl FnMut(&[Signals; I], usize) -> f64) -> Moments<M> {
+        let (mut bases, mut moments) = (bases::<I>(), Moments::EMPTY);
         for k in 0..40 {
-            let e = |k: usize| libm::sin(0.37 * k as f64) + libm::cos(0.11 * k as f64);
-            let z = basis.step([e(k + 2), e(k + 1), e(k)]);
+            let z = bases.step(|input, age| {
+                let t = (k + 2) as f64 - age as f64;
+                libm::sin((0.37 - 0.09 * input as f64) * t) + libm::cos((0.11 + 0.04 * input as f64) * t)
+            });
             moments.add(&z, 0.2, y(&z, k));
         }
         moments
     }
 
-    #[test]
-    fn score_and_information_match_difference_quotients() {
-        let state = [0.3, -0.2, 0.1, 0.4, 0.2, -0.03, 0.01];
-        let moments = block(|_, k| libm::sin(k as f64));
-        let about = moments.local_model(&basis(), &state);
-        assert!((about.energy - moments.residual_energy(&basis(), &state)).abs() < 1e-12);
-        for i in 0..STATE_COUNT {
+    const ONE_INPUT: [f64; STATE_COUNT] = [0.3, -0.2, 0.1, 0.4, 0.2, -0.03, 0.01];
+    const TWO_INPUTS: [f64; state_count(2)] = [0.3, -0.2, 0.1, 0.4, 0.2, -0.03, 0.01, 0.2, 0.1, -0.3, -0.02];
+
+    fn check_derivatives<const I: usize, const S: usize, const M: usize>(state: [f64; S]) {
+        let moments = block::<I, M>(|_, k| libm::sin(k as f64));
+        let about = moments.local_model(&bases::<I>(), &state);
+        assert!((about.energy - moments.residual_energy(&bases::<I>(), &state)).abs() < 1e-12);
+        for i in 0..S {
             // E has degree four in the state but is quadratic in each number, so a difference quotient is exact.
             let at = |step: f64| {
                 let mut moved = state;
                 moved[i] += step;
-                moments.residual_energy(&basis(), &moved)
+                moments.residual_energy(&bases::<I>(), &moved)
             };
             let h = 1e-4;
             let slope = (at(h) - at(-h)) / (2.0 * h);
@@ -201,12 +220,25 @@ mod tests {
     }
 
     #[test]
-    fn true_state_leaves_no_residual() {
-        let state = [0.3, -0.2, 0.1, 0.4, 0.2, -0.03, 0.01];
-        let w = weights(&basis(), &state);
-        let moments = block(|z, _| (0..SIGNAL_COUNT).map(|k| w[k] * z[k]).sum::<f64>() + w[SIGNAL_COUNT] * 0.2);
-        let about = moments.local_model(&basis(), &state);
+    fn score_and_information_match_difference_quotients() {
+        check_derivatives::<1, STATE_COUNT, SUM_COUNT>(ONE_INPUT);
+        check_derivatives::<2, { state_count(2) }, { sum_count(2) }>(TWO_INPUTS);
+    }
+
+    fn check_true_state<const I: usize, const S: usize, const M: usize>(state: [f64; S]) {
+        let w: Weights<M> = weights(&bases::<I>(), &state);
+        let moments = block::<I, M>(|z, _| {
+            let response: f64 = z.as_flattened().iter().zip(w).map(|(z, w)| w * z).sum();
+            response + state[GAIN_COUNT] * 0.2
+        });
+        let about = moments.local_model(&bases::<I>(), &state);
         assert!(about.energy < 1e-12 && about.score.iter().all(|s| s.abs() < 1e-9));
-        assert_eq!(Moments::EMPTY.local_model(&basis(), &state).energy, 0.0);
+        assert_eq!(Moments::<M>::EMPTY.local_model(&bases::<I>(), &state).energy, 0.0);
+    }
+
+    #[test]
+    fn true_state_leaves_no_residual() {
+        check_true_state::<1, STATE_COUNT, SUM_COUNT>(ONE_INPUT);
+        check_true_state::<2, { state_count(2) }, { sum_count(2) }>(TWO_INPUTS);
     }
 }

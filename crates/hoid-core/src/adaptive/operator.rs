@@ -10,9 +10,8 @@ use hoid_numerics::products::congruence;
 
 use super::{
     AdaptiveFilter,
-    candidate::FIT_FREQUENCIES_RAD_S,
     defaults::START_TIME_S,
-    sizes::{DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, PARAMETER_COUNT, STATE_COUNT},
+    sizes::{GAIN_COUNT, PARAMETER_COUNT, correction_places, first_gain},
 };
 
 /// Time constant in s of a correction of the standard errors, which are too small in the first seconds because the
@@ -20,10 +19,17 @@ use super::{
 /// people with a seed that the test does not use (`tests/first_seconds.rs` of `hoid-track`).
 const SETTLING_S: f64 = 4.0;
 
-impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
+impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: usize, const P: usize>
+    AdaptiveFilter<E, I, S, M, P>
+{
     /// Returns K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
     pub fn operator(&self) -> [f64; PARAMETER_COUNT] {
-        let [k_e, k_e_dot, omega, zeta, tau] = self.live_candidate().operator();
+        self.operator_of(0)
+    }
+
+    /// Like [`AdaptiveFilter::operator`], for the response to an input.
+    pub fn operator_of(&self, input: usize) -> [f64; PARAMETER_COUNT] {
+        let [k_e, k_e_dot, omega, zeta, tau] = self.live_candidate().operators()[input];
         // The error is held over each sample; half a sample of the delay is due to this zero-order hold and is
         // subtracted.
         let hold = 0.5 * self.sample_time();
@@ -33,16 +39,22 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Returns the covariance of [`AdaptiveFilter::operator`], including the scatter of other operators that predict u
     /// about as well as the estimate.
     pub fn operator_covariance(&self) -> [[f64; PARAMETER_COUNT]; PARAMETER_COUNT] {
-        let mut rows = [[0.0; STATE_COUNT]; PARAMETER_COUNT];
-        for (row, gains) in rows.iter_mut().zip(self.gain_and_lead_matrix()) {
-            row[..GAIN_COUNT].copy_from_slice(&gains);
+        self.operator_covariance_of(0)
+    }
+
+    /// Like [`AdaptiveFilter::operator_covariance`], for the response to an input.
+    pub fn operator_covariance_of(&self, input: usize) -> [[f64; PARAMETER_COUNT]; PARAMETER_COUNT] {
+        let mut rows = [[0.0; S]; PARAMETER_COUNT];
+        for (row, gains) in rows.iter_mut().zip(self.gain_and_lead_matrix_of(input)) {
+            row[first_gain(input)..][..GAIN_COUNT].copy_from_slice(&gains);
         }
-        for j in 0..DYNAMICS_COUNT {
-            rows[2 + j][LINEAR_COUNT + j] = 1.0;
+        for (row, place) in rows[2..].iter_mut().zip(correction_places(input)) {
+            row[place] = 1.0;
         }
         let own = congruence(&rows, &self.state_covariance());
         let scatter = self.alternatives().scatter(
-            &self.live_candidate().operator(),
+            input,
+            &self.live_candidate().operators()[input],
             self.informative_samples(),
             self.max_replay_samples(),
         );
@@ -55,8 +67,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// unlikely hypotheses, such as those born in the last second, leave K_e undetermined.
     pub fn lead_time(&self) -> [f64; 2] {
         let map = self.gain_and_lead_matrix();
-        let pair = |state: &[f64; STATE_COUNT]| map.map(|row| (0..GAIN_COUNT).map(|k| row[k] * state[k]).sum::<f64>());
-        let product = |c: &[[f64; STATE_COUNT]; STATE_COUNT], i: usize, j: usize| -> f64 {
+        let pair = |state: &[f64; S]| map.map(|row| (0..GAIN_COUNT).map(|k| row[k] * state[k]).sum::<f64>());
+        let product = |c: &[[f64; S]; S], i: usize, j: usize| -> f64 {
             let each = (0..GAIN_COUNT).map(|a| map[i][a] * (0..GAIN_COUNT).map(|b| c[a][b] * map[j][b]).sum::<f64>());
             each.sum()
         };
@@ -76,11 +88,16 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// Returns the matrix that maps the gains of the basis to K_e and K_e_dot.
     pub fn gain_and_lead_matrix(&self) -> [[f64; GAIN_COUNT]; 2] {
-        self.basis().gain_and_lead_matrix(&FIT_FREQUENCIES_RAD_S)
+        self.gain_and_lead_matrix_of(0)
+    }
+
+    /// Like [`AdaptiveFilter::gain_and_lead_matrix`], for the gains of an input.
+    pub fn gain_and_lead_matrix_of(&self, input: usize) -> [[f64; GAIN_COUNT]; 2] {
+        self.live_candidate().gain_and_lead_matrix(input)
     }
 
     /// Returns the reported covariance of gains, level and corrections.
-    pub fn state_covariance(&self) -> [[f64; STATE_COUNT]; STATE_COUNT] {
+    pub fn state_covariance(&self) -> [[f64; S]; S] {
         let mut c = self.live_candidate().mixture.covariance();
         if !self.has_initial_estimate() {
             let seconds = self.update_count() as f64 * self.sample_time();

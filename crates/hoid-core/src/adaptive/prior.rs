@@ -7,6 +7,28 @@ use super::{
     sizes::{DYNAMICS_COUNT, START_COUNT},
 };
 
+/// Longest delay in s.
+pub(super) const LONGEST_DELAY_S: f64 = 0.9;
+
+/// Prior of the delay of a further input.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DelayPrior {
+    /// Delay in s, for an input that is interpolated linearly between samples.
+    pub tau: f64,
+    /// Standard deviation in s.
+    pub deviation: f64,
+    /// Delays of the starting points in s.
+    pub starts: [f64; START_COUNT],
+}
+
+impl DelayPrior {
+    /// True if both numbers are valid.
+    pub(super) fn is_valid(&self) -> bool {
+        let longest = |tau: &f64| (0.0..=LONGEST_DELAY_S).contains(tau);
+        longest(&self.tau) && self.starts.iter().all(longest) && self.deviation > 0.0 && self.deviation.is_finite()
+    }
+}
+
 /// Prior for a person and for the changes of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdaptivePrior {

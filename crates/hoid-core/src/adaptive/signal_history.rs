@@ -17,6 +17,12 @@ pub(super) fn to_pairs(signals: &[f64; SIGNAL_COUNT]) -> SignalPairs {
     core::array::from_fn(|i| F64x2([signals[2 * i], signals[2 * i + 1]]))
 }
 
+/// Returns the signals of one sample from their pairs.
+#[inline(always)]
+pub(super) fn from_pairs(pairs: &SignalPairs) -> [f64; SIGNAL_COUNT] {
+    core::array::from_fn(|i| pairs[i / 2].0[i % 2])
+}
+
 /// Signals of the last samples.
 #[derive(Debug, Clone)]
 pub(super) struct SignalHistory {

@@ -50,6 +50,8 @@ const MIN_MISFIT_RATIO: f64 = 1.5;
 /// Ratio of the innovations to their long-run value below which there is no misfit.
 const MIN_INNOVATION_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
+/// Multiple of the long-run value of R up to which the model predicts u as well as before a misfit.
+const MAX_FIT_RATIO: f64 = 2.0;
 /// Distance of a block from the long-run values below which it resembles them: four times the logarithm of four.
 const SIMILAR_DISTANCE: f64 = 4.0 * 1.386;
 /// Distance from the long-run values above which a block is unusual.
@@ -268,6 +270,12 @@ impl Profile {
     /// absolute logarithms of their ratios.
     pub fn resembles(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) < SIMILAR_DISTANCE
+    }
+
+    /// True if R of a block is at most twice its long-run value: the model predicts u about as well as it typically
+    /// does.
+    pub fn has_typical_fit(&self, block: &Block) -> bool {
+        block.ratio().is_none_or(|ratio| ratio <= MAX_FIT_RATIO * self.ratio)
     }
 
     /// True once the long-run values are known.

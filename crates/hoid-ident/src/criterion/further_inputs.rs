@@ -12,7 +12,7 @@ use super::{
     further_input::FurtherSignals, normal_equations::Column, polynomials::Polynomials, prediction_error::Criterion,
     whitening::whiten, workspace::Workspace,
 };
-use crate::linalg::least_squares::add_scaled;
+use crate::linalg::vectors::add_scaled;
 
 impl Criterion<'_> {
     /// Returns B and F of each further input.

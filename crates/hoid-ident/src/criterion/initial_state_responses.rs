@@ -23,7 +23,7 @@ use hoid_core::filter::{divide_from, divide_in_place};
 
 use crate::{
     criterion::{stationary_noise::StationaryNoise, whitening::whiten},
-    linalg::least_squares::{add_scaled, dot},
+    linalg::vectors::{add_scaled, dot},
 };
 
 /// Orthonormal basis of the responses to the initial states of a record, and the map from this basis to the states.

@@ -13,7 +13,10 @@ use super::{
     workspace::Workspace,
 };
 use crate::{
-    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    linalg::{
+        least_squares::solve_symmetric,
+        vectors::{add_scaled, dot},
+    },
     optimize::{Linearisation, Objective},
 };
 

@@ -13,8 +13,8 @@ use super::{
 };
 use crate::{
     linalg::{
-        least_squares::{add_scaled, dot},
         products::{LaggedColumn, gram, products},
+        vectors::{add_scaled, dot},
     },
     optimize::Linearisation,
 };

@@ -14,7 +14,7 @@ use super::{
     whitening::{divide_and_whiten, whiten},
     workspace::{Workspace, uses_single_pass},
 };
-use crate::linalg::least_squares::add_scaled;
+use crate::linalg::vectors::add_scaled;
 
 /// Initial states that a pass over a record has eliminated.
 #[derive(Default)]

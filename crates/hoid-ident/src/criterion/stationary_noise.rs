@@ -20,7 +20,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::linalg::least_squares::add_scaled;
+use crate::linalg::vectors::add_scaled;
 
 /// Number of doublings of the Lyapunov sum: 2^60 terms suffice for any stable pole whose modulus differs from one in
 /// double precision.

@@ -8,7 +8,7 @@ use super::{
     signals::EliminatedStates,
 };
 use crate::{
-    linalg::least_squares::dot,
+    linalg::vectors::dot,
     optimize::{Linearisation, Objective},
 };
 

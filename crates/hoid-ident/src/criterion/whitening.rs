@@ -3,7 +3,7 @@
 use hoid_core::filter::{SecondOrder, divide_from};
 use hoid_lanes::{FourLaneTask, FourLanes, with_four_lanes};
 
-use crate::linalg::least_squares::add_scaled;
+use crate::linalg::vectors::add_scaled;
 
 /// Computes `y = (1 + d1 q^-1) / (1 + f1 q^-1 + f2 q^-2) x` from rest.
 pub(super) fn divide_and_whiten([f1, f2]: [f64; 2], d1: f64, x: &[f64], y: &mut [f64]) {

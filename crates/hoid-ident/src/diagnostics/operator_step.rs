@@ -28,7 +28,7 @@ use super::constancy::score_blocks;
 use crate::{
     Constraint, Estimator,
     criterion::{Criterion, Data, Workspace, first_residual},
-    linalg::least_squares::add_scaled,
+    linalg::vectors::add_scaled,
 };
 
 /// Order of the noise model.

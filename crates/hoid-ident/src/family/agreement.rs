@@ -32,7 +32,7 @@
 use hoid_model::{FamilyOperator, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::linalg::least_squares::{dot, solve_symmetric};
+use crate::linalg::{least_squares::solve_symmetric, vectors::dot};
 
 /// Method in a comparison of estimation methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

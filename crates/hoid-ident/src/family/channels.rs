@@ -45,12 +45,11 @@ use crate::{
         further_input::{FurtherInput, InputOrders},
     },
     grey_box::parametrisation::Parametrisation,
-    linalg::least_squares::{add_scaled, dot},
+    independent_inputs::check_independent_inputs,
+    linalg::vectors::add_scaled,
     several_inputs::SeveralInputs,
 };
 
-/// Fraction of the power of an input that the previous inputs must leave unexplained.
-const MIN_UNEXPLAINED_SHARE: f64 = 1e-9;
 /// Relative increase of the diagonal of the normal matrix in the regression for the ARX model.
 const RELATIVE_RIDGE: f64 = 1e-7;
 /// Longest delay of a channel relative to the end of the preview, s.
@@ -153,53 +152,13 @@ impl<'s> FurtherInputs<'s> {
     /// # Errors
     /// [`IdentError::BadOption`] with the name of the input.
     pub fn check(&self, records: &[Record]) -> Result<(), IdentError> {
-        let refuse = |found: String, expected: String| {
-            Err(IdentError::BadOption {
-                option: "the inputs".to_owned(),
-                found,
-                expected,
-            })
-        };
         let whole = |of: &dyn Fn(usize) -> Vec<f64>| -> Vec<f64> { (0..records.len()).flat_map(of).collect() };
-        let mut names = vec!["e"];
-        let mut basis = vec![whole(&|k| Detrend::Mean.detrended_values(records[k].input()))];
-        for (channel, values) in self.all.iter().zip(&self.values) {
+        let error = whole(&|k| Detrend::Mean.detrended_values(records[k].input()));
+        let channels = (self.all.iter().zip(&self.values)).map(|(channel, values)| {
             let own = whole(&|k| Detrend::Mean.detrended_values(&values[k]));
-            let power = dot(&own, &own);
-            if power <= 0.0 {
-                return refuse(
-                    format!("{} is constant", channel.name),
-                    format!(
-                        "inputs that vary; drop {}: a response to a constant input cannot be identified",
-                        channel.name
-                    ),
-                );
-            }
-            // The projection is repeated, because the second pass removes the rounding error of the first.
-            let mut left = own;
-            for _ in 0..2 {
-                for known in &basis {
-                    let size = dot(known, known);
-                    if size > 0.0 {
-                        let share = dot(known, &left) / size;
-                        left.iter_mut().zip(known).for_each(|(x, k)| *x -= share * k);
-                    }
-                }
-            }
-            if dot(&left, &left) <= MIN_UNEXPLAINED_SHARE * power {
-                return refuse(
-                    format!("{} is a linear combination of {}", channel.name, names.join(" and ")),
-                    format!(
-                        "linearly independent inputs (r = e + y is not independent of e and y); drop one of {}, {}",
-                        names.join(", "),
-                        channel.name
-                    ),
-                );
-            }
-            names.push(&channel.name);
-            basis.push(left);
-        }
-        Ok(())
+            (channel.name.as_str(), own)
+        });
+        check_independent_inputs(std::iter::once(("e", error)).chain(channels))
     }
 
     /// Returns the first sample at which no channel needs samples from before the record; the noise model may need

@@ -16,8 +16,8 @@ use crate::{
     criterion::Workspace,
     grey_box::{objective::PhysicalCriterion, parametrisation::Parametrisation},
     linalg::{
-        least_squares::dot,
         products::{LaggedColumn, gram},
+        vectors::dot,
     },
 };
 

@@ -44,7 +44,7 @@ use crate::{
     criterion::{Criterion, Data, Workspace},
     grey_box::objective::PhysicalCriterion,
     iv::{NoiseFreeInput, noise_free_inputs, simulated_output},
-    linalg::least_squares::{add_scaled, dot},
+    linalg::vectors::{add_scaled, dot},
     optimize::Linearisation,
 };
 

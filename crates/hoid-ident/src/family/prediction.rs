@@ -30,7 +30,7 @@ use crate::{
         objective::{Penalty, PhysicalCriterion},
         parametrisation::Parametrisation,
     },
-    linalg::least_squares::dot,
+    linalg::vectors::dot,
     optimize::Minimum,
 };
 

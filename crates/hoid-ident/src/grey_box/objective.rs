@@ -13,7 +13,7 @@ use crate::{
         Criterion, Data, Workspace,
         further_input::{FurtherInput, InputOrders},
     },
-    linalg::least_squares::dot,
+    linalg::vectors::dot,
     optimize::Linearisation,
     optimize::{Minimum, Objective, SearchOptions, minimise},
 };

@@ -1,6 +1,6 @@
 //! Columns with the rows of all records, one record after the other.
 
-use crate::linalg::least_squares::{add_scaled, dot};
+use crate::linalg::vectors::{add_scaled, dot};
 
 /// Columns with the rows of all records, one record after the other.
 pub(crate) type Columns = Vec<Vec<f64>>;

@@ -11,7 +11,7 @@ use hoid_model::polynomial::reflect_roots_inside;
 use nalgebra::DMatrix;
 
 use super::columns::{Columns, split_by_record};
-use crate::{linalg::least_squares::dot, noise_model::noise_model};
+use crate::{linalg::vectors::dot, noise_model::noise_model};
 
 /// Largest order of the autoregression that describes the spectrum of a residual.
 const MAX_ORDER: usize = 30;

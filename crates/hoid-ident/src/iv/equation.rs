@@ -21,7 +21,10 @@ use crate::{
     IdentError,
     criterion::Data,
     criterion::initial_state_responses::{InitialHistory, InitialStateResponses},
-    linalg::least_squares::{LeastSquares, add_scaled, dot},
+    linalg::{
+        least_squares::LeastSquares,
+        vectors::{add_scaled, dot},
+    },
 };
 
 /// The prefilter `D/(C F)`.

@@ -14,7 +14,7 @@ use crate::{
     assembled_fit::{Solution, assemble_fit},
     criterion::{Criterion, Data, Workspace, first_residual},
     informative_data::{check_degrees_of_freedom, check_record, common_sample_time},
-    linalg::least_squares::dot,
+    linalg::vectors::dot,
 };
 
 /// Residuals are only rounding errors if their amplitude is below this share of the output.

@@ -27,7 +27,10 @@ use hoid_model::Record;
 use crate::{
     IdentError,
     criterion::Data,
-    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    linalg::{
+        least_squares::solve_symmetric,
+        vectors::{add_scaled, dot},
+    },
 };
 
 use super::{

@@ -1,6 +1,6 @@
 //! Final state of an instrumental variable iteration.
 
-use crate::{Termination, linalg::least_squares::dot};
+use crate::{Termination, linalg::vectors::dot};
 
 use super::equation::{Equation, Prefilter};
 

@@ -12,7 +12,7 @@
 use crate::{
     IdentError, Reason, Termination,
     criterion::Data,
-    linalg::least_squares::{add_scaled, dot},
+    linalg::vectors::{add_scaled, dot},
 };
 
 use super::{

@@ -40,7 +40,10 @@ use super::{
 use crate::{
     IdentError, Reason, SearchOptions, Termination,
     criterion::Workspace,
-    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    linalg::{
+        least_squares::solve_symmetric,
+        vectors::{add_scaled, dot},
+    },
     optimize::{Linearisation, Objective, minimise},
 };
 

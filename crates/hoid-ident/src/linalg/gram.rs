@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::least_squares::add_scaled;
+use super::vectors::add_scaled;
 
 /// The sum `sum x x'` over rows x; only its lower triangle is stored.
 pub(crate) struct Gram {

@@ -13,7 +13,7 @@ use std::ops::Range;
 
 use hoid_lanes::{FourLaneTask, FourLanes, with_four_lanes};
 
-use crate::linalg::least_squares::add_scaled;
+use crate::linalg::vectors::add_scaled;
 
 /// Number of samples that are read at a time, such that the samples of all columns remain in the first-level cache. It
 /// is a multiple of eight, the largest number of partial sums of a product. The last digits of sums over residuals

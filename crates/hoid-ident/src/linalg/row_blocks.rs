@@ -8,7 +8,7 @@
 //! The reflection for column k has only the element `R_kk` and the column of the block in its vector, since R is zero
 //! below the diagonal.
 
-use super::least_squares::{add_scaled, dot};
+use super::vectors::{add_scaled, dot};
 
 /// Number of rows in a block.
 const BLOCK_ROWS: usize = 256;

@@ -4,7 +4,10 @@ use hoid_model::Orders;
 
 use crate::{
     criterion::Block,
-    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    linalg::{
+        least_squares::solve_symmetric,
+        vectors::{add_scaled, dot},
+    },
     optimize::Linearisation,
 };
 

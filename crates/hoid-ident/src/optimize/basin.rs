@@ -1,7 +1,7 @@
 //! Test of whether a start leads to a known minimum.
 
 use super::objective::Minimum;
-use crate::linalg::least_squares::dot;
+use crate::linalg::vectors::dot;
 
 /// True if a start with this loss is in the basin of a known minimum: its loss agrees with the quadratic model about
 /// the minimum, so a search from the start would end in this minimum.

@@ -7,7 +7,7 @@ use super::{
     termination::Reason,
 };
 use crate::criterion::Workspace;
-use crate::linalg::least_squares::{dot, solve_symmetric};
+use crate::linalg::{least_squares::solve_symmetric, vectors::dot};
 
 /// Predicted relative decrease of the loss below which the second derivative is estimated from the gradients.
 const SECANT_DECREASE_LIMIT: f64 = 1e-2;

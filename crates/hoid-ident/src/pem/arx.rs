@@ -18,8 +18,8 @@ use crate::{
     Fit, IdentError, Reason, Termination,
     assembled_fit::{Solution, assemble_fit},
     criterion::{Criterion, Data},
-    linalg::least_squares::{LeastSquares, add_scaled},
     linalg::products::{LaggedColumn, ResidualProducts, gram},
+    linalg::{least_squares::LeastSquares, vectors::add_scaled},
 };
 
 /// Largest condition number (an upper bound, `p tr(G^-1)`) for which the scaled normal matrix is used. At this limit

@@ -24,7 +24,7 @@ use crate::{
     Fit, IdentError, Reason, Termination,
     assembled_fit::{Solution, assemble_fit, fixed_or_bounded_flags},
     criterion::{Criterion, Workspace},
-    linalg::{information::inverse_information_of_free, least_squares::dot},
+    linalg::{information::inverse_information_of_free, vectors::dot},
     optimize::{Minimum, Objective, free_parameters, minimise},
     pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings},
 };

@@ -19,7 +19,7 @@ use crate::{
     Constraint, Fit, IdentError,
     criterion::{Criterion, Data, Workspace, first_residual},
     linalg::information::inverse_information,
-    linalg::least_squares::dot,
+    linalg::vectors::dot,
     pem::fit_settings::FitSettings,
     pem::prediction_focus,
 };

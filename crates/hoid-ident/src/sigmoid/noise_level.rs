@@ -6,7 +6,7 @@
 //! residuals are then weighted by 1/sigma(t), and fit and levels are estimated alternately. Source: R. J. Carroll and
 //! D. Ruppert, *Transformation and Weighting in Regression*, 1988, ch. 3.
 
-use crate::linalg::least_squares::dot;
+use crate::linalg::vectors::dot;
 
 /// Model of the standard deviation of the innovations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

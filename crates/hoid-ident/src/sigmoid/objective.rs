@@ -33,7 +33,7 @@ use super::{layout::Layout, sigmoid_point::SigmoidPoint, unit_operator::UnitOper
 use crate::{
     criterion::Workspace,
     grey_box::objective::Penalty,
-    linalg::least_squares::{add_scaled, dot},
+    linalg::vectors::{add_scaled, dot},
     optimize::Linearisation,
     optimize::Objective,
 };

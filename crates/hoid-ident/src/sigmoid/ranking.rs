@@ -13,7 +13,10 @@ use super::{
     sigmoid_point::SigmoidPoint,
     unit_operator::UnitOperator,
 };
-use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
+use crate::linalg::{
+    least_squares::solve_symmetric,
+    vectors::{add_scaled, dot},
+};
 
 /// Time before the first residual of the ranking, in time constants of the poles.
 const SETTLING_TIME_CONSTANTS: f64 = 4.0;

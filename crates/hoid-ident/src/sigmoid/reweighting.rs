@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     IdentError, Reason, SearchOptions,
-    linalg::least_squares::dot,
+    linalg::vectors::dot,
     optimize::{Minimum, Objective},
 };
 

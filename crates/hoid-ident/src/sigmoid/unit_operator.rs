@@ -12,7 +12,7 @@ use hoid_model::{
 };
 
 use super::layout::Layout;
-use crate::linalg::least_squares::add_scaled;
+use crate::linalg::vectors::add_scaled;
 
 /// Operators with each power of s as numerator, for one theta.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use hoid_numerics::statistics::mean;
 
-use crate::linalg::least_squares::dot;
+use crate::linalg::vectors::dot;
 
 /// Two-sided 99 % point of the normal distribution.
 const Z_99: f64 = 2.575_829_303_548_901;

@@ -1,6 +1,6 @@
 //! Goodness of fit of a model, VAF and NRMSE, for one or several records.
 
-use crate::linalg::{least_squares::dot, products::variance};
+use crate::linalg::{products::variance, vectors::dot};
 
 /// VAF and NRMSE fit of a model, %.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]

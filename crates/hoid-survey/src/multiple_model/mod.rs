@@ -250,6 +250,7 @@ fn change_in_seconds(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sam
         innovation_variance: [before.innovation_variance, now.innovation_variance],
         z: change.z,
         of_operator: false,
+        further: None,
     }
 }
 

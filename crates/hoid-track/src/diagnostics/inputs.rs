@@ -11,10 +11,13 @@
 
 use hoid_model::Finding;
 
-use crate::{response::Response, trace::Trace};
+use crate::{
+    change::{Change, FurtherChange},
+    further_input::FURTHER_RESPONSES_RAD_S,
+    response::Response,
+    trace::Trace,
+};
 
-/// Frequencies at which responses are compared, rad/s.
-const COMPARED_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 /// Least time between compared rows, s.
 const MIN_ROW_DISTANCE_S: f64 = 10.0;
 /// Largest number of rows that are compared.
@@ -38,12 +41,17 @@ impl Trace {
     /// changed. `rows` are the examined rows.
     pub(super) fn changed_input_finding(&self, rows: &[usize]) -> Option<Finding> {
         let further = self.options().further.as_ref()?;
-        let own = self.largest_change(rows, |row, omega| Some(self.response_at(row, omega)));
-        let of_further = self.largest_change(rows, |row, omega| self.further_response(row, omega));
         let channel = further.channel.as_str();
-        let named =
-            |found: Option<LargestChange>| found.filter(|f| f.p_value < SIGNIFICANCE_LEVEL).map(|f| f.as_text());
-        let message = match (named(own), named(of_further)) {
+        let changes = match self.options().method.is_self_starting() {
+            true => self.declared_input_changes(),
+            false => {
+                let own = self.largest_change(rows, |row, omega| Some(self.response_at(row, omega)));
+                let of_further = self.largest_change(rows, |row, omega| self.further_response(row, omega));
+                [own, of_further].map(|found| found.filter(|f| f.p_value < SIGNIFICANCE_LEVEL).map(|f| f.as_text()))
+            }
+        };
+        let [own, of_further] = changes;
+        let message = match (own, of_further) {
             (Some(own), Some(further)) => {
                 format!("the response to e changed {own}; the response to {channel} also changed, {further}")
             }
@@ -56,6 +64,28 @@ impl Trace {
             (None, None) => return None,
         };
         Some(Finding::note("changed-input", message))
+    }
+
+    /// Returns the declared changes of the response to e, and those of the response to the further input, as text.
+    fn declared_input_changes(&self) -> [Option<String>; 2] {
+        let text = |of: &dyn Fn(&Change) -> Vec<&'static str>| {
+            let each = self.changes().iter().filter_map(|(t, change)| {
+                let named = of(change);
+                let at_s = t - change.seconds_ago;
+                (!named.is_empty()).then(|| format!("at {at_s:.1} s ({})", named.join(", ")))
+            });
+            Some(each.collect::<Vec<_>>().join(" and ")).filter(|text| !text.is_empty())
+        };
+        [
+            text(&Change::changed_quantities_of_e),
+            text(&|change| {
+                change
+                    .further
+                    .iter()
+                    .flat_map(FurtherChange::changed_quantities)
+                    .collect()
+            }),
+        ]
     }
 
     /// Returns the largest change of a response between two of the rows; `None` if no two rows can be compared.
@@ -72,9 +102,9 @@ impl Trace {
             .flat_map(|from| (from + 1..=last).map(move |to| [from, to]))
             .filter(|[from, to]| at(rows[*to]) - at(rows[*from]) >= MIN_ROW_DISTANCE_S)
             .collect();
-        let comparisons = (COMPARED_RAD_S.len() * pairs.len()) as f64;
+        let comparisons = (FURTHER_RESPONSES_RAD_S.len() * pairs.len()) as f64;
         let mut largest: Option<LargestChange> = None;
-        for omega_rad_s in COMPARED_RAD_S {
+        for omega_rad_s in FURTHER_RESPONSES_RAD_S {
             let all: Vec<Response> = rows.iter().filter_map(|row| response(*row, omega_rad_s)).collect();
             if all.len() <= last {
                 continue;

@@ -28,7 +28,7 @@ const PROPOSED_LAGS_S: (f64, f64) = (0.5, 10.0);
 impl Trace {
     /// Finding that the lag of the basis is not that of the person.
     pub(super) fn held_lag_finding(&self, record: &Record) -> Option<Finding> {
-        let lag_s = self.options().method.basis_lag_s()?;
+        let lag_s = self.options().basis_lag_of_one_input_s()?;
         let tau_s = self.operator(self.len().checked_sub(1)?).ok()?.tau_e_s.value;
         let [first, _] = COMPARED_RAD_S;
         let phase = self.low_responses.first()?.phase_deg();

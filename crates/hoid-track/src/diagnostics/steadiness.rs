@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use hoid_core::adaptive::{GAIN_COUNT, STATE_COUNT};
+use hoid_core::adaptive::{DYNAMICS_COUNT, GAIN_COUNT};
 use hoid_ident::diagnostics::{ResponseBasis, ResponseChange, TimeCourse, response_changes};
 use hoid_model::{Finding, Record};
 
@@ -83,9 +83,9 @@ impl Trace {
     fn basis_signals(&self, record: &Record, lag_s: f64) -> Option<BasisSignals> {
         let (basis, signals) = self.signals(record, lag_s)?;
         let term = |i: usize| {
-            let mut gains = [0.0; STATE_COUNT];
+            let mut gains = [0.0; GAIN_COUNT];
             gains[i] = 1.0;
-            basis.weights(&gains).to_vec()
+            basis.weights(&gains, &[0.0; DYNAMICS_COUNT]).to_vec()
         };
         Some(BasisSignals {
             columns: transpose(&signals),
@@ -98,7 +98,7 @@ impl Trace {
     /// basis; other methods forget, or model how people drift, and do not assume that a person is constant between
     /// changes.
     pub(super) fn response_change_finding(&self, record: &Record) -> Option<Finding> {
-        self.options().method.basis_lag_s()?;
+        self.options().basis_lag_of_one_input_s()?;
         let unlikely = |found: &ResponseChange| match found.time_course {
             TimeCourse::Oscillation(_) => found.p_value / OSCILLATION_P_VALUE,
             TimeCourse::Step => found.p_value / STEP_P_VALUE,

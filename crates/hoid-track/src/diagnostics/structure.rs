@@ -46,7 +46,7 @@ impl Trace {
 
     /// Returns the result of the test; `None` for methods without a basis.
     pub(super) fn residual_response(&self, record: &Record) -> Option<ResidualResponse> {
-        self.options().method.basis_lag_s()?;
+        self.options().basis_lag_of_one_input_s()?;
         let ts = self.sample_time().s();
         let end = self.times_s().last()? + ts;
         let changed = self.changes().last().map(|(t, change)| t - change.seconds_ago);

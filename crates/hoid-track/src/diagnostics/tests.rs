@@ -75,6 +75,7 @@ fn change() -> crate::Change {
         innovation_variance: [1.0; 2],
         z: [0.0; 6],
         of_operator: true,
+        further: None,
     }
 }
 

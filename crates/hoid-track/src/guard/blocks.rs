@@ -6,7 +6,8 @@ use hoid_core::guard::{
 };
 
 use super::{
-    ConstantSpan, Guard, MAX_LEVEL_RATIO, MIN_OUTLIER_SIZE, MIN_SNAPSHOT_AGE, SNAPSHOT_INTERVAL, event::GuardKind,
+    ConstantSpan, FOLLOWING_BLOCKS, Guard, MAX_LEVEL_RATIO, MIN_OUTLIER_SIZE, MIN_SNAPSHOT_AGE, SNAPSHOT_INTERVAL,
+    event::GuardKind,
 };
 use crate::recursion::Recursion;
 
@@ -41,10 +42,10 @@ impl Guard {
             self.judge_pause(recursion, fault, &block);
             return;
         }
-        match fault {
+        match self.unless_followed(fault, &block) {
             Some(fault) => {
                 let (kind, channel) = kind_and_channel(fault);
-                let blocks = self.profile.duration_blocks(fault);
+                let blocks = self.profile.duration_blocks(fault) + self.following.saturating_sub(1);
                 let seen = u64::from(blocks) * u64::from(self.block_length);
                 self.restore_older_state(recursion, seen);
                 let seen = match kind {
@@ -53,6 +54,8 @@ impl Guard {
                 };
                 self.start_pause(kind, channel, seen.min(self.samples), 0.0);
             }
+            // Blocks that the recursion still has to explain are neither learnt nor stored.
+            None if self.following > 0 => self.sound_blocks = 0,
             None if self.in_ring == 0 => {
                 self.profile.update(&block);
                 self.start_quantile_estimation(&block);
@@ -70,6 +73,22 @@ impl Guard {
                 }
             }
             None => {}
+        }
+    }
+
+    /// Returns the fault, unless it is a misfit that the recursion may still follow. After a change of the person, the
+    /// model predicts u badly until the recursion has followed the change, and then as well as before; a pause would
+    /// keep the old estimate. A misfit therefore becomes a fault only when it has lasted for [`FOLLOWING_BLOCKS`] more.
+    fn unless_followed(&mut self, fault: Option<Fault>, block: &Block) -> Option<Fault> {
+        let lasts = match fault {
+            Some(Fault::Misfit) => true,
+            Some(_) => false,
+            None => self.following > 0 && !self.profile.has_typical_fit(block),
+        };
+        self.following = if lasts { self.following + 1 } else { 0 };
+        match fault {
+            Some(Fault::Misfit) | None => (self.following > FOLLOWING_BLOCKS).then_some(Fault::Misfit),
+            other => other,
         }
     }
 
@@ -155,5 +174,103 @@ fn kind_and_channel(fault: Fault) -> (GuardKind, usize) {
         Fault::RescaledOutput => (GuardKind::Level, 1),
         Fault::Swapped => (GuardKind::Swapped, 2),
         Fault::Misfit => (GuardKind::Misfit, 2),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_core::state::State;
+    use hoid_model::SampleTime;
+
+    use super::super::{Guard, GuardKind};
+    use crate::recursion::{Recursion, Sample, StepOutcome};
+
+    /// A recursion whose innovations are set by the test. Its state is the number of samples that updated it.
+    struct Predictor {
+        innovation: f64,
+        updates: u64,
+    }
+
+    impl State for Predictor {
+        fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+            self.updates.visit(each);
+        }
+    }
+
+    impl Recursion for Predictor {
+        fn step(&mut self, sample: Sample) -> StepOutcome {
+            self.updates += 1;
+            self.step_without_update(sample)
+        }
+
+        fn step_without_update(&mut self, _: Sample) -> StepOutcome {
+            StepOutcome {
+                innovation: self.innovation,
+                shortened: false,
+            }
+        }
+
+        fn bridge(&mut self, _: Sample) {}
+
+        fn theta(&self) -> &[f64] {
+            &[]
+        }
+
+        fn covariance(&self, _: &mut [f64]) -> bool {
+            false
+        }
+
+        fn innovation_variance(&self) -> f64 {
+            1.0
+        }
+    }
+
+    /// Returns the faults that start a pause, and the number of updates at the end, if the innovations are many times
+    /// larger for a number of seconds in the middle of two minutes.
+    fn pauses(seconds: f64) -> (Vec<GuardKind>, u64) {
+        let mut recursion = Predictor {
+            innovation: 0.0,
+            updates: 0,
+        };
+        let mut guard = Guard::new(&mut recursion, 20, None, SampleTime::AT_100_HZ);
+        let mut pauses = Vec::new();
+        let mut was_paused = false;
+        for k in 0..12_000_u32 {
+            let t = 0.01 * f64::from(k);
+            let wave = |shift: f64| (0.9 * t + shift).sin() + (2.3 * t + shift).sin() + 0.01 * (31.0 * t + shift).sin();
+            recursion.innovation = if (60.0..60.0 + seconds).contains(&t) {
+                1e-2
+            } else {
+                1e-7
+            };
+            let sample = Sample {
+                e: wave(0.0),
+                u: 0.3 * wave(1.0),
+                reference: None,
+            };
+            guard.process(&mut recursion, sample, true);
+            if guard.is_paused() && !was_paused {
+                pauses.extend(guard.event().map(|event| event.kind));
+            }
+            was_paused = guard.is_paused();
+        }
+        (pauses, recursion.updates)
+    }
+
+    /// A recursion follows a change of the person within seconds.
+    #[test]
+    fn short_misfit_is_no_fault() {
+        let (none, all) = pauses(0.0);
+        assert_eq!((none.as_slice(), all), ([].as_slice(), 12_000));
+        assert_eq!(pauses(6.0), (none, all));
+    }
+
+    #[test]
+    fn lasting_misfit_restores_the_state_before_it() {
+        let (found, updates) = pauses(30.0);
+        assert_eq!(found, [GuardKind::Misfit]);
+        // The updates during the misfit are withdrawn, with those since the last stored state.
+        let most = 12_000 - 3_000;
+        assert!((most - 1_000..most).contains(&updates), "{updates}");
     }
 }

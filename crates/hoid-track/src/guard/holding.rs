@@ -49,6 +49,7 @@ impl Guard {
         }
         self.ring[place] = RawSample {
             values: x,
+            reference: sample.reference.unwrap_or(f64::NAN),
             held: holds,
             moves,
         };
@@ -60,7 +61,7 @@ impl Guard {
             return self.handle_lasting(recursion, c, sample);
         }
         if holds == [false; CHANNEL_COUNT] {
-            return self.reprocess(recursion, sample);
+            return self.reprocess(recursion);
         }
         let sample = Sample {
             e: clean[0],
@@ -93,7 +94,7 @@ impl Guard {
     /// Handles the return of both signals. The recursion takes the samples again from the start of the excursion.
     /// Held-back samples are replaced by values on a parabola through the last good sample, with its slope, and the
     /// next good sample.
-    fn reprocess(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> GuardDecision {
+    fn reprocess(&mut self, recursion: &mut dyn Recursion) -> GuardDecision {
         for c in 0..CHANNEL_COUNT {
             let mut last = self.channels_before[c].last();
             let mut slope = self.channels_before[c].slope();
@@ -126,11 +127,7 @@ impl Guard {
         self.before.restore(recursion);
         let mut outcome = None;
         for raw in &self.ring[..self.in_ring] {
-            let taken = Sample {
-                e: raw.values[0],
-                u: raw.values[1],
-                ..sample
-            };
+            let taken = raw.with_values(raw.values);
             // e acts on u only after the delay, so the current innovation does not contain the interpolated e. A tenth
             // of a second of interpolated u affects an estimate less than it would if a bank created no hypotheses for
             // that time.
@@ -164,7 +161,8 @@ impl Guard {
         let mut last = self.channels_before.map(|channel| channel.last());
         let mut outcome = None;
         for k in 0..self.in_ring {
-            let RawSample { values, moves, .. } = self.ring[k];
+            let raw = self.ring[k];
+            let RawSample { values, moves, .. } = raw;
             let mut sound = [true; CHANNEL_COUNT];
             for i in 0..CHANNEL_COUNT {
                 sound[i] = values[i].is_finite() && !self.is_too_large(i, values[i]);
@@ -174,11 +172,7 @@ impl Guard {
                     self.channels[i].accept(values[i], &errors);
                 }
             }
-            let taken = Sample {
-                e: last[0],
-                u: last[1],
-                ..sample
-            };
+            let taken = raw.with_values(last);
             outcome = None;
             match sound {
                 [true, true] if moves => outcome = Some(recursion.step(taken)),

@@ -24,6 +24,11 @@
 //! may be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached
 //! their size.
 //!
+//! **Misfits.** After a sudden change of the person with little remnant, the old estimate predicts u worse than the past
+//! of u does. A recursion follows such a change within seconds, whereas a pause would keep the old estimate. A misfit is
+//! therefore a fault only if the recursion has not followed it within [`FOLLOWING_BLOCKS`] more blocks, so that R is at most
+//! twice its long-run value again ([`hoid_core::guard::profile`]). The state before the misfit is then restored.
+//!
 //! **Filters have settled** when the delay and [`SETTLING_S`] have passed: after that time the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 %.
 //!
@@ -82,6 +87,8 @@ const BLOCK_S: f64 = 1.0;
 /// Number of blocks without a fault between two snapshots, and smallest age, in blocks, of a snapshot that is restored.
 const SNAPSHOT_INTERVAL: u32 = 5;
 const MIN_SNAPSHOT_AGE: u64 = 4;
+/// Number of blocks in which the recursion may follow a change of the person before a misfit is a fault.
+const FOLLOWING_BLOCKS: u32 = 6;
 /// Multiple of the typical mean magnitude beyond which the level of a signal has changed.
 const MAX_LEVEL_RATIO: f64 = 30.0;
 /// Smallest size of an outlier as a multiple of the mean magnitude: e passes a low-pass filter before it reaches an
@@ -106,11 +113,24 @@ pub(crate) struct GuardDecision {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct RawSample {
     values: [f64; CHANNEL_COUNT],
+    /// External signal; NaN if it is not known.
+    reference: f64,
     held: [bool; CHANNEL_COUNT],
     moves: bool,
 }
 
-hoid_core::state!([] RawSample { values, held, moves });
+hoid_core::state!([] RawSample { values, reference, held, moves });
+
+impl RawSample {
+    /// Returns the sample with other values of e and u.
+    fn with_values(&self, [e, u]: [f64; CHANNEL_COUNT]) -> Sample {
+        Sample {
+            e,
+            u,
+            reference: Some(self.reference).filter(|reference| reference.is_finite()),
+        }
+    }
+}
 
 /// A pause, in which the estimate is kept constant.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -153,6 +173,8 @@ pub(crate) struct Guard {
     block: Block,
     in_block: u32,
     sound_blocks: u32,
+    /// Number of blocks in which the recursion has been following a misfit.
+    following: u32,
     centre: [f64; CHANNEL_COUNT],
     largest: [f64; CHANNEL_COUNT],
     /// States of the recursion and of the channels before the held-back samples, and these samples.
@@ -188,6 +210,7 @@ impl State for Guard {
                 &mut self.block,
                 &mut self.in_block,
                 &mut self.sound_blocks,
+                &mut self.following,
                 &mut self.centre,
                 &mut self.largest,
                 &mut self.before,
@@ -243,6 +266,7 @@ impl Guard {
             block: Block::default(),
             in_block: 0,
             sound_blocks: 0,
+            following: 0,
             centre: [0.0; CHANNEL_COUNT],
             largest: [f64::INFINITY; CHANNEL_COUNT],
             before: Snapshot::default(),

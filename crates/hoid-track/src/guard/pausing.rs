@@ -27,7 +27,7 @@ impl Guard {
             suspect_samples: 0,
         };
         self.block = Block::default();
-        self.in_block = 0;
+        (self.in_block, self.following) = (0, 0);
         self.report(kind, channel, samples, size, GuardAction::Paused, 0);
     }
 

@@ -8,6 +8,9 @@
 //! none, some parameters, or an earlier fit, from whose estimate and covariance the recursion starts
 //! (`starting_point`).
 //!
+//! **A further input** has a response with gains and a delay of its own and the neuromuscular system of the response to
+//! e. Its polynomials have the delay of their order; its parameters are K_f, K_f_dot and tau_f.
+//!
 //! **Reported estimate.** The recursion reports the gain and lead whose response is nearest to the response of the
 //! gains of the basis ([`AdaptiveFilter::operator`]). The polynomials are this operator after a zero-order hold, with
 //! the delay nk.
@@ -16,14 +19,16 @@ mod starting_point;
 
 use hoid_core::{
     adaptive::{
-        AdaptiveFilter, DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT,
-        basis::Basis,
-        defaults::{self, DefaultOperator},
-        memory_needed,
+        AdaptiveFilter, AdaptivePrior, DYNAMICS_COUNT, GAIN_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT, TwoInputFilter,
+        basis::{Basis, Point},
+        correction_places,
+        defaults::{self, DefaultOperator, further_delay},
+        difference::ParameterGroup,
+        first_gain, memory_needed_for,
     },
-    state::{State, visit_all},
+    state::State,
 };
-use hoid_ident::{IdentError, settings, settings::Bounds};
+use hoid_ident::{IdentError, settings, settings::Bounds, several_inputs::InputOrders};
 use hoid_model::{
     SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate},
@@ -32,7 +37,8 @@ use hoid_numerics::products::congruence;
 use starting_point::{StartingPoint, initial_estimate};
 
 use crate::{
-    change::Change,
+    change::{Change, FurtherChange},
+    further_input::{FurtherOperator, TrackedInput},
     guard::{GuardChoice, GuardOptions},
     memory::Memory,
     method::{MethodDescription, RecursiveMethod, check_delay, check_operator_orders, invalid_option as bad_option},
@@ -40,7 +46,8 @@ use crate::{
     recursion::{Recursion, Sample, StepOutcome},
     reported::ReportedModel,
     response::Response,
-    setup::{DEFAULT_DELAY_S, Setup, StartSource},
+    setup::{Setup, StartSource},
+    shared_options::DEFAULT_DELAY_S,
     start::StartState,
 };
 
@@ -102,6 +109,23 @@ impl RecursiveMethod for AdaptiveOptions {
                 "nc = 0 and nd of at most 24",
             ));
         }
+        if let Some(further) = &setup.further {
+            let InputOrders { nb, nf, nk } = further.orders;
+            if (nb, nf) != (2, 2) || nk == 0 {
+                return Err(bad_option(
+                    "the orders of the further input of adaptive",
+                    format!("nb = {nb}, nf = {nf}, nk = {nk}"),
+                    "nb = 2, nf = 2 and nk of 1 or more: the response has the form of the operator",
+                ));
+            }
+            if self.prior.fit().is_some() {
+                return Err(bad_option(
+                    "the prior of adaptive",
+                    format!("an earlier fit, with the further input {}", further.channel),
+                    "population, none or single parameters: a fit has no covariance between the responses to two inputs",
+                ));
+            }
+        }
         let start = match setup.start {
             StartSource::Theta(_) => Some("coefficients"),
             StartSource::Nothing => Some("nothing"),
@@ -124,7 +148,14 @@ impl RecursiveMethod for AdaptiveOptions {
         from: &StartState,
         sample_time: SampleTime,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        Ok(Box::new(AdaptiveRecursion::new(self, setup, from, sample_time)?))
+        match &setup.further {
+            None => self.build_with_one_input(setup, from, sample_time),
+            Some(further) => self.build_with_two_inputs(further, setup, from, sample_time),
+        }
+    }
+
+    fn supports_further_input(&self) -> bool {
+        true
     }
 
     fn is_physical(&self) -> bool {
@@ -173,54 +204,119 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 }
 
-/// The filter of the method with its reported estimate.
-struct AdaptiveRecursion {
-    model: Box<AdaptiveFilter<Vec<f64>>>,
-    reported: ReportedModel,
-}
-
-impl AdaptiveRecursion {
-    fn new(
-        options: &AdaptiveOptions,
+impl AdaptiveOptions {
+    fn build_with_one_input(
+        &self,
         setup: &Setup,
         from: &StartState,
         sample_time: SampleTime,
-    ) -> Result<Self, IdentError> {
-        let ts = sample_time.s();
-        let nk = setup.orders.nk;
-        // A delay that differs from the default was given by the user.
-        let is_given = nk != sample_time.nk(DEFAULT_DELAY_S);
-        let beginning = StartingPoint::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
-        let point = beginning.point;
-        let basis = Basis::new(point, ts).ok_or_else(|| unusable_fit(&format!("a delay of {} s", point.tau)))?;
-        let fit = options.prior.fit();
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        let (prior, point) = self.kernel_prior(setup, sample_time)?;
+        let basis =
+            Basis::new(point, sample_time.s()).ok_or_else(|| unusable_fit(&format!("a delay of {} s", point.tau)))?;
+        let fit = self.prior.fit();
         let known = fit.map(|fit| initial_estimate(fit, &basis, sample_time)).transpose()?;
+        let model = AdaptiveFilter::new(prior, self.memory(1, sample_time));
+        let model = match &known {
+            Some(known) => model.and_then(|model| model.with_initial_estimate(known)),
+            None => model,
+        };
+        let reported = vec![ReportedModel::new(from, setup.orders.nk, sample_time)];
+        Ok(Box::new(AdaptiveRecursion::new(model, reported, 0.0)?))
+    }
+
+    fn build_with_two_inputs(
+        &self,
+        further: &TrackedInput,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        let (prior, _) = self.kernel_prior(setup, sample_time)?;
+        let nk = further.orders.nk;
+        let delay = further_delay((nk as f64 - 0.5) * sample_time.s(), is_given(nk, sample_time));
+        let model = TwoInputFilter::with_further_input(prior, delay, self.memory(2, sample_time));
+        // The coefficients of the further input follow those of the response to e.
+        let own = from.values.len() - further.parameter_count();
+        let starts = [from.part(0..own), from.part(own..from.values.len())];
+        let reported = (starts.iter().zip([setup.orders.nk, nk]))
+            .map(|(from, nk)| ReportedModel::new(from, nk, sample_time))
+            .collect();
+        Ok(Box::new(AdaptiveRecursion::new(model, reported, further.preview_s)?))
+    }
+
+    /// Returns the prior of the kernel, and the point at which its basis starts.
+    fn kernel_prior(&self, setup: &Setup, sample_time: SampleTime) -> Result<(AdaptivePrior, Point), IdentError> {
+        let (ts, nk) = (sample_time.s(), setup.orders.nk);
+        let start = StartingPoint::of(
+            &self.prior,
+            (nk as f64 - 0.5) * ts,
+            is_given(nk, sample_time),
+            sample_time,
+        )?;
         let supposed = DefaultOperator {
-            point,
-            spread: beginning.spread,
+            point: start.point,
+            spread: start.spread,
             // An nd of 0 or 1 gives no information about the colour of the noise, so the default order is used.
             order: match setup.orders.nd {
                 0 | 1 => defaults::NOISE_ORDER,
                 nd => nd,
             },
-            limit: options.innovation_limit(),
-            false_alarms: options.false_alarms,
+            limit: self.innovation_limit(),
+            false_alarms: self.false_alarms,
         };
-        let memory = vec![0.0; memory_needed(ts, options.replay)];
-        let model = AdaptiveFilter::new(supposed.prior(ts), memory);
-        let model = match &known {
-            Some(known) => model.and_then(|model| model.with_initial_estimate(known)),
-            None => model,
-        };
+        Ok((supposed.prior(ts), start.point))
+    }
+
+    fn memory(&self, inputs: usize, sample_time: SampleTime) -> Vec<f64> {
+        vec![0.0; memory_needed_for(inputs, sample_time.s(), self.replay)]
+    }
+}
+
+/// True for a delay that differs from the default and was therefore given by the user.
+fn is_given(nk: usize, sample_time: SampleTime) -> bool {
+    nk != sample_time.nk(DEFAULT_DELAY_S)
+}
+
+/// The filter of the method with its reported estimate, for the sizes of a number of inputs.
+struct AdaptiveRecursion<const I: usize, const S: usize, const M: usize, const P: usize> {
+    model: Box<AdaptiveFilter<Vec<f64>, I, S, M, P>>,
+    /// Polynomials of the response to e with the noise model, and of the response to the further input.
+    reported: Vec<ReportedModel>,
+    /// Coefficients of all inputs.
+    theta: Vec<f64>,
+    /// Last known value of the further input.
+    last: f64,
+    preview_s: f64,
+}
+
+impl<const I: usize, const S: usize, const M: usize, const P: usize> AdaptiveRecursion<I, S, M, P> {
+    fn new(
+        model: Option<AdaptiveFilter<Vec<f64>, I, S, M, P>>,
+        reported: Vec<ReportedModel>,
+        preview_s: f64,
+    ) -> Result<Self, IdentError> {
         let model = model.ok_or_else(|| unusable_fit("this delay, sample time, prior and options"))?;
         let mut made = Self {
             model: Box::new(model),
-            reported: ReportedModel::new(from, nk, sample_time),
+            reported,
+            theta: Vec::new(),
+            last: 0.0,
+            preview_s,
         };
-        if known.is_some() {
-            made.report();
+        match made.model.has_initial_estimate() {
+            true => made.report(),
+            false => made.join_coefficients(),
         }
         Ok(made)
+    }
+
+    /// Returns the inputs of a sample, and whether the further input is known; if not, its last value is used.
+    fn inputs(&mut self, sample: Sample) -> ([f64; I], bool) {
+        self.last = sample.reference.unwrap_or(self.last);
+        let mut inputs = [self.last; I];
+        inputs[0] = sample.e;
+        (inputs, I == 1 || sample.reference.is_some())
     }
 
     /// True if an estimate exists and its response is not zero; a response of zero has no gain in dB and no phase.
@@ -229,40 +325,135 @@ impl AdaptiveRecursion {
     }
 
     fn report(&mut self) {
-        let [k_e, k_e_dot, omega, zeta, _] = self.model.operator();
-        self.reported.set_operator([k_e, k_e_dot, omega, zeta]);
-        self.reported.set_noise(self.model.d());
+        for (input, reported) in self.reported.iter_mut().enumerate() {
+            let [k, k_dot, omega, zeta, _] = self.model.operator_of(input);
+            reported.set_operator([k, k_dot, omega, zeta]);
+        }
+        self.reported[0].set_noise(self.model.d());
+        self.join_coefficients();
     }
 
-    /// Returns K_e, K_e_dot, omega, zeta and tau before the last change, and the amounts by which they changed; the
-    /// amount is zero for parameters that did not change.
-    fn change_estimates(&self) -> [[Estimate; PARAMETER_COUNT]; 2] {
+    fn join_coefficients(&mut self) {
+        self.theta.clear();
+        for reported in &self.reported {
+            self.theta.extend_from_slice(reported.theta());
+        }
+    }
+
+    fn response_of(&self, input: usize, omega_rad_s: f64) -> Option<Response> {
+        let (value, by) = self.model.response_of_with_derivatives(input, omega_rad_s);
+        self.has_response(value).then(|| Response {
+            value,
+            covariance: congruence(&by, &self.model.state_covariance()),
+        })
+    }
+
+    /// Returns K_e, K_e_dot, omega, zeta and tau of the response to an input before the last change, and the amounts by
+    /// which they changed; the amount is zero for parameters that did not change.
+    fn change_estimates(&self, input: usize) -> [[Estimate; PARAMETER_COUNT]; 2] {
         let detector = self.model.detector();
-        let map = self.model.gain_and_lead_matrix();
-        let (at, hold) = (self.model.basis().point(), 0.5 * self.reported.sample_time_s());
-        let beginning = [at.omega, at.zeta, at.tau - hold];
+        let map = self.model.gain_and_lead_matrix_of(input);
+        let (at, hold) = (
+            self.model.basis_of(input).point(),
+            0.5 * self.reported[0].sample_time_s(),
+        );
+        let start = [at.omega, at.zeta, at.tau - hold];
+        let (first, places) = (first_gain(input), correction_places(input));
         let gain = |i: usize, state: &[f64], of: &dyn Fn(usize, usize) -> f64| {
-            let value = map[i].iter().zip(state).map(|(m, s)| m * s).sum();
+            let value = map[i].iter().zip(&state[first..]).map(|(m, s)| m * s).sum();
             let pairs = (0..GAIN_COUNT).flat_map(|a| (0..GAIN_COUNT).map(move |b| (a, b)));
-            let variance = pairs.map(|(a, b)| map[i][a] * of(a, b) * map[i][b]).sum();
+            let variance = pairs
+                .map(|(a, b)| map[i][a] * of(first + a, first + b) * map[i][b])
+                .sum();
             Estimate::with_variance(value, variance)
         };
         let (told, by) = (detector.contrast(), detector.difference());
         let before = |i: usize| match i {
             0 | 1 => gain(i, &told.before, &|a, b| told.covariance_before[a][b]),
             _ => {
-                let k = LINEAR_COUNT + i - 2;
-                Estimate::with_variance(beginning[i - 2] + told.before[k], told.covariance_before[k][k])
+                let k = places[i - 2];
+                Estimate::with_variance(start[i - 2] + told.before[k], told.covariance_before[k][k])
             }
         };
         let difference = |i: usize| match i {
             0 | 1 => gain(i, &by.value, &|a, b| by.covariance[a][b]),
             _ => {
-                let k = LINEAR_COUNT + i - 2;
+                let k = places[i - 2];
                 Estimate::with_variance(by.value[k], by.covariance[k][k])
             }
         };
         [std::array::from_fn(before), std::array::from_fn(difference)]
+    }
+
+    /// Returns the parameters of the response to an input before and after the last change, and the changes divided by
+    /// their standard errors.
+    fn changed_parameters(&self, input: usize) -> ([[Estimate; 2]; PARAMETER_COUNT], [f64; PARAMETER_COUNT]) {
+        let [old, by] = self.change_estimates(input);
+        let z = |i: usize| match by[i].standard_error {
+            Some(error) if error > 0.0 => by[i].value / error,
+            _ => 0.0,
+        };
+        // Parameters that did not change keep their values.
+        let new = |i: usize| match by[i].value == 0.0 {
+            true => old[i],
+            false => Estimate {
+                value: old[i].value + by[i].value,
+                ..by[i]
+            },
+        };
+        (std::array::from_fn(|i| [old[i], new(i)]), std::array::from_fn(z))
+    }
+
+    fn has_changed(&self, input: usize) -> bool {
+        let difference = self.model.detector().difference();
+        let of_input = [ParameterGroup::Gains(input), ParameterGroup::Delay(input)];
+        of_input.into_iter().any(|group| difference.has_changed(group))
+    }
+
+    /// Returns the last declared change.
+    fn last_change(&self) -> Option<Change> {
+        let detector = self.model.detector();
+        let (pairs, z) = self.changed_parameters(0);
+        let further = self.further_change();
+        let told = detector.contrast();
+        let variance = detector.innovation_variances();
+        let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
+        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.typical_level()).sqrt();
+        let [k_e, k_e_dot, omega_nm_rad_s, zeta_nm, tau_e_s] = pairs;
+        Some(Change {
+            seconds_ago: detector.detection_delay_s(),
+            odds: self.change_odds()?,
+            k_e,
+            k_e_dot,
+            omega_nm_rad_s,
+            zeta_nm,
+            tau_e_s,
+            t_l_s: [0, 1].map(|side| k_e_dot[side].value / k_e[side].value),
+            innovation_variance: variance,
+            z: [z[0], z[1], z[2], z[3], level, z[4]],
+            of_operator: I == 1 || self.has_changed(0) || detector.difference().has_changed(ParameterGroup::System),
+            further,
+        })
+    }
+
+    fn further_change(&self) -> Option<FurtherChange> {
+        if I == 1 {
+            return None;
+        }
+        let (pairs, z) = self.changed_parameters(1);
+        let operator = |side: usize| FurtherOperator {
+            k_f: pairs[0][side],
+            k_f_dot: pairs[1][side],
+            tau_f_s: Estimate {
+                value: pairs[4][side].value - self.preview_s,
+                ..pairs[4][side]
+            },
+        };
+        Some(FurtherChange {
+            operators: [operator(0), operator(1)],
+            z: [z[0], z[1], z[4]],
+            is_changed: self.has_changed(1),
+        })
     }
 }
 
@@ -272,15 +463,24 @@ fn unusable_fit(what: &str) -> IdentError {
     }
 }
 
-impl State for AdaptiveRecursion {
+impl<const I: usize, const S: usize, const M: usize, const P: usize> State for AdaptiveRecursion<I, S, M, P> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        visit_all(&mut [&mut *self.model, &mut self.reported], each);
+        self.model.visit(each);
+        self.reported.as_mut_slice().visit(each);
+        if I > 1 {
+            self.last.visit(each);
+        }
+        self.join_coefficients();
     }
 }
 
-impl Recursion for AdaptiveRecursion {
+impl<const I: usize, const S: usize, const M: usize, const P: usize> Recursion for AdaptiveRecursion<I, S, M, P> {
     fn step(&mut self, sample: Sample) -> StepOutcome {
-        let step = self.model.step(sample.e, sample.u);
+        let (inputs, is_known) = self.inputs(sample);
+        let step = match is_known {
+            true => self.model.step_inputs(inputs, sample.u),
+            false => self.model.follow_inputs(inputs, sample.u),
+        };
         if self.model.has_started() {
             self.report();
         }
@@ -288,27 +488,50 @@ impl Recursion for AdaptiveRecursion {
     }
 
     fn step_without_update(&mut self, sample: Sample) -> StepOutcome {
-        self.model.step_without_update(sample.e, sample.u).into()
+        let (inputs, _) = self.inputs(sample);
+        self.model.follow_inputs(inputs, sample.u).into()
     }
 
     fn bridge(&mut self, sample: Sample) {
-        self.model.bridge(sample.e);
+        let (inputs, _) = self.inputs(sample);
+        self.model.bridge_inputs(inputs);
     }
 
     fn theta(&self) -> &[f64] {
-        self.reported.theta()
+        &self.theta
     }
 
     fn covariance(&self, into: &mut [f64]) -> bool {
         if !self.model.has_started() {
             return false;
         }
-        let c = self.model.operator_covariance();
-        let whole = std::array::from_fn(|i| std::array::from_fn(|j| c[i][j]));
-        self.reported.covariance(&whole, into);
-        match self.model.noise_model().covariance() {
-            Some(of_d) => self.reported.write_noise_covariance(&of_d, into),
-            None => return false,
+        let Some(of_d) = self.model.noise_model().covariance() else {
+            return false;
+        };
+        let write_block = |input: usize, block: &mut [f64]| {
+            let c = self.model.operator_covariance_of(input);
+            let whole = std::array::from_fn(|i| std::array::from_fn(|j| c[i][j]));
+            self.reported[input].covariance(&whole, block);
+            if input == 0 {
+                self.reported[input].write_noise_covariance(&of_d, block);
+            }
+        };
+        if I == 1 {
+            write_block(0, into);
+            return true;
+        }
+        into.fill(0.0);
+        // The coefficients of different inputs are reported without their covariance.
+        let (width, mut first) = (self.theta.len(), 0);
+        for (input, reported) in self.reported.iter().enumerate() {
+            let own = reported.theta().len();
+            let mut block = vec![0.0; own * own];
+            write_block(input, &mut block);
+            for (i, row) in block.chunks_exact(own).enumerate() {
+                let at = (first + i) * width + first;
+                into[at..at + own].copy_from_slice(row);
+            }
+            first += own;
         }
         true
     }
@@ -334,54 +557,39 @@ impl Recursion for AdaptiveRecursion {
         })
     }
 
+    fn further_operator(&self) -> Option<FurtherOperator> {
+        if I == 1 {
+            return None;
+        }
+        let (values, covariance) = (self.model.operator_of(1), self.model.operator_covariance_of(1));
+        let of = |i: usize, value: f64| Estimate::with_variance(value, covariance[i][i]);
+        Some(FurtherOperator {
+            k_f: of(0, values[0]),
+            k_f_dot: of(1, values[1]),
+            tau_f_s: of(4, values[4] - self.preview_s),
+        })
+    }
+
     fn change_odds(&self) -> Option<f64> {
         Some(self.model.detector().log_significance())
     }
 
     fn change(&self) -> Option<Change> {
-        let detector = self.model.detector();
-        if !detector.is_change_declared() {
-            return None;
-        }
-        let [old, by] = self.change_estimates();
-        let z = |i: usize| match by[i].standard_error {
-            Some(error) if error > 0.0 => by[i].value / error,
-            _ => 0.0,
-        };
-        // Parameters that did not change keep their values.
-        let new = |i: usize| match by[i].value == 0.0 {
-            true => old[i],
-            false => Estimate {
-                value: old[i].value + by[i].value,
-                ..by[i]
-            },
-        };
-        let pair = |i: usize| [old[i], new(i)];
-        let told = detector.contrast();
-        let variance = detector.innovation_variances();
-        let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
-        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.typical_level()).sqrt();
-        Some(Change {
-            seconds_ago: detector.detection_delay_s(),
-            odds: self.change_odds()?,
-            k_e: pair(0),
-            k_e_dot: pair(1),
-            omega_nm_rad_s: pair(2),
-            zeta_nm: pair(3),
-            tau_e_s: pair(4),
-            t_l_s: [old[1].value / old[0].value, new(1).value / new(0).value],
-            innovation_variance: variance,
-            z: [z(0), z(1), z(2), z(3), level, z(4)],
-            of_operator: true,
-        })
+        self.model.detector().is_change_declared().then(|| self.last_change())?
+    }
+
+    fn revised_change(&self) -> Option<Change> {
+        self.model.detector().is_change_revised().then(|| self.last_change())?
     }
 
     fn response(&self, omega_rad_s: f64) -> Option<Response> {
-        let (value, by) = self.model.response_with_derivatives(omega_rad_s);
-        self.has_response(value).then(|| Response {
-            value,
-            covariance: congruence(&by, &self.model.state_covariance()),
-        })
+        self.response_of(0, omega_rad_s)
+    }
+
+    fn further_response(&self, omega_rad_s: f64) -> Option<Response> {
+        let found = (I > 1).then(|| self.response_of(1, omega_rad_s))??;
+        // The model has the channel advanced by the preview as its input.
+        Some(found.advanced(self.preview_s * omega_rad_s))
     }
 
     fn response_value(&self, omega_rad_s: f64) -> Option<[f64; 2]> {

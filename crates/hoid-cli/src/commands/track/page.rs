@@ -4,7 +4,7 @@ use hoid::analysis::TrackingResult;
 use hoid::model::numbers::count_with_noun;
 use hoid::model::{GainUnit, uncertainty::Estimate};
 use hoid::report::numbers;
-use hoid::track::{Response, operator_parameter};
+use hoid::track::{FURTHER_RESPONSES_RAD_S, FurtherOperator, Response, operator_parameter};
 
 use crate::{error::CliError, text};
 
@@ -164,9 +164,6 @@ fn estimate_table(tracked: &TrackingResult) -> String {
     )
 }
 
-/// Frequencies in rad/s at which the response to a further input is printed if the user gives none.
-const FURTHER_FREQUENCIES_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
-
 /// Returns the response to the further input at a few times; empty for a model with one input.
 fn further_response_table(tracked: &TrackingResult) -> String {
     let trace = &tracked.trace;
@@ -174,10 +171,15 @@ fn further_response_table(tracked: &TrackingResult) -> String {
         return String::new();
     };
     let at = match trace.options().at_rad_s.as_slice() {
-        [] => &FURTHER_FREQUENCIES_RAD_S,
+        [] => &FURTHER_RESPONSES_RAD_S,
         given => given,
     };
     let mut header = vec!["t in s".to_owned()];
+    let has_parameters = (0..trace.len()).any(|row| trace.further_operator(row).is_some());
+    if has_parameters {
+        let [k_f, k_f_dot, tau_f] = FurtherOperator::NAMES;
+        header.extend([k_f.to_owned(), k_f_dot.to_owned(), format!("{tau_f} (s)")]);
+    }
     header.extend(
         at.iter()
             .flat_map(|omega| [format!("dB at {omega} rad/s"), format!("deg at {omega} rad/s")]),
@@ -185,6 +187,10 @@ fn further_response_table(tracked: &TrackingResult) -> String {
     let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).into_time_series();
     for row in printed_rows(tracked) {
         let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
+        if has_parameters {
+            let found = trace.further_operator(row).map(|operator| operator.parameters());
+            cells.extend((0..FurtherOperator::NAMES.len()).map(|i| plus_minus(found.map(|found| found[i]))));
+        }
         for omega in at {
             let found = trace.further_response(row, *omega);
             cells.push(plus_minus(found.as_ref().map(Response::gain_db)));

@@ -73,16 +73,21 @@ fn derivatives_agree_with_finite_differences() {
 #[test]
 fn weights_match_the_regressors() {
     let basis = Basis::new(point(), 0.01).unwrap();
-    let state: [f64; STATE_COUNT] = [1.2, -0.7, 0.4, 0.3, 1.5, -0.04, 0.02];
+    let (gains, corrections) = ([1.2, -0.7, 0.4], [1.5, -0.04, 0.02]);
     let z: Signals = [0.3, -1.1, 0.7, 2.0, -5.0, 11.0];
     let r = basis.regressors(&z);
     let expected: f64 = (0..GAIN_COUNT)
         .map(|i| {
-            let corrected: f64 = (0..DYNAMICS_COUNT).map(|j| state[4 + j] * r.by[j][i]).sum();
-            state[i] * (r.x[i] + corrected)
+            let corrected: f64 = (0..DYNAMICS_COUNT).map(|j| corrections[j] * r.by[j][i]).sum();
+            gains[i] * (r.x[i] + corrected)
         })
         .sum();
-    let found: f64 = basis.weights(&state).iter().zip(z).map(|(w, z)| w * z).sum();
+    let found: f64 = basis
+        .weights(&gains, &corrections)
+        .iter()
+        .zip(z)
+        .map(|(w, z)| w * z)
+        .sum();
     assert!((found - expected).abs() < 1e-9 * expected.abs(), "{found} {expected}");
 }
 

@@ -17,13 +17,14 @@
 
 use core::ops::Range;
 
-use super::{AdaptiveFilter, correction_variances, filter_output, store, trust_region};
+use super::{AdaptiveFilter, filter_output, store, trust_region};
 use crate::adaptive::{
     basis::Point,
     candidate::Candidate,
     history::{History, SampleUse},
     mixture::ChangePrior,
     saturation::Saturation,
+    sizes::is_correction,
 };
 
 /// Number of stored samples that a replay reads for each new sample.
@@ -38,17 +39,19 @@ const TOLERATED_DEFICIT_NATS: f64 = 20.0;
 /// Minimum number of samples for the first estimate, as a multiple of the order of the noise model.
 const MIN_SAMPLES_PER_ORDER: u64 = 3;
 
-impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
+impl<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: usize, const P: usize>
+    AdaptiveFilter<E, I, S, M, P>
+{
     /// Makes the first estimate once there are enough samples: the best of the candidates from all starting points over
     /// the samples so far or, without replays, the candidate at the point of the person.
     pub(super) fn try_to_start(&mut self) {
         let (ts, n) = (self.prior.sample_time, self.history.sample_count());
         let enough = n as f64 * ts >= self.prior.hold && n >= MIN_SAMPLES_PER_ORDER * self.prior.order as u64;
-        if !enough || !self.powers.iter().all(|p| *p > 0.0) {
+        if !enough || !self.input_powers.iter().chain(&self.powers).all(|p| *p > 0.0) {
             return;
         }
         if !self.has_replays() {
-            if let Some(live) = self.build_candidate(self.prior.person, &self.prior_noise, 1.0) {
+            if let Some(live) = self.build_candidate(self.origin.points(), &self.prior_noise, 1.0) {
                 self.live = live;
                 self.started = true;
             }
@@ -56,9 +59,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
         // There are more samples than the memory holds only after altered numbers were restored.
         let first = n.saturating_sub(self.history.capacity() as u64);
-        let mut best: Option<(f64, Candidate)> = None;
-        for start in self.prior.starts {
-            let Some(mut candidate) = self.build_candidate(start, &self.prior_noise, 1.0) else {
+        let mut best: Option<(f64, Candidate<I, S, M, P>)> = None;
+        for start in 0..self.prior.starts.len() {
+            let points = self.starting_points(start);
+            let Some(mut candidate) = self.build_candidate(points, &self.prior_noise, 1.0) else {
                 continue;
             };
             if !feed_samples(
@@ -70,7 +74,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             ) {
                 continue;
             }
-            let evidence = candidate.evidence + self.log_prior(start);
+            let evidence = candidate.evidence + self.log_prior(&points);
             if evidence.is_finite() && best.as_ref().is_none_or(|(least, _)| evidence > *least) {
                 best = Some((evidence, candidate));
             }
@@ -81,11 +85,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// Log prior density of a point, up to a constant.
-    fn log_prior(&self, point: Point) -> f64 {
-        let (p, is) = (self.prior.person, correction_variances(&self.prior));
-        let away = [point.omega - p.omega, point.zeta - p.zeta, point.tau - p.tau];
-        -0.5 * away.iter().zip(is).map(|(a, v)| a * a / v).sum::<f64>()
+    /// Log prior density of the points of all inputs, up to a constant.
+    fn log_prior(&self, points: &[Point; I]) -> f64 {
+        let (away, is) = (self.origin.corrections::<S>(points), self.correction_variances());
+        let each = (0..S).filter(|i| is_correction(*i)).map(|i| away[i] * away[i] / is[i]);
+        -0.5 * each.sum::<f64>()
     }
 
     /// Starts a trial if none is running. Otherwise continues the trial, and decides about it when it has caught up.
@@ -113,12 +117,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     fn start_replay(&mut self) {
         self.replays += 1;
         let elsewhere = self.replays.is_multiple_of(2) && self.initial.is_none();
-        let (point, stage) = match elsewhere {
-            true => (self.prior.starts[self.starting_point_index()], 2),
-            false => (self.live.point(), 1),
+        let (points, stage) = match elsewhere {
+            true => (self.starting_points(self.starting_point_index()), 2),
+            false => (self.live.points(), 1),
         };
         let live = self.live.clone();
-        self.start_from(&live, point, stage);
+        self.start_from(&live, points, stage);
     }
 
     /// Index of the starting point of the current trial or, if the current trial started from the estimate, of the last
@@ -128,10 +132,10 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Starts a trial at a point, with the noise model and the dispersion of another candidate.
-    fn start_from(&mut self, from: &Candidate, point: Point, stage: u64) {
+    fn start_from(&mut self, from: &Candidate<I, S, M, P>, points: [Point; I], stage: u64) {
         let mut d = from.noise.clone();
         d.solve();
-        let Some(trial) = self.build_candidate(point, &d, from.dispersion()) else {
+        let Some(trial) = self.build_candidate(points, &d, from.dispersion()) else {
             self.replay_stage = 0;
             return;
         };
@@ -139,8 +143,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         // right from the first block, before the trial has estimated the gains itself.
         let later = (trial.start.saturating_sub(from.start)) / from.block_samples().max(1);
         let guide = from.mixture.segments();
-        let basis = trial.basis().clone();
-        self.trial = trial.with_guide(guide.converted(later, |state| from.convert_state(&basis, state)));
+        let bases = trial.bases().clone();
+        self.trial = trial.with_guide(guide.converted(later, |state| from.convert_state(&bases, state)));
         (self.replay_stage, self.next_sample) = (stage, self.trial.start);
     }
 
@@ -157,8 +161,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let same = trial.start == self.live.start;
         self.apply_population_prior(&mut trial);
         if stage > 1 && stage <= STAGE_COUNT {
-            let point = trial.point();
-            self.start_from(&trial, point, stage + 1);
+            let points = trial.points();
+            self.start_from(&trial, points, stage + 1);
             return;
         }
         let takes_over = match stage {
@@ -171,7 +175,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             let deficit = (evidence - self.live.evidence).abs();
             self.alternatives.store(
                 self.starting_point_index(),
-                loser.operator(),
+                loser.operators(),
                 deficit,
                 self.informative_samples(),
             );
@@ -182,28 +186,29 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Replaces, in a candidate, the trust region of a replay by the prior for a person.
-    fn apply_population_prior(&self, candidate: &mut Candidate) {
+    fn apply_population_prior(&self, candidate: &mut Candidate<I, S, M, P>) {
         if self.initial.is_some() {
             return;
         }
-        let (p, at) = (self.prior.person, candidate.basis().point());
-        let mean = [p.omega - at.omega, p.zeta - at.zeta, p.tau - at.tau];
+        let bases = candidate.bases();
+        let mean = bases.corrections(&self.origin.points());
+        let trusted = trust_region(&bases.points());
         candidate
             .mixture
-            .replace_prior(trust_region(at), correction_variances(&self.prior), mean);
+            .replace_prior(&trusted, &self.correction_variances(), &mean);
     }
 }
 
 /// Passes samples of the history to a candidate; returns false if a number has overflowed.
-fn feed_samples<E: AsRef<[f64]> + AsMut<[f64]>>(
-    history: &History<E>,
+fn feed_samples<E: AsRef<[f64]> + AsMut<[f64]>, const I: usize, const S: usize, const M: usize, const P: usize>(
+    history: &History<E, I>,
     saturation: &Saturation,
     changes: &ChangePrior,
-    candidate: &mut Candidate,
+    candidate: &mut Candidate<I, S, M, P>,
     samples: Range<u64>,
 ) -> bool {
     for sample in samples {
-        candidate.advance_basis(|age| history.error(sample, age));
+        candidate.advance_bases(|input, age| history.input(input, sample, age));
         let (u, sample_use) = history.output(sample);
         let through = match sample_use {
             SampleUse::Update => {

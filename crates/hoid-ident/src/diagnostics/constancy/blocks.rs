@@ -9,7 +9,7 @@ use std::ops::Range;
 use crate::{
     criterion::{Data, Workspace},
     grey_box::{objective::PhysicalCriterion, parametrisation::Parametrisation},
-    linalg::least_squares::{add_scaled, dot},
+    linalg::vectors::{add_scaled, dot},
 };
 
 /// Length of a block, s: longer than the correlation time of the residuals.

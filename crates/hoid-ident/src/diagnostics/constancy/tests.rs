@@ -14,7 +14,7 @@ use super::{
 use crate::{
     Estimator, Fit, GreyBox,
     criterion::Data,
-    linalg::least_squares::{dot, solve_symmetric},
+    linalg::{least_squares::solve_symmetric, vectors::dot},
 };
 
 fn simulated_record(condition: Condition, replication: u64) -> Record {

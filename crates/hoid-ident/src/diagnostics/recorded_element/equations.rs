@@ -3,7 +3,10 @@
 use hoid_model::{Complex64, ContinuousTransferFunction};
 
 use super::spectra::Spectra;
-use crate::linalg::least_squares::{LeastSquares, add_scaled, dot};
+use crate::linalg::{
+    least_squares::LeastSquares,
+    vectors::{add_scaled, dot},
+};
 
 /// Scan of the delay of the element, s: smallest delay, largest delay, step.
 const DELAY_SCAN_S: (f64, f64, f64) = (-0.05, 0.3, 0.01);

@@ -178,7 +178,7 @@ pub(super) fn initial_estimate(
         state,
         covariance: symmetrise(&covariance),
         variance: fit.innovation_variance,
-        unit: fit.operator.response_and_gradient(REFERENCE_RAD_S).value.norm(),
+        units: [fit.operator.response_and_gradient(REFERENCE_RAD_S).value.norm()],
         remnant: lags.map(|lags| (lags, REMNANT_WEIGHT_S)),
     })
 }
