@@ -7,15 +7,12 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::{row_blocks::reduce_rows, vectors::dot};
+use super::vectors::dot;
 
 /// A column counts as linearly dependent on previous columns if its diagonal element of R has less than this relative
 /// size. Rounding alone leaves about 1e-15; regressors that determine their coefficients to a few digits are above
 /// 1e-10.
 pub(crate) const RANK_TOLERANCE: f64 = 1e-12;
-
-/// Number of rows above which the problem is first reduced to a triangular one.
-const TALL_ROWS: usize = 1024;
 
 /// The factors of `X P = Q R` and `Q' y`, from which all results are computed.
 #[derive(Debug)]
@@ -45,16 +42,6 @@ impl LeastSquares {
                 column.iter_mut().for_each(|v| *v /= norm);
             }
         }
-        if rows > TALL_ROWS.max(2 * p) {
-            let (mut columns, mut y) = reduce_rows(columns, y);
-            return Self::factor_scaled(&mut columns, &mut y, scales);
-        }
-        Self::factor_scaled(columns, y, scales)
-    }
-
-    /// Factors columns that were divided by these scales.
-    fn factor_scaled(columns: &mut [f64], y: &mut [f64], scales: Vec<f64>) -> Self {
-        let (rows, p) = (y.len(), scales.len());
         let mut pivots: Vec<usize> = (0..p).collect();
         let mut r = vec![0.0; p * p];
         let mut rank = 0;
@@ -284,43 +271,6 @@ mod tests {
         assert!(
             text.contains("b2 is a combination of a1") || text.contains("a1 is a combination of b2"),
             "{text}"
-        );
-    }
-
-    /// A tall problem with nearly dependent columns gives the same factors directly and from its triangular problem.
-    #[test]
-    fn reduced_rows_have_the_same_solution() {
-        let rows = 3001;
-        let column = |f: &dyn Fn(f64) -> f64| (0..rows).map(|t| f(f64::from(t))).collect::<Vec<f64>>();
-        let x = [
-            column(&|t| (0.3 * t).sin()),
-            column(&|t| (0.3 * t + 1e-4).sin()),
-            column(&|t| (0.011 * t * t).cos()),
-            column(&|t| if t < 2000.0 { 0.0 } else { 1.0 }),
-        ]
-        .concat();
-        let y = column(&|t| (0.3 * t + 0.5).sin() + (0.7 * t).cos() + 0.2 * (0.011 * t * t).cos());
-        let scales = vec![1.0; 4];
-        let direct = LeastSquares::factor_scaled(&mut x.clone(), &mut y.clone(), scales.clone());
-        let (mut reduced, mut right) = reduce_rows(&x, &y);
-        assert_eq!((reduced.len(), right.len()), (20, 5));
-        let of_reduced = LeastSquares::factor_scaled(&mut reduced, &mut right, scales);
-        assert_eq!(of_reduced.pivots, direct.pivots);
-        // The condition number is 1e4.
-        for (a, b) in of_reduced.solution().iter().zip(direct.solution()) {
-            assert!((a - b).abs() < 1e-11 * b.abs(), "{a} {b}");
-        }
-        let [a, b] = [&of_reduced, &direct].map(|of| of.residual_sum_of_squares);
-        assert!((a - b).abs() < 1e-13 * b, "{a} {b}");
-        for (a, b) in of_reduced.inverse_gram().iter().zip(direct.inverse_gram()) {
-            assert!((a - b).abs() < 1e-8 * b.abs().max(1e-9), "{a} {b}");
-        }
-        // An exactly dependent column is found in the triangular problem.
-        let dependent = [&x[..], &x[..rows as usize]].concat();
-        let (mut reduced, mut right) = reduce_rows(&dependent, &y);
-        assert_eq!(
-            LeastSquares::factor_scaled(&mut reduced, &mut right, vec![1.0; 5]).rank,
-            4
         );
     }
 

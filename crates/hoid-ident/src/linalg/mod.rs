@@ -4,7 +4,6 @@
 //! |---|---|
 //! | `products` | sums of products of long signals |
 //! | `least_squares` | linear regression by QR with column pivoting |
-//! | `row_blocks` | reduction of a tall regression to a triangular one |
 //! | `gram` | normal equations for a small number of columns, row by row |
 //! | `vectors` | sums of vectors and products of vectors |
 //! | `information` | inverse of the information matrix of the free parameters |
@@ -13,7 +12,6 @@ pub(crate) mod gram;
 pub(crate) mod information;
 pub(crate) mod least_squares;
 pub(crate) mod products;
-mod row_blocks;
 pub(crate) mod vectors;
 
 pub use vectors::dot;
