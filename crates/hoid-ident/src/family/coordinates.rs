@@ -28,12 +28,8 @@ pub(crate) fn limits(
 ) -> Vec<(f64, f64)> {
     let highest = MAX_NYQUIST_SHARE * sample_time.nyquist_rad_s();
     let of = |coordinate: &Coordinate| match coordinate {
-        Coordinate::Gain => (f64::NEG_INFINITY, f64::INFINITY),
+        Coordinate::Gain | Coordinate::Linear | Coordinate::Quadratic => (f64::NEG_INFINITY, f64::INFINITY),
         Coordinate::Lead => (0.0, LONGEST_LEAD_S),
-        // The sum and the product of two leads. At the bound the integration has no visible effect; without a bound, the
-        // search would follow the gain to zero forever.
-        Coordinate::Linear => (-2.0 * LONGEST_LEAD_S, 2.0 * LONGEST_LEAD_S),
-        Coordinate::Quadratic => (-LONGEST_LEAD_S.powi(2), LONGEST_LEAD_S.powi(2)),
         Coordinate::LagRate => LAG_RATE_LIMITS,
         Coordinate::Droop => (0.0, MAX_DROOP_RAD_S),
         Coordinate::LogOmega => (MIN_NEUROMUSCULAR_RAD_S.min(0.5 * highest).ln(), highest.ln()),
