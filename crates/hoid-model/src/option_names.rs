@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn assignments_become_entries() {
-        let entries = literal_entries("e=0.5,u=deg", |name, value| format!("{name} = {value}"));
-        assert_eq!(entries, "e = 0.5, u = \"deg\"");
+        let entries = literal_entries("e=0.5,u=rad:deg", |name, value| format!("{name} = {value}"));
+        assert_eq!(entries, "e = 0.5, u = \"rad:deg\"");
     }
 }

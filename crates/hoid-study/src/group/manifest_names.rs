@@ -116,7 +116,7 @@ mod tests {
             "--sparse r=hold",
             "--resample",
             "--fill",
-            "--scale e=0.5,u=deg",
+            "--scale e=0.5,u=rad:deg",
             "--offset u=1",
             "--decimate 2",
             "--new-fs 50",
@@ -124,11 +124,10 @@ mod tests {
             "--drop-repeated",
             "--input r",
             "--role r=feedforward",
-            "--controlled-element 90/(s(s+6))",
             "--excitation f_t",
         ] {
             let said = in_manifest(&format!("add {typed}"), "C 1");
-            let line = said.strip_prefix("add ").unwrap().replace("/(s(s+6))", "");
+            let line = said.strip_prefix("add ").unwrap();
             let run = "[[runs]]\nfile = \"a.csv\"\nsubject = \"P\"\ncondition = \"C 1\"\nrun = \"1\"\n";
             let text = format!("name = \"g\"\n{line}\n{run}");
             match line.strip_prefix("hoid identify ") {
@@ -140,6 +139,10 @@ mod tests {
                 ),
             }
         }
+        assert_eq!(
+            in_manifest("without --controlled-element (90/(s(s+6)), say)", "C 1"),
+            "without conditions.\"C 1\".controlled_element (90/(s(s+6)), say)"
+        );
         assert_eq!(
             in_manifest("longer runs; --form, --neuromuscular no", "C1"),
             "longer runs; analysis.form, hoid identify --neuromuscular no"
