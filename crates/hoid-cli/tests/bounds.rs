@@ -7,7 +7,7 @@ use std::fs;
 
 use tempfile::TempDir;
 
-use common::{failure_of, stdout_of};
+use common::{BOX_JENKINS_OPTIONS, failure_of, stdout_of};
 
 const HUGE_NUMBER: &str = "18446744073709551615";
 
@@ -54,21 +54,8 @@ fn exceeded_limits_are_refused_at_once() {
         assert!(message.contains(expected), "{arguments:?}: {message}");
     }
     // A horizon beyond the record is limited to the record.
-    stdout_of(
-        d,
-        &[
-            "identify",
-            "c1.csv",
-            "--structure",
-            "bj",
-            "--nk",
-            "29",
-            "--orders",
-            "nd=1",
-            "--horizon",
-            "1000",
-        ],
-    );
+    let identify = [&["identify", "c1.csv", "--horizon", "1000"][..], &BOX_JENKINS_OPTIONS];
+    stdout_of(d, &identify.concat());
     for options in [
         ["--subjects", "100000000"],
         ["--runs", HUGE_NUMBER],

@@ -13,7 +13,7 @@ use std::{
 
 use tempfile::TempDir;
 
-use common::{failure_of, json, stdout_of};
+use common::{BOX_JENKINS_OPTIONS, failure_of, json, stdout_of};
 
 /// Returns a simulated run as text.
 fn simulated_run_text(directory: &Path) -> String {
@@ -67,16 +67,7 @@ fn gains_without_units_are_not_in_degrees() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     let text = simulated_run_text(d);
-    let identify = [
-        "identify",
-        "run.csv",
-        "--structure",
-        "bj",
-        "--nk",
-        "29",
-        "--orders",
-        "nd=1",
-    ];
+    let identify = [&["identify", "run.csv"][..], &BOX_JENKINS_OPTIONS].concat();
     for (units, declared, expected) in [
         ("# units: t s, e deg, u deg\n", None, Some("deg/deg")),
         ("# units: t s, e deg, u V\n", None, Some("V/deg")),

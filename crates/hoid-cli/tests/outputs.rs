@@ -13,7 +13,7 @@ use tempfile::TempDir;
 
 use hoid::model::numbers::with_uncertainty;
 
-use common::{failure_of, hoid, json, simulated_run, stdout_of};
+use common::{BOX_JENKINS_OPTIONS, failure_of, hoid, json, simulated_run, stdout_of};
 
 /// Returns a folder with a simulated run `in.csv`, a group `g` of two runs, and a plan.
 fn workplace() -> TempDir {
@@ -36,17 +36,6 @@ fn workplace() -> TempDir {
     );
     directory
 }
-
-const FIT_OPTIONS: [&str; 8] = [
-    "--structure",
-    "bj",
-    "--nk",
-    "29",
-    "--orders",
-    "nd=1",
-    "--initial-state",
-    "zero",
-];
 
 #[test]
 fn output_that_is_an_input_is_refused() {
@@ -75,8 +64,15 @@ fn output_that_is_an_input_is_refused() {
     all.push(figure.to_vec());
     fs::create_dir(d.join("pages")).unwrap();
     fs::copy(d.join("in.csv"), d.join("pages/report.html")).unwrap();
-    let mut report = vec!["identify", "pages/report.html", "--report", "pages"];
-    report.extend(FIT_OPTIONS);
+    let mut report = vec![
+        "identify",
+        "pages/report.html",
+        "--report",
+        "pages",
+        "--initial-state",
+        "zero",
+    ];
+    report.extend(BOX_JENKINS_OPTIONS);
     all.push(report);
     all.push(vec!["group", "g", "--out", "g"]);
     all.push(vec!["group", "g/group.toml", "--out", "g"]);
@@ -106,8 +102,8 @@ fn unwritable_outputs_are_refused_before_the_work() {
 
 /// Returns each command that prints, with arguments for which it is fast.
 fn printing_commands() -> Vec<Vec<&'static str>> {
-    let mut identify = vec!["identify", "in.csv"];
-    identify.extend(FIT_OPTIONS);
+    let mut identify = vec!["identify", "in.csv", "--initial-state", "zero"];
+    identify.extend(BOX_JENKINS_OPTIONS);
     let mut as_json = identify.clone();
     as_json.push("--json");
     vec![

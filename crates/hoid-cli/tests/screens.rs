@@ -7,7 +7,7 @@ mod common;
 
 use std::{fs, path::Path, process::Command};
 
-use common::{failure_of, stdout_of};
+use common::{BOX_JENKINS_OPTIONS, failure_of, stdout_of};
 use tempfile::TempDir;
 
 fn simulated_runs() -> TempDir {
@@ -18,16 +18,10 @@ fn simulated_runs() -> TempDir {
     directory
 }
 
-const FIT_OPTIONS: [&str; 8] = [
-    "identify",
-    "1.csv",
-    "--structure",
-    "bj",
-    "--nk",
-    "29",
-    "--orders",
-    "nd=1",
-];
+/// Returns the arguments of a fit.
+fn fit_arguments() -> Vec<&'static str> {
+    [&["identify", "1.csv"][..], &BOX_JENKINS_OPTIONS].concat()
+}
 
 /// Returns the standard output on a screen of the given width.
 fn output_at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
@@ -44,7 +38,7 @@ fn output_at_width(directory: &Path, columns: &str, arguments: &[&str]) -> Strin
 fn answer_comes_first_and_fits_on_a_screen() {
     let directory = simulated_runs();
     let d = directory.path();
-    let page = stdout_of(d, &FIT_OPTIONS);
+    let page = stdout_of(d, &fit_arguments());
     assert!(page.starts_with("Verdict: "), "{page}");
     let lines = page.lines().count();
     assert!(lines <= 24, "{lines} lines:\n{page}");
@@ -61,7 +55,7 @@ fn answer_comes_first_and_fits_on_a_screen() {
         !page.contains("Settings given:") && !page.contains("Ljung-Box"),
         "{page}"
     );
-    let all = stdout_of(d, &[&FIT_OPTIONS[..], &["-v"]].concat());
+    let all = stdout_of(d, &[&fit_arguments()[..], &["-v"]].concat());
     for part in [
         "Settings given: ",
         "By default: ",
@@ -83,7 +77,7 @@ fn pages_fit_the_screen_width() {
         let text = output_at_width(
             directory.path(),
             &columns.to_string(),
-            &[&FIT_OPTIONS[..], &["-v"]].concat(),
+            &[&fit_arguments()[..], &["-v"]].concat(),
         );
         let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
         assert!(widest <= columns, "{widest} columns on a screen of {columns}:\n{text}");

@@ -12,9 +12,7 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{hoid, json, stdout_of};
-
-const BOX_JENKINS_OPTIONS: [&str; 6] = ["--structure", "bj", "--nk", "29", "--orders", "nd=1"];
+use common::{BOX_JENKINS_OPTIONS, hoid, json, stdout_of};
 
 fn simulated_run(condition: &str) -> TempDir {
     let directory = TempDir::new().unwrap();
@@ -216,18 +214,10 @@ fn stream_lines_have_a_level_that_sets_the_exit_code() {
 fn wrong_controlled_element_is_doubtful_in_every_command() {
     let directory = simulated_run("C1");
     let d = directory.path();
+    let box_jenkins = [&["identify", "c.csv"][..], &BOX_JENKINS_OPTIONS].concat();
     let commands: [&[&str]; 4] = [
         &["identify", "c.csv"],
-        &[
-            "identify",
-            "c.csv",
-            "--structure",
-            "bj",
-            "--nk",
-            "29",
-            "--orders",
-            "nd=1",
-        ],
+        &box_jenkins,
         &["describe", "c.csv", "--excitation", "f_t"],
         &["track", "c.csv"],
     ];
@@ -298,21 +288,10 @@ fn every_result_has_reasons_with_kinds_and_a_verdict_on_each_answer() {
     let d = directory.path();
     freeze_error(d);
     let of_loop = ["response", "crossover", "phase_margin", "K_e", "tau_e"];
+    let box_jenkins = [&["identify", "frozen.csv"][..], &BOX_JENKINS_OPTIONS].concat();
     let commands: [(&[&str], &[&str]); 5] = [
         (&["identify", "frozen.csv"], &of_loop),
-        (
-            &[
-                "identify",
-                "frozen.csv",
-                "--structure",
-                "bj",
-                "--nk",
-                "29",
-                "--orders",
-                "nd=1",
-            ],
-            &of_loop[..4],
-        ),
+        (&box_jenkins, &of_loop[..4]),
         (
             &["identify", "frozen.csv", "--noise", "remnant", "--remnant-order", "1"],
             &of_loop,

@@ -11,6 +11,9 @@ use std::{
 use serde_json::Value;
 use tempfile::TempDir;
 
+/// Options of a Box-Jenkins fit with the orders of the simulated operator and its remnant.
+pub const BOX_JENKINS_OPTIONS: [&str; 6] = ["--structure", "bj", "--nk", "29", "--orders", "nd=1"];
+
 pub fn hoid(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)
