@@ -371,8 +371,8 @@ impl Tracker {
     }
 
     /// Returns the last declared change if its parameters were estimated again at the last sample: with two inputs, the
-    /// first data after a change hardly show which response changed. Its delay counts from the declaration; its odds are
-    /// those of the last sample.
+    /// first data after a change hardly show which response changed. Its delay counts from the declaration; its odds
+    /// are those of the last sample.
     pub fn revised_change(&self) -> Option<Change> {
         self.recursion.revised_change().filter(|_| self.moved)
     }

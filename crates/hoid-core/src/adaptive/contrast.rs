@@ -163,8 +163,8 @@ pub(super) struct SolvedSpans<'b, const S: usize, const P: usize> {
 }
 
 impl<'b, const S: usize, const P: usize> SolvedSpans<'b, S, P> {
-    /// Solves both spans. `with_prior` adds a prior to the sums of each span. Returns `None` if the data of a span do not
-    /// determine a state.
+    /// Solves both spans. `with_prior` adds a prior to the sums of each span. Returns `None` if the data of a span do
+    /// not determine a state.
     pub fn new(sides: [&'b [Block<S, P>]; 2], with_prior: impl Fn(Block<S, P>) -> Block<S, P>) -> Option<Self> {
         let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
         let solutions = [sums[0].solve()?, sums[1].solve()?];

@@ -249,7 +249,8 @@ impl<const I: usize, const S: usize> Detector<I, S> {
         (before >= least && recent >= enough).then(|| [&blocks[before.saturating_sub(most)..before], &blocks[now..]])
     }
 
-    /// Returns the number of blocks, at most `recent`, after the block border with the smallest residual sum of squares.
+    /// Returns the number of blocks, at most `recent`, after the block border with the smallest residual sum of
+    /// squares.
     fn locate_change<const P: usize>(&self, blocks: &[Block<S, P>], mean: &[f64; S], recent: usize) -> usize {
         let recent = recent.min(blocks.len().saturating_sub(1));
         let (mut ago, mut least) = (recent, f64::INFINITY);
@@ -265,9 +266,10 @@ impl<const I: usize, const S: usize> Detector<I, S> {
     }
 
     /// Estimates the change between past and present. The difference is reported with the covariance given by the noise
-    /// model, multiplied by a dispersion. The dispersion is the mean ratio of the covariance estimated from the scores to
-    /// that given by the noise model, for the difference between the two halves of the past. The covariance from the
-    /// scores alone is too uncertain to distinguish gains from a delay, and the scores of the present contain the change.
+    /// model, multiplied by a dispersion. The dispersion is the mean ratio of the covariance estimated from the scores
+    /// to that given by the noise model, for the difference between the two halves of the past. The covariance from the
+    /// scores alone is too uncertain to distinguish gains from a delay, and the scores of the present contain the
+    /// change.
     fn describe_change<const P: usize>(&mut self, sides: [&[Block<S, P>]; 2], mean: &[f64; S]) {
         let [past, _] = sides;
         let halves = past.split_at(past.len() / 2);

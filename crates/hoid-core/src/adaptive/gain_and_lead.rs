@@ -139,8 +139,8 @@ mod tests {
         assert!((1.2..2.2).contains(&mean), "{mean}");
     }
 
-    /// A smaller gain with the same ratio of lead and gain is a typical fluctuation; a lead that changes by the same amount is
-    /// a change.
+    /// A smaller gain with the same ratio of lead and gain is a typical fluctuation; a lead that changes by the same
+    /// amount is a change.
     #[test]
     fn change_of_lead_is_distinguished_from_a_fluctuation_of_the_gain() {
         let mut random = 6;

@@ -2,8 +2,8 @@
 //! input in a state.
 //!
 //! The types of this module have the sizes of a model as parameters: I inputs, S states, M numbers per sample in the
-//! sums of a block, and P different products of two states. The state of the first input is `[gains (3), level, d omega,
-//! d zeta, d tau]`; each further input adds `[gains (3), d tau]`. The inputs share omega and zeta.
+//! sums of a block, and P different products of two states. The state of the first input is `[gains (3), level, d
+//! omega, d zeta, d tau]`; each further input adds `[gains (3), d tau]`. The inputs share omega and zeta.
 
 /// Number of gains of the numerator.
 pub const GAIN_COUNT: usize = 3;

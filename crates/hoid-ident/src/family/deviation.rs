@@ -7,9 +7,9 @@
 //! `H(omega) = Y(omega) Z(omega) (1 + delta(omega))`
 //!
 //! where real and imaginary part of delta are independent Gaussian processes of `ln omega` with variance s^2 and
-//! correlation `R = (1 + a) e^{-a}`, `a = sqrt(3) |ln(omega/omega')|/L`; L is an octave (M. C. Kennedy and A. O'Hagan, *J.
-//! Royal Statistical Society B* 63 (2001) 425-464). This is the smoothest Matern process that has a slope and no curvature:
-//! the crossover error needs the slope of the response.
+//! correlation `R = (1 + a) e^{-a}`, `a = sqrt(3) |ln(omega/omega')|/L`; L is an octave (M. C. Kennedy and A. O'Hagan,
+//! *J. Royal Statistical Society B* 63 (2001) 425-464). This is the smoothest Matern process that has a slope and no
+//! curvature: the crossover error needs the slope of the response.
 //!
 //! **Variance.** Let `H_j` be the lines with variance v_j and `N = diag(v_j/(2 |Y_j Z_j|^2))`, G the slopes
 //! `d ln Y_j/dx`, and C the covariance of the fit at the lines. Then, with the sum over real and imaginary part,
@@ -77,8 +77,8 @@ fn relative_variance(point: &MeasuredResponse, sampled: Complex64) -> f64 {
 }
 
 impl Misfit {
-    /// Returns the variance of the deviation from a fit at the lines with its chi^2, degrees of freedom and covariance of
-    /// the coordinates; `None` if the form fits within the errors of the lines.
+    /// Returns the variance of the deviation from a fit at the lines with its chi^2, degrees of freedom and covariance
+    /// of the coordinates; `None` if the form fits within the errors of the lines.
     pub(super) fn of(
         points: &[MeasuredResponse],
         operator: &FamilyOperator,

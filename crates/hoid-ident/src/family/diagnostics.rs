@@ -19,9 +19,9 @@ use crate::{Termination, diagnostics::residuals::ResidualMeasures};
 
 /// chi^2 per degree of freedom at the lines above which the operator does not fit the describing function.
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
-/// Root mean square deviation of the response from the form at the lines up to which the form is a sufficient description
-/// of a person, because response and errors include the deviation. A form without a lead or lag that the person has is
-/// off by more.
+/// Root mean square deviation of the response from the form at the lines up to which the form is a sufficient
+/// description of a person, because response and errors include the deviation. A form without a lead or lag that the
+/// person has is off by more.
 const LARGEST_DEVIATION: f64 = 0.2;
 /// Significance level of two tests: agreement between methods, and the form against a free model.
 const SIGNIFICANCE_LEVEL: f64 = 0.01;

@@ -24,10 +24,11 @@
 //! may be held back one after the other. Memory is bounded, and nothing is allocated once the snapshots have reached
 //! their size.
 //!
-//! **Misfits.** After a sudden change of the person with little remnant, the old estimate predicts u worse than the past
-//! of u does. A recursion follows such a change within seconds, whereas a pause would keep the old estimate. A misfit is
-//! therefore a fault only if the recursion has not followed it within [`FOLLOWING_BLOCKS`] more blocks, so that R is at most
-//! twice its long-run value again ([`hoid_core::guard::profile`]). The state before the misfit is then restored.
+//! **Misfits.** After a sudden change of the person with little remnant, the old estimate predicts u worse than the
+//! past of u does. A recursion follows such a change within seconds, whereas a pause would keep the old estimate. A
+//! misfit is therefore a fault only if the recursion has not followed it within [`FOLLOWING_BLOCKS`] more blocks, so
+//! that R is at most twice its long-run value again ([`hoid_core::guard::profile`]). The state before the misfit is
+//! then restored.
 //!
 //! **Filters have settled** when the delay and [`SETTLING_S`] have passed: after that time the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 %.

@@ -367,22 +367,22 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> AdaptiveRec
                 .sum();
             Estimate::with_variance(value, variance)
         };
-        let (told, by) = (detector.contrast(), detector.difference());
+        let (contrast, difference) = (detector.contrast(), detector.difference());
         let before = |i: usize| match i {
-            0 | 1 => gain(i, &told.before, &|a, b| told.covariance_before[a][b]),
+            0 | 1 => gain(i, &contrast.before, &|a, b| contrast.covariance_before[a][b]),
             _ => {
                 let k = places[i - 2];
-                Estimate::with_variance(start[i - 2] + told.before[k], told.covariance_before[k][k])
+                Estimate::with_variance(start[i - 2] + contrast.before[k], contrast.covariance_before[k][k])
             }
         };
-        let difference = |i: usize| match i {
-            0 | 1 => gain(i, &by.value, &|a, b| by.covariance[a][b]),
+        let change = |i: usize| match i {
+            0 | 1 => gain(i, &difference.value, &|a, b| difference.covariance[a][b]),
             _ => {
                 let k = places[i - 2];
-                Estimate::with_variance(by.value[k], by.covariance[k][k])
+                Estimate::with_variance(difference.value[k], difference.covariance[k][k])
             }
         };
-        [std::array::from_fn(before), std::array::from_fn(difference)]
+        [std::array::from_fn(before), std::array::from_fn(change)]
     }
 
     /// Returns the parameters of the response to an input before and after the last change, and the changes divided by
@@ -415,9 +415,9 @@ impl<const I: usize, const S: usize, const M: usize, const P: usize> AdaptiveRec
         let detector = self.model.detector();
         let (pairs, z) = self.changed_parameters(0);
         let further = self.further_change();
-        let told = detector.contrast();
+        let [before, now] = detector.contrast().samples;
         let variance = detector.innovation_variances();
-        let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
+        let log_variance = 2.0 / before + 2.0 / now;
         let level = (variance[1] / variance[0]).ln() / (log_variance * detector.typical_level()).sqrt();
         let [k_e, k_e_dot, omega_nm_rad_s, zeta_nm, tau_e_s] = pairs;
         Some(Change {
