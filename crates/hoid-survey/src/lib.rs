@@ -54,8 +54,8 @@ pub use linear_network::LinearNetworkOptions;
 pub use multiple_model::MultipleModelOptions;
 pub use physical::PhysicalOptions;
 pub use registry::{
-    ListedMethod, dual_ekf, ekf, fused, is_for_comparison, is_option_for_comparison, linear_network, list_methods,
-    method, methods, multiple_model, physical, registry, renamed_method, rriv, set, ukf, window,
+    ListedMethod, dual_ekf, ekf, fused, is_for_comparison, linear_network, list_methods, method, methods,
+    multiple_model, options_for_comparison, physical, registry, renamed_method, rriv, set, ukf, window,
 };
 pub use rriv::RrivOptions;
 pub use window::WindowOptions;

@@ -1,6 +1,8 @@
 //! All recursive methods by name: the methods of [`hoid_track`] and of this crate. A new method needs an entry in this
 //! list.
 
+use std::collections::BTreeSet;
+
 use hoid_ident::{IdentError, settings::MethodSpec};
 use hoid_track::{AdaptiveOptions, Method, RlsOptions, RpemOptions, building::invalid_option};
 
@@ -68,11 +70,14 @@ pub fn is_for_comparison(method: &Method) -> bool {
         .any(|own| own.name() == method.name())
 }
 
-/// True for an option that only methods of this crate have; the help text of the command line omits such options.
-pub fn is_option_for_comparison(option: &str) -> bool {
-    let has = |method: &Method| method.spec().settings.iter().any(|setting| setting.name == option);
-    let mut with_option = methods().into_iter().filter(has).peekable();
-    with_option.peek().is_some() && with_option.all(|method| is_for_comparison(&method))
+/// Returns the options that only methods of this crate have; the help text of the command line omits them.
+pub fn options_for_comparison() -> BTreeSet<&'static str> {
+    let (of_survey, others): (Vec<Method>, Vec<Method>) = methods().into_iter().partition(is_for_comparison);
+    let names = |all: Vec<Method>| -> BTreeSet<&'static str> {
+        let settings = all.iter().flat_map(|method| method.spec().settings);
+        settings.map(|setting| setting.name).collect()
+    };
+    &names(of_survey) - &names(others)
 }
 
 /// Returns the properties of each method, for the command line, plans, Python and the book.

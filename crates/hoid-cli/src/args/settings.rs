@@ -26,9 +26,9 @@ pub trait Registry {
     /// The available items, in the order of help.
     fn specs() -> Vec<MethodSpec>;
 
-    /// True for an option that help does not show.
-    fn is_hidden(_option: &str) -> bool {
-        false
+    /// Options that help does not show.
+    fn hidden_options() -> BTreeSet<&'static str> {
+        BTreeSet::new()
     }
 }
 
@@ -37,8 +37,8 @@ impl Registry for RecursiveMethods {
         survey::registry()
     }
 
-    fn is_hidden(option: &str) -> bool {
-        survey::is_option_for_comparison(option)
+    fn hidden_options() -> BTreeSet<&'static str> {
+        survey::options_for_comparison()
     }
 }
 
@@ -182,12 +182,10 @@ fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
 
 impl<R: Registry> Args for SettingArgs<R> {
     fn augment_args(command: Command) -> Command {
-        let hidden: Vec<&str> = (R::specs().iter().flat_map(|spec| &spec.settings))
-            .map(|setting| setting.name)
-            .filter(|name| R::is_hidden(name))
-            .collect();
-        let command = with_settings(command, &R::specs());
-        (hidden.into_iter()).fold(command, |command, name| command.mut_arg(name, |arg| arg.hide(true)))
+        let hidden = R::hidden_options().into_iter();
+        hidden.fold(with_settings(command, &R::specs()), |command, name| {
+            command.mut_arg(name, |arg| arg.hide(true))
+        })
     }
 
     fn augment_args_for_update(command: Command) -> Command {

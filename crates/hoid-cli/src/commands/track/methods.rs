@@ -1,6 +1,8 @@
 //! `hoid track --methods`: list of the recursive methods, with the options that help does not show.
 
-use hoid::survey::{ListedMethod, is_option_for_comparison, list_methods};
+use std::collections::BTreeSet;
+
+use hoid::survey::{ListedMethod, list_methods, options_for_comparison};
 use serde_json::{Value, json};
 
 use crate::{args::flag, error::CliError, json, output};
@@ -11,7 +13,8 @@ pub fn list(as_json: bool) -> Result<(), CliError> {
     if as_json {
         return json::print(&Value::Array(all.iter().map(method_json).collect()));
     }
-    let lines: String = all.iter().map(method_line).collect();
+    let hidden = options_for_comparison();
+    let lines: String = all.iter().map(|one| method_line(one, &hidden)).collect();
     output::print(&lines)
 }
 
@@ -19,16 +22,16 @@ fn structure_names(one: &ListedMethod) -> Vec<&'static str> {
     one.spec.structures.iter().map(|structure| structure.name()).collect()
 }
 
-fn method_line(one: &ListedMethod) -> String {
+fn method_line(one: &ListedMethod, hidden: &BTreeSet<&str>) -> String {
     let mark = match (one.is_default, one.is_for_comparison) {
         (true, _) => "default",
         (_, true) => "survey",
         _ => "",
     };
     let spec = &one.spec;
-    let hidden = spec.settings.iter().filter(|s| is_option_for_comparison(s.name));
-    let hidden: Vec<String> = hidden.map(|s| format!("--{}", flag(s.name))).collect();
-    let options = match hidden.as_slice() {
+    let further = spec.settings.iter().filter(|s| hidden.contains(s.name));
+    let further: Vec<String> = further.map(|s| format!("--{}", flag(s.name))).collect();
+    let options = match further.as_slice() {
         [] => String::new(),
         all => format!("; further options: {}", all.join(", ")),
     };
