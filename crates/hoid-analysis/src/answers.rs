@@ -122,8 +122,8 @@ fn answer_status(name: &str, why: Option<String>) -> AnswerStatus {
 /// An estimate with its 95 % interval; without an interval, that of a normal distribution applies.
 type MeasureWithInterval = (Estimate, Option<(f64, f64)>);
 
-/// Assesses the crossover and the phase margin of a loop. Each is given with its interval, or with the reason why it does
-/// not exist.
+/// Assesses the crossover and the phase margin of a loop. Each is given with its interval, or with the reason why it
+/// does not exist.
 fn loop_answers(measures: [Result<MeasureWithInterval, &str>; 2]) -> impl Iterator<Item = AnswerStatus> {
     let words = ["the crossover", "the phase margin"];
     (0..2).map(move |k| {

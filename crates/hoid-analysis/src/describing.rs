@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use hoid_ident::{
     MarginEstimates,
-    frequency::{DescribingMargins, Description, DescriptionOptions, describe_runs},
+    frequency::{Description, DescriptionOptions, describe_runs},
 };
 use hoid_io::Offset;
 use hoid_model::{Decimation, FaultHandling};
@@ -52,20 +52,10 @@ pub struct DescribingFunctionResult {
     pub settings: Vec<Setting>,
 }
 
-/// Returns crossover and margins with the controlled element; `None` if the controlled element is unknown.
-fn described_margins(margins: Option<&DescribingMargins>) -> Option<MarginEstimates> {
-    margins.map(|m| MarginEstimates {
-        crossover_rad_s: m.crossover_rad_s,
-        phase_margin_deg: m.phase_margin_deg,
-        gain_margin_db: m.gain_margin_db,
-        phase_crossover_rad_s: m.phase_crossover_rad_s,
-    })
-}
-
 impl DescribingFunctionResult {
     /// Returns crossover and margins with the controlled element; `None` if the controlled element is unknown.
-    pub fn margins(&self) -> Option<MarginEstimates> {
-        described_margins(self.found.margins.as_ref())
+    pub fn margins(&self) -> Option<&MarginEstimates> {
+        self.found.margins.as_ref().map(|margins| &margins.estimates)
     }
 }
 
@@ -87,11 +77,11 @@ impl DescribingFunctionOptions {
         };
         let mut found = describe_runs(&data.records, &options)?;
         let (element, channel) = (options.controlled_element.as_ref(), options.excitation.as_deref());
-        let margins = described_margins(found.margins.as_ref());
+        let margins = found.margins.as_ref().map(|margins| &margins.estimates);
         let verdict = data.with_findings(found.verdict);
         let verdict = verdict.append(data.element_finding(element, channel));
         let verdict = verdict.append(data.display_finding(&[]));
-        found.verdict = judged(verdict, &description_answers(margins.as_ref()));
+        found.verdict = judged(verdict, &description_answers(margins));
         let settings = self.settings(&data, late, &found);
         Ok(DescribingFunctionResult { found, data, settings })
     }

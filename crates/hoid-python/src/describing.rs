@@ -107,7 +107,7 @@ impl PyDescription {
     /// Returns crossover and margins; `None` without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(margins) = &self.0.found.margins else {
+        let Some(margins) = self.0.margins() else {
             return Ok(None);
         };
         let all = PyDict::new(py);
@@ -301,7 +301,7 @@ impl PyDescribingFunction {
 
     /// Returns crossover frequency and phase margin of the loop with a controlled element.
     fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
-        let margins = self.found.open_loop(&element.transfer_function()?).margins();
+        let margins = self.found.open_loop(&element.transfer_function()?).margins().estimates;
         let all = PyDict::new(py);
         all.set_item("crossover_rad_s", margins.crossover_rad_s.map(value_and_error))?;
         all.set_item("phase_margin_deg", margins.phase_margin_deg.map(value_and_error))?;

@@ -107,7 +107,7 @@ fn describing_functions_match_the_table() {
         let denominator: &[f64] = if first_order { &[1.0, 0.0] } else { &[1.0, 1.0, 0.0] };
         let element = ContinuousTransferFunction::new(&[1.0], denominator).unwrap();
         let margins = h.open_loop(&element).margins();
-        let measured = h.measured_open_loop().unwrap().margins();
+        let measured = h.measured_open_loop().unwrap().margins().estimates;
         let fit = h
             .fit_gain_lead_delay(&GainLeadDelayOptions {
                 lead: !first_order,
@@ -115,7 +115,8 @@ fn describing_functions_match_the_table() {
             })
             .unwrap();
         let coherence = h.lines.iter().map(|l| l.coherence.unwrap()).sum::<f64>() / h.lines.len() as f64;
-        let (crossover, phase) = (margins.crossover_rad_s.unwrap(), margins.phase_margin_deg.unwrap());
+        let found = margins.estimates;
+        let (crossover, phase) = (found.crossover_rad_s.unwrap(), found.phase_margin_deg.unwrap());
         println!("{} {}", row.person, row.plant);
         let shown = |e: Estimate| format!("{:.4} +- {:.4}", e.value, e.standard_error.unwrap_or(f64::NAN));
         // For small numbers, half a unit of the last digit of the table exceeds 1 %.

@@ -42,7 +42,7 @@ impl DescribingFunctionResult {
         });
         set("lines", lines.collect());
         if let Some(margins) = self.margins() {
-            set("open_loop", margin_estimates(&margins));
+            set("open_loop", margin_estimates(margins));
         }
         let bands = function.remnant_spectrum.iter().map(|band| {
             json!({

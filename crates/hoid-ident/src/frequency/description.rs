@@ -137,7 +137,9 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         excitation: &excitation,
         channel: channel.as_deref(),
         realisation,
-        open_loop: open_loop.as_ref().zip(margins.as_ref()),
+        open_loop: open_loop
+            .as_ref()
+            .zip(margins.as_ref().map(|margins| &margins.estimates)),
         offset_samples: options.offset_samples,
     };
     let verdict = Verdict::of(findings(&judged, &parts)?);

@@ -98,8 +98,8 @@ fn default_options_describe_several_runs() {
         let s = e.standard_error.unwrap();
         assert!((e.value - truth).abs() < 3.0 * s && s < 0.1 * truth, "{truth}: {e}");
     };
-    within(margins.crossover_rad_s, 1.5635);
-    within(margins.phase_margin_deg, 76.67);
+    within(margins.estimates.crossover_rad_s, 1.5635);
+    within(margins.estimates.phase_margin_deg, 76.67);
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
     // The phase runs from a lead to a lag of more than one turn. It has no jumps, and each phase differs from its
     // principal value by whole turns.
@@ -193,7 +193,7 @@ fn crossover_outside_the_measured_lines_is_doubtful() {
     };
     let found = with("1/s");
     assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
-    let crossover = found.margins.unwrap().crossover_rad_s.unwrap();
+    let crossover = found.margins.unwrap().estimates.crossover_rad_s.unwrap();
     assert!((crossover.value - 2.0).abs() < 4.0 * crossover.standard_error.unwrap());
     for (text, expected) in [
         ("0.01/s", "below 0.628"),

@@ -24,12 +24,12 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::{
     describe::DescribingFunction,
     excitation::{Excitation, channel_values},
-    open_loop::{DescribingMargins, OpenLoop},
+    open_loop::OpenLoop,
     options::Realisation,
     spectrum::{coefficients, power},
     window::Window,
 };
-use crate::IdentError;
+use crate::{IdentError, derived_quantities::MarginEstimates};
 
 /// Significance level of the tests against chance.
 const SIGNIFICANCE_LEVEL: f64 = 0.05;
@@ -46,7 +46,7 @@ pub(super) struct DiagnosticInputs<'a> {
     pub channel: Option<&'a str>,
     pub realisation: Realisation,
     /// Open loop and its margins, if there is a controlled element.
-    pub open_loop: Option<(&'a OpenLoop, &'a DescribingMargins)>,
+    pub open_loop: Option<(&'a OpenLoop, &'a MarginEstimates)>,
     pub offset_samples: f64,
 }
 
@@ -177,7 +177,7 @@ fn coherence_finding(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     )
 }
 
-fn loop_findings(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
+fn loop_findings(open_loop: &OpenLoop, margins: &MarginEstimates) -> Vec<Finding> {
     let sizes: Vec<f64> = open_loop.response.iter().map(|l| l.norm()).collect();
     let (Some(low), Some(high)) = (open_loop.omega_rad_s.first(), open_loop.omega_rad_s.last()) else {
         return Vec::new();

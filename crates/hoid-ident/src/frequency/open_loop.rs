@@ -11,14 +11,14 @@
 //! margin nearest to 0 dB is returned. Standard errors come from the jackknife over runs (`ratio.rs`); the spread is
 //! the standard deviation of single runs.
 
-use hoid_model::{Complex64, ContinuousTransferFunction, uncertainty::Estimate};
+use hoid_model::{Complex64, ContinuousTransferFunction};
 
 use super::{
     DescribingFunction,
     excitation::refuse,
     ratio::{jackknife, standard_deviation},
 };
-use crate::IdentError;
+use crate::{IdentError, derived_quantities::MarginEstimates};
 
 /// Frequency response of an open loop at the lines.
 #[derive(Debug, Clone, PartialEq)]
@@ -42,18 +42,11 @@ pub struct Crossover {
     pub phase_margin_deg: f64,
 }
 
-/// Crossover and margins with their standard errors. A quantity is `None` if its crossing does not exist between the
-/// lines.
+/// Crossover and margins with their standard errors, and their spread over the runs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingMargins {
-    /// Crossover frequency omega_c, rad/s.
-    pub crossover_rad_s: Option<Estimate>,
-    /// Phase margin phi_m, deg.
-    pub phase_margin_deg: Option<Estimate>,
-    /// Frequency at which the phase falls through -180 deg, rad/s.
-    pub phase_crossover_rad_s: Option<Estimate>,
-    /// Gain margin at the frequency at which the phase falls through -180 deg, dB.
-    pub gain_margin_db: Option<Estimate>,
+    /// Crossover and margins; a quantity is `None` if its crossing does not exist between the lines.
+    pub estimates: MarginEstimates,
     /// Crossover of each run; `None` for a run without a crossover.
     pub per_run: Vec<Option<Crossover>>,
     /// Standard deviation of the crossover over the runs that have a crossover, rad/s.
@@ -146,10 +139,12 @@ impl OpenLoop {
             standard_deviation(&known)
         };
         DescribingMargins {
-            crossover_rad_s: estimate(|c| c.omega_rad_s),
-            phase_margin_deg: estimate(|c| c.phase_margin_deg),
-            phase_crossover_rad_s: of_turning(|c| c.omega_rad_s),
-            gain_margin_db: of_turning(|c| c.gain_margin_db),
+            estimates: MarginEstimates {
+                crossover_rad_s: estimate(|c| c.omega_rad_s),
+                phase_margin_deg: estimate(|c| c.phase_margin_deg),
+                phase_crossover_rad_s: of_turning(|c| c.omega_rad_s),
+                gain_margin_db: of_turning(|c| c.gain_margin_db),
+            },
             crossover_spread_rad_s: spread(|c| c.omega_rad_s),
             phase_margin_spread_deg: spread(|c| c.phase_margin_deg),
             per_run,

@@ -110,7 +110,8 @@ fn interpolated_margins_are_close_to_the_true_margins() {
             (open_loop.margins(), 0.01, 1.2),
             (open_loop.margins_with_delay(delay_s), 0.01, 0.5),
         ] {
-            let (omega, phase) = (margins.crossover_rad_s.unwrap(), margins.phase_margin_deg.unwrap());
+            let found = margins.estimates;
+            let (omega, phase) = (found.crossover_rad_s.unwrap(), found.phase_margin_deg.unwrap());
             println!("{condition}: {} rad/s, {} deg", omega.value, phase.value);
             assert_eq!((omega.standard_error, margins.per_run.len()), (None, 1));
             assert!((omega.value / crossover - 1.0).abs() < of_crossover);
@@ -147,7 +148,7 @@ fn confidence_circles_have_nominal_coverage() {
             }
         }
         let margins = found.open_loop(&continuous).margins();
-        let crossover = margins.crossover_rad_s.unwrap();
+        let crossover = margins.estimates.crossover_rad_s.unwrap();
         crossovers.push(crossover.value);
         errors.push(crossover.standard_error.unwrap().powi(2));
     }
@@ -299,6 +300,7 @@ fn weights_and_ranges_are_checked() {
         single
             .open_loop_with(|_| Complex64::new(1.0, 0.0))
             .margins()
+            .estimates
             .crossover_rad_s,
         None
     );

@@ -218,7 +218,8 @@ fn write_describing_function(
     put("rms_e", found.rms_e);
     put("rms_u", found.rms_u);
     let mut margins_of_lines = None;
-    if let Some(at) = &description.margins {
+    if let Some(margins) = &description.margins {
+        let at = &margins.estimates;
         let all = [
             ("crossover_rad_s", at.crossover_rad_s),
             ("phase_margin_deg", at.phase_margin_deg),

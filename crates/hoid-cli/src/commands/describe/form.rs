@@ -73,7 +73,7 @@ impl DescriptionReport<'_> {
         }
         page.push_str(&format!("{}\n{rows}\n", self.title()));
         if let (Some(margins), Some(element)) = (self.described.margins(), self.element) {
-            page.push_str(&format!("Open loop with {element}: {}", text::margins(&margins)));
+            page.push_str(&format!("Open loop with {element}: {}", text::margins(margins)));
         }
         let percent = |e: &Estimate| {
             let scaled = Estimate {
