@@ -12,6 +12,7 @@ use hoid_numerics::statistics::upper_median;
 
 use super::{
     choice::{FormFigures, best_form, weights},
+    coordinates::integration_vanishes,
     covariances::{self, Covariances},
     diagnostics::MAX_DAMPING_RATIO,
     line_fit::LineFit,
@@ -44,6 +45,13 @@ impl TriedForm<'_> {
         let gain = operator.named_parameters().into_iter().find(|p| is_dc_gain(p.name))?;
         Some((self.form, gain.value))
     }
+
+    /// True if the operator of the prediction error fit or of the fit at the lines has a property.
+    fn any_operator(&self, has: impl Fn(&FamilyOperator) -> bool) -> bool {
+        let fit = self.fit.as_ref().ok();
+        let of_fit = fit.and_then(|fit| fit.layout().operator(fit.eta(), 0).ok());
+        of_fit.as_ref().is_some_and(&has) || self.lines.as_ref().is_some_and(|lines| has(&lines.operator))
+    }
 }
 
 /// Criteria of all forms, and the best form.
@@ -69,9 +77,10 @@ impl Comparison {
                 keep_best_fits(&mut counting, tried, prediction.equality_threshold());
             }
             // If a form lacks a lag that the person has, the neuromuscular poles replace this lag.
-            retain(&mut counting, |i| !neuromuscular_poles_are_lags(&tried[i]));
+            retain(&mut counting, |i| !tried[i].any_operator(neuromuscular_poles_are_lags));
             retain(&mut counting, |i| {
                 tried[i].fit.as_ref().is_ok_and(|fit| !is_undetermined(fit))
+                    && !tried[i].any_operator(integration_vanishes)
             });
             if noise_free {
                 keep_simplest(&mut counting, tried);
@@ -158,20 +167,11 @@ fn is_undetermined(fit: &PredictionFit<'_>) -> bool {
     fit.ridge > 0.0 || !covariances::covariances(fit).is_some_and(known)
 }
 
-/// True if the neuromuscular poles have become two separate lags, in the prediction error fit or in the fit at the
-/// lines.
-fn neuromuscular_poles_are_lags(tried: &TriedForm<'_>) -> bool {
-    let lags = |operator: &FamilyOperator| {
-        operator
-            .neuromuscular_parameters()
-            .is_some_and(|(_, zeta)| zeta > MAX_DAMPING_RATIO)
-    };
-    let of_fit = tried
-        .fit
-        .as_ref()
-        .ok()
-        .and_then(|fit| fit.layout().operator(fit.eta(), 0).ok());
-    of_fit.is_some_and(|operator| lags(&operator)) || tried.lines.as_ref().is_some_and(|l| lags(&l.operator))
+/// True if the neuromuscular poles have become two separate lags.
+fn neuromuscular_poles_are_lags(operator: &FamilyOperator) -> bool {
+    operator
+        .neuromuscular_parameters()
+        .is_some_and(|(_, zeta)| zeta > MAX_DAMPING_RATIO)
 }
 
 /// Returns the median of kappa over the forms, used for all forms so that their criteria are comparable.

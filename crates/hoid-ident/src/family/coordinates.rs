@@ -1,12 +1,15 @@
 //! Search ranges of the coordinates of an operator.
 
 use hoid_model::{
-    SampleTime,
+    FamilyOperator, SampleTime,
     operator_family::{Coordinate, Form},
 };
 
 /// Longest lead time, s. In records of people a longer lead cannot be distinguished from a pure derivative.
 const LONGEST_LEAD_S: f64 = 30.0;
+/// Largest `c_1` and `c_2` of the quadratic form: the sum and the product of two longest leads.
+const LARGEST_LINEAR_S: f64 = 2.0 * LONGEST_LEAD_S;
+const LARGEST_QUADRATIC_S2: f64 = LONGEST_LEAD_S * LONGEST_LEAD_S;
 /// Bounds of `1/T_I`, 1/s: a lag at the lower bound is practically an integration, a lag at the upper bound has hardly
 /// any effect.
 pub(super) const LAG_RATE_LIMITS: (f64, f64) = (1e-3, 30.0);
@@ -28,8 +31,11 @@ pub(crate) fn limits(
 ) -> Vec<(f64, f64)> {
     let highest = MAX_NYQUIST_SHARE * sample_time.nyquist_rad_s();
     let of = |coordinate: &Coordinate| match coordinate {
-        Coordinate::Gain | Coordinate::Linear | Coordinate::Quadratic => (f64::NEG_INFINITY, f64::INFINITY),
+        Coordinate::Gain => (f64::NEG_INFINITY, f64::INFINITY),
         Coordinate::Lead => (0.0, LONGEST_LEAD_S),
+        // Without a bound, the search for an integration that the operator does not have would follow its gain to zero.
+        Coordinate::Linear => (-LARGEST_LINEAR_S, LARGEST_LINEAR_S),
+        Coordinate::Quadratic => (-LARGEST_QUADRATIC_S2, LARGEST_QUADRATIC_S2),
         Coordinate::LagRate => LAG_RATE_LIMITS,
         Coordinate::Droop => (0.0, MAX_DROOP_RAD_S),
         Coordinate::LogOmega => (MIN_NEUROMUSCULAR_RAD_S.min(0.5 * highest).ln(), highest.ln()),
@@ -37,6 +43,20 @@ pub(crate) fn limits(
         Coordinate::Delay => delay_range_s,
     };
     form.coordinates(neuromuscular).iter().map(of).collect()
+}
+
+/// True if a zero of an integration is at its bound, so that the integration has no visible effect: its gain is the
+/// smallest that the bounds allow.
+pub(super) fn integration_vanishes(operator: &FamilyOperator) -> bool {
+    let coordinates = operator.form().coordinates(false);
+    coordinates
+        .iter()
+        .zip(operator.coordinates())
+        .any(|(coordinate, x)| match coordinate {
+            Coordinate::Linear => x.abs() >= LARGEST_LINEAR_S,
+            Coordinate::Quadratic => x.abs() >= LARGEST_QUADRATIC_S2,
+            _ => false,
+        })
 }
 
 /// Exchanges the two zeros of a lead with a droop if the lead is slower than the droop, and returns whether it did.
@@ -115,8 +135,6 @@ pub(super) fn start_grid(
 
 #[cfg(test)]
 mod tests {
-    use hoid_model::FamilyOperator;
-
     use super::*;
 
     #[test]

@@ -358,6 +358,20 @@ mod tests {
         assert!(pairs.all(|d| d < 1e-4), "{found:?} {direct:?}");
     }
 
+    /// An operator with a lead and no integration is a quadratic integration with a gain of zero.
+    #[test]
+    fn search_for_an_integration_that_is_missing_ends_at_its_bound() {
+        let ts = SampleTime::AT_100_HZ;
+        let points = points(&truth(Form::Lead), ts);
+        let none = OperatorPrior::none();
+        let form = Form::QuadraticIntegral;
+        let criterion = ResponseCriterion::new(form, true, &points, &none, (0.02, 0.8), (ts, Intersample::Auto));
+        let found = criterion.fit(&SearchOptions::default()).unwrap();
+        assert!(found.termination.converged(), "{:?}", found.termination);
+        let (c_1, bound) = (found.coordinates[1], criterion.limits[1].1);
+        assert!(c_1.abs() <= bound && c_1.abs() > 0.99 * bound, "{c_1}");
+    }
+
     #[test]
     fn exact_response_returns_its_operator() {
         let ts = SampleTime::new(1.0 / 60.0).unwrap();
