@@ -19,9 +19,10 @@ use super::{
     blocks::Row,
     f64x2::F64x2,
     last_blocks::LastBlocks,
-    mixture::{ChangePrior, Mixture, NoiseScales, Segments},
+    mixture::{ChangePrior, Mixture, NoiseScales},
     moments::Moments,
     noise::NoiseModel,
+    segments::Segments,
     signal_history::{SignalHistory, SignalPairs, from_pairs, to_pairs},
     sizes::{
         DYNAMICS_COUNT, GAIN_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT, SIGNAL_COUNT, correction_places, delay_place,

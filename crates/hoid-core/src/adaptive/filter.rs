@@ -14,11 +14,12 @@ use super::{
     basis::{Basis, Complex, Point},
     candidate::{Candidate, MAX_SIGNAL},
     detector::Detector,
-    history::{History, SampleUse, ring_count},
+    history::{History, SampleUse},
     initial_estimate::InitialEstimate,
+    memory::{errors_needed, min_memory_of},
     mixture::{Mixture, NoiseScales, gain_and_lead_directions},
     noise::NoiseModel,
-    prior::{AdaptivePrior, DelayPrior, LONGEST_DELAY_S},
+    prior::{AdaptivePrior, DelayPrior},
     saturation::Saturation,
     sizes::{
         DYNAMICS_COUNT, GAIN_COUNT, PRODUCT_COUNT, STATE_COUNT, SUM_COUNT, correction_places, input_count,
@@ -118,7 +119,7 @@ impl<E: AsMut<[f64]>, const I: usize, const S: usize, const M: usize, const P: u
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Builds the recursion at rest. If `memory` has [`memory_needed`] numbers, the replays have their full length.
-    /// With fewer numbers the replays are shorter, and with [`min_memory`], the minimum, there are none. Returns
+    /// With fewer numbers the replays are shorter, and with [`min_memory`](super::min_memory), the minimum, there are none. Returns
     /// `None` for invalid numbers or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         Self::with_inputs(prior, [], memory)
@@ -607,32 +608,4 @@ fn corrections_of<const S: usize>(deviations: impl Fn(usize) -> [f64; DYNAMICS_C
         }
     }
     variances
-}
-
-/// Returns the number of past errors that must be stored for the longest delay. The sample time is in s.
-pub fn errors_needed(sample_time: f64) -> usize {
-    libm::ceil(LONGEST_DELAY_S / sample_time) as usize + 4
-}
-
-/// Returns the minimum length of the memory in numbers. The sample time is in s.
-pub fn min_memory(sample_time: f64) -> usize {
-    min_memory_of(1, sample_time)
-}
-
-fn min_memory_of(inputs: usize, sample_time: f64) -> usize {
-    ring_count(inputs) * errors_needed(sample_time)
-}
-
-/// Maximum number of samples in a replay.
-const MAX_REPLAY_SAMPLES: f64 = 12_000.0;
-
-/// Returns the length of the memory, in numbers, for replays over `seconds`. The sample time is in s.
-pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
-    memory_needed_for(1, sample_time, seconds)
-}
-
-/// Like [`memory_needed`], for a model with the given number of inputs.
-pub fn memory_needed_for(inputs: usize, sample_time: f64, seconds: f64) -> usize {
-    let samples = (seconds / sample_time).clamp(0.0, MAX_REPLAY_SAMPLES);
-    ring_count(inputs) * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)
 }

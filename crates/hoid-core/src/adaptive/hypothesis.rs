@@ -18,18 +18,9 @@
 
 use hoid_numerics::elimination;
 
-use super::{bases::Bases, moments::Moments, sizes::MAX_SEGMENTS};
+use super::{bases::Bases, moments::Moments, segments::Segment, sizes::MAX_SEGMENTS};
 
 pub(super) type Covariance<const S: usize> = [[f64; S]; S];
-
-/// Segment that ended with a change: its last block, and the state at its end.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Segment<const S: usize> {
-    pub until: u64,
-    pub state: [f64; S],
-}
-
-crate::state!([const S: usize] Segment<S> { until, state });
 
 /// Hypothesis about the last change of the operator.
 #[derive(Debug, Clone, Copy, PartialEq)]

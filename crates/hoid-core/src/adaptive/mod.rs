@@ -104,18 +104,18 @@ mod gain_and_lead;
 mod history;
 mod hypothesis;
 mod last_blocks;
+mod memory;
 mod moments;
 mod operator;
 mod prior;
 mod saturation;
+mod segments;
 mod signal_history;
 mod sizes;
 mod volatility;
 
-pub use filter::{
-    AdaptiveFilter, REPLAY_SAMPLES_PER_STEP, TwoInputFilter, errors_needed, memory_needed, memory_needed_for,
-    min_memory,
-};
+pub use filter::{AdaptiveFilter, REPLAY_SAMPLES_PER_STEP, TwoInputFilter};
+pub use memory::{errors_needed, memory_needed, memory_needed_for, min_memory};
 pub use prior::{AdaptivePrior, DelayPrior};
 pub use sizes::{
     DYNAMICS_COUNT, GAIN_COUNT, LINEAR_COUNT, MAX_HYPOTHESES, MAX_NOISE_ORDER, PARAMETER_COUNT, PRODUCT_COUNT,

@@ -11,7 +11,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::{
     agreement::{Agreement, AgreementMethod, MethodEstimate, agreement, coordinates_with_log_gain},
     channel::{ChannelFit, SeenChannel},
-    channel_lines::{ChannelInForm, ChannelLineFitter, have_separate_lines},
+    channel_criterion::{ChannelInForm, ChannelLineFitter},
+    channel_lines::have_separate_lines,
     channels::add_responses,
     choice::{FormFigures, evidence_for},
     covariances::response_errors,

@@ -26,7 +26,8 @@ use hoid_model::{Complex64, Detrend, Form, Record, SampleTime, Structure, operat
 use super::{
     arx_response::{MAX_NB, frequencies, halve_orders, initial_orders, measured_response},
     channel::{Channel, ChannelFit, ChannelResponse, SeenChannel, preview_samples},
-    channel_lines::{ChannelInForm, ChannelLineFitter, ChannelLines, have_separate_lines, own_coordinates},
+    channel_criterion::{ChannelInForm, ChannelLineFitter, own_coordinates},
+    channel_lines::{ChannelLines, have_separate_lines},
     coordinates,
     covariances::Covariances,
     estimated::EstimateErrors,

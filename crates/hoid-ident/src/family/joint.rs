@@ -25,7 +25,7 @@ use std::{borrow::Cow, sync::Arc};
 use hoid_numerics::statistics::mean;
 
 use super::{
-    channel_lines::ChannelCriterion,
+    channel_criterion::ChannelCriterion,
     covariances::{BAND_FREQUENCIES_RAD_S, Covariances, covariances, response_errors},
     layout::FamilyLayout,
     line_fit::LineFit,

@@ -3,7 +3,7 @@
 use hoid_model::{FamilyOperator, Form, uncertainty::Estimate};
 
 use super::{
-    channel_lines::ChannelMinimum,
+    channel_criterion::ChannelMinimum,
     deviation::Misfit,
     jackknife::{add_prior_contribution, jackknife},
     lines::LineData,

@@ -27,7 +27,7 @@
 //! | `starts` | the starts of these searches, and the orders of the noise model |
 //! | `channel` | a further input: request, form, results |
 //! | `channels` | inputs of a person in addition to the error; `choice`: selection of their forms |
-//! | `channel_lines` | the responses to all inputs at the lines |
+//! | `channel_lines`, `channel_criterion` | means and variances of several inputs at the lines; the fit to them |
 //! | `comparison` | comparison of the forms |
 //! | `assembly` | assembly of the result from the searches of the forms |
 //! | `estimated` | the operator of a record with its errors |
@@ -64,6 +64,7 @@ mod agreement;
 mod arx_response;
 mod assembly;
 mod channel;
+mod channel_criterion;
 mod channel_lines;
 mod channels;
 mod choice;

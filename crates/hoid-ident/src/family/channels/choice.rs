@@ -13,7 +13,7 @@ use crate::{
     criterion::Workspace,
     family::{
         channel::{Channel, ChannelFit, ChannelForm},
-        channel_lines::{ChannelInForm, ChannelLineFitter, ChannelMinimum, own_coordinates},
+        channel_criterion::{ChannelInForm, ChannelLineFitter, ChannelMinimum, own_coordinates},
         prediction::{NoiseOrders, PredictionProblem},
         prediction_fit::PredictionFit,
     },
