@@ -215,3 +215,39 @@ fn invalid_displays_are_refused() {
     }
     assert!(!at.path().join("run.csv").exists());
 }
+
+/// Values that the data do not determine are in parentheses; the page has a curve of each parameter of F and of F at
+/// each frequency.
+#[test]
+fn tracked_response_to_the_target_is_printed_and_drawn() {
+    let at = TempDir::new().unwrap();
+    simulate(at.path(), "C1", "1", &[]);
+    let options = [
+        "track",
+        "run.csv",
+        "--input",
+        "e",
+        "--input",
+        "f_t",
+        "--role",
+        "f_t=feedforward:0.25",
+        "--at",
+        "2",
+    ];
+    let text = stdout_of(at.path(), &[&options[..], &["--report", "page"]].concat());
+    let table = text.split_once("Response to f_t.").unwrap().1;
+    let first = table.lines().find(|line| line.contains('±')).unwrap();
+    assert!(first.contains('('), "{text}");
+    assert!(
+        table.contains("In parentheses: not determined by the data so far."),
+        "{text}"
+    );
+    let page = fs::read_to_string(at.path().join("page/index.html")).unwrap();
+    assert!(page.contains("Subscript f: the response to f_t."));
+    for label in ["|F(2)|", "\u{2220}F(2)", "\u{1e1f}</tspan>"] {
+        assert!(page.contains(label), "{label}");
+    }
+    let found = json(at.path(), &[&options[..], &["--json"]].concat());
+    let determined = |name: &str| parameter(&found, 1, name)["determined"].as_bool().unwrap();
+    assert!(determined("K_f_dot") && !determined("K_f"), "{}", found["channels"]);
+}

@@ -1,11 +1,12 @@
 //! The parameters of an operator that the data determine.
 //!
 //! A parameter is determined if it is more than two standard errors from zero and, if the method has a prior for the
-//! parameter, the data have at least halved the prior variance. Otherwise the value comes mainly from the prior.
+//! parameter, the data have at least halved the prior variance. Otherwise the value comes mainly from the prior. The
+//! delay of a further input may be zero, so only its variance counts.
 
-use hoid_model::uncertainty::OperatorEstimate;
+use hoid_model::uncertainty::{Estimate, OperatorEstimate};
 
-use crate::{Trace, Tracker, methods::Method};
+use crate::{FurtherOperator, Trace, Tracker, methods::Method};
 
 /// Smallest distance of a determined parameter from zero, in standard errors.
 const MIN_DISTANCE: f64 = 2.0;
@@ -26,12 +27,26 @@ fn determinations(method: &Method, operator: &OperatorEstimate) -> Vec<Determina
             _ => None,
         }
     };
-    let of = |(name, _, estimate): (&'static str, _, hoid_model::uncertainty::Estimate)| {
+    let of = |(name, _, estimate): (&'static str, _, Estimate)| {
         let error = estimate.standard_error?;
         let learnt = supposed(name).is_none_or(|before| error * error < MAX_REMAINING_SHARE * before * before);
         Some((name, learnt && estimate.value.abs() > MIN_DISTANCE * error))
     };
     operator.rows().into_iter().filter_map(of).collect()
+}
+
+fn further_determinations(delay_deviation_s: Option<f64>, operator: &FurtherOperator) -> [bool; 3] {
+    let is_nonzero = |gain: Estimate| {
+        gain.standard_error
+            .is_some_and(|error| gain.value.abs() > MIN_DISTANCE * error)
+    };
+    let halved =
+        |error: f64| delay_deviation_s.is_none_or(|before| error * error < MAX_REMAINING_SHARE * before * before);
+    [
+        is_nonzero(operator.k_f),
+        is_nonzero(operator.k_f_dot),
+        operator.tau_f_s.standard_error.is_some_and(halved),
+    ]
 }
 
 impl Tracker {
@@ -47,6 +62,14 @@ impl Trace {
     /// error are omitted.
     pub fn determinations(&self, operator: &OperatorEstimate) -> Vec<Determination> {
         determinations(&self.options().method, operator)
+    }
+
+    /// Returns, for each parameter of the response to the further input in a row, whether it is determined.
+    pub fn further_determinations(&self, operator: &FurtherOperator) -> [bool; FurtherOperator::NAMES.len()] {
+        let options = self.options();
+        let further = options.further.as_ref();
+        let before = further.and_then(|f| options.method.further_delay_deviation(f, self.sample_time()));
+        further_determinations(before, operator)
     }
 
     /// Returns for each parameter of the operator a column, such as `K_e_determined`, with 1 in each row in which the
@@ -73,8 +96,6 @@ impl Trace {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use hoid_model::uncertainty::Estimate;
-
     use super::*;
 
     #[test]
@@ -100,5 +121,23 @@ mod tests {
         assert_eq!(found, expected);
         let other = determinations(&Method::rpem(), &operator);
         assert!(other.contains(&("omega_nm", true)));
+    }
+
+    #[test]
+    fn response_to_a_further_input_may_have_no_delay() {
+        let e = |value: f64, error: f64| Estimate::with_variance(value, error * error);
+        let operator = |gain_error: f64, delay_error: f64| FurtherOperator {
+            k_f: e(0.5, gain_error),
+            k_f_dot: e(0.02, 0.1),
+            tau_f_s: e(0.0, delay_error),
+        };
+        assert_eq!(
+            further_determinations(Some(0.1), &operator(0.1, 0.03)),
+            [true, false, true]
+        );
+        assert_eq!(
+            further_determinations(Some(0.1), &operator(0.3, 0.08)),
+            [false, false, false]
+        );
     }
 }

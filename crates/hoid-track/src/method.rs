@@ -15,6 +15,7 @@ use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use crate::{
     forgetting::ForgettingRule,
+    further_input::TrackedInput,
     guard::GuardChoice,
     memory::{Memory, MemoryOptions},
     person_prior::PersonPrior,
@@ -234,6 +235,11 @@ pub trait RecursiveMethod: Settings + MethodObject + 'static {
 
     /// Prior standard deviations of omega_nm in rad/s, zeta_nm and tau_e in s, for methods with a prior.
     fn prior_deviations(&self) -> Option<[f64; 3]> {
+        None
+    }
+
+    /// Prior standard deviation of the delay of a further input, s, for methods with a prior.
+    fn further_delay_deviation(&self, _further: &TrackedInput, _sample_time: SampleTime) -> Option<f64> {
         None
     }
 

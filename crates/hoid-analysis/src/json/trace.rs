@@ -137,13 +137,17 @@ impl TrackingResult {
                 false => own.contains(name),
             });
             let operator = trace.further_operator(row).filter(|_| !first);
+            let parameter = |name: String, e: Estimate| json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)});
             let physical = operator.iter().flat_map(|found| {
-                let names = FurtherOperator::NAMES.map(str::to_owned);
-                names.into_iter().zip(found.parameters())
+                let determined = trace.further_determinations(found);
+                let estimates = FurtherOperator::NAMES.into_iter().zip(found.parameters());
+                estimates.zip(determined).map(move |((name, e), determined)| {
+                    let mut whole = parameter(name.to_owned(), e);
+                    whole["determined"] = json!(determined);
+                    whole
+                })
             });
-            let parameters = of_input.chain(physical).map(|(name, e)| {
-                json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
-            });
+            let parameters = of_input.map(|(name, e)| parameter(name, e)).chain(physical);
             let response = |place: usize, omega: f64| match first {
                 true => trace.response(row, place),
                 false => trace.further_response(row, omega),

@@ -174,6 +174,9 @@ fn symbol(name: &str) -> String {
         "omega_nm" => ("\u{3c9}", "nm"),
         "zeta_nm" => ("\u{3b6}", "nm"),
         "tau_e" => ("\u{3c4}", "e"),
+        "K_f" => ("K", "f"),
+        "K_f_dot" => ("K", "\u{1e1f}"),
+        "tau_f" => ("\u{3c4}", "f"),
         other => match other.char_indices().nth(1).map(|(at, _)| other.split_at(at)) {
             Some((letter, digits)) if digits.bytes().all(|b| b.is_ascii_digit()) => (letter, digits),
             _ => return mark_scripts(other),

@@ -43,7 +43,7 @@ pub fn operator_names(traces: &[EvaluatedTrace<'_>]) -> Vec<&'static str> {
 
 pub fn unit(name: &str) -> &'static str {
     match name {
-        "T_L" | "K_e_dot" | "tau_e" => "s",
+        "T_L" | "K_e_dot" | "tau_e" | "K_f_dot" | "tau_f" => "s",
         "omega_nm" => "rad/s",
         "zeta_nm" => "-",
         _ => "",

@@ -7,7 +7,7 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_numerics::statistics::finite_quantile;
-use hoid_track::{StartSource, Trace};
+use hoid_track::{FurtherOperator, StartSource, Trace};
 
 use super::{
     coefficients::{Coefficient, fit_coefficients, must_join_poles, trace_coefficients},
@@ -92,6 +92,9 @@ fn legend_symbol(name: &str) -> &str {
         "omega_nm" => "\u{3c9}_{nm}",
         "zeta_nm" => "\u{3b6}_{nm}",
         "tau_e" => "\u{3c4}_e",
+        "K_f" => "K_f",
+        "K_f_dot" => "K_\u{1e1f}",
+        "tau_f" => "\u{3c4}_f",
         other => other,
     }
 }
@@ -172,6 +175,16 @@ pub fn response_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> Option<T
             Some(response(trace, row)?.phase_deg())
         });
     }
+    if traces.iter().any(|t| t.section.trace.options().further.is_some()) {
+        for omega in &frequencies {
+            add(format!("|F({omega})|"), "dB", &|trace, row| {
+                Some(trace.further_response(row, *omega)?.gain_db())
+            });
+            add(format!("\u{2220}F({omega})"), "deg", &|trace, row| {
+                Some(trace.further_response(row, *omega)?.phase_deg())
+            });
+        }
+    }
     let with_element = traces
         .iter()
         .any(|t| t.section.trace.options().controlled_element.is_some());
@@ -216,7 +229,9 @@ fn innovation_standard_deviations(t: &EvaluatedTrace<'_>) -> Vec<f64> {
 
 /// The parameters of the operator over time, one panel for each.
 pub fn operator_grid(traces: &[EvaluatedTrace<'_>], record: &Record) -> TraceGrid {
-    grid(traces, record, operator_panels(traces, record, PlottedPart::Value))
+    let mut panels = operator_panels(traces, record, PlottedPart::Value);
+    panels.extend(further_input_panels(traces));
+    grid(traces, record, panels)
 }
 
 fn operator_panels(traces: &[EvaluatedTrace<'_>], record: &Record, shown: PlottedPart) -> Vec<TracePanel> {
@@ -245,6 +260,35 @@ fn operator_panels(traces: &[EvaluatedTrace<'_>], record: &Record, shown: Plotte
         }
     };
     operator_names(traces).into_iter().map(panel).collect()
+}
+
+/// One panel for each parameter of the response to a further input; none if no method estimates them.
+fn further_input_panels(traces: &[EvaluatedTrace<'_>]) -> Vec<TracePanel> {
+    let operators: Vec<Vec<Option<FurtherOperator>>> = traces
+        .iter()
+        .map(|t| {
+            (0..t.section.trace.len())
+                .map(|row| t.section.trace.further_operator(row))
+                .collect()
+        })
+        .collect();
+    if operators.iter().flatten().all(Option::is_none) {
+        return Vec::new();
+    }
+    let panel = |(i, name): (usize, &str)| {
+        let curve = |(method, t): (usize, &EvaluatedTrace<'_>)| {
+            let of = |found: &Option<FurtherOperator>| found.map(|found| found.parameters()[i]);
+            let estimates: Vec<Option<Estimate>> = operators[method].iter().map(of).collect();
+            curve(method, t.section.trace.times_s(), &estimates, PlottedPart::Value)
+        };
+        TracePanel {
+            name: name.to_owned(),
+            unit: unit(name).to_owned(),
+            curves: traces.iter().enumerate().map(curve).collect(),
+            ordinate: Ordinate::Robust,
+        }
+    };
+    FurtherOperator::NAMES.into_iter().enumerate().map(panel).collect()
 }
 
 fn ordinate(shown: PlottedPart) -> Ordinate {

@@ -85,6 +85,7 @@ impl TrackReport<'_> {
             answer => self.verdict.as_ref().map(|v| context! { verdict => fit_summary::verdict(v) }),
             settings => page::settings_rows(&self.settings),
             notes => self.notes.clone(),
+            further => self.traces.iter().find_map(|t| Some(t.trace.options().further.as_ref()?.channel.clone())),
             names => self.traces.iter().map(|t| t.name.clone()).collect::<Vec<_>>(),
             has_start => self.traces.iter().any(|t| t.trace.start().is_some()),
             has_batch => self.traces.iter().any(|t| !t.batch.is_empty()),

@@ -19,7 +19,8 @@ mod starting_point;
 
 use hoid_core::{
     adaptive::{
-        AdaptiveFilter, AdaptivePrior, DYNAMICS_COUNT, GAIN_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT, TwoInputFilter,
+        AdaptiveFilter, AdaptivePrior, DYNAMICS_COUNT, DelayPrior, GAIN_COUNT, MAX_NOISE_ORDER, PARAMETER_COUNT,
+        TwoInputFilter,
         basis::{Basis, Point},
         correction_places,
         defaults::{self, DefaultOperator, further_delay},
@@ -189,6 +190,10 @@ impl RecursiveMethod for AdaptiveOptions {
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
     }
 
+    fn further_delay_deviation(&self, further: &TrackedInput, sample_time: SampleTime) -> Option<f64> {
+        Some(further_delay_prior(further, sample_time).deviation)
+    }
+
     fn basis_lag_s(&self) -> Option<f64> {
         let StartingPoint { point, .. } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::AT_100_HZ).ok()?;
         Some(point.lag)
@@ -234,7 +239,7 @@ impl AdaptiveOptions {
     ) -> Result<Box<dyn Recursion>, IdentError> {
         let (prior, _) = self.kernel_prior(setup, sample_time)?;
         let nk = further.orders.nk;
-        let delay = further_delay((nk as f64 - 0.5) * sample_time.s(), is_given(nk, sample_time));
+        let delay = further_delay_prior(further, sample_time);
         let model = TwoInputFilter::with_further_input(prior, delay, self.memory(2, sample_time));
         // The coefficients of the further input follow those of the response to e.
         let own = from.values.len() - further.parameter_count();
@@ -271,6 +276,11 @@ impl AdaptiveOptions {
     fn memory(&self, inputs: usize, sample_time: SampleTime) -> Vec<f64> {
         vec![0.0; memory_needed_for(inputs, sample_time.s(), self.replay)]
     }
+}
+
+fn further_delay_prior(further: &TrackedInput, sample_time: SampleTime) -> DelayPrior {
+    let nk = further.orders.nk;
+    further_delay((nk as f64 - 0.5) * sample_time.s(), is_given(nk, sample_time))
 }
 
 /// True for a delay that differs from the default and was therefore given by the user.

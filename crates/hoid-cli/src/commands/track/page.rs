@@ -121,7 +121,7 @@ fn estimate_table(tracked: &TrackingResult) -> String {
     let gain = GainUnit::of(tracked.record());
     let units = ["", "s", "s", "rad/s", "", "s"];
     let suppose = tracked.trace.options().method.is_self_starting();
-    let mut bracketed = false;
+    let mut has_undetermined = false;
     let mut header = vec!["t in s".to_owned()];
     if with_operator {
         let named = tracked.trace.operator_columns().into_iter().zip(units);
@@ -141,9 +141,8 @@ fn estimate_table(tracked: &TrackingResult) -> String {
             let determined = determined.unwrap_or_default();
             cells.extend(tracked.trace.operator_columns().into_iter().map(|n| {
                 let open = suppose && determined.iter().any(|(name, yes)| *name == n && !yes);
-                bracketed |= open;
                 match open {
-                    true => format!("({})", plus_minus(of(n))),
+                    true => in_parentheses(&plus_minus(of(n)), &mut has_undetermined),
                     false => plus_minus(of(n)),
                 }
             }));
@@ -153,15 +152,25 @@ fn estimate_table(tracked: &TrackingResult) -> String {
         }
         rows.add_row(cells);
     }
-    let open = match bracketed {
+    format!(
+        "Estimate by {} with one standard error; the trace has all {} rows.\n{rows}\n{}",
+        trace.options().method.name(),
+        trace.len(),
+        undetermined_legend(has_undetermined)
+    )
+}
+
+/// Returns an undetermined value in parentheses, and sets the flag that they need a legend.
+fn in_parentheses(value: &str, has_undetermined: &mut bool) -> String {
+    *has_undetermined = true;
+    format!("({value})")
+}
+
+fn undetermined_legend(has_undetermined: bool) -> &'static str {
+    match has_undetermined {
         true => "In parentheses: not determined by the data so far.\n",
         false => "",
-    };
-    format!(
-        "Estimate by {} with one standard error; the trace has all {} rows.\n{rows}\n{open}",
-        trace.options().method.name(),
-        trace.len()
-    )
+    }
 }
 
 /// Returns the response to the further input at a few times; empty for a model with one input.
@@ -175,6 +184,7 @@ fn further_response_table(tracked: &TrackingResult) -> String {
         given => given,
     };
     let mut header = vec!["t in s".to_owned()];
+    let mut has_undetermined = false;
     let has_parameters = (0..trace.len()).any(|row| trace.further_operator(row).is_some());
     if has_parameters {
         let [k_f, k_f_dot, tau_f] = FurtherOperator::NAMES;
@@ -188,8 +198,15 @@ fn further_response_table(tracked: &TrackingResult) -> String {
     for row in printed_rows(tracked) {
         let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
         if has_parameters {
-            let found = trace.further_operator(row).map(|operator| operator.parameters());
-            cells.extend((0..FurtherOperator::NAMES.len()).map(|i| plus_minus(found.map(|found| found[i]))));
+            let found = trace.further_operator(row);
+            let determined = found.map(|operator| trace.further_determinations(&operator));
+            cells.extend((0..FurtherOperator::NAMES.len()).map(|i| {
+                let estimate = plus_minus(found.map(|operator| operator.parameters()[i]));
+                match determined.is_some_and(|determined| !determined[i]) {
+                    true => in_parentheses(&estimate, &mut has_undetermined),
+                    false => estimate,
+                }
+            }));
         }
         for omega in at {
             let found = trace.further_response(row, *omega);
@@ -198,7 +215,11 @@ fn further_response_table(tracked: &TrackingResult) -> String {
         }
         rows.add_row(cells);
     }
-    format!("Response to {}.\n{rows}\n", further.channel)
+    format!(
+        "Response to {}.\n{rows}\n{}",
+        further.channel,
+        undetermined_legend(has_undetermined)
+    )
 }
 
 /// Returns crossover and phase margin at the end of the trace; empty without a controlled element.
