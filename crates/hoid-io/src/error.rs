@@ -312,7 +312,7 @@ pub enum IoError {
     },
     /// Missing values in a column.
     #[error(
-        "{file}, {location}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); bridge missing values linearly with --fill, or exclude the rows with --from and --to"
+        "{file}, {location}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); {remedy}"
     )]
     Missing {
         /// Name of the file.
@@ -327,6 +327,8 @@ pub enum IoError {
         count: usize,
         /// Number of rows examined.
         rows: usize,
+        /// Remedy.
+        remedy: &'static str,
     },
     /// Values missing in many places, as in a topic that was logged at another rate.
     #[error(
@@ -351,7 +353,7 @@ pub enum IoError {
     },
     /// Missing values at the start or the end of the record.
     #[error(
-        "{file}, {location}, column {column}: the values at the {end} of the record are missing, so --fill has no value to bridge to; exclude these rows with --from and --to"
+        "{file}, {location}, column {column}: the values at the {end} of the record are missing, so --fill has no value to bridge to; {remedy}"
     )]
     NothingToBridgeTo {
         /// Name of the file.
@@ -362,6 +364,8 @@ pub enum IoError {
         column: String,
         /// End of the record: "start" or "end".
         end: &'static str,
+        /// Remedy.
+        remedy: &'static str,
     },
     /// Neither a time column nor a given sampling frequency.
     #[error(

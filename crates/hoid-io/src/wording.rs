@@ -81,6 +81,9 @@ pub(crate) fn short_error(what: &str) -> String {
 /// Minimum similarity of a suggested name; flags of the command line have the same limit.
 const MIN_SIMILARITY: f64 = 0.7;
 
+/// Ends of the names of columns that contain the values of a signal, such as `e.Data` beside `e.Time`.
+const VALUE_PARTS: [&str; 2] = [".data", ".values"];
+
 /// Returns suggestions such as "; did you mean "u"?" for names that do not exist: for each of them the name that
 /// differs only in case, or else the most similar name in Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989)
 /// 414-420). For e and u the column with a common name of the signal may be suggested. The result is empty if no name
@@ -89,6 +92,8 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     let of = |asked: &&str| {
         let asked = asked.trim().to_lowercase();
         let score = |name: &str| (strsim::jaro(&asked, &name.trim().to_lowercase()), name.to_owned());
+        // Of the parts of a signal, its values.
+        let is_values = |name: &str| VALUE_PARTS.iter().any(|part| name.to_lowercase().ends_with(part));
         // One or two letters occur in many longer names: only a name that starts with them is suggested.
         let is_near = |name: &&&str| asked.chars().count() > 2 || name.trim().to_lowercase().starts_with(&asked);
         let known = names
@@ -97,7 +102,7 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
             .filter(is_near)
             .map(|name| score(name));
         let best = known
-            .max_by(|a, b| a.0.total_cmp(&b.0))
+            .max_by(|a, b| a.0.total_cmp(&b.0).then(is_values(&a.1).cmp(&is_values(&b.1))))
             .filter(|best| best.0 > MIN_SIMILARITY);
         let meant = best.map(|best| best.1).or_else(|| suggest_by_role(&asked, names))?;
         Some(format!("\"{}\"", format_name(&meant)))
@@ -171,6 +176,8 @@ mod tests {
         assert_eq!(did_you_mean(&["q"], &names), "");
         assert_eq!(did_you_mean(&["e"], &["Time [ms]"]), "");
         assert_eq!(did_you_mean(&["q"], &[]), "");
+        let parts = ["e.Time", "e.Data", "e.Name"];
+        assert_eq!(did_you_mean(&["e"], &parts), "; did you mean \"e.Data\"?");
         let own = ["t", "Target", "Stick", "Tracking error"];
         assert_eq!(did_you_mean(&["e"], &own), "; did you mean \"Tracking error\"?");
         assert_eq!(did_you_mean(&["Error"], &own), "; did you mean \"Tracking error\"?");

@@ -55,17 +55,6 @@ pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<FillCounts, 
 /// Drops each row that equals an earlier row in all columns, including the time: the row before, or, if a block of rows
 /// was written twice, the row with the same time.
 pub(super) fn drop_repeated(table: Table<'_>, time: usize) -> (Table<'_>, Option<Step>) {
-    let same = |before: usize, row: usize| {
-        table.columns.iter().enumerate().all(|(index, column)| {
-            let [a, b] = [before, row].map(|row| table.value(index, row));
-            let texts = [before, row].map(|row| column.texts.binary_search(&row).is_ok());
-            match texts {
-                [false, false] => a == b || a.is_nan() && b.is_nan(),
-                [true, true] => table.source.cell(before, index) == table.source.cell(row, index),
-                _ => false,
-            }
-        })
-    };
     let t = |row: usize| table.value(time, row);
     let (mut advancing, mut repeated) = (Vec::new(), Vec::new());
     for row in 0..table.rows {
@@ -75,7 +64,7 @@ pub(super) fn drop_repeated(table: Table<'_>, time: usize) -> (Table<'_>, Option
         }
         let with_this_time = advancing.get(advancing.partition_point(|before| t(*before) < t(row)));
         let earlier = row.checked_sub(1).into_iter().chain(with_this_time.copied());
-        if earlier.into_iter().any(|before| same(before, row)) {
+        if earlier.into_iter().any(|before| rows_are_equal(&table, before, row)) {
             repeated.push(row);
         }
     }
@@ -90,6 +79,19 @@ pub(super) fn drop_repeated(table: Table<'_>, time: usize) -> (Table<'_>, Option
         .filter(|row| repeated.binary_search(row).is_err())
         .collect();
     (keep_rows(table, rows), Some(step))
+}
+
+/// True if two rows are equal in all columns.
+pub(super) fn rows_are_equal(table: &Table<'_>, before: usize, row: usize) -> bool {
+    table.columns.iter().enumerate().all(|(index, column)| {
+        let [a, b] = [before, row].map(|row| table.value(index, row));
+        let texts = [before, row].map(|row| column.texts.binary_search(&row).is_ok());
+        match texts {
+            [false, false] => a == b || a.is_nan() && b.is_nan(),
+            [true, true] => table.source.cell(before, index) == table.source.cell(row, index),
+            _ => false,
+        }
+    })
 }
 
 fn next_missing_run(values: &[f64], from: usize) -> Option<Range<usize>> {

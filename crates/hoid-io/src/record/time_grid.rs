@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use hoid_model::SampleTime;
 
+use super::repair::rows_are_equal;
 use super::table_reader::TableReader;
 use super::trials::MIN_TRIAL_ROWS;
 use crate::IoError;
@@ -194,7 +195,10 @@ impl TableReader<'_> {
                 location: place(row),
                 found: at(row),
                 previous: at(row.saturating_sub(1)),
-                remedy: backward_remedy(t, row),
+                remedy: {
+                    let after = rows.start.saturating_add(row);
+                    backward_remedy(t, row, rows_are_equal(&self.table, after.saturating_sub(1), after))
+                },
             },
             SamplingFault::WrongTime {
                 row,
@@ -278,10 +282,12 @@ impl TableReader<'_> {
 }
 
 /// Returns the remedy for a time in a row that is not later than the time before.
-fn backward_remedy(t: &[f64], row: usize) -> &'static str {
+fn backward_remedy(t: &[f64], row: usize, is_repeated: bool) -> &'static str {
     let previous = row.checked_sub(1).and_then(|row| t.get(row));
     let mut next = t.iter().skip(row).take(MIN_TRIAL_ROWS);
-    if previous == t.get(row) {
+    if previous == t.get(row) && !is_repeated {
+        "write t with more decimals, or give --fs HZ in place of t if the samples are evenly spaced"
+    } else if previous == t.get(row) {
         "drop rows that were written twice with --drop-repeated, write t with more decimals, or give --fs HZ in place \
          of t if the samples are evenly spaced"
     } else if next.any(|t| Some(t) > previous) {
