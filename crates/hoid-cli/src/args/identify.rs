@@ -65,7 +65,7 @@ pub struct IdentifyArgs {
     pub remnant_discretisation: RemnantDiscretisation,
     #[command(flatten)]
     pub picture: FigureArgs,
-    /// Also evaluate the prediction K samples ahead
+    /// Also evaluate the prediction of a polynomial model K samples ahead
     #[arg(long, value_name = "K", value_parser = parse_horizon)]
     pub horizon: Option<usize>,
     /// Also evaluate the model on this record

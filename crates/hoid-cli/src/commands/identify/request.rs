@@ -71,6 +71,7 @@ pub fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError
 /// option does apply; `None` if all options apply.
 fn misplaced_option(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static str, &'static str)> {
     let changing = matches!(asked, ResolvedRequest::Change(_));
+    let with_polynomials = matches!(asked, ResolvedRequest::Polynomials(_) | ResolvedRequest::Remnant(_));
     let steady = "a model that does not change";
     let all = [
         (
@@ -80,7 +81,11 @@ fn misplaced_option(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'s
         ),
         (args.trace.is_some() && !changing, "--trace", "--change sigmoid"),
         (args.validate.is_some() && changing, "--validate", steady),
-        (args.horizon.is_some() && changing, "--horizon", steady),
+        (
+            args.horizon.is_some() && !with_polynomials,
+            "--horizon",
+            "models with polynomials, such as --structure bj, and to --remnant-order",
+        ),
         (
             args.report.is_some() && changing,
             "--report",
