@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     linalg::{
-        products::{LaggedColumn, gram, products},
+        products::{LaggedColumn, gram},
         vectors::{add_scaled, dot},
     },
     optimize::Linearisation,
@@ -128,6 +128,12 @@ impl Criterion<'_> {
 /// Adds the products of the residuals and the columns of psi, with the initial states projected out.
 fn add_products(states: &EliminatedStates, columns: &[Column<'_>], eps: &[f64], total: &mut Linearisation) {
     let p = columns.len();
+    // Components of each column in the space of the initial states: one row per column of psi.
+    let count = states.responses.basis().count();
+    let mut inside = Vec::with_capacity(p * count);
+    for column in columns {
+        inside.extend(states.responses.basis().map(|q| dot(q, &column.values[..q.len()])));
+    }
     let residuals = LaggedColumn {
         values: eps,
         is_shift_of_previous: false,
@@ -137,15 +143,13 @@ fn add_products(states: &EliminatedStates, columns: &[Column<'_>], eps: &[f64], 
         is_shift_of_previous: column.is_shift_of_previous,
     });
     let all: Vec<LaggedColumn<'_>> = std::iter::once(residuals).chain(lagged).collect();
-    // Components of the columns in the space of the initial states, one row per basis vector. They are subtracted from
-    // the products; the residuals have no such components.
-    let inside: Vec<Vec<f64>> = states.responses.basis().map(|q| products(q, &all[1..])).collect();
     let (raw, q) = (gram(&all), p + 1);
     total.sum_of_squares += raw[0];
     for (i, column) in columns.iter().enumerate() {
         total.descent[i] += column.sign * raw[i + 1];
         for (j, other) in columns[..=i].iter().enumerate() {
-            let projected = raw[(i + 1) * q + j + 1] - inside.iter().map(|c| c[i] * c[j]).sum::<f64>();
+            let projected = raw[(i + 1) * q + j + 1]
+                - dot(&inside[i * count..(i + 1) * count], &inside[j * count..(j + 1) * count]);
             let product = column.sign * other.sign * projected;
             total.gram[i * p + j] += product;
             if i != j {

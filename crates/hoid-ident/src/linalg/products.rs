@@ -253,42 +253,6 @@ impl FourLaneTask for Gram<'_, '_> {
     }
 }
 
-/// Returns the product of a vector with each of the columns, over the length of the vector.
-pub(crate) fn products(vector: &[f64], columns: &[LaggedColumn<'_>]) -> Vec<f64> {
-    with_four_lanes(Products { vector, columns })
-}
-
-struct Products<'c, 'a> {
-    vector: &'c [f64],
-    columns: &'c [LaggedColumn<'a>],
-}
-
-impl FourLaneTask for Products<'_, '_> {
-    type Output = Vec<f64>;
-
-    #[inline(always)]
-    fn run<F: FourLanes>(self, zero: F) -> Vec<f64> {
-        let Self { vector, columns } = self;
-        // The vector is column zero.
-        let others: Vec<usize> = (1..=columns.len()).collect();
-        let mut tiles = Vec::with_capacity(others.len());
-        Tile::add_tiles(0, &others, zero, &mut tiles);
-        let column = |j: usize| j.checked_sub(1).map_or(vector, |j| &columns[j].values[..vector.len()]);
-        for stretch in stretches(vector.len()) {
-            for tile in &mut tiles {
-                tile.add(|j| &column(j)[stretch.clone()]);
-            }
-        }
-        let mut products = vec![0.0; columns.len()];
-        for tile in &tiles {
-            for (k, &j) in tile.ys[..tile.count].iter().enumerate() {
-                products[j - 1] = tile.total(k, column);
-            }
-        }
-        products
-    }
-}
-
 /// Returns the product of columns i and j minus the product of columns i - 1 and j - 1, if i and j are shifts.
 fn end_difference(columns: &[LaggedColumn<'_>], i: usize, j: usize) -> f64 {
     let (x, y) = (columns[i - 1].values, columns[j - 1].values);

@@ -69,24 +69,6 @@ fn products_are_bit_identical_on_each_path() {
 }
 
 #[test]
-fn products_with_a_vector_are_bit_identical_on_each_path() {
-    for n in LENGTHS {
-        let (vector, columns) = (wave(n, 0.7), waves(n + 9, 7));
-        for path in InstructionSet::available() {
-            let task = Products {
-                vector: &vector,
-                columns: &unshifted_columns(&columns),
-            };
-            let found = path.with_four_lanes(task).unwrap();
-            for (k, column) in columns.iter().enumerate() {
-                let defined = product_in_partial_sums(&vector, &column[..n], partial_sum_count(k, 7));
-                assert_eq!(found[k].to_bits(), defined.to_bits(), "{path:?}: {k}, {n} samples");
-            }
-        }
-    }
-}
-
-#[test]
 fn two_lags_in_one_pass_are_bit_identical_to_the_tiles() {
     for n in LENGTHS.map(|n| n + 1) {
         let (u, e) = (wave(n + 2, 0.05), wave(n + 2, 0.11));
