@@ -96,15 +96,18 @@ impl Recordings {
     }
 }
 
-/// Returns the describing function for a fit that also uses the lines. A missing channel is an error only if the user
-/// named it.
+/// Returns the describing function for a fit that also uses the lines. Missing lines are an error only if the user gave
+/// their channel or their period.
 pub(crate) fn line_describing_function(
     described: &Result<Option<Description>, AnalysisError>,
     excitation: &Excitation,
+    period_s: Option<f64>,
 ) -> Option<Result<hoid_ident::frequency::DescribingFunction, IdentError>> {
     match described {
         Ok(found) => found.as_ref().map(|found| Ok(found.function.clone())),
-        Err(AnalysisError::Ident(error)) if excitation.channel_name().is_some() => Some(Err(error.clone())),
+        Err(AnalysisError::Ident(error)) if excitation.channel_name().is_some() || period_s.is_some() => {
+            Some(Err(error.clone()))
+        }
         Err(_) => None,
     }
 }

@@ -89,8 +89,8 @@ impl BatchEstimator for FamilyEstimator {
             },
             ..with.estimator.clone()
         };
-        let mut fit =
-            estimator.fit_with_response(&data.records, line_describing_function(&described, &with.excitation))?;
+        let lines = line_describing_function(&described, &with.excitation, with.period_s);
+        let mut fit = estimator.fit_with_response(&data.records, lines)?;
         fit.lead_s = data.input_lead_s();
         let element = with.controlled_element.as_ref();
         let mut verdict = fit.verdict.clone();
