@@ -26,7 +26,7 @@
 //!         margins: None,
 //!     }],
 //!     notes: Vec::new(),
-//!     answer: None,
+//!     fit_summary: None,
 //!     pictures: Vec::new(),
 //! };
 //! let page = report.to_html()?;
