@@ -1,6 +1,6 @@
 //! Recordings before and during identification, with an account of their processing.
 
-use hoid_ident::diagnostics::recorded_element;
+use hoid_ident::diagnostics::{machine_output_finding, recorded_element};
 use hoid_io::{QualityIssue, Step, issues_of_channels};
 use hoid_model::{Channel, ContinuousTransferFunction, Fault, Finding, Record, Verdict, uncertainty::Estimate};
 
@@ -107,6 +107,7 @@ impl Recordings {
                 });
             }
         }
+        all.extend(machine_output_finding(&self.records));
         all
     }
 

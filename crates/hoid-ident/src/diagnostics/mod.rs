@@ -15,6 +15,7 @@
 //! | `residuals-not-white`, `structure`, `leverage` | properties of the residuals |
 //! | `no-response` | no response beyond chance |
 //! | `other-input`, `inputs-together` | inputs other than the error |
+//! | `machine-output` | u is the output of the machine instead of the control |
 //! | `controlled-element` | the recorded loop does not have the given controlled element |
 //! | `exact-fit`, `no-change`, `change-point` | information; the result remains valid |
 //!
@@ -29,6 +30,7 @@
 //! | `operator_step` | evidence against an operator in a stretch of data |
 //! | `second_opinion` | second fits without outlying samples or without slow components |
 //! | `other_inputs` | test of whether u responds to a recorded target in addition to e |
+//! | `machine_output` | test of whether u is the output of the machine |
 //! | `recorded_element` | test of whether the recorded loop has the given controlled element |
 //! | `whitened` | least squares with autoregressive noise, used by several tests |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict on each kind of fit |
@@ -37,6 +39,7 @@ pub(crate) mod constancy;
 mod fit;
 mod grey_box;
 mod loop_response;
+mod machine_output;
 mod no_response;
 mod operator;
 mod operator_step;
@@ -50,6 +53,7 @@ mod whitened;
 
 pub use constancy::{RUN_TO_RUN_DEVIATION, ResponseBasis, ResponseChange, TimeCourse, response_changes};
 pub use loop_response::{LoopResponse, loop_response};
+pub use machine_output::machine_output_finding;
 pub use no_response::{Response, response_to_error};
 pub use operator::{gain_findings, has_negative_lead, is_undetermined, neuromuscular_finding, pole_findings};
 pub use operator_step::{OperatorStep, operator_step};

@@ -24,7 +24,9 @@
 //!
 //! **Level.** T is compared with Student's distribution with n - 2 degrees of freedom. The p-value of the supremum is
 //! the smaller of Bonferroni's bound and the value for continuous time ([`critical`]), corrected for the number of
-//! directions. The delay and the other parameters are tested separately, each at the level [`SIGNIFICANCE_LEVEL`]. The
+//! directions. The delay and the other parameters are tested separately, each at the level [`SIGNIFICANCE_LEVEL`]. For
+//! drifts and periodic changes within a record, z is weighted by a line or a sine instead of 0 and 1; these count only
+//! if they exceed the variation of people from run to run. The
 //! directions are the parameters of the operator or, if the coefficients do not correspond to an operator, the
 //! coefficients.
 //!
@@ -52,7 +54,7 @@ pub(crate) use blocks::{physical_score_blocks, score_blocks};
 use influential_block::most_influential_block;
 pub use response_changes::{ResponseBasis, ResponseChange, response_changes};
 pub use search::TimeCourse;
-use search::{Change, strongest_step};
+use search::{Change, strongest_course, strongest_step};
 pub(crate) use search::{Constancy, Direction};
 
 /// Largest p-value at which a parameter counts as changed, both in the test of the delay and in the test of the other
@@ -106,7 +108,13 @@ impl Constancy<'_> {
 
     /// Returns a warning if a parameter changes, with the name of the parameter and the approximate time.
     pub fn change_finding(&self, records: &[Record]) -> Option<Finding> {
-        let of = |delay: bool| strongest_step(self, delay).filter(|change| change.p_value < SIGNIFICANCE_LEVEL);
+        let of = |delay: bool| {
+            let found = [strongest_step(self, delay), strongest_course(self, delay)]
+                .into_iter()
+                .flatten();
+            let found = found.filter(|change| change.p_value < SIGNIFICANCE_LEVEL);
+            found.min_by(|a, b| a.p_value.total_cmp(&b.p_value))
+        };
         let mut found: Vec<Change> = [of(true), of(false)].into_iter().flatten().collect();
         found.sort_by(|a, b| a.p_value.total_cmp(&b.p_value));
         let words: Vec<String> = found
@@ -133,14 +141,35 @@ impl Constancy<'_> {
 
     fn change_description(&self, change: &Change, records: usize) -> String {
         let at_s = change.first_sample as f64 * self.sample_time_s;
+        let of_record = match records {
+            0 | 1 => String::new(),
+            _ => format!(" in record {}", change.record + 1),
+        };
+        let (name, size, error, unit) = (&change.name, change.size, change.error, change.unit);
+        match change.time_course {
+            TimeCourse::Step => {}
+            TimeCourse::Drift => {
+                return format!(
+                    "{name} drifts by about {size:+.2} ± {error:.2}{unit}{of_record} (p = {:.0e})",
+                    change.p_value
+                );
+            }
+            TimeCourse::Oscillation(period_s) => {
+                return format!(
+                    "{name} oscillates by about {:.2} ± {error:.2}{unit} with a period of about {period_s:.0} s{of_record} (p = {:.0e})",
+                    size.abs(),
+                    change.p_value
+                );
+            }
+        }
         let place = match (records, change.first_sample) {
             (0 | 1, _) => format!("about {at_s:.0} s after the start"),
             (_, 0) => format!("in record {} compared with the others", change.record + 1),
             _ => format!("about {at_s:.0} s after the start of record {}", change.record + 1),
         };
         format!(
-            "{} changes by about {:+.2} ± {:.2}{} {place} (p = {:.0e})",
-            change.name, change.size, change.error, change.unit, change.p_value
+            "{name} changes by about {size:+.2} ± {error:.2}{unit} {place} (p = {:.0e})",
+            change.p_value
         )
     }
 }

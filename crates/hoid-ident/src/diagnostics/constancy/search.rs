@@ -1,6 +1,9 @@
 //! Search for the most significant change over all directions, records and instants.
 
-use std::f64::consts::{FRAC_PI_4, TAU};
+use std::{
+    f64::consts::{FRAC_PI_4, TAU},
+    ops::Range,
+};
 
 use hoid_numerics::statistics::upper_median;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
@@ -12,6 +15,8 @@ use super::{
 
 /// Minimum number of blocks on each side of a change.
 const MIN_BLOCKS_PER_SIDE: usize = 2;
+/// Minimum number of blocks of a record that is tested for a drift or a periodic change.
+const MIN_BLOCKS_OF_COURSE: usize = 8;
 /// Shortest period of a periodic change, in blocks.
 const MIN_PERIOD_BLOCKS: f64 = 5.0;
 /// A change is tested only if at least this share of its information remains after estimating the constant parameters.
@@ -29,6 +34,18 @@ pub(crate) struct Constancy<'a> {
     /// Relative variation of the parameters between runs.
     pub run_to_run: f64,
     pub sample_time_s: f64,
+}
+
+impl Constancy<'_> {
+    /// Returns the duration of a block, s; `None` if no record has three blocks.
+    fn block_s(&self) -> Option<f64> {
+        // The first block of a record starts at sample zero, before its first residual.
+        let pair = self
+            .blocks
+            .windows(2)
+            .find(|pair| pair[0].record == pair[1].record && pair[0].from > 0)?;
+        Some((pair[1].from - pair[0].from) as f64 * self.sample_time_s)
+    }
 }
 
 /// A direction in the space of the parameters.
@@ -79,13 +96,36 @@ pub(super) struct Candidate {
 
 impl Candidate {
     /// Returns a step: a change of size one in a range of blocks, and zero in all other blocks.
-    fn step(record: usize, at: usize, blocks: std::ops::Range<usize>, all: usize) -> Self {
+    fn step(record: usize, at: usize, blocks: Range<usize>, all: usize) -> Self {
         let weights = (0..all).map(|c| f64::from(u8::from(blocks.contains(&c)))).collect();
         Self {
             record,
             first_sample: at,
             time_course: TimeCourse::Step,
             weights,
+        }
+    }
+
+    /// Returns a change that follows `weight` over the blocks of a record, counted from zero, and is zero elsewhere.
+    fn course(
+        record: usize,
+        time_course: TimeCourse,
+        own: &Range<usize>,
+        all: usize,
+        weight: impl Fn(f64) -> f64,
+    ) -> Self {
+        let weights = (0..all).map(|c| {
+            if own.contains(&c) {
+                weight((c - own.start) as f64)
+            } else {
+                0.0
+            }
+        });
+        Self {
+            record,
+            first_sample: 0,
+            time_course,
+            weights: weights.collect(),
         }
     }
 }
@@ -105,6 +145,21 @@ struct CandidateTest {
 pub(super) fn strongest_step(of: &Constancy<'_>, delay: bool) -> Option<Change> {
     let directions: Vec<_> = of.directions.iter().filter(|d| d.delay == delay).collect();
     strongest_change(of, &directions, &candidate_steps(of.blocks))
+}
+
+/// Returns the drift or the periodic change with the smallest p-value within a record, among those that exceed the
+/// variation of the parameters between runs by two standard errors: of the delay if `delay` is true, otherwise of the
+/// other parameters.
+pub(super) fn strongest_course(of: &Constancy<'_>, delay: bool) -> Option<Change> {
+    let is_long = |record: usize| of.blocks.iter().filter(|b| b.record == record).count() >= MIN_BLOCKS_OF_COURSE;
+    let mut sets = drifts(of.blocks);
+    sets.extend(periodic_changes(of.blocks, of.block_s()?));
+    sets.retain(|set| is_long(set.record));
+    let courses = (of.directions.iter()).filter(|direction| direction.delay == delay);
+    let directions: Vec<_> = courses.collect();
+    let found = strongest_change(of, &directions, &sets)?;
+    let usual = directions.iter().find(|direction| direction.name == found.name)?.size * of.run_to_run;
+    (found.size.abs() > usual + 2.0 * found.error).then_some(found)
 }
 
 /// Returns the change with the smallest p-value among these directions and candidates, whether or not it is
@@ -175,12 +230,10 @@ pub(super) fn strongest_change(of: &Constancy<'_>, directions: &[&Direction], se
 /// Returns the candidate steps: each whole record if there are several records, and the part of a record after each
 /// block boundary.
 pub(super) fn candidate_steps(blocks: &[ScoreBlock]) -> Vec<Candidate> {
-    let records = blocks.last().map_or(0, |b| b.record + 1);
+    let several = blocks.last().is_some_and(|b| b.record > 0);
     let mut all = Vec::new();
-    for record in 0..records {
-        let from = blocks.partition_point(|b| b.record < record);
-        let to = blocks.partition_point(|b| b.record <= record);
-        if records > 1 && to - from >= MIN_BLOCKS_PER_SIDE {
+    for (record, Range { start: from, end: to }) in records(blocks) {
+        if several && to - from >= MIN_BLOCKS_PER_SIDE {
             all.push(Candidate::step(record, 0, from..to, blocks.len()));
         }
         for k in from + MIN_BLOCKS_PER_SIDE..(to + 1).saturating_sub(MIN_BLOCKS_PER_SIDE) {
@@ -190,39 +243,48 @@ pub(super) fn candidate_steps(blocks: &[ScoreBlock]) -> Vec<Candidate> {
     all
 }
 
-/// Returns the only candidate for a drift: a linear change over the blocks of one record.
+/// Returns the candidate drifts: a linear change over the blocks of each record.
 pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Candidate> {
-    let n = blocks.len();
-    let weight = |c: usize| (c as f64 + 0.5) / n.max(1) as f64 - 0.5;
-    let weights = (0..n).map(weight).collect();
-    let time_course = TimeCourse::Drift;
-    vec![Candidate {
-        record: 0,
-        first_sample: 0,
-        time_course,
-        weights,
-    }]
+    records(blocks)
+        .map(|(record, own)| {
+            let n = own.len().max(1) as f64;
+            Candidate::course(record, TimeCourse::Drift, &own, blocks.len(), |c| (c + 0.5) / n - 0.5)
+        })
+        .collect()
 }
 
-/// Returns sinusoidal changes over the blocks of one record, where `block_s` is the duration of a block: periods from
+/// Returns sinusoidal changes over the blocks of each record, where `block_s` is the duration of a block: periods from
 /// [`MIN_PERIOD_BLOCKS`] blocks to two thirds of the record, with frequencies spaced by half the frequency resolution,
 /// each in four phases.
 pub(super) fn periodic_changes(blocks: &[ScoreBlock], block_s: f64) -> Vec<Candidate> {
-    let n = blocks.len();
-    let frequencies = (3..)
-        .map(|k| f64::from(k) / (2.0 * n as f64))
-        .take_while(|f| *f <= 1.0 / MIN_PERIOD_BLOCKS);
-    let of = |frequency: f64, phase: u32| Candidate {
-        record: 0,
-        first_sample: 0,
-        time_course: TimeCourse::Oscillation(block_s / frequency),
-        weights: (0..n)
-            .map(|c| (TAU * (c as f64 + 0.5) * frequency + FRAC_PI_4 * f64::from(phase)).sin())
-            .collect(),
+    let of_record = |(record, own): (usize, Range<usize>)| {
+        let n = own.len() as f64;
+        let frequencies = (3..)
+            .map(move |k| f64::from(k) / (2.0 * n))
+            .take_while(|f| *f <= 1.0 / MIN_PERIOD_BLOCKS);
+        let of = move |frequency: f64, phase: u32| {
+            let course = TimeCourse::Oscillation(block_s / frequency);
+            Candidate::course(record, course, &own, blocks.len(), |c| {
+                (TAU * (c + 0.5) * frequency + FRAC_PI_4 * f64::from(phase)).sin()
+            })
+        };
+        let all: Vec<Candidate> = frequencies
+            .flat_map(|frequency| (0..4).map(move |phase| (frequency, phase)))
+            .map(|(frequency, phase)| of(frequency, phase))
+            .collect();
+        all
     };
-    frequencies
-        .flat_map(|frequency| (0..4).map(move |phase| of(frequency, phase)))
-        .collect()
+    records(blocks).flat_map(of_record).collect()
+}
+
+/// Returns the records, each with the range of its blocks.
+fn records(blocks: &[ScoreBlock]) -> impl Iterator<Item = (usize, Range<usize>)> {
+    let count = blocks.last().map_or(0, |b| b.record + 1);
+    (0..count).map(|record| {
+        let from = blocks.partition_point(|b| b.record < record);
+        let to = blocks.partition_point(|b| b.record <= record);
+        (record, from..to)
+    })
 }
 
 fn test_candidate(
