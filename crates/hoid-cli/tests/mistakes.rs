@@ -164,6 +164,67 @@ fn output_that_is_a_multiple_of_the_input_is_named() {
 }
 
 #[test]
+fn output_of_the_machine_as_control_is_doubtful() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    stdout_of(at, &["simulate", "--condition", "C1", "--out", "run.csv"]);
+    let found = json(
+        at,
+        &["identify", "run.csv", "--input", "e", "--output", "f_t-e", "--json"],
+    );
+    let reasons = found["verdict"]["reasons"].as_array().unwrap();
+    assert!(
+        found["verdict"]["level"] != "trustworthy" && reasons.iter().any(|r| r["kind"] == "machine-output"),
+        "{}",
+        found["verdict"]
+    );
+}
+
+/// A remedy that has been followed is not repeated.
+#[test]
+fn remedies_for_times_can_be_followed() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    write_samples(d, "coarse.csv", "t,e,u", 400, |k| {
+        let (t, e, u) = wave(k);
+        format!("{t:.1},{e},{u}")
+    });
+    write_samples(d, "summary.csv", "t,e,u", 400, |k| {
+        let (t, e, u) = wave(k);
+        if k == 399 {
+            format!(",{e},{u}")
+        } else {
+            format!("{t},{e},{u}")
+        }
+    });
+    for (arguments, remedy, other) in [
+        (
+            &["coarse.csv"][..],
+            "write t with more decimals, or give --fs",
+            "--drop-repeated",
+        ),
+        (&["summary.csv"], "or remove these rows from the file", "--from"),
+        (&["summary.csv", "--fill"], "remove these rows from the file", "--from"),
+    ] {
+        let (code, message) = failure_of(d, &[&["identify"], arguments].concat());
+        assert!(
+            code == 1 && message.contains(remedy) && !message.contains(other),
+            "{message}"
+        );
+    }
+}
+
+#[test]
+fn period_that_does_not_fit_is_a_note() {
+    let directory = simulated_run();
+    let text = stdout_of(directory.path(), &["identify", "c1.csv", "--period", "13"]);
+    assert!(
+        text.contains("no fit at the lines of the excitation") && text.contains("13 s"),
+        "{text}"
+    );
+}
+
+#[test]
 fn wrong_usage_exits_with_two() {
     let directory = simulated_run();
     let d = directory.path();
@@ -186,6 +247,7 @@ fn wrong_usage_exits_with_two() {
         &["identify", "c1.csv", "--remnant-order", "1", "--form", "lead-lag"],
         &["identify", "c1.csv", "--prior", "omega_nm=1"],
         &["identify", "c1.csv", "--trace", "x.csv"],
+        &["identify", "c1.csv", "--horizon", "10"],
         &["identify", "c1.csv", "--structure", "time-varying", "--report", "out"],
         &["identify", "c1.csv", "--structure", "time-varying", "--orders", "nb=2"],
         &["identify", "c1.csv", "--nk", "29", "--fix", "d1"],

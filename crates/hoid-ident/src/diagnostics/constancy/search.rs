@@ -147,19 +147,20 @@ pub(super) fn strongest_step(of: &Constancy<'_>, delay: bool) -> Option<Change> 
     strongest_change(of, &directions, &candidate_steps(of.blocks))
 }
 
-/// Returns the drift or the periodic change with the smallest p-value within a record, among those that exceed the
-/// variation of the parameters between runs by two standard errors: of the delay if `delay` is true, otherwise of the
-/// other parameters.
+/// Returns the drift or the periodic change with the smallest p-value within a record: of the delay if `delay` is true,
+/// otherwise of the other parameters. `None` if the change, less two standard errors and times the share of the record
+/// in all data, is smaller than the variation of the parameter between runs.
 pub(super) fn strongest_course(of: &Constancy<'_>, delay: bool) -> Option<Change> {
-    let is_long = |record: usize| of.blocks.iter().filter(|b| b.record == record).count() >= MIN_BLOCKS_OF_COURSE;
+    let block_count = |record: usize| of.blocks.iter().filter(|b| b.record == record).count();
     let mut sets = drifts(of.blocks);
     sets.extend(periodic_changes(of.blocks, of.block_s()?));
-    sets.retain(|set| is_long(set.record));
+    sets.retain(|set| block_count(set.record) >= MIN_BLOCKS_OF_COURSE);
     let courses = (of.directions.iter()).filter(|direction| direction.delay == delay);
     let directions: Vec<_> = courses.collect();
     let found = strongest_change(of, &directions, &sets)?;
     let usual = directions.iter().find(|direction| direction.name == found.name)?.size * of.run_to_run;
-    (found.size.abs() > usual + 2.0 * found.error).then_some(found)
+    let share = block_count(found.record) as f64 / of.blocks.len() as f64;
+    (share * (found.size.abs() - 2.0 * found.error) > usual).then_some(found)
 }
 
 /// Returns the change with the smallest p-value among these directions and candidates, whether or not it is

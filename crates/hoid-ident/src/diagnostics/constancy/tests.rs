@@ -9,7 +9,7 @@ use hoid_sim::{RunSeed, Simulator};
 use super::{
     Constancy, Direction,
     blocks::score_blocks,
-    search::{Change, strongest_step},
+    search::{Change, TimeCourse, strongest_course, strongest_step},
 };
 use crate::{
     Estimator, Fit, GreyBox,
@@ -105,15 +105,20 @@ fn uniform_numbers(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-/// Regression on two columns; the first coefficient increases by `jump` in the middle. Signals and noise are
-/// first-order autoregressions with the coefficient `memory`.
+/// Regression on two columns; the first coefficient varies with time. Signals and noise are first-order autoregressions
+/// with the coefficient `memory`.
 struct Regression {
     x: [Vec<f64>; 2],
     y: Vec<f64>,
 }
 
 impl Regression {
+    /// The first coefficient increases by `jump` in the middle.
     fn new(seed: u64, n: usize, memory: f64, jump: f64) -> Self {
+        Self::with_course(seed, n, memory, |t| if t >= n / 2 { jump } else { 0.0 })
+    }
+
+    fn with_course(seed: u64, n: usize, memory: f64, course: impl Fn(usize) -> f64) -> Self {
         let mut draw = uniform_numbers(seed);
         let mut signal = || {
             let mut x = 0.0;
@@ -126,7 +131,7 @@ impl Regression {
         };
         let (x, noise) = ([signal(), signal()], signal());
         let y = (0..n)
-            .map(|t| (1.0 + if t >= n / 2 { jump } else { 0.0 }) * x[0][t] - 0.5 * x[1][t] + noise[t])
+            .map(|t| (1.0 + course(t)) * x[0][t] - 0.5 * x[1][t] + noise[t])
             .collect();
         Self { x, y }
     }
@@ -139,6 +144,10 @@ impl Regression {
     }
 
     fn strongest_change(&self) -> Change {
+        self.strongest(strongest_step).unwrap()
+    }
+
+    fn strongest(&self, search: fn(&Constancy<'_>, bool) -> Option<Change>) -> Option<Change> {
         let columns: Vec<&[f64]> = self.x.iter().map(Vec::as_slice).collect();
         let theta = self.solve(&columns);
         let eps: Vec<f64> = (0..self.y.len())
@@ -162,7 +171,7 @@ impl Regression {
             run_to_run: 0.06,
             sample_time_s: 0.01,
         };
-        strongest_step(&constancy, false).unwrap()
+        search(&constancy, false)
     }
 }
 
@@ -189,6 +198,28 @@ fn change_equals_the_coefficient_of_its_regressor() {
 }
 
 #[test]
+fn drifts_and_periodic_changes_are_found_with_their_sizes() {
+    let sine = |t: usize| 0.6 * (std::f64::consts::TAU * t as f64 / 1400.0 + 0.4).sin();
+    let swaying = Regression::with_course(7, 8000, 0.9, sine);
+    let found = swaying.strongest(strongest_course).unwrap();
+    let TimeCourse::Oscillation(period_s) = found.time_course else {
+        panic!("{found:?}");
+    };
+    assert!((period_s / 14.0 - 1.0).abs() < 0.1 && found.p_value < 1e-5, "{found:?}");
+    assert!((found.size.abs() - 0.6).abs() < 3.0 * found.error, "{found:?}");
+    let drifting = Regression::with_course(8, 8000, 0.9, |t| 0.9 * t as f64 / 8000.0);
+    let found = drifting.strongest(strongest_course).unwrap();
+    assert_eq!(found.time_course, TimeCourse::Drift);
+    assert!(
+        (found.size - 0.9).abs() < 3.0 * found.error && found.p_value < 1e-5,
+        "{found:?}"
+    );
+    // Smaller than the variation of people from run to run, which is 6 % here.
+    let small = Regression::with_course(9, 8000, 0.9, |t| sine(t) / 12.0);
+    assert!(small.strongest(strongest_course).is_none());
+}
+
+#[test]
 fn false_alarm_rate_does_not_exceed_the_level() {
     // With correlated noise and regressors, the scores are correlated over about ten samples.
     for memory in [0.0, 0.9] {
@@ -201,6 +232,14 @@ fn false_alarm_rate_does_not_exceed_the_level() {
                     < 0.05
             })
             .count();
+        let course = (0..runs)
+            .filter_map(|k| Regression::new(5000 + u64::from(k), 4000, memory, 0.0).strongest(strongest_course))
+            .filter(|found| found.p_value < 0.05)
+            .count();
+        assert!(
+            course as f64 / f64::from(runs) < 0.05 + 3.0 * 0.011,
+            "memory {memory}: {course}"
+        );
         let share = alarms as f64 / f64::from(runs);
         // The share is 5 % within three standard errors of 1.1 %.
         assert!(share < 0.05 + 3.0 * 0.011, "memory {memory}: {share}");
