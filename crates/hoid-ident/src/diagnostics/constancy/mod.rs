@@ -26,8 +26,8 @@
 //! the smaller of Bonferroni's bound and the value for continuous time ([`critical`]), corrected for the number of
 //! directions. The delay and the other parameters are tested separately, each at the level [`SIGNIFICANCE_LEVEL`]. For
 //! drifts and periodic changes within a record, z is weighted by a line or a sine instead of 0 and 1; these count only
-//! if they exceed the variation of people from run to run. The directions are the parameters of the operator or, if the coefficients do not correspond to an operator, the
-//! coefficients.
+//! if they exceed the variation of people from run to run. The directions are the parameters of the operator or, if the
+//! coefficients do not correspond to an operator, the coefficients.
 //!
 //! | file | contents |
 //! |---|---|
@@ -155,7 +155,8 @@ impl Constancy<'_> {
             }
             TimeCourse::Oscillation(period_s) => {
                 return format!(
-                    "{name} oscillates by about {:.2} ± {error:.2}{unit} with a period of about {period_s:.0} s{of_record} (p = {:.0e})",
+                    "{name} oscillates by about {:.2} ± {error:.2}{unit} with a period of about {period_s:.0} \
+                     s{of_record} (p = {:.0e})",
                     size.abs(),
                     change.p_value
                 );
