@@ -137,7 +137,10 @@ impl TrackingResult {
                 false => own.contains(name),
             });
             let operator = trace.further_operator(row).filter(|_| !first);
-            let parameter = |name: String, e: Estimate| json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)});
+            let parameter = |name: String, e: Estimate| {
+                let standard_error = optional(e.standard_error);
+                json!({"name": name, "value": number(e.value), "standard_error": standard_error})
+            };
             let physical = operator.iter().flat_map(|found| {
                 let determined = trace.further_determinations(found);
                 let estimates = FurtherOperator::NAMES.into_iter().zip(found.parameters());

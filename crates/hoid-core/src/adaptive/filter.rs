@@ -118,9 +118,9 @@ impl<E: AsMut<[f64]>, const I: usize, const S: usize, const M: usize, const P: u
 }
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// Builds the recursion at rest. If `memory` has [`memory_needed`] numbers, the replays have their full length.
-    /// With fewer numbers the replays are shorter, and with [`min_memory`](super::min_memory), the minimum, there are none. Returns
-    /// `None` for invalid numbers or too little memory.
+    /// Builds the recursion at rest. If `memory` has [`memory_needed`](super::memory_needed) numbers, the replays have
+    /// their full length. With fewer numbers the replays are shorter, and with [`min_memory`](super::min_memory), the
+    /// minimum, there are none. Returns `None` for invalid numbers or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         Self::with_inputs(prior, [], memory)
     }
