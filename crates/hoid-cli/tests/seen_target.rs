@@ -242,7 +242,7 @@ fn tracked_response_to_the_target_is_printed_and_drawn() {
         table.contains("In parentheses: not determined by the data so far."),
         "{text}"
     );
-    let page = fs::read_to_string(at.path().join("page/index.html")).unwrap();
+    let page = fs::read_to_string(at.path().join("page/report.html")).unwrap();
     assert!(page.contains("Subscript f: the response to f_t."));
     for label in ["|F(2)|", "\u{2220}F(2)", "\u{1e1f}</tspan>"] {
         assert!(page.contains(label), "{label}");

@@ -312,7 +312,7 @@ pub enum IoError {
     },
     /// Missing values in a column.
     #[error(
-        "{file}, {location}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); {remedy}"
+        "{file}, {location}, column {column}: the value is missing ({found}; {count} of {rows} missing in this column); {}", missing_remedy(.column)
     )]
     Missing {
         /// Name of the file.
@@ -327,8 +327,6 @@ pub enum IoError {
         count: usize,
         /// Number of rows examined.
         rows: usize,
-        /// Remedy.
-        remedy: &'static str,
     },
     /// Values missing in many places, as in a topic that was logged at another rate.
     #[error(
@@ -353,7 +351,7 @@ pub enum IoError {
     },
     /// Missing values at the start or the end of the record.
     #[error(
-        "{file}, {location}, column {column}: the values at the {end} of the record are missing, so --fill has no value to bridge to; {remedy}"
+        "{file}, {location}, column {column}: the values at the {end} of the record are missing, so --fill has no value to bridge to; {}", open_end_remedy(.column)
     )]
     NothingToBridgeTo {
         /// Name of the file.
@@ -364,8 +362,6 @@ pub enum IoError {
         column: String,
         /// End of the record: "start" or "end".
         end: &'static str,
-        /// Remedy.
-        remedy: &'static str,
     },
     /// Neither a time column nor a given sampling frequency.
     #[error(
@@ -677,6 +673,22 @@ pub enum IoError {
         /// Reason for the error.
         source: ModelError,
     },
+}
+
+/// Returns the remedy for missing values; rows without a time cannot be excluded by their time.
+fn missing_remedy(column: &str) -> &'static str {
+    match column {
+        "t" => "bridge missing times linearly with --fill, or remove these rows from the file",
+        _ => "bridge missing values linearly with --fill, or exclude the rows with --from and --to",
+    }
+}
+
+/// Returns the remedy for missing values at the start or the end of the record.
+fn open_end_remedy(column: &str) -> &'static str {
+    match column {
+        "t" => "remove these rows from the file",
+        _ => "exclude these rows with --from and --to",
+    }
 }
 
 /// Returns the remedy for a row of another length than the header.

@@ -135,10 +135,6 @@ impl TableReader<'_> {
                 location: self.table.source.location(row),
                 column: format_name(&source.name),
                 end,
-                remedy: match source.name == "t" {
-                    true => "remove these rows from the file",
-                    false => "exclude these rows with --from and --to",
-                },
             }
         })?;
         if bridged.values > 0 && lacks && self.signals.contains(&column) {

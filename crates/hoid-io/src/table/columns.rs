@@ -174,10 +174,6 @@ impl Table<'_> {
                 rows: examined,
             };
         }
-        let remedy = match column.name == "t" {
-            true => "bridge missing times linearly with --fill, or remove these rows from the file",
-            false => "bridge missing values linearly with --fill, or exclude the rows with --from and --to",
-        };
         IoError::Missing {
             file,
             location: place,
@@ -185,7 +181,6 @@ impl Table<'_> {
             found,
             count,
             rows: examined,
-            remedy,
         }
     }
 }
