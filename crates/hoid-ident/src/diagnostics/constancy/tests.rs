@@ -7,7 +7,7 @@ use hoid_model::{
 use hoid_sim::{RunSeed, Simulator};
 
 use super::{
-    Constancy, Direction,
+    Constancy, Direction, SIGNIFICANCE_LEVEL,
     blocks::score_blocks,
     search::{Change, TimeCourse, strongest_course, strongest_step},
 };
@@ -199,23 +199,26 @@ fn change_equals_the_coefficient_of_its_regressor() {
 
 #[test]
 fn drifts_and_periodic_changes_are_found_with_their_sizes() {
-    let sine = |t: usize| 0.6 * (std::f64::consts::TAU * t as f64 / 1400.0 + 0.4).sin();
+    let sine = |t: usize| (std::f64::consts::TAU * t as f64 / 1400.0 + 0.4).sin();
     let swaying = Regression::with_course(7, 8000, 0.9, sine);
     let found = swaying.strongest(strongest_course).unwrap();
     let TimeCourse::Oscillation(period_s) = found.time_course else {
         panic!("{found:?}");
     };
-    assert!((period_s / 14.0 - 1.0).abs() < 0.1 && found.p_value < 1e-5, "{found:?}");
-    assert!((found.size.abs() - 0.6).abs() < 3.0 * found.error, "{found:?}");
-    let drifting = Regression::with_course(8, 8000, 0.9, |t| 0.9 * t as f64 / 8000.0);
+    assert!(
+        (period_s / 14.0 - 1.0).abs() < 0.1 && found.p_value < SIGNIFICANCE_LEVEL,
+        "{found:?}"
+    );
+    assert!((found.size.abs() - 1.0).abs() < 3.0 * found.error, "{found:?}");
+    let drifting = Regression::with_course(8, 8000, 0.9, |t| 1.6 * t as f64 / 8000.0);
     let found = drifting.strongest(strongest_course).unwrap();
     assert_eq!(found.time_course, TimeCourse::Drift);
     assert!(
-        (found.size - 0.9).abs() < 3.0 * found.error && found.p_value < 1e-5,
+        (found.size - 1.6).abs() < 3.0 * found.error && found.p_value < SIGNIFICANCE_LEVEL,
         "{found:?}"
     );
     // Smaller than the variation of people from run to run, which is 6 % here.
-    let small = Regression::with_course(9, 8000, 0.9, |t| sine(t) / 12.0);
+    let small = Regression::with_course(9, 8000, 0.9, |t| 0.05 * sine(t));
     assert!(small.strongest(strongest_course).is_none());
 }
 
