@@ -25,7 +25,7 @@ use crate::{
     SearchOptions,
     criterion::Workspace,
     grey_box::{objective::Penalty, parametrisation::Parametrisation},
-    linalg::least_squares::solve_symmetric,
+    linalg::least_squares::{covariance_of_free, solve_symmetric},
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
@@ -303,26 +303,12 @@ impl ChannelCriterion {
         let free: Vec<usize> = (0..p)
             .filter(|&i| self.limits[i].0 < x[i] && x[i] < self.limits[i].1)
             .collect();
-        let part: Vec<f64> = (free.iter())
-            .flat_map(|&i| free.iter().map(move |&j| (i, j)))
-            .map(|(i, j)| minimum.linearisation.gram[i * p + j])
-            .collect();
-        let covariance = || {
-            let mut covariance = vec![0.0; p * p];
-            for (k, &i) in free.iter().enumerate() {
-                let mut unit = vec![0.0; free.len()];
-                unit[k] = 1.0;
-                let column = solve_symmetric(&part, &unit)?;
-                free.iter().zip(column).for_each(|(&j, v)| covariance[j * p + i] = v);
-            }
-            Some(covariance)
-        };
         let alone = self.clone().without_prior(1.0);
         let chi_squared = alone.linearise(&x, &mut Workspace::default()).sum_of_squares;
         chi_squared.is_finite().then(|| ChannelMinimum {
             chi_squared,
             equations: 2 * self.lines.lines.len(),
-            covariance: covariance(),
+            covariance: covariance_of_free(&minimum.linearisation.gram, &free, p),
             coordinates: x,
             minimum,
         })

@@ -25,7 +25,7 @@ use crate::{
     IdentError, SearchOptions, Termination,
     criterion::Workspace,
     grey_box::objective::Penalty,
-    linalg::least_squares::solve_symmetric,
+    linalg::least_squares::covariance_of_free,
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
 
@@ -159,19 +159,7 @@ impl<'p> ResponseCriterion<'p> {
     pub fn covariance(&self, minimum: &ResponseMinimum) -> Option<Vec<f64>> {
         let p = minimum.coordinates.len();
         let free = self.free_coordinates(&minimum.coordinates);
-        let part: Vec<f64> = free
-            .iter()
-            .flat_map(|&i| free.iter().map(move |&j| (i, j)))
-            .map(|(i, j)| minimum.information[i * p + j])
-            .collect();
-        let mut covariance = vec![0.0; p * p];
-        for (k, &i) in free.iter().enumerate() {
-            let mut unit = vec![0.0; free.len()];
-            unit[k] = 1.0;
-            let column = solve_symmetric(&part, &unit)?;
-            free.iter().zip(column).for_each(|(&j, v)| covariance[j * p + i] = v);
-        }
-        Some(covariance)
+        covariance_of_free(&minimum.information, &free, p)
     }
 
     /// Returns the ratio of the posterior to the prior variance of each coordinate: 0 without a prior, 1 at a bound or
