@@ -191,8 +191,18 @@ pub(super) fn strongest_change(of: &Constancy<'_>, directions: &[&Direction], se
     let mut best: Option<Change> = None;
     for direction in directions {
         let v = DVector::from_column_slice(&direction.vector);
+        let along: Vec<DVector<f64>> = matrices.iter().map(|m| m * &v).collect();
         let all: Vec<CandidateTest> = (0..sets.len())
-            .filter_map(|k| test_candidate(of, (&matrices, &scores), &inverse, (&v, direction.size), &sets[k], k))
+            .filter_map(|k| {
+                test_candidate(
+                    of,
+                    (&matrices, &scores),
+                    &inverse,
+                    (&v, &along, direction.size),
+                    &sets[k],
+                    k,
+                )
+            })
             .collect();
         let mut ratios: Vec<f64> = all.iter().map(|t| t.by_blocks / t.model_variance_test).collect();
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
@@ -292,12 +302,11 @@ fn test_candidate(
     of: &Constancy<'_>,
     (matrices, scores): (&[DMatrix<f64>], &[DVector<f64>]),
     inverse: &DMatrix<f64>,
-    (v, size): (&DVector<f64>, f64),
+    (v, along, size): (&DVector<f64>, &[DVector<f64>], f64),
     set: &Candidate,
     index: usize,
 ) -> Option<CandidateTest> {
     let p = v.len();
-    let along: Vec<DVector<f64>> = matrices.iter().map(|m| m * v).collect();
     let mut inside = DVector::zeros(p);
     let (mut information, mut of_set) = (0.0, 0.0);
     for (moved, weight) in along.iter().zip(&set.weights) {
