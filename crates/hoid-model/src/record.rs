@@ -207,6 +207,12 @@ impl Record {
         self.channels().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
+    /// Returns the values of a channel other than the input and the output; `None` if there is no such channel.
+    pub fn other_channel(&self, name: &str) -> Option<&[f64]> {
+        let found = self.others.iter().find(|c| c.name == name);
+        found.map(|c| c.values.as_slice())
+    }
+
     /// Returns the part of the record with the samples at `from_s <= t < to_s`.
     ///
     /// # Errors

@@ -17,11 +17,8 @@ const MIN_TARGET_SHARE: f64 = 0.05;
 /// Returns a warning if u is a combination of e and a recorded target at every sample of a record.
 pub fn machine_output_finding(records: &[Record]) -> Option<Finding> {
     let target = |record: &Record| {
-        let is_signal = |name: &str| record.channels().take(2).any(|signal| signal.name == name);
-        TARGET_CHANNELS
-            .into_iter()
-            .filter(|name| !is_signal(name))
-            .find(|name| record.channel(name).is_some_and(|r| is_combination(record, r)))
+        let is_cause = |name: &&str| record.other_channel(name).is_some_and(|r| is_combination(record, r));
+        TARGET_CHANNELS.into_iter().find(is_cause)
     };
     let (record, name) = records.iter().find_map(|record| Some((record, target(record)?)))?;
     let output = &record.output_channel().name;

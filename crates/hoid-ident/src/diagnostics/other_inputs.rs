@@ -28,12 +28,7 @@ const P_VALUE_LIMITS: [f64; 2] = [1e-2, 1e-7];
 
 /// Returns a finding for each recorded target to which u responds.
 pub fn family_findings(estimator: &FamilyEstimator, fit: &FamilyFit, records: &[Record]) -> Vec<Finding> {
-    let is_recorded = |name: &&str| {
-        records.iter().all(|record| {
-            let is_signal = record.channels().take(2).any(|signal| signal.name == *name);
-            !is_signal && record.channel(name).is_some()
-        })
-    };
+    let is_recorded = |name: &&str| records.iter().all(|record| record.other_channel(name).is_some());
     let found = |name: &str| {
         let (found, apart) = response_to(
             estimator,

@@ -27,13 +27,11 @@ impl ExogenousChannels {
     /// record. An excitation with another name counts as both.
     pub(super) fn of(records: &[Record], excitation: Option<&str>) -> Self {
         let moves = |name: &&str| {
-            let is_signal = |record: &Record| record.channels().take(2).any(|channel| channel.name == *name);
             let varies = |record: &Record| {
-                let values = record.channel(name)?;
+                let values = record.other_channel(name)?;
                 Some(values.iter().any(|value| *value != values[0]))
             };
-            records.iter().all(|r| !is_signal(r) && varies(r).is_some())
-                && records.iter().any(|r| varies(r) == Some(true))
+            records.iter().all(|r| varies(r).is_some()) && records.iter().any(|r| varies(r) == Some(true))
         };
         let either = COMMON_EXCITATIONS.into_iter().chain(excitation);
         let of = |known: &[&str], others: &[&str]| -> Vec<String> {
