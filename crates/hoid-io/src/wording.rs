@@ -81,7 +81,7 @@ pub(crate) fn short_error(what: &str) -> String {
 /// Minimum similarity of a suggested name; flags of the command line have the same limit.
 const MIN_SIMILARITY: f64 = 0.7;
 
-/// Ends of the names of columns that contain the values of a signal, such as `e.Data` of `e.Data` and `e.Time`.
+/// Ends of the names of columns that contain the values of a signal; `e.Data` has one, `e.Time` has none.
 const VALUE_PARTS: [&str; 2] = [".data", ".values"];
 
 /// Returns suggestions such as "; did you mean "u"?" for names that do not exist: for each of them the name that
