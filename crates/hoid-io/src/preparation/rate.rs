@@ -11,8 +11,9 @@
 //! record; samples whose filter would reach beyond the record are cut.
 //!
 //! In a model with a hold (all models of hoid) the input is held over the new sample time T, whereas the input of the
-//! operator was held over the old sample time Ts, if at all. A hold over T delays by T/2: to agree with the data, the
-//! delay of the model must be shorter by `(T - Ts) / 2` than the delay identified at the old rate.
+//! operator was held over the old sample time Ts. A hold over T delays by T/2. The input is therefore taken
+//! `(T - Ts)/2` later than the output, as in decimation (earlier if the frequency increases), and the delay of a model
+//! is the same at both rates.
 
 use hoid_model::{
     Detrend, SampleTime,
@@ -99,16 +100,19 @@ impl RecordParts {
             Kernel::for_interpolation()
         };
         let half = kernel.samples_per_side() as f64;
-        // The new grid starts at the first sample of the record; only samples whose filter lies within the record, up
-        // to rounding, are used.
-        let first = ((half - 1e-10) / factor).ceil();
-        let end = ((last - half + 1e-10) / factor).floor();
+        // Position of an input sample relative to the output sample of its row, in old samples.
+        let lead = if self.has_input { 0.5 * (factor - 1.0) } else { 0.0 };
+        // The new grid starts at the first sample of the record; only rows whose filters lie within the record, up to
+        // rounding, are used.
+        let first = ((half - lead.min(0.0) - 1e-10) / factor).ceil();
+        let end = ((last - half - lead.max(0.0) + 1e-10) / factor).floor();
         if first > end {
             return Err(too_long(self));
         }
         let n = ((end - first) as usize).saturating_add(1);
-        for channel in &mut self.channels {
-            channel.values = kernel.values(&channel.values, first * factor, factor, n);
+        for (index, channel) in self.channels.iter_mut().enumerate() {
+            let shift = if index == 0 { lead } else { 0.0 };
+            channel.values = kernel.values(&channel.values, first * factor + shift, factor, n);
         }
         let cut_s = (first * new.s(), last * old.s() - end * new.s());
         self.start_s += cut_s.0;
@@ -123,8 +127,7 @@ impl RecordParts {
             stop_db: STOP_BAND_ATTENUATION_DB,
             taps: kernel.samples_per_side().saturating_mul(2).saturating_add(1),
             cut_s,
-            delay_s: 0.5 * (new.s() - old.s()),
-            input_lead_s: 0.0,
+            input_lead_s: lead * old.s(),
         });
         Ok(())
     }

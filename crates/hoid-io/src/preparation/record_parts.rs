@@ -13,7 +13,7 @@ pub(super) struct RecordParts {
     pub(super) sample_time: SampleTime,
     pub(super) channels: Vec<Channel>,
     /// True if the first channel is the input; the output is then the second channel, otherwise the first.
-    has_input: bool,
+    pub(super) has_input: bool,
     pub(super) steps: Vec<Step>,
 }
 

@@ -105,10 +105,8 @@ pub enum Step {
         taps: usize,
         /// Times cut at the start and at the end of the record, s.
         cut_s: (f64, f64),
-        /// Time by which the delay of a model with a hold must be shorter than at the old rate, s.
-        delay_s: f64,
-        /// Time by which the input of a row is sampled later than its output, s. As a result, the delay of a model is
-        /// the same at both rates.
+        /// Time by which the input of a row is sampled later than its output, s; negative if it is sampled earlier. As
+        /// a result, the delay of a model is the same at both rates.
         input_lead_s: f64,
     },
     /// The run-in at the start was dropped.
@@ -162,7 +160,6 @@ impl From<Decimated> for Step {
             stop_db: done.stop_db,
             taps: done.taps,
             cut_s: (0.0, 0.0),
-            delay_s: 0.0,
             input_lead_s: done.lead_s,
         }
     }
@@ -266,52 +263,40 @@ impl fmt::Display for Step {
                 from_hz,
                 to_hz,
                 pass_hz,
-                stop_hz: Some(stop_hz),
-                stop_db,
-                taps,
-                input_lead_s,
-                ..
-            } if *input_lead_s > 0.0 => write!(
-                f,
-                "{} Hz, filtered and decimated by {} to {} Hz: a linear-phase filter of {taps} samples on all \
-                 channels, pass band to {} Hz, {stop_db} dB from {} Hz; each input sample is taken in the middle \
-                 of its hold, {} s later, to keep the delay of the old rate",
-                format_decimal(*from_hz),
-                format_decimal(*factor),
-                format_decimal(*to_hz),
-                format_decimal(*pass_hz),
-                format_decimal(*stop_hz),
-                format_decimal(*input_lead_s)
-            ),
-            Self::Rate {
-                from_hz,
-                to_hz,
-                pass_hz,
                 stop_hz,
                 stop_db,
                 taps,
                 cut_s,
-                delay_s,
-                ..
+                input_lead_s,
             } => {
+                write!(f, "{} Hz", format_decimal(*from_hz))?;
+                let to = format_decimal(*to_hz);
+                // Decimation cuts nothing at the ends.
+                match *cut_s == (0.0, 0.0) {
+                    true => write!(f, ", filtered and decimated by {} to {to} Hz:", format_decimal(*factor))?,
+                    false => write!(f, " to {to} Hz by")?,
+                }
                 write!(
                     f,
-                    "{} Hz to {} Hz by a linear-phase filter of {taps} samples on all channels, pass band to {} Hz",
-                    format_decimal(*from_hz),
-                    format_decimal(*to_hz),
+                    " a linear-phase filter of {taps} samples on all channels, pass band to {} Hz",
                     format_decimal(*pass_hz)
                 )?;
                 if let Some(stop) = stop_hz {
                     write!(f, ", {stop_db} dB from {} Hz", format_decimal(*stop))?;
                 }
-                write!(
-                    f,
-                    "; {} s cut at the start, {} s at the end; the hold at the new rate makes the delay of a model {} by {} s",
-                    format_decimal(cut_s.0),
-                    format_decimal(cut_s.1),
-                    if *delay_s > 0.0 { "shorter" } else { "longer" },
-                    format_decimal(delay_s.abs())
-                )
+                if *input_lead_s != 0.0 {
+                    write!(
+                        f,
+                        "; each input sample is taken in the middle of its hold, {} s {}, to keep the delay of the old rate",
+                        format_decimal(input_lead_s.abs()),
+                        if *input_lead_s > 0.0 { "later" } else { "earlier" }
+                    )?;
+                }
+                if *cut_s != (0.0, 0.0) {
+                    let (start, end) = (format_decimal(cut_s.0), format_decimal(cut_s.1));
+                    write!(f, "; {start} s cut at the start, {end} s at the end")?;
+                }
+                Ok(())
             }
             Self::RunIn { seconds, samples } => {
                 write!(
