@@ -79,8 +79,7 @@ impl DescribingFunctionOptions {
         let (element, channel) = (options.controlled_element.as_ref(), options.excitation.as_deref());
         let margins = found.margins.as_ref().map(|margins| &margins.estimates);
         let verdict = data.with_findings(found.verdict);
-        let verdict = verdict.append(data.element_finding(element, channel));
-        let verdict = verdict.append(data.display_finding(&[]));
+        let verdict = verdict.append(data.loop_findings(element, channel, &[]));
         found.verdict = judged(verdict, &description_answers(margins));
         let settings = self.settings(&data, late, &found);
         Ok(DescribingFunctionResult { found, data, settings })

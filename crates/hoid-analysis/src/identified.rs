@@ -83,9 +83,12 @@ impl<E: BatchEstimator> Identification<E> {
         let mut data = recordings
             .repaired(self.faults, E::OF)?
             .at_rate(self.rate, counts_samples)?;
-        // The controlled element is checked before the fit, which removes the response to further inputs from u.
-        let element = data.element_finding(self.controlled_element.as_ref(), self.excitation.channel_name());
-        let displayed = data.display_finding(&self.estimator.further_inputs());
+        // The signals of the loop are checked before the fit, which removes the response to further inputs from u.
+        let of_loop = data.loop_findings(
+            self.controlled_element.as_ref(),
+            self.excitation.channel_name(),
+            &self.estimator.further_inputs(),
+        );
         let FittedModel {
             mut fit,
             verdict,
@@ -99,7 +102,7 @@ impl<E: BatchEstimator> Identification<E> {
             .then(|| response_to_error(&data.records))
             .flatten();
         let verdict = verdict.prepend(response.and_then(|found| found.finding()));
-        let verdict = verdict.append(element).append(displayed);
+        let verdict = verdict.append(of_loop);
         let all = fit.answers(0, self.controlled_element.as_ref());
         let verdict = answers::with_answers(verdict, &all, &self.answers);
         E::set_verdict(&mut fit, &verdict);

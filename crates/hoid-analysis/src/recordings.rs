@@ -107,24 +107,31 @@ impl Recordings {
                 });
             }
         }
-        all.extend(machine_output_finding(&self.records));
         all
     }
 
-    /// Returns a warning if the recorded loop does not contain the given controlled element. `excitation` is the
-    /// channel of a target or a disturbance.
-    pub(crate) fn element_finding(
+    /// Returns warnings if the recorded signals are not those of the assumed loop: u is the output of the machine, the
+    /// loop does not contain the given controlled element, or the display showed a channel that is not among the inputs
+    /// of the model. `excitation` is the channel of a target or a disturbance; `inputs` are the inputs of the model
+    /// other than the error.
+    pub(crate) fn loop_findings(
         &self,
-        given: Option<&ContinuousTransferFunction>,
+        element: Option<&ContinuousTransferFunction>,
         excitation: Option<&str>,
-    ) -> Option<Finding> {
-        let given = given?;
-        recorded_element(&self.records, given, excitation)?.finding(given)
+        inputs: &[&str],
+    ) -> Vec<Finding> {
+        let recorded = |given| recorded_element(&self.records, given, excitation)?.finding(given);
+        let all = [
+            machine_output_finding(&self.records),
+            element.and_then(recorded),
+            self.display_finding(inputs),
+        ];
+        all.into_iter().flatten().collect()
     }
 
     /// Returns a warning if the display showed a channel that is not an input of the model. `inputs` are the inputs of
     /// the model other than the error.
-    pub(crate) fn display_finding(&self, inputs: &[&str]) -> Option<Finding> {
+    fn display_finding(&self, inputs: &[&str]) -> Option<Finding> {
         let first = self.records.first()?;
         let own = [first.input_channel(), Some(first.output_channel())];
         let is_missing = |channel: &&Channel| {

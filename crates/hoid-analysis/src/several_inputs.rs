@@ -224,7 +224,7 @@ impl SeveralInputsResult {
             }
         }
         let inputs: Vec<&str> = model.inputs.iter().map(|(name, _)| name.as_str()).collect();
-        findings.extend(data.display_finding(&inputs));
+        findings.extend(data.loop_findings(None, None, &inputs));
         let verdict = data.with_findings(Verdict::of(findings));
         Ok(Self {
             fit,

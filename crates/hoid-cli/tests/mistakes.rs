@@ -168,16 +168,15 @@ fn output_of_the_machine_as_control_is_doubtful() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     stdout_of(at, &["simulate", "--condition", "C1", "--out", "run.csv"]);
-    let found = json(
-        at,
-        &["identify", "run.csv", "--input", "e", "--output", "f_t-e", "--json"],
-    );
-    let reasons = found["verdict"]["reasons"].as_array().unwrap();
-    assert!(
-        found["verdict"]["level"] != "trustworthy" && reasons.iter().any(|r| r["kind"] == "machine-output"),
-        "{}",
-        found["verdict"]
-    );
+    for command in ["identify", "track", "describe"] {
+        let found = json(at, &[command, "run.csv", "--input", "e", "--output", "f_t-e", "--json"]);
+        let reasons = found["verdict"]["reasons"].as_array().unwrap();
+        assert!(
+            found["verdict"]["level"] != "trustworthy" && reasons.iter().any(|r| r["kind"] == "machine-output"),
+            "{command}: {}",
+            found["verdict"]
+        );
+    }
 }
 
 /// A remedy that has been followed is not repeated.

@@ -156,9 +156,8 @@ impl Tracking {
         let trace: Trace = trace.moving_average(rows);
         let verdict = trace.verdict(record, choice.as_ref())?;
         let verdict = verdict.prepend(findings_of_quality(account, record, SystemKind::Person));
-        let verdict = verdict.append(data.element_finding(used.controlled_element.as_ref(), None));
         let inputs: Vec<&str> = used.further.iter().map(|further| further.channel.as_str()).collect();
-        let verdict = verdict.append(data.display_finding(&inputs));
+        let verdict = verdict.append(data.loop_findings(used.controlled_element.as_ref(), None, &inputs));
         let verdict = with_answers(verdict, &trace_answers(&trace), &[]).map_messages(in_recursion);
         let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
         let own = OwnSettings {
