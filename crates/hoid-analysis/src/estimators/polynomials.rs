@@ -8,7 +8,9 @@ use hoid_ident::{
     progress,
     settings::MethodSpec,
 };
-use hoid_model::{ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, Verdict, theta_from_start};
+use hoid_model::{
+    ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, Verdict, VerdictLevel, theta_from_start,
+};
 
 use super::{
     BatchEstimator, FittedModel,
@@ -215,6 +217,12 @@ impl BatchEstimator for Polynomials {
             if level.is_kept() && !data.were_detrended() {
                 verdict = verdict.append(second_opinion::level_finding(&estimator, &fit, records));
             }
+        }
+        // The direct estimate of the operator takes longer than most polynomials, and a fit that is already in doubt does
+        // not need it.
+        let is_believed = verdict.level == VerdictLevel::Trustworthy && fit.rounding_error_share().is_none();
+        if with.faults != FaultHandling::Keep && !steps && is_believed {
+            verdict = verdict.append(second_opinion::operator_finding(&fit, records));
         }
         found.extend(level.report(data, |_, record| fit.level(record)));
         Ok(FittedModel {

@@ -15,6 +15,7 @@
 //! | `residuals-not-white`, `structure`, `leverage` | properties of the residuals |
 //! | `no-response` | no response beyond chance |
 //! | `other-input`, `inputs-together` | inputs other than the error |
+//! | `operator` | the operator of polynomials differs from the operator estimated directly |
 //! | `machine-output` | u is the output of the machine instead of the control |
 //! | `controlled-element` | the recorded loop does not have the given controlled element |
 //! | `exact-fit`, `no-change`, `change-point` | information; the result remains valid |
@@ -28,7 +29,7 @@
 //! | `no_response` | test of whether u responds to e at all |
 //! | `operator` | findings about the gains, poles and delay of an operator |
 //! | `operator_step` | evidence against an operator in a stretch of data |
-//! | `second_opinion` | second fits without outlying samples or without slow components |
+//! | `second_opinion` | second fits without outlying samples, without slow components, or with another estimator |
 //! | `other_inputs` | test of whether u responds to a recorded target in addition to e |
 //! | `machine_output` | test of whether u is the output of the machine |
 //! | `recorded_element` | test of whether the recorded loop has the given controlled element |

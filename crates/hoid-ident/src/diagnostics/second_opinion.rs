@@ -8,11 +8,15 @@
 //! Two fits differ if a parameter, the crossover or the phase margin differs by more than three standard errors. The
 //! standard error is the one from the first fit or, if larger, the one from the information lost in the second fit,
 //! `sqrt(se'^2 - se^2)`. If nothing is removed, there is no second fit, because it would be identical to the first.
+//!
+//! The operator of polynomials is compared in the same way with the operator estimated directly (`operator`): an
+//! efficient estimate and another estimate from the same data differ by the variance `se'^2 - se^2` (J. A. Hausman,
+//! *Econometrica* 46 (1978) 1251-1271).
 
 use std::f64::consts::TAU;
 
 use hoid_model::{
-    ContinuousTransferFunction, Detrend, Finding, Record,
+    ContinuousTransferFunction, Detrend, Finding, Record, VerdictLevel,
     margins::MANUAL_CONTROL_RANGE_RAD_S,
     uncertainty::{Estimate, OperatorEstimate},
 };
@@ -54,18 +58,7 @@ impl RemovedComponent {
 
     /// Returns a warning if the first and the second fit differ in any of these quantities.
     fn finding(self, pairs: impl IntoIterator<Item = ComparedEstimate>) -> Option<Finding> {
-        let differ: Vec<String> = pairs
-            .into_iter()
-            .filter_map(|(name, first, other)| {
-                let error = first.standard_error.filter(|e| *e > 0.0)?;
-                let lost = (other.standard_error.unwrap_or(0.0).powi(2) - error * error)
-                    .max(0.0)
-                    .sqrt();
-                let off = (first.value - other.value).abs() / error.max(lost);
-                (off > SIGNIFICANT_DIFFERENCE && off.is_finite()).then(|| format!("{name} by {off:.1}"))
-            })
-            .collect();
-        let differ = (!differ.is_empty()).then(|| differ.join(", "))?;
+        let differ = significant_differences(pairs)?;
         Some(match self {
             Self::Outliers => Finding::warning(
                 "leverage",
@@ -84,6 +77,23 @@ impl RemovedComponent {
             ),
         })
     }
+}
+
+/// Returns the names of the quantities that differ significantly, with the differences in standard errors; `None` if
+/// there is no such quantity.
+fn significant_differences(pairs: impl IntoIterator<Item = ComparedEstimate>) -> Option<String> {
+    let differ: Vec<String> = pairs
+        .into_iter()
+        .filter_map(|(name, first, other)| {
+            let error = first.standard_error.unwrap_or(0.0);
+            let lost = (other.standard_error.unwrap_or(0.0).powi(2) - error * error)
+                .max(0.0)
+                .sqrt();
+            let off = (first.value - other.value).abs() / error.max(lost);
+            (off > SIGNIFICANT_DIFFERENCE && off.is_finite()).then(|| format!("{name} by {off:.1}"))
+        })
+        .collect();
+    (!differ.is_empty()).then(|| differ.join(", "))
 }
 
 /// Removes each component in `all`, one at a time, and returns the findings. `refit` fits the changed records and
@@ -115,6 +125,35 @@ pub fn polynomial_findings(
         pairs.extend(compared_loops(fit, &other, element));
         Some(pairs)
     })
+}
+
+/// Returns a warning if the operator that a polynomial fit represents differs from the operator estimated directly from
+/// the same records. Polynomials with a noise model that is too simple, poles that the system and the noise share, or
+/// instruments that the remnant contains have a bias that their standard errors do not contain.
+///
+/// There is no finding if the polynomials do not represent an operator, or if the records are not those of a person: the
+/// direct estimate is compared only if nothing speaks against it.
+pub fn operator_finding(fit: &Fit, records: &[Record]) -> Option<Finding> {
+    let converted = fit.operator().ok()?;
+    let direct = FamilyEstimator::default().fit_with_response(records, None).ok()?;
+    if direct.verdict.level != VerdictLevel::Trustworthy {
+        return None;
+    }
+    let all = &direct.operator(0).parameters;
+    let pairs = converted.rows().map(|(name, _, estimate)| {
+        let known = all.iter().find(|p| p.name == name && p.determined)?;
+        Some((name.to_owned(), estimate, known.estimate()))
+    });
+    let differ = significant_differences(pairs.into_iter().flatten())?;
+    Some(Finding::warning(
+        "operator",
+        format!(
+            "the operator of this model differs from the operator estimated directly (form {}): {differ} standard \
+             errors; a noise model that is too simple or shares its poles with the operator, and instruments that \
+             contain the remnant, bias the model: use the default estimator, or another structure",
+            direct.form
+        ),
+    ))
 }
 
 /// Returns the period above which a component is slow: [`SLOW_PERIOD_S`], or ten periods of the slowest pole of the
@@ -316,6 +355,21 @@ mod tests {
         e[4000] = 30.0;
         let u = Channel::new("u", "", record.output().to_vec());
         [Record::new(record.sample_time(), Channel::new("e", "", e), u).unwrap()]
+    }
+
+    #[test]
+    fn biased_operator_of_polynomials_is_reported() {
+        let record = [simulated_record(Condition::C1)];
+        let of = |structure: Structure| {
+            let estimator = Estimator::new(structure, structure.operator_orders(29));
+            operator_finding(&estimator.fit(&record).unwrap(), &record)
+        };
+        let found = of(Structure::Armax).unwrap();
+        assert!(
+            found.kind == "operator" && found.message.contains("(form lead): T_L by "),
+            "{found:?}"
+        );
+        assert_eq!(of(Structure::BoxJenkins), None);
     }
 
     #[test]
